@@ -1,1 +1,1 @@
-"""Encodings of a realization: each module has one; `registry` lists them."""
+"""Encodings of a realization, which `registry` lists."""

@@ -1,4 +1,4 @@
-"""The output .arkit.csv: ARKit weights, in the layout of the app Live Link Face."""
+"""The output .arkit.csv: ARKit weights in the layout of the app Live Link Face."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from realizer.realization import Realization
 
 _EYE = ("Blink", "LookDown", "LookIn", "LookOut", "LookUp", "Squint", "Wide")
-# In the order of the app's files.
+# The order of the app's files.
 SHAPES = (
     *(f"Eye{word}{side}" for side in ("Left", "Right") for word in _EYE),
     *(f"Jaw{word}" for word in ("Forward", "Right", "Left", "Open")),
@@ -33,10 +33,10 @@ COLUMNS = ("Timecode", "BlendShapeCount", *SHAPES, *TURNS)
 
 
 def encode_arkit_csv(frames: ArkitFrames, fps: float) -> str:
-    """The text: `HH:MM:SS:FF.fff` at `fps`, 61, weights 0..1, turns in radians.
+    """Return rows of the time as `HH:MM:SS:FF.fff` at `fps`, 61, weights 0..1, and rotations in radians.
 
-    Yaw goes to the character's left, pitch down, roll to its right, as ARKit's pose of a face that is not
-    mirrored comes out of Unreal. Eyes do not roll.
+    Yaw is to the character's left, pitch down, roll to its right, as in the file of an unmirrored face in
+    Unreal. Eyes do not roll.
     """
     order = [ARKIT_NAMES().index(name[0].lower() + name[1:]) for name in SHAPES]
     eyes = np.pad(frames.eyes, ((0, 0), (0, 0), (0, 1))).reshape(len(frames.times), 6)

@@ -1,4 +1,4 @@
-"""Captions: the speech of a realization as subtitle lines of a film."""
+"""Captions: subtitles of the speech in a film."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from realizer.playback.active_block import ScheduledSpeech
     from realizer.realization import Realization
 
-# As subtitles are usually made: about 40 letters a line, a new one where the voice rests.
-MOST, ENOUGH = 42, 20  # letters; a line that has enough ends at a short rest
+# As usual for subtitles: about 40 letters a line, and a new line at a pause of the voice.
+MOST, ENOUGH = 42, 20  # letters; a line that has enough ends at a short pause
 REST, LONG_REST = 0.12, 0.6  # s
-LINGER = 0.4  # s that a line stays when it has been said
+LINGER = 0.4  # s that a line stays after its last word
 CLOCK = Fraction(1, 1000)
-# What the encoder of MP4's subtitles makes its description of looks from.
+# The encoder of MP4's subtitles takes their style from this.
 STYLE = (
     b"[Script Info]\nScriptType: v4.00+\nPlayResX: 384\nPlayResY: 288\n\n[V4+ Styles]\n"
     b"Format: Name, Fontname, Fontsize, PrimaryColour, SecondaryColour, OutlineColour, BackColour, Bold, "
@@ -31,7 +31,7 @@ STYLE = (
 
 
 def captions(realization: Realization) -> tuple[Span, ...]:
-    """Spans in order that do not overlap; what is said at once stands in lines of its own."""
+    """Return spans in order without overlap; simultaneous speech is shown in separate lines."""
     lines = [line for speaking in realization.speeches for line in _lines(speaking)]
     bounds = sorted({time for line in lines for time in (line.start, line.end)})
     found = []
@@ -43,7 +43,7 @@ def captions(realization: Realization) -> tuple[Span, ...]:
 
 
 def _lines(speaking: ScheduledSpeech) -> Iterator[Span]:
-    """The words of an utterance by the line; each stays a little, but not into the next."""
+    """Yield the lines of an utterance; each stays a little longer, but not into the next."""
     lines: list[Span] = []
     for word in speech_spans.words(speaking):
         if lines:
@@ -59,15 +59,15 @@ def _lines(speaking: ScheduledSpeech) -> Iterator[Span]:
 
 
 class Track:
-    """Captions as a stream of a film."""
+    """A subtitle stream of a film."""
 
     def __init__(self, av: Any, film: Any, codec: str, lines: Sequence[Span], end: float) -> None:
-        """A new stream, shown by players unless they are told not to.
+        """Add a stream that players show by default.
 
         Args:
             codec: FFmpeg's name: mov_text for MP4, webvtt for WebM.
             lines: in order.
-            end: of the film, in seconds; no line is longer there.
+            end: of the film, in seconds; later lines are cut.
         """
         self._av, self._film, self._codec, self._end = av, film, codec, end
         self._left = list(reversed(lines))
@@ -76,7 +76,7 @@ class Track:
         self._stream.codec_context.time_base = self._stream.time_base = CLOCK
 
     def write(self, until: float) -> None:
-        """Those that begin before a time, in seconds; once each."""
+        """Write the lines that start before a time, in seconds, and were not written before."""
         while self._left and self._left[-1].start < until:
             line = self._left.pop()
             packet = self._av.Packet(_coded(self._codec, line.text))

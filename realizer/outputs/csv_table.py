@@ -1,4 +1,4 @@
-"""The output .csv: time, every AU and every FAP, a row a frame."""
+"""The output .csv: time, every AU and every FAP, a row for each frame."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def encode_csv(realization: Realization) -> str:
-    """A header, then a row a frame: `time` in seconds, `AU12L` ... 0..1, `open_jaw` ... integers in FAPU."""
+    """Return rows of `time` in seconds, AUs such as `AU12L` in 0..1, FAPs as integers in FAPU."""
     buffer = io.StringIO()
     table = csv.writer(buffer, lineterminator="\n")
     table.writerow(["time", *(f"AU{name}" for name in AU_NAMES()), *(row.name for row in faps())])

@@ -1,4 +1,4 @@
-"""FAP clips as .fap, .csv and .json files: reader and writer."""
+"""Readers and writers of FAP clips as .fap, .csv and .json files."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from realizer.core.errors import RealizerError
 from realizer.outputs import fap_text
 from realizer.tables import faps
 
-# Columns of a table for the numbers of FAP 1 and 2.
+# Table columns of FAP 1 and 2.
 VISEME = tuple(f"viseme_{part}" for part in ("select1", "select2", "blend", "def"))
 EXPRESSION = tuple(
     f"expression_{part}" for part in ("select1", "intensity1", "select2", "intensity2", "init_face", "def")
@@ -27,12 +27,12 @@ INT32 = 2**31 - 1
 
 
 def read_clip(content: bytes) -> FAPClip:
-    """The clip of a file, whichever of the three it is; `notes` says what was odd.
+    """Read a clip from any of the three formats; its `notes` list deviations from the format.
 
-    Tables and JSON may also be those of `realizer realize`: what is no FAP is passed over.
+    Also reads the tables and JSON of `realizer realize`, ignoring values that are not FAPs.
 
     Raises:
-        RealizerError: it is none of them, or a cell is no number; says where.
+        RealizerError: if it is none of them, or a cell is not a number; the text says where.
     """
     text = content.decode("utf-8-sig", "replace")
     if text.lstrip().startswith("{"):
@@ -43,7 +43,7 @@ def read_clip(content: bytes) -> FAPClip:
 
 
 def clip_to_range(clip: FAPClip) -> FAPClip:
-    """The clip within the range of the standard; each FAP that went beyond it is one more of `notes`."""
+    """Limit a clip to the range of the standard, with a note for each FAP that exceeded it."""
     rows = faps()
     values = np.clip(clip.values, [row.least for row in rows], [row.most for row in rows]).astype(np.int32)
     values[:, :2] = clip.values[:, :2]
@@ -57,7 +57,7 @@ def clip_to_range(clip: FAPClip) -> FAPClip:
 
 
 def _to_csv(clip: FAPClip) -> str:
-    """A row a frame: `time` in seconds, the numbers of FAP 1 and 2, each FAP that is given, in its FAPU."""
+    """Return rows of `time` in seconds, the numbers of FAP 1 and 2, and the FAPs in the mask, in FAPU."""
     given = [row for row in faps()[2:] if clip.mask[row.fap - 1]]
     parts = [clip.values[:, [row.fap - 1 for row in given]]]
     names = [row.name for row in given]
@@ -113,10 +113,10 @@ def _from_csv(text: str) -> FAPClip:
 
 
 def _rate(times: npt.NDArray[np.float64]) -> tuple[float, list[str]]:
-    """Frames a second of a column of times, and what is odd about it.
+    """Return the frame rate of a column of times, and notes.
 
     Raises:
-        RealizerError: they do not rise evenly.
+        RealizerError: if they do not rise evenly.
     """
     if len(times) < 2:
         return 25.0, ["less than two frames have no rate; taken as 25 a second"]
@@ -131,7 +131,7 @@ def _rate(times: npt.NDArray[np.float64]) -> tuple[float, list[str]]:
 
 
 def _to_json(clip: FAPClip) -> str:
-    """As `realizer realize` writes FAPs, with the numbers of FAP 1 and 2 where they are given."""
+    """Return FAPs in the JSON of `realizer realize`, with the numbers of FAP 1 and 2 if in the mask."""
     fap: dict[str, Any] = {
         "names": [row.name for row in faps()],
         "values": clip.values.tolist(),
@@ -171,7 +171,7 @@ def _from_json(text: str) -> FAPClip:
 
 
 def _rows(rows: Any, width: int, where: str) -> Iterator[npt.NDArray[np.float64]]:
-    """Each row as numbers; at least one."""
+    """Yield each row as numbers; at least one."""
     if not isinstance(rows, list) or not rows:
         raise RealizerError(f"{where}: wanted a list of frames, got {str(rows)[:40]}")
     for number, row in enumerate(rows):
@@ -195,7 +195,7 @@ def _whole(values: npt.NDArray[np.float64]) -> npt.NDArray[np.int32]:
     return np.rint(values).astype(np.int32)
 
 
-# suffix -> the text of a clip.
+# The encoder of each suffix.
 ENCODINGS: dict[str, Callable[[FAPClip], str]] = {
     ".fap": lambda clip: fap_text.encode(clip_to_range(clip)),
     ".csv": _to_csv,

@@ -1,4 +1,4 @@
-"""The output .fap: MPEG-4 FAP text (version 2.1), as Xface and Greta read it."""
+"""The output .fap: MPEG-4 FAP text (version 2.1), which Xface and Greta read."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from realizer.outputs.output import Output, RenderSettings
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-SMALL = 4096  # what FAPs of the face do not reach; turns do
+SMALL = 4096  # only rotations exceed it
 
 
 def encode(clip: FAPClip) -> str:
-    """The text. The header is the first line, the mask is the same in every frame, frames count from 0.
+    """Return a clip as text: a header line, then a mask and values for each frame, numbered from 0.
 
-    Readers take a FAP without a mask bit as neutral, so what any frame uses is written in all of them.
+    All frames have the mask of the clip, because readers take FAPs outside a frame's mask as neutral.
 
     Raises:
-        ValueError: fps is not a positive number.
+        ValueError: if fps is not a positive number.
     """
     if not (math.isfinite(clip.fps) and clip.fps > 0):
         raise ValueError(f"fps: wanted a positive number, got {clip.fps}")
@@ -43,7 +43,7 @@ def encode(clip: FAPClip) -> str:
 
 
 def _words(numbers: Int32) -> list[list[str]]:
-    """(n, k) numbers as text, row by row."""
+    """Return numbers (n, k) as text, row by row."""
     words = _small().take(numbers + SMALL, mode="clip")
     others = (numbers < -SMALL) | (numbers > SMALL)
     words[others] = [str(number) for number in numbers[others].tolist()]
@@ -53,15 +53,12 @@ def _words(numbers: Int32) -> list[list[str]]:
 
 @cache
 def _small() -> Any:
-    """The texts of -SMALL..SMALL: looking a word up takes a third of making it."""
+    """Return the texts of -SMALL..SMALL; a lookup takes a third of the time of a conversion."""
     return np.array([str(number) for number in range(-SMALL, SMALL + 1)], object)
 
 
 def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
-    """The first character's frames. The name in the header is the first block's id.
-
-    Where visemes are asked for, FAP 1 says what is spoken beside the FAPs that show it.
-    """
+    """Encode the first character's frames, named after the first block; with FAP 1 if visemes are wanted."""
     blocks = [schedule.block for schedule in realization.schedules]
     clip = FAPClip.of(realization.faps, realization.fps, blocks[0] if blocks else "realizer")
     if drawing.visemes:
@@ -72,7 +69,7 @@ def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
 
 
 def _word(name: str) -> str:
-    """The name without blanks and never a number of its own: readers cut the header at blanks."""
+    """Return the name without blanks, at which readers split the header."""
     return re.sub(r"\s+", "_", name.strip()) or "realizer"
 
 

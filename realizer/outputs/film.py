@@ -26,21 +26,21 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-RATE = 48000  # Hz; the one rate that AAC and Opus share with every player
+RATE = 48000  # Hz; a rate of both AAC and Opus that every player supports
 REPORT = 250  # frames between two lines of progress: 10 s of film
-# FFmpeg's number for ITU-R BT.709 in matrix, primaries and transfer; untagged films come out with other
-# reds, player by player.
+# FFmpeg's number for ITU-R BT.709 in matrix, primaries and transfer; the colours of untagged films depend on
+# the player.
 BT709 = 1
 
 
 @dataclass(frozen=True)
 class Format:
-    """What goes into a film file.
+    """The encoders of a film file.
 
     Attributes:
         container, video, audio, subtitles: FFmpeg's names.
-        options: of the video encoder. Fixed threads, so that two machines write the same bytes.
-        container_options: bitexact leaves out the writer's version and random identifiers.
+        options: of the video encoder. Threads are fixed, so that two machines write the same bytes.
+        container_options: bitexact omits the writer's version and random identifiers.
     """
 
     container: str
@@ -91,17 +91,17 @@ def encode_film(
     rate: int = RATE,
     lines: Sequence[Span] = (),
 ) -> None:
-    """Write a film: picture k is shown at k / fps, the first sample sounds at 0.
+    """Write a film with picture k at k / fps and the first sample at 0.
 
-    The sound is filled up with silence to the last picture's end, so the track is always there.
+    The sound is padded with silence to the end of the last picture, so that there always is a sound track.
 
     Args:
-        pictures: `count` times (h, w, 3) uint8; an odd last row or column is left out: 4:2:0 wants even.
+        pictures: `count` times (h, w, 3) uint8; an odd last row or column is cut off, as 4:2:0 requires.
         sound: (n,) int16 mono at `rate`.
-        lines: subtitles, in order; without any there is no track of them.
+        lines: subtitles, in order; without any there is no subtitle track.
 
     Raises:
-        RealizerError: PyAV is not installed, or lacks an encoder.
+        RealizerError: if PyAV is not installed, or lacks an encoder.
     """
     av = _av()
     pace = Fraction(fps).limit_denominator(1001)
@@ -129,7 +129,7 @@ def _write(
     video = film.add_stream(form.video, rate=pace, options={**form.options, **_steady(form.video)})
     audio = film.add_stream(form.audio, rate=rate, layout="mono")
     audio.bit_rate = form.bit_rate
-    # Without this an encoder writes its version into the stream, or picks threads by the machine.
+    # Without this, encoders write their version into the stream, or choose threads by the machine.
     for stream in (video, audio):
         stream.codec_context.flags |= av.codec.context.Flags.bitexact
     track = Track(av, film, form.subtitles, lines, float(count / pace)) if lines else None
@@ -157,9 +157,9 @@ def _write(
 
 @cache
 def _steady(encoder: str) -> dict[str, str]:
-    """Options without which an encoder gives other bytes every run.
+    """Return options that make an encoder deterministic.
 
-    x264's AVX-512 code does (core 165: 12 runs, 8 results), its AVX2 code does not.
+    x264's AVX-512 code is not (core 165: 12 runs, 8 results); its AVX2 code is.
     """
     if encoder != "libx264":
         return {}
@@ -185,7 +185,7 @@ def _sound(av: Any, pcm: Int16, rate: int, first: int) -> Any:
 
 
 def write_film(realization: Realization, path: Path, drawing: RenderSettings) -> None:
-    """Draw and encode side by side: the drawing process is a batch ahead."""
+    """Write a film while its pictures are drawn a batch ahead."""
     _av()  # before the drawing starts
     form = FORMATS[Path(path).suffix.lower()]
     size, _ = _picture_size(drawing)
@@ -197,7 +197,7 @@ def write_film(realization: Realization, path: Path, drawing: RenderSettings) ->
 
 def _picture_size(drawing: RenderSettings) -> tuple[tuple[int, int], bool]:
     width, height = drawing.size
-    return (width + width % 2, height + height % 2), False  # 4:2:0 wants even
+    return (width + width % 2, height + height % 2), False  # 4:2:0 requires even sizes
 
 
 def _av() -> Any:
@@ -210,7 +210,7 @@ def _av() -> Any:
 
 def _output(suffix: str, media_type: str, description: str) -> Output:
     def encode(realization: Realization, drawing: RenderSettings) -> bytes:
-        with TemporaryDirectory(prefix="realizer-") as folder:  # FFmpeg goes back to the front of a film
+        with TemporaryDirectory(prefix="realizer-") as folder:  # FFmpeg seeks back to the start of a film
             path = Path(folder) / f"film{suffix}"
             write_film(realization, path, drawing)
             return path.read_bytes()

@@ -1,4 +1,4 @@
-"""The output .glb: an animated glTF 2.0 head with morph targets, joints and a key a frame."""
+"""The output .glb: an animated glTF 2.0 head with morph targets, joints and a key for each frame."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ if TYPE_CHECKING:
     from realizer.face.model import Face
     from realizer.realization import Realization
 
-# Nodes by their numbers in the file; those of the eyes follow.
+# Node numbers; those of the eyes follow.
 FACE, NECK, HEAD = 0, 1, 2
 EYES = ("left_eye", "right_eye")
 MATERIALS = (("face", 0.6), ("eyes", 0.15))  # name, roughness
 
 
 def encode_glb(face: Face, poses: Float32, fps: float) -> bytes:
-    """The file: frame k of the animation is at k / fps, and linear between.
+    """Return a glTF file with frame k at k / fps and linear interpolation.
 
-    One mesh holds all that changes its shape. It is bound to two joints, neck and head, as far as each vertex
-    turns with the head. Eyeballs are rigid, on nodes in the head.
+    One mesh contains everything that changes its shape. Its vertices are bound to two joints, neck and head,
+    in the proportion in which they turn with the head. Eyeballs are rigid, on nodes in the head.
 
     Args:
-        poses: (n, len(face.takes)), `Realization.poses`.
+        poses: (n, len(face.inputs)), `Realization.poses`.
     """
     made = make_morph_targets(face, poses)
     file = GlbFile()
@@ -83,7 +83,7 @@ def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
 
 
 def quaternions(turns: Float32) -> Float32:
-    """(n, 4) x, y, z, w of (n, 3) pitch, yaw, roll, applied as `face.deform` does: roll first, yaw last."""
+    """Convert pitch, yaw, roll (n, 3) to x, y, z, w (n, 4), as `face.deform` does: roll first, yaw last."""
     from scipy.spatial.transform import Rotation
 
     turned = Rotation.from_euler("YXZ", turns[:, [1, 0, 2]].astype(np.float64)).as_quat()
@@ -92,7 +92,7 @@ def quaternions(turns: Float32) -> Float32:
 
 
 def _unbound(file: GlbFile, pivot: Float32) -> int:
-    """What takes the vertices at rest into the two joints; glTF writes matrices by columns."""
+    """Add the inverse bind matrices of the two joints; glTF stores matrices by columns."""
     matrices = np.tile(np.eye(4, dtype=np.float32), (2, 1, 1))
     matrices[1, 3, :3] = -pivot
     return file.add(matrices.reshape(2, 16))

@@ -15,19 +15,19 @@ if TYPE_CHECKING:
     from realizer.face.model import Face
     from realizer.outputs.morph_targets import MorphTargets
 
-BENT = 0.01  # what a target turns a normal less, nobody sees: half a degree
+BENT = 0.01  # smaller changes of a normal, half a degree, are invisible
 
 
 def rigid_mesh(
     file: GlbFile, face: Face, mine: Bool, name: str, material: int, centre: Float32 | float = 0.0
 ) -> dict[str, Any]:
-    """The mesh at rest.
+    """Return the mesh of a part of a face at rest.
 
     Args:
-        mine: (n_vertices,) which of them; triangles that have others too are left out.
-        centre: (3,) metres, what becomes the mesh's origin.
+        mine: (n_vertices,) whether a vertex belongs to the part; triangles with other vertices are omitted.
+        centre: (3,) metres, the origin of the mesh.
     """
-    # Colours have the baked occlusion in them, for no viewer takes it by the vertex.
+    # Colours include the baked occlusion, because viewers do not support it by vertex.
     colours = np.full((mine.sum(), 4), 65535, np.uint16)
     colours[:, :3] = np.rint(linear(face.colours[mine]) * face.occlusion[mine, None] * 65535)
     triangles = face.triangles[mine[face.triangles].all(axis=1)]
@@ -45,13 +45,13 @@ def rigid_mesh(
 
 
 def morphing_mesh(file: GlbFile, face: Face, mine: Bool, material: int, made: MorphTargets) -> dict[str, Any]:
-    """The same with the targets, by their names, and two joints: 0 stays, 1 is the head."""
+    """Return the mesh of a part with morph targets, and two joints: 0 is fixed, 1 is the head."""
     mesh = rigid_mesh(file, face, mine, face.name, material)
     (primitive,) = mesh["primitives"]
     shares = np.zeros((mine.sum(), 4), np.float32)
     shares[:, 1] = face.basis["head"][mine, 0]
     shares[:, 0] = 1 - shares[:, 1]
-    # Where there is no share, the number of the joint is to be 0.
+    # glTF requires joint 0 for weights of 0.
     joints = (shares > 0) * np.array([0, 1, 0, 0], np.uint8)
     primitive["attributes"]["JOINTS_0"] = file.add(joints, target=ARRAY_BUFFER)
     primitive["attributes"]["WEIGHTS_0"] = file.add(shares, target=ARRAY_BUFFER)
@@ -59,7 +59,7 @@ def morphing_mesh(file: GlbFile, face: Face, mine: Bool, material: int, made: Mo
         ups = _ups(face, face.vertices)
         primitive["targets"] = [_target(file, face, mine, moves, ups) for moves in made.moves]
         mesh["weights"] = [0.0] * len(made.names)
-        # Where all who read glTF look for the names of targets.
+        # The usual place for names of targets, which glTF does not define.
         mesh["extras"] = {"targetNames": list(made.names)}
     return mesh
 
@@ -74,7 +74,7 @@ def _target(file: GlbFile, face: Face, mine: Bool, moves: Float32, ups: Float32)
 
 
 def _ups(face: Face, vertices: Float32) -> Float32:
-    """Normals; a vertex without a triangle gets one that points forward: glTF wants unit length."""
+    """Return normals; forward for a vertex without a triangle, because glTF requires unit length."""
     ups: Float32 = normals(face, vertices[None])[0]
     ups[np.abs(ups).sum(axis=1) == 0] = (0, 0, 1)
     return ups

@@ -12,10 +12,10 @@ if TYPE_CHECKING:
 
 
 def encode_json(realization: Realization) -> str:
-    """One line of JSON and a line end.
+    """Return a line of JSON.
 
     Raises:
-        ValueError: a number that JSON has no word for (nan, inf).
+        ValueError: if a number is not finite.
     """
     text = json.dumps(realization.to_json(), ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text + "\n"

@@ -16,27 +16,27 @@ if TYPE_CHECKING:
     from realizer.face.model import Face
 
 HEAD = (48, 49, 50)  # FAPs that turn the head: pitch, yaw, roll
-EYES = ((25, 23), (26, 24))  # and the eyeballs: pitch and yaw of the left, of the right
-THRUST = (27, 28)  # and what pushes them forward
-TRUE = 1e-4  # m; no vertex is further off in any frame
-SEEN = 5e-6  # m; what a target moves less stays out of it
+EYES = ((25, 23), (26, 24))  # FAPs that turn the eyeballs: pitch and yaw of the left, of the right
+THRUST = (27, 28)  # FAPs that push them forward
+TRUE = 1e-4  # m; greatest error of a vertex in any frame
+SEEN = 5e-6  # m; smaller movements are omitted from a target
 CHUNK = 64  # frames at once
-FIRST = 256  # frames, all over the performance, that are looked at first
+FIRST = 256  # frames, spread over the performance, that are analysed first
 
 
 @dataclass(frozen=True, eq=False)
 class MorphTargets:
-    """What poses of a face are made of, up to a tenth of a millimetre.
+    """Morph targets and weights that reproduce poses of a face within a tenth of a millimetre.
 
     Attributes:
-        names: (k,) of the targets: FAPs and action units as they are called, then "correction 1", ...; what
-            goes the other way is a target of its own, "open_jaw reversed".
+        names: (k,) of the targets: FAPs and action units, then "correction 1", ...; the opposite direction is
+            a target of its own, such as "open_jaw reversed".
         moves: (k, n_vertices, 3) float32 metres at weight 1.
-        weights: (n, k) float32, 0..1: many programs cut off what is less or more.
-        head: (n, 3) float32 radians: pitch, yaw, roll; the vertices turn by `basis["head"]` of it.
-        eyes: (n, 2, 2) float32 radians: pitch and yaw of the left and the right eyeball; zeros where the eyes
-            are no balls.
-        thrust: (n, 2) float32 metres that the eyeballs stand forward, in the head.
+        weights: (n, k) float32, 0..1, because many programs clip other values.
+        head: (n, 3) float32 radians: pitch, yaw, roll; vertices rotate by the part `basis["head"]` of it.
+        eyes: (n, 2, 2) float32 radians: pitch and yaw of the left and the right eyeball; zeros if the face
+            has no separate eyeballs.
+        thrust: (n, 2) float32 metres by which the eyeballs are pushed forward in the head.
     """
 
     names: tuple[str, ...]
@@ -48,14 +48,14 @@ class MorphTargets:
 
 
 def make_morph_targets(face: Face, poses: Float32) -> MorphTargets:
-    """Targets of what is used, and of what they do not make when they come together.
+    """Return targets for the used columns, and corrections for their combinations.
 
-    Each column that the poses use is a target: what it alone does at its strongest. What remains (the jaw
-    goes in an arc, lids slide over eyeballs, contours of a lip hold together) is made of as many principal
-    components as it takes.
+    Each used column is a target: the movement of its strongest value alone. The remaining differences (the
+    jaw moves in an arc, lids slide over eyeballs, contours of a lip hold together) are corrected by as many
+    principal components as necessary.
 
     Args:
-        poses: (n, len(face.takes)), `Realization.poses`.
+        poses: (n, len(face.inputs)), `Realization.poses`.
     """
     from realizer.face.deform import deform
 
@@ -70,7 +70,7 @@ def make_morph_targets(face: Face, poses: Float32) -> MorphTargets:
             shaped[first:last] = False
             eyes[:, eye] = still[:, _columns(columns, EYES[eye])] * np.float32(ANGLE_UNIT)
             still[:, _columns(columns, EYES[eye])] = 0
-            # Lids go with the ball, so its push stays.
+            # Lids move with the ball, so the thrust remains in the shape.
             thrust[:, eye] = still[:, columns[fap(THRUST[eye]).name]] * face.basis["thrust"]
     rest = face.vertices.astype(np.float64)
 
@@ -108,7 +108,7 @@ def _columns(columns: Mapping[str, int], numbers: tuple[int, ...]) -> list[int]:
 
 
 def _one_way(values: Any, names: Sequence[str]) -> tuple[list[str], Float64, Float64]:
-    """Columns (n, k) that go both ways as (n, m) that go from 0 to 1; (m, k) what each of these is at 1."""
+    """Split signed columns (n, k) into weights (n, m), 0..1; return names, values (m, k) at 1, weights."""
     both = np.maximum(np.stack([values, -values]), 0.0).astype(np.float64)
     most = both.max(axis=1)
     found = [(k, way) for k in range(len(names)) for way in (0, 1) if most[way, k] > 0]
@@ -122,7 +122,7 @@ def _one_way(values: Any, names: Sequence[str]) -> tuple[list[str], Float64, Flo
 def _used(
     face: Face, still: Float32, moved: Callable[[Float32], Float64]
 ) -> tuple[list[str], Float64, Float64]:
-    """Names, (k, 3 n_vertices) moves and (n, k) weights of the columns that alone move anything."""
+    """Return names, moves (k, 3 n_vertices) and weights (n, k) of the columns that move vertices."""
     names, alone, weights = _one_way(still, face.inputs)
     moves = moved(alone.astype(np.float32)) if names else np.empty((0, 3 * len(face.vertices)))
     kept = np.flatnonzero(np.abs(moves).max(axis=1, initial=0) > SEEN)
@@ -130,10 +130,10 @@ def _used(
 
 
 def _components(left: Float64) -> Float64:
-    """The fewest principal components, (k, m) orthonormal, that leave no vertex of (n, m) off by TRUE."""
+    """Return the fewest principal components (k, m), orthonormal, that bring errors (n, m) below TRUE."""
     if np.abs(left).max(initial=0) <= TRUE / 2:
         return np.empty((0, left.shape[1]))
-    # Of the few frames' own products: they are fewer than coordinates.
+    # By the products of frames, which are fewer than coordinates.
     sizes, mixes = np.linalg.eigh(left @ left.T)
     order = np.argsort(-sizes)
     order = order[sizes[order] > 1e-12 * sizes.max()]

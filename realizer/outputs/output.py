@@ -1,4 +1,4 @@
-"""The output value: suffix, media type, and the function that encodes a realization."""
+"""The type of outputs: suffix, media type, and the function that encodes a realization."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RenderSettings:
-    """How it is drawn or written: what `realize --size --camera --at --light --background --visemes` say."""
+    """Settings of an output: the options --size --camera --at --light --background --visemes of `realize`."""
 
     size: tuple[int, int] = (512, 512)  # width, height
     camera: str = "front"
-    at: float | None = None  # seconds; None: the whole span
-    light: str | None = None  # a preset; None: as `realizer.render.Renderer` takes it, as is
-    background: str | None = None  # "#rrggbb", or of one picture "transparent"
-    visemes: bool = False  # whether a .fap file has FAP 1 beside the FAPs of the lips
-    renderer: Renderer | None = None  # what draws, where `Output.begin` started it
+    at: float | None = None  # seconds of a single picture; None: the whole span
+    light: str | None = None  # a preset; None: the default of `realizer.render.Renderer`
+    background: str | None = None  # "#rrggbb", or for a single picture "transparent"
+    visemes: bool = False  # whether a .fap file has FAP 1 in addition to the FAPs of the lips
+    renderer: Renderer | None = None  # started by `Output.begin`
 
     def pictures(
         self, realization: Realization, size: tuple[int, int], frames: Sequence[int]
     ) -> Generator[UInt8, None, None]:
-        """The first character in these frames, rising, with the face it has in each; drawn a batch ahead.
+        """Yield pictures of the first character in these frames, rising, drawn a batch ahead.
 
-        Close it where not all of them are taken.
+        Close the generator unless it is exhausted.
         """
         from realizer.pipeline import pictures
 
@@ -59,10 +59,10 @@ class RenderSettings:
         alpha: bool = False,
         face: str | None = None,
     ) -> Renderer:
-        """What draws poses of a realization like that; `alpha` where the picture may be transparent.
+        """Return a renderer for poses of a realization; `alpha` if pictures may be transparent.
 
         Args:
-            face: one that it has for a time; None: its own.
+            face: one of its faces; None for its first.
         """
         own = face in (None, realization.face_name)
         if own and self.renderer is not None and self.renderer.size == size:
@@ -72,7 +72,7 @@ class RenderSettings:
     def make_renderer_for(
         self, face: str, deformer: str | None, size: tuple[int, int], *, alpha: bool = False
     ) -> Renderer:
-        """What draws that face, moved by that deformer; nothing has started yet."""
+        """Return a renderer for a face and a deformer, not yet started."""
         from realizer.render import Renderer
 
         return Renderer(
@@ -88,19 +88,19 @@ class RenderSettings:
 
 @dataclass(frozen=True)
 class Output:
-    """One encoding.
+    """A file format into which realizations are encoded.
 
     Attributes:
-        suffix: ".fap"; the name in `realizer outputs` is the suffix without its dot.
+        suffix: such as ".fap"; the name in `realizer outputs` is the suffix without its dot.
         media_type: such as "video/mp4".
         description: one line for `realizer outputs`.
-        encode: (realization, drawing) -> the content of the file.
-        needs: the extras to install; () if it always works.
-        picture_size: width and height of its pictures, and whether they may be transparent; None: there are
-            none.
-        all_characters: whether it holds what all characters do; others hold the face of the first.
-        save: (realization, path, drawing) -> None, of what may be too long to be held: writes it bit by bit.
-        reader: the program of others that reads it in the tests; "" if there is none.
+        encode: returns the content of the file for a realization and settings.
+        needs: the extras to install; () if none.
+        picture_size: returns width and height of its pictures, and whether they may be transparent; None if
+            it has no pictures.
+        all_characters: whether it contains all characters; otherwise only the first.
+        save: writes a file piece by piece, if it may be too long for memory.
+        reader: the foreign program that reads it in the tests; "" if none.
     """
 
     suffix: str
@@ -114,17 +114,17 @@ class Output:
     reader: str = ""
 
     def write(self, realization: Realization, path: Path, drawing: RenderSettings) -> None:
-        """Write the file, whole or not at all; `path` may be any place that can be written."""
+        """Write the file completely or not at all; `path` may be a device or a pipe."""
         if self.save is not None:
             self.save(realization, path, drawing)
         else:
             write_bytes(path, self.encode(realization, drawing))
 
     def begin(self, drawing: RenderSettings, face: str, deformer: str | None = None) -> RenderSettings:
-        """The drawing to hand to `write`; what draws starts now, and gets ready while the rest is planned.
+        """Return the settings for `write` with a renderer that starts now, during planning.
 
         Raises:
-            RenderError: `drawing.background` is none.
+            RenderError: if `drawing.background` is not a colour.
         """
         if self.picture_size is None:
             return drawing

@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from realizer.realization import Realization
 
 MOST = 24  # pictures on a sheet
-LEAST = 8  # and so many at least, where there are as many frames
-PACE = 0.25  # s; what a sheet without many sync points shows
+LEAST = 8  # pictures at least, if there are as many frames
+PACE = 0.25  # s between pictures of a sheet without many sync points
 
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """One picture of a sheet: frame number, seconds, and the sync points nearest to it."""
+    """A picture of a sheet: frame number, seconds, and the sync points nearest to it."""
 
     frame: int
     time: float
@@ -29,9 +29,9 @@ class Moment:
 
 
 def moments(realization: Realization, most: int = MOST) -> tuple[Moment, ...]:
-    """The frames worth a picture, in order: first, last, sync points, then the widest gaps halved.
+    """Choose frames for a sheet: the first, the last, those of sync points, and the middles of wide gaps.
 
-    Where more than `most` frames have a sync point, those closest to the one before go first.
+    If more than `most` frames have sync points, those closest to the one before are dropped.
     """
     count = len(realization.faps.times)
     points = _points(realization, count)
@@ -50,7 +50,7 @@ def moments(realization: Realization, most: int = MOST) -> tuple[Moment, ...]:
 
 
 def row_at(realization: Realization, seconds: float) -> Float32:
-    """(k,) the pose at an instant, between the two frames around it; outside of all, the nearest."""
+    """Return the pose (k,) at an instant, interpolated between frames; the nearest outside of them."""
     frames = realization.poses
     place = min(max(seconds * realization.fps, 0.0), len(frames) - 1)
     below = int(place)
@@ -61,7 +61,7 @@ def row_at(realization: Realization, seconds: float) -> Float32:
 
 
 def encode_png(pixels: UInt8) -> bytes:
-    """PNG bytes of (h, w, 3) uint8, or of (h, w, 4) with alpha."""
+    """Encode (h, w, 3) uint8, or (h, w, 4) with alpha, as PNG."""
     from PIL import Image
 
     buffer = io.BytesIO()
@@ -70,7 +70,7 @@ def encode_png(pixels: UInt8) -> bytes:
 
 
 def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
-    """With `drawing.at` the picture of that instant; otherwise the sheet, its pictures at half the size."""
+    """Encode the picture at `drawing.at`, or else the sheet, with pictures of half the size."""
     from realizer.render.contact_sheet import sheet
 
     size, alpha = _picture_size(drawing)
@@ -94,7 +94,7 @@ def _picture_size(drawing: RenderSettings) -> tuple[tuple[int, int], bool]:
 
 
 def _points(realization: Realization, count: int) -> dict[int, tuple[str, ...]]:
-    """Frame number -> the sync points nearest to it; a block is named where there are several."""
+    """Return the sync points nearest to each frame, with block names if there are several blocks."""
     found: dict[int, list[str]] = {}
     several = len(realization.schedules) > 1
     for schedule in realization.schedules:

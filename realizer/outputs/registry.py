@@ -31,10 +31,10 @@ OUTPUTS: Registry[Output] = Registry(
 
 
 def output_for(path: str | Path) -> Output:
-    """The encoding of a path's suffix, either case; the longest that fits: `x.arkit.csv` is no `.csv`.
+    """Return the output for the longest known suffix of a path, so that `x.arkit.csv` is not `.csv`.
 
     Raises:
-        ValueError: no or an unknown suffix; the text lists the known ones.
+        ValueError: if there is no suffix or an unknown one; the text lists the known ones.
     """
     parts = [part.lower() for part in Path(path).suffixes]
     for k in range(len(parts)):

@@ -1,4 +1,4 @@
-"""Spans of speech and instants of sync points in a realization, on one clock."""
+"""Times of words, phonemes and sync points of a realization, on one clock."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ if TYPE_CHECKING:
     from realizer.realization import Realization
     from realizer.speech.utterance import Phoneme, Word
 
-LEAST = 0.001  # s; shorter is a rounding error of who told the times
+LEAST = 0.001  # s; shorter spans are rounding errors
 
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """Seconds from the start of the realization, and what is there; blanks in `text` are single."""
+    """A text and its seconds from the start of the realization; blanks in `text` are single."""
 
     start: float
     end: float
@@ -24,17 +24,17 @@ class Span:
 
 
 def words(speaking: ScheduledSpeech) -> Iterator[Span]:
-    """The words of one utterance, in order, as far as it sounds."""
+    """Yield the words of an utterance in order, until it is cut off."""
     return _audible(speaking, ((word, word.text) for word in speaking.utterance.words))
 
 
 def phonemes(speaking: ScheduledSpeech) -> Iterator[Span]:
-    """Its phonemes, as they are written in IPA; pauses are left out."""
+    """Yield the phonemes of an utterance in IPA, without pauses."""
     return _audible(speaking, ((phoneme, phoneme.ipa) for phoneme in speaking.utterance.phonemes))
 
 
 def points(realization: Realization) -> tuple[tuple[float, str], ...]:
-    """(seconds, "block:behaviour:point") of every sync point, by time, then by name."""
+    """Return (seconds, "block:behaviour:point") of every sync point, by time, then by name."""
     found = (
         (schedule.start + float(time), f"{schedule.block}:{behaviour}:{point}")
         for schedule in realization.schedules

@@ -21,23 +21,23 @@ if TYPE_CHECKING:
     from realizer.playback.active_block import ScheduledSpeech
     from realizer.realization import Realization
 
-RATE = 22050  # Hz; what TalkingHead takes PCM for where nobody says otherwise
-# Ready Player Me's names of these visemes, where they are not those of Oculus.
+RATE = 22050  # Hz; TalkingHead's default for PCM
+# Ready Player Me's names of visemes that differ from those of Oculus.
 NAMES = {"ih": "I", "oh": "O", "ou": "U"}
-# Shapes of the mouth are left to the visemes, but for those by which an expression bends its corners.
+# Visemes move the mouth; of its ARKit shapes only those of its corners, which expressions use, are written.
 MOUTH, CORNERS = ("jaw", "mouth", "tongue"), ("mouthSmile", "mouthFrown", "mouthDimple")
-# Both eyes look up and down by one value there.
+# TalkingHead has one value for both eyes.
 BOTH = {"eyeLookDownLeft": "eyesLookDown", "eyeLookUpLeft": "eyesLookUp"}
 HEAD = ("headRotateY", "headRotateX", "headRotateZ")  # radians: yaw, pitch, roll
-SEEN = 0.005  # a value that never comes so far is left out
+SEEN = 0.005  # values that never exceed it are omitted
 
 
 def encode_talkinghead(realization: Realization) -> str:
-    """One line of JSON: the properties of the first argument of `speakAudio`; times in milliseconds.
+    """Return a line of JSON: the properties of the first argument of `speakAudio`; times in milliseconds.
 
-    `words` and `visemes` with their times and durations; `anim`, what the face does beside speaking, a frame
-    each; `markers` the names of sync points, to be replaced by functions where they are wanted; `audio`, to
-    be handed over as `[bytes]`, is base64 of 16-bit mono PCM at `sampleRate`.
+    `words` and `visemes` have times and durations; `anim` is the animation of the rest of the face by frames;
+    `markers` are names of sync points, to be replaced by functions; `audio`, to be passed as `[bytes]`, is
+    base64 of 16-bit mono PCM at `sampleRate`.
     """
     mine = tuple(s for s in realization.speeches if s.character == 0)
     words = [word for speaking in mine for word in speech_spans.words(speaking)]
@@ -70,7 +70,7 @@ def _timed(name: str, letter: str, spans: Iterable[Span]) -> dict[str, Any]:
 
 
 def _visemes(speaking: ScheduledSpeech) -> Iterator[Span]:
-    """The strongest viseme of each sound; neighbours that are the same are one."""
+    """Yield the strongest viseme of each sound; equal neighbours are joined."""
     names = {row.viseme: NAMES.get(row.name, row.name) for row in oculus_visemes()}
     now: Span | None = None
     for phoneme in speech_spans.phonemes(speaking):
@@ -91,7 +91,7 @@ def _visemes(speaking: ScheduledSpeech) -> Iterator[Span]:
 
 
 def _anim(realization: Realization) -> dict[str, Any]:
-    """Value k is reached after the first k + 1 of `dt`, so the frame at 0 is left out."""
+    """Return the animation without frame 0, because value k is reached after the first k + 1 of `dt`."""
     frames = arkit(realization.aus, realization.mapping)
     values = {
         BOTH.get(name, name): column

@@ -1,4 +1,4 @@
-"""The output .textgrid: words, phonemes and sync points, as Praat and ELAN read them."""
+"""The output .textgrid: words, phonemes and sync points for Praat and ELAN."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from realizer.outputs.speech_spans import Span
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-DIGITS = 6  # after the point: microseconds
+DIGITS = 6  # decimals: microseconds
 
 
 def encode_textgrid(realization: Realization) -> str:
-    """The text, in Praat's long form: interval tiers `words` and `phonemes`, a point tier `syncs`.
+    """Return Praat's long text format with interval tiers `words` and `phonemes` and a point tier `syncs`.
 
-    Further characters have tiers named after them. Points that fall together are one, their names apart by a
-    blank, because a tier has one point at a time.
+    Further characters have tiers named after them. Points at the same time are one, with names separated by
+    blanks, because a tier cannot have two points at the same time.
     """
     end = max([realization.duration, 1 / realization.fps, *_ends(realization)])
     tiers = []
@@ -47,7 +47,7 @@ def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
 
 
 def _intervals(name: str, end: float, spans: Iterable[Span]) -> list[str]:
-    """A tier without a hole: what nobody says is an interval with no text."""
+    """Return an interval tier, in which silence is an interval without text."""
     whole = list(_filled(end, spans))
     lines = [*_head("IntervalTier", name, end), f"intervals: size = {len(whole)}"]
     for k, span in enumerate(whole, 1):

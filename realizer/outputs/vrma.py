@@ -1,4 +1,4 @@
-"""The output .vrma: VRM animation of preset expressions, head and gaze, for any VRM avatar."""
+"""The output .vrma: a VRM animation of preset expressions, head and gaze, for any VRM avatar."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ if TYPE_CHECKING:
 FILE = "vrm.toml"
 EXTENSION, VERSION = "VRMC_vrm_animation", "1.0"
 BLINKS = {"blinkLeft": "eyeBlinkLeft", "blinkRight": "eyeBlinkRight"}
-# Of these units the lips are made when somebody speaks: they tell of no face.
+# Action units of speaking lips, which are ignored in expressions.
 LIPS = {25, 26, 27}
 
 
 def encode_vrma(realization: Realization) -> bytes:
-    """The file: a glTF 2.0 of a skeleton at rest and an animation, frame k at k / fps.
+    """Return a glTF 2.0 file of a skeleton at rest and an animation, frame k at k / fps.
 
-    The weight of an expression is the first coordinate of a node's place; the head turns in its bone, the
-    gaze in a node of its own. VRM's axes are ours.
+    The weight of an expression is the first coordinate of a node's translation; the head rotates as a bone,
+    the gaze as a node of its own. VRM has the same axes as our faces.
     """
     frames = arkit(realization.aus, realization.mapping)
     file = GlbFile()
@@ -70,10 +70,10 @@ def encode_vrma(realization: Realization) -> bytes:
 
 
 def expressions(realization: Realization) -> dict[str, Float32]:
-    """Name of a preset expression of VRM -> (n,) float32 weights 0..1, of the first character.
+    """Return the weights, (n,) float32 0..1, of VRM's preset expressions for the first character, by name.
 
-    Vowels are what the mouth says; blinks what ARKit's shapes say of the lids; emotions the mixture of their
-    faces that comes nearest to the action units shown, by non-negative least squares.
+    Vowels come from visemes, blinks from ARKit's shapes, and emotions are the mixture of their faces that is
+    nearest to the action units, by non-negative least squares.
     """
     visemes = realization.visemes()
     blinks = arkit(realization.aus, realization.mapping).weights
@@ -90,7 +90,7 @@ def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
 
 
 def _mixture(shown: Float32) -> Float64:
-    """(n, k) parts of the faces. Of so few, all choices of those that take part are tried."""
+    """Return the parts (n, k) of the faces, by trying all subsets of these few."""
     _, faces = _faces()
     best = np.zeros((len(shown), len(faces)))
     least = np.square(shown * faces.any(axis=0)).sum(axis=1).astype(np.float64)
@@ -108,7 +108,7 @@ def _mixture(shown: Float32) -> Float64:
 
 @cache
 def _faces() -> tuple[tuple[str, ...], Float64]:
-    """Names, and (k, n_aus) what each shows at 1."""
+    """Return the names of the faces, and their action units (k, n_aus)."""
     names = _table()["face"]
     faces = np.zeros((len(names), len(AU_NAMES())))
     for row, lexeme in zip(faces, names.values(), strict=True):
@@ -127,7 +127,7 @@ def _mouth() -> dict[str, dict[int, float]]:
 
 
 def _skeleton() -> tuple[list[dict[str, Any]], dict[str, int]]:
-    """Nodes, and the number of each bone's."""
+    """Return the nodes of the skeleton, and the node number of each bone."""
     bones = _table()["bones"]
     numbers = {name: k for k, name in enumerate(bones)}
     nodes: list[dict[str, Any]] = [{"name": name, "translation": bone["at"]} for name, bone in bones.items()]

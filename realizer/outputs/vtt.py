@@ -13,23 +13,23 @@ from realizer.outputs.output import Output, RenderSettings
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-LEAST = 0.001  # s; WebVTT wants every cue to end after it starts, and counts milliseconds
-KINDS = ("word", "phoneme", "sync")  # of cues that start together, in this order
+LEAST = 0.001  # s; WebVTT requires cues to end after their start, and counts milliseconds
+KINDS = ("word", "phoneme", "sync")  # the order of cues that start together
 
 
 @dataclass(frozen=True, slots=True)
 class _Cue:
     start: float
     end: float
-    kind: str  # the class a style sheet, or a program, can pick it by
+    kind: str  # the class for style sheets and programs
     text: str
     id: str = ""
 
 
 def encode_vtt(realization: Realization) -> str:
-    """Cues by start time: words as `<c.word>`, IPA as `<c.phoneme>`, sync points as `<c.sync>`.
+    """Return cues by start time: words as `<c.word>`, IPA as `<c.phoneme>`, sync points as `<c.sync>`.
 
-    A sync point's cue is a frame long, and its name is its identifier too.
+    The cue of a sync point lasts a frame, and its identifier is its name.
     """
     cues = sorted(_cues(realization), key=lambda cue: (cue.start, KINDS.index(cue.kind), cue.id))
     blocks = ["WEBVTT"]

@@ -12,11 +12,11 @@ from realizer.outputs.output import Output, RenderSettings
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-RATE = 22050  # Hz; the rate of espeak-ng's voices, so nothing is resampled
+RATE = 22050  # Hz; the rate of espeak-ng, whose sound is not resampled
 
 
 def encode_wav(pcm: Int16, rate: int) -> bytes:
-    """RIFF bytes of (n,) int16 mono."""
+    """Return (n,) int16 mono as a RIFF file."""
     buffer = io.BytesIO()
     with wave.open(buffer, "wb") as file:
         file.setnchannels(1)

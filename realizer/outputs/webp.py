@@ -1,4 +1,4 @@
-"""The output .webp: an animated picture."""
+"""The output .webp: an animated picture without sound."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from realizer.outputs.output import Output, RenderSettings
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-PACE = 25  # pictures a second at most: more than that is a film
+PACE = 25  # pictures a second at most
 QUALITY, METHOD = 75, 4  # 160 kB a second at 512x512
-MOST = 2**24 - 1  # of what a number of three bytes can say
-ANIMATED, WHOLE = 0x02, 0x02  # flags: of the file; of a picture that covers what was there
+MOST = 2**24 - 1  # the greatest number of three bytes
+ANIMATED, WHOLE = 0x02, 0x02  # flags: of the file; of a picture that replaces the one before
 
 
 def encode_webp(pictures: Iterable[UInt8], starts: Sequence[float], end: float) -> bytes:
-    """The file; it plays again and again.
+    """Encode an animation that repeats for ever.
 
-    Each picture is coded by itself, as it comes, so that only one is in memory.
+    Pictures are encoded one by one, so that only one is in memory.
 
     Args:
         pictures: (h, w, 3) uint8, all of one size.
-        starts: seconds, when each is shown; in order, from 0.
-        end: seconds, when the last one has been shown.
+        starts: seconds at which each is shown; in order, from 0.
+        end: seconds at which the last one ends.
 
     Source: RFC 9649, WebP image format, 2.7.
     """
@@ -45,7 +45,7 @@ def encode_webp(pictures: Iterable[UInt8], starts: Sequence[float], end: float) 
         image.save(buffer, "WEBP", quality=QUALITY, method=METHOD)
         size = image.size
         head = b"\0\0\0" * 2 + _three(size[0] - 1) + _three(size[1] - 1) + _three(after - start)
-        # Without the head of a file of its own: 12 bytes.
+        # Without the file header of 12 bytes.
         parts.append(_chunk(b"ANMF", head + bytes([WHOLE]) + buffer.getvalue()[12:]))
     look = struct.pack("<B3x", ANIMATED) + _three(size[0] - 1) + _three(size[1] - 1)
     body = b"WEBP" + _chunk(b"VP8X", look) + _chunk(b"ANIM", b"\xff\xff\xff\xff\0\0") + b"".join(parts)
@@ -53,7 +53,7 @@ def encode_webp(pictures: Iterable[UInt8], starts: Sequence[float], end: float) 
 
 
 def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
-    """Every frame, or at higher rates every second, third, ...: at most 25 pictures a second."""
+    """Encode every frame, or every second, third, ... for at most 25 pictures a second."""
     step = math.ceil(realization.fps / PACE)
     frames = range(0, realization.frames, step)
     starts = [frame / realization.fps for frame in frames]

@@ -1,4 +1,4 @@
-"""Voices: text with marks to sound, with the times of words, phonemes and marks.
+"""Voices, which convert text with marks to sound and the times of words, phonemes and marks.
 
-What is here is loaded when it is first used: the values alone start no engine and read no table.
+Importing a module starts no engine and reads no table.
 """

@@ -1,4 +1,4 @@
-"""Phrases of an utterance and the accents in them: where a voice pauses and what it stresses."""
+"""Detection of the phrases of an utterance and of the accents in them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PRIMARY = 1
 
 @dataclass(frozen=True, slots=True)
 class Accent:
-    """A syllable that stands out; `nuclear` where it is the last of its phrase, which stands out most."""
+    """A stressed syllable; `nuclear` if it is the last of its phrase, which is the most prominent one."""
 
     time: float
     nuclear: bool = False
@@ -27,7 +27,7 @@ class Accent:
 
 @dataclass(frozen=True, slots=True)
 class Phrase:
-    """What is said between two pauses, in seconds from the start of the utterance."""
+    """The speech between two pauses, in seconds from the start of the utterance."""
 
     start: float
     end: float
@@ -36,20 +36,19 @@ class Phrase:
 
 @cache
 def prosody_facts() -> dict[str, Any]:
-    """prosody.toml, whole."""
+    """Return the contents of prosody.toml."""
     return tables.read_toml(tables.text_of(FILE), FILE)
 
 
-# Long texts are looked at once, for as long as they are of interest to anybody.
+# Results are cached as long as the utterance is in use.
 _known: WeakKeyDictionary[Utterance, tuple[Phrase, ...]] = WeakKeyDictionary()
 
 
 def phrases(utterance: Utterance) -> tuple[Phrase, ...]:
-    """The phrases of an utterance, in order; none where nothing is said.
+    """Return the phrases of an utterance, in order.
 
-    A phrase ends where nothing sounds for a while, at commas too. Its accents are the phonemes of primary
-    stress, in their middle. Where the voice says nothing of stress, they are the words that are loudest, and
-    without sound the longest word.
+    A phrase ends at a pause, such as that of a comma. Its accents are the middles of phonemes with primary
+    stress. If the voice does not report stress, they are the loudest words; without sound, the longest word.
     """
     found = _known.get(utterance)
     if found is None:
@@ -81,7 +80,7 @@ def _find_phrases(utterance: Utterance) -> list[Phrase]:
 
 
 def _accent_times(utterance: Utterance, words: Sequence[tuple[float, float]]) -> list[float]:
-    """When the loudest words of a phrase are loudest, or the middle of the longest."""
+    """Return the times at which the loudest words are loudest, or the middle of the longest word."""
     if not words:
         return []
     heard = [_loudest(utterance, start, end) for start, end in words]
@@ -93,7 +92,7 @@ def _accent_times(utterance: Utterance, words: Sequence[tuple[float, float]]) ->
 
 
 def _loudest(utterance: Utterance, start: float, end: float) -> tuple[float, float]:
-    """The largest root mean square of a short window, and when it is; 0 where there is no sound."""
+    """Return the largest root mean square of a short window, 0 if there is no sound, and its time."""
     if utterance.pcm is None or not utterance.sample_rate:
         return 0.0, start
     rate, window = utterance.sample_rate, prosody_facts()["accents"]["window"]

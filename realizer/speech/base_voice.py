@@ -1,4 +1,4 @@
-"""The base of the voices that the registry lists."""
+"""The base class of voices."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from realizer.speech.utterance import SpeechRequest, Utterance
 
 
 class BaseVoice(ABC):
-    """Turns text with marks into an utterance. Its methods block, and may be called from any thread.
+    """A speech synthesizer. Its methods block, and may be called from any thread.
 
     Args:
-        voice: one of its own voices: what follows the colon in "espeak:nl". None for its default.
+        voice: a voice of its engine: the part after the colon in "espeak:nl". None for the default.
 
     Attributes:
-        name: the name in the registry of voices, then a colon and the voice where there is one.
-        engine: what speaks, for lists.
+        name: the name in the registry of voices, followed by a colon and the voice, if any.
+        engine: the name of the engine, for lists.
         description: one sentence, for lists.
     """
 
@@ -29,20 +29,20 @@ class BaseVoice(ABC):
 
     @classmethod
     def missing(cls, voice: str | None = None) -> str | None:
-        """Return the sentence that says what to install or to change; None if the voice works here."""
+        """Return a sentence that says what to install or to change, or None if the voice works here."""
         return f"voice {cls.name}: wanted nothing after its name, got {voice!r}" if voice else None
 
     @classmethod
     def languages(cls) -> tuple[str, ...]:
-        """Return BCP-47 tags of what it speaks; () if they are not known before its engine starts."""
+        """Return BCP-47 tags of the languages; () if they are unknown before the engine starts."""
         return ()
 
     @abstractmethod
     def say(self, request: SpeechRequest) -> Utterance:
-        """Speak.
+        """Synthesize speech.
 
         Raises:
-            VoiceError: the engine is missing or died; the text says what to do. The next call works again.
+            VoiceError: if the engine is missing or died; the text says what to do. The next call restarts it.
         """
 
     def close(self) -> None:  # noqa: B027

@@ -13,7 +13,7 @@ MAX_SAMPLES = 30_000_000  # about 60 MB
 
 
 class UtteranceCache:
-    """The latest utterances by request; callable from any thread."""
+    """The latest utterances by request; thread-safe."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -21,14 +21,14 @@ class UtteranceCache:
         self._samples = 0
 
     def get(self, request: SpeechRequest, speak: Callable[[SpeechRequest], Utterance]) -> Utterance:
-        """What was said before, or what `speak` says now, which is then kept."""
+        """Return the cached utterance of a request, or synthesize it with `speak` and cache it."""
         with self._lock:
             if request in self._utterances:
                 self._utterances.move_to_end(request)
                 return self._utterances[request]
         utterance = speak(request)
         with self._lock:
-            if (same := self._utterances.pop(request, None)) is not None:  # another thread asked too
+            if (same := self._utterances.pop(request, None)) is not None:  # from another thread
                 self._samples -= _samples(same)
             self._utterances[request] = utterance
             self._samples += _samples(utterance)

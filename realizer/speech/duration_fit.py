@@ -11,17 +11,17 @@ from realizer.core.errors import VoiceError
 from realizer.speech.utterance import WARP, SpeechRequest, Utterance, Voice
 from realizer.speech.volume import with_volumes
 
-# A voice is asked again at another rate so often; its rate has steps, and pauses do not stretch evenly.
+# Attempts at other rates; more than one is needed because rates have steps and pauses do not scale evenly.
 TRIES = 9
-# What is left is made up for by playing it faster or slower by so little (a tenth of a semitone) that nobody
-# hears it.
+# The remaining difference is removed by resampling, which changes the pitch inaudibly: by a tenth of a
+# semitone.
 NEAR = 0.006
 
 
 def speak_to_length(voice: Voice, request: SpeechRequest) -> Utterance:
-    """Speak, `say.seconds` long where that is given: at the rate that comes nearest, then by resampling.
+    """Synthesize speech that lasts `request.seconds`, if set, by choosing a rate and then resampling.
 
-    What is recorded is not spoken (`speech.given`), and stays as long as it is.
+    A recording (`request.recording`) keeps its length.
 
     Raises:
         VoiceError: as `voice.say`.
@@ -34,10 +34,10 @@ def speak_to_length(voice: Voice, request: SpeechRequest) -> Utterance:
 
 
 def silent_fallback(request: SpeechRequest, fault: VoiceError | str) -> Utterance:
-    """What the silent voice makes of what another one failed to say, with a warning that says why.
+    """Return the silent voice's utterance of a request that another voice failed, with a warning.
 
     Raises:
-        VoiceError: the text is too long.
+        VoiceError: if the text is too long.
     """
     from realizer.speech.silent import SilentVoice
 
@@ -50,7 +50,7 @@ def _synthesize(voice: Voice, request: SpeechRequest) -> Utterance:
     if request.seconds is None or not utterance.duration:
         return utterance
     rate, best = request.rate, utterance
-    slow: tuple[float, float] | None = None  # the fastest rate that is too slow, and how long it takes
+    slow: tuple[float, float] | None = None  # the fastest rate that is too slow, and its duration
     fast: tuple[float, float] | None = None
     for _ in range(TRIES):
         if abs(best.duration / request.seconds - 1.0) <= NEAR:
@@ -60,7 +60,7 @@ def _synthesize(voice: Voice, request: SpeechRequest) -> Utterance:
         else:
             fast = (rate, utterance.duration)
         if slow and fast and slow[1] > fast[1]:
-            # Between the two, by length as they lie, but never so near to one of them that nothing is won.
+            # Interpolate between the two by duration, at a distance from both ends to make progress.
             part = min(0.8, max(0.2, (slow[1] - request.seconds) / (slow[1] - fast[1])))
             rate = slow[0] + part * (fast[0] - slow[0])
         else:
@@ -69,15 +69,15 @@ def _synthesize(voice: Voice, request: SpeechRequest) -> Utterance:
         if abs(utterance.duration - request.seconds) < abs(best.duration - request.seconds):
             best = utterance
         elif utterance.duration == before.duration and not (slow and fast):
-            break  # as slow or as fast as it can
+            break  # the engine's slowest or fastest rate
     return allow_small_warp(stretched(best, {"end": request.seconds}))
 
 
 def stretched(utterance: Utterance, times: Mapping[str, float]) -> Utterance:
-    """The same utterance with its end, and marks that are named, at these times; it stretches no more.
+    """Return the utterance resampled so that its end and marks have given times; it cannot stretch again.
 
     Args:
-        times: "end" or a mark -> seconds from its start.
+        times: seconds from its start for "end" and marks.
     """
     was = {**utterance.marks, "end": utterance.duration}
     knots = sorted((was[name], time) for name, time in times.items() if name in was)
@@ -105,5 +105,5 @@ def stretched(utterance: Utterance, times: Mapping[str, float]) -> Utterance:
 
 
 def allow_small_warp(utterance: Utterance) -> Utterance:
-    """An utterance that the voice is not asked for again: it can be warped a little."""
+    """Return an utterance that may only be resampled a little, not synthesized again."""
     return replace(utterance, stretch=WARP if utterance.duration else (1.0, 1.0))

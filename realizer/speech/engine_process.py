@@ -1,4 +1,4 @@
-"""The client of an engine's process; it replaces a process that dies or hangs."""
+"""The client of an engine's process, which replaces a process that dies or hangs."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from typing import IO, Any
 from realizer.core.errors import VoiceError
 
 RUN = Path(__file__).with_name("engine_worker.py")
-LOOKS = 20  # at a request, in the time it may take
+LOOKS = 20  # checks of a running request within its time limit
 
 
 @dataclass(frozen=True, slots=True)
 class Engine:
-    """What runs in a process of its own.
+    """An engine that runs in a process of its own.
 
     Attributes:
-        name: what messages call it.
-        worker: its file, as `engine_worker` takes it.
-        install_hint: None where it is installed, otherwise the sentence that says what to install.
+        name: its name in messages.
+        worker: its file, the first argument of `engine_worker`.
+        install_hint: returns a sentence that says what to install, or None if it is installed.
     """
 
     name: str
@@ -37,11 +37,11 @@ class Engine:
 
 
 class EngineProcess:
-    """One process, started at the first request; one request at a time, from any thread.
+    """A process that starts with the first request and serves one at a time; thread-safe.
 
     Args:
         engine: what to run.
-        options: more arguments for it.
+        options: further arguments.
         limit: seconds after which a request counts as hung and the process is replaced.
     """
 
@@ -57,15 +57,15 @@ class EngineProcess:
 
     @property
     def pid(self) -> int | None:
-        """The process's id while it runs."""
+        """The process's id, or None if it is not running."""
         running = self._running
         return None if running is None else running.process.pid
 
     def hello(self) -> dict[str, Any]:
-        """What the engine said of itself: rate, voices, variants. Starts it if needed.
+        """Return the engine's description of itself (rate, voices, variants), starting it if needed.
 
         Raises:
-            VoiceError: it is not installed or does not start.
+            VoiceError: if it is not installed or does not start.
         """
         with self._lock:
             if not self._hello:
@@ -73,10 +73,10 @@ class EngineProcess:
             return self._hello
 
     def ask(self, request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
-        """The head and the body of the answer.
+        """Send a request, and return the head and the body of the answer.
 
         Raises:
-            VoiceError: it is not installed, refused, died or hung; the next call starts it afresh.
+            VoiceError: if it is not installed, refused, died or hung; the next call starts it again.
         """
         with self._lock:
             running = self._started()
@@ -96,25 +96,25 @@ class EngineProcess:
         return head, body
 
     def close(self) -> None:
-        """End the process, also under a request of another thread. May be called twice."""
+        """End the process, even during a request of another thread. May be called twice."""
         running = self._running
         if running is not None and self._owner == os.getpid():
-            running.process.kill()  # a request in progress sees the end of the pipe and lets go of the lock
+            running.process.kill()  # a request in progress gets the end of the pipe and releases the lock
         with self._lock:
             self._stop()
 
     def _started(self) -> _Running:
-        if self._owner != os.getpid():  # after a fork of ours the process belongs to our parent
+        if self._owner != os.getpid():  # after a fork, the process belongs to the parent
             self._running, self._end, self._owner = None, None, os.getpid()
         if self._running is not None:
             if self._running.process.poll() is None:
                 return self._running
-            self._stop()  # it died while nobody asked
+            self._stop()  # it died between requests
         fix = self._engine.install_hint()
         if fix:
             raise VoiceError(fix)
         process = subprocess.Popen(
-            # By path and without the current folder, so that it starts alone wherever the package lies.
+            # By path and with -P, so that only the worker's own imports are loaded, from any folder.
             [sys.executable, "-P", str(RUN), str(self._engine.worker), *self._options],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -140,21 +140,22 @@ class EngineProcess:
 
 
 class _Running:
-    """A process that is killed when it lets somebody wait too long.
+    """A process that is killed when a request takes too long.
 
-    One thread watches for its whole life: one for each request took as long as what surrounds the request.
+    One thread watches it for its whole life, because a thread for each request would cost as much as the
+    rest of a request.
     """
 
     def __init__(self, process: subprocess.Popen[bytes], limit: float) -> None:
         self.process = process
         self._every = limit / LOOKS
-        self._until = float("inf")  # when somebody will have waited too long
+        self._until = float("inf")  # deadline of the current request
         self._over = threading.Event()
         threading.Thread(target=self._look, name="watch", daemon=True).start()
 
     @contextlib.contextmanager
     def waiting(self, limit: float) -> Iterator[None]:
-        """While the caller waits for it, at most so many seconds."""
+        """Limit the time until the end of the block, in seconds."""
         self._until = time.monotonic() + limit
         try:
             yield
@@ -162,13 +163,13 @@ class _Running:
             self._until = float("inf")
 
     def end(self) -> None:
-        """Kill it and let go of it."""
+        """Kill the process and close its pipes."""
         self._over.set()
         self.process.kill()
         self.process.wait()
         for pipe in (self.process.stdin, self.process.stdout):
             if pipe is not None:
-                with contextlib.suppress(OSError):  # what was still to be written has no reader
+                with contextlib.suppress(OSError):  # buffered output has no reader
                     pipe.close()
 
     def _look(self) -> None:

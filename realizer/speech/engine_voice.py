@@ -1,4 +1,4 @@
-"""The base of voices whose engine runs in a process of its own."""
+"""The base class of voices whose engine runs in a process of its own."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from realizer.speech.utterance import SpeechRequest, Utterance
 
 
 class EngineVoice(BaseVoice):
-    """A voice with an engine of its own; the same request gives the same samples.
+    """A voice whose engine runs in a process of its own; the same request gives the same samples.
 
     Thread-safe. The process starts with the first request; if it dies, that request fails with VoiceError and
     the next one starts it again.
 
     Args:
         voice: one of the engine's voices, or None for its default.
-        limit: seconds that one request of the engine may take.
+        limit: greatest duration of one request to the engine, in seconds.
         options: for the worker process.
     """
 
@@ -35,23 +35,23 @@ class EngineVoice(BaseVoice):
         self._cache = UtteranceCache()
 
     def say(self, request: SpeechRequest) -> Utterance:
-        """Speak; `duration` is exactly the sound's.
+        """Synthesize speech; `duration` is exactly that of the sound.
 
-        Wrong SSML is spoken as plain text, control characters and emoji are left out, an unknown language is
-        spoken as English, an empty text is no sound: each with a warning.
+        Malformed SSML is spoken as plain text, control characters and emoji are ignored, an unknown language
+        is spoken as English, an empty text has no sound; each gives a warning.
 
         Raises:
-            VoiceError: the text is too long, or the engine is missing, died or hung.
+            VoiceError: if the text is too long, or the engine is missing, died or hung.
         """
         return self._cache.get(request, self._speak)
 
     def close(self) -> None:
-        """End the process; may be called twice. A later request starts it again."""
+        """End the process. May be called twice; a later request starts it again."""
         self._process.close()
 
     @property
     def pid(self) -> int | None:
-        """Id of the engine's process while it runs."""
+        """The id of the engine's process, or None if it is not running."""
         return self._process.pid
 
     def _speak(self, request: SpeechRequest) -> Utterance:
@@ -62,4 +62,4 @@ class EngineVoice(BaseVoice):
 
     @abstractmethod
     def _synthesize(self, request: SpeechRequest, script: Script) -> Utterance:
-        """Return what the engine makes of a request that has something to say, uncached."""
+        """Return the engine's utterance of a script that is not empty."""

@@ -1,15 +1,14 @@
 """A process around one engine: JSON requests on stdin; JSON headers and bodies (PCM) on stdout.
 
-    arguments        the engine's file, [--no-fork], and what is the engine's own
-    first line out   what the engine says of itself, or {"error": text}
+    arguments        the engine's file, [--no-fork], and arguments of the engine
+    first line out   the engine's description of itself, or {"error": text}
     line in          {"op": one of the engine's operations, ...}
     line out         {"bytes": n, "last": whether the process ends now, ...} and n bytes; or {"error": text}
 
-The engine's file has `load(arguments)`, which gives an object with `hello()`, `operations` (name -> function
-of the request, giving head and the pieces of the body) and `drifts`: whether what it says depends on what it
-said before. One that drifts is made ready once and each request is served by a fork of that (or, where there
-is no fork, by a fresh process). Nothing of the realizer is imported, so that it starts at once and no licence
-spreads.
+The engine's file defines `load(arguments)`, which returns an object with `hello()`, `operations` (functions
+by name, from the request to the head and the parts of the body) and `drifts`: whether its results depend on
+earlier requests. If so, the engine is loaded once and each request is served by a fork of it (or, on systems
+without fork, by a new process). Nothing of the realizer is imported, for a fast start and for the licences.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 PARENT_DEATH_SIGNAL = 1  # prctl
-PATIENCE = 5.0  # s between looks at whether the parent is still there
+PATIENCE = 5.0  # s between checks whether the parent is alive
 
 
 def answer(engine: Any, request: dict[str, Any], out: int, last: bool = False) -> None:
@@ -39,7 +38,7 @@ def answer(engine: Any, request: dict[str, Any], out: int, last: bool = False) -
 
 
 def write(out: int, head: dict[str, Any], body: Sequence[bytes] = ()) -> None:
-    # Not joined: a fork pays for each page of memory that it is the first to write.
+    # Not joined, because a fork pays for each page of memory that it writes first.
     for part in (json.dumps(head).encode() + b"\n", *body):
         data = memoryview(part)
         while data:
@@ -47,9 +46,9 @@ def write(out: int, head: dict[str, Any], body: Sequence[bytes] = ()) -> None:
 
 
 def requests() -> Iterator[dict[str, Any]]:
-    """What stands in the lines of stdin, until it ends or the parent does.
+    """Yield the requests on stdin until it or the parent ends.
 
-    Read here and not by a fork, where all that is touched for the first time costs.
+    They are parsed before the fork, which would pay for each page of memory that it touches first.
     """
     parent = os.getppid()
     pending = b""
@@ -57,7 +56,7 @@ def requests() -> Iterator[dict[str, Any]]:
         if b"\n" in pending:
             line, _, pending = pending.partition(b"\n")
             yield json.loads(line)
-        # End of file is not enough: another child of our parent may hold the other end of the pipe.
+        # Waiting for end of file is not enough: another child of the parent may hold the pipe open.
         elif not hasattr(os, "fork") or select.select([0], [], [], PATIENCE)[0]:
             read = os.read(0, 1 << 16)
             if not read:
@@ -66,7 +65,7 @@ def requests() -> Iterator[dict[str, Any]]:
 
 
 def serve_in_forks(engine: Any, out: int) -> None:
-    """One fork a request, so that each starts from the same state."""
+    """Serve each request in a fork, so that all start from the same state."""
     libc = ctypes.CDLL(None) if sys.platform == "linux" else None
     for request in requests():
         child = os.fork()
@@ -83,7 +82,7 @@ def serve_in_forks(engine: Any, out: int) -> None:
 
 
 def loaded(arguments: list[str]) -> Any:
-    """The engine whose file is the first argument."""
+    """Load the engine whose file is the first argument."""
     spec = importlib.util.spec_from_file_location("engine", Path(arguments[0]))
     assert spec is not None
     assert spec.loader is not None
@@ -94,7 +93,7 @@ def loaded(arguments: list[str]) -> Any:
 
 def main(arguments: list[str]) -> None:
     forks = hasattr(os, "fork") and "--no-fork" not in arguments
-    # Ctrl-C is for our parent. A library may print to stdout: the answers go elsewhere.
+    # Ctrl-C is for the parent. Libraries may print to stdout, so answers use a copy of it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     out = os.dup(1)
     nothing = os.open(os.devnull, os.O_WRONLY)

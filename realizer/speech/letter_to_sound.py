@@ -1,4 +1,4 @@
-"""Vowel units and approximate phonemes of written words, by tables per language."""
+"""Vowel units and approximate phonemes of written words, by tables for each language."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LONGEST_GROUP = 6  # letters
 
 @dataclass(frozen=True, slots=True)
 class LetterRule:
-    """What some letters sound like; `ipa` is phonemes joined by "-"."""
+    """The sound of a group of letters; `ipa` is phonemes joined by "-"."""
 
     language: str
     letters: str
@@ -27,13 +27,13 @@ class LetterRule:
 
 @cache
 def syllable_facts() -> dict[str, Any]:
-    """The table of vowel units: times, and per language what is a vowel."""
+    """Return the table of vowel units: durations, and the vowels of each language."""
     return tables.read_toml(tables.text_of("syllables.toml"), "syllables.toml")
 
 
-@lru_cache(maxsize=4096)  # a text says the same words again and again
+@lru_cache(maxsize=4096)  # texts repeat words
 def vowel_units(word: str, language: str) -> int:
-    """How many vowel units a word lasts; at least 1. Digits count by their names.
+    """Return the length of a word in vowel units, at least 1. Digits count by their names.
 
     Args:
         word: one written word.
@@ -46,7 +46,7 @@ def vowel_units(word: str, language: str) -> int:
 
 
 def letters_to_phonemes(word: str, language: str) -> tuple[str, ...]:
-    """IPA of a written word, roughly: the longest letters that the table knows, from left to right."""
+    """Return the approximate IPA of a word by the longest groups of letters in the table, left to right."""
     facts = _facts(language)
     return tuple(ipa for part in _parts(word, facts) for ipa in _sounded(part, _subtag(language)))
 
@@ -61,7 +61,7 @@ def _facts(language: str) -> Mapping[str, Any]:
 
 
 def _parts(word: str, facts: Mapping[str, Any]) -> list[str]:
-    """The word in lower case, split at what joins it, digits by their names."""
+    """Return the parts of a word in lower case, without joining characters; digits by their names."""
     word = unicodedata.normalize("NFC", word.lower()).replace("’", "'")
     parts: list[str] = []
     for run in re.findall(r"\d|[^\W\d_]+(?:'[^\W\d_]+)*|\S", word):
@@ -87,7 +87,7 @@ def _units(word: str, facts: Mapping[str, Any]) -> int:
         elif word[at] in vowels or _plain(word[at]) in vowels:
             count += 1
         elif unicodedata.category(word[at]) == "Lo":
-            count += 1  # a script that does not write its vowels as letters, or writes syllables
+            count += 1  # a script without letters for vowels, or with letters for syllables
         at += len(group) if group else 1
     return max(count, 1)
 
@@ -118,7 +118,7 @@ def _sounded(word: str, language: str) -> tuple[str, ...]:
     at = 0
     while at < len(word):
         letters, ipa = _longest(word, at, language)
-        # Two letters of one consonant are one sound.
+        # A doubled letter is one sound.
         if not (len(ipa) == 1 and heard[-1:] == [ipa[0]] and word[at] == word[at - 1]):
             heard += ipa
         at += letters
@@ -140,5 +140,5 @@ def _longest(word: str, at: int, language: str) -> tuple[int, tuple[str, ...]]:
     plain = _plain(word[at])
     if plain != word[at]:
         return 1, _rules().get((language, plain, "any"), _rules().get((GENERIC, plain, "any"), ()))
-    # A letter of a script that the table does not know: some open vowel, so that the mouth moves.
+    # A letter of an unknown script is an open vowel, so that the mouth moves.
     return 1, ("a",) if unicodedata.category(word[at]).startswith("L") else ()

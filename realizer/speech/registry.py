@@ -1,4 +1,4 @@
-"""The registry of voices: which can speak here, and what to install for the others."""
+"""The registry of voices."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from realizer.core.registry import Registry
 from realizer.speech.base_voice import BaseVoice
 from realizer.speech.utterance import Voice
 
-# The first that is installed speaks where a document and the settings name none; a plug-in never does.
+# The first that is installed is the default voice; plug-ins never are.
 VOICES: Registry[type[BaseVoice]] = Registry(
     "realizer.voices",
     {
@@ -26,12 +26,12 @@ OTHER_NAMES = {"espeak-ng": "espeak", "hibari-tts": "hibari"}
 
 @dataclass(frozen=True, slots=True)
 class VoiceInfo:
-    """One voice.
+    """A row of the list of voices.
 
     Attributes:
-        name: what `find_voice` takes.
-        engine: what speaks.
-        languages: BCP-47 tags; () if they are not known before the engine is installed.
+        name: its name for `find_voice`.
+        engine: the name of its engine.
+        languages: BCP-47 tags; () if they are unknown before the engine is installed.
         available: whether it works on this machine.
         description: one sentence: what it is, or what to install.
     """
@@ -53,15 +53,15 @@ def voices() -> tuple[VoiceInfo, ...]:
 
 
 def find_voice(name: str | None = None) -> Voice:
-    """Return the voice of that name.
+    """Return a voice by name.
 
     Args:
         name: "espeak", "espeak:VOICE" (a voice of espeak-ng such as "en-gb+f3"), "hibari", "hibari:VOICE",
             "silent", the name of a plug-in's voice, or None for the best that is installed.
 
     Raises:
-        VoiceError: no such voice, or it is not installed; the text says what to do.
-        PluginError: the voice is of a plug-in that cannot be used.
+        VoiceError: if there is no such voice, or it is not installed; the text says what to do.
+        PluginError: if the voice belongs to a plug-in that cannot be used.
     """
     if name is None:
         name = next(known for known, voice in VOICES.working() if voice.missing() is None)
@@ -80,6 +80,6 @@ def find_voice(name: str | None = None) -> Voice:
 
 @cache
 def reference_voice() -> Voice:
-    """Return the voice whose phonemes and times recordings are compared with, one for the whole process."""
+    """Return the voice whose phonemes and times recordings are compared with; one for the process."""
     name = "espeak" if VOICES["espeak"].missing() is None else "silent"
     return find_voice(name)

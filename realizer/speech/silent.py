@@ -1,4 +1,4 @@
-"""The silent voice: estimated times of words, marks and phonemes, without sound."""
+"""The silent voice, which estimates the times of words, marks and phonemes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SLOWEST, FASTEST = 0.25, 4.0  # of the voice's own rate
 
 
 class SilentVoice(BaseVoice):
-    """Rule-based durations by vowel units (Wojdel 2005, 6.4.1); the fallback when no engine is installed."""
+    """A voice without sound that estimates durations by vowel units (Wojdel 2005, 6.4.1)."""
 
     name = "silent"
     engine = "rules"
@@ -26,10 +26,10 @@ class SilentVoice(BaseVoice):
         return tuple(name for name in syllable_facts()["languages"] if name != GENERIC)
 
     def say(self, request: SpeechRequest) -> Utterance:
-        """Words last as many units (0.2 s at rate 1) as they have vowels; a punctuation mark lasts one.
+        """Estimate times: a word lasts a unit (0.2 s at rate 1) for each vowel, a punctuation mark one unit.
 
         Raises:
-            VoiceError: the text is too long.
+            VoiceError: if the text is too long.
         """
         script = read_script(request)
         facts = syllable_facts()
@@ -45,13 +45,13 @@ def _layout(things: Sequence[Token], language: str, rate: float, warnings: tuple
     words: list[Word] = []
     phonemes = [Phoneme(0.0, now, "")]
     marks: dict[str, float] = {}
-    waiting: list[str] = []  # marks that wait for the next word
+    waiting: list[str] = []  # marks before the next word
     for thing in things:
         if isinstance(thing, Mark):
             waiting.append(thing.name)
             continue
         if isinstance(thing, Pause):
-            if thing.seconds:  # a mark stands before the silence that follows it
+            if thing.seconds:  # a mark before a <break> is at its start
                 marks.update(dict.fromkeys(waiting, now))
                 waiting = []
             length = thing.seconds or facts["unit"] / rate
@@ -78,13 +78,13 @@ def _layout(things: Sequence[Token], language: str, rate: float, warnings: tuple
 
 def _phonemes(word: WordToken, language: str, start: float, length: float, consonant: float) -> list[Phoneme]:
     ipa = letters_to_phonemes(word.text, language) or ("",)
-    vowel = [not sound or sound[0] in vowels() for sound in ipa]  # what has no sound counts as one
+    vowel = [not sound or sound[0] in vowels() for sound in ipa]  # an unknown sound counts as a vowel
     times = [1.0 if is_vowel else consonant for is_vowel in vowel]
     share = length / sum(times)
     stressed = vowel.index(True) if any(vowel) else None
     phonemes = []
     for k, (sound, time) in enumerate(zip(ipa, times, strict=True)):
-        # Short words are mostly unstressed; in longer ones the first vowel stands out, for want of better.
+        # Short words are mostly unstressed; in longer ones the stress is assumed on the first vowel.
         stress = 1 if k == stressed and len(word.text) > 3 else 0
         phonemes.append(Phoneme(start, start + time * share, sound, stress))
         start += time * share
@@ -92,7 +92,7 @@ def _phonemes(word: WordToken, language: str, start: float, length: float, conso
 
 
 def _joined(phonemes: list[Phoneme]) -> tuple[Phoneme, ...]:
-    """Pauses that touch are one; each phoneme ends where the next begins, exactly."""
+    """Join adjacent pauses, and make each phoneme end exactly where the next one begins."""
     joined: list[Phoneme] = []
     for phoneme in phonemes:
         before = joined[-1] if joined else None

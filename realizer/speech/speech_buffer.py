@@ -1,4 +1,4 @@
-"""A buffer that joins pieces of speech to one utterance."""
+"""A buffer that joins pieces of speech into one utterance."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ FADE = 0.004  # s, where a sound is cut
 
 @dataclass(slots=True)
 class SpeechBuffer:
-    """What has been spoken so far.
+    """The speech so far.
 
     Attributes:
-        pcm: the pieces, one behind the other; `length` samples in all.
+        pcm: the pieces, `length` samples in all.
         phonemes: in order; `start` and `end` in samples of the whole.
         words: first sample, end, text.
     """
@@ -31,12 +31,12 @@ class SpeechBuffer:
     words: list[tuple[int, int, str]] = field(default_factory=list)
 
     def add(self, pcm: Int16) -> None:
-        """Put a piece behind the others."""
+        """Append a piece of sound."""
         self.pcm.append(pcm)
         self.length += len(pcm)
 
     def sounds(self, rate: int) -> tuple[Phoneme, ...]:
-        """They tile the sound: what nobody speaks is a pause, pauses that touch are one.
+        """Return phonemes and pauses, which cover the sound without gaps.
 
         Args:
             rate: Hz.
@@ -59,7 +59,7 @@ class SpeechBuffer:
         )
 
     def marks(self, placed: Sequence[PlacedMark]) -> dict[str, int]:
-        """Mark -> sample: where the next word begins, or before a <break> where the last one ended."""
+        """Return the sample of each mark: the start of the next word, or the last end before a <break>."""
         marks: dict[str, int] = {}
         for mark in placed:
             if mark.word < len(self.words) and not mark.paused:
@@ -70,7 +70,7 @@ class SpeechBuffer:
 
 
 def cut(pcm: Int16, first: int, last: int, rate: int) -> Int16:
-    """The samples from `first` to `last`, faded where something was cut off."""
+    """Return the samples from `first` to `last`, faded in and out where the sound is cut."""
     part = pcm[first:last].astype(np.float32)
     ramp = np.linspace(0, 1, min(len(part), round(FADE * rate)), dtype=np.float32)
     if first > 0:

@@ -17,7 +17,7 @@ LONGEST_BREAK = 10.0  # s; longer silences are a scheduling matter, not a voice'
 LONGEST_ATTRIBUTE = 200  # characters; engines copy attributes into fixed buffers
 
 # SSML 1.1 elements that change how text is spoken, with the attributes that are passed on. `audio` is not
-# one of them: an engine would open the file it names.
+# among them, because an engine would open the file that it names.
 SPOKEN: Mapping[str, tuple[str, ...]] = {
     "emphasis": ("level",),
     "lang": ("xml:lang",),
@@ -30,7 +30,7 @@ SPOKEN: Mapping[str, tuple[str, ...]] = {
     "voice": ("xml:lang", "name", "gender", "age", "variant"),
 }
 EMPTY = ("break", "mark", "bookmark", "sync")
-# And those that change nothing a voice could do: their text is spoken as it is.
+# Elements without an effect on speech: their text is spoken unchanged.
 PLAIN = frozenset({"desc", "lexicon", "lookup", "meta", "metadata", "speak", "token", "w"})
 STRENGTHS = {"none": 0.0, "x-weak": 0.1, "weak": 0.2, "medium": 0.4, "strong": 0.7, "x-strong": 1.2}  # s
 CLOCK = re.compile(r"\s*\+?(\d+(?:\.\d+)?|\.\d+)\s*(ms|s)\s*")
@@ -68,11 +68,11 @@ Part = str | Mark | Break | Tag
 
 @dataclass(frozen=True, slots=True)
 class Script:
-    """Parts in the order of the text.
+    """A parsed text.
 
     Attributes:
-        parts: text (not empty, blanks collapsed), marks, breaks, and properly nested tags.
-        warnings: what was left out, in sentences.
+        parts: text (not empty, blanks collapsed), marks, breaks, and properly nested tags, in order.
+        warnings: sentences about what was ignored.
     """
 
     parts: tuple[Part, ...]
@@ -80,29 +80,29 @@ class Script:
 
     @property
     def text(self) -> str:
-        """What is spoken, without marks and tags."""
+        """The text without marks and tags."""
         return "".join(part for part in self.parts if isinstance(part, str))
 
     @property
     def marks(self) -> tuple[str, ...]:
-        """Names of the marks in the order of the text."""
+        """The names of the marks in the order of the text."""
         return tuple(part.name for part in self.parts if isinstance(part, Mark))
 
     @property
     def is_silent(self) -> bool:
-        """Whether there is nothing a voice could pronounce."""
+        """Whether there is nothing to pronounce."""
         return not any(unicodedata.category(c)[0] in "LNS" for c in self.text)
 
 
 def read_script(request: SpeechRequest) -> Script:
-    """The script of a request. Wrong SSML is spoken as plain text, its marks kept, with a warning.
+    """Parse the SSML of a request. Malformed SSML is read as plain text with marks, with a warning.
 
-    Control characters, lone surrogates, emoji, elements that are not SSML (their text is spoken), marks
-    without a name or with that of an earlier one, and values that nobody understands are left out with a
-    warning; attributes that are not SSML are left out silently.
+    Control characters, lone surrogates, emoji, elements that are not SSML (but not their text), marks without
+    a name or with that of an earlier one, and unknown values are ignored with a warning; attributes that are
+    not SSML are ignored silently.
 
     Raises:
-        VoiceError: the text is longer than `MAX_TEXT` characters.
+        VoiceError: if the text is longer than `MAX_TEXT` characters.
     """
     if len(request.ssml) > MAX_TEXT:
         raise VoiceError(
@@ -137,14 +137,14 @@ def read_script(request: SpeechRequest) -> Script:
 
 
 def _twice(name: str, seen: set[str]) -> bool:
-    """Whether a name is in there already; it is from now on."""
+    """Return whether a name was seen before, and remember it."""
     there = name in seen
     seen.add(name)
     return there
 
 
 def _parse(ssml: str) -> tuple[list[Part], list[str]]:
-    """The parts, and what is odd about them, in sentences."""
+    """Return the parts and warnings."""
     parts: list[Part] = []
     odd: list[str] = []
     reader = expat.ParserCreate()
@@ -182,7 +182,7 @@ def _parse(ssml: str) -> tuple[list[Part], list[str]]:
 
 
 def _point(name: str, attributes: Mapping[str, str], odd: list[str]) -> Iterator[Part]:
-    """An element without content: a mark by any of its spellings, or a break; what is odd goes to `odd`."""
+    """Yield the mark or the break of an element without content, and add warnings to `odd`."""
     if name == "break":
         time, strength = attributes.get("time"), attributes.get("strength", "medium")
         clock = CLOCK.fullmatch(time or "")
@@ -205,7 +205,7 @@ def _point(name: str, attributes: Mapping[str, str], odd: list[str]) -> Iterator
 
 
 def _scrape(ssml: str) -> Iterator[Part]:
-    """Text and marks of something that only looks like XML."""
+    """Yield text and marks of malformed XML."""
     place = 0
     for tag in MARKUP.finditer(ssml):
         yield unescape(ssml[place : tag.start()], {"&quot;": '"', "&apos;": "'"})
@@ -218,9 +218,9 @@ def _scrape(ssml: str) -> Iterator[Part]:
 
 
 def _collapsed(parts: list[Part]) -> Iterator[Part]:
-    """Blanks as one space, texts that touch joined, texts of nothing left out."""
+    """Yield the parts with adjacent texts joined, blanks collapsed to one space, and no empty text."""
     text = ""
-    blank = True  # whether what was given out last ended in a blank: leading blanks go
+    blank = True  # whether the last text ended in a blank, so that leading blanks are dropped
     for part in [*parts, None]:
         if isinstance(part, str):
             text += part
@@ -237,10 +237,10 @@ def _collapsed(parts: list[Part]) -> Iterator[Part]:
 
 
 def write_tag(tag: Tag) -> str:
-    """The tag as SSML text; attributes in double quotes."""
+    """Return the tag as SSML text, with attributes in double quotes."""
     if tag.attributes is None:
         return f"</{tag.name}>"
-    # quoteattr would choose single quotes for a value that holds a double one: an engine's trap.
+    # quoteattr would choose single quotes for a value with a double one, which engines do not accept.
     return "".join([f"<{tag.name}", *(f" {k}={_quoted(v)}" for k, v in tag.attributes), ">"])
 
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-# SSML 1.1 leaves the size of the named steps to the engine: these are ours.
+# SSML 1.1 leaves the size of the named steps to the engine; these are our choice.
 RATES = {"x-slow": 0.5, "slow": 0.75, "medium": 1.0, "default": 1.0, "fast": 1.4, "x-fast": 1.8}
 PITCHES = {"x-low": 0.75, "low": 0.87, "medium": 1.0, "default": 1.0, "high": 1.15, "x-high": 1.33}
 VOLUMES = {
@@ -27,12 +27,12 @@ NUMBER = re.compile(r"\s*([+-]?)(\d+(?:\.\d+)?|\.\d+)\s*(%|st|dB|)\s*", re.IGNOR
 
 @dataclass(frozen=True, slots=True)
 class Prosody:
-    """How some text is spoken, as parts of the voice's own way; 1 is no change.
+    """Factors on the voice's own way of speaking; 1 is no change.
 
     Attributes:
         rate: 2 is twice as fast.
         pitch: 2 is an octave higher.
-        volume: on the amplitude; 0 is silent.
+        volume: of the amplitude; 0 is silent.
     """
 
     rate: float = 1.0
@@ -40,7 +40,7 @@ class Prosody:
     volume: float = 1.0
 
     def within(self, attributes: Mapping[str, str]) -> Prosody:
-        """How the text of a <prosody> inside this one is spoken; what is not understood changes nothing."""
+        """Return the prosody of a <prosody> element inside this one; unknown values change nothing."""
         return Prosody(
             self.rate * _bounded(_factor(attributes.get("rate", ""), RATES), MIN_RATE, MAX_RATE),
             self.pitch * _bounded(_factor(attributes.get("pitch", ""), PITCHES), MIN_PITCH, MAX_PITCH),
@@ -52,7 +52,7 @@ PLAIN = Prosody()
 
 
 def is_supported(attribute: str, value: str) -> bool:
-    """Whether an attribute of <prosody> says something; of another one than rate, pitch and volume: True."""
+    """Return whether the value of an attribute of <prosody> is valid; True except for rate, pitch, volume."""
     names = {"rate": RATES, "pitch": PITCHES, "volume": VOLUMES}.get(attribute)
     if names is None or value.strip() in names or NUMBER.fullmatch(value):
         return True
@@ -60,7 +60,7 @@ def is_supported(attribute: str, value: str) -> bool:
 
 
 def _factor(text: str, names: Mapping[str, float]) -> float:
-    """A name, a percentage ("80%", "+10%"), semitones ("-2st") or decibels ("+6dB") as a factor."""
+    """Return the factor of a name, a percentage ("80%", "+10%"), semitones ("-2st") or decibels ("+6dB")."""
     number = NUMBER.fullmatch(text)
     if not number:
         return names.get(text.strip(), 1.0)
@@ -72,7 +72,7 @@ def _factor(text: str, names: Mapping[str, float]) -> float:
         return float(10 ** (signed / 20))
     if unit == "%":
         return 1.0 + signed / 100 if sign else digits / 100
-    # A bare number: of a rate a factor, of a volume 0..100 where 100 is the voice's own (SSML 1.0).
+    # A bare number is a factor of the rate, or a volume of 0..100, where 100 is the voice's own (SSML 1.0).
     if names is VOLUMES and not sign:
         return digits / 100
     return digits if names is RATES and not sign else 1.0

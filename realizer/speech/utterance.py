@@ -1,4 +1,4 @@
-"""The values of speech: request, utterance, words, phonemes, and the voice protocol."""
+"""The data types of speech: request, utterance, word, phoneme, recording, and the voice protocol."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from typing import Protocol
 
 from realizer.core.array_types import Int16
 
-# A voice can speak so much faster or slower and still be understood, as parts of its usual length; ours.
+# Limits of the length of synthesized speech that is still intelligible, relative to the usual; our choice.
 STRETCH = (0.6, 1.8)
-# And a sound can be played so much faster or slower, here more and there less, without asking the voice.
+# Limits of the length of sound that is resampled, not synthesized again.
 WARP = (0.92, 1.08)
-MAX_TEXT = 20_000  # characters; about 20 minutes of speech, beyond what one behaviour can want
+MAX_TEXT = 20_000  # characters; about 20 minutes of speech, more than a behaviour needs
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Recording:
-    """Sound that is there already. It equals nothing but itself.
+    """Recorded speech. It equals nothing but itself.
 
     Attributes:
         rate: Hz.
         pcm: (n,) int16 mono.
-        text: what is said in it, plain, where whoever made it told.
-        words, phonemes: when, in seconds from its start, where that was told; in order.
+        text: the plain text, if known.
+        words, phonemes: in order, in seconds from its start; () if unknown.
     """
 
     rate: int
@@ -35,17 +35,17 @@ class Recording:
 
 @dataclass(frozen=True, slots=True)
 class SpeechRequest:
-    """What a voice is asked to say.
+    """A text to be spoken by a voice.
 
     Attributes:
-        ssml: the content of <speak>: text with <mark name="x"/> and the SSML elements the document used;
-            plain text has its <, > and & escaped.
+        ssml: the content of <speak>: text with <mark name="x"/> and the SSML elements of the document; the
+            <, > and & of plain text are escaped.
         marks: names of the marks in the order of the text.
         language: BCP-47, such as "en-US".
         voice: name of a voice, or None for the language's default.
         rate: 1 is the voice's own rate, 2 twice as fast.
-        seconds: how long it is to last; None as long as it takes. For `speech.fitting`, voices need not look.
-        recording: somebody who says it already: no voice is asked, it is aligned (`speech.align`).
+        seconds: wanted duration, or None for the voice's own; handled by `duration_fit`, not by voices.
+        recording: a recording of the text, which is aligned (`speech.align`) instead of synthesizing speech.
     """
 
     ssml: str
@@ -71,7 +71,7 @@ class Phoneme:
     Attributes:
         ipa: "" for a pause.
         stress: 0 none, 1 primary, 2 secondary.
-        volume: how loud it is meant, on the amplitude; 1 is the voice's own way.
+        volume: requested factor of the amplitude; 1 is the voice's own.
     """
 
     start: float
@@ -83,19 +83,19 @@ class Phoneme:
 
 @dataclass(frozen=True, eq=False)
 class Utterance:
-    """Speech with its times; all in seconds from its start.
+    """Speech with its times, all in seconds from its start.
 
     Attributes:
-        duration: seconds; the PCM is exactly this long where there is any.
-        sample_rate: Hz; 0 where there is no sound (silent voice).
+        duration: seconds; exactly the length of the PCM, if there is any.
+        sample_rate: Hz; 0 if there is no sound (silent voice).
         pcm: (n,) int16 mono, or None.
         words, phonemes: in order; phonemes do not overlap.
-        marks: mark name -> seconds.
+        marks: seconds by name.
         warnings: sentences for the client, such as "the text is empty".
-        stretch: the shortest and the longest it could be made, as parts of its duration, by asking the voice
-            again; (1, 1) where it is as it is.
-        sections: (start, utterance) of what it was joined of; () where it is one. While a long text is being
-            made the duration is a guess, and the sound ends with the last part.
+        stretch: the least and the greatest length, relative to its duration, to which it can be changed;
+            (1, 1) if it cannot.
+        sections: (start, utterance) of the parts it was joined from, if any. While a long text is being
+            synthesized, the duration is an estimate and the sound ends with the last part.
     """
 
     duration: float
@@ -110,15 +110,15 @@ class Utterance:
 
 
 class Voice(Protocol):
-    """Turns text with marks into an utterance; one method, blocking, callable from any thread."""
+    """A speech synthesizer. Its methods block, and may be called from any thread."""
 
     name: str
 
     def say(self, request: SpeechRequest) -> Utterance:
-        """Speak.
+        """Synthesize speech.
 
         Raises:
-            VoiceError: the engine is missing or died; the text says what to do. The next call works again.
+            VoiceError: if the engine is missing or died; the text says what to do. The next call restarts it.
         """
         ...
 

@@ -1,4 +1,4 @@
-"""Phoneme loudness from the volume that a text requests."""
+"""Volumes of phonemes, as requested by the text."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from realizer.speech.words import WordToken, tokens
 
 
 def with_volumes(request: SpeechRequest, utterance: Utterance) -> Utterance:
-    """The utterance, each phoneme with the volume of the <prosody> elements around its word.
+    """Return the utterance with the volumes of <prosody> elements applied to the phonemes inside them.
 
-    By the text and not by the sound: how loud a voice or a recording is of itself says nothing of effort.
-    Where the voice has other words than the text, they lie over each other evenly.
+    Volumes come from the text, because the loudness of the sound does not indicate effort. If the voice
+    reports other words than the text has, their indices are scaled.
     """
     if "volume" not in request.ssml or not utterance.words:
         return utterance

@@ -1,4 +1,4 @@
-"""Boundaries of words that an engine reports as one."""
+"""Detection of boundaries between words that an engine reports as one."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ import numpy as np
 
 from realizer.tables.phonemes import vowels
 
-MAX_CELLS = 60_000  # of an alignment; beyond it words share by their number of phonemes
-SKIP, UNLIKE, ALIKE, HINT = 0.7, 1.2, 0.4, -0.5  # costs of the alignment, ours
+MAX_CELLS = 60_000  # of an alignment; longer texts are divided by numbers of phonemes
+SKIP, UNLIKE, ALIKE, HINT = 0.7, 1.2, 0.4, -0.5  # costs of the alignment; our choice
 
 
 def boundaries(
     expected: Sequence[Sequence[str]], heard: Sequence[str], hints: Collection[int] = ()
 ) -> list[int]:
-    """For each word the index of its first phoneme: the cheapest alignment of the words spoken alone.
+    """Return the index of each word's first phoneme, by aligning the phonemes of words spoken separately.
 
     Args:
-        expected: phonemes of each word alone.
-        heard: phonemes of all of them together.
-        hints: indices where the engine reports some word.
+        expected: phonemes of each word spoken separately.
+        heard: phonemes of all words spoken together.
+        hints: indices at which the engine reports a word.
     """
     flat = [(strip_marks(sound), n == 0) for word in expected for n, sound in enumerate(word)]
     if not flat or len(flat) * len(heard) > MAX_CELLS:
@@ -28,7 +28,7 @@ def boundaries(
         shares = np.concatenate(([0.0], np.cumsum(counts)[:-1])) / counts.sum()
         return [round(share * len(heard)) for share in shares]
     plain = [strip_marks(sound) for sound in heard]
-    # Plain lists: the groups are small, and indexing arrays one number at a time is slow.
+    # Lists are faster than arrays, because the groups are small and indexed one number at a time.
     cost = [SKIP * j for j in range(len(plain) + 1)]
     steps = [[2] * (len(plain) + 1)]  # 0 both, 1 expected alone, 2 heard alone
     for sound, opens in flat:
@@ -39,7 +39,7 @@ def boundaries(
             cost.append(min(ways))
             step.append(ways.index(cost[-1]))
         steps.append(step)
-    at = [0] * len(flat)  # for each expected phoneme, the first one heard from there on
+    at = [0] * len(flat)  # for each expected phoneme, the index of the first heard one from there on
     i, j = len(flat), len(plain)
     while i:
         if steps[i][j] == 2:
@@ -57,12 +57,12 @@ def boundaries(
 
 
 def strip_marks(ipa: str) -> str:
-    """A phoneme without stress and length."""
+    """Return a phoneme without stress and length marks."""
     return ipa.strip("ˈˌː_").replace("ː", "")
 
 
 def is_vowel(ipa: str) -> bool:
-    """Whether a bare phoneme begins as a vowel."""
+    """Return whether a phoneme without marks begins with a vowel."""
     return ipa[:1] in vowels()
 
 

@@ -1,4 +1,4 @@
-"""The words of a script with their places."""
+"""A tokenizer of scripts: words with their places, pauses and marks."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from realizer.speech.ssml import Break, Mark, Script
 from realizer.speech.ssml_prosody import PLAIN, Prosody
 
-# Ideographs and kana are words of their own (there are no blanks between words to go by).
+# Ideographs and kana are words of their own, as there are no blanks between words.
 SINGLE = r"[\u3040-\u30ff\u3400-\u9fff\uf900-\ufaff\U00020000-\U0003ffff]"
-# Letters with their marks, joined by apostrophes, hyphens or dots between letters; numbers with their signs.
+# Letters with diacritics, joined by apostrophes, hyphens or dots between letters; numbers with their signs.
 WORD = re.compile(
     rf"{SINGLE}|\d[\d.,:/]*\d|(?:(?!{SINGLE})[^\W_]|[\u0300-\u036f\u0900-\u0dff])+"
     rf"(?:['’.\u00ad-](?!{SINGLE})[^\W_]+)*|[&%@+=°§#*]|[^\s\w!-/:-@\[-`{{-~]",
@@ -21,7 +21,7 @@ WORD = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class WordToken:
-    """A word as it is written; `place` counts characters in the text that the engine is given."""
+    """A written word; `place` is its index in the text that the engine gets."""
 
     text: str
     place: int
@@ -31,7 +31,7 @@ class WordToken:
 
 @dataclass(frozen=True, slots=True)
 class Pause:
-    """A silence that the text asks for: `signs` is punctuation, `seconds` a <break>."""
+    """A pause of punctuation, `signs`, or of a <break> of `seconds`."""
 
     signs: str
     seconds: float = 0.0
@@ -39,7 +39,7 @@ class Pause:
 
 @dataclass(frozen=True, slots=True)
 class PlacedMark:
-    """A mark: `word` is the index of the next word; `paused` whether a <break> lies between."""
+    """A mark: `word` is the index of the next word; `paused` whether a <break> is between them."""
 
     name: str
     word: int
@@ -50,7 +50,7 @@ Token = WordToken | Pause | Mark
 
 
 def words_in(text: str) -> Iterator[tuple[str, int]]:
-    """(word, place) in order; symbols that are spoken ("&", "€") count as words, punctuation does not."""
+    """Yield (word, place) in order; symbols that are spoken ("&", "€") are words, punctuation is not."""
     for found in WORD.finditer(text):
         first = found[0][0]
         if unicodedata.category(first)[0] in "LNSM" or first in "&%@#*§":
@@ -58,11 +58,11 @@ def words_in(text: str) -> Iterator[tuple[str, int]]:
 
 
 def tokens(script: Script, phrase: str) -> tuple[Token, ...]:
-    """Words, pauses and marks in the order of the text, for a voice that has no engine.
+    """Return words, pauses and marks in the order of the text, for voices without an engine.
 
     Args:
         script: the parts; <prosody> scales the words inside it, <sub alias> replaces its text.
-        phrase: the characters that make a pause; a run of them is one.
+        phrase: the characters of pauses; several together are one pause.
     """
     found: list[Token] = []
     manners = [PLAIN]  # of the open tags, outermost first

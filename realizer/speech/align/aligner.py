@@ -1,4 +1,4 @@
-"""Forced alignment: the times of words and phonemes in a recording, by the best aligner installed."""
+"""Forced alignment of recordings with their text, by the best aligner installed."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from realizer.speech.utterance import SpeechRequest, Utterance, Voice
 
 Aligner = Literal["pocketsphinx", "espeak"]
 
-# The cost (`Spans`) of a probability of 1/2, and how fast it falls: between right texts and wrong ones, as
-# measured on human and espeak-ng's speech.
+# The cost (`Spans`) of a probability of 1/2, and the width of the curve, which separates right texts from
+# wrong ones in human speech and that of espeak-ng.
 COST, COST_OF_WORD = (0.935, -0.01), (1.0, -0.05)
 DOUBT = 0.5
-OTHER = "+f3"  # a woman's voice of espeak-ng, beside the language's own, a man's
-FASTEST = 4.0  # times as fast as a voice speaks: nobody does
+OTHER = "+f3"  # a female voice of espeak-ng, in addition to the default, which is male
+FASTEST = 4.0  # times the rate of a voice; nobody speaks faster
 
 log = logging.getLogger(__name__)
 
@@ -40,22 +40,22 @@ def align(
     aligner: Aligner | None = None,
     voice: Voice | None = None,
 ) -> Alignment:
-    """Find when a recording says each word and phoneme of a text.
+    """Find the times of the words and phonemes of a text in a recording.
 
-    English goes by pocketsphinx where it is installed; other languages, and what it cannot align, by what
-    espeak-ng says of the text, warped to the recording. Without either the words are spread over what sounds.
+    English is aligned by pocketsphinx if it is installed; other languages, and recordings that it cannot
+    align, by warping espeak-ng's speech to the recording. Without either, words are spread over the sound.
 
     Args:
         pcm: (n,) or (n, channels) samples: int16, int32 or floats in -1..1.
         rate: Hz.
-        text: what is said, plain.
+        text: plain text of the recording.
         language: BCP-47.
-        aligner: only this one.
-        voice: what says the same, instead of espeak-ng.
+        aligner: the only one to use.
+        voice: used instead of espeak-ng.
 
     Raises:
-        AlignError: the recording or the text cannot be used, or the aligner that was asked for cannot.
-        VoiceError: the text is too long, or espeak-ng died.
+        AlignError: if the recording, the text or the given aligner cannot be used.
+        VoiceError: if the text is too long, or espeak-ng died.
     """
     return align_request(
         mono(pcm, rate), int(rate), SpeechRequest(escape(text), language=language), aligner, voice
@@ -65,12 +65,12 @@ def align(
 def align_request(
     sound: Float32, rate: int, request: SpeechRequest, aligner: Aligner | None, voice: Voice | None
 ) -> tuple[Alignment, Utterance]:
-    """The alignment of a recording, and what a voice made of the same request.
+    """Align a recording with a request, and return a voice's utterance of the request too.
 
     Args:
         sound: (n,) -1..1.
         rate: Hz.
-        request: how it is to be spoken does not matter.
+        request: its voice, rate and duration are ignored.
         aligner, voice: as in `align`.
 
     Raises:
@@ -113,7 +113,7 @@ def align_request(
 
 
 def _unusable_reason(aligner: str | None, voice: Voice | None) -> str | None:
-    """Why the aligner that was asked for cannot be used."""
+    """Return why the aligner cannot be used, or None."""
     from realizer.speech.espeak import voice as espeak
 
     if aligner not in (None, "pocketsphinx", "espeak"):
@@ -131,7 +131,7 @@ HOP = 160  # samples
 
 
 def _by_sound(sound: Float32, duration: float, references: list[Utterance]) -> Alignment:
-    """By voices that say the same."""
+    """Align with the most similar of several voices that speak the text."""
     spans = dtw_align(sound, references)
     each = [probability(cost, COST_OF_WORD) for cost in spans.costs]
     return moved(

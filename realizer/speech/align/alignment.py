@@ -11,25 +11,25 @@ from realizer.core.array_types import Float64
 from realizer.core.errors import RealizerError
 from realizer.speech.utterance import Phoneme, Utterance, Word
 
-MIN_PAUSE = 0.02  # s; shorter ones are of the sound before
+MIN_PAUSE = 0.02  # s; shorter ones are added to the sound before
 
 
 class AlignError(RealizerError):
-    """A recording and a text that cannot be brought together; the text says what was wanted and what came."""
+    """Raised if a recording and a text cannot be aligned."""
 
 
 @dataclass(frozen=True, slots=True)
 class Alignment:
-    """When a recording says what; all in seconds from its start.
+    """The times of words and phonemes in a recording, in seconds from its start.
 
     Attributes:
         duration: of the recording.
-        words: in the order of the text; those that are not heard have no length.
-        phonemes: they tile 0..duration; "" is a pause.
+        words: in the order of the text; words that were not found have no length.
+        phonemes: with pauses (""), they cover 0..duration without gaps.
         confidences: 0..1, one for each word.
-        phoneme_confidences: 0..1, one for each phoneme: that of its word; 1 of pauses.
-        confidence: 0..1 of all; below 0.5 the recording probably says something else.
-        aligner: "pocketsphinx", "espeak", or "even" where there is neither and the words are spread.
+        phoneme_confidences: 0..1, one for each phoneme: that of its word; 1 for pauses.
+        confidence: 0..1, of the whole; below 0.5 the recording probably has another text.
+        aligner: "pocketsphinx", "espeak", or "even" if neither is installed and words are spread evenly.
         warnings: sentences.
     """
 
@@ -52,16 +52,16 @@ def build(
     each: list[float],
     confidence: float,
 ) -> Alignment:
-    """What was found in order, inside the recording, with pauses between.
+    """Return an alignment with times in order, within the recording, and with pauses.
 
     Args:
-        aligner: which one.
-        reference: what says the words' texts.
+        aligner: its name.
+        reference: an utterance with the same words.
         duration: of the recording.
-        spans: (n, 2) of its words.
+        spans: (n, 2) times of the words.
         sounds: phonemes in order, and the word of each.
         each: confidence of each word.
-        confidence: of all.
+        confidence: of the whole.
     """
     spans = np.clip(np.maximum.accumulate(np.nan_to_num(spans).ravel()), 0.0, duration).reshape(-1, 2)
     words = tuple(
@@ -105,7 +105,7 @@ def moved(
     each: list[float],
     confidence: float,
 ) -> Alignment:
-    """The same of the reference's phonemes; (m, 2) `spans` are where they were found."""
+    """Return an alignment with the phonemes of the reference; `spans` (m, 2) are their times."""
     starts = np.array([word.start for word in reference.words])
     phonemes, owners = [], []
     for phoneme, (start, end) in zip(reference.phonemes, spans, strict=True):
@@ -116,6 +116,6 @@ def moved(
 
 
 def probability(value: float, where: tuple[float, float]) -> float:
-    """0..1 by a logistic curve: 1/2 at the first of `where`, falling or rising as fast as the second says."""
+    """Return the value of a logistic curve, 0..1; `where` is its middle and its signed width."""
     middle, width = where
     return 1.0 / (1.0 + math.exp(min(50.0, max(-50.0, -(value - middle) / width))))

@@ -13,14 +13,14 @@ STRIPPED = str.maketrans("", "", "ːˑˈˌ̩̯̃̍͡ʲʰˀ_-~|")
 
 @dataclass(frozen=True, slots=True)
 class Sounded:
-    """One or two phones of ARPABET, and the IPA of them."""
+    """One or two phones of ARPABET, and their IPA."""
 
     arpabet: str
     ipa: str
 
 
 def to_arpabet(ipa: Iterable[str]) -> tuple[str, ...]:
-    """Phones of phonemes; a symbol that is not in the table is left out."""
+    """Return the phones of phonemes; symbols that are not in the table are ignored."""
     phones: list[str] = []
     for phoneme in ipa:
         text, at = phoneme.translate(STRIPPED), 0
@@ -33,7 +33,7 @@ def to_arpabet(ipa: Iterable[str]) -> tuple[str, ...]:
 
 
 def to_ipa(phone: str) -> str:
-    """The IPA of one phone; "" for what is no phone of speech (silence, noise)."""
+    """Return the IPA of one phone; "" for silence and noise."""
     return _sounds().get(phone, "")
 
 

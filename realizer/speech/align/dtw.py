@@ -12,24 +12,24 @@ from realizer.core.array_types import Bool, Float64
 
 Index = npt.NDArray[np.intp]
 
-# In units of the usual difference of a frame and a state; found by trial on human and on synthetic speech.
-STAY, SKIP, SKIP_TWO = 0.3, 0.3, 1.0  # of a state a frame longer, or of states left out
-ENTER = 5.0  # of a pause: a weak sound or a closure is none
-SILENT, NOT_SILENT = 0.35, 8.0  # of a silent frame in a pause, and for each part of loudness more
-NOISE = 2.0  # of a frame in a pause at most: a breath or a cough, which is not of the text
+# Costs, in units of the usual difference of a frame and a state; tuned on human and synthetic speech.
+STAY, SKIP, SKIP_TWO = 0.3, 0.3, 1.0  # of staying in a state, and of skipping one or two
+ENTER = 5.0  # of a pause, so that weak sounds and closures are not taken for one
+SILENT, NOT_SILENT = 0.35, 8.0  # of a silent frame in a pause, and for loudness (0..1) in it
+NOISE = 2.0  # greatest cost of a frame in a pause, for breaths and coughs
 IMPOSSIBLE = 1e30
-AT_ONCE = 256  # frames whose costs are worked out together
-SAMPLED = 300  # rows and columns that the usual difference is taken of
+AT_ONCE = 256  # frames whose costs are computed together
+SAMPLED = 300  # rows and columns from which the usual difference is computed
 
 
 @dataclass(frozen=True, eq=False)
 class States:
-    """What is to be heard, in order.
+    """The expected sounds, in order.
 
     Attributes:
-        features: (j, d); rows of pauses do not count.
-        pause: (j,) where a pause may be, or not: it can be left out. The first and the last are such.
-        times: (j,) seconds in the reference; of a pause that of what follows.
+        features: (j, d); rows of pauses are ignored.
+        pause: (j,) whether the state is an optional pause, such as the first and the last one.
+        times: (j,) seconds in the reference; for a pause, those of the next state.
     """
 
     features: Float64
@@ -39,11 +39,11 @@ class States:
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """What is heard.
+    """The recorded sounds.
 
     Attributes:
-        features: (t, d), normalised as those of the states are.
-        quiet: (t,) what each frame costs in a pause.
+        features: (t, d), normalised like those of the states.
+        quiet: (t,) cost of each frame in a pause.
         usual: the unit of costs: the median difference of a frame and a state.
     """
 
@@ -53,7 +53,7 @@ class Observed:
 
 
 def distance(features: Float64, others: Float64) -> Float64:
-    """(t, j) root mean square differences of (t, d) and (j, d) features."""
+    """Return the root mean square differences (t, j) of features (t, d) and (j, d)."""
     squares = (features**2).sum(axis=1)[:, None] + (others**2).sum(axis=1)
     distance: Float64 = np.sqrt(
         np.maximum(squares - 2 * (features @ others.T), 0.0) / max(1, features.shape[1])
@@ -62,13 +62,13 @@ def distance(features: Float64, others: Float64) -> Float64:
 
 
 def usual(features: Float64, others: Float64) -> float:
-    """The median of `distance`, of evenly chosen rows."""
+    """Return the median of `distance` for a sample of rows."""
     some = (rows[:: max(1, len(rows) // SAMPLED)] for rows in (features, others))
     return max(float(np.median(distance(*some))), 1e-6)
 
 
 def quiet(part: Float64, threshold: float) -> Float64:
-    """(t,) what frames cost in a pause, by how loud they are between silence (0) and speech (1)."""
+    """Return the costs (t,) of frames in a pause, by their loudness between silence (0) and speech (1)."""
     cost: Float64 = np.minimum(SILENT + NOT_SILENT * np.maximum(0.0, part - threshold), NOISE)
     return cost
 
@@ -76,16 +76,16 @@ def quiet(part: Float64, threshold: float) -> Float64:
 def best_path(
     heard: Observed, states: States, centre: Index | None = None, reach: int = 0
 ) -> tuple[Index, Float64]:
-    """The cheapest way: (t,) the state of each frame, and (t,) what each costs.
+    """Return the cheapest path: (t,) the state of each frame, and (t,) the cost of each.
 
-    From one frame to the next the state is the same one, the next, or one of the two after that (dynamic time
-    warping with slopes 0 to 3); a pause is left out or stayed in for nothing. Work and memory are t times the
-    width of the band.
+    From one frame to the next the state stays the same or advances by up to three (dynamic time warping with
+    slopes 0 to 3); skipping a pause and staying in it are free. Time and memory are t times the width of the
+    band.
 
     Args:
         heard: t frames.
-        states: j of them.
-        centre: (t,) the state about which the way lies, rising; None: anywhere.
+        states: j states.
+        centre: (t,) the state in the middle of the band, rising; None for no band.
         reach: states to each side of it.
 
     Source: Sakoe and Chiba 1978, with the pauses of a recogniser of words.
@@ -97,7 +97,7 @@ def best_path(
     stay, enter, two, three = penalties
     came = np.zeros((frames, width), np.int8)
     costs = _costs(heard, states, lows, width)
-    total = np.full(width + 3, IMPOSSIBLE)  # by state - low, after three that are impossible
+    total = np.full(width + 3, IMPOSSIBLE)  # by state - low, after three impossible ones
     total[3:5] = next(costs)[:2]
     ways, places = np.empty((4, width)), np.arange(width)
     for t in range(1, frames):
@@ -121,10 +121,10 @@ def best_path(
 
 
 def _penalties(pause: Bool) -> Float64:
-    """(4, j): of staying in a state, and of coming to it from the one, two or three before."""
+    """Return the costs (4, j) of staying in a state, and of reaching it from one, two or three before."""
     enter = np.where(pause, ENTER, 0.0)
-    enter[[0, -1]] = 0.0  # silence before and after all of it is not a pause that somebody makes
-    over = np.append(False, pause[:-1])  # a pause is left out
+    enter[[0, -1]] = 0.0  # silence before and after the text is free
+    over = np.append(False, pause[:-1])  # skips a pause
     over_two = over | np.append([False, False], pause[:-2])[: len(pause)]
     stay = np.where(pause, 0.0, STAY)
     two, three = np.where(over, 0.0, SKIP), np.where(over_two, SKIP, SKIP_TWO)
@@ -132,7 +132,7 @@ def _penalties(pause: Bool) -> Float64:
 
 
 def _costs(heard: Observed, states: States, lows: Index, width: int) -> Iterator[Float64]:
-    """(width,) for each frame."""
+    """Yield the costs (width,) of each frame."""
     for k in range(0, len(lows), AT_ONCE):
         band = slice(int(lows[k]), int(lows[k : k + AT_ONCE][-1]) + width)
         rows = distance(heard.features[k : k + AT_ONCE], states.features[band]) / heard.usual
@@ -142,7 +142,7 @@ def _costs(heard: Observed, states: States, lows: Index, width: int) -> Iterator
 
 
 def _traced(came: npt.NDArray[np.int8], lows: Index, last: int) -> Index:
-    """(t,) states, from the last place in its band back."""
+    """Return the states (t,) of the path that ends at `last` in its band."""
     way = np.empty(len(lows), np.intp)
     state = int(lows[-1]) + last
     for t in range(len(lows) - 1, -1, -1):

@@ -1,4 +1,4 @@
-"""The aligner for any language: dynamic time warping against a voice that says the same text."""
+"""The aligner for any language: dynamic time warping against a voice that speaks the same text."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from realizer.speech.align.dtw import Index, Observed, States, best_path, quiet,
 from realizer.speech.utterance import Utterance
 
 COARSE, FINE = 320, 80  # samples between frames: 20 and 5 ms
-FAR, NEAR = 30.0, 0.4  # s to each side that the way is looked for in: of the diagonal, and of the coarse way
-SLOWEST, FASTEST = 0.4, 2.5  # of the reference, which is brought to the speed of the recording first
+FAR, NEAR = 30.0, 0.4  # s on each side of the diagonal, and of the coarse path, that are searched
+SLOWEST, FASTEST = 0.4, 2.5  # limits of the factor by which the reference is brought to the recording's rate
 LEAST = 0.2  # s of speech
-RIDGE = 30.0  # frames that speak against any change when the one voice is made to sound like the other
+RIDGE = 30.0  # regularisation, in frames, when the reference is adapted to the recorded voice
 
 
 @dataclass(frozen=True, eq=False)
 class Spans:
-    """What was found, in seconds of the recording.
+    """The result of an alignment, in seconds of the recording.
 
     Attributes:
-        reference: the voice that was most like it.
+        reference: the most similar of the voices' utterances.
         words: (n, 2) start and end of each word of the reference.
-        phonemes: (m, 2) of each phoneme; its pauses are (nan, nan).
-        costs: (n,) how unlike the two are in each word, where 1 is as unlike as the same sounds in the wrong
-            order: under 0.9 for the same words in another voice, near 1 for others.
-        cost: of all of it.
-        pace: how many times faster than the reference it is.
+        phonemes: (m, 2) start and end of each phoneme; (nan, nan) for pauses.
+        costs: (n,) difference of the two in each word, where 1 is that of the same sounds in the wrong order:
+            under 0.9 for the same words in another voice, near 1 for other words.
+        cost: of the whole.
+        pace: the speed of the recording relative to the reference.
     """
 
     reference: Utterance
@@ -43,7 +43,7 @@ class Spans:
 
 @dataclass(frozen=True, eq=False)
 class _Match:
-    """A voice brought to the speed of the recording, and the coarse way between the two."""
+    """A voice's utterance at the speed of the recording, and the coarse path between the two."""
 
     reference: Utterance
     spoken: Float32
@@ -62,18 +62,18 @@ class _Match:
 
 
 def dtw_align(sound: Float32, references: Sequence[Utterance]) -> Spans:
-    """Warp a voice that says the same text to the recording; no model, any language that the voice speaks.
+    """Warp the most similar of several utterances to the recording.
 
     Args:
-        sound: (n,) at 16 kHz, with something to be heard in it.
-        references: the same text by voices that differ, with sound; what is most like the recording counts.
+        sound: (n,) at 16 kHz, not silent.
+        references: the same text by different voices, with sound.
 
     Source: Malfrère and Dutoit 1997, who align speech by synthesis.
     """
     best = min((_matched(sound, reference) for reference in references), key=lambda match: match.cost)
     reference, states, way = best.reference, best.states, best.way
 
-    # The same with the voice made to sound like the recording, closer, and only near the way found.
+    # Again with the voice adapted to the recording, at a higher resolution, and only near the coarse path.
     energy = f.energies(sound, FINE)
     part, talks = f.voice_activity(f.loudness(energy))
     fine = _states(best.spoken, FINE * best.speed, reference)
@@ -119,7 +119,7 @@ def _matched(sound: Float32, reference: Utterance) -> _Match:
 
 
 def _states(spoken: Float32, hop: float, reference: Utterance) -> States:
-    """The frames of the reference, instead of its pauses one before each word and at the end."""
+    """Return the frames of the reference, with one pause before each word and at the end for its pauses."""
     values = f.cepstra(f.energies(spoken, hop))
     times = np.arange(len(values)) * hop / f.RATE
     said = np.ones(len(times), bool)
@@ -147,7 +147,7 @@ def _heard(values: Float64, part: Float64, talks: Bool, states: States) -> Obser
 
 
 def _likened(values: Float64, states: States, way: Index) -> Float64:
-    """(d + 1, d): a linear change of the reference's features, and a shift, to the recording's."""
+    """Return the affine map (d + 1, d) from the reference's features to the recording's."""
     pairs = ~states.pause[way]
     ours = np.hstack([states.features[way[pairs]], np.ones((int(pairs.sum()), 1))])
     same = np.eye(ours.shape[1])
@@ -156,7 +156,7 @@ def _likened(values: Float64, states: States, way: Index) -> Float64:
 
 
 def _null(heard: Observed, states: States, centre: Index, reach: int) -> float:
-    """What a wrong text would cost, of the same sounds: the least of their costs in other orders."""
+    """Return the cost of a wrong text: the least cost of the same sounds in other orders."""
     places = np.arange(len(states.times))
     found = [1.0]
     for order in (places[::-1], *(np.roll(places, len(places) * part // 3) for part in (1, 2))):
@@ -170,7 +170,7 @@ def _null(heard: Observed, states: States, centre: Index, reach: int) -> float:
 
 
 def _costs(words: Float64, way: Index, spent: Float64, pause: Bool, null: float) -> Float64:
-    """(n,) the mean cost of the frames of each word."""
+    """Return the mean cost (n,) of the frames of each word."""
     said = ~pause[way]
     total = np.append(0.0, np.cumsum(np.where(said, spent, 0.0)))
     count = np.append(0, np.cumsum(said))
@@ -183,7 +183,7 @@ def _costs(words: Float64, way: Index, spent: Float64, pause: Bool, null: float)
 
 
 def _spans(pairs: Float64, states: States, way: Index) -> Float64:
-    """(n, 2) frames in which the way enters and leaves what lies between two times of the reference."""
+    """Return (n, 2) the frames at which the path enters and leaves the interval between two times."""
     said = np.flatnonzero(~states.pause)
     times = states.times[said]
     first = np.searchsorted(times, pairs[:, 0] - 1e-9)

@@ -9,22 +9,22 @@ import numpy as np
 
 from realizer.core.array_types import Bool, Float32, Float64
 
-RATE = 16_000  # Hz; all that matters of speech lies below half of it
-WINDOW, SPECTRUM = 400, 512  # samples: 25 ms, as recognisers of speech take it
+RATE = 16_000  # Hz; speech has all relevant frequencies below half of it
+WINDOW, SPECTRUM = 400, 512  # samples: 25 ms, as usual in speech recognition
 BANDS, LOWEST, HIGHEST = 26, 100.0, 7000.0  # of the mel scale, Hz
-KEPT = 13  # cepstra; the finer ones tell the pitch
+KEPT = 13  # cepstra; higher ones depend on the pitch
 EMPHASIS = 0.97
-# Of the mean energy of a band: below it a band counts as empty, so that noise in it does not matter.
+# Of the mean energy of a band: added to energies, so that noise in empty bands has no effect.
 FLOOR = 0.01
-SLOPE = 2  # frames to each side, for how the cepstra change
-AT_ONCE = 4000  # frames; a spectrum of more would only take memory
-# Silence is near the quietest frames, speech near the loudest: percentiles, and parts of the range between.
+SLOPE = 2  # frames to each side, for the slopes of cepstra
+AT_ONCE = 4000  # frames; limits the memory for spectra
+# Percentiles of loudness for silence and speech, and the part of the range between them that is not silence.
 QUIET, LOUD, HEARD = 5, 95, 0.1
 MIN_RANGE, MAX_RANGE = 1.0, 5.0  # powers of ten; steady noise has no range, digital silence too much
 
 
 def resampled(pcm: Float32, rate: int) -> Float32:
-    """(n,) float32 at `rate` Hz as (m,) float32 at 16 kHz, without what would alias."""
+    """Resample (n,) float32 at `rate` Hz to (m,) float32 at 16 kHz."""
     from scipy.signal import resample_poly
 
     shared = gcd(rate, RATE)
@@ -35,7 +35,7 @@ def resampled(pcm: Float32, rate: int) -> Float32:
 
 
 def energies(sound: Float32, hop: float) -> Float64:
-    """(n, bands) energy in the bands of the mel scale; frame k is about k x hop.
+    """Return the energy (n, bands) in the bands of the mel scale; frame k is centred at k x hop.
 
     Args:
         sound: (m,) at 16 kHz, -1..1.
@@ -54,7 +54,7 @@ def energies(sound: Float32, hop: float) -> Float64:
 
 
 def cepstra(energy: Float64) -> Float64:
-    """(n, 26) cepstra of (n, bands) energies, with their slopes.
+    """Return cepstra (n, 26) of energies (n, bands), with their slopes.
 
     Source: Davis and Mermelstein 1980 for the cepstra; Furui 1986 for their slopes.
     """
@@ -64,13 +64,13 @@ def cepstra(energy: Float64) -> Float64:
 
 
 def loudness(energy: Float64) -> Float64:
-    """(n,) powers of ten, of (n, bands)."""
+    """Return the loudness (n,), in powers of ten, of energies (n, bands)."""
     total: Float64 = np.log10(energy.sum(axis=1) + 1e-9)
     return total
 
 
 def voice_activity(loud: Float64) -> tuple[Float64, Bool]:
-    """(n,) how loud each frame is between silence (0) and speech (1), and which are more than silence."""
+    """Return the loudness (n,) of frames between silence (0) and speech (1), and which are not silent."""
     low, high = np.percentile(loud, (QUIET, LOUD))
     low = max(low, high - MAX_RANGE)
     part = (loud - low) / max(high - low, MIN_RANGE)
@@ -78,14 +78,14 @@ def voice_activity(loud: Float64) -> tuple[Float64, Bool]:
 
 
 def normalised(features: Float64, of: Bool) -> Float64:
-    """Each column with mean 0 and deviation 1 over the frames `of`: the room and the loudness go."""
+    """Scale columns to mean 0 and deviation 1 over the frames `of`; removes effects of room and loudness."""
     chosen = features[of] if of.any() else features
     scaled: Float64 = (features - chosen.mean(axis=0)) / (chosen.std(axis=0) + 1e-6)
     return scaled
 
 
 def _slopes(values: Float64) -> Float64:
-    """(n, k): the slope of the line through each value and its neighbours."""
+    """Return the slope (n, k) of the line through each value and its neighbours."""
     padded = np.pad(values, ((SLOPE, SLOPE), (0, 0)), mode="edge")
     count = len(values)
     steps = range(1, SLOPE + 1)
@@ -110,7 +110,7 @@ def _bands() -> Float64:
 
 @cache
 def _cosines() -> Float64:
-    """(bands, kept): the cosine transform."""
+    """Return the cosine transform (bands, kept)."""
     angles = np.pi / BANDS * (np.arange(BANDS)[:, None] + 0.5) * np.arange(KEPT)
     cosines: Float64 = np.cos(angles) * np.sqrt(2 / BANDS)
     return cosines

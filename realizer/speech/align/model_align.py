@@ -1,4 +1,4 @@
-"""The aligner for English, by the acoustic model of pocketsphinx."""
+"""The aligner for English, which uses the acoustic model of pocketsphinx."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from realizer.speech.align.alignment import Alignment, build, probability
 from realizer.speech.align.arpabet import to_arpabet, to_ipa
 from realizer.speech.utterance import Phoneme, Utterance
 
-# The score (`AlignedWord`) of a probability of 1/2, and how fast it falls: between right texts and wrong
-# ones, as measured on human and espeak-ng's speech.
+# The score (`AlignedWord`) of a probability of 1/2, and the width of the curve, which separates right texts
+# from wrong ones in human speech and that of espeak-ng.
 SCORE, SCORE_OF_WORD = (-35.0, 4.0), (-45.0, 8.0)
 UNSTRESSED = {"ʌ": "ə", "ɝ": "ɚ"}
 VOWELS = set("aeiouæɑɔəɚɛɝɪʊʌ")
 
 
 def model_align(sound: Float32, duration: float, reference: Utterance) -> Alignment | None:
-    """The words as the acoustic model hears them; None where it finds them not.
+    """Align words by the acoustic model; return None if it does not find them.
 
-    Words that its dictionary does not have are said as the reference says them.
+    Words that are not in its dictionary have the phonemes of the reference.
 
     Args:
         sound: (n,) at 16 kHz.
         duration: seconds of the recording.
-        reference: its words with their phonemes; from the same text.
+        reference: a voice's utterance of the text.
     """
     of_words = [
         [p for p in reference.phonemes if p.ipa and word.start - 1e-6 <= p.start < word.end - 1e-6]

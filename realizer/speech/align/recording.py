@@ -12,14 +12,14 @@ from realizer.speech.align.features import resampled
 RATES = (1000, 384_000)  # Hz
 CHANNELS = 64
 LEAST, MOST = 0.05, 1800.0  # s
-SILENCE = 2e-4  # of the full scale: the last bits
+SILENCE = 2e-4  # of the full scale: noise in the last bits
 
 
 def mono(pcm: npt.ArrayLike, rate: float) -> Float32:
-    """(n,) float32 in -1..1, of (n,) or (n, channels) int16, int32 or floats.
+    """Convert (n,) or (n, channels) int16, int32 or floats to (n,) float32 in -1..1.
 
     Raises:
-        AlignError: no sound, or in no form that is known.
+        AlignError: if the samples or the rate are invalid.
     """
     samples = np.asarray(pcm)
     if not (np.isfinite(rate) and RATES[0] <= rate <= RATES[1] and float(rate).is_integer()):
@@ -41,10 +41,10 @@ def mono(pcm: npt.ArrayLike, rate: float) -> Float32:
 
 
 def to_aligner(sound: Float32, rate: int) -> Float32:
-    """(m,) at 16 kHz.
+    """Resample to 16 kHz.
 
     Raises:
-        AlignError: there is nothing to be heard.
+        AlignError: if the sound is silent.
     """
     if float(np.abs(sound).max()) < SILENCE:
         raise AlignError("recording: wanted somebody who speaks, got silence")

@@ -1,4 +1,4 @@
-"""Utterances from recordings: words, phonemes and the times of marks."""
+"""Utterances from recordings by alignment: words, phonemes and marks."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from realizer.speech.align.aligner import Aligner, align_request
 from realizer.speech.align.recording import mono
 from realizer.speech.utterance import Recording, SpeechRequest, Utterance
 
-KEPT = 8  # recordings; a document is looked at more than once before it plays
+KEPT = 8  # recordings; a document is planned more than once before it plays
 
 
 def utterance_of_recording(
     pcm: npt.ArrayLike, rate: float, request: SpeechRequest, *, aligner: Aligner | None = None
 ) -> Utterance:
-    """A recording of what is asked for as an utterance: its words, phonemes and marks where they are heard.
+    """Return a recording as an utterance, with words, phonemes and marks at the times of alignment.
 
     Args:
         pcm: as in `align`.
         rate: Hz.
-        request: the text with its marks; how it is to be spoken does not matter.
-        aligner: only this one.
+        request: the text with its marks; its voice, rate and duration are ignored.
+        aligner: the only one to use.
 
     Raises:
         AlignError, VoiceError: as `align`.
@@ -34,8 +34,8 @@ def utterance_of_recording(
     knots = [(time, at) for a, b in zip(reference.words, found.words, strict=True) for time, at in
              ((a.start, b.start), (a.end, b.end))]  # fmt: skip
     was, now = np.maximum.accumulate(np.array([(0.0, 0.0), *knots]), axis=0).T
-    # A word that follows another at once in the reference may follow a pause here: of knots at one time the
-    # last counts, so that a mark before a word comes when that word does.
+    # Words that are adjacent in the reference may have a pause between them here: of knots at one time the
+    # last counts, so that a mark before a word is at the start of that word.
     marks = {name: float(np.interp(time, was, now)) for name, time in reference.marks.items()}
     return Utterance(
         duration=len(sound) / rate,
@@ -50,7 +50,7 @@ def utterance_of_recording(
 
 @lru_cache(KEPT)
 def align_recording(request: SpeechRequest, recording: Recording) -> Utterance:
-    """As `utterance_of_recording`; it sounds also where it cannot be aligned, with a warning."""
+    """Return `utterance_of_recording`, or the sound alone with a warning if it cannot be aligned."""
     try:
         return utterance_of_recording(recording.pcm, recording.rate, request)
     except RealizerError as error:

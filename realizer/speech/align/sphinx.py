@@ -16,16 +16,15 @@ from realizer.core.array_types import Float32
 INSTALL = "no aligner of English: pip install 'bml-realizer[align]'"
 FRAME = 0.01  # s
 
-_lock = threading.Lock()  # a decoder is for one thread at a time
+_lock = threading.Lock()  # decoders are not thread-safe
 
 
 @dataclass(frozen=True, slots=True)
 class AlignedWord:
-    """A word: its phones as (start, end, ARPABET), in seconds, and how well the model knows them.
+    """A word, with its phones as (start, end, ARPABET) in seconds.
 
     Attributes:
-        score: the mean over its frames of the log likelihood against that of the best sound there is; 0 is
-            perfect.
+        score: the mean log likelihood of its frames relative to that of the best phone; 0 is perfect.
     """
 
     phones: tuple[tuple[float, float, str], ...]
@@ -33,19 +32,19 @@ class AlignedWord:
 
 
 def install_hint() -> str | None:
-    """None where pocketsphinx is installed; otherwise the sentence that says what to install."""
+    """Return a sentence that says how to install pocketsphinx, or None if it is installed."""
     return None if importlib.util.find_spec("pocketsphinx") else INSTALL
 
 
 def align_words(
     sound: Float32, words: Sequence[tuple[str, tuple[str, ...]]]
 ) -> tuple[AlignedWord | None, ...] | None:
-    """What was found for each word; None where the sound cannot be the words, or the model does not know how.
+    """Align words with the sound; return None if that is impossible.
 
     Args:
         sound: (n,) at 16 kHz, -1..1.
-        words: (spelling, its phones if the dictionary does not have it). A word without either is left out,
-            and gets None.
+        words: (spelling, phones in case the dictionary does not have it). A word without phones that is not
+            in the dictionary is ignored, and its result is None.
     """
     pcm = np.clip(np.rint(sound * 32767), -32768, 32767).astype("<i2").tobytes()
     with _lock:
@@ -62,7 +61,7 @@ def align_words(
             _hear(decoder, pcm)
             found = [_aligned_word(word) for word in decoder.get_alignment() if word.name[0] not in "<[("]
         except RuntimeError:
-            # A pass that failed leaves the decoder in the middle of it.
+            # After a failed pass the decoder is in an undefined state.
             _decoder.cache_clear()
             return None
     if len(found) != sum(1 for name in names if name):
@@ -79,7 +78,7 @@ def _decoder() -> Any:
 
 
 def _known(decoder: Any, spelling: str, phones: Sequence[str]) -> str:
-    """The name of the word in the decoder's dictionary; "" where it cannot be said."""
+    """Return the name of the word in the decoder's dictionary, adding it if needed; "" without phones."""
     plain = spelling.lower().replace("’", "'")
     if decoder.lookup_word(plain) is not None:
         return plain
@@ -92,7 +91,7 @@ def _known(decoder: Any, spelling: str, phones: Sequence[str]) -> str:
 
 
 def _hear(decoder: Any, pcm: bytes) -> None:
-    decoder.reinit_feat()  # forget the noise of what was heard before: the same sound gives the same times
+    decoder.reinit_feat()  # forget earlier noise, so that the same sound gives the same times
     decoder.start_utt()
     decoder.process_raw(pcm, full_utt=True)
     decoder.end_utt()

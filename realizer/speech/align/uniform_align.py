@@ -1,4 +1,4 @@
-"""The aligner of last resort: words spread evenly over voiced time."""
+"""The fallback aligner, which spreads words evenly over the time with speech."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ INSTALL = "no aligner, words are spread evenly: pip install 'bml-realizer[speech
 
 
 def uniform_align(sound: Float32, duration: float, reference: Utterance) -> Alignment:
-    """What is left where no aligner is installed; the confidence is 0."""
+    """Spread the words of the reference over the audible parts of the recording; the confidence is 0."""
     loud = features.loudness(features.energies(sound, HOP))
     _, talks = features.voice_activity(loud)
     passed = np.append(0.0, np.cumsum(talks)) / max(int(talks.sum()), 1)
-    passed += np.arange(len(passed)) * 1e-12  # rising, so that it can be turned round
+    passed += np.arange(len(passed)) * 1e-12  # strictly rising, so that it has an inverse
     times = np.minimum(np.arange(len(passed)) * HOP / features.RATE, duration)
     first, last = reference.words[0].start, reference.words[-1].end
 

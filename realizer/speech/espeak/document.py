@@ -1,4 +1,4 @@
-"""The SSML that espeak-ng is given, with the places of words and marks in it."""
+"""A writer of SSML for espeak-ng, with the places of words and marks in it."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from realizer.speech.ssml import Break, Mark, Part, Script, Tag, write_tag
 from realizer.speech.ssml_prosody import PLAIN
 from realizer.speech.words import PlacedMark, words_in
 
-# Of its pitch, from 50 % to 200 % of the setting: octaves for each doubling, as heard in its sound.
+# Octaves for each doubling of espeak-ng's pitch setting, as measured in its sound from 50 % to 200 %.
 OCTAVES = 0.72
-MAX_PITCH = 198.0  # %; its setting ends there
+MAX_PITCH = 198.0  # %; the greatest setting
 STOPS = re.compile(r"\.+(?!\w)")
 
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """What espeak-ng is given.
+    """The input of espeak-ng.
 
     Attributes:
         text: SSML; marks are named m0, m1, ...
@@ -35,7 +35,7 @@ class Document:
 
 
 def write_document(script: Script) -> Document:
-    """The script as SSML: inside <speak>, attributes in double quotes, only elements that are spoken."""
+    """Return the script as SSML for espeak-ng."""
     text = "<speak>"
     words: list[tuple[str, int]] = []
     marks: list[PlacedMark] = []
@@ -55,7 +55,7 @@ def write_document(script: Script) -> Document:
 
 
 def _stops_first(parts: Sequence[Part]) -> list[Part]:
-    """The parts, full stops that stand behind a mark before it: alone there espeak-ng says "dot"."""
+    """Return the parts with full stops after a mark moved before it, where espeak-ng would say "dot"."""
     moved: list[Part] = []
     for part in parts:
         stops = STOPS.match(part) if isinstance(part, str) else None
@@ -73,9 +73,9 @@ def _stops_first(parts: Sequence[Part]) -> list[Part]:
 
 
 def _in_its_units(tag: Tag) -> Tag:
-    """The tag with volume and pitch of <prosody> as espeak-ng means them.
+    """Return the tag with volume and pitch of <prosody> in espeak-ng's units.
 
-    It reads decibels and semitones as per cent, and its pitch is a setting and not a factor.
+    It reads decibels and semitones as per cent, and its pitch is a setting, not a factor.
     """
     if tag.name != "prosody" or tag.attributes is None:
         return tag
@@ -83,6 +83,6 @@ def _in_its_units(tag: Tag) -> Tag:
     manner = PLAIN.within(given)
     if "volume" in given:
         given["volume"] = f"{100 * manner.volume:.1f}%"
-    if manner.pitch != PLAIN.pitch:  # of Hz it alone knows what they are
+    if manner.pitch != PLAIN.pitch:  # values in Hz are passed on unchanged
         given["pitch"] = f"{min(MAX_PITCH, max(0.0, 100 + 100 * np.log2(manner.pitch) / OCTAVES)):.1f}%"
     return Tag(tag.name, tuple(given.items()))

@@ -1,4 +1,4 @@
-"""Times of words, phonemes and marks from the events that espeak-ng reports."""
+"""Times of words, phonemes and marks from the events of espeak-ng."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from realizer.speech.utterance import Phoneme, Word
 from realizer.speech.word_boundaries import boundaries, is_vowel, strip_marks
 
 STRESS = {"ˈ": 1, "ˌ": 2}
-SILENCE = 8  # of 32768; a closure is exact zeros but for the tail of the sound before
+SILENCE = 8  # of 32768; a closure is exact zeros, except for the tail of the sound before
 MIN_CLOSURE = 0.01  # s
-KEPT_OF_VOWEL = 0.4  # of a sound that a closure is cut from
+KEPT_OF_VOWEL = 0.4  # of a sound whose end is given to a closure
 
 Spoken = Callable[[Sequence[str]], Sequence[Sequence[str]]]
 
@@ -29,7 +29,7 @@ class Timeline:
 
 @dataclass(slots=True)
 class WordGroup:
-    """A run of phonemes that begins where one of our words surely begins, and the words in it."""
+    """A run of phonemes that starts where espeak-ng reports a word, and the words in it."""
 
     sample: int
     first: int  # of the phonemes
@@ -37,14 +37,14 @@ class WordGroup:
 
 
 def timeline(document: Document, events: Sequence[Event], pcm: Int16, rate: int, spoken: Spoken) -> Timeline:
-    """The times of everything in seconds; phonemes tile 0..len(pcm)/rate without a gap.
+    """Return all times in seconds; phonemes and pauses cover 0..len(pcm)/rate without gaps.
 
     Args:
-        document: what was spoken.
+        document: the spoken document.
         events: (type, sample, place, text) in order.
         pcm: (n,) int16.
         rate: Hz.
-        spoken: words -> the phonemes of each alone; only asked where espeak-ng merged words.
+        spoken: returns the phonemes of words spoken separately; called if espeak-ng merged words.
     """
     events = _linked(events)
     begins, sounds, word_events = _sounds(events, len(pcm))
@@ -62,10 +62,10 @@ def timeline(document: Document, events: Sequence[Event], pcm: Int16, rate: int,
 
 
 def _linked(events: Sequence[Event]) -> list[Event]:
-    """The events with words and marks that come too early moved to their first phoneme.
+    """Return the events with words and marks that are too early moved to their first phoneme.
 
-    Where a nasal runs on into a vowel ("one of", "am in"), espeak-ng reports the second word, after the
-    nasal in order, at the time when the nasal begins.
+    If a nasal continues into a vowel ("one of", "am in"), espeak-ng reports the second word after the nasal,
+    but with the time at which the nasal starts.
     """
     moved = list(events)
     latest: tuple[int, str] = (-1, "")
@@ -79,7 +79,7 @@ def _linked(events: Sequence[Event]) -> list[Event]:
 
 
 def _sounds(events: Sequence[Event], end: int) -> tuple[list[int], list[str], list[tuple[int, int, int]]]:
-    """Starts of phonemes, their IPA with stress, and (sample, place, index of its first phoneme) of words."""
+    """Return starts of phonemes, their IPA with stress, and (sample, place, first phoneme) of words."""
     begins: list[int] = []
     sounds: list[str] = []
     words: list[tuple[int, int, int]] = []
@@ -100,14 +100,14 @@ def _words(
     end: int,
     spoken: Spoken,
 ) -> list[tuple[int, int]]:
-    """For each of our words: its first sample and the one after its last."""
+    """Return (first sample, sample after the last) of each word of the document."""
     if not document.words:
         return []
     starts = {place: index for index, (_, place) in enumerate(document.words)}
     groups: list[WordGroup] = []
     last = -1
     for sample, place, first in events:
-        # After some punctuation the place is that of the blank before the word.
+        # After some punctuation the place is the blank before the word.
         index = starts.get(place, starts.get(place + 1, -1))
         if index > last:
             groups.append(WordGroup(sample, first))
@@ -115,7 +115,7 @@ def _words(
             last = index
     if not groups:
         groups = [WordGroup(begins[0] if begins else 0, 0)]
-    if not groups[0].words or groups[0].words[0] != 0:  # words before the first that was reported
+    if not groups[0].words or groups[0].words[0] != 0:  # words before the first reported one
         groups[0].words = [0]
         groups[0].first = 0
     bounds = [group.words[0] for group in groups] + [len(document.words)]
@@ -144,7 +144,7 @@ def _words(
                 first = found[-1][1]
             until = begins[mine[-1] + 1] if mine and mine[-1] + 1 < len(begins) else end
             found.append((first, max(first, until if mine else first)))
-    # A word ends where the next begins at the latest.
+    # A word ends at the latest where the next one begins.
     return [
         (first, min(last, found[k + 1][0]) if k + 1 < len(found) else last)
         for k, (first, last) in enumerate(found)
@@ -152,7 +152,7 @@ def _words(
 
 
 def _marks(document: Document, events: Sequence[Event], words: Sequence[tuple[int, int]]) -> dict[str, int]:
-    """Mark -> sample: where the next word begins; before a <break> and at the end as it is reported."""
+    """Return the sample of each mark: the start of the next word; as reported before a <break> or the end."""
     reported: dict[str, int] = {}
     for kind, sample, _, text in events:
         if kind == MARK:
@@ -164,7 +164,7 @@ def _marks(document: Document, events: Sequence[Event], words: Sequence[tuple[in
         following = words[mark.word] if mark.word < len(words) else None
         heard = reported.get(f"m{k}")
         if following is not None and not mark.paused:
-            # A reported mark comes too early where espeak-ng puts a little pause before the word.
+            # The reported time is too early if espeak-ng makes a short pause before the word.
             sample = following[0]
         else:
             sample = before if heard is None else heard
@@ -174,10 +174,10 @@ def _marks(document: Document, events: Sequence[Event], words: Sequence[tuple[in
 
 
 def _with_closures(begins: Sequence[int], sounds: Sequence[str], pcm: Int16, rate: int) -> list[int]:
-    """Starts of the phonemes with each closure given to the stop that it belongs to.
+    """Return the starts of phonemes with each closure added to its stop.
 
-    espeak-ng reports a stop at its burst: the silence of the closure counts to the sound before, and lips
-    that follow it would close when the burst is heard.
+    espeak-ng reports a stop at its burst and counts the silence of the closure as part of the sound before,
+    so that lips would close only when the burst is heard.
     """
     begins = list(begins)
     loud = (pcm > SILENCE) | (pcm < -SILENCE)
@@ -187,7 +187,7 @@ def _with_closures(begins: Sequence[int], sounds: Sequence[str], pcm: Int16, rat
         if mostly[k] or before == here or not sounds[k] or not sounds[k - 1] or _is_vowel(sounds[k]):
             continue
         backwards = loud[before:here][::-1]
-        still = int(backwards.argmax())  # 0 also where nothing is loud
+        still = int(backwards.argmax())  # 0 also if nothing is loud
         quiet = here - still if still else before
         if here - quiet >= MIN_CLOSURE * rate:
             begins[k] = max(quiet, before + round(KEPT_OF_VOWEL * (here - before)))
@@ -211,10 +211,10 @@ def _phonemes(begins: Sequence[int], sounds: Sequence[str], end: int, rate: int)
     )
 
 
-# The same few hundred sounds are heard again and again.
+# There are only a few hundred different sounds.
 @lru_cache(maxsize=2048)
 def _plain(sound: str) -> tuple[str, int]:
-    """The sound without its stress, and that."""
+    """Return the sound without stress marks, and its stress."""
     stress = next((STRESS[c] for c in sound if c in STRESS), 0)
     return sound.replace("ˈ", "").replace("ˌ", ""), stress
 

@@ -14,7 +14,7 @@ WORD, MARK, END, PHONEME = 1, 3, 5, 7
 
 Event = tuple[int, int, int, str]
 
-# espeak_EVENT of speak_lib.h; `text` is a phoneme's, eight bytes without an end where all eight are used.
+# espeak_EVENT of speak_lib.h; `text` is a phoneme, which has no terminating 0 if it takes all eight bytes.
 LAYOUT = np.dtype(
     [
         ("type", np.intc),
@@ -31,12 +31,11 @@ LAYOUT = np.dtype(
 
 
 def read_answer(head: Mapping[str, Any], body: bytes) -> tuple[list[Event], Int16]:
-    """(type, sample, place, text) in order, of those that are of use, and (n,) int16 that nobody can write.
+    """Parse an answer to "say" of `espeak.worker`.
 
-    `text` is a phoneme's IPA or a mark's name.
-
-    Args:
-        head, body: of the answer to "say", as `espeak_worker` gives them.
+    Returns:
+        (type, sample, place, text) of words, marks, phonemes and ends in order, where `text` is a phoneme's
+        IPA or a mark's name; and (n,) int16 samples, read-only.
     """
     size: int = head["events"]
     told = np.frombuffer(body, LAYOUT, size // LAYOUT.itemsize)
@@ -53,7 +52,7 @@ def read_answer(head: Mapping[str, Any], body: bytes) -> tuple[list[Event], Int1
     return events, np.frombuffer(body, "<i2", offset=size)
 
 
-# A language has some hundred of them.
+# A language has about a hundred.
 @lru_cache(maxsize=2048)
 def _label(raw: bytes) -> str:
     return raw.split(b"\0")[0].decode("utf-8", "replace")

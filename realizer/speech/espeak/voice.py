@@ -18,13 +18,13 @@ from realizer.speech.ssml import Script
 from realizer.speech.utterance import STRETCH, SpeechRequest, Utterance
 
 WORDS_A_MINUTE = 175  # espeak-ng's own rate
-SLOWEST, FASTEST = 80, 450  # words a minute; what it accepts
+SLOWEST, FASTEST = 80, 450  # words a minute; the range that it accepts
 MAX_CACHED_WORDS = 4096
 INSTALL = "espeak-ng is not installed: pip install 'bml-realizer[speech]' (or apt-get install libespeak-ng1)"
 
 
 def install_hint() -> str | None:
-    """None where espeak-ng is installed; otherwise the sentence that says what to install."""
+    """Return a sentence that says how to install espeak-ng, or None if it is installed."""
     if importlib.util.find_spec("espeakng_loader") is not None:
         return None
     import ctypes.util  # slow, and only needed without the package
@@ -36,11 +36,11 @@ ENGINE = Engine("espeak-ng", Path(__file__).with_name("worker.py"), install_hint
 
 
 class EspeakVoice(EngineVoice):
-    """espeak-ng in over 100 languages; the same request gives the same samples, in any order and process.
+    """espeak-ng, with over 100 languages; a request gives the same samples in any order and process.
 
     Args:
-        voice: a voice of espeak-ng ("nl", "en-gb+f3", "+m3" for the language's own with a variant), or None.
-        limit: seconds that one request may take.
+        voice: a voice of espeak-ng ("nl", "en-gb+f3", "+m3" for a variant of the default voice), or None.
+        limit: greatest duration of one request to the engine, in seconds.
         options: for the worker process ("--data", PATH; "--no-fork").
     """
 
@@ -83,7 +83,7 @@ class EspeakVoice(EngineVoice):
         )
 
     def _word_phonemes(self, voice: str, words: Sequence[str]) -> list[tuple[str, ...]]:
-        """The phonemes of each word by itself."""
+        """Return the phonemes of each word spoken separately."""
         with self._lock:
             known = dict(self._alone)
         unknown = sorted({word for word in words if (voice, word) not in known})
@@ -97,14 +97,14 @@ class EspeakVoice(EngineVoice):
 
 
 def choose_voice(hello: dict[str, Any], wanted: str | None, language: str) -> tuple[str, tuple[str, ...]]:
-    """espeak-ng's own name of a voice, and warnings.
+    """Return espeak-ng's name of a voice, and warnings.
 
-    espeak-ng takes "nl" and "en-gb" but not "nl-NL" or "fr-fr": its list of voices knows which tag is whose.
+    espeak-ng accepts "nl" and "en-gb" but not "nl-NL" or "fr-fr"; its list of voices has the tags of each.
 
     Args:
-        hello: what the engine said of itself.
-        wanted: a tag, an identifier or a name of the list, with or without "+variant"; or None.
-        language: BCP-47, used where `wanted` names no voice.
+        hello: the engine's description of itself.
+        wanted: a tag, an identifier or a name from the list, with or without "+variant"; or None.
+        language: BCP-47, used if `wanted` is not a voice.
     """
     warnings: list[str] = []
     base, _, variant = (wanted or "").partition("+")
@@ -127,7 +127,7 @@ def choose_voice(hello: dict[str, Any], wanted: str | None, language: str) -> tu
 
 
 def _by_tag(hello: dict[str, Any], tag: str) -> str | None:
-    """The voice of a BCP-47 tag: the longest part of it that some voice has, most specific first."""
+    """Return the voice for a BCP-47 tag, or for the longest part of it that has one."""
     subtags = tag.lower().replace("_", "-").split("-")
     for length in range(len(subtags), 0, -1):
         part = "-".join(subtags[:length])

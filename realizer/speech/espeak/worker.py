@@ -1,11 +1,11 @@
 """The espeak-ng engine, run by `engine_worker`: text to PCM and events.
 
-espeak-ng is GPL-3 and not thread-safe, and what it says depends on what it said before: it is only ever
-loaded in a process of its own.
+espeak-ng is GPL-3 and not thread-safe, and its sound depends on earlier requests, so it is only loaded in a
+process of its own.
 
     hello     {"rate", "variants": [name], "voices": [{"name", "id", "languages": [[priority, tag]]}]}
-    say       {"text", "voice", "wpm"} -> {"events": n, "marks": [name of each event that is a mark]} and
-              n bytes of events, as they lie in the engine's memory, and int16 PCM
+    say       {"text", "voice", "wpm"} -> {"events": n, "marks": [name of each event that is a mark]},
+              n bytes of events as the engine's structs, and int16 PCM
     phonemes  {"voice", "words"} -> {"phonemes": [[ipa, ...], ...]}
 """
 
@@ -18,13 +18,13 @@ import os
 from pathlib import Path
 from typing import Any, ClassVar
 
-LONGEST_PATH = 140  # bytes; espeak-ng keeps its data path in a buffer of 160 with names appended
-PIECE = 500  # ms of sound that we are called with at once
-LONGEST_SOUND = 1800  # s; a text that lasts longer is refused
+LONGEST_PATH = 140  # bytes; espeak-ng appends names to its data path in a buffer of 160
+PIECE = 500  # ms of sound in each callback
+LONGEST_SOUND = 1800  # s; longer texts are refused
 SYNCHRONOUS, PHONEME_EVENTS, PHONEME_IPA, DONT_EXIT = 2, 1, 2, 0x8000
 UTF8, SSML, END_PAUSE = 1, 0x10, 0x1000
 RATE = 1  # parameter number: words a minute
-MARK = 3  # type of an event; 0 stands behind the last one
+MARK = 3  # type of an event; 0 follows the last one
 
 
 class EventId(ctypes.Union):
@@ -68,17 +68,17 @@ SynthCallback = ctypes.CFUNCTYPE(
 
 
 class Engine:
-    """espeak-ng, loaded and ready.
+    """The loaded library.
 
     Args:
-        data: folder of its data, or None for what came with the library.
+        data: folder of its data, or None for the library's own.
 
     Raises:
-        RuntimeError: the library or its data cannot be loaded.
+        RuntimeError: if the library or its data cannot be loaded.
     """
 
     drifts = True
-    # Spoken before any request, always the same: a fork of an engine that has spoken takes half the time.
+    # Spoken before any request: a fork of an engine that has spoken takes half the time.
     first: ClassVar[dict[str, Any]] = {"text": "<speak>One, two.</speak>", "wpm": 175}
 
     def __init__(self, data: str | None) -> None:
@@ -100,7 +100,7 @@ class Engine:
         if data is not None:
             self.variants = sorted(p.name for p in Path(data, "voices", "!v").glob("*"))
             if len(os.fsencode(data)) > LONGEST_PATH:
-                # This process's folder is its own: from inside the data the path is one character.
+                # From inside the data folder the path is one character long.
                 os.chdir(data)
                 data = "."
         flags = PHONEME_EVENTS | PHONEME_IPA | DONT_EXIT
@@ -115,10 +115,10 @@ class Engine:
         self.heard = 0
         self.events: list[bytes] = []
         self.marks: list[str] = []
-        # Made once and here: what a fork is the first to touch costs it more than its work on it.
+        # Created here, because a fork pays for each page of memory that it touches first.
         self.callback = SynthCallback(self._hear)
         lib.espeak_SetSynthCallback(self.callback)
-        # The voice that is asked for most; an installation may lack English.
+        # The most common voice; an installation may lack English.
         english = (v["id"] for v in self.voices if any(tag == "en-us" for _, tag in v["languages"]))
         with contextlib.suppress(StopIteration, RuntimeError):
             self.say({**self.first, "voice": next(english)})
@@ -134,7 +134,7 @@ class Engine:
         while entries[index]:
             entry = entries[index].contents
             at, tags = entry.languages, []
-            # A list of: priority byte, tag, 0; a priority of 0 ends it.
+            # A list of priority byte, tag, 0; a priority of 0 ends it.
             while (priority := ctypes.c_ubyte.from_address(at).value) != 0:
                 tag = ctypes.string_at(at + 1)
                 tags.append([priority, tag.decode("ascii", "replace")])
@@ -155,13 +155,13 @@ class Engine:
         return {"events": len(events), "marks": self.marks}, [events, *self.sound]
 
     def _hear(self, wave: Any, count: int, event: Any) -> int:
-        """Keep a piece of sound and the events in it; not 0 where that was enough."""
+        """Store a piece of sound and its events; return 1 to stop the engine, otherwise 0."""
         if wave and count > 0:
             self.sound.append(ctypes.string_at(wave, 2 * count))
             self.heard += count
         fields, at = ctypes.cast(event, INTS), 0
         while (kind := fields[at]) != 0:
-            if kind == MARK:  # its name lies elsewhere in memory
+            if kind == MARK:  # its name is a pointer
                 self.marks.append(text(event[at // FIELDS].id.name or b""))
             at += FIELDS
         self.events.append(ctypes.string_at(event, at * ctypes.sizeof(ctypes.c_int)))
@@ -183,7 +183,7 @@ class Engine:
         return {"phonemes": answers}, []
 
     def _choose(self, voice: str) -> None:
-        if voice == self.voice:  # reading it again takes a tenth of what a sentence does
+        if voice == self.voice:  # loading it again takes a tenth of the time of a sentence
             return
         if self.lib.espeak_SetVoiceByName(voice.encode()) != 0:
             raise RuntimeError(f"espeak-ng has no voice {voice!r}")
@@ -191,11 +191,11 @@ class Engine:
 
 
 def find_library() -> tuple[str, str | None]:
-    """(library, data folder or None for its own): the pip package, or else the system's."""
+    """Return (library, data folder or None for its own) of the pip package, or else of the system."""
     try:
         import espeakng_loader
     except ImportError:
-        import ctypes.util  # brings so much along that a fork took half as long again
+        import ctypes.util  # imports so much that forks take half as long again
 
         path = ctypes.util.find_library("espeak-ng")
         if path is None:

@@ -1,4 +1,4 @@
-"""Runs of text that hibari speaks in one go, with the places of marks among the words."""
+"""Division of a script into runs of text with one prosody, with the places of marks among the words."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from realizer.speech.words import PlacedMark, words_in
 
 @dataclass(frozen=True, slots=True)
 class ProsodyRun:
-    """Text spoken in one manner.
+    """Text with one prosody.
 
     Attributes:
-        text: plain; may be empty, where the script ends in a pause.
-        words: those of the text, in order.
-        prosody: the manner.
-        pause: seconds of silence before it that the script asks for.
+        text: plain; may be empty if the script ends in a pause.
+        words: of the text, in order.
+        prosody: of the text.
+        pause: seconds of silence before it.
     """
 
     text: str
@@ -27,9 +27,9 @@ class ProsodyRun:
 
 
 def runs(script: Script) -> tuple[tuple[ProsodyRun, ...], tuple[PlacedMark, ...]]:
-    """Runs end at a <break> and where <prosody> begins or ends; <sub> is read by its alias.
+    """Divide a script at each <break>, and where <prosody> begins or ends; <sub> is read by its alias.
 
-    hibari has no other elements of SSML: their text is spoken.
+    hibari does not support other SSML elements: their text is spoken.
     """
     found: list[ProsodyRun] = []
     marks: list[PlacedMark] = []

@@ -15,13 +15,13 @@ from realizer.speech.word_boundaries import boundaries, is_vowel, strip_marks
 from realizer.speech.words import words_in
 
 Role = Literal["sound", "primary", "secondary", "long", "pause", "joint"]
-# What a reader makes of a text: written word, phonemes in hibari's signs, whether a blank follows.
+# A word as hibari reads it: text, phonemes in hibari's signs, whether a blank follows.
 Token = tuple[str, str, bool]
-WINDOW = 12  # words that a number or an abbreviation is read as, at most
-QUIET = 0.02  # of the loudest sample: where a sentence without known lengths is taken to begin and end
-SILENCE = 40  # of 32768; its pauses are nearly zeros, its faintest fricatives above 100
+WINDOW = 12  # most words into which a number or an abbreviation is expanded
+QUIET = 0.02  # of the loudest sample: the start and the end of a sentence without known lengths
+SILENCE = 40  # of 32768; pauses are nearly zeros, the faintest fricatives above 100
 KEPT_OF_LAST = 0.4  # of a sound whose end is silent
-SHARES = {"pause": 1.5, "vowel": 1.0, "consonant": 0.6}  # of a sentence without known lengths; ours
+SHARES = {"pause": 1.5, "vowel": 1.0, "consonant": 0.6}  # relative lengths, if unknown; our choice
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ class SignRow:
 
 @dataclass(frozen=True, slots=True)
 class Lengths:
-    """How long each sign of a sentence is, in samples; they add up to its sound."""
+    """The length of each sign of a sentence, in samples; they add up to its sound."""
 
     lead: int
     signs: tuple[int, ...]
@@ -44,7 +44,7 @@ class Lengths:
 
 @dataclass(frozen=True, slots=True)
 class Sound:
-    """One phoneme or pause (ipa ""): samples from the start of its sentence; `token` is its word's index."""
+    """A phoneme or pause (ipa ""), in samples from the start of its sentence; `token` is its word's index."""
 
     ipa: str
     stress: int
@@ -66,7 +66,7 @@ def _role(sign: str) -> tuple[str, Role]:
 
 
 def signs_of(sentence: Sequence[Token]) -> tuple[str, tuple[int, ...]]:
-    """The signs that hibari is given, and for each the index of its token."""
+    """Return the signs of a sentence for hibari, and for each the index of its token."""
     signs, owners = "", []
     for k, (_, phonemes, blank) in enumerate(sentence):
         said = phonemes + (" " if blank and k + 1 < len(sentence) else "")
@@ -76,14 +76,14 @@ def signs_of(sentence: Sequence[Token]) -> tuple[str, tuple[int, ...]]:
 
 
 def sounds(sentence: Sequence[Token], lengths: Lengths) -> list[Sound]:
-    """Phonemes and pauses in order; they tile the sentence from 0.
+    """Return phonemes and pauses in order, which cover the sentence from 0 without gaps.
 
-    A stress counts to its vowel, and what hibari gives to a blank to the phoneme before.
+    The length of a stress sign is added to its vowel, that of a blank to the phoneme before.
     """
     signs, owners = signs_of(sentence)
     found = [Sound("", 0, 0, lengths.lead, 0)]
     at = lengths.lead
-    opened: tuple[int, int] | None = None  # stress, and where it began
+    opened: tuple[int, int] | None = None  # stress, and the start of its sign
     for sign, owner, length in zip(signs, owners, lengths.signs, strict=True):
         ipa, role = _role(sign)
         end = at + length
@@ -110,7 +110,7 @@ def sounds(sentence: Sequence[Token], lengths: Lengths) -> list[Sound]:
 
 
 def trim_to_sound(told: Sequence[Sound], pcm: Int16) -> list[Sound]:
-    """The same with pauses that begin where it falls silent: the last sound of a phrase is told too long."""
+    """Return the sounds with pauses that start where silence does; last sounds of phrases are too long."""
     found = list(told)
     for k in range(1, len(found)):
         last, pause = found[k - 1], found[k]
@@ -126,7 +126,7 @@ def trim_to_sound(told: Sequence[Sound], pcm: Int16) -> list[Sound]:
 
 
 def guess_lengths(sentence: Sequence[Token], pcm: Int16) -> Lengths:
-    """Lengths by rule, where the model does not tell them: shares of the part of the sound that is heard."""
+    """Return estimated lengths, for models that do not report them: shares of the audible part."""
     loud = np.flatnonzero(
         np.abs(pcm.astype(np.int32)) > QUIET * max(1, int(np.abs(pcm.astype(np.int32)).max()))
     )
@@ -149,16 +149,16 @@ def word_spans(
     heard: Sequence[Sound],
     alone: Callable[[Sequence[str]], Sequence[Sequence[str]]],
 ) -> list[tuple[int, int]]:
-    """For each of our words the indices of its first sound and of the one after its last; equal for none.
+    """Return (first sound, sound after the last) of each word; equal indices for a word without sounds.
 
-    hibari writes numbers, dates and abbreviations out before it reads them: words that stand in its own text
-    too are found there, what lies between is shared out by how each word sounds alone.
+    hibari expands numbers, dates and abbreviations before it reads them. Words that also occur in the
+    expanded text are matched; words between them are divided by their phonemes when spoken separately.
 
     Args:
-        words: ours, as they are written.
-        tokens: hibari's, of all sentences.
-        heard: of all sentences; `token` counts through.
-        alone: words -> phonemes of each by itself.
+        words: of the text.
+        tokens: of hibari, of all sentences.
+        heard: of all sentences; `token` is an index into `tokens`.
+        alone: returns the phonemes of words spoken separately.
     """
     firsts: dict[int, int] = {}
     for k, sound in enumerate(heard):
@@ -197,7 +197,7 @@ def word_spans(
 
 
 def _matched(ours: Sequence[str], theirs: Sequence[str]) -> list[tuple[int, int]]:
-    """Pairs of equal words in order: on from the nearest pair after each that differ."""
+    """Return pairs of equal words in order; after a difference, continue from the nearest equal pair."""
     pairs = []
     i = j = 0
     while i < len(ours) and j < len(theirs):

@@ -1,4 +1,4 @@
-"""The hibari voice: neural English speech; its model runs in a process of its own."""
+"""The hibari voice, neural English speech; its model runs in a process of its own."""
 
 from __future__ import annotations
 
@@ -33,17 +33,17 @@ from realizer.speech.ssml import Script
 from realizer.speech.utterance import STRETCH, SpeechRequest, Utterance, Word
 
 INSTALL = "hibari (neural, English) is not installed: pip install 'bml-realizer[neural]'"
-SHOWN = 3  # words that a warning names
+SHOWN = 3  # words quoted in a warning
 
 
 def install_hint() -> str | None:
-    """None where hibari is installed; otherwise the sentence that says what to install."""
+    """Return a sentence that says how to install hibari, or None if it is installed."""
     there = all(importlib.util.find_spec(name) for name in ("hibari", "onnxruntime"))
     return None if there else INSTALL
 
 
 def voice_hint(name: str) -> str | None:
-    """None where that voice of hibari is on this machine; otherwise the sentence that says what to do."""
+    """Return a sentence that says how to get a voice of hibari, or None if it is on this machine."""
     from hibari.voices import VOICES, voice_path
 
     if name not in VOICES:
@@ -64,13 +64,13 @@ def _facts() -> dict[str, float]:
 
 
 class HibariVoice(EngineVoice):
-    """hibari speaks English; the same request gives the same samples.
+    """hibari, which speaks English; the same request gives the same samples.
 
-    A long text is spoken a sentence at a time, so that others come between.
+    A long text is spoken sentence by sentence, so that other requests can be served in between.
 
     Args:
-        voice: one of hibari's that is on this machine, or None for the one in the package.
-        limit: seconds that a sentence may take.
+        voice: one of hibari's voices that is on this machine, or None for the one in the package.
+        limit: greatest duration of the synthesis of a sentence, in seconds.
         options: for the worker ("--durations", TENSOR).
     """
 
@@ -127,13 +127,13 @@ class HibariVoice(EngineVoice):
         joined: bool,
         goes_on: bool,
     ) -> None:
-        """Put a run behind what has been spoken.
+        """Synthesize a run and append it to `track`.
 
         Args:
             pace: rate of the request.
             rate: Hz.
-            joined: whether it goes on where the run before ended, without a pause.
-            goes_on: the same of the run after.
+            joined: whether it follows the run before without a pause.
+            goes_on: whether the run after follows without a pause.
         """
         track.add(np.zeros(round(run.pause * rate), np.int16))
         heard: list[Sound] = []
@@ -143,7 +143,7 @@ class HibariVoice(EngineVoice):
                 tokens += sentence
                 continue
             pcm, told = self._sentence(sentence, run, pace, rate)
-            # A new sentence keeps the breath before it; the first starts at once.
+            # The silence at its start is kept, except for the first sentence.
             lead = 0 if joined else round(syllable_facts()["edge"] * rate)
             first = max(0, told[0].end - lead) if not heard and not told[0].ipa else 0
             ends_open = goes_on and k + 1 == len(reading) and not _ends_in_pause(sentence)
@@ -168,7 +168,7 @@ class HibariVoice(EngineVoice):
     def _sentence(
         self, sentence: Sequence[Token], run: ProsodyRun, pace: float, rate: int
     ) -> tuple[Int16, list[Sound]]:
-        """Sound, and its phonemes when they are heard; they tile it."""
+        """Return the sound of a sentence and its phonemes, which cover it without gaps."""
         facts = _facts()
         speed = min(facts["fastest"], max(facts["slowest"], pace * run.prosody.rate))
         asked = {"op": "say", "phonemes": signs_of(sentence)[0], "speed": speed, "pitch": run.prosody.pitch}
@@ -187,7 +187,7 @@ class HibariVoice(EngineVoice):
         return pcm, trim_to_sound(heard, pcm)
 
     def _word_phonemes(self, words: Sequence[str]) -> list[list[str]]:
-        """The phonemes of each word by itself."""
+        """Return the phonemes of each word spoken separately."""
         head, _ = self._process.ask({"op": "read", "texts": list(words)})
         found = []
         for text in head["texts"]:

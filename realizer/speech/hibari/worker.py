@@ -1,12 +1,12 @@
 """The hibari engine, run by `engine_worker`: text to readings, readings to PCM and durations.
 
-    hello   {"rate", "durations": whether the model tells how long its signs are}
+    hello   {"rate", "durations": whether the model reports the durations of its signs}
     read    {"texts"} -> {"texts": [[[[word, phonemes, blank after], ...] a sentence, ...] a text, ...]}
     say     {"phonemes", "speed", "pitch"} -> {"lead", "signs": [one a character of `phonemes`], "tail"} in
-            samples (null where the model does not tell), and float32 PCM
+            samples (null if the model does not report them), and float32 PCM
 
-hibari (Apache-2.0) speaks English. Its model has no output for durations; the tensor is there and is named as
-one. The same request gives the same samples: the noise is drawn from a fixed seed for each sentence.
+hibari (Apache-2.0) speaks English. Its model has a tensor of durations, which is declared as an output here.
+The same request gives the same samples, because the noise of each sentence has a fixed seed.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from typing import Any
 
 DURATIONS = "/Round_output_0"  # frames of each sign, in the models of hibari 0.2
 SEED = 0
-LONGEST = 400  # phonemes at once; the time and memory of the model grow with the square
-LINK = re.compile(r"\](?=\()")  # hibari reads [word](/phonemes/); here brackets are brackets
+LONGEST = 400  # phonemes at once; time and memory of the model grow with the square
+LINK = re.compile(r"\](?=\()")  # hibari interprets [word](/phonemes/); here brackets are text
 
 
 class Speaker:
-    """The model and its reader, loaded.
+    """The loaded model and its reader.
 
     Args:
         voice: one of hibari's voices that is on this machine.
-        durations: name of the tensor that holds them.
+        durations: name of the tensor of durations.
     """
 
     drifts = False
@@ -40,14 +40,14 @@ class Speaker:
         try:
             self.hibari = Hibari(voice, with_output(model, durations))
             self.has_durations = True
-        except Exception:  # onnxruntime's own kinds are not public; a model that is damaged fails again
+        except Exception:  # onnxruntime's exceptions are not public; a damaged model fails again
             self.hibari = Hibari(voice, model)
             self.has_durations = False
         self.reader = self.hibari.g2p
         self.operations = {"read": self.read, "say": self.say}
 
     def hello(self) -> dict[str, Any]:
-        self.reading("Hello.")  # the first sentence should not wait for what is loaded when it is used
+        self.reading("Hello.")  # load now what the first sentence would have to wait for
         self.say({"phonemes": "hi", "speed": 1.0, "pitch": 1.0})
         return {"rate": self.hibari.sample_rate, "durations": self.has_durations}
 
@@ -91,7 +91,7 @@ class Speaker:
 
 
 def split(words: list[tuple[str, str, bool]]) -> list[list[tuple[str, str, bool]]]:
-    """A sentence as pieces of at most `LONGEST` phonemes: at a comma, else at a blank, else anywhere."""
+    """Split a sentence into pieces of at most `LONGEST` phonemes at commas, else at blanks, else anywhere."""
     pieces: list[list[tuple[str, str, bool]]] = [[]]
     length = 0
     for text, phonemes, blank in words:
@@ -113,10 +113,10 @@ def split(words: list[tuple[str, str, bool]]) -> list[list[tuple[str, str, bool]
 
 
 def with_output(model: bytes, tensor: str) -> bytes:
-    """An ONNX model with one more output.
+    """Return an ONNX model with one more output.
 
-    Two messages of one kind are read as one, by the rules of protocol buffers: a second ModelProto.graph (7)
-    with nothing but a GraphProto.output (12) that has a ValueInfoProto.name (1) is put behind the model.
+    Protocol buffers merge repeated messages, so a second ModelProto.graph (7) that only has a
+    GraphProto.output (12) with a ValueInfoProto.name (1) is appended to the model.
     """
     message = tensor.encode()
     for field in (1, 12, 7):

@@ -1,1 +1,1 @@
-"""Utterances from recordings and clips."""
+"""Utterances from recordings."""

@@ -1,4 +1,4 @@
-"""Lip motion from loudness, for sound without a transcript."""
+"""Phonemes from loudness, for recordings without a transcript."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from realizer.speech.utterance import Phoneme
 
 
 def by_loudness(pcm: Int16, rate: int) -> tuple[Phoneme, ...]:
-    """Vowels as open as the sound is loud, by the root mean square of windows (`envelope.toml`).
+    """Return vowels that are the more open the louder the sound is (`envelope.toml`).
 
-    They tile the sound; () for silence.
+    Phonemes and pauses cover the sound without gaps; () for silence.
 
     Args:
         pcm: (n,) mono.

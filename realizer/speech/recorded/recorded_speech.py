@@ -1,4 +1,4 @@
-"""Utterances from a recording and its known times."""
+"""Utterances from recordings, by known times, alignment or loudness."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from realizer.core.array_types import Float64
 from realizer.speech.recorded.loudness_lips import by_loudness
 from realizer.speech.utterance import Phoneme, Recording, SpeechRequest, Utterance, Word
 
-# Words of a voice touch where those of a recording may lie apart: what ends with a word ends so much before
-# the next one begins.
+# Words of a voice are adjacent, while those of a recording may have gaps: the end of a word is mapped as a
+# time this much before the start of the next one.
 EDGE = 1e-4  # s
 SIDE = 1e-3  # letters
 
 
 def utterance_of(request: SpeechRequest, recording: Recording) -> Utterance:
-    """The recording as an utterance: by the times that came with it, or else aligned, or else by loudness.
+    """Return a recording as an utterance, by its times if known, else by alignment, else by loudness.
 
-    Phonemes that were told move the lips as they are; of words alone, each has the phonemes a voice gives
-    it. Marks of the text come before the word that they stand before. Without times the text is found in the
-    sound; without a text the mouth opens as the sound is loud.
+    Known phonemes are used unchanged; if only words are known, each has the phonemes of the reference voice.
+    Marks are placed before their words. Without times the text is aligned with the sound; without a text the
+    mouth opens with the loudness.
 
     Raises:
-        VoiceError: the text is too long, or the voice died that knows what its phonemes are.
+        VoiceError: if the text is too long, or the reference voice died.
     """
-    # Imported here: what it needs takes longer to load than most texts to speak.
+    # Imported here, because loading the aligners takes longer than most texts to speak.
     from realizer.speech.align.recording_marks import align_recording
 
     if not recording.words and not recording.phonemes:
@@ -65,7 +65,7 @@ def utterance_of(request: SpeechRequest, recording: Recording) -> Utterance:
 def _utterance(
     recording: Recording, words: Sequence[Word], phonemes: Sequence[Phoneme], marks: dict[str, float]
 ) -> Utterance:
-    """Everything inside the sound, phonemes without gaps."""
+    """Return an utterance with all times within the sound, and pauses in the gaps between phonemes."""
     duration = len(recording.pcm) / recording.rate
     tiled: list[Phoneme] = []
     now = 0.0
@@ -89,37 +89,37 @@ def _opening(recording: Recording) -> tuple[Phoneme, ...]:
 
 
 def _reference(request: SpeechRequest) -> Utterance:
-    """What a voice makes of the same text; its times are those of nobody."""
+    """Return the reference voice's utterance of the same text, whose times only count relatively."""
     from realizer.speech.registry import reference_voice
 
     return reference_voice().say(replace(request, voice=None, rate=1.0, seconds=None, recording=None))
 
 
 def _one_word(phonemes: Sequence[Phoneme], reference: Utterance) -> tuple[Word, ...]:
-    """All the text as one word, from the first sound to the last."""
+    """Return all the text as one word, from the first sound to the last."""
     said = [p for p in phonemes if p.ipa] or list(phonemes)
     return (Word(said[0].start, said[-1].end, "".join(w.text for w in reference.words)),)
 
 
 def _knots(reference: Sequence[Word], own: Sequence[Word]) -> tuple[Float64, Float64]:
-    """Times of the reference, and of the recording: where the same letters of the text are said.
+    """Return times in the reference and in the recording at which the same letters of the text are spoken.
 
-    Whoever times words may divide them otherwise than we do; letters are the same.
+    Letters are compared because recordings may divide the text into other words.
     """
     letters, times = _letters(reference)
     places, instants = _letters(own)
     if not len(times) or not len(instants):
         return np.zeros(1), np.zeros(1)
-    if len(own) == 1 and len(reference) > 1:  # one stretch of sound: as the reference goes, evenly
+    if len(own) == 1 and len(reference) > 1:  # a single span for all words: scale the reference
         return times[[0, -1]], instants[[0, -1]]
-    # Between two words a pause may lie: a word begins behind it, and ends before it.
+    # If there is a pause between two words, it belongs to neither.
     beside = np.where(np.arange(len(letters)) % 2 == 0, SIDE, -SIDE)
     times[1::2] -= EDGE
     return times, np.interp(letters * (places[-1] / letters[-1]) + beside, places, instants)
 
 
 def _letters(words: Sequence[Word]) -> tuple[Float64, Float64]:
-    """How many letters of the text come before each word's start and end, and when that is."""
+    """Return the number of letters of the text before each word's start and end, and the times of these."""
     said = [(word, sum(map(str.isalnum, word.text))) for word in words]
     said = [(word, length) for word, length in said if length]
     ends = np.cumsum([length for _, length in said], dtype=np.float64)

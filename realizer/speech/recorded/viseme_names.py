@@ -1,4 +1,4 @@
-"""Viseme names of other systems, mapped to phonemes by a table."""
+"""A table from viseme names of other systems to phonemes."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ class NamedViseme:
 
 
 def viseme_sets() -> tuple[str, ...]:
-    """The sets that are known."""
+    """Return the names of the known sets."""
     return tuple(_sounds())
 
 
 def sound_of(set: str, viseme: str) -> str:
-    """IPA whose mouth the viseme is; "" for silence.
+    """Return the IPA whose mouth shape the viseme is; "" for silence.
 
     Raises:
-        KeyError: no such set, or no such viseme in it; the text says which there are.
+        KeyError: if there is no such set, or no such viseme in it; the text lists the known ones.
     """
     if set not in _sounds():
         raise KeyError(f"wanted a set of visemes of {', '.join(_sounds())}, got {set!r}")
