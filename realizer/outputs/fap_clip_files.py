@@ -99,7 +99,7 @@ def _from_csv(text: str) -> FAPClip:
     fps, notes = _rate(cells[:, column_of["time"]])
     others = len(head) - 1 - len(wanted)
     if others:
-        notes.append(f"{others} columns are no FAP and passed over")
+        notes.append(f"{others} columns are not FAPs and are ignored")
     values, mask = np.zeros((len(body), 68)), np.zeros(68, bool)
     for name, fap in numbers.items():
         if name in wanted:
@@ -119,7 +119,7 @@ def _rate(times: npt.NDArray[np.float64]) -> tuple[float, list[str]]:
         RealizerError: if they do not rise evenly.
     """
     if len(times) < 2:
-        return 25.0, ["less than two frames have no rate; taken as 25 a second"]
+        return 25.0, ["fewer than two frames have no rate; taken as 25 a second"]
     step = (times[-1] - times[0]) / (len(times) - 1)
     if not step > 0:
         raise RealizerError(f"time: wanted rising times, got {times[0]:g} to {times[-1]:g}")

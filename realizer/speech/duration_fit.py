@@ -42,7 +42,7 @@ def silent_fallback(request: SpeechRequest, fault: VoiceError | str) -> Utteranc
     from realizer.speech.silent import SilentVoice
 
     made = speak_to_length(SilentVoice(), request)
-    return replace(made, warnings=(*made.warnings, f"{fault}; this one has no sound"))
+    return replace(made, warnings=(*made.warnings, f"{fault}; the silent voice is used instead"))
 
 
 def _synthesize(voice: Voice, request: SpeechRequest) -> Utterance:

@@ -70,7 +70,7 @@ def find_voice(name: str | None = None) -> Voice:
     if engine not in VOICES:
         known = ", ".join(VOICES)
         raise VoiceError(
-            f"voice: wanted one of {known}, got {name!r}; `realizer voices` says how to get them"
+            f"voice: wanted one of {known}, got {name!r}; `realizer voices` says how to install them"
         )
     voice = VOICES[engine]
     if fix := voice.missing(variant or None):

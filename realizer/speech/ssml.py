@@ -112,7 +112,7 @@ def read_script(request: SpeechRequest) -> Script:
     warnings: list[str] = []
     ssml, wrong = NOT_XML.subn(" ", request.ssml)
     if wrong:
-        warnings.append(f"{wrong} control characters in the text are left out")
+        warnings.append(f"{wrong} control characters in the text are ignored")
     try:
         parts, odd = _parse(ssml)
         warnings += odd
@@ -120,10 +120,10 @@ def read_script(request: SpeechRequest) -> Script:
         warnings.append(f"the text is not well-formed SSML ({error}): spoken as plain text")
         parts = list(_scrape(ssml))
     if any(isinstance(part, Mark) and not part.name for part in parts):
-        warnings.append("a mark without a name is left out")
+        warnings.append("a mark without a name is ignored")
     names = [part.name for part in parts if isinstance(part, Mark) and part.name]
     for name in sorted({name for name in names if names.count(name) > 1}):
-        warnings.append(f"there are several marks {name!r}: the first one counts")
+        warnings.append(f"there are several marks {name!r}: the first one is used")
     seen = {""}
     parts = [part for part in parts if not (isinstance(part, Mark) and _twice(part.name, seen))]
     if any(isinstance(part, str) and PICTURES.search(part) for part in parts):
@@ -164,7 +164,7 @@ def _parse(ssml: str) -> tuple[list[Part], list[str]]:
             kept = ((k, attributes[k][:LONGEST_ATTRIBUTE]) for k in SPOKEN[name] if k in attributes)
             parts.append(Tag(name, tuple(kept)))
         elif name not in PLAIN:
-            odd.append(f"<{name[:40]}> is not spoken SSML: it is left out, text in it is not")
+            odd.append(f"<{name[:40]}> is not SSML for speech: it is ignored, but its text is spoken")
 
     def end(name: str) -> None:
         name = name.rpartition(":")[2]

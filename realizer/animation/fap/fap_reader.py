@@ -81,7 +81,7 @@ def read_fap(text: str | bytes) -> FAPClip:
         notes.add("frames are not lines; read as one stream of numbers, as Xface does", lines[0][0])
     frames = [_frame(mask, values, notes) for mask, values in pairs]
     if count is not None and count != len(frames):
-        notes.add(f"the header says {count} frames, there are {len(frames)}", 1)
+        notes.add(f"the header says {count} frames, the file has {len(frames)}", 1)
     return _clip(name, fps, frames, notes)
 
 
@@ -217,7 +217,7 @@ def _clip(name: str, fps: float, frames: list[_Frame], notes: _Notes) -> FAPClip
         given[place, frame.layout.used] = True
     seen = given[[*places]] if places else given
     if len(seen) and not (seen == seen[0]).all():
-        notes.add("the mask varies; where a frame does not give a FAP it is neutral")
+        notes.add("the mask varies; FAPs that a frame omits are neutral")
     values = numbers[:, 1:69]
     _note_ranges(values, notes)
     used: Bool = np.asarray(given[:, 1:].any(axis=0))
@@ -234,12 +234,12 @@ def _places(frames: list[_Frame], notes: _Notes) -> list[int]:
         notes.add(f"frames are numbered from {least}", frames[0].line)
     places = [frame.number - least for frame in frames]
     if len(set(places)) < len(places):
-        notes.add("a frame number comes twice; the later frame counts")
+        notes.add("a frame number occurs twice; the later frame is used")
     if max(places) >= SPARSEST * len(frames):
-        notes.add("frame numbers jump wildly; taken in the order of the file")
+        notes.add("frame numbers are far apart; frames are used in the order of the file")
         return list(range(len(frames)))
     if len(set(places)) <= max(places):
-        notes.add("frame numbers have gaps; frames in between are neutral")
+        notes.add("frame numbers have gaps; missing frames are neutral")
     return places
 
 
@@ -281,8 +281,8 @@ def _integers(words: list[str], notes: _Notes, line: int) -> list[int]:
 def _integer(word: str, notes: _Notes, line: int) -> int:
     value = _number(word)
     if value is None:
-        notes.add("a value is no number, taken as 0", line)
+        notes.add("a value is not a number; taken as 0", line)
         return 0
     if value != int(value):
-        notes.add("values are not whole, rounded", line)
+        notes.add("values are not integers; rounded", line)
     return max(-INT32, min(INT32, round(value)))

@@ -84,7 +84,7 @@ def align_request(
     plain = replace(request, voice=None, rate=1.0, seconds=None, recording=None)
     reference = speaker.say(plain)
     if not reference.words:
-        raise AlignError("text: wanted words that are said in the recording, got none")
+        raise AlignError("text: wanted words, got none")
     needed = reference.words[-1].end - reference.words[0].start
     if duration < needed / FASTEST:
         raise AlignError(

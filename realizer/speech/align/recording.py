@@ -47,5 +47,5 @@ def to_aligner(sound: Float32, rate: int) -> Float32:
         AlignError: if the sound is silent.
     """
     if float(np.abs(sound).max()) < SILENCE:
-        raise AlignError("recording: wanted somebody who speaks, got silence")
+        raise AlignError("recording: wanted speech, got silence")
     return resampled(sound, rate)

@@ -112,7 +112,7 @@ def choose_voice(hello: dict[str, Any], wanted: str | None, language: str) -> tu
     if base and found is None and base in hello["variants"]:  # "f3" alone
         base, variant = "", base
     if base and found is None:
-        warnings.append(f"espeak-ng has no voice {base!r}: the language's own is used")
+        warnings.append(f"espeak-ng has no voice {base!r}: the default voice of the language is used")
     if variant and hello["variants"] and variant not in hello["variants"]:
         warnings.append(f"espeak-ng has no variant {variant!r}: the plain voice is used")
         variant = ""

@@ -211,7 +211,7 @@ def _warnings(request: SpeechRequest, track: SpeechBuffer, hello: dict[str, Any]
         found.append(f"hibari speaks English only: {request.language!r} is read as English")
     if not hello["durations"]:
         found.append(
-            "this hibari does not tell how long its phonemes are: their times are shared out over its sound"
+            "this hibari does not report the durations of its phonemes: their times are estimated"
         )
     if not track.phonemes:
         found.append("hibari found nothing to pronounce in the text")

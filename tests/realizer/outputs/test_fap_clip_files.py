@@ -88,7 +88,7 @@ def test_a_table_of_a_spreadsheet_is_read() -> None:
     assert got.fps == 2
     assert got.values[:, 2].tolist() == [10, 20]
     assert np.flatnonzero(got.mask).tolist() == [2]
-    assert got.notes == ("1 columns are no FAP and passed over",)
+    assert got.notes == ("1 columns are not FAPs and are ignored",)
 
 
 def test_a_table_of_one_frame_is_taken_as_25_a_second() -> None:

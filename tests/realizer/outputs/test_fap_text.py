@@ -106,8 +106,8 @@ ODD = {
     "a network message": (f"\n{M}\n910 10 -1\n{M}\n911 20 -2\n", PLAIN, "910"),
     "frames from 1": (f"2.1 x 25 2\n{M}\n1 10 -1\n{M}\n2 20 -2\n", PLAIN, "numbered from 1"),
     "frames out of order": (f"2.1 x 25 2\n{M}\n1 20 -2\n{M}\n0 10 -1\n", PLAIN, None),
-    "count too high": (f"2.1 x 25 9\n{BODY}", PLAIN, "says 9 frames, there are 2"),
-    "count too low": (f"2.1 x 25 1\n{BODY}", PLAIN, "says 1 frames, there are 2"),
+    "count too high": (f"2.1 x 25 9\n{BODY}", PLAIN, "says 9 frames, the file has 2"),
+    "count too low": (f"2.1 x 25 1\n{BODY}", PLAIN, "says 1 frames, the file has 2"),
     "rate 0": (f"2.1 x 0 2\n{BODY}", PLAIN, "frame rate"),
     "69 columns": (
         f"2.1 x 25 2\n{BODY}".replace(M, mask(JAW, LIP, columns=69)),
@@ -134,8 +134,8 @@ ODD = {
     ),
     "beyond the range": (f"2.1 x 25 1\n{mask(JAW)}\n0 99999\n", clip(fap3=[99999]), "open_jaw"),
     "negative one-way FAP": (f"2.1 x 25 1\n{mask(JAW)}\n0 -5\n", clip(fap3=[-5]), "open_jaw"),
-    "floats": (f"2.1 x 25 1\n{M}\n0 10.4 -1.0\n", clip(fap3=[10], fap4=[-1]), "not whole"),
-    "rubbish": (f"2.1 x 25 1\n{M}\n0 inf abc\n", clip(fap3=[0], fap4=[0]), "no number"),
+    "floats": (f"2.1 x 25 1\n{M}\n0 10.4 -1.0\n", clip(fap3=[10], fap4=[-1]), "not integers"),
+    "rubbish": (f"2.1 x 25 1\n{M}\n0 inf abc\n", clip(fap3=[0], fap4=[0]), "not a number"),
     "value missing": (f"2.1 x 25 1\n{M}\n0 10\n", clip(fap3=[10], fap4=[0]), "wanted 2 values, got 1"),
     "value too many": (f"2.1 x 25 1\n{M}\n0 10 -1 5\n", clip(fap3=[10], fap4=[-1]), "wanted 2 values, got 3"),
     "frame twice": (f"2.1 x 25 2\n{M}\n0 1 1\n{M}\n0 10 -1\n", clip(fap3=[10], fap4=[-1]), "twice"),
@@ -155,7 +155,7 @@ ODD = {
         PLAIN,
         "not lines",
     ),
-    "wild frame numbers": (f"2.1 x 25 2\n{M}\n0 10 -1\n{M}\n2000000000 20 -2\n", PLAIN, "jump wildly"),
+    "wild frame numbers": (f"2.1 x 25 2\n{M}\n0 10 -1\n{M}\n2000000000 20 -2\n", PLAIN, "far apart"),
 }
 
 

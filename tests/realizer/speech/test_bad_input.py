@@ -227,5 +227,5 @@ def test_a_voice_that_fails_is_one_warning_and_the_others_play() -> None:
             pass
 
     schedule = played('<text>one <sync id="a"/>two</text>', Broken())
-    assert warned(schedule) == ["line 1, /bml/speech[1]: speech: it died; this one has no sound"]
+    assert warned(schedule) == ["line 1, /bml/speech[1]: speech: it died; the silent voice is used instead"]
     assert points(schedule, "s")["end"] > points(schedule, "s")["a"] > 0

@@ -141,7 +141,7 @@ def test_a_voice_that_fails_in_the_middle_leaves_silence_there_and_the_block_end
     client = driver.run(300)
     assert client.feedback[-1].id == "b:end"
     told = [(f.id, f.text) for f in client.feedback if isinstance(f, WarningFeedback)]
-    assert told == [("b:s", "speech: it died; this one has no sound")]
+    assert told == [("b:s", "speech: it died; the silent voice is used instead")]
     assert driver.send({"type": "state"}).of("state")[-1]["voice"]["fault"] == "it died"
 
 

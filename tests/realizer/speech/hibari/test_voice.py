@@ -258,7 +258,7 @@ def test_a_model_that_does_not_tell_its_durations_has_times_by_rule_and_says_so(
         said, exact = lone.say(HELLO), neural.say(HELLO)
     finally:
         lone.close()
-    assert [w for w in said.warnings if "does not tell how long its phonemes are" in w]
+    assert [w for w in said.warnings if "does not report the durations of its phonemes" in w]
     assert tiles(said)
     assert [w.text for w in said.words] == [w.text for w in exact.words]
     # Both cut the silence before the sound; what is left differs by how well rules know the durations.
