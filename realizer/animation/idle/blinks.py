@@ -112,7 +112,7 @@ def _blink_time(at: float, late: float, ends: Sequence[PhraseEnd]) -> float:
 
 @lru_cache(maxsize=64)
 def _draws(seed: int, count: int) -> Float64:
-    """Return (3, count) for the first blinks: seconds at which they are due, rising, and two random numbers."""
+    """Return (3, count) for the first blinks: rising seconds at which they are due, two random numbers."""
     normal, turn, draw, late = uniform(seed, (301, 302, 304, 305), np.arange(count))
     # Box-Muller: two uniform numbers make a normal one.
     normal = np.sqrt(-2.0 * np.log1p(-normal)) * np.cos(2.0 * np.pi * turn)

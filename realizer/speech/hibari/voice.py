@@ -210,9 +210,7 @@ def _warnings(request: SpeechRequest, track: SpeechBuffer, hello: dict[str, Any]
     if request.language.lower().replace("_", "-").split("-")[0] != "en":
         found.append(f"hibari speaks English only: {request.language!r} is read as English")
     if not hello["durations"]:
-        found.append(
-            "this hibari does not report the durations of its phonemes: their times are estimated"
-        )
+        found.append("this hibari does not report the durations of its phonemes: their times are estimated")
     if not track.phonemes:
         found.append("hibari found nothing to pronounce in the text")
     else:
