@@ -46,8 +46,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Allow slow tests and those in a browser 300 s; `timeout` in pyproject.toml is for the others.
 
-    Chromium may draw without a graphics card beside other tests; Playwright's timeouts of 30 s come first. A
-    timeout that fires while a failure is reported ends the whole run.
+    The timeouts of Playwright come first. One that fires while a failure is reported ends the whole run.
     """
     for item in items:
         marked = item.get_closest_marker("slow") or item.get_closest_marker("browser")

@@ -19,6 +19,7 @@ from realizer.face.load import list_faces, load_face
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 pytestmark = [
     pytest.mark.browser,
+    pytest.mark.slow,  # Without a graphics card, Chromium takes the cores from all that runs beside it.
     pytest.mark.xdist_group("browser"),
     pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt install chromium"),
     # Playwright's own event loop closes its pipes late.
