@@ -1,4 +1,4 @@
-"""Rewriting of a block so that its sync points are absolute times."""
+"""Conversion of a block to absolute times."""
 
 from __future__ import annotations
 
@@ -13,28 +13,29 @@ from bml_schema.values import MAX_SECONDS
 
 __all__ = ["with_absolute_times"]
 
-_SAME = 1e-6  # s; solvers leave this much between times that should be one
+_SAME = 1e-6  # s; rounding of solvers between times that should be equal
 
 
 def with_absolute_times(block: Block, times: Mapping[str, Mapping[str, float]]) -> Block:
-    """The block with every sync point at the time it has, such that scheduling it again gives the same times.
+    """Return a copy of a block in which every sync point has its scheduled time.
 
-    Sync points become attributes, those of speech the `ref` of their <sync>. What has no attribute
-    ("stroke:n", the marks of a description) stands in one <constraint> at the end. What the block says of
-    other blocks stays, and so do the constraints that its times fulfil: the others were dropped.
+    Scheduling the result again gives the same times. Sync points are written as attributes, and those of
+    speech as the `ref` of their <sync>. Sync points without an attribute form ("stroke:n", the marks of a
+    description) go into one <constraint> at the end. References to other blocks stay, and so do the
+    constraints that the times satisfy; the others were dropped by the scheduler.
 
     Args:
-        block: as it was scheduled.
-        times: behaviour id -> sync point -> seconds from block start; a behaviour that is not in it was
-            dropped, and goes with all that named it.
+        block: the block that was scheduled.
+        times: behaviour id -> sync point -> seconds from block start. Behaviours that are missing were
+            dropped, and are removed with all references to them.
 
     Raises:
-        ValueError: a time no document can say: more than a day, or NaN.
+        ValueError: a time is NaN or more than a day.
     """
     left = without(block, [b.id for b in block.behaviours if b.id not in times]).block
     fixed: list[Synchronize] = []
 
-    def kept(node: Behaviour | Constraint) -> Behaviour | Constraint | None:
+    def with_times(node: Behaviour | Constraint) -> Behaviour | Constraint | None:
         if isinstance(node, Constraint):
             return node if all(_holds(part, times) for part in node.parts) else None
         return _timed(node, times[node.id], fixed)
@@ -42,11 +43,11 @@ def with_absolute_times(block: Block, times: Mapping[str, Mapping[str, float]]) 
     children: list[Behaviour | Required | Constraint] = []
     for node in left.children:
         if isinstance(node, Required):
-            inside = map(kept, node.children)
+            inside = map(with_times, node.children)
             children.append(replace(node, children=tuple(n for n in inside if n is not None)))
-        elif (one := kept(node)) is not None:
+        elif (one := with_times(node)) is not None:
             children.append(one)
-    # A block that was timed before says them already.
+    # A block with absolute times already has them.
     known = {part for c in left.constraints for part in c.parts}
     if new := tuple(part for part in fixed if part not in known):
         children.append(Constraint(parts=new))
@@ -54,7 +55,7 @@ def with_absolute_times(block: Block, times: Mapping[str, Mapping[str, float]]) 
 
 
 def _timed(node: Behaviour, times: Mapping[str, float], fixed: list[Synchronize]) -> Behaviour:
-    """The behaviour with its times; what has no attribute goes into `fixed`."""
+    """Return the behaviour with its times; add those that have no attribute to `fixed`."""
     at = {point: _number(f"{node.id}:{point}", time) for point, time in times.items()}
     syncs = {p: at.pop(p) for p in node.sync_points if p in at}
     if isinstance(node, Speech) and node.text is not None:
@@ -70,18 +71,18 @@ def _timed(node: Behaviour, times: Mapping[str, float], fixed: list[Synchronize]
 
 
 def _holds(part: Synchronize | Before | After, times: Mapping[str, Mapping[str, float]]) -> bool:
-    """Whether the times fulfil a constraint, as far as they tell."""
-    told = [time for ref in part.refs if (time := _time(ref, times)) is not None]
+    """Return whether the times satisfy a constraint; unknown times satisfy any."""
+    known = [time for ref in part.refs if (time := _time(ref, times)) is not None]
     if isinstance(part, Synchronize):
-        return not told or max(told) - min(told) <= _SAME
+        return not known or max(known) - min(known) <= _SAME
     when = _time(part.ref, times)
     if when is None:
         return True
-    return all(t <= when + _SAME if isinstance(part, Before) else t >= when - _SAME for t in told)
+    return all(t <= when + _SAME if isinstance(part, Before) else t >= when - _SAME for t in known)
 
 
 def _time(ref: SyncRef, times: Mapping[str, Mapping[str, float]]) -> float | None:
-    """Seconds from block start of a reference; None where the times do not tell."""
+    """Return the seconds from block start of a reference, or None if the times do not have it."""
     if ref.block is not None:
         return None
     if ref.behaviour is None or ref.behaviour == "bml":

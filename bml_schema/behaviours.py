@@ -42,7 +42,7 @@ STANCES: Final = ("SITTING", "CROUCHING", "STANDING", "LYING")
 BODY_PARTS: Final = ("ARMS", "LEFT_ARM", "RIGHT_ARM", "LEGS", "LEFT_LEG", "RIGHT_LEG", "HEAD", "WHOLEBODY")
 
 AMOUNT = number(0, 1)
-# How far attackPeak exceeds the sustained amount; -1 would be no peak at all.
+# Relative excess of attackPeak over the sustained amount; at -1 the peak is 0.
 _OVERSHOOT = number(-1, 10)
 _ANGLE = number(-360, 360)
 
@@ -77,7 +77,7 @@ class Head(Behaviour):
     tag = core("head")
     sync_points = STROKE
     lexeme: str = attribute(word)
-    # More than 100 nods are a mistake, and each has sync points to schedule and report.
+    # More than 100 nods are a mistake; each has sync points to schedule and report.
     repetition: int = attribute(integer(1, 100), default=1)
     amount: float = attribute(AMOUNT, default=0.5)
 
@@ -92,7 +92,7 @@ class HeadDirectionShift(Behaviour):
 
 @node
 class FaceLexeme(Behaviour):
-    """A facial expression by name; inside <face> it has no timing and may have no id."""
+    """A facial expression by name; inside <face> it has no timing, and its id is optional."""
 
     tag = core("faceLexeme")
     sync_points = PEAK
@@ -103,7 +103,7 @@ class FaceLexeme(Behaviour):
 
 @node
 class FaceFacs(Behaviour):
-    """One FACS action unit; inside <face> it has no timing and may have no id."""
+    """One FACS action unit; inside <face> it has no timing, and its id is optional."""
 
     tag = extension("faceFacs")
     sync_points = PEAK
@@ -136,7 +136,7 @@ class FaceShift(Behaviour):
 
 @node
 class Sync(Part):
-    """A named point between two words; `ref` says when it is to be, if anything does."""
+    """A named point between two words; `ref` is an optional reference for its time."""
 
     tag = core("sync")
     id: str = attribute(name)
@@ -145,7 +145,12 @@ class Sync(Part):
 
 @node
 class SpeechText(Part):
-    """What is said: strings and Syncs in order, blanks kept, neighbouring strings joined; its xml:lang."""
+    """The text of a speech: strings and Syncs in order, with whitespace as written.
+
+    Attributes:
+        parts: neighbouring strings are joined.
+        language: xml:lang, or "".
+    """
 
     tag = core("text")
     parts: tuple[str | Sync, ...] = mixed(Sync, default=())
@@ -165,7 +170,7 @@ class Speech(Behaviour):
 
     @property
     def marked(self) -> tuple[str, ...]:
-        """Ids of the syncs in the text, in order."""
+        """The ids of the syncs in the text, in order."""
         return tuple(p.id for p in self.text.parts if isinstance(p, Sync)) if self.text else ()
 
     def fault(self) -> str:
@@ -179,7 +184,7 @@ class Speech(Behaviour):
 
 @node
 class Wait(Behaviour):
-    """Do nothing for some seconds, or as long as its start and end say."""
+    """Wait for some seconds, or as long as its start and end references require."""
 
     tag = core("wait")
     duration: float = attribute(number(0, 86400, wanted="seconds, 0..86400"), default=0.0, old="max-wait")
@@ -207,7 +212,7 @@ class Pointing(Behaviour):
 
 @node
 class Stance(Part):
-    """How the body stands, sits or lies."""
+    """The stance of the body: sitting, crouching, standing or lying."""
 
     tag = core("stance")
     type: str = attribute(one_of(*STANCES))
@@ -215,7 +220,7 @@ class Stance(Part):
 
 @node
 class Pose(Part):
-    """How one part of the body is held."""
+    """The pose of one part of the body."""
 
     tag = core("pose")
     part: str = attribute(one_of(*BODY_PARTS))

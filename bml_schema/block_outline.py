@@ -1,4 +1,4 @@
-"""A first pass over a <bml> element: its children, and the names that references may use."""
+"""A first pass over a <bml> element: its children, and the sync points that references can name."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from bml_schema.node_schema import local, schema_of
 from bml_schema.nodes import Behaviour, Constraint, Description, Required
 from bml_schema.sync_refs import Names, Points
 
-# A NamedTuple of thousands is made in a third of the time without its own `__new__`, which is Python.
+# NamedTuples are made in a third of the time without their own `__new__`, which is Python code.
 made = tuple.__new__
 
 
 class Kind(NamedTuple):
-    """What children of the block of one tag have in common.
+    """The common properties of all children of a block with the same tag.
 
     Attributes:
         step: name in paths.
-        cls: None for a constraint and for what is unknown.
-        points: what references may name; None where nobody knows.
-        varies: that depends on the element: a number of strokes, or marks in what is said.
+        cls: node class; None for a constraint and an unknown element.
+        points: sync points that references can name; None if unknown.
+        varies: the sync points depend on the element: on its number of strokes, or the marks in its text.
     """
 
     tag: str
@@ -56,12 +56,12 @@ class Entry(NamedTuple):
 
 
 class BlockOutline:
-    """What stands in one block.
+    """The children of one block.
 
     Attributes:
-        names: what references may name; filled by `entries`.
-        owners: id -> the behaviour that has it, the first of several.
-        loose: text that stands between elements, with the element around it and its path: nobody's.
+        names: sync points that references can name; filled by `entries`.
+        owners: id -> the first behaviour with this id.
+        loose: text between elements, with the element around it and its path.
     """
 
     __slots__ = ("elements", "kinds", "loose", "names", "owners")
@@ -70,13 +70,13 @@ class BlockOutline:
         self.elements = elements
         self.names = names
         self.owners: dict[str, Entry] = {}
-        self.kinds: dict[str, Kind] = {}  # by tag as it stands
+        self.kinds: dict[str, Kind] = {}  # by tag as written in the document
         self.loose: list[tuple[str, etree._Element, str]] = []
 
     # bml := (behaviour | constraint | required)*
 
     def entries(self, parent: etree._Element, path: str, *, required: bool) -> list[Entry | list[Entry]]:
-        """What stands in a block, as a tree: a list for each <required>; one inside another adds nothing."""
+        """Return the children of a block as a tree: each <required> is a list, nested ones are flattened."""
         tree: list[Entry | list[Entry]] = []
         counts: dict[str, int] = {}
         loose = parent.text
@@ -99,7 +99,7 @@ class BlockOutline:
             id = element.get("id", "").strip()
             entry = made(Entry, (element, kind, id, here, required))
             tree.append(entry)
-            # What references may say of it, before any is read.
+            # All names must be known before the first reference is read.
             if id and id not in owners and kind.tag != Constraint.tag:
                 owners[id] = entry
                 points[id] = self.points(element, kind) if kind.varies else kind.points
@@ -108,13 +108,13 @@ class BlockOutline:
         return tree
 
     def kind(self, element: etree._Element) -> Kind:
-        """What the tag of an element says."""
+        """Return the kind of an element, by its tag."""
         tag = self.elements.tag(element)
         cls = self.elements.vocabulary.get(tag)
         return Kind(tag, local(tag)) if cls is None else _kind_of(cls)
 
     def points(self, element: etree._Element, kind: Kind) -> Points | None:
-        """What references may name of an element of a kind that varies."""
+        """Return the sync points of an element of a kind that varies."""
         if kind.points is None or kind.cls is None:
             return None
         names = frozenset(kind.points.names)
@@ -127,7 +127,7 @@ class BlockOutline:
             if tag == SpeechText.tag:
                 marks += [s.get("id", "").strip() for s in child if self.elements.tag(s) == Sync.tag]
             elif tag == Description.tag:
-                # It may name points that the core text leaves out.
+                # It may name points that the core text does not have.
                 marks += [m.get("name", "").strip() for m in child.iterdescendants("{*}mark")]
         return Points(names.union(m for m in marks if ":" not in m)) if marks else kind.points
 

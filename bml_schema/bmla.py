@@ -32,7 +32,7 @@ class Interrupt(Behaviour):
 
     Attributes:
         target: the block.
-        include: only these behaviours; () all.
+        include: only these behaviours; () for all.
         exclude: all but these behaviours.
     """
 
@@ -52,7 +52,7 @@ class Activate(Behaviour):
 
 @node
 class Trajectory(Part):
-    """How a parameter goes to its new value: at once, or evenly from start to end."""
+    """The course of a parameter to its new value: at once, or linear from start to end."""
 
     tag = bmla("trajectory")
     type: str = attribute(one_of("linear", "instant"))
@@ -62,11 +62,11 @@ class Trajectory(Part):
 
 @node
 class ParameterValueChange(Behaviour):
-    """Change a parameter of a behaviour that plays, such as its amount or volume.
+    """Change a parameter of a playing behaviour, such as its amount or volume.
 
     Attributes:
         target: (block, behaviour).
-        param_id: its name; what there is depends on the behaviour.
+        param_id: its name; which parameters exist depends on the behaviour.
     """
 
     tag = bmla("parametervaluechange")

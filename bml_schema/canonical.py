@@ -13,10 +13,10 @@ _XML = "http://www.w3.org/XML/1998/namespace"
 
 
 def canonical(element: etree._Element) -> str:
-    """The element without its tail: one text for one tree, whatever prefixes its author chose.
+    """Return the XML text of an element without its tail, independent of the prefixes in the document.
 
     Elements use default namespaces, attributes prefixes p1, p2 ...; lxml's own canonical form is quadratic
-    in the namespaces around the element.
+    in the number of namespaces around the element.
     """
     out: list[str] = []
     _append(element, "", out)
@@ -56,11 +56,11 @@ def _split(clark: str) -> tuple[str, str]:
     return space[1:], name
 
 
-MAX_ATTRIBUTES = 100  # of one element; BML has ten, and lxml is quadratic in them
+MAX_ATTRIBUTES = 100  # of one element; BML has ten, and the time lxml takes is quadratic
 
 
 def attributes(element: etree._Element) -> list[tuple[str, str]]:
-    """Clark names and texts, in document order; a Fault if lxml would take too long."""
+    """Return Clark names and values in document order; raise Fault if there are too many for lxml."""
     count = len(element.attrib)
     if count > MAX_ATTRIBUTES:
         raise Fault(f"wanted at most {MAX_ATTRIBUTES} attributes, got {count}", element)

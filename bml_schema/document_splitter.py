@@ -1,4 +1,4 @@
-"""A splitter that finds the documents, and the broken stretches, in a text."""
+"""A splitter that finds the documents and the broken stretches in a text."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 from bml_schema.errors import BMLError, quoted
 
-_MAX_MARKS = 100_000  # so that a hostile text of 16 MiB costs no more than an honest one of 1 MiB
+_MAX_MARKS = 100_000  # so that a hostile text of 16 MiB costs no more than an ordinary one of 1 MiB
 
-# What decides where a document begins and ends, and what may hide such marks.
+# The marks where documents begin and end, and the constructs that can hide such marks.
 _MARKS = re.compile(r"<!--|<!\[CDATA\[|<!DOCTYPE|<\?|<(?:[\w.-]+:)?bml(?=[\s/>])|</(?:[\w.-]+:)?bml\s*>")
 NEXT = re.compile(r"<(?:[\w.-]+:)?bml(?=[\s/>])")
 _REST_OF_TAG = re.compile(r"""(?:[^<>"']|"[^<"]*"|'[^<']*')*+>""")
@@ -23,12 +23,12 @@ _CLOSERS = {
     "<!DOCTYPE": re.compile(r"\]\s*>"),
 }
 _BLANKS = " \t\r\n\ufeff"
-# What may stand between documents; SmartBody wraps its own in <act>.
+# Allowed between documents; SmartBody wraps documents in <act>.
 _BETWEEN = re.compile(rf"(?:[{_BLANKS}]|</?act(?=[\s/>])[^<>]*>|</?participant(?=[\s/>])[^<>]*>)*+")
 
 
 class DocumentSpan(NamedTuple):
-    """text[start:end] is a document whose start tag is `tag`, or `fault` says why it cannot be one."""
+    """A part of a text: `tag` is the start tag of the document, or `fault` tells why it is not a document."""
 
     start: int
     end: int
@@ -45,8 +45,8 @@ class _Mark(NamedTuple):
 
 
 def _marks(text: str, first: int, last: int) -> Iterator[_Mark]:
-    """What decides where documents begin and end; linear in the text whatever it holds."""
-    never: set[str] = set()  # closers that do not come any more: looked for once, not for each opener
+    """Yield the marks that decide where documents begin and end, in linear time for any text."""
+    never: set[str] = set()  # closers that do not occur any more: searched for once, not for each opener
     here = first
     for n in count():
         found = _MARKS.search(text, here, last)
@@ -83,7 +83,7 @@ def _marks(text: str, first: int, last: int) -> Iterator[_Mark]:
 
 
 def document_spans(text: str, first: int = 0, last: int | None = None) -> Iterator[DocumentSpan]:
-    """Documents in text[first:last], and what stands between them that should not, in order."""
+    """Yield the documents in text[first:last] and the broken stretches between them, in order."""
     last = len(text) if last is None else last
     marks = list(_marks(text, first, last))
     ends: dict[int, int] = {}
@@ -98,7 +98,7 @@ def document_spans(text: str, first: int = 0, last: int | None = None) -> Iterat
     roots = [n for n, mark in enumerate(marks) if mark.kind in ("open", "whole")]
     after = dict(zip(roots, [marks[n].start for n in roots[1:]], strict=False))
     here = first
-    junk = doctype = -1  # where the stretch began that is not told of yet; -1 while there is none
+    junk = doctype = -1  # start of a broken stretch that was not reported yet, or -1
     for n, mark in enumerate([*marks, _Mark("end", last, last)]):
         if mark.start < here:
             continue  # inside a document

@@ -20,8 +20,8 @@ from bml_schema.vocabulary import VOCABULARY
 __all__ = ["MAX_BYTES", "MAX_DOCUMENTS", "parse", "read"]
 
 MAX_BYTES = 1 << 20  # of one document; an hour of speech with a nod on every word is a third of it
-_MAX_RETRIES = 20  # times that a broken document is searched for a good one inside it
-_MAX_AGAIN = 100_000  # characters of one text that are searched so, or a large broken one takes seconds
+_MAX_RETRIES = 20  # searches for a good document inside a broken one
+_MAX_AGAIN = 100_000  # characters of one text that are searched again; more would take seconds
 MAX_DOCUMENTS = 1000  # in one text; a text full of "<bml>" must not become a flood of warnings
 
 Vocabulary = Mapping[str, type[Behaviour]]
@@ -29,7 +29,7 @@ Vocabulary = Mapping[str, type[Behaviour]]
 _LONG_TAG = re.compile(rb"<([^\s<>/!?]++)[^<>\n]*+\n[^<>]*+>")
 _ID = re.compile(r"""\sid\s*=\s*(?:"([^"<]*)"|'([^'<]*)')""")
 _ENCODING = re.compile(rb"""<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
-# Some of Python's codecs are slow or strange enough to be an attack.
+# Some of Python's other codecs are slow enough for an attack.
 _CODECS = {"utf-8", "utf-16", "ascii", "iso8859-1", "iso8859-15", "cp1252"}
 
 
@@ -41,17 +41,17 @@ def parse(
     max_bytes: int = MAX_BYTES,
     max_behaviours: int = MAX_BEHAVIOURS,
 ) -> Block:
-    """The block of a text that holds exactly one document.
+    """Return the block of a text that holds exactly one document.
 
     Args:
         text: the document; with or without namespace, any prefix; blanks, BOM, declaration and comments
             before it are allowed. Bytes in UTF-8, UTF-16 or Latin.
         vocabulary: Clark tag -> node class; extensions add theirs.
-        strict: the first Problem is an error.
-        max_bytes, max_behaviours: more are refused.
+        strict: raise the first Problem.
+        max_bytes, max_behaviours: limits of a document.
 
     Returns:
-        The block. What was dropped from it is in its `problems`.
+        The block; `problems` has what was dropped from it.
 
     Raises:
         BMLError: no block: not well-formed (BMLSyntaxError), no usable id, too big
@@ -82,12 +82,12 @@ def read(
     max_behaviours: int = MAX_BEHAVIOURS,
     max_documents: int = MAX_DOCUMENTS,
 ) -> Iterator[Block | BMLError]:
-    """The blocks of a text with any number of documents, in order.
+    """Yield the blocks of a text with any number of documents, in order.
 
-    After a broken stretch reading goes on at the next `<bml`. Lines are counted over the whole text.
+    After a broken stretch reading continues at the next `<bml`. Lines are counted over the whole text.
 
     Yields:
-        A Block for each document, a BMLError for each stretch that gave none. Raises nothing.
+        A Block for each document, a BMLError for each stretch without one. Raises nothing.
     """
     data, roots = _whole(text, max_bytes)
     if 0 < len(roots) <= max_documents:
@@ -110,10 +110,10 @@ def read(
         return
     line = 1
     counted = 0
-    broken = False  # the stretch before was broken XML: what follows it up to the next document is part of it
+    broken = False  # the stretch before was broken XML: all text up to the next document is part of it
     todo = deque(found)
     retries, again = _MAX_RETRIES, _MAX_AGAIN
-    told = 0  # up to here broken XML has been told of
+    reported = 0  # end of the broken XML that was reported
     for n in count():
         if not todo:
             return
@@ -121,8 +121,7 @@ def read(
         line += text.count("\n", counted, stretch.start)
         counted = stretch.start
         if n == max_documents:
-            said = f"wanted at most {n} documents in one text; the rest is not read"
-            yield BMLError(said, line=line)
+            yield BMLError(f"wanted at most {n} documents in one text; the rest is not read", line=line)
             return
         if broken and stretch.fault and not stretch.tag:
             continue
@@ -130,7 +129,7 @@ def read(
             block = _block(text, stretch, line, vocabulary, max_bytes, max_behaviours)
         except BMLError as wrong:
             broken = isinstance(wrong, BMLSyntaxError)
-            if not (broken and stretch.start < told):
+            if not (broken and stretch.start < reported):
                 yield wrong
             if broken and not stretch.fault and retries and again > 0:
                 # A good document may stand inside the broken one, where their end tags happen to match.
@@ -138,7 +137,7 @@ def read(
                 if inner is not None:
                     retries -= 1
                     again -= stretch.end - inner.start()
-                    told = max(told, stretch.end)
+                    reported = max(reported, stretch.end)
                     todo.extendleft(reversed(list(document_spans(text, inner.start(), stretch.end))))
         else:
             broken = False
@@ -146,9 +145,10 @@ def read(
 
 
 def _whole(text: str | bytes, max_bytes: int) -> tuple[bytes, list[etree._Element]]:
-    """What lxml was given, and the documents in it, where the text is nothing but one sound document.
+    """Return the bytes of a text and its documents if it is sound, otherwise no documents.
 
-    Nearly all texts are, and are read in one pass; no document sends a text the long way, which explains.
+    Most texts are one sound document, and are parsed in one pass. All others take the slow way, which
+    explains.
     """
     if len(text) > max_bytes:
         return b"", []
@@ -175,7 +175,7 @@ def _whole(text: str | bytes, max_bytes: int) -> tuple[bytes, list[etree._Elemen
 
 
 def _begins(data: bytes) -> dict[tuple[int, str], int]:
-    """Where start tags of several lines begin: (line of its end, which is all lxml knows, name) -> line."""
+    """Map (last line, name) of each start tag over several lines to its first line; lxml knows the last."""
     begins: dict[tuple[int, str], int] = {}
     if data.count(b"\n") == data.count(b">\n"):
         return begins  # every line ends with a tag
@@ -220,15 +220,15 @@ _PARSER = etree.XMLParser(
 
 
 def element(data: bytes, *, lines_before: int = 0, block: str | None = None) -> etree._Element:
-    """The root of one document in UTF-8 without prolog; BMLSyntaxError if it is not well-formed."""
+    """Return the root of a document in UTF-8 without prolog; raise BMLSyntaxError if not well-formed."""
     try:
         return etree.fromstring(data, _PARSER)
     except etree.XMLSyntaxError as wrong:
         line = (wrong.lineno or 1) + lines_before
-        said = re.sub(r",? line \d+, column \d+.*", "", wrong.msg or "no XML", flags=re.DOTALL)
-        if "xcessive depth" in said:
-            said = "elements nested too deep, wanted at most 256"
-        raise BMLSyntaxError(f"not well-formed: {said}", line=line, block=block) from None
+        reason = re.sub(r",? line \d+, column \d+.*", "", wrong.msg or "no XML", flags=re.DOTALL)
+        if "xcessive depth" in reason:
+            reason = "elements nested too deep, wanted at most 256"
+        raise BMLSyntaxError(f"not well-formed: {reason}", line=line, block=block) from None
 
 
 def _encoded(document: str, line: int, block: str | None) -> bytes:
@@ -236,13 +236,12 @@ def _encoded(document: str, line: int, block: str | None) -> bytes:
         return document.encode()
     except UnicodeEncodeError as wrong:
         line += document.count("\n", 0, wrong.start)
-        got = f"U+{ord(document[wrong.start]):04X}"
-        said = f"wanted characters XML can hold, got {got}"
-        raise BMLSyntaxError(said, line=line, block=block) from None
+        text = f"wanted characters XML can hold, got U+{ord(document[wrong.start]):04X}"
+        raise BMLSyntaxError(text, line=line, block=block) from None
 
 
 def _decoded(data: bytes) -> str:
-    """Text of bytes, by BOM, declaration, or as UTF-8."""
+    """Decode bytes by BOM, declaration, or as UTF-8."""
     named = _ENCODING.match(data.removeprefix(codecs.BOM_UTF8).lstrip())
     encoding = named[1].decode() if named else "utf-8"
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):

@@ -14,13 +14,13 @@ __all__ = ["ReducedBlock", "without"]
 
 
 class ReducedBlock(NamedTuple):
-    """What is left of a block without some of its behaviours.
+    """A block without some of its behaviours.
 
     Attributes:
-        block: the rest; its places and problems are those of the whole.
-        lost_references: id of a behaviour that went -> what went with it: "behaviour:sync" for a reference,
-            the id of a constraint or its path.
-        fatal: ids whose loss breaks a constraint inside <required>.
+        block: the rest; its places and problems are those of the original.
+        lost_references: id of a removed behaviour -> the references and constraints that were removed with
+            it: "behaviour:sync", or the id or path of a constraint.
+        fatal: ids of removed behaviours that a constraint inside <required> names.
     """
 
     block: Block
@@ -29,11 +29,11 @@ class ReducedBlock(NamedTuple):
 
 
 def without(block: Block, gone: Collection[str]) -> ReducedBlock:
-    """The block without some behaviours, the references to their sync points, and the constraints on them.
+    """Return a block without some behaviours, the references to their sync points, and their constraints.
 
     Args:
-        block: stays as it is.
-        gone: ids of behaviours; one the block does not hold costs what names it.
+        block: is not changed.
+        gone: ids of behaviours. For an id that the block does not have, references to it are removed.
     """
     gone = frozenset(gone)
     losses = ReferenceRemover(gone)
@@ -49,13 +49,7 @@ def without(block: Block, gone: Collection[str]) -> ReducedBlock:
 
 
 class ReferenceRemover:
-    """What vanishes with dropped behaviours.
-
-    Attributes:
-        lost_references: id of the dropped behaviour -> "behaviour:sync" of references, ids or paths of
-            constraints.
-        fatal: ids whose loss breaks a required constraint.
-    """
+    """Removes references to dropped behaviours; collects `lost_references` and `fatal` as in ReducedBlock."""
 
     def __init__(self, gone: Collection[str]) -> None:
         self.gone = gone
@@ -65,7 +59,7 @@ class ReferenceRemover:
     def without(
         self, node: Behaviour | Constraint, *, required: bool = False
     ) -> Behaviour | Constraint | None:
-        """The node without references to what is gone; None if it is gone, or a constraint that names it."""
+        """Return a node without references to dropped behaviours, or None if the node itself goes."""
         if isinstance(node, Constraint):
             return self._constraint(node, required or node.required)
         return None if node.id in self.gone else self._behaviour(node)

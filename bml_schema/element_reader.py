@@ -1,7 +1,7 @@
 """The reader of one element in a block: attributes, children, descriptions, constraints.
 
-Recursive descent, one function per grammar rule. The first element with a fault raises it; who called
-decides what goes with it.
+Recursive descent, one function per grammar rule. The first fault is raised as a Fault; the caller decides
+what is dropped with it.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ _INNER = {c.tag for c in (Block, Required, Constraint, Description, SpeechText, 
 
 @lru_cache(maxsize=1000)
 def _standard(raw: str) -> tuple[str, str]:
-    """The tag in the core if it is a draft's or has no namespace, and the same in the extensions, else ""."""
+    """Return the core tag of an element of the core or a draft, and the extension tag of that name or ""."""
     space, name = raw[1:].split("}") if raw.startswith("{") else ("", raw)
     if space in _DRAFTS or not space or space == CORE:
         return core(name), extension(name)
@@ -65,9 +65,8 @@ class ElementReader:
 
     Attributes:
         vocabulary: Clark tag -> node class.
-        names: what references may name; None looks nothing up.
-        unknown_attributes: what is to be said of attributes that nobody knows, with the element; who tells it
-            clears it.
+        names: what references can name; None disables the check.
+        unknown_attributes: (message, element) for unknown attributes; the caller reports and clears them.
     """
 
     __slots__ = ("names", "unknown_attributes", "vocabulary")
@@ -78,7 +77,7 @@ class ElementReader:
         self.unknown_attributes: list[tuple[str, etree._Element]] = []
 
     def tag(self, element: etree._Element) -> str:
-        """Clark tag; elements of drafts and without namespace count as core, faceFacs as extension."""
+        """Return the Clark tag; without namespace or in a draft's it is core, or extension for faceFacs."""
         raw: Any = element.tag
         if raw in _INNER or raw in self.vocabulary:
             return cast("str", raw)
@@ -88,7 +87,7 @@ class ElementReader:
     # element := attributes children
 
     def node(self, cls: type[Any], element: etree._Element, *, timed: bool = False) -> Any:
-        """An element as its class says; timed: with an id and sync points of its own."""
+        """Read an element as a node of a class; `timed` nodes have an id and sync points."""
         shape = schema_of(cls)
         values = self.attributes(shape, element, timed)
         if shape.mixed:
@@ -100,12 +99,12 @@ class ElementReader:
         elif (loose := element.text) and not loose.isspace():
             self.no_text(element)
         node: Any = cls(**values)
-        if timed and shape.checked and (said := node.fault()):
-            raise Fault(said, element)
+        if timed and shape.checked and (fault := node.fault()):
+            raise Fault(fault, element)
         return node
 
     def attributes(self, shape: NodeSchema, element: etree._Element, timed: bool) -> dict[str, Any]:
-        """Values by field; one Fault names everything that is wrong with them."""
+        """Return attribute values by field; raise one Fault that names all faults."""
         values: dict[str, Any] = {}
         syncs: dict[str, SyncRef] = {}
         foreign: dict[str, str] = {}
@@ -128,22 +127,21 @@ class ElementReader:
                 else:
                     values[spec.field] = spec.read(text)
             except ValueError as wrong:
-                # Who reads a reference says the whole sentence.
-                said = wrong if spec is None or spec.read is None else _unwanted(spec, text)
-                faults.append(f"{local(name)}: {said}")
+                # The message about a reference is complete already.
+                reason = wrong if spec is None or spec.read is None else _unwanted(spec, text)
+                faults.append(f"{local(name)}: {reason}")
         if shape.old:
             faults += _drafts(shape, values, foreign)
         if not values.keys() >= shape.needed:
             if shape.timed and not timed and "id" not in element.attrib:
-                values["id"] = ""  # a part of <face>: it has no timing, so nobody need name it
+                values["id"] = ""  # a part of <face> has no timing, so its id is optional
             missing = (s for s in shape.required if s.field not in values and s.name not in element.attrib)
             faults += [f"{s.name}: wanted {s.value.wanted}, got none" for s in missing]
-        said = self.describe_unknown(shape, element, foreign, timed) if foreign else ""
+        unknown = self.describe_unknown(shape, element, foreign, timed) if foreign else ""
         if faults:
-            faults += (said,) if said else ()
-            raise Fault("; ".join(faults), element)
-        if said:
-            self.unknown_attributes.append((said, element))
+            raise Fault("; ".join([*faults, unknown] if unknown else faults), element)
+        if unknown:
+            self.unknown_attributes.append((unknown, element))
         if shape.timed:
             values["syncs"] = syncs
             values["unknown_attributes"] = foreign
@@ -152,12 +150,12 @@ class ElementReader:
     def describe_unknown(
         self, shape: NodeSchema, element: etree._Element, foreign: Iterable[str], timed: bool
     ) -> str:
-        """What is to be said of the attributes that a shape does not know; "" for nothing."""
+        """Return the message about attributes that the schema does not have, or ""."""
         suggest = did_you_mean if self.names is None else self.names.suggest
         return describe_unknown(shape, element, foreign, timed, suggest)
 
     def children(self, shape: NodeSchema, element: etree._Element, values: dict[str, Any]) -> None:
-        """Child elements into the fields of `values`."""
+        """Read child elements into the fields of `values`."""
         found: dict[str, list[Any]] = {}
         descriptions: list[Description] = []
         others: list[str] = []
@@ -171,7 +169,7 @@ class ElementReader:
                 descriptions.append(self.description(child))
                 continue
             if spec is None and tag.startswith(_KNOWN):
-                # Documents leave an extension's children in the core namespace, in none, or in its sister's.
+                # Some documents put an extension's children into the core namespace, or into none.
                 spec = shape.by_local.get(local(tag))
             if spec is not None:
                 found.setdefault(spec[0].field, []).append(self.node(spec[1], child))
@@ -203,7 +201,7 @@ class ElementReader:
             raise Fault(f"wanted elements, got the text {quoted(loose)}{hint}", element)
 
     def mixed(self, shape: NodeSchema, element: etree._Element) -> Iterator[Any]:
-        """text := (characters | sync)*, blanks kept."""
+        """Read text := (characters | sync)*, with whitespace as written."""
         if element.text:
             yield element.text
         for child in element:
@@ -236,7 +234,7 @@ class ElementReader:
     # constraint := (synchronize | before | after)+
 
     def constraint(self, element: etree._Element) -> dict[str, Any]:
-        """The id and parts of a constraint, by field."""
+        """Return the id and parts of a constraint, by field."""
         values = self.attributes(schema_of(Constraint), element, False)
         self.no_text(element)
         values["parts"] = tuple(self.constraint_part(child) for child in element)
@@ -274,7 +272,7 @@ class ElementReader:
 
 
 def _drafts(shape: NodeSchema, values: dict[str, Any], foreign: dict[str, str]) -> Iterator[str]:
-    """Read what a draft named otherwise, unless its present name is there too; yields what is wrong."""
+    """Read attributes by their names in drafts, unless the present name is used too; yield faults."""
     for name, spec in shape.old.items():
         if name in foreign and spec.field not in values and spec.read is not None:
             text = foreign.pop(name)
@@ -289,7 +287,7 @@ def _unwanted(spec: Attribute, text: str) -> str:
 
 
 def loose_text(element: etree._Element) -> str:
-    """Character data of an element that should hold elements only; "" where there is none."""
+    """Return character data of an element that should only have child elements, or ""."""
     text = element.text
     if text and not text.isspace():
         return text.strip()

@@ -1,8 +1,8 @@
 """Faults of documents: an error if no block results, a problem if only a part is dropped.
 
 BMLError               no block: too big, no usable id, not a <bml>
-├── BMLSizeError       more in it than is read
-└── BMLSyntaxError     not well-formed XML, or XML we refuse to read (DTD, entities)
+├── BMLSizeError       too many bytes or behaviours
+└── BMLSyntaxError     not well-formed XML, or XML with a DTD or entities
 """
 
 from __future__ import annotations
@@ -26,30 +26,30 @@ CUSTOM_ATTRIBUTE_NOT_SUPPORTED = "CUSTOM_ATTRIBUTE_NOT_SUPPORTED"
 
 
 class Place(NamedTuple):
-    """Where something stands: 1-based line in the text (where its start tag begins), and element path."""
+    """A position: 1-based line in the text (where the start tag begins), and element path."""
 
     line: int
     path: str
 
     def with_place(self, text: str) -> str:
-        """A sentence with the place in front."""
+        """Return a sentence with the place in front."""
         return at(self.line, self.path, text)
 
 
 def at(line: int | None, path: str, text: str) -> str:
-    """One sentence with its place: `line 3, /bml/head[1]: amount: wanted 0..1, got 7`."""
+    """Return one sentence with its place: `line 3, /bml/head[1]: amount: wanted 0..1, got 7`."""
     where = ", ".join(filter(None, (f"line {line}" if line else "", path)))
     return f"{where}: {text}" if where else text
 
 
 class BMLError(Exception):
-    """A stretch of text that gave no block.
+    """The error for a stretch of text without a block.
 
     Attributes:
-        text: what was wanted and what came, without the place.
-        line: 1-based line in the text that was read, None if there is none to name.
-        path: element path such as "/bml", "" where the text is not well-formed.
-        block: the block's id if it could be read, else None.
+        text: expected and actual value, without the place.
+        line: 1-based line in the text, or None.
+        path: element path such as "/bml"; "" if the text is not well-formed.
+        block: the block's id, or None if it could not be read.
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class BMLError(Exception):
         self.block = block
 
     def __reduce__(self) -> tuple[object, ...]:
-        # Errors cross process borders (batch workers); keyword arguments do not survive the default.
+        # Errors are pickled (batch workers), and the default does not keep keyword arguments.
         return _again, (type(self), self.text, self.line, self.path, self.block)
 
 
@@ -71,25 +71,26 @@ def _again(kind: type[BMLError], text: str, line: int | None, path: str, block: 
 
 
 class BMLSizeError(BMLError):
-    """There are more bytes or behaviours in it than are read."""
+    """The document has too many bytes or behaviours."""
 
 
 class BMLSyntaxError(BMLError):
-    """The text is not well-formed XML, or brings a DTD or entities."""
+    """The text is not well-formed XML, or has a DTD or entities."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Problem:
-    """A part of a document that was left out while parsing; becomes one BML warning.
+    """A part of a document that was dropped while parsing; it becomes one BML warning.
 
     Attributes:
         id: "block:behaviour" ("block:path" for a behaviour without id), a constraint's id, or the block's.
         type: BML warning type, such as PARSING_FAILURE.
-        text: what was wanted and what came, without the place; str(problem) has it in front.
-        line, path: where.
-        lost_references: what vanished with it: "behaviour:sync" for a reference, a constraint's id or path.
-        fatal: the whole block goes, because it was inside <required>.
-        dropped: a behaviour or constraint went; otherwise attributes only, and what they stand on plays.
+        text: expected and actual value, without the place; str(problem) includes the place.
+        line, path: position of the fault.
+        lost_references: what was dropped with it: "behaviour:sync" for a reference, a constraint's id or
+            path.
+        fatal: the whole block is dropped, because the part was inside <required>.
+        dropped: a behaviour or constraint was dropped; if false only attributes were.
     """
 
     id: str
@@ -106,7 +107,7 @@ class Problem:
 
 
 class Fault(Exception):
-    """What is wrong with an element; it becomes the Problem of the behaviour or constraint around it."""
+    """A fault of an element; it becomes the Problem of the behaviour or constraint around it."""
 
     def __init__(self, text: str, element: _Element, type: str = PARSING_FAILURE) -> None:
         super().__init__(text)
@@ -115,21 +116,21 @@ class Fault(Exception):
         self.type = type
 
 
-_LONGEST_SHOWN = 60  # characters of a value in a message; enough to find it, never a flood
+_LONGEST_SHOWN = 60  # characters of a value in a message
 
 
 def quoted(value: str) -> str:
-    """A value as it stands in a message: numbers bare, everything else quoted, long ones cut."""
+    """Format a value for a message: numbers bare, everything else quoted, long values cut."""
     if len(value) > _LONGEST_SHOWN:
         value = value[:_LONGEST_SHOWN] + "..."
     return value if re.fullmatch(r"[+-]?[0-9.]+", value) else f'"{value}"'
 
 
-_MAX_CHOICES = 500  # difflib is slow; a suggestion is not worth more than about a millisecond
+_MAX_CHOICES = 500  # difflib is slow; this many take about a millisecond
 
 
 def did_you_mean(word: str, choices: Iterable[str]) -> str:
-    """`, did you mean "nod1"?` if one of the first 500 choices is close, else ""."""
+    """Return `, did you mean "nod1"?` if one of the first 500 choices is close, else ""."""
     if len(word) > _LONGEST_SHOWN:
         return ""
     near = difflib.get_close_matches(

@@ -9,24 +9,24 @@ from bml_schema.values import integer, number, one_of, string, word
 
 __all__ = ["Blink", "Emotion", "Expression", "Fap", "FapFile", "Faps", "Idle", "Mood", "Timeline"]
 
-_ANGLE = number(-1e6, 1e6, wanted="degrees")  # on the wheel of emotions; turns do not count
+_ANGLE = number(-1e6, 1e6, wanted="degrees")  # on the wheel of emotions; full turns are ignored
 _AFFECT = number(-1, 1)
 _SEED = integer(0, 2**31 - 1)
-_ACTIVATION = number(0, 7)  # 7 is all of an emotion, as Paul scales Whissel
+_ACTIVATION = number(0, 7)  # 7 is the maximum on Paul's scale of Whissel's words
 _FAPU = number(-1e5, 1e5)
 
 
 @node
 class EmotionBase(Behaviour):
-    """What an emotion and a mood say alike.
+    """The attributes that emotion and mood share.
 
     Attributes:
-        name: its word, or an archetype with the number of one of its profiles ("fear 8").
-        angle, activation: instead of a word, its place on the wheel; activation 0..7, None the angle's own.
-        valence, arousal: instead of both, its place between pleasant and unpleasant, calm and excited.
-        intensity: how much of it shows; 1 all, as a word is already as strong as it says.
-        profile: which of several ways to show it; None the usual one.
-        seed: for a face that is drawn within what the profile allows; None its middle.
+        name: an emotion word, or an archetype with the number of one of its profiles ("fear 8").
+        angle, activation: instead of a word, a place on the wheel; activation 0..7, None for the angle's own.
+        valence, arousal: instead of both, a place between pleasant and unpleasant, calm and excited.
+        intensity: 0..1 of the full strength of the word or place.
+        profile: name of the set of profiles; None for the default.
+        seed: for a random face within the ranges of the profile; None for their centres.
     """
 
     name: str | None = attribute(word, default=None)
@@ -70,7 +70,7 @@ class Expression(Behaviour):
     """Show an expression of the expression library, such as "template:astonishment".
 
     Attributes:
-        because: what placed it, in words; for whoever reads the document.
+        because: the reason for it, for readers of the document.
     """
 
     tag = own("expression")
@@ -108,7 +108,7 @@ class FapFile(Behaviour):
 
 @node
 class Timeline(Behaviour):
-    """Play a file of the media folder that has expressions one after the other, in several channels."""
+    """Play a file of the media folder with a sequence of expressions in several channels."""
 
     tag = own("timeline")
     file_name: str = attribute(word)
@@ -126,11 +126,11 @@ class Blink(Behaviour):
 
 @node
 class Idle(Behaviour):
-    """What a face does when it does nothing, from now on.
+    """The idle motion of a face from now on.
 
     Attributes:
-        blinks: the part of its usual blinks that it keeps, 0 none.
-        motion: the part of its usual small movements of head and eyes, 0 none.
+        blinks: the share of its usual blinks, 0 for none.
+        motion: the share of its usual small movements of head and eyes, 0 for none.
     """
 
     tag = own("idle")

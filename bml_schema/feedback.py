@@ -1,8 +1,8 @@
 """BML feedback messages: classes, writer and parser.
 
 `to_xml` takes `seq`, the number of the message in its session, and `epoch`, the POSIX seconds at which the
-session clock was 0: with it every time of the session clock comes in POSIX milliseconds too, as BMLA has it.
-Neither is part of ==.
+session clock was 0; with `epoch` every time of the session clock is also written in POSIX milliseconds, as
+BMLA does. Neither is part of ==.
 """
 
 from __future__ import annotations
@@ -46,9 +46,9 @@ class BlockProgress:
         id: "block:start" or "block:end".
         global_time: seconds on the session clock.
         character_id: as in the block.
-        status: BMLA's word for the block's state: IN_EXEC, DONE, INTERRUPTED, REVOKED; None says nothing.
-        said: where speech of the block was cut off: all its words that were spoken to their end, "" for none.
-        posix_time: milliseconds since 1970, as read; None where it does not say.
+        status: BMLA's state of the block: IN_EXEC, DONE, INTERRUPTED, REVOKED; or None.
+        said: if speech of the block was cut off, the words that were spoken completely; "" for none.
+        posix_time: milliseconds since 1970, as read, or None.
     """
 
     id: str
@@ -61,11 +61,11 @@ class BlockProgress:
 
     @property
     def last_word(self) -> str | None:
-        """The last word of `said`; None where there is none."""
+        """The last word of `said`, or None."""
         return self.said.split()[-1] if self.said and self.said.strip() else None
 
     def to_xml(self, seq: int | None = None, epoch: float | None = None) -> str:
-        """The element as text; `seq` and `epoch` as the module says."""
+        """Return the element as XML text; for `seq` and `epoch` see the module."""
         posix = _posix("bmla:posixTime", self.global_time, epoch, self.posix_time)
         said = _given("realizer:said", self.said) + _given("realizer:lastWord", self.last_word)
         return (
@@ -94,7 +94,7 @@ class SyncPointProgress:
     posix_time: int | None = field(default=None, compare=False)
 
     def to_xml(self, seq: int | None = None, epoch: float | None = None) -> str:
-        """The element as text; `seq` and `epoch` as the module says."""
+        """Return the element as XML text; for `seq` and `epoch` see the module."""
         return (
             f'<syncPointProgress{_CORE} id="{sanitized_value(self.id)}" time="{_seconds(self.time)}"'
             f' globalTime="{_seconds(self.global_time)}"{_given("characterId", self.character_id)}'
@@ -105,12 +105,12 @@ class SyncPointProgress:
 
 @node
 class WarningFeedback:
-    """Something was dropped.
+    """A part of a document was dropped.
 
     Attributes:
         id: a block, "block:behaviour", or a constraint.
         type: such as PARSING_FAILURE.
-        text: for people.
+        text: explanation for people.
     """
 
     id: str
@@ -120,7 +120,7 @@ class WarningFeedback:
     seq: int | None = field(default=None, compare=False)
 
     def to_xml(self, seq: int | None = None, epoch: float | None = None) -> str:
-        """The element as text; no CDATA and no elements inside, clients refuse both."""
+        """Return the element as XML text, without CDATA and child elements, which some clients refuse."""
         start = (
             f'<warningFeedback{_CORE} id="{sanitized_value(self.id)}" type="{sanitized_value(self.type)}"'
             f"{_given('characterId', self.character_id)}{_ours(_number(self.seq if seq is None else seq))}"
@@ -130,11 +130,11 @@ class WarningFeedback:
 
 @node
 class BlockPrediction:
-    """When a block is expected to start and end, seconds on the session clock; None while unknown.
+    """The expected start and end of a block, seconds on the session clock; None while unknown.
 
     Attributes:
-        status: BMLA's word for its state: IN_PREP, PENDING, LURKING, IN_EXEC, SUBSIDING.
-        posix_start, posix_end: milliseconds since 1970, as read; None where it does not say.
+        status: BMLA's state of the block: IN_PREP, PENDING, LURKING, IN_EXEC, SUBSIDING.
+        posix_start, posix_end: milliseconds since 1970, as read, or None.
     """
 
     id: str
@@ -147,7 +147,7 @@ class BlockPrediction:
 
 @node
 class PredictionFeedback:
-    """What is expected to happen.
+    """The expected times of blocks and behaviours.
 
     Attributes:
         blocks: block times.
@@ -161,22 +161,22 @@ class PredictionFeedback:
     seq: int | None = field(default=None, compare=False)
 
     def to_xml(self, seq: int | None = None, epoch: float | None = None) -> str:
-        """The element as text; `seq` and `epoch` as the module says."""
+        """Return the element as XML text; for `seq` and `epoch` see the module."""
         writer = Writer()
         inner: list[str] = []
         for block in self.blocks:
             start, end = block.global_start, block.global_end
-            told = (
+            posix = (
                 _posix("bmla:posixStartTime", start, epoch, block.posix_start)
                 + _posix("bmla:posixEndTime", end, epoch, block.posix_end)
                 + _given("bmla:status", block.status)
             )
-            if told:
+            if posix:
                 writer.prefixes[BMLA] = "bmla"
             times = "" if start is None else f' globalStart="{_seconds(start)}"'
             if end is not None:
                 times += f' globalEnd="{_seconds(end)}"'
-            inner.append(f'<bml id="{sanitized_value(block.id)}"{times}{told}/>')
+            inner.append(f'<bml id="{sanitized_value(block.id)}"{times}{posix}/>')
         inner.extend(writer.behaviour(b) for b in self.behaviours)
         declared = writer.declarations()
         tag = (
@@ -190,12 +190,12 @@ Feedback = BlockProgress | SyncPointProgress | WarningFeedback | PredictionFeedb
 
 
 def prediction_of(node: Behaviour, block: str, times: Mapping[str, float]) -> Behaviour:
-    """A behaviour as predictionFeedback tells of it: id "block:behaviour", each sync point a plain number.
+    """Return a behaviour for predictionFeedback: its id is "block:behaviour", each sync point a plain number.
 
     Args:
-        node: as parsed; its descriptions, its priority and what is others' stay out.
+        node: as parsed; descriptions, priority and unknown attributes and children are left out.
         block: id of its block.
-        times: sync point -> seconds from block start. "stroke:n" has no attribute form and stays out.
+        times: sync point -> seconds from block start. "stroke:n" has no attribute form and is left out.
     """
     syncs = {p: SyncRef(offset=round(times[p], 6)) for p in node.sync_points if p in times}
     id = f"{block}:{node.id}"
@@ -206,19 +206,19 @@ def prediction_of(node: Behaviour, block: str, times: Mapping[str, float]) -> Be
         refs = {p: SyncRef(offset=round(time, 6)) for p, time in times.items() if p not in node.sync_points}
         parts = node.text.parts if node.text is not None else ()
         parts = tuple(p if isinstance(p, str) else changed(p, ref=refs.pop(p.id, None)) for p in parts)
-        # Marks that only a description names stand behind the text.
+        # Marks that only a description names follow the text.
         parts += tuple(Sync(id=mark, ref=ref) for mark, ref in refs.items())
         return changed(node, text=SpeechText(parts=parts) if parts else node.text)
     if isinstance(node, FaceKeyframe):
-        return changed(node, interpolator=None)  # thousands of numbers that nobody reads from feedback
+        return changed(node, interpolator=None)  # thousands of numbers that no client needs in feedback
     return node
 
 
 def parse_feedback(text: str, vocabulary: Mapping[str, type[Behaviour]] = VOCABULARY) -> Feedback:
-    """The feedback an element tells of; unknown attributes and unknown children are ignored.
+    """Parse a feedback element; unknown attributes and children are ignored.
 
     Raises:
-        BMLError: not well-formed, not feedback, or without an attribute it must have.
+        BMLError: not well-formed, not feedback, or without a required attribute.
     """
     if "<!DOCTYPE" in text:
         raise BMLSyntaxError("wanted feedback without DTD and entities, got <!DOCTYPE")
@@ -227,7 +227,7 @@ def parse_feedback(text: str, vocabulary: Mapping[str, type[Behaviour]] = VOCABU
     except UnicodeEncodeError:
         raise BMLSyntaxError("wanted characters XML can hold") from None
     kind = str(root.tag)
-    who: dict[str, Any] = {"character_id": root.get("characterId"), "seq": _seq(root)}
+    common: dict[str, Any] = {"character_id": root.get("characterId"), "seq": _seq(root)}
     if kind == core("blockProgress"):
         status = root.get(bmla("status"))
         return BlockProgress(
@@ -236,7 +236,7 @@ def parse_feedback(text: str, vocabulary: Mapping[str, type[Behaviour]] = VOCABU
             status=status,
             said=root.get(own("said")),
             posix_time=_milliseconds(root),
-            **who,
+            **common,
         )
     if kind == core("syncPointProgress"):
         return SyncPointProgress(
@@ -244,16 +244,16 @@ def parse_feedback(text: str, vocabulary: Mapping[str, type[Behaviour]] = VOCABU
             time=_time(root, "time"),
             global_time=_time(root, "globalTime"),
             posix_time=_milliseconds(root),
-            **who,
+            **common,
         )
     if kind == core("warningFeedback"):
-        said = "".join(str(t) for t in root.itertext())
-        return WarningFeedback(id=_needed(root, "id"), type=_needed(root, "type"), text=said, **who)
+        text = "".join(str(t) for t in root.itertext())
+        return WarningFeedback(id=_needed(root, "id"), type=_needed(root, "type"), text=text, **common)
     if kind == core("predictionFeedback"):
         blocks = tuple(_block(e) for e in root if e.tag == core("bml"))
         behaviours = (read_behaviour(e, vocabulary) for e in root if e.tag != core("bml"))
         return PredictionFeedback(
-            blocks=blocks, behaviours=tuple(b for b in behaviours if b is not None), **who
+            blocks=blocks, behaviours=tuple(b for b in behaviours if b is not None), **common
         )
     raise BMLError(f"wanted BML 1.0 feedback, got <{local(kind)}>", line=_line(root))
 
@@ -279,7 +279,7 @@ def _needed(source: etree._Element, name: str) -> str:
 
 def _time(source: etree._Element, name: str) -> float:
     value = _needed(source, name).strip()
-    # Java clients and servers write 1.0E-4: others' feedback may have exponents, ours never.
+    # Java programs write 1.0E-4: feedback of other realizers may have exponents, ours never has.
     if not NUMBER.fullmatch(value.partition("E")[0].partition("e")[0]):
         raise BMLError(f"{name}: wanted seconds, got {quoted(value)}", line=_line(source))
     try:
@@ -305,26 +305,26 @@ def _whole(value: str) -> int | None:
     return int(value) if value.isdecimal() and len(value) < 20 else None
 
 
-# s; up to here a double tells microseconds apart, so that six digits are what rounding leaves of it.
+# s; up to here a double resolves microseconds.
 _EXACT = 1e9
 _CORE = f' xmlns="{CORE}"'
 _OURS = f' xmlns:realizer="{OWN}"'
 
 
 def _seconds(time: float) -> str:
-    """To the microsecond, and never with an exponent."""
+    """Format a time to the microsecond, never with an exponent."""
     if -_EXACT < time < _EXACT:
         return f"{time:.6f}".rstrip("0").rstrip(".")
     return decimal(round(time, 6))
 
 
 def _given(name: str, value: str | None) -> str:
-    """An attribute; "" where there is no value."""
+    """Return an attribute, or "" without a value."""
     return "" if value is None else f' {name}="{sanitized_value(value)}"'
 
 
 def _posix(name: str, time: float | None, epoch: float | None, read: int | None) -> str:
-    """A time on the session clock as whole milliseconds since 1970; without an epoch, what was read."""
+    """Return an attribute of whole milliseconds since 1970; without an epoch, of the value that was read."""
     if time is not None and epoch is not None:
         read = round((epoch + time) * 1000)
     return "" if read is None else f' {name}="{read}"'
@@ -335,10 +335,10 @@ def _number(seq: int | None) -> str:
 
 
 def _bmla(attributes: str) -> str:
-    """Attributes of BMLA with their namespace."""
+    """Return attributes of BMLA with the declaration of their namespace."""
     return f' xmlns:bmla="{BMLA}"{attributes}' if attributes else ""
 
 
 def _ours(attributes: str, declared: str = "") -> str:
-    """Attributes of ours with our namespace, unless a predicted behaviour of ours has declared it."""
+    """Return attributes of ours with our namespace, unless a predicted behaviour of ours has declared it."""
     return attributes if not attributes or _OURS in declared else _OURS + attributes

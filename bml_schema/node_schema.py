@@ -27,16 +27,16 @@ __all__ = ["attribute", "child", "children", "mixed", "node", "sync_ref", "text"
 _KEY = "bml"
 _T = TypeVar("_T")
 
-# The one value that cannot be read alone: it needs the ids of the block.
+# A placeholder: to read a reference, the parser needs the ids of the block.
 sync_ref = Value("a sync reference", lambda text: text, str, "syncReference")
 
 
 @dataclass(frozen=True, slots=True)
 class Attribute:
-    """One XML attribute: field it goes to, its name in XML, what it may hold.
+    """One XML attribute of a node class.
 
-    `read` is that of its value, None for a sync reference, which cannot be read alone. `old` is the name that
-    drafts of the standard gave it, or "".
+    `read` is the reader of its value, None for a sync reference, which needs the ids of the block. `old` is
+    the name of the attribute in drafts of the standard, or "".
     """
 
     field: str
@@ -50,7 +50,7 @@ class Attribute:
 
 @dataclass(frozen=True, slots=True)
 class Child:
-    """One kind of child elements: field they go to, classes by tag, how many there may and must be."""
+    """One kind of child elements: the field, the classes, and the allowed and required numbers."""
 
     field: str
     classes: tuple[type[Any], ...]
@@ -60,20 +60,21 @@ class Child:
 
 @dataclass(frozen=True, slots=True)
 class NodeSchema:
-    """All an element may hold, as the parser and the writer need it.
+    """The attributes and children of an element, for the parser and the writer.
 
     Attributes:
-        attributes: XML name -> Attribute; `old`: the same by the names that drafts gave them.
+        attributes: XML name -> Attribute; `old`: the same by their names in drafts.
         children: in order of declaration.
-        by_tag: Clark tag -> (Child, class); `by_local`: the same by local name, for documents that leave an
-            extension's own children in another namespace.
+        by_tag: Clark tag -> (Child, class); `by_local`: the same by local name, for documents that put an
+            extension's own children into another namespace.
         mixed: field of the mixed content (text and children in order), or "".
         text: field of the character data, or "".
         names: names of all fields.
-        name: local name of its element.
-        timed: it has sync points, and may hold descriptions and what is not ours.
-        sync_points: in order; `points`: the same; `strokes`: it may have several strokes, "stroke:n".
-        checked: its class has a `fault` of its own to ask.
+        name: local name of the element.
+        timed: it has sync points, and can have descriptions and unknown attributes and children.
+        sync_points: in order; `points`: the same as a set; `strokes`: it can have several strokes,
+            "stroke:n".
+        checked: its class overrides `fault`.
         needed: the fields of `required`.
     """
 
@@ -96,38 +97,38 @@ class NodeSchema:
 
     @property
     def listed(self) -> str:
-        """The children an element may have, in words."""
+        """The allowed children as words for a message."""
         tags = [f"<{local(c.tag)}>" for kind in self.children for c in kind.classes] or ["<description>"]
         return ", ".join(tags[:-1]) + f" or {tags[-1]}" if len(tags) > 1 else tags[0]
 
 
 def attribute(value: Value, *, default: Any = MISSING, name: str = "", old: str = "") -> Any:
-    """An XML attribute, required without a default.
+    """Declare an XML attribute; without a default it is required.
 
     Args:
-        name: in XML, if it is not the field's name in camelCase.
-        old: what drafts called it; it is read where the attribute itself is not given, and not written.
+        name: its name in XML, if that is not the field's name in camelCase.
+        old: its name in drafts; it is read if the attribute itself is missing, and never written.
     """
     return field(default=default, metadata={_KEY: ("attribute", value, (name, old))})
 
 
 def child(cls: type[Any], *, default: Any = MISSING) -> Any:
-    """One child element; without a default it is required."""
+    """Declare one child element; without a default it is required."""
     return field(default=default, metadata={_KEY: ("child", (cls,), default is MISSING)})
 
 
 def children(*classes: type[Any], least: int = 0, default: Any = MISSING) -> Any:
-    """Child elements of some classes, as a tuple in document order; at least `least` of them."""
+    """Declare a tuple of child elements of some classes in document order, at least `least` of them."""
     return field(default=default, metadata={_KEY: ("children", classes, least)})
 
 
 def mixed(*classes: type[Any], default: Any = MISSING) -> Any:
-    """The whole content: a tuple of strings and nodes in document order, blanks kept."""
+    """Declare mixed content: a tuple of strings and nodes in document order, with whitespace as written."""
     return field(default=default, metadata={_KEY: ("mixed", classes, 0)})
 
 
 def text(*, default: Any = MISSING) -> Any:
-    """The character data of an element without children, blanks kept."""
+    """Declare the character data of an element without children, with whitespace as written."""
     return field(default=default, metadata={_KEY: ("text", (), 0)})
 
 
@@ -137,7 +138,7 @@ def text(*, default: Any = MISSING) -> Any:
     field_specifiers=(attribute, child, children, mixed, text, field),
 )
 def node(cls: type[_T]) -> type[_T]:
-    """A frozen, slotted, keyword-only dataclass: a node class."""
+    """Make a class a node class: a frozen dataclass with slots and keyword arguments."""
     made = dataclass(frozen=True, slots=True, kw_only=True)(cls)
     made.__init__ = _quick_init(made)  # type: ignore[method-assign]
     return made
@@ -147,9 +148,9 @@ _ABSENT: Any = object()
 
 
 def _quick_init(cls: type[Any]) -> Callable[..., None]:
-    """The `__init__` a dataclass has, in half the time: documents are made of thousands of nodes.
+    """Return an `__init__` like a dataclass's, in half the time: documents have thousands of nodes.
 
-    A frozen dataclass looks each slot up by its name to get past its own `__setattr__`; this knows the slots.
+    The `__init__` of a frozen dataclass looks up each slot by its name; this one has the slots.
     """
     known: dict[str, Any] = {"absent": _ABSENT}
     parameters: list[str] = []
@@ -179,7 +180,7 @@ def _quick_init(cls: type[Any]) -> Callable[..., None]:
 
 
 def changed(one: _T, **values: Any) -> _T:
-    """A node with other values in some fields: as `dataclasses.replace`, in a third of its time."""
+    """Return a node with other values in some fields, as `dataclasses.replace` in a third of its time."""
     cls: type[Any] = type(one)
     known = _FIELDS.get(cls)
     if known is None:
@@ -194,18 +195,18 @@ _FIELDS: dict[type[Any], tuple[tuple[str, ...], Callable[[Any], tuple[Any, ...]]
 
 
 def local(tag: str) -> str:
-    """The name behind the namespace of a Clark tag."""
+    """Return the local name of a Clark tag."""
     return tag.rpartition("}")[2]
 
 
 def camel(name: str) -> str:
-    """offset_angle -> offsetAngle."""
+    """Return a name in camelCase: offset_angle -> offsetAngle."""
     head, *tail = name.split("_")
     return head + "".join(t.capitalize() for t in tail)
 
 
 def schema_of(cls: type[Any]) -> NodeSchema:
-    """The shape of a node class, read once from its fields."""
+    """Return the schema of a node class, derived once from its fields."""
     shape = _SHAPES.get(cls)
     if shape is None:
         shape = _SHAPES[cls] = _shape(cls)

@@ -32,38 +32,38 @@ CORE = "http://www.bml-initiative.org/bml/bml-1.0"
 EXTENSIONS = "http://www.bml-initiative.org/bml/coreextensions-1.0"
 BMLA = "http://www.asap-project.org/bmla"
 BMLT = "http://hmi.ewi.utwente.nl/bmlt"
-OWN = "urn:bml-realizer:1"  # what we add to BML ourselves
+OWN = "urn:bml-realizer:1"  # the extensions of this project
 COMPOSITIONS = ("MERGE", "APPEND", "REPLACE")
 
 
 def core(name: str) -> str:
-    """Clark tag of an element of the BML 1.0 core namespace."""
+    """Return the Clark name of an element in the BML 1.0 core namespace."""
     return f"{{{CORE}}}{name}"
 
 
 def extension(name: str) -> str:
-    """Clark tag of an element of the BML 1.0 core extensions namespace."""
+    """Return the Clark name of an element in the BML 1.0 core extensions namespace."""
     return f"{{{EXTENSIONS}}}{name}"
 
 
 def bmla(name: str) -> str:
-    """Clark name in the namespace of BMLA, the extensions of AsapRealizer."""
+    """Return the Clark name of a name in the namespace of BMLA, the extensions of AsapRealizer."""
     return f"{{{BMLA}}}{name}"
 
 
 def bmlt(name: str) -> str:
-    """Clark name in the namespace of BMLT, the extensions of Elckerlyc."""
+    """Return the Clark name of a name in the namespace of BMLT, the extensions of Elckerlyc."""
     return f"{{{BMLT}}}{name}"
 
 
 def own(name: str) -> str:
-    """Clark name in our own namespace."""
+    """Return the Clark name of a name in the namespace of this project."""
     return f"{{{OWN}}}{name}"
 
 
 @node
 class Part:
-    """Base of elements inside a behaviour that have no timing of their own."""
+    """The base of elements inside a behaviour without timing of their own."""
 
     tag: ClassVar[str]
 
@@ -73,9 +73,9 @@ class Description(Part):
     """A richer form of a behaviour, for realizers that know its type.
 
     Attributes:
-        priority: the highest one whose type is known replaces the core form (priority 0).
+        priority: the highest one with a known type replaces the core form (priority 0).
         type: such as "application/ssml+xml".
-        content: XML text of what is inside, in canonical form with its own namespace declarations; for
+        content: XML text of the content, in canonical form with its own namespace declarations; for
             application/ssml+xml exactly the <speak> element.
     """
 
@@ -88,22 +88,21 @@ class Description(Part):
 
 @node
 class Behaviour:
-    """Base of everything that has sync points.
+    """The base of all elements with sync points.
 
     Attributes:
         id: unique in the block; "" only for the parts of <face> and <faceShift>.
-        syncs: sync point -> where the document wants it; only those the document gives.
-        priority: bmla:priority; of two that want the same thing the lower one is dropped.
+        syncs: sync point -> its reference in the document; only those that the document gives.
+        priority: bmla:priority; in a conflict the behaviour of the lower priority is dropped.
         descriptions: in document order.
-        unknown_attributes: attributes this class does not know, by Clark name, kept for others and for the
-            round trip.
-        unknown_children: child elements of others, such as <bmlt:parameter>, kept likewise: each as XML text
-            in canonical form, with its own namespace declarations.
+        unknown_attributes: attributes this class does not define, by Clark name, kept for the round trip.
+        unknown_children: child elements of other namespaces, such as <bmlt:parameter>, kept as canonical XML
+            with their own namespace declarations.
     """
 
     tag: ClassVar[str]
     sync_points: ClassVar[tuple[str, ...]] = ("start", "end")
-    # True: each <sync id> inside is a sync point too (speech).
+    # Each <sync id> inside is a sync point too (speech).
     marks: ClassVar[bool] = False
 
     id: str = attribute(name)
@@ -114,13 +113,13 @@ class Behaviour:
     unknown_children: tuple[str, ...] = ()
 
     def fault(self) -> str:
-        """What is wrong with the whole of it, beyond single attributes; "" if it is sound."""
+        """Return a fault of the behaviour as a whole, beyond single attributes, or ""."""
         return ""
 
 
 @node
 class Synchronize(Part):
-    """All refs are equal in time; a plain number among them is a time from block start."""
+    """All refs have the same time; a plain number among them is a time from block start."""
 
     tag = core("synchronize")
     refs: tuple[SyncRef, ...] = ()
@@ -146,13 +145,13 @@ class After(Part):
 
 @node
 class Constraint(Part):
-    """What must hold between sync points of several behaviours.
+    """Conditions on sync points of several behaviours.
 
     Attributes:
         id: None if the document gives none.
         parts: in document order.
-        required: it stands inside <required>. Where it stands in the tree says so too: not part of ==.
-        place: where it stands in the text; not part of ==.
+        required: it is inside <required>; not part of ==, as the tree has this too.
+        place: its position in the text; not part of ==.
     """
 
     tag = core("constraint")
@@ -164,7 +163,7 @@ class Constraint(Part):
 
 @node
 class Required(Part):
-    """Behaviours and constraints without which the whole block goes."""
+    """Behaviours and constraints without which the whole block is dropped."""
 
     tag = core("required")
     children: tuple[Behaviour | Constraint, ...] = ()
@@ -176,21 +175,21 @@ class Block:
 
     Attributes:
         id: never empty, never "bml".
-        character_id: who acts; None if the document does not say.
-        composition: MERGE, APPEND or REPLACE, beside, after or instead of earlier blocks.
-        append_after: BMLA: starts when all these blocks are done, beside what composition says.
+        character_id: the character, or None if the document does not name one.
+        composition: MERGE, APPEND or REPLACE: beside, after or instead of earlier blocks.
+        append_after: BMLA: starts when all these blocks are done, in addition to its composition.
             "APPEND-AFTER(a,b)" as composition means the same.
         chunk_after: BMLA: starts when all these blocks are subsiding (past every relax) or done.
         prepend_before, chunk_before: BMLA: these blocks, not started yet, append or chunk after this one.
         interrupt: BMLA: these blocks are interrupted when this one is scheduled.
         on_start: BMLA: these preplanned blocks are activated when this one starts.
-        preplan: BMLA: planned, but not started before somebody activates it.
+        preplan: BMLA: it is planned, but starts only when it is activated.
         children: in document order.
-        unknown_attributes: attributes this version does not know, by Clark name.
+        unknown_attributes: attributes this version does not define, by Clark name.
         problems: what was dropped while parsing; not part of ==.
         places: behaviour or constraint id -> line and path; not part of ==.
-        behaviours: all, in document order, those inside <required> too.
-        constraints: all, in document order, those inside <required> too.
+        behaviours: all, in document order, with those inside <required>.
+        constraints: all, in document order, with those inside <required>.
         required: ids of the behaviours inside <required>.
     """
 
@@ -229,9 +228,9 @@ class Block:
         put(self, "behaviours", behaviours)
         put(self, "constraints", tuple([c for c in flat if isinstance(c, Constraint)]))
         put(self, "required", frozenset(required))
-        # The first of two with the same id counts, as in documents.
+        # Of two behaviours with the same id the first counts, as in documents.
         put(self, "_by_id", {b.id: b for b in behaviours[::-1]})
 
     def __getitem__(self, id: str) -> Behaviour:
-        """The behaviour with this id; KeyError if there is none."""
+        """Return the behaviour with an id; raise KeyError if there is none."""
         return self._by_id[id]

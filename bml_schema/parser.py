@@ -1,7 +1,7 @@
 """The recursive-descent parser of one <bml> element.
 
-Faults stay where they are: a behaviour or constraint with a fault is left out and told of in one Problem.
-Attributes that nobody knows are told of too, and cost nothing else.
+A behaviour or constraint with a fault is dropped and reported in one Problem; the rest of the block stays.
+Unknown attributes are reported too, and nothing is dropped because of them.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ from bml_schema.values import block_names, describe_mismatch
 
 __all__ = ["MAX_BEHAVIOURS"]
 
-MAX_BEHAVIOURS = 10_000  # in one block; more than anybody writes, and still scheduled in about a second
-_MAX_LISTED = 10  # lost references named in a warning's text; `Problem.lost_references` has them all
-# BMLA says this in composition or in an attribute of its own.
+MAX_BEHAVIOURS = 10_000  # in one block; scheduled in about a second
+_MAX_LISTED = 10  # lost references in a warning's text; `Problem.lost_references` has all
+# BMLA writes this in composition or in an attribute of its own.
 _APPEND_AFTER = re.compile(r"\s*APPEND-AFTER\s*\(([^()]*)\)\s*", re.IGNORECASE)
 _BLOCK_LISTS = {a.field for a in schema_of(Block).attributes.values() if a.value is block_names}
-_MAX_ID = 256  # characters of an id a warning repeats
+_MAX_ID = 256  # characters of an id that a warning repeats
 
 
 def read_block(
@@ -53,14 +53,14 @@ def read_block(
     begins: Mapping[tuple[int, str], int] = MappingProxyType({}),
     max_behaviours: int = MAX_BEHAVIOURS,
 ) -> Block:
-    """The block of a <bml> element.
+    """Read the block of a <bml> element.
 
     Args:
         root: as lxml parsed it, without comments and processing instructions.
         vocabulary: Clark tag -> node class.
-        lines_before: lines of the text in front of what lxml saw.
-        begins: (line where a start tag ends, its local name) -> line where it begins, if that is another.
-        max_behaviours: more (constraints counted with them) are refused.
+        lines_before: number of lines in the text before the part that lxml parsed.
+        begins: (line where a start tag ends, its local name) -> line where it begins, if they differ.
+        max_behaviours: the limit of behaviours and constraints together.
 
     Raises:
         BMLError: not a <bml>, no usable id, or too many behaviours.
@@ -80,14 +80,14 @@ def read_block(
     reader = _Reader(outline, lines)
     entries = flat(tree)
     if len(entries) > max_behaviours:
-        said = f"wanted at most {max_behaviours} behaviours and constraints in a block, got {len(entries)}"
-        raise BMLSizeError(said, line=line, path="/bml", block=names.block)
+        text = f"wanted at most {max_behaviours} behaviours and constraints in a block, got {len(entries)}"
+        raise BMLSizeError(text, line=line, path="/bml", block=names.block)
     if wrong_attributes:
         reader.problem(names.block, Fault(wrong_attributes, root), "/bml", root, dropped=False)
     if stray := elements.describe_unknown(schema_of(Block), root, values["unknown_attributes"], False):
         reader.report_unknown(names.block, stray, "/bml", root, root)
     for text, parent, path in outline.loose:
-        # Nobody's text, so the block's problem.
+        # The text belongs to no behaviour, so the problem is the block's.
         reader.problem(
             names.block, Fault(f"wanted elements, got the text {quoted(text)}", parent), path, parent
         )
@@ -110,9 +110,9 @@ def read_block(
 
 
 def read_behaviour(element: etree._Element, vocabulary: Vocabulary) -> Behaviour | None:
-    """A behaviour on its own, as predictions hold them; None if its kind is unknown or it has a fault.
+    """Read a single behaviour of a prediction; return None if its element is unknown or has a fault.
 
-    Its id may hold colons ("block:behaviour"), and its references are not looked up.
+    Its id can contain colons ("block:behaviour"), and its references are not checked.
     """
     elements = ElementReader(vocabulary)
     cls = vocabulary.get(elements.tag(element))
@@ -128,7 +128,7 @@ def read_behaviour(element: etree._Element, vocabulary: Vocabulary) -> Behaviour
 
 
 def _block_attributes(root: etree._Element, line: int) -> tuple[dict[str, Any], str]:
-    """Values by field, and what is wrong with them; a fault in the id is an error."""
+    """Return attribute values by field, and a message about faults; raise BMLError for a fault in the id."""
     known = schema_of(Block).attributes
     values: dict[str, Any] = {"unknown_attributes": {}}
     faults: list[str] = []
@@ -146,22 +146,22 @@ def _block_attributes(root: etree._Element, line: int) -> tuple[dict[str, Any], 
             else:
                 values[spec.field] = spec.value.read(text)
         except ValueError:
-            said = f"{local(name)}: {describe_mismatch(spec.value.wanted, text, quoted(text))}"
+            fault = f"{local(name)}: {describe_mismatch(spec.value.wanted, text, quoted(text))}"
             if name == "id":
-                raise BMLError(said, line=line, path="/bml") from None
+                raise BMLError(fault, line=line, path="/bml") from None
             if text.strip():
                 default = "" if spec.default is None else spec.value.write(spec.default)
-                faults.append(f"{said}; taken as {default or 'none'}")
+                faults.append(f"{fault}; taken as {default or 'none'}")
     if after:
         values["append_after"] = tuple(dict.fromkeys((*values.get("append_after", ()), *after)))
     for field in _BLOCK_LISTS & values.keys():
-        # A block cannot wait for itself; its id in such a list says nothing.
+        # A block cannot wait for itself; its own id is ignored.
         values[field] = tuple(id for id in values[field] if id != values["id"])
     return values, "; ".join(faults)
 
 
 class _Lines(NamedTuple):
-    """Lines of the text where start tags begin; lxml knows where they end, in what it was given."""
+    """Lines of the text where start tags begin; lxml only knows where they end, in the part it parsed."""
 
     before: int
     begins: Mapping[tuple[int, str], int]
@@ -174,7 +174,7 @@ class _Lines(NamedTuple):
 
 
 class _Reader:
-    """What is known while one block is read."""
+    """The state of reading one block."""
 
     __slots__ = ("elements", "line", "names", "owners", "places", "problems")
 
@@ -182,13 +182,13 @@ class _Reader:
         self.elements = outline.elements
         self.names = outline.names
         self.owners = outline.owners
-        # Nearly always lxml's lines are those of the text.
+        # Mostly the lines of lxml are those of the text.
         self.line: Callable[[etree._Element], int] = lines.of if any(lines) else attrgetter("sourceline")
         self.problems: list[Problem] = []
         self.places: dict[str, Place] = {}
 
     def behaviour(self, entry: Entry) -> Behaviour | None:
-        """The node of an entry; None, and a Problem, if it is dropped."""
+        """Return the node of an entry, or None, with a Problem, if it is dropped."""
         element = entry.element
         try:
             cls = entry.kind.cls
@@ -197,11 +197,12 @@ class _Reader:
             owner = self.owners.get(entry.id, entry)
             if owner is not entry:
                 line = self.line(owner.element)
-                said = f"id: wanted one of its own, got {quoted(entry.id)}, which line {line} has"
-                raise Fault(said, element)
+                raise Fault(
+                    f"id: wanted one of its own, got {quoted(entry.id)}, which line {line} has", element
+                )
             node: Behaviour = self.elements.node(cls, element, timed=True)
         except Fault as fault:
-            self.elements.unknown_attributes.clear()  # it goes, whatever else is to be said of it
+            self.elements.unknown_attributes.clear()  # it is dropped anyway
             id = entry.id if 0 < len(entry.id) <= _MAX_ID else entry.path
             self.problem(f"{self.names.block}:{id}", fault, entry.path, element, entry.required)
             return None
@@ -226,13 +227,13 @@ class _Reader:
         return Fault(f"no behaviour <{name}> in BML 1.0{hint}", element, BEHAVIOR_TYPE_NOT_SUPPORTED)
 
     def report_unknown_attributes(self, id: str, entry: Entry) -> None:
-        """Tell of the attributes that nobody knows, element by element."""
+        """Report the unknown attributes of a behaviour or constraint, one Problem for each element."""
         for said, element in self.elements.unknown_attributes:
             self.report_unknown(id, said, entry.path, element, entry.element)
         self.elements.unknown_attributes.clear()
 
     def constraint(self, entry: Entry) -> Constraint | None:
-        """The node of an entry; None, and a Problem, if it is dropped."""
+        """Return the node of an entry, or None, with a Problem, if it is dropped."""
         element = entry.element
         try:
             values = self.elements.constraint(element)
@@ -245,10 +246,10 @@ class _Reader:
         place = Place(self.line(element), entry.path)
         return Constraint(**values, required=entry.required, place=place)
 
-    # What went, and what went with it
+    # References to dropped behaviours
 
     def prune(self, nodes: dict[int, Behaviour | Constraint]) -> None:
-        """Take references to dropped behaviours out of what is left, and tell of them in the Problems."""
+        """Remove references to dropped behaviours from the other nodes, and name them in the Problems."""
         gone = self.owners.keys() - self.places.keys()
         if not gone:
             return
@@ -303,7 +304,7 @@ class _Reader:
 def _grouped(
     tree: list[Entry | list[Entry]], nodes: Mapping[int, Behaviour | Constraint]
 ) -> tuple[Behaviour | Required | Constraint, ...]:
-    """The nodes that are left, in the tree of their entries."""
+    """Arrange the remaining nodes in the tree of their entries."""
     if list not in map(type, tree):
         return tuple(nodes.values())
     out: list[Behaviour | Required | Constraint] = []
@@ -321,7 +322,7 @@ def _grouped(
 
 
 def _path_below(element: etree._Element, top: etree._Element, path: str) -> str:
-    """Path of an element inside `top`, whose own path is known."""
+    """Return the path of an element inside `top`, whose path is given."""
     steps = ""
     while element is not top:
         parent = element.getparent()

@@ -1,6 +1,6 @@
 """Source positions: line, column and length of an element or attribute in a text.
 
-The parser knows lines only; this reads the text once more, forgivingly, to underline what a fault means.
+The parser only knows lines; this module scans the text again, and tolerates errors.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _ENCODING = re.compile(rb"""<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)["']
 
 
 class Spot(NamedTuple):
-    """Where something stands in a text: line and column from 1, length in characters, not beyond its line."""
+    """A position: line and column from 1, and a length in characters that does not exceed the line."""
 
     line: int
     column: int
@@ -27,22 +27,22 @@ class Spot(NamedTuple):
 
 
 class Source:
-    """A text with any number of documents, whole or broken.
+    """A text with any number of documents, well-formed or not.
 
     Args:
-        text: as it was read; bytes in any encoding the parser takes, wrong ones become U+FFFD.
+        text: str, or bytes in any encoding the parser takes; undecodable bytes become U+FFFD.
 
     Attributes:
         text: decoded.
         elements: every start tag, in order.
-        errors: what is not well-formed, as far as that is seen, in order.
+        errors: places that are not well-formed, in order.
     """
 
     def __init__(self, text: str | bytes) -> None:
         self.text = _decoded(text) if isinstance(text, bytes) else text
         self.elements, self.errors = scan(self.text)
         self._starts = [0, *(m.end() for m in re.finditer("\n", self.text))]
-        self._line = 0, ""  # the last one asked for
+        self._line = 0, ""  # the last result of `line`
         self._children = {
             (e.parent, e.name.rpartition(":")[2], e.nth): n for n, e in enumerate(self.elements)
         }
@@ -53,15 +53,15 @@ class Source:
                 self._ids.setdefault(self.id(e), []).append(e)
 
     def line(self, number: int) -> str:
-        """The text of a line without its end; "" where there is no such line."""
+        """Return the text of a line without its line end, or "" if there is no such line."""
         if not 1 <= number <= len(self._starts):
             return ""
-        if self._line[0] != number:  # one line may hold a whole document, and each of its faults
+        if self._line[0] != number:  # one line can hold a whole document with many faults
             self._line = number, self.text[self._starts[number - 1] : self._end_of(number)]
         return self._line[1]
 
     def _end_of(self, number: int) -> int:
-        """Offset of the end of a line."""
+        """Return the offset of the end of a line."""
         end = self._starts[number] - 1 if number < len(self._starts) else len(self.text)
         return end - (self.text[end - 1 : end] == "\r" and end > self._starts[number - 1])
 
@@ -69,7 +69,7 @@ class Source:
         return bisect_right(self._starts, offset)
 
     def spot(self, offset: int, end: int) -> Spot:
-        """The part of text[offset:end] on its first line; at least one character long."""
+        """Return the part of text[offset:end] on its first line; at least one character long."""
         number = self.line_of(offset)
         column = offset - self._starts[number - 1]
         longest = self._end_of(number) - offset
@@ -78,16 +78,16 @@ class Source:
     def locate(
         self, path: str, attribute: str = "", *, line: int | None = None, block: str | None = None
     ) -> Spot:
-        """Where the value of an attribute stands, or the name of the element where it has no such attribute.
+        """Return the position of an attribute's value, or of the element's name if it has no such attribute.
 
         Args:
             path: of the element, such as "/bml/required[1]/head[2]".
             attribute: its name, with prefix, as a Clark name, or its local part.
-            line: where the element's start tag begins; tells documents of one text apart.
+            line: where the element's start tag begins; selects one of several documents.
             block: id of the document; likewise.
 
         Returns:
-            The place; the line alone, without blanks around it, where the path leads nowhere.
+            The position; that of the whole line if no element has this path.
         """
         element = self.find(path, line=line, block=block)
         if element is None:
@@ -95,33 +95,33 @@ class Source:
         return self.locate_in(element, attribute)
 
     def locate_in(self, element: Element, attribute: str) -> Spot:
-        """Where the value of an attribute stands, or the element's name where it has no such attribute."""
+        """Return the position of an attribute's value, or of the element's name if there is none."""
         value = self.value_span(element, attribute)
         return self.spot(*value) if value else self.name_spot(element)
 
     def find(self, path: str, *, line: int | None = None, block: str | None = None) -> Element | None:
-        """The element at a path; of several documents the one that fits line and id best."""
+        """Return the element at a path; of several documents the one that matches line and id best."""
         steps = [(m[1], int(m[2] or 1)) for m in _STEP.finditer(path)]
         if not steps or steps[0][0] != DOCUMENT:
             return None
-        found = [e for root in self._roots if (e := self._below(root, steps[1:])) is not None]
-        return self._best(found, line, block)
+        elements = [e for root in self._roots if (e := self._below(root, steps[1:])) is not None]
+        return self._best(elements, line, block)
 
     def named(self, id: str, *, line: int | None = None, block: str | None = None) -> Element | None:
-        """The first element with an id; of several documents the one that fits line and block id best."""
+        """Return the first element with an id; of several documents the one that fits line and block best."""
         return self._best(self._ids.get(id, []), line, block)
 
     def document(self, id: str) -> Element | None:
-        """The last <bml> with an id."""
+        """Return the last <bml> with an id."""
         roots = (self.elements[n] for n in reversed(self._roots))
         return next((root for root in roots if self.id(root) == id), None)
 
     def inside(self, element: Element) -> Iterator[Element]:
-        """The elements of the document that an element belongs to."""
+        """Return the elements of the document that an element belongs to."""
         return (e for e in self.elements if e.root == element.root)
 
     def below(self, element: Element) -> Iterator[Element]:
-        """The elements inside an element, in order."""
+        """Yield the elements inside an element, in order."""
         first = bisect_right(self.elements, element.offset, key=lambda e: e.offset)
         around = {first - 1}
         for number in range(first, len(self.elements)):
@@ -131,7 +131,7 @@ class Source:
             yield self.elements[number]
 
     def on_line(self, line: int) -> Iterator[Element]:
-        """The elements whose start tag begins on a line."""
+        """Yield the elements whose start tag begins on a line."""
         first = bisect_right(self.elements, self._starts[line - 1] - 1, key=lambda e: e.offset)
         for number in range(first, len(self.elements)):
             if self.line_of(self.elements[number].offset) != line:
@@ -139,14 +139,14 @@ class Source:
             yield self.elements[number]
 
     def block(self, element: Element) -> str:
-        """The id of the document that an element belongs to; "" for none."""
+        """Return the id of the document that an element belongs to, or ""."""
         return self.id(self.elements[element.root]) if element.root >= 0 else ""
 
     def id(self, element: Element) -> str:
         return self.value(element, "id").strip()
 
     def path(self, element: Element) -> str:
-        """The path of an element from its <bml>."""
+        """Return the path of an element from its <bml>."""
         steps = ""
         while element.parent >= 0 and element is not self.elements[element.root]:
             steps = f"/{element.name.rpartition(':')[2]}[{element.nth}]{steps}"
@@ -154,12 +154,12 @@ class Source:
         return f"/{DOCUMENT}{steps}"
 
     def value(self, element: Element, attribute: str) -> str:
-        """What an attribute holds; "" where there is none."""
+        """Return the value of an attribute, or ""."""
         span = self.value_span(element, attribute)
         return html.unescape(self.text[span[0] : span[1]]) if span else ""
 
     def value_span(self, element: Element, attribute: str) -> tuple[int, int] | None:
-        """Offsets of an attribute's value, None where there is none."""
+        """Return the offsets of an attribute's value, or None."""
         if attribute in element.attributes:
             return element.attributes[attribute]
         wanted = attribute.rpartition("}")[2]
@@ -170,11 +170,11 @@ class Source:
         return None
 
     def name_spot(self, element: Element) -> Spot:
-        """The name in a start tag."""
+        """Return the position of the name in a start tag."""
         return self.spot(element.offset + 1, element.offset + 1 + len(element.name))
 
     def attribute_spot(self, element: Element, attribute: str) -> Spot:
-        """The name of an attribute, or of the element where it has no such."""
+        """Return the position of an attribute's name, or of the element's name if there is none."""
         span = self.value_span(element, attribute)
         if span is None:
             return self.name_spot(element)
@@ -183,13 +183,13 @@ class Source:
         return self.spot(start, start + len(local))
 
     def whole_line(self, number: int) -> Spot:
-        """A line from its first to its last character that is no blank."""
+        """Return the position of a line without the whitespace around it."""
         text = self.line(number)
         blanks = len(text) - len(text.lstrip())
         return Spot(number, blanks + 1, max(1, len(text.strip())))
 
     def error_on_line(self, line: int) -> ScanError | None:
-        """What is not well-formed on a line, or above it in the same document: parsers notice some late."""
+        """Return the syntax error on a line, or the last one above it: parsers find some late."""
         on = next((s for s in self.errors if self.line_of(s.offset) == line), None)
         if on is not None:
             return on
@@ -199,22 +199,22 @@ class Source:
         return above[-1] if above else None
 
     def _below(self, root: int, steps: list[tuple[str, int]]) -> Element | None:
-        here: int | None = root
+        number: int | None = root
         for name, n in steps:
-            here = self._children.get((here, name, n)) if here is not None else None
-        return self.elements[here] if here is not None else None
+            number = self._children.get((number, name, n)) if number is not None else None
+        return self.elements[number] if number is not None else None
 
-    def _best(self, found: list[Element], line: int | None, block: str | None) -> Element | None:
+    def _best(self, elements: list[Element], line: int | None, block: str | None) -> Element | None:
         def fits(element: Element) -> tuple[bool, bool, bool]:
-            # Of a tag over several lines the parser may know its last one only.
+            # Of a tag over several lines the parser may only know the last line.
             begins, ends = (line == self.line_of(offset) for offset in (element.offset, element.end - 1))
             return begins, ends, block is not None and self.block(element) == block
 
-        return max(found, key=fits, default=None)
+        return max(elements, key=fits, default=None)
 
 
 def _decoded(data: bytes) -> str:
-    """Text of bytes, by BOM, declaration or as UTF-8; what is no text becomes U+FFFD."""
+    """Decode bytes by BOM, declaration or as UTF-8; undecodable bytes become U+FFFD."""
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return data.decode("utf-16", "replace")
     named = _ENCODING.match(data.removeprefix(codecs.BOM_UTF8).lstrip())

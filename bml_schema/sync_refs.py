@@ -13,7 +13,7 @@ from bml_schema.values import MAX_SECONDS, NUMBER, decimal, describe_mismatch
 
 __all__ = ["SyncRef"]
 
-# Sync points of the core. A name in the middle of three that is one of these is no behaviour's id.
+# Sync points of the core. In the middle of three names, one of these is not a behaviour's id.
 _POINTS = frozenset({"start", "ready", "strokeStart", "stroke", "strokeEnd", "attackPeak", "relax", "end"})
 _LONGEST = 1000  # characters of a reference: two ids of 256, a sync id, an offset
 _WANTED = 'a number of seconds or a reference such as "behaviour:sync + 0.5"'
@@ -24,13 +24,13 @@ _OFFSET_LIKE = re.compile(r".*[+-]\s*(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)")
 
 @node
 class SyncRef:
-    """A point in time, as a document says it.
+    """A point in time in a document.
 
     Attributes:
         block: another block's id; None for the own block.
         behaviour: a behaviour's id, "bml" for the block itself, None for a plain number.
         sync: sync point name; None for a plain number.
-        index: n of "stroke:n", counted from 1; None without.
+        index: n of "stroke:n", counted from 1, or None.
         offset: seconds after that point; for a plain number, seconds after block start.
     """
 
@@ -46,7 +46,7 @@ class SyncRef:
         point = ":".join(filter(None, (self.block, self.behaviour, self.sync)))
         if self.index is not None:
             point = f"{point}:{self.index}"
-        # Blanks around the sign, because ids may hold hyphens; "+ 0" where the name ends like an offset.
+        # Blanks around the sign, because ids may hold hyphens; "+ 0" if the name ends like an offset.
         if self.offset or _OFFSET_LIKE.fullmatch(point):
             point += f" {'-' if self.offset < 0 else '+'} {decimal(abs(self.offset))}"
         return point
@@ -61,17 +61,17 @@ class Points(NamedTuple):
 
 @dataclass(slots=True)
 class Names:
-    """What references of one block can name: its id, and the sync points of each behaviour id.
+    """The names that references of one block can use: its id, and the sync points of each behaviour id.
 
-    Points are None for an element of unknown kind: whatever is said of it vanishes with it.
+    Points are None for an unknown element: references to it are dropped with it.
     """
 
     block: str
     points: dict[str, Points | None] = field(default_factory=dict)
-    suggestions: int = 10  # "did you mean" is slow; a document full of faults gets the first few
+    suggestions: int = 10  # "did you mean" is slow, and a document may have many faults
 
     def suggest(self, word: str, choices: Iterable[str]) -> str:
-        """`, did you mean ...?` or "", the latter always once the document used its suggestions up."""
+        """Return `, did you mean ...?` or "", and always "" after ten suggestions for one document."""
         if self.suggestions <= 0:
             return ""
         self.suggestions -= 1
@@ -79,24 +79,24 @@ class Names:
 
 
 def read_sync_ref(text: str, names: Names | None = None) -> SyncRef:
-    """The reference a text stands for.
+    """Parse a sync reference.
 
-    Ids may hold hyphens and dots: a reading whose names exist goes before one that cuts an offset off.
-    References into other blocks are not checked; one into the own block by its id loses the id.
+    Ids may hold hyphens and dots: a reading whose names exist takes precedence over one with an offset.
+    References into other blocks are not checked; the id of the own block is removed.
 
     Args:
         text: value of an attribute.
-        names: what the own block holds; None checks the grammar only.
+        names: the names of the own block; None checks the grammar only.
 
     Raises:
-        ValueError: not a reference, or one to something the own block does not hold. The text says what
-            was wanted and what came.
+        ValueError: not a reference, or no such behaviour or sync point in the own block. The message has
+            the expected and the actual value.
 
     Source: BML 1.0, sync references.
     """
     source, colon, sync = text.partition(":")
     if colon and names is not None and (points := names.points.get(source)):
-        # Nearly all references are such, and their names exist.
+        # Nearly all references have this form, and their names exist.
         if sync in points.names:
             return SyncRef(behaviour=source, sync=sync)
         plain = _PLAIN.fullmatch(sync)
@@ -138,7 +138,7 @@ def _with_offset(text: str) -> SyncRef | None:
 
 
 def _point(text: str, offset: str) -> SyncRef | None:
-    """[block:]source:sync[:index] with an offset such as "-0.5" or ""; None if it does not have that form."""
+    """Parse [block:]source:sync[:index] with an offset such as "-0.5" or ""; return None for another form."""
     parts = [p.strip() for p in text.split(":")]
     if not all(parts):
         return None
@@ -166,7 +166,7 @@ def _own(ref: SyncRef, names: Names) -> SyncRef:
 
 
 def _single_stroke(ref: SyncRef, names: Names) -> SyncRef:
-    """stroke:1 of a behaviour with one stroke is its stroke."""
+    """Replace stroke:1 of a behaviour with one stroke by stroke."""
     points = names.points.get(ref.behaviour or "")
     if ref.index != 1 or points is None or points.strokes != 1:
         return ref
@@ -174,7 +174,7 @@ def _single_stroke(ref: SyncRef, names: Names) -> SyncRef:
 
 
 def _missing(ref: SyncRef, names: Names, say: bool = False) -> str:
-    """Why a reference into the own block leads nowhere; "" if it leads somewhere."""
+    """Return why a reference into the own block is wrong, or ""; a full message only with `say`."""
     source, sync = ref.behaviour or "", ref.sync or ""
     if source == "bml":
         return (

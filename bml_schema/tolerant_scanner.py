@@ -12,12 +12,12 @@ _CLOSER = {"<!--": "-->", "<![CDATA[": "]]>", "<?": "?>", "<!DOCTYPE": ">"}
 _NAME = re.compile(r"[^\s<>/='\"]+")
 _ATTRIBUTE = re.compile(r"""\s*([^\s<>/='"]+)\s*=\s*(?:"([^"<]*)"|'([^'<]*)')""")
 _TAG_END = re.compile(r"\s*/?>")
-_SLIPPED = re.compile(r"\s*([^\s<>/='\"]+)(?:\s*=\s*([^\s<>]*))?")
+_BROKEN_ATTRIBUTE = re.compile(r"\s*([^\s<>/='\"]+)(?:\s*=\s*([^\s<>]*))?")
 _BAD_ENTITY = re.compile(r"&(?!(?:amp|lt|gt|quot|apos|#[0-9]+|#x[0-9a-fA-F]+);)[^\s<>;\"'&]{0,30};?")
 
 
 class ScanError(NamedTuple):
-    """A place that no XML parser takes, what is wrong there, and the offset of what it does not fit or -1."""
+    """A syntax error: its place, a message, and the offset of a related place, or -1."""
 
     offset: int
     length: int
@@ -31,11 +31,11 @@ class Element:
 
     Attributes:
         name: as written, with its prefix.
-        offset, end: of "<", and behind ">".
+        offset, end: of "<", and after ">".
         attributes: name as written -> (offset, end) of its value without the quotes.
-        parent: number of the element around it, -1 for none.
-        nth: which one of its name among the children of its parent, from 1.
-        root: number of the nearest <bml> around it, itself included, -1 for none.
+        parent: number of the parent element, or -1.
+        nth: position among the children of the parent with the same name, from 1.
+        root: number of the nearest <bml> around it, or its own; -1 if there is none.
     """
 
     name: str
@@ -48,23 +48,23 @@ class Element:
 
 
 def scan(text: str) -> tuple[list[Element], list[ScanError]]:
-    """Every start tag, and every slip, both in order; forgiving, as texts are scanned that are broken."""
+    """Return every start tag and every syntax error, in order."""
     one = _Scan(text)
     one.run()
     return one.elements, sorted(one.errors)
 
 
 class _Scan:
-    """One pass over a text; linear in it, whatever it holds."""
+    """One pass over a text, in linear time."""
 
     def __init__(self, text: str) -> None:
         self.text = text
         self.elements: list[Element] = []
         self.errors: list[ScanError] = []
         self.open: list[int] = []
-        self.names: dict[str, int] = {}  # how many of these are open
+        self.names: dict[str, int] = {}  # number of open elements by name
         self.counts: dict[tuple[int, str], int] = {}
-        self.never: set[str] = set()  # closers that do not come any more
+        self.never: set[str] = set()  # closers that do not occur any more
 
     def run(self) -> None:
         here = 0
@@ -79,7 +79,7 @@ class _Scan:
             self.errors.append(ScanError(max(0, end - 1), 1, words, first.offset))
 
     def tag(self, opener: str, start: int, end: int) -> int:
-        """Read what begins at `start`; returns where to go on."""
+        """Read the construct at `start`; return the offset after it."""
         if opener in _CLOSER:
             closer = _CLOSER[opener]
             close = -1 if closer in self.never else self.text.find(closer, end)
@@ -121,22 +121,22 @@ class _Scan:
         return element.end
 
     def report_errors(self, tag: str, here: int) -> int:
-        """Say what is wrong in a start tag; returns where to look for the next tag."""
-        slips, text = self.errors, self.text
-        found = _SLIPPED.match(text, here)
+        """Report the error in a start tag; return where to look for the next tag."""
+        errors, text = self.errors, self.text
+        found = _BROKEN_ATTRIBUTE.match(text, here)
         if found is None:
             at = here + len(text[here : here + 200]) - len(text[here : here + 200].lstrip())
-            slips.append(ScanError(at, 1, f"wanted an attribute or the end of <{tag}>"))
+            errors.append(ScanError(at, 1, f"wanted an attribute or the end of <{tag}>"))
             return here
         name, value = found[1], found[2]
         if value is None:
-            slips.append(ScanError(found.start(1), len(name), f'wanted {name}="...", got no value'))
+            errors.append(ScanError(found.start(1), len(name), f'wanted {name}="...", got no value'))
         elif value[:1] in ('"', "'"):
-            slips.append(
+            errors.append(
                 ScanError(found.start(2), len(value), f"the value of {name} is never closed by {value[0]}")
             )
         else:
-            slips.append(
+            errors.append(
                 ScanError(found.start(2), max(1, len(value)), f"wanted quotes around the value of {name}")
             )
         return found.end()

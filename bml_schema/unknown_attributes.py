@@ -1,7 +1,7 @@
-"""Problems and hints for attributes that an element's class does not define.
+"""Messages about attributes that an element's class does not define.
 
-A slip such as `amout="1"` would otherwise show nothing, and nobody would know why. What other languages put
-on our elements is theirs: it is kept, and nothing is said.
+A misspelling such as `amout="1"` would otherwise go unnoticed. Attributes of other namespaces are kept
+without a message.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from lxml import etree
 from bml_schema.node_schema import NodeSchema, local
 from bml_schema.nodes import CORE, EXTENSIONS, OWN
 
-# BMLA and BMLT have more attributes than are known here.
+# Not BMLA and BMLT: they have more attributes than this package knows.
 _OURS = tuple(f"{{{space}}}" for space in (CORE, EXTENSIONS, OWN))
 
 
@@ -24,12 +24,12 @@ def describe_unknown(
     timed: bool,
     suggest: Callable[[str, Iterable[str]], str],
 ) -> str:
-    """One text for all attributes that mean nothing where they stand; "" where there are none such.
+    """Return one message about all attributes without a meaning, or "".
 
     Args:
-        names: Clark names of what the shape does not know.
+        names: Clark names of attributes that the schema does not have.
         timed: sync points are attributes of the element.
-        suggest: (a name, those known) -> `, did you mean ...?` or "".
+        suggest: (name, known names) -> `, did you mean ...?` or "".
     """
     wrong = [name for name in names if name not in shape.old and (name[0] != "{" or name.startswith(_OURS))]
     if not wrong:
@@ -39,7 +39,7 @@ def describe_unknown(
         known += shape.sync_points
     around = element.getparent() if shape.timed and not timed else None
     where = "" if around is None else f" inside <{local(str(around.tag))}>"
-    said = [f"{name}: no attribute of <{shape.name}>{where}, so it does nothing" for name in wrong]
-    # Once, before the last hint: what is meant by several is in one list.
-    said[-1] += f"; known are {', '.join(known)}" if known else "; there are none"
-    return "; ".join(text + suggest(local(name), known) for text, name in zip(said, wrong, strict=True))
+    texts = [f"{name}: no attribute of <{shape.name}>{where}, so it does nothing" for name in wrong]
+    # The list of known attributes comes once, before the last suggestion.
+    texts[-1] += f"; known are {', '.join(known)}" if known else "; there are none"
+    return "; ".join(text + suggest(local(name), known) for text, name in zip(texts, wrong, strict=True))

@@ -22,14 +22,14 @@ _FANCY = re.compile(r"[+-]?(?:nan|inf|infinity|[0-9.]+e[+-]?[0-9]+)", re.IGNOREC
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """What an attribute may hold.
+    """The values of an attribute.
 
     Attributes:
         wanted: the end of the sentence "wanted ...".
-        read: text -> value; ValueError if it is not one.
+        read: text -> value; raises ValueError.
         write: value -> text, such that read(write(v)) == v.
-        type: XSD type the test of nodes against XSD looks for.
-        words: the closed set, if it is one.
+        type: XSD type, which a test compares with the schema.
+        words: the closed set of words, or ().
         low, high: the range of a number.
     """
 
@@ -43,7 +43,7 @@ class Value:
 
 
 def decimal(value: float) -> str:
-    """A number without exponent that reads back as the same float; ValueError for NaN and infinity."""
+    """Format a number without exponent so that it reads back as the same float; ValueError for NaN."""
     text = repr(float(value))
     if "n" in text:  # inf, nan
         raise ValueError(f"wanted a finite number, got {value}")
@@ -53,13 +53,13 @@ def decimal(value: float) -> str:
 
 
 def describe_mismatch(wanted: str, got: str, shown: str) -> str:
-    """`wanted 0..1, got 7`, with a hint where a number is written in a way BML does not have."""
+    """Return `wanted 0..1, got 7`, with a hint if a number is written in a form that BML does not have."""
     hint = " (a plain decimal number, no exponent, NaN or infinity)" if _FANCY.fullmatch(got.strip()) else ""
     return f"wanted {wanted}{hint}, got {shown}"
 
 
 def number(low: float, high: float, *, wanted: str = "") -> Value:
-    """A decimal number in low..high."""
+    """Return the Value of decimal numbers in low..high."""
 
     def read(text: str) -> float:
         text = text.strip()
@@ -74,7 +74,7 @@ def number(low: float, high: float, *, wanted: str = "") -> Value:
 
 
 def integer(low: int, high: int) -> Value:
-    """A whole number in low..high."""
+    """Return the Value of whole numbers in low..high."""
 
     def read(text: str) -> int:
         text = text.strip()
@@ -89,7 +89,7 @@ def integer(low: int, high: int) -> Value:
 
 
 def one_of(*words: str, any_case: bool = False) -> Value:
-    """One of a closed set of words; with any_case, "merge" is read as MERGE."""
+    """Return the Value of a closed set of words; with any_case, "merge" is read as MERGE."""
     known = frozenset(words)
 
     def read(text: str) -> str:
@@ -150,12 +150,12 @@ def _read_flag(text: str) -> bool:
     return text in ("true", "1")
 
 
-# An open set: the members of the standard must exist, others may.
+# An open set of words.
 word = Value("a word", _read_word)
 string = Value("text", str)
 flag = Value("true or false", _read_flag, lambda v: "true" if v else "false", "boolean")
 seconds = number(-MAX_SECONDS, MAX_SECONDS, wanted=f"seconds, at most {MAX_SECONDS:g}")
-# Ids hold no colon, because references and feedback ids are joined with it. Those of behaviours hold no
+# Ids have no colon, because references and feedback ids are joined with it. Those of behaviours have no
 # blank, because "a - 1" must always mean an offset. "bml" is the block itself in references.
 block_name = Value(
     f'a name of at most {_MAX_NAME} characters without ":", other than "bml"',
@@ -167,6 +167,6 @@ name = Value(
     _read_name,
     type="name",
 )
-# BMLA puts commas between names; ids of behaviours hold no blanks, so that blanks may stand there too.
+# BMLA separates names by commas; ids of behaviours have no blanks, so that blanks may separate them too.
 block_names = Value("names of blocks with commas between them", _read_block_names, _write_names, "blockNames")
 names = Value("names of behaviours with commas between them", _read_names, _write_names, "names")

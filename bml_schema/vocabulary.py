@@ -10,7 +10,7 @@ from bml_schema.nodes import Behaviour
 
 __all__ = ["VOCABULARY"]
 
-# Clark tag -> class; users add theirs: {**VOCABULARY, Wink.tag: Wink}.
+# Clark tag -> class; extend it by {**VOCABULARY, Wink.tag: Wink}.
 VOCABULARY: Final[Mapping[str, type[Behaviour]]] = {
     cls.tag: cls
     for module in (behaviours, bmla, extensions)

@@ -28,7 +28,7 @@ __all__ = ["write"]
 
 _IN_CORE = f"{{{CORE}}}"
 _XML = "http://www.w3.org/XML/1998/namespace"
-# Prefixes people know; any other namespace becomes ns1, ns2, ...
+# Well-known prefixes; any other namespace becomes ns1, ns2, ...
 _PREFIXES: Mapping[str, str] = {
     CORE: "bml",
     EXTENSIONS: "ext",
@@ -40,17 +40,17 @@ _PREFIXES: Mapping[str, str] = {
 
 
 def write(block: Block) -> str:
-    """The document of a block, in the core namespace, one behaviour a line.
+    """Return the document of a block, in the core namespace, with one behaviour a line.
 
     Raises:
-        ValueError: a node made by hand holds what XML or BML cannot: a control character, NaN, or a
-            description or an element of others that is not well-formed.
+        ValueError: a node has values that XML or BML cannot represent: a control character, NaN, or a
+            description or unknown child that is not well-formed.
     """
     return Writer().block(block) + "\n"
 
 
 class Writer:
-    """Writes elements, and keeps the namespaces they needed for the root to declare."""
+    """A writer of elements; collects the namespaces that the root has to declare."""
 
     def __init__(self) -> None:
         self.prefixes: dict[str, str] = {}
@@ -62,11 +62,11 @@ class Writer:
         return "\n".join((start + ">", *lines, "</bml>")) if lines else start + "/>"
 
     def declarations(self) -> str:
-        """xmlns attributes for every namespace used so far."""
+        """Return xmlns attributes for every namespace used so far."""
         return "".join(f' xmlns:{p}="{escape_value(uri)}"' for uri, p in self.prefixes.items())
 
     def behaviour(self, node: Behaviour, indent: str = "") -> str:
-        """One behaviour; its namespaces are in `declarations` afterwards."""
+        """Write one behaviour; its namespaces are in `declarations` afterwards."""
         return self._element(node, indent)
 
     def _child(self, node: Behaviour | Required | Constraint, indent: str) -> Iterable[str]:
@@ -112,7 +112,7 @@ class Writer:
         inside = _parsed(node.content, "description: wanted well-formed content")
         values = self._attributes(node)
         if any(not str(e.tag).startswith("{") for e in inside.iterdescendants()):
-            # Elements without namespace must not fall into the core one.
+            # Elements without namespace must not get the core one.
             return f'<bml:description xmlns:bml="{CORE}" xmlns=""{values}>{node.content}</bml:description>'
         return f"<description{values}>{node.content}</description>"
 
@@ -134,7 +134,7 @@ class Writer:
         return out
 
     def name(self, clark: str, *, attribute: bool = False) -> str:
-        """Clark name -> name with a prefix, which is declared on the root; elements of the core need none."""
+        """Return a Clark name with a prefix, which the root declares; elements of the core have no prefix."""
         if not clark.startswith("{"):
             return clark
         if not attribute and clark.startswith(_IN_CORE):
@@ -153,7 +153,7 @@ _PLAIN = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False
 
 
 def _parsed(content: str, wanted: str) -> etree._Element:
-    """The content in an element around it; a ValueError if it is not well-formed."""
+    """Parse content inside a wrapper element; raise ValueError if it is not well-formed."""
     try:
         return etree.fromstring(f"<x>{content}</x>".encode(), _PLAIN)
     except (etree.XMLSyntaxError, UnicodeEncodeError) as wrong:
@@ -161,7 +161,7 @@ def _parsed(content: str, wanted: str) -> etree._Element:
 
 
 def _checked(other: str) -> str:
-    """Text of an element of others that stays one: in a namespace, so that nobody takes it for ours."""
+    """Return an unknown child; raise ValueError if it is not one well-formed element in a namespace."""
     wanted = "others: wanted one well-formed element in a namespace of its own"
     inside = _parsed(other, wanted)
     if len(inside) != 1 or not str(inside[0].tag).startswith("{") or inside.text or inside[0].tail:
@@ -174,7 +174,7 @@ def _value(name: str, text: str) -> str:
 
 
 def _ordered(node: Any) -> list[str]:
-    """The sync points a node gives, in chronological order."""
+    """Return the sync points of a node that have references, in chronological order."""
     syncs: Mapping[str, SyncRef] = getattr(node, "syncs", {})
     known = [p for p in node.sync_points if p in syncs] if syncs else []
     return known if len(known) == len(syncs) else known + [p for p in syncs if p not in known]
