@@ -1,8 +1,8 @@
 """Send it BML, get a living face.
 
-realize(text)   documents in, schedule, FAP frames, sound and feedback out; no clock
+realize(text)   play documents without a clock: schedule, FAP frames, sound and feedback
 schedule(text)  the sync times alone
-Player          blocks alive in a session, told the time
+Player          the blocks of a session; every call has the time as an argument
 load_face(name) a face folder as arrays
 serve(settings) the service
 """
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-# Where each public name lives. They are imported on first use: `import realizer` stays quick, and works
-# where an optional part is missing.
+# The module of each public name. They are imported on first use: `import realizer` stays quick, and works
+# without the optional parts.
 _HOMES = {
     "Face": "realizer.face.model",
     "FaceError": "realizer.core.errors",

@@ -1,4 +1,4 @@
-"""Documents played or scheduled without a clock: `realizer.realize` and `realizer.schedule`."""
+"""Playing and scheduling without a clock: `realizer.realize` and `realizer.schedule`."""
 
 from __future__ import annotations
 
@@ -39,18 +39,18 @@ def realize(
     Args:
         documents: BML text, or several texts; all are submitted at t = 0, in order.
         face: name of a face folder.
-        deformer: what moves it: "mpeg4" (FAPs) or "au" (its model of action units); None is what it says.
+        deformer: "mpeg4" (FAPs) or "au" (action units); None for the face's own choice.
         fps: frames a second.
-        voice: a voice or its name; None takes espeak-ng where it is installed, otherwise the silent voice.
+        voice: a voice or its name; None for espeak-ng, or the silent voice if that is not installed.
         scene: target name -> (x, y, z) metres, origin between the eyes.
         seed: for idle motion; the same seed gives the same frames.
         idle: blinks and small head motion.
         language: BCP-47 of speech that does not name its own.
-        media: the folder of the files that documents may name.
-        expressions: a folder of expressions of the user's own, which documents may name.
+        media: the folder of the files that documents can name.
+        expressions: a folder of additional expressions that documents can name.
         cooccurrence: which AUs a face can show together: "on", "off", or a file of rules.
-        prosody: nods, brows, blinks and looks that go with what is said; none without `idle`.
-        mapping: a file of what AUs ask of FAPs; it goes before what the face says.
+        prosody: nods, brows, blinks and looks that accompany speech; they need `idle`.
+        mapping: a file with a mapping of AUs to FAPs, used instead of the face's.
 
     Raises:
         FaceError: no such face.
@@ -83,10 +83,10 @@ def schedule(
     scene: Mapping[str, Position] | None = None,
     media: Path | None = None,
 ) -> Schedule:
-    """Return the sync times of one BML document: parse, timing, solve; no animation.
+    """Return the sync times of one BML document, without animation.
 
     Raises:
-        BMLError: the document gives no block; with line and path.
+        BMLError: the text has no valid document; with line and path.
         VoiceError: the named voice is not installed.
     """
     player = Player(PlayOptions(scene=scene, idle=False, media=media))

@@ -1,7 +1,7 @@
 """The pipeline: eight steps from BML to pixels.
 
     1 parse     text -> blocks of behaviours                                      `bml_schema`
-    2 time      behaviour -> its sync points, and how long the gaps between last  `realizer.behaviours`
+    2 time      behaviour -> its sync points and preferred gaps between them      `realizer.behaviours`
     3 schedule  block -> a time for every sync point, by least squares            `realizer.scheduling`
     4 expand    behaviour and times -> curves of action units (AUs) and FAPs      `realizer.behaviours`
     5 blend     curves of all behaviours -> AUs, a row a frame                    `realizer.animation.blend`
@@ -9,8 +9,8 @@
     7 deform    FAPs or AUs -> the vertices of a face                             `realizer.face.deform`
     8 draw      vertices -> pixels                                                `realizer.render`
 
-Blocks wait for, replace and refer to each other, so a `Player` plans each of them beside those that it has:
-steps 2 to 4 are `realizer.playback.block_planner`. The service does the same, with a clock.
+Blocks wait for, replace and refer to each other, so a `Player` plans each block together with the earlier
+ones: steps 2 to 4 are in `realizer.playback.block_planner`. The service does the same, with a clock.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a player has played, sampled: frames, sound and feedback, for outputs and for whoever asks."""
+"""The result of playing documents: sampled frames, sound and feedback of all characters."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ from realizer.tables import faps
 if TYPE_CHECKING:
     from realizer.face.model import Face
 
-# Longest stretch of frames computed in one call: the cost of a call is flat up to here, its memory is not.
+# Longest stretch of frames in one call: longer ones need more memory and are not faster.
 WINDOW = 10.0  # s
-# More is a mistake (four hours at 25 fps) and would not fit into memory as JSON or film.
+# Four hours at 25 fps; more would not fit into memory as JSON or film.
 MAX_FRAMES = 360_000
 
 
 @dataclass(frozen=True, eq=False)
 class Performance:
-    """What one character does: (n, ...) frames at k / fps."""
+    """The frames of one character: (n, ...) frames at k / fps."""
 
     aus: AUFrames
     faps: FAPFrames
@@ -44,7 +44,7 @@ class Performance:
 
 @dataclass(frozen=True, eq=False)
 class FaceChange:
-    """A face from a frame on, and what its AUs ask of FAPs."""
+    """A face from a frame on, and its mapping of AUs to FAPs."""
 
     frame: int
     face: str
@@ -58,16 +58,16 @@ class Realization:
     Attributes:
         fps: frames a second; frame k is sampled at k / fps.
         duration: seconds, to the end of the last block.
-        face_name: which face folder is drawn; the last one where it changes.
-        deformer: "mpeg4" or "au", what moves that face; None is what it says itself.
-        mapping: what its AUs ask of FAPs.
-        face_changes: the faces of the first character, in order, where it changes.
+        face_name: the face folder that is drawn; the last one if it changes.
+        deformer: "mpeg4" or "au", the deformer of that face; None for the face's own choice.
+        mapping: the mapping of its AUs to FAPs.
+        face_changes: the faces of the first character, in order, if it changes.
         characters: character id (None: unnamed) -> its frames, the first character first.
         schedules: one per accepted or failed block, in the order of submission.
         feedback_events: BML feedback, in order.
         warnings: all of them, in order.
-        refusals: documents and blocks that gave nothing to play.
-        speeches: what sounds when.
+        refusals: reasons of refused documents and blocks.
+        speeches: the utterances with their times.
     """
 
     fps: float
@@ -85,7 +85,7 @@ class Realization:
 
     @property
     def has_content(self) -> bool:
-        """Some block was accepted: there is something to write."""
+        """Whether some block was accepted, so that there is something to write."""
         return not all(schedule.failed for schedule in self.schedules)
 
     @property
@@ -110,12 +110,12 @@ class Realization:
 
     @property
     def speech(self) -> tuple[tuple[float, Utterance], ...]:
-        """(start in seconds, utterance) of everything said."""
+        """(start in seconds, utterance) of each utterance."""
         return tuple((s.start, s.utterance) for s in self.speeches)
 
     @cached_property
     def face(self) -> Face:
-        """The face pictures are drawn with.
+        """The face for drawing pictures.
 
         Raises:
             FaceError: no such face, or its folder is damaged.
@@ -126,7 +126,7 @@ class Realization:
 
     @cached_property
     def poses(self) -> Float32:
-        """(n, k) float32: what the first character is drawn by, a column for each thing its face takes.
+        """(n, k) float32: poses of the first character, a column for each input of its face.
 
         Raises:
             FaceError: no such face, or its folder is damaged.
@@ -137,12 +137,12 @@ class Realization:
 
     @cached_property
     def faces(self) -> list[tuple[int, Realization]]:
-        """What is to be drawn by one face after the other: (its first frame, those frames and no sound)."""
+        """The parts that one face after the other draws: (first frame, those frames without sound)."""
         if len(self.face_changes) < 2:
             return [(0, self)]
         name = next(iter(self.characters))
         ends = [*(one.frame for one in self.face_changes[1:]), self.frames]
-        found = []
+        parts = []
         for one, end in zip(self.face_changes, ends, strict=True):
             aus, faps = self.aus.part(one.frame, end), self.faps.values[one.frame : end]
             shown = Performance(aus, FAPFrames(aus.times, faps, self.faps.mask))
@@ -154,14 +154,16 @@ class Realization:
                 speeches=(),
                 face_changes=(),
             )
-            found.append((one.frame, part))
-        return found
+            parts.append((one.frame, part))
+        return parts
 
     def visemes(self, character: int = 0) -> Float64:
-        """(n, 15) float64: how much of each MPEG-4 viseme a character says; column 0 is none, rows add to 1.
+        """Return (n, 15) float64: the weight of each MPEG-4 viseme of a character; rows add to 1.
+
+        Column 0 is the closed mouth of silence.
 
         Args:
-            character: its place in `characters`.
+            character: its index in `characters`.
         """
         from realizer.animation.lips.viseme_weights import viseme_weights
         from realizer.animation.lips.visemes import lip_shapes
@@ -170,15 +172,15 @@ class Realization:
         weights = np.eye(1, len(lip_shapes())).repeat(len(times), axis=0)
         for speaking in self.speeches:
             if speaking.character == character:
-                said = viseme_weights(speaking.utterance.phonemes, times - speaking.start)
-                left = np.clip(1 - (times - speaking.until) / SPEECH_FADE, 0, 1)
-                weights[:, 1:] = np.maximum(weights[:, 1:], said[:, 1:] * left[:, None])
+                spoken = viseme_weights(speaking.utterance.phonemes, times - speaking.start)
+                fade = np.clip(1 - (times - speaking.until) / SPEECH_FADE, 0, 1)
+                weights[:, 1:] = np.maximum(weights[:, 1:], spoken[:, 1:] * fade[:, None])
         weights[:, 1:] /= np.maximum(weights[:, 1:].sum(axis=1, keepdims=True), 1.0)
         weights[:, 0] = np.maximum(1 - weights[:, 1:].sum(axis=1), 0.0)
         return weights
 
     def sound(self, rate: int = 22050) -> Int16:
-        """(round(duration x rate),) int16 mono: all that is said, mixed; silence where nobody speaks."""
+        """Return (round(duration x rate),) int16 mono: the mix of all utterances."""
         mix = np.zeros(round(self.duration * rate), np.float32)
         for speaking in self.speeches:
             utterance = speaking.utterance
@@ -191,7 +193,7 @@ class Realization:
         return np.clip(np.rint(mix), -32768, 32767).astype(np.int16)
 
     def to_json(self) -> dict[str, Any]:
-        """The JSON of `realizer realize -o x.json`."""
+        """Return the JSON of `realizer realize -o x.json`."""
         first, *others = self.characters.items()
         out: dict[str, Any] = {
             "fps": self.fps,
@@ -219,13 +221,13 @@ def realization_of(
     accepted: Sequence[Schedule],
     refused: Sequence[Warning],
 ) -> Realization:
-    """Return what a player has played to its end, of which it has forgotten nothing.
+    """Return the realization of a player that has played to the end and still has its whole history.
 
     Args:
-        mapping: of AUs to FAPs, by which `characters` were made.
-        feedback: all that it gave.
-        accepted: the schedules as they were when their blocks were accepted.
-        refused: what it did not take.
+        mapping: the mapping of AUs to FAPs that was used for `characters`.
+        feedback: all feedback of the player.
+        accepted: the schedules of blocks at the time of acceptance.
+        refused: warnings of refused documents and blocks.
     """
     from realizer.face.load import face_name
 
@@ -257,7 +259,7 @@ def frame_times(duration: float, fps: float) -> list[Float64]:
 
 
 def frames_until(duration: float, fps: float) -> int:
-    """The number of frames in 0..duration.
+    """Return the number of frames in 0..duration.
 
     Raises:
         RealizerError: there are too many.
@@ -273,7 +275,7 @@ def frames_until(duration: float, fps: float) -> int:
 def merge_warnings(
     feedback_events: Sequence[Feedback], schedules: Sequence[Schedule], refusals: Sequence[Warning] = ()
 ) -> tuple[Warning, ...]:
-    """The warnings among all feedback, as planning gave them where it did: that says more."""
+    """Return the warnings among all feedback, with the clauses that planning gave them."""
     planned = {(w.id, w.type, w.text): w for w in (*refusals, *(w for s in schedules for w in s.warnings))}
     known = ((f.id, f.type, f.text) for f in feedback_events if isinstance(f, WarningFeedback))
     return tuple(planned.get(key) or Warning(*key) for key in known)

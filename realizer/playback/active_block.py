@@ -1,4 +1,4 @@
-"""An accepted block on the session clock, and what happens to it while it waits or plays."""
+"""An accepted block on the session clock, while it waits or plays."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from realizer.playback.resources import claims
 from realizer.scheduling.timing import Schedule
 from realizer.speech.utterance import Utterance
 
-# Sound and lips stop faster than a face relaxes, so that a barge-in is heard at once.
+# Sound and lips stop faster than a face relaxes, so that an interruption is heard at once.
 SPEECH_FADE = 0.12  # s
-# Times that differ by less are the same, solved again.
+# Rounding of times that are solved again.
 SAME = 1e-9  # s
-# A word that lacks no more than this has sounded to its end.
+# A word that lacks no more than this was heard completely.
 HEARD = 1e-4  # s
 
 
 @dataclass(frozen=True, eq=False)
 class ScheduledSpeech:
-    """An utterance that sounds from `start` on, cut off (with a short fade) at `until` if that is sooner."""
+    """An utterance from `start` on, cut off (with a short fade) at `until` if that is sooner."""
 
     start: float
     until: float
@@ -39,18 +39,18 @@ class ScheduledSpeech:
     gains: tuple[Gain, ...] = ()
 
     def is_complete(self, now: float) -> bool:
-        """Whether it has sounded to its end."""
+        """Whether all of it has been heard."""
         return min(self.until, now) >= self.start + self.utterance.duration - HEARD
 
     def words(self, now: float) -> list[str]:
-        """The words that have sounded to their end."""
+        """Return the words that have been heard completely."""
         heard = min(self.until, now) - self.start + HEARD
         return [word.text for word in self.utterance.words if word.end <= heard]
 
 
 @dataclass(frozen=True, eq=False)
 class Dependency:
-    """A block does not start before another one has ended, or subsides."""
+    """A block that another one waits for: for its end, or until it subsides."""
 
     block: ActiveBlock
     subsiding: bool = False
@@ -62,21 +62,21 @@ class Dependency:
 
 @dataclass(eq=False)
 class ActiveBlock:
-    """A block that was accepted, until it has ended and its last frames are past.
+    """An accepted block, until it has ended and its last frames are past.
 
     Attributes:
-        plan: its schedule has the start; inf while that is not known (it was not activated).
-        context: what it was planned with.
-        character: whose face it moves.
+        plan: its schedule has the start, which is inf while unknown (the block was not activated).
+        context: the context of its planning.
+        character: index of its character.
         number: order of acceptance.
-        order: at one instant it reports before blocks of a higher one.
-        not_before: it does not start sooner, seconds on the session clock.
-        dependencies: nor before these; empty once it has started.
-        followers: the blocks that wait for it.
-        stopped_at: when it was cut off.
+        order: at one instant it reports before blocks of a higher order.
+        not_before: its earliest start, seconds on the session clock.
+        dependencies: blocks that it waits for; empty once it has started.
+        followers: blocks that wait for it.
+        stopped_at: when it was cut off, or None.
         external_refs: its references into other blocks.
-        first_schedule: its schedule as it was when the block was accepted.
-        channels, shifts, speech: by behaviour, on the session clock; empty while the start is not known.
+        first_schedule: its schedule when it was accepted.
+        channels, shifts, speech: by behaviour, on the session clock; empty while the start is unknown.
     """
 
     plan: Plan
@@ -129,21 +129,21 @@ class ActiveBlock:
 
     @property
     def is_waiting(self) -> bool:
-        """It was not started yet."""
+        """Whether it has not started yet."""
         return self.state in (State.PENDING, State.LURKING)
 
     @property
     def start(self) -> float:
-        """When it starts or did, seconds on the session clock; inf while that is not known."""
+        """When it starts or started, seconds on the session clock; inf while unknown."""
         return self.schedule.start
 
     @property
     def end(self) -> float:
-        """When its end is due."""
+        """When it ends or was cut off."""
         return self.schedule.end if self.stopped_at is None else self.stopped_at
 
     def words_spoken(self, now: float) -> str | None:
-        """Where its speech was cut off: all words that have sounded to their end; None where it was not."""
+        """Return the words heard completely before its speech was cut off; None if it was not."""
         spoken = [b for b in self.context.utterances if b in self.first_schedule.times]
         heard = [self.speech[b] for b in spoken if b in self.speech]
         if len(heard) == len(spoken) and all(s.is_complete(now) for s in heard):
@@ -153,12 +153,12 @@ class ActiveBlock:
 
     @property
     def invisible_after(self) -> float:
-        """When nothing of it is to be seen any more."""
+        """The time after which it is no longer visible."""
         return self.end + (RELAX if self.state is State.INTERRUPTED else 0.0)
 
     @property
     def subsides_at(self) -> float:
-        """When every behaviour is past its relax, or its end where it has no relax."""
+        """When every behaviour is past its relax, or its end if it has no relax."""
         if self.stopped_at is not None:
             return self.stopped_at
         last = 0.0
@@ -168,28 +168,27 @@ class ActiveBlock:
 
     @property
     def earliest(self) -> float:
-        """When it may start: inf while it is not activated, or waits for one that is not."""
+        """Its earliest start; inf while it or a block that it waits for is not activated."""
         if self.state is State.PENDING:
             return float("inf")
         return max([self.not_before, *(wait.until for wait in self.dependencies)])
 
     def change_state(self, event: BlockEvent) -> None:
-        """Take the state that follows from an event."""
+        """Change to the state that follows from an event."""
         self.state = next_state(self.state, event)
 
     def add_dependency(self, wait: Dependency) -> None:
-        """Wait for one more block."""
         self.dependencies.append(wait)
         wait.block.followers.append(self)
 
     def apply_plan(self, plan: Plan, start: float) -> None:
-        """Take a plan, or the one it has, and a start: everything comes to stand on the session clock."""
+        """Place a plan on the session clock, with its channels, base states and speech."""
         if plan.block is not self.block:
             self.external_refs = external_refs(plan.block)
         if start != plan.schedule.start:
             late = start - plan.schedule.start
-            held = tuple(claim.shifted(late) for claim in plan.claims)
-            plan = replace(plan, schedule=replace(plan.schedule, start=start), claims=held)
+            shifted = tuple(claim.shifted(late) for claim in plan.claims)
+            plan = replace(plan, schedule=replace(plan.schedule, start=start), claims=shifted)
         self.plan = plan
         self.channels, self.shifts, self.speech = {}, {}, {}
         if start == float("inf"):
@@ -211,17 +210,17 @@ class ActiveBlock:
                 )
 
     def unfinished(self, now: float) -> set[str]:
-        """The behaviours whose end has not passed."""
+        """Return the behaviours whose end has not passed."""
         return {b for b, times in self.schedule.times.items() if self.start + float(times[-1]) > now}
 
     def retime(self, schedule: Schedule, now: float) -> list[str]:
-        """Take other times for what has not passed; what is shown goes on without a jump.
+        """Change the times of sync points that have not passed; visible curves continue without a jump.
 
         Args:
-            schedule: of the same block from the same start; what passed before `now` is as it was.
+            schedule: of the same block from the same start; times before `now` are unchanged.
 
         Returns:
-            The behaviours whose times are others.
+            The behaviours whose times changed.
         """
         changed = [
             b
@@ -257,9 +256,9 @@ class ActiveBlock:
         return changed
 
     def update_speech(self, behaviour: str, utterance: Utterance, now: float) -> None:
-        """Take another utterance of a speech; its points that have passed stay where they were.
+        """Replace the utterance of a speech; its points that have passed stay where they were.
 
-        The schedule is as before: `retime` gives it the times that follow.
+        The schedule is not changed: the caller computes new times and passes them to `retime`.
         """
         self.context = replace(self.context, utterances={**self.context.utterances, behaviour: utterance})
         node = self.block[behaviour]
@@ -270,7 +269,7 @@ class ActiveBlock:
         new = np.concatenate([[0.0], np.cumsum(wanted.preferred)])
         for point, time in zip(wanted.points, new + was["start"], strict=True):
             passed = was.get(point, np.inf)
-            # What has not passed comes when the voice says, but not before now.
+            # Future points are at the times of the new utterance, but not before now.
             at.append(float(passed) if passed <= local else max(float(time), local if at else float(time)))
         gaps = np.diff(np.maximum.accumulate(at))
         timing = replace(wanted, preferred=gaps, least=gaps)
@@ -285,14 +284,14 @@ class ActiveBlock:
             self.speech[behaviour] = replace(self.speech[behaviour], utterance=utterance)
 
     def _placed(self, behaviour: str, channels: Sequence[Channel]) -> tuple[Channel, ...]:
-        """Channels of a behaviour on the session clock."""
+        """Return channels of a behaviour on the session clock."""
         return later(channels, self.start, f"{self.block.id}:{behaviour}")
 
     def cut(self, behaviours: Collection[str], now: float, *, ends: bool = False) -> None:
-        """End behaviours at `now`: what is shown relaxes without a jump, what has not begun never comes.
+        """End behaviours at `now`: visible ones relax without a jump, those that have not begun are removed.
 
-        Of their sync points those that have passed stay; relax comes at once and the end when the face has
-        relaxed (at once with `ends`, where the whole block is cut off).
+        Their past sync points stay. Relax is at once, and the end is after the face has relaxed, or at once
+        with `ends`, if the whole block is cut off.
         """
         points, times = dict(self.schedule.points), dict(self.schedule.times)
         never: list[str] = []
@@ -315,23 +314,23 @@ class ActiveBlock:
         left = tuple(c for c in self.plan.claims if c.behaviour not in behaviours)
         timings = {b: timing for b, timing in self.plan.timings.items() if b not in behaviours}
         schedule = replace(self.schedule, points=points, times=times)
-        # A block that waits may be planned anew.
+        # A waiting block may be planned again.
         block = without(self.block, never).block if never and self.is_waiting else self.block
         self.plan = replace(self.plan, block=block, schedule=schedule, claims=left, timings=timings)
 
     def _cut_times(
         self, behaviour: str, names: tuple[str, ...], at: Float64, local: float, ends: bool
     ) -> tuple[tuple[str, ...], Float64]:
-        kept = {name: float(time) for name, time in zip(names, at, strict=True) if time <= local}
+        times = {name: float(time) for name, time in zip(names, at, strict=True) if time <= local}
         if "relax" in names:
-            kept.setdefault("relax", local)
+            times.setdefault("relax", local)
         shown = "relax" in names or behaviour in self.channels or behaviour in self.shifts
         relax = 0.0 if ends else SPEECH_FADE if behaviour in self.speech else RELAX if shown else 0.0
-        kept["end"] = min(local + relax, float(at[-1]))
-        return tuple(kept), np.array(list(kept.values()))
+        times["end"] = min(local + relax, float(at[-1]))
+        return tuple(times), np.array(list(times.values()))
 
     def scale(self, behaviour: str, gains: Collection[Gain], *, sound: bool) -> None:
-        """Let the sound of a behaviour, or all that it shows, become stronger or weaker."""
+        """Scale the sound of a behaviour, or all its channels."""
         if sound and behaviour in self.speech:
             heard = self.speech[behaviour]
             self.speech[behaviour] = replace(heard, gains=(*heard.gains, *gains))
@@ -340,6 +339,6 @@ class ActiveBlock:
             self.channels[behaviour] = tuple(replace(c, gains=(*c.gains, *gains)) for c in own)
 
     def moving_channels(self) -> Iterator[Channel]:
-        """Its channels that are not base states."""
+        """Return its channels that are not base states."""
         for own in self.channels.values():
             yield from own

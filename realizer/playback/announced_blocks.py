@@ -1,4 +1,4 @@
-"""Blocks that were announced and have not arrived, and the commands for them."""
+"""Announced blocks that have not arrived, and the commands for them."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from realizer.playback.block_states import BlockEvent, State, next_state
 
 @dataclass(eq=False)
 class AnnouncedBlock:
-    """What was done to a block before it came.
+    """An announced block with the commands that it received so far.
 
     Attributes:
-        state: IN_PREP, or REVOKED where it was ended; that was reported.
-        activated: it need not wait for activation.
-        dependencies: what was put before it.
+        state: IN_PREP, or REVOKED after it was ended and reported.
+        activated: it does not wait for activation.
+        dependencies: blocks that were placed before it.
     """
 
     block: Block
@@ -29,7 +29,7 @@ class AnnouncedBlock:
         return self.state is State.REVOKED
 
     def change_state(self, event: BlockEvent) -> None:
-        """Take the state that follows from an event."""
+        """Change to the state that follows from an event."""
         self.state = next_state(self.state, event)
 
 
@@ -49,9 +49,9 @@ class AnnouncedBlocks:
         self._blocks[block.id] = AnnouncedBlock(block)
 
     def get(self, id: str) -> AnnouncedBlock | None:
-        """Of a block that is still to come."""
+        """Return the announced block with an id, or None."""
         return self._blocks.get(id)
 
     def pop(self, block: Block) -> AnnouncedBlock:
-        """A block is here, or will not come: what was done to it until now."""
+        """Remove and return a block that has arrived or was withdrawn."""
         return self._blocks.pop(block.id, None) or AnnouncedBlock(block)

@@ -1,4 +1,4 @@
-"""The mix of the utterances that play, cut off and faded as heard, at any sample rate."""
+"""Rendering of utterances as samples at any rate, cut off and faded as heard."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from realizer.animation.curves import gain_at
 from realizer.core.array_types import Float32, Int16
 from realizer.playback.active_block import ScheduledSpeech
 
-# Cut-off speech fades this long, so that it does not click, and is over in 50 ms with a packet cut in two.
+# Duration of the fade of cut-off speech, which avoids a click; with half a packet it is over in 50 ms.
 CUT = 0.04  # s
 
 
 def render_utterance(speaking: ScheduledSpeech, rate: int) -> Float32:
-    """(n,) float32: the sound of an utterance at a rate, cut off and faded where it was stopped.
+    """Return (n,) float32 samples of an utterance with sound, cut off and faded if it was stopped.
 
-    Films and streams are made from it alike. The utterance must have sound.
+    Films and streams both use it.
     """
     utterance = speaking.utterance
     assert utterance.pcm is not None
@@ -32,7 +32,7 @@ def render_utterance(speaking: ScheduledSpeech, rate: int) -> Float32:
 
 
 def resample(pcm: Int16, rate: int, wanted: int) -> Float32:
-    """PCM at another rate, (n,) float32; linear, after a box filter where the rate falls."""
+    """Return PCM at another rate, (n,) float32: linear interpolation, box-filtered if the rate falls."""
     samples: Float32 = pcm.astype(np.float32)
     if rate == wanted:
         return samples

@@ -9,12 +9,12 @@ from realizer.behaviours.kind import Activate, BlockCommand, Change, Interrupt
 from realizer.playback.active_block import ActiveBlock
 from realizer.playback.timeline import BlockTimeline
 
-# "At once" takes this long on a face, so that it does not jump, and in a sound, so that it does not click.
+# Duration of an instant change of a face and of a sound, which avoids jumps and clicks.
 AT_ONCE = {False: 0.1, True: 0.02}  # s
 
 
 class Blocks(Protocol):
-    """The blocks of a session, as far as a command changes them."""
+    """The blocks of a session, as far as commands need them."""
 
     timeline: BlockTimeline
 
@@ -26,14 +26,14 @@ class Blocks(Protocol):
 
 
 class CommandError(Exception):
-    """What could not be done; the text says what was wanted and what there was."""
+    """A command that cannot be executed; the message has the expected and the actual value."""
 
 
 def execute(blocks: Blocks, playing: ActiveBlock, behaviour: str, act: BlockCommand, now: float) -> None:
-    """Do what a behaviour of a playing block is there for.
+    """Execute the command of a behaviour of a playing block.
 
     Raises:
-        ActFault: it cannot be done.
+        CommandError: it cannot be executed.
     """
     match act:
         case Interrupt():
@@ -70,8 +70,8 @@ def _change(blocks: Blocks, act: Change, now: float, until: float) -> None:
     node = target.block[act.behaviour]
     known = target.kinds[node.tag].parameters
     if act.parameter not in known:
-        there = ", ".join(sorted(known)) or "none"
-        raise CommandError(f"paramId: {act.block}:{act.behaviour} has {there}, got {act.parameter!r}")
+        names = ", ".join(sorted(known)) or "none"
+        raise CommandError(f"paramId: {act.block}:{act.behaviour} has {names}, got {act.parameter!r}")
     usual = known[act.parameter]
     whole = float(getattr(node, usual) if isinstance(usual, str) else usual)
     if whole <= 0.0:

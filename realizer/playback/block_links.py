@@ -1,4 +1,4 @@
-"""Links between a block and the active ones: what it waits for, replaces and refers to."""
+"""Links between a block and the active ones: dependencies, replaced blocks and references."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ FOREVER = float("inf")
 
 
 def dependencies(block: Block, character: int, alive: Collection[ActiveBlock]) -> list[Dependency]:
-    """What a block waits for: BML 1.0's APPEND, all of its character that is known now; BMLA's lists.
+    """Return the blocks that a block waits for: for APPEND all of its character, and those of BMLA's lists.
 
-    Of blocks that wait for each other only the last is named: it ends when all of them have.
+    Of blocks that wait for each other only the last is returned, because it ends when all of them have.
     """
     named = [
         p
@@ -32,12 +32,12 @@ def dependencies(block: Block, character: int, alive: Collection[ActiveBlock]) -
 
 
 def followers(block: Block) -> list[tuple[str, bool]]:
-    """The ids of the blocks that are to wait for this one, and whether for its subsiding only."""
+    """Return (id, subsiding) of the blocks that have to wait for this one, or only for its subsiding."""
     return [(id, False) for id in block.prepend_before] + [(id, True) for id in block.chunk_before]
 
 
 def blocks_to_end(block: Block, character: int, alive: Iterable[ActiveBlock]) -> list[ActiveBlock]:
-    """The blocks that this one ends when it is taken in: those it interrupts, or replaces."""
+    """Return the blocks that this one interrupts or replaces when it is accepted."""
     replaces = block.composition == "REPLACE"
     return [p for p in alive if p.block.id in block.interrupt or (replaces and p.character == character)]
 
@@ -45,7 +45,7 @@ def blocks_to_end(block: Block, character: int, alive: Iterable[ActiveBlock]) ->
 def existing_claims(
     character: int, alive: Iterable[ActiveBlock], without: Iterable[ActiveBlock] = ()
 ) -> list[ResourceClaim]:
-    """What the blocks of a character need for themselves, on the session clock."""
+    """Return the claims of the blocks of a character, on the session clock."""
     gone = {id(p) for p in without}
     return [
         claim
@@ -56,7 +56,7 @@ def existing_claims(
 
 
 def all_dependencies(waits: Iterable[Dependency]) -> set[int]:
-    """The id() of every block that is waited for, by any chain."""
+    """Return the id() of every direct and indirect dependency."""
     todo = [wait.block for wait in waits]
     found = {id(p) for p in todo}
     while todo:
@@ -71,11 +71,11 @@ def external_times(
     start: float,
     fallback: Callable[[str], Schedule | None] = lambda id: None,
 ) -> Callable[[SyncRef], float | None]:
-    """Sync points of other blocks: a reference -> seconds from `start`, None where that is not known.
+    """Return a function that maps references into other blocks to seconds from `start`, or None if unknown.
 
     Args:
-        schedule_of: block id -> its schedule, `start` on the session clock; None where there is none.
-        fallback: where the points are looked for that the schedule does not have any more.
+        schedule_of: block id -> its schedule, with `start` on the session clock, or None.
+        fallback: the same for points that the schedule no longer has.
     """
 
     def instant(ref: SyncRef) -> float | None:
@@ -91,7 +91,7 @@ def external_times(
 
 
 def _time(ref: SyncRef, schedule: Schedule) -> float | None:
-    """Seconds from the start of a block."""
+    """Return the seconds from block start of a reference, or None."""
     if ref.behaviour == "bml":
         return {"start": 0.0, "end": schedule.duration}.get(ref.sync or "")
     sync = ref.sync if ref.index is None else f"{ref.sync}:{ref.index}"
@@ -104,7 +104,7 @@ def _time(ref: SyncRef, schedule: Schedule) -> float | None:
 def with_stops(
     schedule_of: Callable[[str], Schedule | None], blocks: Iterable[ActiveBlock], now: float
 ) -> Callable[[str], Schedule | None]:
-    """`schedule_of` as it is when some blocks are stopped at `now`: nothing of them is later."""
+    """Return `schedule_of` as if some blocks were stopped at `now`, so that nothing of them is later."""
     gone = {p.block.id for p in blocks}
 
     def of(id: str) -> Schedule | None:

@@ -1,4 +1,4 @@
-"""The manager of a session's blocks: accepts, starts, moves and ends them."""
+"""The manager of a session's blocks: it accepts, starts, moves and ends them."""
 
 from __future__ import annotations
 
@@ -28,22 +28,22 @@ from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.utterance import Utterance
 
 FOREVER = float("inf")
-# More than so many anticipators are forgotten, the oldest first, where no block is tied to them.
+# Maximum number of anticipators; of the others the oldest that no block is tied to are dropped.
 ANTICIPATORS = 2_000
 
 
 class BlockManager:
-    """The blocks of one session, and the feedback they owe.
+    """The blocks of one session, and their pending feedback.
 
     Args:
-        kinds: tag -> Kind.
-        characters: whose base states the blocks shift; shared with who made them.
-        veto: (block, what was planned) -> why it is not to be played; None where it is.
+        kinds: tag -> BehaviourKind.
+        characters: the blocks change their base states; shared with the caller.
+        veto: (block, its schedule) -> why it is refused, or None.
 
     Attributes:
         timeline: when the accepted ones play.
         blocks: the blocks.
-        reports: the feedback that is owed.
+        reports: pending feedback.
     """
 
     def __init__(
@@ -70,13 +70,13 @@ class BlockManager:
         self.reports.add(acknowledgement(block, now if start == FOREVER else start))
 
     def withdraw(self, block: Block, now: float) -> None:
-        """Give up a block that was announced."""
+        """Remove a block that was announced, and report its end."""
         fate = self._announced.pop(block)
         if not fate.revoked:
             self._revoke(fate, now)
 
     def submit(self, block: Block, character: int, context: PlanningContext, now: float) -> Schedule:
-        """Plan a block and take it in, or refuse it."""
+        """Plan a block and accept or refuse it."""
         self.advance(now)
         self.announce(block, character, now)
         try:
@@ -110,7 +110,7 @@ class BlockManager:
         playing = ActiveBlock(
             planned, self.kinds, context, character, self.blocks.next_number, now, waits, state
         )
-        playing.apply_plan(planned, playing.earliest)  # what it waited for may just have been ended by itself
+        playing.apply_plan(planned, playing.earliest)  # it may have ended its own dependencies
         self.blocks.add(playing)
         self.timeline.place(playing)
         for follower, subsiding in ((p, s) for p, s in behind if not p.is_done):
@@ -129,7 +129,7 @@ class BlockManager:
     # time ---------------------------------------------------------------------------------------
 
     def advance(self, now: float) -> None:
-        """Let everything happen that is due, in order, each thing at its own time."""
+        """Process everything that is due, in order, each event at its own time."""
         for event in self.timeline.events.due(now):
             self._handle_event(event, self.blocks[event.block])
 
@@ -141,21 +141,22 @@ class BlockManager:
         return float("-inf") if self.reports else self.timeline.events.next
 
     def is_idle(self, now: float = -FOREVER) -> bool:
-        """Nothing plays, waits, is expected or owed, and of what has ended nothing is to be seen.
+        """Whether nothing plays, waits, is announced or pending, and nothing that ended is still visible.
 
         Args:
-            now: what was gone by then counts as gone, though blinks and nods may still come of it.
+            now: blocks that were invisible by then count as gone, though they may still affect blinks and
+                nods.
         """
         seen = any(not playing.is_done or playing.invisible_after > now for playing in self.blocks.all())
         return not (seen or self._announced or self.reports)
 
     def has_due(self, now: float, before: float) -> bool:
-        """Whether `due(now)` or `forget(before)` would have something."""
+        """Whether `due(now)` or `forget(before)` would do something."""
         due = self.timeline.events.next
         return (due is not None and due <= now) or self.blocks.first_invisible < before or bool(self.reports)
 
     def forget(self, before: float) -> bool:
-        """Drop blocks of which nothing is to be seen after a time; True where there were some."""
+        """Drop blocks that are invisible after a time; return whether there were any."""
         gone = self.blocks.forget(before)
         for playing in gone:
             self.timeline.events.drop(playing)
@@ -200,14 +201,14 @@ class BlockManager:
             if required and not playing.is_done:
                 self.timeline.stop(playing, now)
 
-    # what is done to blocks ---------------------------------------------------------------------
+    # commands -----------------------------------------------------------------------------------
 
     def has_seen(self, id: str) -> bool:
-        """Whether there is or was such a block, or will be."""
+        """Whether there is, was or will be such a block."""
         return id in self._announced or self.blocks.has_seen(id)
 
     def revoke(self, id: str, now: float) -> bool:
-        """End a block that was announced and is not here yet; False where there is none."""
+        """End a block that was announced and has not arrived; return False if there is none."""
         fate = self._announced.get(id)
         if fate is None or fate.revoked:
             return False
@@ -219,17 +220,17 @@ class BlockManager:
         self.reports.add(progress(fate.block, "end", now, fate.state))
 
     def stop_all(self, now: float, ids: Collection[str] | None) -> list[str]:
-        """Stop these blocks, or all; returns the ids of those that played or waited."""
+        """Stop these blocks, or all; return the ids of those that played or waited."""
         self.advance(now)
         stopped = [p for p in self.blocks.active() if ids is None or p.block.id in ids]
-        # The last first: a block that waits for another need not be planned anew before it is stopped too.
+        # The last first, so that no block is planned again because its dependency was stopped.
         for playing in reversed(stopped):
             if not playing.is_done:
                 self.timeline.stop(playing, now)
         return [p.block.id for p in stopped]
 
     def activate(self, id: str, now: float) -> bool:
-        """Let a preplanned block start, when what it waits for is over; False where it is none."""
+        """Let a preplanned block start after its dependencies; return False if there is none."""
         playing = self.blocks.find(id)
         if playing is None:
             fate = self._announced.get(id)
@@ -246,11 +247,12 @@ class BlockManager:
         return True
 
     def anticipate(self, id: str, syncs: Mapping[str, float], now: float) -> None:
-        """Points in time are expected at other times than before: what is tied to them follows.
+        """Change the expected times of points; sync points that are tied to them follow.
 
         Args:
-            id: of an anticipator; its points are `anticipators:id:sync` in references.
-            syncs: sync -> seconds on the session clock; as soon as can be, where that is too soon.
+            id: of an anticipator; references name its points as `anticipators:id:sync`.
+            syncs: sync -> seconds on the session clock; a time that is too soon becomes the earliest
+                possible.
         """
         self.advance(now)
         tied = [p for p in self.blocks.active() if p.start < FOREVER and id in anticipators_of(p.block)]
@@ -275,7 +277,7 @@ class BlockManager:
         playing = self.blocks.find(id)
         if playing is None or behaviour not in playing.plan.timings:
             return False
-        if playing.start == FOREVER:  # it is planned when that is known
+        if playing.start == FOREVER:  # it is planned when its start is known
             utterances = {**playing.context.utterances, behaviour: utterance}
             playing.context = replace(playing.context, utterances=utterances)
             return True
@@ -287,10 +289,10 @@ class BlockManager:
     # starts -------------------------------------------------------------------------------------
 
     def _links(self, block: Block, character: int) -> tuple[list[Dependency], list[tuple[ActiveBlock, bool]]]:
-        """What a block waits for, and the blocks that are to wait for it.
+        """Return the dependencies of a block, and the blocks that have to wait for it.
 
         Raises:
-            _Refused: one of those has started, or is waited for itself.
+            _Rejection: one of the latter has started, or is itself a dependency.
         """
         waits = self._dependencies(block, character)
         behind: list[tuple[ActiveBlock, bool]] = []
@@ -312,7 +314,7 @@ class BlockManager:
         return block_links.dependencies(block, character, self.blocks.active()) + ahead
 
     def _in_use(self, block: Block, character: int) -> bool:
-        """Its id belongs to a block that plays or waits, and that it does not end."""
+        """Whether its id belongs to a playing or waiting block that it does not end."""
         other = self.blocks.find(block.id)
         return other is not None and other not in block_links.blocks_to_end(block, character, [other])
 
@@ -322,7 +324,7 @@ class BlockManager:
 
 
 class _Rejection(Exception):
-    """A block cannot be taken in, and why."""
+    """A block cannot be accepted; the warning has the reason."""
 
     def __init__(self, warning: Warning) -> None:
         super().__init__(warning.text)

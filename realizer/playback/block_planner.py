@@ -1,4 +1,4 @@
-"""Steps 2 to 4 for one block: timings, schedule and channels."""
+"""Steps 2 to 4 of the pipeline for one block: timings, schedule and channels."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from realizer.scheduling import Member, schedule_together
 from realizer.scheduling.timing import Schedule, Timing, Warning
 from realizer.speech.utterance import WARP
 
-# s; a speech whose points differ by no more is not spoken again.
+# s; a speech whose points move by no more is not synthesized again.
 SAME = 1e-6
-# s; shorter gaps of a speech say nothing about its rate.
+# s; shorter gaps of a speech are too short to determine its rate.
 SHORT = 0.02
-_MAX_LISTED = 10  # references named in a warning as gone with their behaviour
+_MAX_LISTED = 10  # lost references that a warning names
 
 
 @dataclass(frozen=True)
@@ -27,12 +27,12 @@ class Plan:
     """A block that can be played.
 
     Attributes:
-        block: without the behaviours that were dropped, and what referred to them.
-        schedule: `failed` when something required cannot be played; nothing else holds anything then.
+        block: without the dropped behaviours and the references to them.
+        schedule: `failed` if something required cannot be played; the other attributes are empty then.
         channels: behaviour id -> channels in seconds from block start.
-        claims: what its behaviours need for themselves, on the clock of `schedule.start`.
-        timings: what its behaviours want of time.
-        other_schedules: the schedules that others have beside it, each from its own start.
+        claims: the exclusive resources of its behaviours, on the clock of `schedule.start`.
+        timings: the timings that its behaviours prefer.
+        other_schedules: the new schedules of the other blocks, each from its own start.
     """
 
     block: Block
@@ -53,31 +53,30 @@ def plan(
     existing_claims: Iterable[ResourceClaim] = (),
     others: Sequence[Member] = (),
 ) -> Plan:
-    """Schedule a block and expand it; what cannot be played is dropped with one warning each.
+    """Schedule a block and expand it; drop with one warning each what cannot be played.
 
     Args:
         context: with the utterances of the block's speech behaviours.
         start: when the block starts, seconds on the session clock.
-        outside: sync points of other blocks -> seconds from this block's start, None where unknown.
-        existing_claims: what behaviours of earlier blocks of this character need for themselves, on the
-            session clock.
-        others: blocks that play and are tied to this one: solved with it, seconds from this block's start.
+        outside: sync points of other blocks -> seconds from this block's start, None if unknown.
+        existing_claims: claims of earlier blocks of this character, on the session clock.
+        others: playing blocks that are tied to this one: solved with it, seconds from this block's start.
     """
-    work = _PlanBuilder(block, kinds, context)
+    builder = _PlanBuilder(block, kinds, context)
     try:
-        work.add_problems()
-        work.time()
-        schedule, *moved = work.schedule(start, outside, tuple(existing_claims), others)
-    except _NeedsStretch as bends:
-        return Plan(block, Schedule(block.id, {}, {}, start=start, lengths=bends.lengths))
+        builder.add_problems()
+        builder.time()
+        schedule, *moved = builder.schedule(start, outside, tuple(existing_claims), others)
+    except _NeedsStretch as stretch:
+        return Plan(block, Schedule(block.id, {}, {}, start=start, lengths=stretch.lengths))
     except _RequiredPartFailed as failed:
         warning = replace(failed.warning, id=block.id)
         return Plan(block, Schedule(block.id, {}, {}, start=start, warnings=(warning,), failed=True))
-    return Plan(work.block, schedule, work.expand(schedule), work.claims, work.timings, moved)
+    return Plan(builder.block, schedule, builder.expand(schedule), builder.claims, builder.timings, moved)
 
 
 class _RequiredPartFailed(Exception):
-    """Something required cannot be played: the block goes, with this warning."""
+    """Something required cannot be played: the block is refused with this warning."""
 
     def __init__(self, warning: Warning) -> None:
         super().__init__(warning.text)
@@ -85,7 +84,7 @@ class _RequiredPartFailed(Exception):
 
 
 class _NeedsStretch(Exception):
-    """More of the block fits if speech lasts longer or shorter."""
+    """More of the block can be played if speech lasts longer or shorter."""
 
     def __init__(self, lengths: Mapping[str, Mapping[str, float]]) -> None:
         super().__init__(str(lengths))
@@ -93,7 +92,7 @@ class _NeedsStretch(Exception):
 
 
 class _PlanBuilder:
-    """A block while it is planned: what is left of it, and the warnings so far."""
+    """A block while it is planned: its remaining behaviours, and the warnings so far."""
 
     def __init__(self, block: Block, kinds: Mapping[str, BehaviourKind], context: PlanningContext) -> None:
         self.original = self.block = block
@@ -104,7 +103,7 @@ class _PlanBuilder:
         self.claims: tuple[ResourceClaim, ...] = ()
 
     def add_problems(self) -> None:
-        """What the parser dropped."""
+        """Add the warnings of the parser."""
         for problem in self.block.problems:
             warning = Warning(problem.id, problem.type, str(problem))
             if problem.fatal:
@@ -112,24 +111,24 @@ class _PlanBuilder:
             self.warnings.append(warning)
 
     def time(self) -> None:
-        """Step 2: what the behaviours' kinds have against them, and what the others want of time."""
+        """Step 2: check the behaviours, and get the timings that they prefer."""
         gone: list[tuple[str, Warning]] = []
         context, utterances = self.context, self.context.utterances
         for node in self.block.behaviours:
             kind = self.kinds.get(node.tag)
             if kind is None:
-                said = f"<{node.tag.rpartition('}')[2]}> is not known here"
-                gone.append((node.id, self.warning("BEHAVIOR_TYPE_NOT_SUPPORTED", node.id, said)))
+                text = f"<{node.tag.rpartition('}')[2]}> is not known here"
+                gone.append((node.id, self.warning("BEHAVIOR_TYPE_NOT_SUPPORTED", node.id, text)))
                 continue
-            found = kind.check(node, context)
-            fatal = next((fault for fault in found if fault.fatal), None)
+            faults = kind.check(node, context)
+            fatal = next((fault for fault in faults if fault.fatal), None)
             if fatal is not None:
                 gone.append((node.id, self.warning(fatal.type, node.id, fatal.text)))
             elif kind.speech_request is not None and node.id not in utterances:
-                said = "speech: no voice could say it"
-                gone.append((node.id, self.warning("CANNOT_CREATE_BEHAVIOR", node.id, said)))
+                text = "speech: no voice could say it"
+                gone.append((node.id, self.warning("CANNOT_CREATE_BEHAVIOR", node.id, text)))
             else:
-                self.warnings += [self.warning(fault.type, node.id, fault.text) for fault in found]
+                self.warnings += [self.warning(fault.type, node.id, fault.text) for fault in faults]
                 self.timings[node.id] = kind.timing(node, context)
         self.drop(gone)
 
@@ -140,7 +139,7 @@ class _PlanBuilder:
         existing_claims: Sequence[ResourceClaim],
         others: Sequence[Member],
     ) -> list[Schedule]:
-        """Step 3: the times of what fits together, and of the others; solved again without what does not."""
+        """Step 3: solve for the times, again without conflicting behaviours until none is left."""
         while True:
             priorities = {node.id: node.priority for node in self.block.behaviours if node.priority}
             own = Member(self.block, self.timings, priorities=priorities)
@@ -162,10 +161,10 @@ class _PlanBuilder:
             if not lost:
                 return [found, *moved]
             losers = ((loss.claim.behaviour, str(loss)) for loss in lost)
-            self.drop((id, self.warning("CANNOT_CREATE_BEHAVIOR", id, said)) for id, said in losers)
+            self.drop((id, self.warning("CANNOT_CREATE_BEHAVIOR", id, text)) for id, text in losers)
 
     def expand(self, schedule: Schedule) -> dict[str, tuple[Channel, ...]]:
-        """Step 4: what the scheduled behaviours show, in seconds from block start."""
+        """Step 4: return the channels of the scheduled behaviours, in seconds from block start."""
         return {
             node.id: self.kinds[node.tag].expand(node, schedule.times[node.id], self.context)
             for node in self.block.behaviours
@@ -179,20 +178,23 @@ class _PlanBuilder:
         outside: Callable[[SyncRef], float | None],
         rigid: Schedule,
     ) -> None:
-        """Where speech is in the way and could be spoken at another rate: raise _Bends if more fits then."""
-        bent = dict(own.timings)
+        """Raise _NeedsStretch if speech at another rate lets more behaviours fit."""
+        flexible = dict(own.timings)
         for node in self.block.behaviours:
-            if node.id in bent and (timing := self.kinds[node.tag].stretch(node, self.context)) is not None:
-                bent[node.id] = timing
-        could = {b: timing for b, timing in bent.items() if timing is not own.timings[b]}
+            if (
+                node.id in flexible
+                and (timing := self.kinds[node.tag].stretch(node, self.context)) is not None
+            ):
+                flexible[node.id] = timing
+        could = {b: timing for b, timing in flexible.items() if timing is not own.timings[b]}
         if not could:
             return
-        found = schedule_together([replace(own, timings=bent), *others], outside=outside)[0]
+        found = schedule_together([replace(own, timings=flexible), *others], outside=outside)[0]
         if found.failed or len(found.times) <= len(rigid.times):
             return
         at = {b: found.times[b] - found.times[b][0] for b in could if b in found.times}
         natural = {b: np.append(0.0, np.cumsum(own.timings[b].preferred)) for b in at}
-        # A voice has one rate for all of a speech: of those its gaps ask for, the one that lets most fit.
+        # A voice has one rate for a whole speech: of the rates of its gaps, the one that lets most fit.
         most = len(rigid.times)
         for b in at if len(at) == 1 else ():
             if could[b].most is None or self.context.utterances[b].stretch == WARP:
@@ -216,7 +218,7 @@ class _PlanBuilder:
             raise _NeedsStretch(lengths)
 
     def drop(self, gone: Iterable[tuple[str, Warning]]) -> None:
-        """Take behaviours out, and what refers to them; each has one warning, which names what went too."""
+        """Drop behaviours and the references to them, with one warning each that names both."""
         dropped = dict(gone)
         if not dropped:
             return
@@ -235,20 +237,20 @@ class _PlanBuilder:
                 more = len(names) - _MAX_LISTED
                 listed = ", ".join(names[:_MAX_LISTED]) + (f" and {more} more" if more > 0 else "")
                 warning = replace(warning, text=f"{warning.text}; with it went {listed}")
-            # What else was to be said of it no longer matters.
+            # Earlier warnings about it do not matter any more.
             self.warnings = [w for w in self.warnings if w.id != warning.id]
             self.warnings.append(warning)
 
     def behaviour_of(self, warning: Warning) -> str:
-        """The behaviour a warning is about; "" where it is about something else."""
+        """Return the behaviour that a warning is about, or ""."""
         block, _, behaviour = warning.id.partition(":")
         return behaviour if block == self.original.id else ""
 
     def warning(self, type: str, behaviour: str, text: str) -> Warning:
-        """What is to be said of a behaviour."""
+        """Return a warning about a behaviour, with its place."""
         return Warning(f"{self.block.id}:{behaviour}", type, self.with_place(behaviour, text))
 
     def with_place(self, behaviour: str, text: str) -> str:
-        """A sentence with the place of its behaviour."""
+        """Return a sentence with the place of its behaviour."""
         place = self.original.places.get(behaviour)
         return text if place is None else place.with_place(text)

@@ -8,11 +8,11 @@ from types import MappingProxyType
 
 
 class State(StrEnum):
-    """The state of a block, in the words of BMLA."""
+    """The state of a block, as BMLA names it."""
 
     IN_PREP = "IN_PREP"  # announced, and being planned
-    PENDING = "PENDING"  # planned, and waits to be activated
-    LURKING = "LURKING"  # planned, and waits for its start
+    PENDING = "PENDING"  # planned, waiting to be activated
+    LURKING = "LURKING"  # planned, waiting for its start
     IN_EXEC = "IN_EXEC"
     SUBSIDING = "SUBSIDING"  # every behaviour is past its relax, some are not past their end
     DONE = "DONE"
@@ -21,7 +21,7 @@ class State(StrEnum):
 
 
 class BlockEvent(StrEnum):
-    """What changes the state of a block."""
+    """An event that changes the state of a block."""
 
     PREPLAN = "preplan"  # it is accepted, and only starts when it is activated
     PLAN = "plan"  # it is accepted
@@ -32,7 +32,7 @@ class BlockEvent(StrEnum):
     STOP = "stop"  # by the client, another block, or a behaviour
 
 
-# The only place where it is decided which state follows; docs/blocks.md draws it.
+# The only place that decides which state follows; docs/blocks.md draws it.
 TRANSITIONS: Mapping[tuple[State, BlockEvent], State] = MappingProxyType(
     {
         (State.IN_PREP, BlockEvent.PREPLAN): State.PENDING,
@@ -52,7 +52,7 @@ TRANSITIONS: Mapping[tuple[State, BlockEvent], State] = MappingProxyType(
 
 
 class TransitionError(RuntimeError):
-    """An event that cannot happen to a block in its state: a fault of the realizer, not of a document."""
+    """An event is impossible in the state of a block: a fault of the realizer, not of a document."""
 
 
 def next_state(state: State, event: BlockEvent) -> State:

@@ -10,21 +10,20 @@ import numpy as np
 from realizer.playback.active_block import ActiveBlock
 from realizer.scheduling.timing import Schedule
 
-# Schedules of blocks that have ended, kept for references to their sync points.
+# Maximum number of schedules of ended blocks, which references may name.
 PAST = 50  # 2 kB each
-PAST_POINTS = 50_000  # of all of them; the last one is kept in any case
+PAST_POINTS = 50_000  # in all of them; the last schedule is kept in any case
 FOREVER = float("inf")
-# BMLA's name for what is no block: points in time that a client announces.
+# BMLA's reserved block id for points in time that a client announces.
 ANTICIPATORS = "anticipators"
 
 
 class BlockStore:
-    """Blocks from their acceptance until nothing of them is to be seen, and what is known of them later.
+    """The blocks of a session while they are active or visible, and the schedules of past ones.
 
     Attributes:
-        next_number: of the next block that is added.
-        first_invisible: from when on nothing is to be seen of the first block that has ended; infinite where
-            none has.
+        next_number: number of the next block.
+        first_invisible: when the first ended block becomes invisible; infinite if there is none.
     """
 
     def __init__(self) -> None:
@@ -38,18 +37,18 @@ class BlockStore:
         self._anticipated = Schedule(ANTICIPATORS, {}, {})
 
     def add(self, playing: ActiveBlock) -> None:
-        """Take in an accepted block."""
+        """Add an accepted block."""
         self._blocks[playing.number] = self._active[playing.block.id] = playing
         self.next_number += 1
 
     def end(self, playing: ActiveBlock) -> None:
-        """A block has ended: its id is free."""
+        """End a block, so that its id can be used again."""
         del self._active[playing.block.id]
         self._ended.append(playing)
         self.first_invisible = min(self.first_invisible, playing.invisible_after)
 
     def forget(self, before: float) -> list[ActiveBlock]:
-        """Drop the blocks of which nothing is to be seen from a time on; returns them."""
+        """Drop and return the ended blocks that are invisible from a time on."""
         if self.first_invisible >= before:
             return []
         gone = [p for p in self._ended if p.invisible_after < before]
@@ -69,19 +68,18 @@ class BlockStore:
         return self._blocks[number]
 
     def all(self) -> list[ActiveBlock]:
-        """Every block that can still be seen or heard, in order of acceptance."""
+        """Return every block that can still be seen or heard, in order of acceptance."""
         return list(self._blocks.values())
 
     def of_character(self, character: int) -> list[ActiveBlock]:
-        """Those of one character."""
         return [p for p in self._blocks.values() if p.character == character]
 
     def active(self) -> list[ActiveBlock]:
-        """The blocks that play or wait, in order of acceptance."""
+        """Return the playing and waiting blocks, in order of acceptance."""
         return list(self._active.values())
 
     def find(self, id: str) -> ActiveBlock | None:
-        """The block of this id that plays or waits."""
+        """Return the playing or waiting block with an id, or None."""
         return self._active.get(id)
 
     def has_seen(self, id: str) -> bool:
@@ -89,37 +87,37 @@ class BlockStore:
         return self.schedule_of(id) is not None
 
     def schedule_of(self, id: str) -> Schedule | None:
-        """Of the newest block of an id, on the session clock; of what is anticipated too."""
+        """Return the schedule of the newest block with an id, or of the anticipators."""
         if id == ANTICIPATORS:
             return self._anticipated
         newest = next((p for p in reversed(self._blocks.values()) if p.block.id == id), None)
         return self._past.get(id) if newest is None else newest.schedule
 
     def first_schedule_of(self, id: str) -> Schedule | None:
-        """Of the newest block of an id, as it was when it was accepted, from where it starts now."""
+        """Return the first schedule of the newest block with an id, moved to its present start."""
         newest = next((p for p in reversed(self._blocks.values()) if p.block.id == id), None)
         if newest is None:
             return None
         first = replace(newest.first_schedule, start=newest.start)
         if newest.stopped_at is None:
             return first
-        last = max(0.0, newest.stopped_at - newest.start)  # nothing of it comes any more
+        last = max(0.0, newest.stopped_at - newest.start)  # points after its stop are never reached
         return replace(first, times={b: np.minimum(t, last) for b, t in first.times.items()})
 
     def snapshot(self) -> tuple[list[Schedule], Schedule]:
-        """When blocks were that have ended, the oldest first, and what is anticipated."""
+        """Return the schedules of ended blocks, the oldest first, and of the anticipators."""
         ended = {playing.block.id: playing.schedule for playing in self._ended}
         past = {id: schedule for id, schedule in self._past.items() if id not in ended} | ended
         return list(past.values())[-PAST:], self._anticipated
 
     def restore(self, past: Iterable[Schedule], anticipated: Schedule) -> None:
-        """Know what another cast has known."""
+        """Restore the schedules of another store's snapshot."""
         self._past = {schedule.block: schedule for schedule in past}
         self._points = sum(map(_points, self._past.values()))
         self._anticipated = anticipated
 
     def anticipate(self, id: str, syncs: Mapping[str, float]) -> None:
-        """Points in time that a client expects, seconds on the session clock."""
+        """Set the expected times of points of an anticipator, seconds on the session clock."""
         known = {**self._anticipated.behaviours.get(id, {}), **syncs}
         points = {**self._anticipated.points, id: tuple(known)}
         times = {**self._anticipated.times, id: np.array(list(known.values()))}
@@ -127,17 +125,17 @@ class BlockStore:
 
     @property
     def anticipators(self) -> Collection[str]:
-        """The ids of all, the one that was first named first."""
+        """The ids of all anticipators, the oldest first."""
         return self._anticipated.points.keys()
 
     def drop_anticipators(self, ids: Collection[str]) -> None:
-        """Their points are anticipated no more."""
+        """Drop all points of some anticipators."""
         points = {id: names for id, names in self._anticipated.points.items() if id not in ids}
         times = {id: self._anticipated.times[id] for id in points}
         self._anticipated = replace(self._anticipated, points=points, times=times)
 
     def latest(self, schedule: Schedule) -> Schedule:
-        """What has become of a schedule as a block had it when it was accepted."""
+        """Return the present schedule of a block, given its first schedule."""
         playing = next((p for p in self._blocks.values() if p.first_schedule is schedule), None)
         return schedule if playing is None else playing.latest
 

@@ -1,4 +1,4 @@
-"""One face of a session: base states and direct values, as channels."""
+"""One character of a session: base states and direct values, as channels."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from realizer.animation.axis import axis, region
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.curves import sample, weights
 
-# A face takes this long back to its base when something is let go: about an expression's own release.
+# Duration of the return to the base face after a release; about that of an expression.
 RELAX = 0.3  # s
 # A directly set AU or FAP is reached this long after it was set.
 SETTLE = 0.12  # s
@@ -19,7 +19,7 @@ SETTLE = 0.12  # s
 
 @dataclass(frozen=True, eq=False)
 class BaseShift:
-    """A change of a base state: from `begin` to `end` it replaces what was the base of its regions."""
+    """A change of a base state: from `begin` to `end` it replaces the base of its regions."""
 
     begin: float
     end: float
@@ -28,13 +28,13 @@ class BaseShift:
 
     @classmethod
     def of(cls, begin: float, end: float, own_region: str, channels: tuple[Channel, ...]) -> BaseShift:
-        """A shift of one region, and of every other that its channels move."""
+        """Return a shift of one region, and of every other region that its channels move."""
         return cls(begin, end, frozenset({own_region, *(region(c.target) for c in channels)}), channels)
 
 
 @dataclass(eq=False)
 class Character:
-    """What a face holds beyond any block."""
+    """The state of a face outside any block."""
 
     id: str | None
     shifts: list[BaseShift] = field(default_factory=list)
@@ -42,22 +42,22 @@ class Character:
     emotion: dict[str, Channel] = field(default_factory=dict)
 
     def add_shifts(self, shifts: Collection[BaseShift]) -> None:
-        """Take new base states, in order of their begin."""
+        """Add base states, in order of their begin."""
         self.shifts = sorted([*self.shifts, *shifts], key=lambda s: (s.begin, s.end))
 
     def replace_shifts(self, old: Mapping[str, BaseShift], new: Mapping[str, BaseShift]) -> None:
-        """Put other shifts in the place of those of the same behaviour."""
+        """Replace the shifts of some behaviours."""
         heirs = {id(old[name]): shift for name, shift in new.items()}
         shifts = [heirs.get(id(s), s) for s in self.shifts]
         self.shifts = sorted(shifts, key=lambda s: (s.begin, s.end))
 
     def cancel(self, shifts: Collection[BaseShift], now: float) -> None:
-        """Drop those of `shifts` that have not begun; one that has begun is carried through."""
+        """Drop those of `shifts` that have not begun; the others continue to their end."""
         gone = {id(s) for s in shifts if s.begin >= now}
         self.shifts = [s for s in self.shifts if id(s) not in gone]
 
     def set_direct(self, values: Mapping[str, float | None], now: float) -> None:
-        """Hold AUs (0..1) and FAPs (FAPU) by name from `now` on; None lets go of one.
+        """Hold AUs (0..1) and FAPs (FAPU) by name from `now` on; None releases one.
 
         Raises:
             KeyError: no such AU or FAP; nothing is changed then.
@@ -65,10 +65,10 @@ class Character:
         _hold(self.direct, values, now, Layer.DIRECT, SETTLE)
 
     def set_emotion(self, values: Mapping[str, float], now: float) -> None:
-        """Hold an emotion from `now` on instead of the one before: AUs (0..1) and FAPs (FAPU) by name.
+        """Hold an emotion from `now` on instead of the previous one: AUs (0..1) and FAPs (FAPU) by name.
 
-        It lies where expressions do, so that mood, speech, gaze and what is set directly find their places
-        beside it, whatever came first. {} lets go of it.
+        It is in the layer of expressions, below mood, speech, gaze and direct values, in whatever order they
+        are set. {} releases it.
 
         Raises:
             KeyError: no such AU or FAP; nothing is changed then.
@@ -77,7 +77,7 @@ class Character:
         _hold(self.emotion, asked, now, Layer.EXPRESSION, RELAX)
 
     def channels(self) -> list[Channel]:
-        """Base states, each until the next shift of its region takes over, and what was set."""
+        """Return base states, each until the next shift of its region, and direct values."""
         out: list[Channel] = []
         for index, shift in enumerate(self.shifts):
             for channel in shift.channels:
@@ -87,7 +87,7 @@ class Character:
         return [*out, *self.emotion.values(), *self.direct.values()]
 
     def forget(self, before: float) -> None:
-        """Drop what can no longer be seen after `before`, so that the cost does not grow with the past."""
+        """Drop what is invisible after `before`, so that the cost does not grow with the past."""
         self.shifts = [
             shift
             for index, shift in enumerate(self.shifts)
@@ -100,7 +100,7 @@ class Character:
 def _hold(
     held: dict[str, Channel], values: Mapping[str, float | None], now: float, layer: Layer, rise: float
 ) -> None:
-    """Let channels go to these values within `rise` seconds, and stay; None fades one out. In place."""
+    """Move channels to these values within `rise` seconds, in place; None fades one out."""
     columns = axis()
     targets = {name: columns[name] for name in values}
     for name, value in values.items():

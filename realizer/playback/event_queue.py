@@ -1,4 +1,4 @@
-"""The queue of events of all blocks, in the order of report."""
+"""The queue of the events of all blocks, in the order of report."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ from realizer.playback.active_block import ActiveBlock
 from realizer.playback.block_states import State
 from realizer.playback.feedback_events import Event, Phase, events
 
-# Entries of blocks that were dropped or moved may wait beside those that count, as many and so many more.
+# The heap may have as many obsolete entries as valid ones, and this many more.
 SPARE = 16
 
 
 class EventQueue:
-    """Events that have not happened."""
+    """A queue of future events."""
 
     def __init__(self) -> None:
         self._first: Event | None = None
-        # Number of a block -> its events, the first one last.
+        # Number of a block -> its events, in reverse order.
         self._events: dict[int, list[Event]] = {}
-        # A heap of the first event of each block, and of others that count no more.
+        # A heap of the first event of each block, and of obsolete events.
         self._firsts: list[Event] = []
 
     @property
     def next(self) -> float | None:
-        """When the first is due; None where there is none."""
+        """The time of the first event, or None."""
         return None if self._first is None else self._first.time
 
     def due(self, now: float) -> Iterator[Event]:
-        """Take what is due out, in order; what is put in meanwhile comes in its turn."""
+        """Remove and yield events that are due, in order, with those that are added meanwhile."""
         while (first := self._first) is not None and first.time <= now:
             events = self._events[first.block]
             events.pop()
@@ -42,7 +42,7 @@ class EventQueue:
             yield first
 
     def add(self, playing: ActiveBlock, only: Collection[tuple[str, str]] | None = None) -> None:
-        """Put in what is still to happen in a block; of its sync points all, or `only` (behaviour, sync)."""
+        """Add the future events of a block; of its sync points all, or `only` these (behaviour, sync)."""
         number, order = playing.number, playing.order
         due = events(playing.block, playing.schedule, order, number)
         if only is not None:
@@ -62,16 +62,16 @@ class EventQueue:
         self._find_next()
 
     def pending(self, playing: ActiveBlock) -> set[tuple[str, str]]:
-        """The sync points of a block that have not passed, as (behaviour, sync)."""
+        """Return the future sync points of a block, as (behaviour, sync)."""
         return {(e.name, e.sync) for e in self._events.get(playing.number, ()) if e.name}
 
     def drop(self, playing: ActiveBlock) -> None:
-        """Take out all that is still to happen in a block."""
+        """Remove all events of a block."""
         if self._events.pop(playing.number, None) is not None:
             self._find_next()
 
     def _find_next(self) -> None:
-        """Find what comes first; what was dropped is taken off the top."""
+        """Find the first event; remove obsolete entries from the top of the heap."""
         self._first = None
         while self._firsts:
             first = self._firsts[0]

@@ -1,4 +1,4 @@
-"""BML feedback of a planned block, with the time each element is due."""
+"""BML feedback of a planned block, with the time at which each message is due."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from realizer.scheduling.timing import Schedule, Warning
 
 
 class Phase(IntEnum):
-    """What an event is, in the order of report at one instant."""
+    """The kind of an event, in the order of report at one instant."""
 
     START = 0
     SYNC = 1
@@ -31,17 +31,17 @@ class Phase(IntEnum):
 
 
 class Event(NamedTuple):
-    """Something that is due at a time; the order of the fields is the order of report.
+    """An event of a block; the order of the fields is the order of report.
 
-    At one instant a block reports before those that follow it, so that what an APPEND waited for, or a
-    REPLACE ended, has ended before it starts; within a block start, sync points by behaviour, end.
+    At one instant a block reports before its followers, so that the dependencies of an APPEND, and the blocks
+    that a REPLACE ended, have ended before it starts; within a block start, sync points by behaviour, end.
 
     Attributes:
         time: seconds on the session clock.
-        order: place of the block among those that report at one instant.
-        behaviour, point: places of a sync point in the block and in its behaviour.
+        order: order of the block among those that report at one instant.
+        behaviour, point: indices of a sync point in the block and in its behaviour.
         block: number of the block.
-        name, sync: what it is called: behaviour id and sync point.
+        name, sync: behaviour id and sync point.
     """
 
     time: float
@@ -54,17 +54,17 @@ class Event(NamedTuple):
     sync: str = ""
 
 
-# A NamedTuple is made in a third of the time without its own `__new__`, which is Python.
+# NamedTuples are made in a third of the time without their own `__new__`, which is Python code.
 _new_event = tuple.__new__
 
 
 def parse_warning(error: BMLError) -> Warning:
-    """Return the BML warning of a document that gave no block."""
+    """Return the BML warning for a document without a valid block."""
     return Warning(error.block or "<no id>", "PARSING_FAILURE", str(error))
 
 
 def acknowledgement(block: Block, start: float) -> PredictionFeedback:
-    """Planning has begun."""
+    """Return the prediction that acknowledges a block: planning has begun."""
     prediction = BlockPrediction(id=block.id, global_start=start, status=State.IN_PREP)
     return PredictionFeedback(character_id=block.character_id, blocks=(prediction,))
 
@@ -75,7 +75,7 @@ def prediction(
     state: State,
     behaviours: Mapping[str, Mapping[str, float]] | None = None,
 ) -> PredictionFeedback:
-    """When a block starts and ends, and the sync points of behaviours where they are to be told."""
+    """Return the prediction of a block's start and end, and of some behaviours' sync points."""
     times = BlockPrediction(
         id=block.id, global_start=schedule.start, global_end=schedule.end, status=state.value
     )
@@ -89,7 +89,7 @@ def prediction(
 
 
 def progress(block: Block, point: str, time: float, state: State, said: str | None = None) -> BlockProgress:
-    """The block started or ended at `time` on the session clock; `said` where its speech was cut off."""
+    """Return the progress of a block that started or ended; `said` if its speech was cut off."""
     return BlockProgress(
         id=f"{block.id}:{point}",
         global_time=time,
@@ -100,7 +100,7 @@ def progress(block: Block, point: str, time: float, state: State, said: str | No
 
 
 def sync_progress(block: Block, behaviour: str, sync: str, time: float, start: float) -> SyncPointProgress:
-    """A sync point passed at `time` on the session clock; the block started at `start`."""
+    """Return the progress of a sync point that passed at `time` in a block that started at `start`."""
     return SyncPointProgress(
         id=f"{block.id}:{behaviour}:{sync}",
         time=time - start,
@@ -110,7 +110,7 @@ def sync_progress(block: Block, behaviour: str, sync: str, time: float, start: f
 
 
 def events(block: Block, schedule: Schedule, order: int, number: int) -> list[Event]:
-    """Every sync point of a block, when it is due; `order` and `number` as of the Event."""
+    """Return an event for every sync point of a block; for `order` and `number` see Event."""
     found: list[Event] = []
     phase = Phase.SYNC
     for place, node in enumerate(block.behaviours):
@@ -126,7 +126,7 @@ def events(block: Block, schedule: Schedule, order: int, number: int) -> list[Ev
 
 
 class Reports:
-    """The feedback a session owes, in the order of report; each is handed out once."""
+    """The pending feedback of a session, in the order of report."""
 
     def __init__(self) -> None:
         self._feedback: list[Feedback] = []
@@ -135,15 +135,14 @@ class Reports:
         return len(self._feedback)
 
     def add(self, feedback: Feedback) -> None:
-        """One more."""
+        """Add a message."""
         self._feedback.append(feedback)
 
     def warn(self, warning: Warning, character: str | None) -> None:
-        """A BML warning."""
-        told = WarningFeedback(id=warning.id, type=warning.type, text=warning.text, character_id=character)
-        self._feedback.append(told)
+        """Add a BML warning."""
+        self.add(WarningFeedback(id=warning.id, type=warning.type, text=warning.text, character_id=character))
 
     def take_all(self) -> list[Feedback]:
-        """What is owed."""
-        owed, self._feedback = self._feedback, []
-        return owed
+        """Remove and return all messages."""
+        pending, self._feedback = self._feedback, []
+        return pending

@@ -1,6 +1,6 @@
-"""The player: composes blocks, reports their feedback and samples their faces.
+"""The player: manages blocks, reports their feedback and samples their faces.
 
-Knows no clock and no I/O: every call is told `now`, in seconds on the session clock.
+It has no clock and no I/O: every call has the argument `now`, seconds on the session clock.
 """
 
 from __future__ import annotations
@@ -33,25 +33,25 @@ from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.utterance import Recording, SpeechRequest, Utterance
 from realizer.tables.cooccurrence import load_rules
 
-# Frames up to this long before `now` can still be asked for.
+# Frames up to this long before `now` can still be computed.
 HISTORY = 1.0  # s
-# What goes with speech comes no farther from it.
+# Motion that accompanies speech is at most this far from it.
 NEAR = 5.0  # s
 
 
 class Player:
-    """The blocks of one session and what they show.
+    """The blocks of one session and their animation.
 
     Args:
-        options: how documents are played. The face, its mapping and the rate are for those who draw.
-        kinds: tag -> Kind, what behaviours there are.
-        clips: id -> sound that documents may name as `clip:ID`; it may change while the player plays.
-        history: seconds before the last `due` for which frames can still be asked for.
-        face_inputs: index of a character -> what moves its face (`Face.takes`); None: that is not known.
-        veto: (block, what was planned) -> why it is not to be played; None where it is.
+        options: how documents are played. Face, mapping and frame rate are for the caller.
+        kinds: tag -> BehaviourKind, the known behaviours.
+        clips: id -> sound that documents can name as `clip:ID`; the caller may add some later.
+        history: seconds before the last `due` for which frames can still be computed.
+        face_inputs: index of a character -> the inputs of its face (`Face.inputs`); None if unknown.
+        veto: (block, its schedule) -> why it is refused, or None.
 
     Attributes:
-        version: rises whenever frames change that were already computed.
+        version: increases whenever frames change that may have been computed before.
     """
 
     def __init__(
@@ -85,10 +85,10 @@ class Player:
     def version(self) -> int:
         return self._manager.timeline.version
 
-    # documents in -------------------------------------------------------------------------------
+    # documents ----------------------------------------------------------------------------------
 
     def speech_requests(self, block: Block) -> dict[str, SpeechRequest]:
-        """{behaviour id: what a voice has to say} before the block can be submitted."""
+        """Return {behaviour id: request to the voice}, whose results `submit` needs."""
         says: dict[str, SpeechRequest] = {}
         for node in block.behaviours:
             kind = self.kinds.get(node.tag)
@@ -101,21 +101,23 @@ class Player:
         return says
 
     def announce(self, block: Block, now: float) -> None:
-        """Acknowledge a block: planning has begun. `submit` does it where it was not done before."""
+        """Acknowledge a block: planning has begun. `submit` does it if it was not done before."""
         self._manager.announce(block, self._character(block.character_id), now)
 
     def submit(self, block: Block, now: float, utterances: Mapping[str, Utterance] | None = None) -> Schedule:
-        """Plan a block and let it play as its composition says.
+        """Plan a block and play it as its composition says.
 
         Args:
-            block: as parsed; its own problems are reported with it.
+            block: as parsed; its problems are reported with it.
             now: seconds on the session clock.
-            utterances: what the voice made of `speech_requests(block)`.
+            utterances: the results of `speech_requests(block)`.
 
         Returns:
-            The schedule; `schedule.failed` when the whole block was refused. Where it has `lengths`, more of
-            the block fits with other utterances: submit it again with such as last so long
-            (`speech.fitting`), or with the same ones whose `stretch` is (1, 1).
+            The schedule; `schedule.failed` if the whole block was refused. If it has `lengths`, more of the
+            block
+            fits with other utterances: submit it again with utterances of these lengths
+                (`speech.duration_fit`), or
+            with the same ones with a `stretch` of (1, 1).
         """
         character = self._character(block.character_id)
         takes = (
@@ -132,7 +134,7 @@ class Player:
         """End blocks gracefully: sound fades, the face relaxes to its base without a jump.
 
         Args:
-            block_ids: which; None for all that play or wait.
+            block_ids: None for all that play or wait.
 
         Returns:
             The ids of the blocks that were stopped.
@@ -140,25 +142,25 @@ class Player:
         return self._manager.stop_all(now, None if block_ids is None else set(block_ids))
 
     def withdraw(self, block: Block, now: float) -> None:
-        """Give up a block that was announced and will not be submitted; its end is reported."""
+        """Remove an announced block that will not be submitted; its end is reported."""
         self._manager.withdraw(block, now)
 
     @property
     def blocks(self) -> BlockStore:
-        """The blocks themselves, to look at: only the player changes them."""
+        """The blocks themselves, for reading only."""
         return self._manager.blocks
 
     @property
     def active_count(self) -> int:
-        """How many blocks play or wait for their start."""
+        """The number of playing and waiting blocks."""
         return len(self._manager.blocks.active())
 
     def set_scene(self, scene: Mapping[str, Position] | None) -> None:
-        """Declare where targets are; documents planned from now on look there."""
+        """Set the positions of targets for documents that are planned from now on."""
         self.context = replace(self.context, scene=scene)
 
     def anticipate(self, id: str, syncs: Mapping[str, float], now: float) -> None:
-        """Expect the points `anticipators:id:sync` at these times; what is tied to them follows.
+        """Set the expected times of the points `anticipators:id:sync`; sync points tied to them follow.
 
         Args:
             syncs: sync -> seconds on the session clock. A point that has passed stays where it was.
@@ -166,22 +168,22 @@ class Player:
         self._manager.anticipate(id, syncs, now)
 
     def forget_anticipator(self, id: str) -> None:
-        """Expect no point of an anticipator any more: nothing alive is tied to it."""
+        """Drop an anticipator that no active block is tied to."""
         self._manager.blocks.drop_anticipators([id])
 
     def update_speech_timing(self, block: str, behaviour: str, utterance: Utterance, now: float) -> bool:
-        """Take what a voice says of its real timing while it speaks: the rest of the block follows.
+        """Replace an utterance by one with its real timing while it is spoken; the rest of the block follows.
 
         Args:
-            utterance: the whole of it, as it turned out. What has passed stays where it was.
+            utterance: the complete utterance. Points that have passed stay where they were.
 
         Returns:
-            False where that speech does not play and does not wait.
+            False if the speech neither plays nor waits.
         """
         return self._manager.update_speech(block, behaviour, utterance, now)
 
     def set_direct(self, values: Mapping[str, float | None], now: float, character: int = 0) -> None:
-        """Hold AUs (0..1) and FAPs (FAPU) by name until told otherwise; None lets go of one.
+        """Hold AUs (0..1) and FAPs (FAPU) by name until they are changed; None releases one.
 
         Raises:
             KeyError: no such AU or FAP.
@@ -190,13 +192,14 @@ class Player:
         self._manager.timeline.mark_changed()
 
     def direct_names(self, character: int = 0) -> tuple[str, ...]:
-        """The names of the AUs and FAPs that are held directly, or have just been let go of."""
+        """Return the names of the AUs and FAPs that are held directly, or have just been released."""
         return tuple(self._characters[character].direct)
 
     def set_emotion(self, values: Mapping[str, float], now: float, character: int = 0) -> None:
-        """Hold an emotion, as AUs (0..1) and FAPs (FAPU) by name, instead of the one held before; {}: none.
+        """Hold an emotion, as AUs (0..1) and FAPs (FAPU) by name, instead of the previous one; {} for none.
 
-        It lies among the expressions, below speech, gaze and what is set directly, whatever is set first.
+        It is in the layer of expressions, below speech, gaze and direct values, in whatever order they are
+        set.
 
         Raises:
             KeyError: no such AU or FAP.
@@ -204,10 +207,10 @@ class Player:
         self._characters[character].set_emotion(values, now)
         self._manager.timeline.mark_changed()
 
-    # feedback out -------------------------------------------------------------------------------
+    # feedback -----------------------------------------------------------------------------------
 
     def due(self, now: float) -> list[Feedback]:
-        """Feedback whose time has come, in the order of report, each once."""
+        """Return feedback that is due, in the order of report, each message once."""
         forgettable = now - self.history - RELAX - AFTERMATH
         if not self._manager.has_due(now, forgettable):
             return []
@@ -219,58 +222,57 @@ class Player:
         return out
 
     def next_deadline(self) -> float | None:
-        """When `due` will next have something; None when nothing plays or waits. In the past: at once."""
+        """Return when `due` next returns something; None if nothing plays or waits; past for at once."""
         return self._manager.next_deadline()
 
     def next_change(self) -> float:
-        """When `due` will next do something: tell, or forget what is past; infinite where neither."""
+        """Return when `due` will next report or forget something; infinite for never."""
         first = self._manager.next_deadline()
         forgets = self._manager.blocks.first_invisible + self.history + RELAX + AFTERMATH
         return forgets if first is None else min(first, forgets)
 
-    # at rest ------------------------------------------------------------------------------------
+    # state --------------------------------------------------------------------------------------
 
     def is_idle(self, now: float = float("-inf")) -> bool:
-        """Nothing plays, waits or is still to be seen: what is held, the scene and `cast.known` are all.
+        """Whether nothing plays, waits or is visible, so that a snapshot holds the whole state.
 
         Args:
-            now: what has ended by then does not count, though what is idle goes by it for some seconds.
+            now: blocks that have ended by then do not count, though they affect idle motion for some seconds.
         """
         return self._manager.is_idle(now)
 
     @property
     def character_states(self) -> tuple[Character, ...]:
-        """The characters themselves, to look at: only the player changes them."""
+        """The characters themselves, for reading only."""
         return tuple(self._characters)
 
     def restore(self, characters: Iterable[Character], past: Iterable[Schedule], expected: Schedule) -> None:
-        """Let a new player be as another one was when it was `is_idle`.
+        """Restore the state of another player that was idle.
 
         Args:
-            characters: its own from now on.
-            past, expected: as `cast.known`.
+            characters: now belong to this player.
+            past, expected: as of `blocks.snapshot`.
         """
         self._characters[:] = characters
         self._manager.blocks.restore(past, expected)
         self._manager.timeline.mark_changed()
 
-    # faces out ----------------------------------------------------------------------------------
+    # frames -------------------------------------------------------------------------------------
 
     @property
     def characters(self) -> list[str | None]:
-        """Ids of the characters; the first is the one that documents without characterId move."""
+        """Ids of the characters; the first is the default of documents without characterId."""
         return [c.id for c in self._characters]
 
     def character_index(self, character: str | None) -> int:
-        """Where a character stands in `characters`; it is added where it is new."""
+        """Return the index of a character in `characters`; a new one is added."""
         return self._character(character)
 
     def frames(self, times: Float64, character: int = 0) -> AUFrames:
-        """The face at any times: a pure function of what was submitted, so live and offline agree.
+        """Return the frames of a face at any times; a pure function of what was submitted, live and offline.
 
         Args:
-            times: (n,) float64 seconds on the session clock, rising; not earlier than `history` before the
-                last `due`.
+            times: (n,) float64 seconds on the session clock, rising; at most `history` before the last `due`.
         """
         times = np.asarray(times, np.float64)
         if not len(times):
@@ -279,10 +281,10 @@ class Player:
         return blend(channels, times, self.rules, idle)
 
     def motion(self, times: Float64, character: int = 0) -> tuple[list[Channel], Idle | None]:
-        """All that moves a face at these times, and perhaps some more.
+        """Return all channels that move a face at these times, and possibly more, and its idle motion.
 
         Args:
-            times: as `frames`, at least one.
+            times: as for `frames`, at least one.
         """
         first, last = float(times[0]), float(times[-1])
         blocks = self._manager.blocks.of_character(character)
@@ -306,23 +308,23 @@ class Player:
 
     @property
     def end(self) -> float:
-        """When the last block has ended, and relaxed where it was cut off; 0 where there was none."""
+        """When the last block has ended, and relaxed if it was cut off; 0 without blocks."""
         return max(
             (p.invisible_after for p in self._manager.blocks.all() if p.end < float("inf")), default=0.0
         )
 
     def speech(self) -> tuple[ScheduledSpeech, ...]:
-        """What sounds or will sound, in order of its start."""
+        """Return past and future utterances, in order of their start."""
         return tuple(
             sorted((s for p in self._manager.blocks.all() for s in p.speech.values()), key=lambda s: s.start)
         )
 
     def latest(self, schedule: Schedule) -> Schedule:
-        """What became of a schedule that `submit` gave, where other blocks moved or interrupted its block."""
+        """Return the present schedule of a block, given the one that `submit` returned."""
         return self._manager.blocks.latest(schedule)
 
     def state(self, now: float) -> dict[str, Any]:
-        """What is playing, which AUs are up and what each layer asks for, as plain data."""
+        """Return the playing blocks, the visible AUs and the values of each layer, as plain data."""
         blocks: list[dict[str, Any]] = []
         for p in self._manager.blocks.active():
             if p.end <= now:
@@ -345,7 +347,7 @@ class Player:
         for layer in Layer:
             alone = idle if layer is Layer.IDLE else None
             own = blend([c for c in channels if c.layer is layer], times, idle=alone)
-            # Below 0.005 nothing is seen of an AU, and of a FAP below half a unit.
+            # AUs below 0.005 and FAPs below half a unit are invisible.
             values = zip(fap_names, own.faps[0].tolist(), strict=True)
             faps = {name: round(value) for name, value in values if abs(value) >= 0.5}
             if (aus := _up(own)) or faps:
@@ -362,7 +364,7 @@ class Player:
             if character.id == wanted:
                 return index
         if self._characters[0].id is None:
-            # The first name that a session hears is the name of its first face.
+            # The first name in a session is the name of its first face.
             self._characters[0].id = wanted
             return 0
         self._characters.append(Character(wanted))
@@ -370,6 +372,6 @@ class Player:
 
 
 def _up(frames: AUFrames) -> dict[str, float]:
-    """The AUs of the first frame that are not 0."""
+    """Return the AUs of the first frame that are not 0."""
     shown = zip(AU_NAMES(), frames.aus[0].tolist(), strict=True)
     return {name: round(value, 3) for name, value in shown if value > 0.005}

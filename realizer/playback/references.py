@@ -9,12 +9,12 @@ from bml_schema import Behaviour, Block, Constraint, Required, Speech, Sync, Syn
 
 
 def external_refs(block: Block) -> tuple[SyncRef, ...]:
-    """Those into other blocks."""
+    """Return the references into other blocks."""
     return tuple(ref for ref in references(block) if ref.block is not None and ref.block != block.id)
 
 
 def references(block: Block) -> Iterator[SyncRef]:
-    """Of its behaviours, their syncs in text, and its constraints."""
+    """Yield the references of its behaviours, of syncs in their text, and of its constraints."""
     for behaviour in block.behaviours:
         yield from behaviour.syncs.values()
         if isinstance(behaviour, Speech) and behaviour.text is not None:
@@ -29,7 +29,7 @@ def references(block: Block) -> Iterator[SyncRef]:
 
 
 def with_references(block: Block, to: Callable[[SyncRef], SyncRef]) -> Block:
-    """The block with what `to` makes of each of its references."""
+    """Return the block with each reference replaced by `to(reference)`."""
 
     def inside(node: Behaviour | Constraint) -> Behaviour | Constraint:
         if isinstance(node, Constraint):

@@ -1,4 +1,4 @@
-"""Active blocks as the scheduler sees them beside a new one."""
+"""Active blocks as members of the scheduling problem of a new block."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ FOREVER = float("inf")
 def affected_blocks(
     block: Block, alive: Iterable[ActiveBlock], now: float, waits: Iterable[Dependency] = ()
 ) -> list[ActiveBlock]:
-    """The blocks that are solved together with one, by references to sync points that have not passed.
+    """Return the blocks that are solved together with one, by references to sync points that have not passed.
 
-    Of two blocks of which one waits for the other only one can move at a time, or the second would flee from
-    the first for ever: what such a block says of the other's points is taken as it is.
+    Of two blocks of which one waits for the other only one can move at a time; otherwise both would move
+    later for ever. The points of the other are fixed.
 
     Args:
-        block: a new one, or one whose times have changed.
-        alive: the other blocks that play or wait.
-        waits: what the block waits for.
+        block: a new block, or one whose times have changed.
+        alive: the other playing and waiting blocks.
+        waits: the dependencies of the block.
 
     Returns:
         Those of `alive` that are connected to the block by any chain, in order.
@@ -66,7 +66,7 @@ def affected_blocks(
 
 
 def _has_passed(ref: SyncRef, playing: ActiveBlock, now: float) -> bool:
-    """Whether a point is past, or nobody's."""
+    """Whether a point is past, or does not exist."""
     sync = ref.sync if ref.index is None else f"{ref.sync}:{ref.index}"
     try:
         time = playing.schedule.at(ref.behaviour or "", sync or "")
@@ -76,7 +76,7 @@ def _has_passed(ref: SyncRef, playing: ActiveBlock, now: float) -> bool:
 
 
 def member(playing: ActiveBlock, origin: float, now: float) -> Member:
-    """A block that plays, on the clock of a block that starts at `origin`; what has passed is held."""
+    """Return a playing block on the clock of a block that starts at `origin`, with fixed past points."""
     late = playing.start - origin
     passed: dict[str, dict[str, float]] = {}
     for behaviour in playing.plan.timings:
@@ -99,15 +99,15 @@ def member(playing: ActiveBlock, origin: float, now: float) -> Member:
 
 
 def anticipators_of(block: Block) -> set[str]:
-    """The anticipators that a block is tied to."""
+    """Return the anticipators that a block is tied to."""
     return {ref.behaviour or "" for ref in references(block) if ref.block == ANTICIPATORS}
 
 
 def lead_time(playing: ActiveBlock, id: str, sync: str, now: float) -> float:
-    """The soonest that an anticipated point can be: what leads up to it in a behaviour takes its least time.
+    """Return the earliest possible time of an anticipated point, after the least times before it.
 
     Returns:
-        Seconds on the session clock; `now` where nothing of the block is tied to the point, or it has passed.
+        Seconds on the session clock; `now` if nothing of the block is tied to the point, or it has passed.
     """
     soonest = now
     for node in playing.block.behaviours:

@@ -9,22 +9,22 @@ from bml_schema import Block
 from realizer.behaviours.kind import BehaviourKind, PlanningContext
 from realizer.scheduling.timing import Schedule
 
-# s; two claims that share less than this do not disturb each other.
+# s; two claims may overlap by this much.
 TOUCH = 1e-3
-# Where one behaviour may pass into the next: two clash only if one lies within the other. A gaze does not
-# pass into that of another block, which is not to be disturbed; a base state does, or it would never change.
+# Resources that may pass from one behaviour to the next: two conflict only if one lies within the other. A
+# gaze does not pass to another block, which must not disturb it; a base state does, or it would never change.
 PASSES = {"gaze": "own block", "base gaze": "any block", "base head": "any block", "base face": "any block"}
 
 
 @dataclass(frozen=True, slots=True)
 class ResourceClaim:
-    """A behaviour needs something for itself for a while.
+    """A claim of a behaviour on an exclusive resource for some time.
 
     Attributes:
         resource: such as "voice" or "gaze"; of one character.
-        begin, end: seconds; of all claims that are compared on the same clock.
-        block, behaviour: whose it is.
-        rank: of two of one block the lower one keeps it.
+        begin, end: seconds; all compared claims are on the same clock.
+        block, behaviour: the claimant.
+        rank: of two behaviours in one block the one of lower rank wins.
     """
 
     resource: str
@@ -35,11 +35,11 @@ class ResourceClaim:
     rank: tuple[float, bool, int] = (0.0, False, 0)
 
     def shifted(self, seconds: float) -> ResourceClaim:
-        """The same claim, later by `seconds`."""
+        """Return the same claim, later by `seconds`."""
         return replace(self, begin=self.begin + seconds, end=self.end + seconds)
 
     def conflicts_with(self, other: ResourceClaim) -> bool:
-        """Whether one of the two has to go."""
+        """Whether one of the two has to be dropped."""
         if (
             self.resource != other.resource
             or min(self.end, other.end) - max(self.begin, other.begin) <= TOUCH
@@ -54,14 +54,14 @@ class ResourceClaim:
 
 @dataclass(frozen=True, slots=True)
 class ResourceConflict:
-    """A claim that cannot be had, and the one that stands in its way."""
+    """A claim that is refused, and the claim that it conflicts with."""
 
     claim: ResourceClaim
     winner: ResourceClaim
     start: float = 0.0  # of the block that loses it
 
     def __str__(self) -> str:
-        """`wanted the gaze from 1 to 2.5 s, g1 has it from 0 to 1.5 s`, from the start of the block."""
+        """Return `wanted the gaze from 1 to 2.5 s, g1 has it from 0 to 1.5 s`, from block start."""
         w, c = self.winner, self.claim
         own = w.behaviour if w.block == c.block else f"{w.block}:{w.behaviour}"
         begin, end, since, until = (f"{round(t - self.start, 3):g}" for t in (c.begin, c.end, w.begin, w.end))
@@ -71,7 +71,7 @@ class ResourceConflict:
 def claims(
     block: Block, schedule: Schedule, kinds: Mapping[str, BehaviourKind], context: PlanningContext
 ) -> Iterator[ResourceClaim]:
-    """What the scheduled behaviours of a block claim, on the clock of `schedule.start`."""
+    """Yield the claims of the scheduled behaviours of a block, on the clock of `schedule.start`."""
     for order, node in enumerate(block.behaviours):
         wanted = kinds[node.tag].claims(node, context) if node.id in schedule.times else ()
         if not wanted:
@@ -87,9 +87,9 @@ def claims(
 def conflicts(
     new_claims: Iterable[ResourceClaim], existing_claims: Iterable[ResourceClaim], start: float = 0.0
 ) -> list[ResourceConflict]:
-    """What of `new_claims` cannot be had: what is held stays, and of two that are wanted the lower rank.
+    """Return the conflicts of new claims: existing ones win, then those of lower rank.
 
-    One loss a behaviour, in order of rank. `start` is where their sentences count from.
+    There is one conflict a behaviour, in order of rank. The times in messages count from `start`.
     """
     had: dict[str, list[ResourceClaim]] = {}
     for claim in existing_claims:

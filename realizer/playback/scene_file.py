@@ -8,10 +8,10 @@ from realizer.behaviours.kind import Position
 
 
 def parse_scene(text: str) -> dict[str, Position]:
-    """A scene from JSON `{"cup": [x, y, z], ...}` or lines `cup x y z`; metres, origin between the eyes.
+    """Parse a scene: JSON `{"cup": [x, y, z], ...}` or lines `cup x y z`; metres, origin between the eyes.
 
     Raises:
-        ValueError: says which entry and what was wanted.
+        ValueError: with the entry and the expected value.
     """
     import json
 

@@ -1,4 +1,4 @@
-"""The speech of blocks: spoken before a block is planned, and again where the plan asks for other lengths."""
+"""Speech synthesis for blocks: before planning, and again if the plan needs other durations."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from realizer.speech.utterance import SpeechRequest, Utterance, Voice
 
 
 def submit_with_speech(player: Player, block: Block, voice: Voice, now: float = 0.0) -> Schedule:
-    """Submit a block with its speech, spoken at other rates where more of the block fits then."""
+    """Submit a block with its speech, at other rates if more of the block fits then."""
     requests = player.speech_requests(block)
     utterances = synthesize(requests, voice)
     planned = player.submit(block, now, utterances)
@@ -29,7 +29,7 @@ def submit_with_speech(player: Player, block: Block, voice: Voice, now: float = 
 
 
 def synthesize(requests: Mapping[str, SpeechRequest], voice: Voice) -> dict[str, Utterance]:
-    """Speak what a block wants; where the voice fails the silent voice takes over, with a warning."""
+    """Synthesize the speech of a block; if the voice fails, use the silent voice and add a warning."""
     utterances: dict[str, Utterance] = {}
     for behaviour, request in requests.items():
         try:
@@ -40,14 +40,14 @@ def synthesize(requests: Mapping[str, SpeechRequest], voice: Voice) -> dict[str,
 
 
 def without_stretch(utterance: Utterance) -> Utterance:
-    """Return an utterance that is not to be spoken again."""
+    """Return an utterance that cannot be stretched."""
     return replace(utterance, stretch=(1.0, 1.0))
 
 
 def stretch_to_fit(
     utterances: Mapping[str, Utterance], lengths: Mapping[str, Mapping[str, float]]
 ) -> dict[str, Utterance]:
-    """Stretch utterances to the lengths that were planned for them; none is to be spoken again."""
+    """Stretch utterances to their planned durations, finally."""
     return {
         b: stretched(u, lengths[b]) if b in lengths else without_stretch(u) for b, u in utterances.items()
     }
@@ -55,7 +55,7 @@ def stretch_to_fit(
 
 @contextmanager
 def open_voice(voice: Voice | str | None) -> Iterator[Voice]:
-    """Open a voice by its name and close it afterwards; a voice that is open already stays open."""
+    """Open a voice by its name and close it afterwards; an open voice stays open."""
     if voice is not None and not isinstance(voice, str):
         yield voice
         return
@@ -67,7 +67,7 @@ def open_voice(voice: Voice | str | None) -> Iterator[Voice]:
 
 
 class _NamedVoice:
-    """The voice of a name; the default one is looked for when something is to be said."""
+    """A voice by name; the default voice is opened on first use."""
 
     def __init__(self, name: str | None) -> None:
         self.name = name or "default"

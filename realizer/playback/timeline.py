@@ -27,17 +27,17 @@ FOREVER = float("inf")
 
 
 class BlockTimeline:
-    """When accepted blocks play, and what becomes of them.
+    """When accepted blocks play.
 
     Args:
-        kinds: tag -> Kind.
-        characters: whose base states the blocks shift; shared with who made them.
+        kinds: tag -> BehaviourKind.
+        characters: the blocks change their base states; shared with the caller.
 
     Attributes:
-        version: rises whenever what is shown changes.
+        version: increases whenever visible motion changes.
         blocks: the blocks.
-        events: what is still to happen in them.
-        reports: the feedback that is owed.
+        events: their future events.
+        reports: pending feedback.
     """
 
     def __init__(self, kinds: Mapping[str, BehaviourKind], characters: Sequence[Character]) -> None:
@@ -61,14 +61,14 @@ class BlockTimeline:
         ended: Collection[ActiveBlock] = (),
         alone: bool = False,
     ) -> tuple[Plan, list[ActiveBlock]]:
-        """The plan of a block beside those that are alive, and whom it is solved with.
+        """Plan a block beside the active ones; return the plan, and the blocks that are solved with it.
 
-        While it is not known when it starts, it is planned as if that were now, and moves nobody.
+        While its start is unknown, it is planned as if it started now, and does not move other blocks.
 
         Args:
-            waits: what it waits for.
-            ended: whom it ends.
-            alone: it takes the points of others as they are.
+            waits: its dependencies.
+            ended: the blocks that it ends.
+            alone: sync points of other blocks are fixed.
         """
         known = start < FOREVER
         origin = start if known else now
@@ -89,7 +89,7 @@ class BlockTimeline:
         return planned, others
 
     def _conflict(self, blocks: Sequence[ActiveBlock], schedules: Sequence[Schedule]) -> bool:
-        """Whether blocks with other times would want what the rest holds."""
+        """Whether blocks with new times would conflict with the claims of the others."""
         for playing, schedule in zip(blocks, schedules, strict=True):
             at = replace(schedule, start=playing.start)
             held = block_links.existing_claims(playing.character, self.blocks.active(), blocks)
@@ -98,7 +98,7 @@ class BlockTimeline:
         return False
 
     def place(self, playing: ActiveBlock) -> None:
-        """A block has a new start: it shifts base states then, and its events are due."""
+        """Schedule the base states and events of a block with a new start."""
         self.characters[playing.character].add_shifts(playing.shifts.values())
         playing.order = self._order
         self._order += 1
@@ -107,13 +107,13 @@ class BlockTimeline:
             self.mark_changed()
 
     def reorder(self, playing: ActiveBlock) -> None:
-        """Let a waiting block, and those that follow it, report after all others at one instant.
+        """Let a waiting block, and its followers, report after all others at one instant.
 
         Raises:
             graphlib.CycleError: blocks wait for each other.
         """
         graph: TopologicalSorter[ActiveBlock] = TopologicalSorter({playing: ()})
-        todo, visited = deque([playing]), {playing}  # paths to a block may be too many to follow each
+        todo, visited = deque([playing]), {playing}  # there may be many paths to a block
         while todo:
             first = todo.popleft()
             for other in first.followers:
@@ -130,7 +130,7 @@ class BlockTimeline:
                 self.events.add(first)
 
     def update_followers(self, playing: ActiveBlock, now: float) -> None:
-        """A block's times have changed: those that wait for it, and for them, may start at another time."""
+        """Move the direct and indirect followers of a block whose times have changed."""
         moved = deque([playing])
         while moved:
             first = moved.popleft()
@@ -139,10 +139,10 @@ class BlockTimeline:
                     moved.append(other)
 
     def move(self, playing: ActiveBlock, now: float, *, after: str = "") -> bool:
-        """Let a waiting block start when it now may; False where nothing about it changes.
+        """Move a waiting block to its earliest start; return False if nothing changes.
 
         Args:
-            after: the block that it waits for and that has moved; its points are taken as they are.
+            after: id of the dependency that has moved; its points are fixed.
         """
         start = playing.earliest
         named = {ref.block for ref in playing.external_refs}
@@ -166,9 +166,9 @@ class BlockTimeline:
                 self.reports.warn(planned.schedule.warnings[0], playing.block.character_id)
                 self.stop(playing, now)
                 return False
-            told = {w.id for w in playing.schedule.warnings}
+            known = {w.id for w in playing.schedule.warnings}
             for warning in planned.schedule.warnings:
-                if warning.id not in told:
+                if warning.id not in known:
                     self.reports.warn(warning, playing.block.character_id)
         playing.apply_plan(planned, start)
         self.place(playing)
@@ -178,7 +178,7 @@ class BlockTimeline:
         return True
 
     def _conflicts_at(self, playing: ActiveBlock, start: float) -> bool:
-        """Whether others hold what a block claims when it starts at another time."""
+        """Whether the claims of a block with another start would conflict with those of other blocks."""
         if not playing.plan.claims:
             return False
         late = start - playing.start
@@ -188,7 +188,7 @@ class BlockTimeline:
         )
 
     def retime(self, blocks: Sequence[ActiveBlock], schedules: Sequence[Schedule], now: float) -> None:
-        """Give blocks other times, each from its own start; what follows them follows."""
+        """Change the times of blocks, each from its own start, and move their followers."""
         for playing, schedule in zip(blocks, schedules, strict=True):
             if playing.is_done:
                 continue
@@ -205,11 +205,11 @@ class BlockTimeline:
             self.update_followers(playing, now)
 
     def linked_blocks(self, playing: ActiveBlock, now: float) -> list[ActiveBlock]:
-        """The other blocks that are solved together with one."""
+        """Return the other blocks that are solved together with one."""
         return affected_blocks(playing.block, self.blocks.active(), now, playing.dependencies)
 
     def reschedule(self, blocks: Sequence[ActiveBlock], origin: float, now: float) -> None:
-        """Give blocks that play the times that now fit best; where none do, they stay as they are."""
+        """Change the times of playing blocks to the best fit; if there is none, keep them and warn."""
         if not blocks:
             return
         members = [member(p, origin, now) for p in blocks]
@@ -220,11 +220,11 @@ class BlockTimeline:
             return
         why = found[0].warnings[0].text if found[0].failed else "it would disturb another block"
         for playing in blocks:
-            told = Warning(playing.block.id, "IMPOSSIBLE_TO_SCHEDULE", f"stays as it was planned: {why}")
-            self.reports.warn(told, playing.block.character_id)
+            warning = Warning(playing.block.id, "IMPOSSIBLE_TO_SCHEDULE", f"stays as it was planned: {why}")
+            self.reports.warn(warning, playing.block.character_id)
 
     def stop(self, playing: ActiveBlock, now: float) -> None:
-        """Cut a block off at `now`: what plays relaxes, what waits never comes, its end is reported."""
+        """Cut a block off at `now`: what plays relaxes, what waits is cancelled, and its end is reported."""
         tied = self.linked_blocks(playing, now) if playing.has_begun else []
         self.events.drop(playing)
         self._withdraw_shifts(playing, playing.shifts.keys(), now)
@@ -256,11 +256,11 @@ class BlockTimeline:
         if schedule.start == FOREVER:
             schedule = replace(schedule, start=now)  # as if it were activated now
         syncs = schedule.behaviours
-        told = syncs if behaviours is None else {b: syncs[b] for b in behaviours}
-        self.reports.add(prediction(playing.block, schedule, playing.state, told))
+        predicted = syncs if behaviours is None else {b: syncs[b] for b in behaviours}
+        self.reports.add(prediction(playing.block, schedule, playing.state, predicted))
 
     def mark_changed(self) -> None:
-        """What is or will be shown is not what it was."""
+        """Note that visible motion has changed."""
         self.version += 1
 
     def _withdraw_shifts(self, playing: ActiveBlock, behaviours: Iterable[str], now: float) -> None:
