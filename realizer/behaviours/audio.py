@@ -1,4 +1,4 @@
-"""audiofile: plays a sound file of the media folder, or a clip that a client sent."""
+"""audiofile: plays a sound file of the media folder, or a clip of a client."""
 
 from __future__ import annotations
 
@@ -16,16 +16,14 @@ from realizer.speech.utterance import Utterance
 
 
 def timing(node: AudioFile, context: PlanningContext) -> Timing:
-    """As long as the file, exactly; one whose end the document gives is cut off there, or silent from its own
-    end on.
-    """
+    """Return the duration of the file; with an end in the document, sound is cut off or silence added."""
     length = np.array([_sound(node, context).duration])
     whole = Timing(("start", "end"), length, length, np.ones(1), rigid=True)
     return replace(whole, least=np.zeros(1), rigid=False) if "end" in node.syncs else whole
 
 
 def expand(node: AudioFile, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
-    """It moves nothing: nobody knows what is said in it."""
+    """Return no channels: the phonemes of the sound are unknown."""
     return ()
 
 

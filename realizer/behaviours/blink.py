@@ -16,7 +16,7 @@ def timing(node: Blink, context: PlanningContext) -> Timing:
 
 
 def expand(node: Blink, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
-    """Shut from attackPeak to relax, by AU45."""
+    """Return channels of AU45, closed from attackPeak to relax."""
     return pose_channels.hold(pose_channels.columns({(45, node.side): 1.0}, node.amount), times, node.id)
 
 

@@ -40,9 +40,9 @@ def activate(node: Activate) -> kind.Activate:
 
 
 def change(node: ParameterValueChange) -> kind.Change:
-    """Evenly from start to end where the document gives an end and does not ask for an instant change."""
+    """Return a linear change if the document gives an end and wants one, otherwise an instant one."""
     trajectory = node.trajectory
-    assert trajectory is not None  # the parser takes none without one
+    assert trajectory is not None  # the parser requires one
     evenly = trajectory.type == "linear" and "end" in node.syncs
     block, behaviour = node.target
     return kind.Change(

@@ -20,7 +20,7 @@ def _kind(node_class: type[Any], element: str) -> BehaviourKind:
 
 
 def nothing(node: Any, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
-    """A face shows nothing of it."""
+    """Return no channels: the face does not move."""
     return ()
 
 

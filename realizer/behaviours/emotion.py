@@ -24,13 +24,13 @@ from realizer.scheduling.timing import Timing
 from realizer.tables.emotion_model import emotion_model
 from realizer.tables.emotions import emotion_faces
 
-# Ours play as action units, so that speech and blinks find their place in them; the published ones as FAPs.
+# Our profiles play as action units, so that speech and blinks combine with them; published ones as FAPs.
 OWN, PUBLISHED = (None, "default", "own"), ("published", "raw")
 PARAMETERS = {"intensity": "intensity", "amount": "intensity"}
 
 
 class EmotionRequest(NamedTuple):
-    """What an element asks for: a word of one of the sets, in lower case, or a place."""
+    """The emotion of an element: a lower-case word of one of the sets, or a place."""
 
     name: str | None
     profiles: str
@@ -41,13 +41,13 @@ class EmotionRequest(NamedTuple):
 
     @classmethod
     def of(cls, node: Emotion | Mood) -> EmotionRequest:
-        shown = node.profile if node.profile is not None and node.profile in PUBLISHED else "own"
+        profiles = node.profile if node.profile is not None and node.profile in PUBLISHED else "own"
         name = None if node.name is None else " ".join(node.name.split()).lower()
-        return cls(name, shown, node.angle, node.activation, node.valence, node.arousal)
+        return cls(name, profiles, node.angle, node.activation, node.valence, node.arousal)
 
 
 def timing(node: Emotion, context: PlanningContext) -> Timing:
-    """As its archetype's face lexeme; between two, as much of each as shows."""
+    """Return the timing of the archetype's face lexeme; between two archetypes their weighted mean."""
     return _timing(EmotionRequest.of(node))
 
 
@@ -71,17 +71,17 @@ def timing_of_mood(node: Mood, context: PlanningContext) -> Timing:
 
 
 def expand(node: Emotion, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
-    """There at attackPeak, held to relax, gone at end."""
+    """Return channels with the emotion from attackPeak to relax."""
     return pose_channels.hold(values_of(node), times, node.id)
 
 
 def expand_mood(node: Mood, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
-    """From start to end the new base face rises, and stays; the neutral one has no channels."""
+    """Return channels that rise to the new base face and stay; the neutral face has none."""
     return pose_channels.keep_base(values_of(node), times, node.id)
 
 
 def check(node: Emotion | Mood, context: PlanningContext) -> tuple[Fault, ...]:
-    """An unknown word, and one without a face, are fatal, an unknown profile is not."""
+    """Return faults: an unknown word, or one without a face, is fatal, an unknown profile is not."""
     if node.name is not None:
         try:
             _has_profile(EmotionRequest.of(node))
@@ -100,41 +100,41 @@ def check(node: Emotion | Mood, context: PlanningContext) -> tuple[Fault, ...]:
 
 @lru_cache(maxsize=1000)
 def _has_profile(feeling: EmotionRequest) -> bool:
-    """True.
+    """Return True; an error is not cached.
 
     Raises:
-        UnknownWordError, ValueError: as `realizer.emotions.emotion`; those are not kept.
+        UnknownWordError, ValueError: as `realizer.emotions.emotion`.
     """
     profile_of(feeling.name or "", feeling.profiles)
     return True
 
 
 def claims_of_mood(node: Mood, context: PlanningContext) -> frozenset[str]:
-    """A face has one resting state."""
+    """Return the claim on the resting state, of which a face has one."""
     return frozenset({"base face"})
 
 
 def values_of(node: Emotion | Mood) -> dict[Target, float]:
-    """Column -> what it shows: AUs 0..1, or FAPs of a published profile; with a seed a draw of them.
+    """Return column -> value: AUs 0..1, or FAPs of a published profile; random within its ranges with a seed.
 
     Raises:
         ValueError: a place off the wheel, or off the plane of valence and arousal.
     """
     if node.profile in PUBLISHED:
         if node.angle is not None:
-            found = wheel(node.angle, node.activation, node.profile)
+            profile = wheel(node.angle, node.activation, node.profile)
         elif node.valence is not None and node.arousal is not None:
-            found = affect(node.valence, node.arousal, node.profile)
+            profile = affect(node.valence, node.arousal, node.profile)
         else:
-            found = profile_of(node.name or "", node.profile)
-        frame = found.frame() if node.seed is None else found.draw(node.seed)
-        return {fap(number): node.intensity * float(frame[number - 1]) for number in found.ranges}
+            profile = profile_of(node.name or "", node.profile)
+        frame = profile.frame() if node.seed is None else profile.draw(node.seed)
+        return {fap(number): node.intensity * float(frame[number - 1]) for number in profile.ranges}
     aus = _aus(EmotionRequest.of(node))
     return pose_channels.columns(aus if node.seed is None else _varied(aus, node.seed), node.intensity)
 
 
 def _varied(aus: Mapping[tuple[int, str], float], seed: int) -> dict[tuple[int, str], float]:
-    """Each action unit a little more or less, as far as our own profiles are wide; both sides alike."""
+    """Scale each action unit randomly within the spread of our profiles, both sides equally."""
     numbers = sorted({number for number, _ in aus})
     spread = emotion_model().spread
     factors = dict(
@@ -145,7 +145,7 @@ def _varied(aus: Mapping[tuple[int, str], float], seed: int) -> dict[tuple[int, 
 
 @lru_cache(maxsize=1000)
 def _aus(feeling: EmotionRequest) -> Mapping[tuple[int, str], float]:
-    """(AU, side) -> 0..1 at intensity 1, of what is no published profile."""
+    """Return (AU, side) -> 0..1 at intensity 1, for an emotion without a published profile."""
     parts, strength = _mix(feeling)
     aus: dict[tuple[int, str], float] = {}
     for name, share in parts.items():
@@ -155,10 +155,10 @@ def _aus(feeling: EmotionRequest) -> Mapping[tuple[int, str], float]:
 
 
 def _mix(feeling: EmotionRequest) -> tuple[Mapping[str, float], float]:
-    """{archetype: its share}, and how strongly they show: 1 as drawn; ({}, 0) for the neutral face.
+    """Return {archetype: weight} and their strength, where 1 is full; ({}, 0) for the neutral face.
 
-    A place is as strong as its activation beside the rim's, or as it is far from the middle of valence and
-    arousal. A word is a kind of face, as strong as `strength_of` has it; `intensity` is how much of it shows.
+    The strength of a place is its activation relative to the rim's, or its distance from the middle of
+    valence and arousal. The strength of a word is `strength_of`; `intensity` scales both.
     """
     if feeling.angle is not None:
         return blend_weights(feeling.angle), strength_at(feeling.activation)

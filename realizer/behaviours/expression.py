@@ -14,19 +14,19 @@ POINTS = ("start", "attackPeak", "relax", "end")
 
 
 def timing(node: Expression, context: PlanningContext) -> Timing:
-    """Onset, apex and offset of the library; a template's as it was measured."""
+    """Return the onset, apex and offset of the library; those of templates were measured."""
     return from_gaps(POINTS, context.library[node.name].gaps)
 
 
 def expand(node: Expression, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
-    """There at attackPeak, held to relax, gone at end."""
+    """Return channels with the expression from attackPeak to relax."""
     return pose_channels.hold(
         pose_channels.columns(context.library[node.name].aus, node.intensity), times, node.id
     )
 
 
 def check(node: Expression, context: PlanningContext) -> tuple[Fault, ...]:
-    """An unknown name is fatal."""
+    """Return a fatal fault for an unknown name."""
     return (
         ()
         if node.name in context.library

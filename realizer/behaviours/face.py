@@ -21,7 +21,7 @@ Part: TypeAlias = FaceLexeme | FaceFacs
 Compound: TypeAlias = Face | FaceShift
 
 POINTS = ("start", "attackPeak", "relax", "end")
-# s; after an overshoot the face settles this fast, or in half of the hold if that is shorter.
+# s; duration from an overshoot to the sustained value, at most half of the hold.
 SETTLE = 0.25
 
 
@@ -42,26 +42,26 @@ def timing_of_shift(node: FaceShift, context: PlanningContext) -> Timing:
 
 
 def expand_part(node: Part, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
-    """0 at start, (1 + overshoot) amount at attackPeak, settling to amount, held to relax, 0 at end."""
+    """Return channels: (1 + overshoot) amount at attackPeak, then amount to relax."""
     return _rise_and_fall(
         {t: {node.overshoot: v} for t, v in _targets(node, context).items()}, times, node.id
     )
 
 
 def expand_face(node: Face, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
-    """Its parts at one time; where several move one AU the stronger one shows."""
-    asked: dict[Target, dict[float, float]] = {}
+    """Return channels of all parts; of several values for one AU the highest is visible."""
+    curves: dict[Target, dict[float, float]] = {}
     for part in node.parts:
         for target, value in _targets(part, context).items():
-            # (1 + o)(1 + p) - 1: the compound's overshoot is laid over its parts'.
+            # (1 + o)(1 + p) - 1: the overshoots of the compound and its parts multiply.
             overshoot = (1 + node.overshoot) * (1 + part.overshoot) - 1
-            curve = asked.setdefault(target, {})
+            curve = curves.setdefault(target, {})
             curve[overshoot] = max(curve.get(overshoot, 0.0), value * node.amount)
-    return _rise_and_fall(asked, times, node.id)
+    return _rise_and_fall(curves, times, node.id)
 
 
 def expand_shift(node: FaceShift, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
-    """From start to end the new base face rises, and stays."""
+    """Return channels that rise to the new base face and stay."""
     values: dict[Target, float] = {}
     for part in node.parts:
         for target, value in _targets(part, context).items():
@@ -73,7 +73,7 @@ def expand_shift(node: FaceShift, times: Float64, context: PlanningContext) -> t
 
 
 def check_part(node: Part, context: PlanningContext) -> tuple[Fault, ...]:
-    """An unknown lexeme or AU is fatal; a side of an AU that has none is not."""
+    """Return faults: an unknown lexeme or AU is fatal; a side of an AU without sides is not."""
     return _faults((node,), context)
 
 
@@ -82,15 +82,15 @@ def check_compound(node: Compound, context: PlanningContext) -> tuple[Fault, ...
 
 
 def _rise_and_fall(
-    asked: Mapping[Target, Mapping[float, float]], times: Float64, source: str
+    values_by_target: Mapping[Target, Mapping[float, float]], times: Float64, source: str
 ) -> tuple[Channel, ...]:
-    """Channels of target -> {overshoot: value}; times (4,) of start, attackPeak, relax, end."""
+    """Return channels of target -> {overshoot: value}; times (4,) of start, attackPeak, relax, end."""
     start, peak, relax, end = times.tolist()
     settled = peak + min(SETTLE, (relax - peak) / 2)
     settling = np.array([start, peak, settled, relax, end])
     channels = []
-    for target, curves in asked.items():
-        for overshoot, value in curves.items():
+    for target, values_by_overshoot in values_by_target.items():
+        for overshoot, value in values_by_overshoot.items():
             highest = (1 + overshoot) * value
             if overshoot and settled > peak:
                 keys, values = settling, np.array([0.0, highest, value, value, 0.0])
@@ -101,7 +101,7 @@ def _rise_and_fall(
 
 
 def _targets(node: Part, context: PlanningContext) -> dict[Target, float]:
-    """Column -> value at the sustained part."""
+    """Return column -> sustained value."""
     if isinstance(node, FaceFacs):
         return dict.fromkeys(au(node.au, node.side), node.amount)
     return pose_channels.columns(context.library[node.lexeme].aus, node.amount)
@@ -115,8 +115,8 @@ def _faults(parts: Iterable[Part], context: PlanningContext) -> tuple[Fault, ...
             if part.lexeme not in context.library:
                 faults.append(pose_channels.unknown_word("lexeme", part.lexeme, context.library))
         elif part.au not in known:
-            said = f"au: wanted a FACS action unit, got {part.au}; near: {tables.nearest(part.au)}"
-            faults.append(Fault("CANNOT_CREATE_BEHAVIOR", said))
+            text = f"au: wanted a FACS action unit, got {part.au}; near: {tables.nearest(part.au)}"
+            faults.append(Fault("CANNOT_CREATE_BEHAVIOR", text))
         elif part.side != "BOTH" and not known[part.au].sides:
             name = f"AU{part.au} ({known[part.au].name})"
             faults.append(
@@ -130,7 +130,7 @@ def _faults(parts: Iterable[Part], context: PlanningContext) -> tuple[Fault, ...
 
 
 def claims_of_shift(node: FaceShift, context: PlanningContext) -> frozenset[str]:
-    """A face has one resting state."""
+    """Return the claim on the resting state, of which a face has one."""
     return frozenset({"base face"})
 
 

@@ -1,4 +1,4 @@
-"""A BML document that plays a FAP clip, as one <facekeyframe>."""
+"""Conversion of a FAP clip to a BML document with one <facekeyframe>."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from realizer.core.errors import RealizerError
 
 
 def document_of(clip: FAPClip, block: str) -> str:
-    """BML text with the clip as keys, a line each; FAPs are limited to the range of the standard.
+    """Return BML text with the clip as keys, a line each; FAPs are limited to the range of the standard.
 
-    FAPs that the clip gives are held at what it says, also where that is 0. FAP 1 and 2 are left out.
+    FAPs that the clip defines are held, also at 0. FAP 1 and 2 are left out.
 
     Args:
         clip: at least two frames, and at least one FAP from 3 on.
-        block: id of the block; the behaviour is `fap`, and the block is refused where it cannot be played.
+        block: id of the block; its behaviour `fap` is required.
 
     Raises:
-        RealizerError: there is nothing to play.
+        RealizerError: the clip has nothing to play.
     """
     columns = np.flatnonzero(clip.mask[2:]) + 2
     if len(clip.values) < 2 or not len(columns):

@@ -18,7 +18,7 @@ from realizer.behaviours.table_timing import timing_from_table
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
-# 1/s^2; a recording bends less than an expression with which it is tied, and more than what is said.
+# 1/s^2; a recording is stiffer than an expression, and less stiff than speech.
 RECORDED = 100.0
 MAX_BYTES = 8 * 2**20  # of text; about ten minutes, read in about a second
 
@@ -28,16 +28,16 @@ def timing(node: Faps, context: PlanningContext) -> Timing:
 
 
 def expand(node: Faps, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
-    """There at attackPeak, held to relax, gone at end; they replace what else moves these FAPs."""
-    there = np.array([0.0, 1.0, 1.0, 0.0])
+    """Return channels with these FAPs from attackPeak to relax; they override other behaviours."""
+    weight = np.array([0.0, 1.0, 1.0, 0.0])
     return tuple(
-        Channel(fap(part.number), times, part.value * there, layer=Layer.FAPS, weight=there, source=node.id)
+        Channel(fap(part.number), times, part.value * weight, layer=Layer.FAPS, weight=weight, source=node.id)
         for part in node.values
     )
 
 
 def check(node: Faps, context: PlanningContext) -> tuple[Fault, ...]:
-    """A number that comes twice is fatal, a value that goes too far is not."""
+    """Return faults: a repeated number is fatal, a value out of range is not."""
     rows = tables.faps()
     seen: set[int] = set()
     faults: list[Fault] = []
@@ -56,14 +56,14 @@ def claims(node: Faps, context: PlanningContext) -> frozenset[str]:
 
 
 def timing_of_file(node: FapFile, context: PlanningContext) -> Timing:
-    """As long as its frames last, from the first to the last; it stretches."""
+    """Return the duration of its frames; it can stretch."""
     clip = media.load(node.file_name, context, read)
     length = (len(clip.values) - 1) / clip.fps
     return Timing(("start", "end"), np.array([length]), np.zeros(1), np.array([RECORDED]))
 
 
 def expand_file(node: FapFile, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
-    """Its frames from start to end, in place of what else moves these FAPs; they come and go smoothly."""
+    """Return its frames from start to end, instead of other behaviours, with a smooth beginning and end."""
     clip = media.load(node.file_name, context, read)
     keys = np.linspace(times[0], times[-1], len(clip.values))
     return tuple(
@@ -73,7 +73,7 @@ def expand_file(node: FapFile, times: Float64, context: PlanningContext) -> tupl
 
 
 def check_file(node: FapFile, context: PlanningContext) -> tuple[Fault, ...]:
-    """A file that cannot be read is fatal; what of FAP 1 and 2 has no face, and values too far, are not."""
+    """Return faults: an unreadable file is fatal; wrong values of FAPs are not."""
     if faults := media.faults(node.file_name, context, read):
         return faults
     clip = media.load(node.file_name, context, read)
@@ -90,7 +90,7 @@ def claims_of_file(node: FapFile, context: PlanningContext) -> frozenset[str]:
 
 
 def read(content: bytes) -> FAPClip:
-    """The clip of a file, with the FAPs that show its visemes and expressions.
+    """Read the clip of a file, and expand its visemes and expressions.
 
     Raises:
         MediaError: fewer than two frames, or too much text.
@@ -107,12 +107,12 @@ def read(content: bytes) -> FAPClip:
 
 
 def moved(clip: FAPClip) -> list[int]:
-    """The FAPs from 3 on that are anything but 0."""
+    """Return the FAPs from 3 on that are not always 0."""
     return [int(column) + 1 for column in np.flatnonzero(clip.values.any(axis=0)) if column >= 2]
 
 
 def out_of_range(number: int, least: float, most: float) -> tuple[Fault, ...]:
-    """A fault, not fatal, where values go beyond the range of a FAP."""
+    """Return a fault, not fatal, if values are beyond the range of a FAP."""
     row = tables.faps()[number - 1]
     if row.least <= least and most <= row.most:
         return ()

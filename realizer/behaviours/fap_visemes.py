@@ -19,7 +19,7 @@ MOST = 63  # of viseme_blend, and of the intensities of expressions
 
 @dataclass(frozen=True, slots=True)
 class FapExpression:
-    """What an expression_select of FAP 2 means: the archetype of that emotion."""
+    """The archetype of an expression_select of FAP 2."""
 
     number: int
     emotion: str
@@ -27,19 +27,19 @@ class FapExpression:
 
 @cache
 def fap_expressions() -> tuple[FapExpression, ...]:
-    """All but 0, which is none."""
+    """Return all expressions but 0, which is none."""
     return tables.read_csv(tables.text_of("fap_expressions.csv"), FapExpression, "fap_expressions.csv")
 
 
 def expand_compound(clip: FAPClip) -> FAPClip:
-    """The clip as faces of FAPs 3 to 68 play it; one without FAP 1 and 2 as it is.
+    """Return a clip with FAP 1 and 2 expanded to FAPs 3 to 68; a clip without them is not changed.
 
-    - Visemes and expressions are mixed as ISO/IEC 14496-2 says: viseme_select1 x blend / 63 +
+    - Visemes and expressions are mixed as ISO/IEC 14496-2 specifies: viseme_select1 x blend / 63 +
       viseme_select2 x (1 - blend / 63), and each expression x its intensity / 63.
-    - Where both are there, a viseme takes from an expression what speech takes: it has the lips.
-    - A FAP that the clip itself gives stands, also at 0; with init_face it is relative to the expression.
+    - With both, a viseme reduces an expression as speech does, because it moves the lips.
+    - A FAP that the clip itself defines is kept, also at 0; with init_face it is added to the expression.
 
-    What cannot be shown is left out, and is one more sentence of `notes`.
+    What cannot be shown is left out, with a sentence in `notes`.
     """
     if not clip.mask[:2].any():
         return clip
@@ -51,7 +51,7 @@ def expand_compound(clip: FAPClip) -> FAPClip:
     mixed = visemes + expressions
     relative = (clip.expressions[:, 4:5] == 1) * expressions
     values = np.where(clip.mask, clip.values + relative, mixed)
-    # Between two visemes the lips are held at 0, and are not somebody else's.
+    # Between two visemes the lips are held at 0, so that no other behaviour moves them.
     mask = clip.mask | (talking.any() & _mouths().any(axis=0)) | expressions.any(axis=0)
     mask[:2] = False
     values[:, :2] = 0
@@ -67,7 +67,7 @@ def expand_compound(clip: FAPClip) -> FAPClip:
 
 
 def _visemes(given: Int32, notes: list[str]) -> tuple[Float64, Float64]:
-    """(n, 68) what they show, and (n,) 0..1 how far a viseme is there at all."""
+    """Return (n, 68) FAPs of the visemes, and (n,) 0..1 their total weight."""
     selects = _selects(given[:, :2], len(_mouths()), "FAP 1: wanted visemes", notes)
     share = _parts(given[:, 2], "FAP 1: wanted blends", notes)
     _defines(given[:, 3], "FAP 1: viseme_def", notes)
@@ -76,7 +76,7 @@ def _visemes(given: Int32, notes: list[str]) -> tuple[Float64, Float64]:
 
 
 def _expressions(given: Int32, notes: list[str]) -> Float64:
-    """(n, 68) what they show."""
+    """Return (n, 68) FAPs of the expressions."""
     selects = _selects(given[:, [0, 2]], len(_faces()), "FAP 2: wanted expressions", notes)
     parts = _parts(given[:, [1, 3]], "FAP 2: wanted intensities", notes)
     _defines(given[:, 5], "FAP 2: expression_def", notes)
@@ -85,7 +85,7 @@ def _expressions(given: Int32, notes: list[str]) -> Float64:
 
 
 def _selects(given: Int32, count: int, wanted: str, notes: list[str]) -> Int32:
-    """The numbers of what there is; 0, which is none, in place of others."""
+    """Return the numbers, with 0, which is none, instead of unknown ones."""
     known = (given >= 0) & (given < count)
     if not known.all():
         notes.append(f"{wanted} 0..{count - 1}, got {given[~known][0]}: shown as none")
@@ -93,7 +93,7 @@ def _selects(given: Int32, count: int, wanted: str, notes: list[str]) -> Int32:
 
 
 def _parts(given: Int32, wanted: str, notes: list[str]) -> Float64:
-    """0..1 of 0..63."""
+    """Scale 0..63 to 0..1."""
     limited = np.clip(given, 0, MOST)
     if (limited != given).any():
         notes.append(f"{wanted} 0..{MOST}, got {given[limited != given][0]}: limited to it")
@@ -108,7 +108,7 @@ def _defines(flags: Int32, name: str, notes: list[str]) -> None:
 
 @cache
 def _mouths() -> Float64:
-    """(15, 68) FAPU, a row a viseme."""
+    """Return (15, 68) FAPU, a row a viseme."""
     out = np.zeros((len(shape_table()[0]), 68))
     for number, values in mouth_faps(shape_table()[0]).items():
         out[:, number - 1] = values
@@ -117,7 +117,7 @@ def _mouths() -> Float64:
 
 @cache
 def _faces() -> Float64:
-    """(7, 68) FAPU, a row an expression; 0 is none."""
+    """Return (7, 68) FAPU, a row an expression; 0 is none."""
     rows = fap_expressions()
     out = np.zeros((1 + max(row.number for row in rows), 68))
     for row in rows:

@@ -1,4 +1,4 @@
-"""gaze, gazeShift: the eyes lead, the head follows, and the eyes turn back by as much."""
+"""gaze, gazeShift: the eyes lead, the head follows, and the eyes turn back accordingly."""
 
 from __future__ import annotations
 
@@ -32,19 +32,20 @@ DIRECTIONS = {
 
 
 REST: Turn = (0.0, 0.0)
-# How far a gaze takes eyes and head, at its keys: start, the eyes there, ready, relax, the eyes back, end.
+# How far a gaze masks the base of eyes and head, at its keys: start, eyes on target, ready, relax, eyes
+# back, end.
 EYES_TAKEN = np.array([0.0, 1.0, 1.0, 1.0, 0.0, 0.0])
 HEAD_TAKEN = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 0.0])
 
 
 class GazeAngles(NamedTuple):
-    """Where a gaze ends.
+    """The final angles of a gaze.
 
     Attributes:
-        eyes: in the head.
-        head: by as much it turns.
-        first: as far as the eyes get before the head follows.
-        away: where the eyes are when they have turned back and the head has not yet.
+        eyes: of the eyes in the head.
+        head: of the head.
+        first: of the eyes before the head follows.
+        away: of the eyes when they have turned back and the head has not yet.
         inward: degrees that each eye turns in.
     """
 
@@ -56,20 +57,22 @@ class GazeAngles(NamedTuple):
 
 
 def split_angle(node: Gaze | GazeShift, context: PlanningContext) -> GazeAngles:
-    """How eyes and head share the angle: the head its part by influence, but little of a small angle; the
-    eyes the rest as far as they turn, and the head again what is left.
+    """Split the angle between eyes and head.
+
+    The head turns its share, by influence, but little of a small angle; the eyes turn the rest up to their
+    limit, and the head what is left.
     """
     yaw, pitch, inward = angles(node.target, context)
     left, up = DIRECTIONS[node.offset_direction]
-    # Behind is behind on the nearer side.
+    # A target behind the head is behind on the nearer side.
     yaw = (yaw + node.offset_angle * left + 180.0) % 360.0 - 180.0
     pitch = max(-90.0, min(90.0, pitch + node.offset_angle * up))
     shares = facts()["influence"]
     part = shares.get((node.influence or "default").upper(), shares["default"])["head"]
     eyes_most, head_most = limits("eyes"), limits("head") if part > 0 else REST
     size = math.hypot(yaw, pitch)
-    asked = _of_head(yaw, part, size, eyes_most[0]), _of_head(pitch, part, size, eyes_most[1])
-    head = limited(asked, head_most)
+    wanted = _of_head(yaw, part, size, eyes_most[0]), _of_head(pitch, part, size, eyes_most[1])
+    head = limited(wanted, head_most)
     return GazeAngles(
         eyes=limited((yaw - head[0], pitch - head[1]), eyes_most),
         head=head,
@@ -80,7 +83,7 @@ def split_angle(node: Gaze | GazeShift, context: PlanningContext) -> GazeAngles:
 
 
 def _of_head(angle: float, part: float, size: float, eyes: float) -> float:
-    """What the head turns of an angle: its part, and what is left where the eyes turn no farther."""
+    """Return the head's share of an angle: its part, and the rest beyond the limit of the eyes."""
     head = angle * part * size / (size + facts()["head"]["small"])
     return angle - math.copysign(eyes, angle) if abs(angle - head) > eyes else head
 
@@ -94,31 +97,32 @@ def timing_of_shift(node: GazeShift, context: PlanningContext) -> Timing:
 
 
 def expand(node: Gaze, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
-    """There from start to ready, held to relax, back at end. While it lasts it takes eyes and head from the
-    base gaze; EYES takes the eyes only.
+    """Return channels that reach the target at ready and leave it at relax.
+
+    They mask the base gaze of eyes and head; with the influence EYES, of the eyes only.
     """
     start, ready, relax, end = times.tolist()
     to = split_angle(node, context)
-    there, back = start + _lead(ready - start), relax + _lead(end - relax)
-    keys = np.array([start, there, ready, relax, back, end])
+    reached, back = start + _lead(ready - start), relax + _lead(end - relax)
+    keys = np.array([start, reached, ready, relax, back, end])
     eyes = [REST, to.first, to.eyes, to.eyes, to.away, REST]
     head = [REST, REST, to.head, to.head, to.head, REST]
-    taken = {"eyes": EYES_TAKEN}
+    masks = {"eyes": EYES_TAKEN}
     if (node.influence or "").upper() != "EYES":
-        taken["head"] = HEAD_TAKEN
+        masks["head"] = HEAD_TAKEN
     return (
         *turn("eyes", keys, eyes, layer=Layer.GAZE, source=node.id),
         *turn("head", keys, head, layer=Layer.GAZE, source=node.id),
         *_converge(keys, to.inward, Layer.GAZE, node.id),
         *(
             Channel(mask_channel(region), keys, values, layer=Layer.GAZE, source=node.id)
-            for region, values in taken.items()
+            for region, values in masks.items()
         ),
     )
 
 
 def expand_shift(node: GazeShift, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
-    """There from start to end, and from then on."""
+    """Return channels that reach the target at end, and stay."""
     start, end = times.tolist()
     to = split_angle(node, context)
     keys = np.array([start, start + _lead(end - start), end])
@@ -134,14 +138,14 @@ def check(node: Gaze | GazeShift, context: PlanningContext) -> tuple[Fault, ...]
 
 
 def _lead(length: float) -> float:
-    """Seconds by which the eyes lead in a turn of this length: at most half of it."""
+    """Return the seconds by which the eyes lead in a turn of this length: at most half of it."""
     return min(float(facts()["eyes"]["lead"]), length / 2)
 
 
 def _converge(
     times: Float64, inward: float, layer: Layer, source: str, holds: bool = False
 ) -> tuple[Channel, ...]:
-    """AU66 for eyes that turn in by so many degrees each, at the first keys of a gaze or all."""
+    """Return AU66 for eyes that each turn in by some degrees, at the first keys of a gaze or all."""
     if not inward:
         return ()
     values = min(inward / tables.by_number()[66].degrees, 1.0) * EYES_TAKEN[: len(times)]
@@ -149,12 +153,12 @@ def _converge(
 
 
 def claims(node: Gaze, context: PlanningContext) -> frozenset[str]:
-    """Every influence takes the eyes: one cannot look at two things."""
+    """Return the claim on the gaze, which every influence needs."""
     return frozenset({"gaze"})
 
 
 def claims_of_shift(node: GazeShift, context: PlanningContext) -> frozenset[str]:
-    """A base state can change to one other at a time; a temporary gaze does not mind."""
+    """Return the claim on the base gaze, which a temporary gaze does not need."""
     return frozenset({"base gaze"})
 
 

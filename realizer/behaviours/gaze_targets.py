@@ -1,4 +1,4 @@
-"""Gaze targets: angles to a target of the scene, and their AU channels for eyes and head."""
+"""Gaze targets: the angles to a target of the scene, and the AU channels of eyes and head."""
 
 from __future__ import annotations
 
@@ -28,23 +28,23 @@ TURNS = {"eyes": ((61, 62), (63, 64)), "head": ((51, 52), (53, 54))}
 
 @cache
 def facts() -> dict[str, Any]:
-    """gaze.toml, whole."""
+    """Return the content of gaze.toml."""
     return tables.read_toml(tables.text_of(FILE), FILE)
 
 
 def limits(part: str) -> Turn:
-    """How far "eyes" or "head" turn at most."""
+    """Return the maximum angles of "eyes" or "head"."""
     return facts()[part]["yaw"], facts()[part]["pitch"]
 
 
 def limited(turn: Turn, most: Turn) -> Turn:
-    """As much of a turn as there can be."""
+    """Limit a turn to maximum angles."""
     (yaw, pitch), (most_yaw, most_pitch) = turn, most
     return max(-most_yaw, min(most_yaw, yaw)), max(-most_pitch, min(most_pitch, pitch))
 
 
 def position(target: str, context: PlanningContext) -> Position | None:
-    """Where a target is, in metres: a point "x,y,z" or a name of the scene, either case; None if nowhere."""
+    """Return the position of a target, "x,y,z" or a name of the scene in any case, in metres; or None."""
     if match := POINT.fullmatch(target):
         x, y, z = (float(number) for number in match.groups())
         return x, y, z
@@ -56,9 +56,9 @@ def position(target: str, context: PlanningContext) -> Position | None:
 
 
 def angles(target: str, context: PlanningContext) -> tuple[float, float, float]:
-    """Yaw (positive to the character's left), pitch (positive up) and how far each eye turns in, degrees.
+    """Return yaw (positive to the left), pitch (positive up) and inward turn of each eye, degrees.
 
-    What is not known, and a target between the eyes, is straight ahead and far away.
+    An unknown target, and one between the eyes, is straight ahead and far away.
     """
     x, y, z = position(target, context) or (0.0, 0.0, 0.0)
     distance = math.sqrt(x * x + y * y + z * z)
@@ -71,7 +71,7 @@ def angles(target: str, context: PlanningContext) -> tuple[float, float, float]:
 
 
 def target_faults(target: str, context: PlanningContext) -> tuple[Fault, ...]:
-    """NO_SUCH_TARGET, not fatal, for a name that is not in a declared scene."""
+    """Return NO_SUCH_TARGET, not fatal, for a name that is not in a declared scene."""
     if context.scene is None or position(target, context) is not None:
         return ()
     near = difflib.get_close_matches(target, list(context.scene), n=3) or sorted(context.scene)[:5]
@@ -92,9 +92,9 @@ def turn(
     source: str,
     holds: bool = False,
 ) -> tuple[Channel, ...]:
-    """Channels that turn "eyes" or "head" by k turns at times (k,).
+    """Return channels that turn "eyes" or "head" by k turns at times (k,).
 
-    An angle is the difference of two AUs; between keys they add up to one smooth course.
+    An angle is the difference of two AUs; between keys they add up to one smooth curve.
     """
     channels = []
     for degrees, sides in zip(zip(*turns, strict=True), TURNS[part], strict=True):

@@ -20,17 +20,19 @@ from realizer.scheduling.timing import Timing
 from realizer.tables.lexemes import head_lexemes
 from realizer.tables.timing import Gap, gaps
 
-# The plain `stroke` of several is the last one: it stays beside its number however the rest is stretched.
+# The plain `stroke` of several is the last one: the gap between the two never stretches.
 SAME = Gap("same", 0.0, 0.0, 1e4, "BML 1.0 gives the plain stroke of a repeated movement no meaning; ours")
 
 
-# The eyes' AU that takes back a turn of the head: left by right, up by down.
+# The AU of the eyes that compensates a turn of the head: left by right, up by down.
 BACK = {51: 62, 52: 61, 53: 64, 54: 63}
 
 
 def timing(node: Head, context: PlanningContext) -> Timing:
-    """start ready strokeStart stroke strokeEnd relax end; with repetition n > 1 instead of the stroke
-    stroke:1 .. stroke:n, and `stroke` with the last of them.
+    """Return the sync points of a lexeme.
+
+    With repetition n > 1 these are start ready strokeStart stroke:1 .. stroke:n stroke strokeEnd relax end,
+    and `stroke` is at the last numbered stroke.
     """
     return _timing(node.lexeme, node.repetition)
 
@@ -50,13 +52,14 @@ def _timing(lexeme: str, repetition: int) -> Timing:
 
 
 def expand(node: Head, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
-    """The lexeme's poses at its sync points; between two strokes, half way, the head is back. The eyes stay
-    on whom they look at, as far as the lexeme says.
+    """Return the lexeme's poses at its sync points; half way between two strokes the head is back.
+
+    The eyes turn against the head as far as the lexeme says, to stay on their target.
     """
     lexeme = head_lexemes()[node.lexeme.upper()]
     start, ready, stroke_start, *strokes, stroke_end, relax, end = times.tolist()
     if len(strokes) > 1:
-        strokes = strokes[:-1]  # the last but one and the last are the same stroke
+        strokes = strokes[:-1]  # the last two are the same stroke
     keys = [start, ready, stroke_start]
     poses: list[tuple[Mapping[int, float], float]] = [({}, 1.0), (lexeme.ready, 1.0), (lexeme.ready, 1.0)]
     for i, stroke in enumerate(strokes):
@@ -93,7 +96,7 @@ def timing_of_shift(node: HeadDirectionShift, context: PlanningContext) -> Timin
 
 
 def expand_shift(node: HeadDirectionShift, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
-    """From start to end the head turns to the target, as far as a head turns, and stays."""
+    """Return channels that turn the head to the target up to its limit, and stay."""
     yaw, pitch, _ = angles(node.target, context)
     turns = [(0.0, 0.0), limited((yaw, pitch), limits("head"))]
     return turn("head", times, turns, layer=Layer.BASE, holds=True, source=node.id)

@@ -19,9 +19,9 @@ def timing(node: Idle, context: PlanningContext) -> Timing:
 
 
 def expand(node: Idle, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
-    """What is taken from blinks and motion rises from start to end, and stays.
+    """Return channels that reduce blinks and motion from start to end, and stay.
 
-    Both channels are there even where nothing is taken: they replace what an earlier one took.
+    Both channels exist even without a reduction: they replace an earlier one.
     """
     return tuple(
         channel(

@@ -19,7 +19,7 @@ from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
-PLAIN = re.compile(r"[0-9.eE+\-\s]*")  # what numbers are made of; float reads more than that
+PLAIN = re.compile(r"[0-9.eE+\-\s]*")  # the characters of numbers; float accepts more
 MOST = 1e6
 PART = {
     "FAPS": re.compile(r"\d{1,3}"),
@@ -29,12 +29,12 @@ WANTED = {"FAPS": 'FAP numbers 3..68 such as "31 32"', "FACS": 'action units suc
 
 
 class KeyframeError(Exception):
-    """What is wrong with a facekeyframe, as a sentence."""
+    """A facekeyframe that cannot be played; the message has the fault."""
 
 
 @dataclass(frozen=True, eq=False)
 class Keys:
-    """What a <FaceInterpolator> says.
+    """The keys of a <FaceInterpolator>.
 
     Attributes:
         parts: FAP number or (AU, side) of each column.
@@ -48,27 +48,27 @@ class Keys:
 
 
 def timing(node: FaceKeyframe, context: PlanningContext) -> Timing:
-    """As long as from its first to its last key; it stretches."""
+    """Return the duration from its first to its last key; it can stretch."""
     times = _keys(node).times
     return Timing(("start", "end"), times[-1:] - times[0], np.zeros(1), np.array([RECORDED]))
 
 
 def expand(node: FaceKeyframe, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
-    """Its keys, the first at start and the last at end; what is not 0 there gets there and back."""
+    """Return channels through its keys from start to end, with eased beginning and end."""
     keys = _keys(node)
     first, last = keys.times[0], keys.times[-1]
     at = times[0] + (keys.times - first) * ((times[-1] - times[0]) / (last - first))
     channels = []
     for column, part in enumerate(keys.parts):
         values = keys.values[:, column]
-        # A FAP that is 0 is held at 0; an action unit of 0 leaves the face to others.
+        # A FAP of 0 is held at 0; an action unit of 0 has no effect.
         shown = values.any() or isinstance(part, int)
         channels += [track(target, at, values, node.id) for target in _targets(part) if shown]
     return tuple(channels)
 
 
 def check(node: FaceKeyframe, context: PlanningContext) -> tuple[Fault, ...]:
-    """What cannot be read is fatal, a FAP that goes too far is not."""
+    """Return faults: unreadable keys are fatal, a FAP out of range is not."""
     try:
         keys = _keys(node)
     except KeyframeError as error:
@@ -83,7 +83,7 @@ def check(node: FaceKeyframe, context: PlanningContext) -> tuple[Fault, ...]:
 
 
 def claims(node: FaceKeyframe, context: PlanningContext) -> frozenset[str]:
-    """FAPs replace each other, so two behaviours cannot have the same; AUs blend."""
+    """Return claims on its FAPs, which replace each other; AUs blend."""
     return frozenset(f"FAP {part}" for part in _keys(node).parts if isinstance(part, int))
 
 
@@ -99,18 +99,18 @@ def _keys(node: FaceKeyframe) -> Keys:
 
 @lru_cache(maxsize=64)
 def _read(type: str, parts: str, text: str) -> Keys:
-    found = _parts(type, parts)
+    columns = _parts(type, parts)
     lines = [line.split() for line in text.splitlines() if line.strip()]
     if len(lines) < 2:
         raise KeyframeError(f"keys: wanted at least two lines, got {len(lines)}")
-    rows = _at_once(lines, len(found) + 1) if PLAIN.fullmatch(text) else None
+    rows = _at_once(lines, len(columns) + 1) if PLAIN.fullmatch(text) else None
     if rows is None or (type == "FACS" and not ((rows[:, 1:] >= 0) & (rows[:, 1:] <= 1)).all()):
-        rows = _by_lines(type, lines, len(found))
-    return Keys(found, rows[:, 0], rows[:, 1:])
+        rows = _by_lines(type, lines, len(columns))
+    return Keys(columns, rows[:, 0], rows[:, 1:])
 
 
 def _at_once(lines: list[list[str]], width: int) -> Float64 | None:
-    """(k, width) the numbers, where nothing is wrong with them; tables of minutes are as long as books."""
+    """Return (k, width) numbers, or None if one is wrong; long tables need this speed."""
     if any(len(words) != width for words in lines):
         return None
     try:
@@ -122,21 +122,21 @@ def _at_once(lines: list[list[str]], width: int) -> Float64 | None:
 
 
 def _by_lines(type: str, lines: list[list[str]], count: int) -> Float64:
-    """(k, 1 + count) the numbers, or what is wrong with the first line that is."""
+    """Return (k, 1 + count) numbers; raise KeyframeError for the first wrong line."""
     before = -np.inf
     rows = np.empty((len(lines), count + 1))
     for row, words in enumerate(lines):
-        place, said = f"line {row + 1} of the keys", " ".join(words)[:60]
+        place, got = f"line {row + 1} of the keys", " ".join(words)[:60]
         wanted = f"wanted a time and {count} value{'s' * (count != 1)}"
         if len(words) != count + 1 or not all(map(NUMBER.fullmatch, words)):
-            raise KeyframeError(f"{place}: {wanted}, got {said!r}")
+            raise KeyframeError(f"{place}: {wanted}, got {got!r}")
         rows[row] = [float(word) for word in words]
         if not np.all(np.abs(rows[row]) <= MOST):
-            raise KeyframeError(f"{place}: wanted numbers within a million, got {said!r}")
+            raise KeyframeError(f"{place}: wanted numbers within a million, got {got!r}")
         if rows[row, 0] <= before:
             raise KeyframeError(f"{place}: wanted a time after {before:g}, got {words[0]}")
         if type == "FACS" and not (np.all(rows[row, 1:] >= 0) and np.all(rows[row, 1:] <= 1)):
-            raise KeyframeError(f"{place}: wanted action units 0..1, got {said!r}")
+            raise KeyframeError(f"{place}: wanted action units 0..1, got {got!r}")
         before = rows[row, 0]
     return rows
 

@@ -1,4 +1,4 @@
-"""The behaviour kind: node class, timing and expansion; and the context of planning."""
+"""The interface of behaviours: timing and expansion of a node class, and the context of planning."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ Position = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class PlanningContext:
-    """What a document cannot know.
+    """The settings and data that planning needs besides the document.
 
     Attributes:
         scene: target name -> (x, y, z) metres, origin between the eyes, +x the character's left, +y up,
             +z forward; None while the session has no scene (then any target is straight ahead).
-        utterances: behaviour id -> what the voice made of it.
+        utterances: behaviour id -> its utterance.
         language: BCP-47 of speech without its own.
-        seed: for anything random.
-        media: the folder that holds the files documents may name; None: there are none.
-        clips: id -> sound that a client sent, which documents name as `clip:ID`.
-        library: the expressions that documents may name.
-        face_inputs: () -> what moves the character's face (`Face.takes`); None where that is not known.
+        seed: for random choices.
+        media: the folder of the files that documents can name, or None.
+        clips: id -> sound of a client, which documents name as `clip:ID`.
+        library: the expressions that documents can name.
+        face_inputs: () -> the inputs of the character's face (`Face.inputs`), or None if unknown.
     """
 
     scene: Mapping[str, Position] | None = None
@@ -44,7 +44,7 @@ class PlanningContext:
 
 @dataclass(frozen=True)
 class Interrupt:
-    """End a block, or those of its behaviours that are in `include` (None: all) and not in `exclude`."""
+    """End a block, or its behaviours that are in `include` (None: all) and not in `exclude`."""
 
     block: str
     include: frozenset[str] | None = None
@@ -60,9 +60,9 @@ class Activate:
 
 @dataclass(frozen=True)
 class Change:
-    """Let a parameter of a behaviour go to `to`, from `initial` (None: from where it is), by a curve.
+    """Change a parameter of a behaviour to `to`, from `initial` (None: from its present value), by a curve.
 
-    At once where `curve` is None, otherwise from the start of the behaviour that does it to its end.
+    The change is instant if `curve` is None, otherwise from start to end of the changing behaviour.
     """
 
     block: str
@@ -73,13 +73,13 @@ class Change:
     curve: str | None = None
 
 
-# What a behaviour does to others when it starts.
+# Executed when the behaviour starts.
 BlockCommand = Interrupt | Activate | Change
 
 
 @dataclass(frozen=True)
 class Fault:
-    """Why a well-formed behaviour cannot or can only partly be played; becomes one BML warning."""
+    """A reason why a behaviour cannot or can only partly be played; it becomes one BML warning."""
 
     type: str
     text: str
@@ -88,26 +88,26 @@ class Fault:
 
 @dataclass(frozen=True)
 class BehaviourKind:
-    """One behaviour element.
+    """The functions that play one behaviour element.
 
     Attributes:
         node: its class in `bml_schema` (core) or in the module itself (extension); `node.tag` is its name.
-        timing: (node, world) -> Timing, step 2. A speech needs `world.utterances[node.id]`.
-        expand: (node, times (k,) seconds from block start, world) -> Channels, step 4. Times follow
-            `timing(...).points`. Body behaviours show nothing on a face: ().
-        check: (node, world) -> faults: unknown lexeme or AU, no such target. Run before timing.
-        speech_request: (node, world) -> what the voice has to say, or None. Only speech has it.
-        command: node -> what it does to other blocks and behaviours when it starts.
-        stretch: (node, world) -> Timing of a rigid behaviour that can be made to fit others where nothing
-            else helps; None where it cannot.
-        sound: (node, world) -> what sounds from its start to its end; None where it is silent.
-        claims: (node, world) -> names of what it needs for itself ("voice", "gaze", "head pitch") from its
-            start to its relax (its end where it has none): of two behaviours of a character that claim the
-            same at one time one is dropped. Expressions claim nothing: they blend.
-        parameters: name of a parameter that can be changed while it plays -> the field that says its value at
-            the beginning, or that value. "volume" scales its sound, all others what it shows.
-        region: a base state this behaviour replaces for good at its end ("eyes", "head", "face"); for the
-            *Shift behaviours, whose channels have `holds=True`.
+        timing: (node, context) -> Timing, step 2. A speech needs `context.utterances[node.id]`.
+        expand: (node, times (k,) seconds from block start, context) -> Channels, step 4. Times follow
+            `timing(...).points`.
+        check: (node, context) -> faults: unknown lexeme or AU, no such target. Called before timing.
+        speech_request: (node, context) -> the request to the voice, or None. Only for speech.
+        command: node -> its command to other blocks and behaviours, executed when it starts.
+        stretch: (node, context) -> Timing of a rigid behaviour that can stretch if nothing else helps, or
+            None.
+        sound: (node, context) -> its sound from start to end, or None.
+        claims: (node, context) -> exclusive resources ("voice", "gaze", "head pitch") that it needs from
+            start to relax (to end if it has no relax): of two behaviours of a character with the same claim
+            at one time one is dropped. Expressions have no claims: they blend.
+        parameters: parameter that can change while it plays -> the field with its initial value, or that
+            value. "volume" scales its sound, all others its channels.
+        region: the base state that this behaviour replaces permanently ("eyes", "head", "face"); for the
+            *Shift behaviours, whose channels have `keeps_last=True`.
     """
 
     node: type[Any]

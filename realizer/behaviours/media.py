@@ -18,21 +18,21 @@ from realizer.core.errors import RealizerError
 T = TypeVar("T")
 
 MAX_BYTES = 64 * 2**20
-MAX_NAMES = 1000  # of a folder, looked through for one that is near
+MAX_NAMES = 1000  # of a folder that are searched for a similar name
 MAX_CACHED = 8  # files
 
 _cache: OrderedDict[tuple[Path | None, str, Any], tuple[tuple[int, int], Any]] = OrderedDict()
 
 
 class MediaError(RealizerError):
-    """A file that cannot be played; the text says what was wanted and what came."""
+    """A file that cannot be played; the message has the expected and the actual value."""
 
 
 def load(name: str, context: PlanningContext, read: Callable[[bytes], T]) -> T:
-    """What `read` makes of a file; it is read once, and again by `faults` when it has changed since.
+    """Return a file as read by `read`, from the cache; `faults` reads it again after a change.
 
     Raises:
-        MediaError: no such file, or none that can be read.
+        MediaError: no such file, or it cannot be read.
     """
     kept = _cache.get((context.media, name, read))
     value: T = kept[1] if kept is not None else _read(name, context, read)
@@ -40,7 +40,7 @@ def load(name: str, context: PlanningContext, read: Callable[[bytes], T]) -> T:
 
 
 def faults(name: str, context: PlanningContext, read: Callable[[bytes], Any]) -> tuple[Fault, ...]:
-    """Why a file cannot be played; it is looked at anew."""
+    """Return why a file cannot be played; the file is checked again."""
     try:
         _read(name, context, read)
     except MediaError as error:
@@ -77,10 +77,10 @@ def _read(name: str, context: PlanningContext, read: Callable[[bytes], T]) -> T:
 
 
 def media_file(name: str, context: PlanningContext) -> Path:
-    """The file that a document names, inside `world.media`.
+    """Return the file that a document names, inside `context.media`.
 
-    Names are relative to the folder, with "/" or, as old documents have it, with "\\". A file: URL and a path
-    with a drive letter name a place on somebody else's machine: the longest end of it that is there counts.
+    Names are relative to the folder, with "/" or, in old documents, "\\". A file: URL and a path with a drive
+    letter are paths on another machine: the longest end of it that exists in the folder is used.
 
     Raises:
         MediaError: no folder, a name that leads elsewhere, or no such file.
@@ -106,7 +106,7 @@ def media_file(name: str, context: PlanningContext) -> Path:
 
 
 def _parts(name: str) -> tuple[bool, list[str]]:
-    """Whether a name is of another machine, and its parts."""
+    """Return whether a name is of another machine, and its parts."""
     text, elsewhere = name.strip(), False
     if text.lower().startswith("file:"):
         text, elsewhere = unquote(urlsplit(text.replace("\\", "/")).path), True
@@ -127,7 +127,7 @@ def _parts(name: str) -> tuple[bool, list[str]]:
 
 
 def _near(folder: Path, parts: list[str]) -> str:
-    """`, did you mean "hello.wav"?` if a file beside it has nearly its name."""
+    """Return `, did you mean "hello.wav"?` if a file beside it has a similar name, else ""."""
     try:
         beside = folder.joinpath(*parts[:-1]).resolve()
         if not beside.is_relative_to(folder):

@@ -1,4 +1,4 @@
-"""AU channels that rise to a pose, and relax or keep it."""
+"""AU channels that rise to a pose, and relax or stay."""
 
 from __future__ import annotations
 
@@ -14,10 +14,7 @@ from realizer.core.array_types import Float64
 
 
 def columns(aus: Mapping[tuple[int, str], float], amount: float) -> dict[Target, float]:
-    """Column -> intensity, of {(AU, side): intensity at amount 1}; an AU that is named twice is the stronger.
-
-    What goes beyond an AU's 1 is as strong as it can be.
-    """
+    """Return column -> intensity, at most 1, of {(AU, side): intensity at amount 1}."""
     values: dict[Target, float] = {}
     for (number, side), intensity in aus.items():
         for target in au(number, side):
@@ -26,7 +23,7 @@ def columns(aus: Mapping[tuple[int, str], float], amount: float) -> dict[Target,
 
 
 def hold(values: Mapping[Target, float], times: Float64, source: str) -> tuple[Channel, ...]:
-    """Channels that are 0 at start, there from attackPeak to relax, 0 at end: times (4,)."""
+    """Return channels that are 0 at start and end, and constant from attackPeak to relax: times (4,)."""
     return tuple(
         Channel(target, times, np.array([0.0, value, value, 0.0]), source=source)
         for target, value in values.items()
@@ -35,7 +32,7 @@ def hold(values: Mapping[Target, float], times: Float64, source: str) -> tuple[C
 
 
 def keep_base(values: Mapping[Target, float], times: Float64, source: str) -> tuple[Channel, ...]:
-    """Channels of a base state that rise from start to end, and stay: times (2,)."""
+    """Return channels of a base state that rise from start to end, and stay: times (2,)."""
     return tuple(
         Channel(target, times, np.array([0.0, value]), layer=Layer.BASE, keeps_last=True, source=source)
         for target, value in values.items()
@@ -43,10 +40,10 @@ def keep_base(values: Mapping[Target, float], times: Float64, source: str) -> tu
 
 
 def unknown_word(attribute: str, word: str, known: Iterable[str]) -> Fault:
-    """The fault of a word that is none of those known, with those near it."""
+    """Return the fault of an unknown word, with similar known ones."""
     names = {name.upper(): name for name in known}
     got = word if len(word) <= 60 else word[:60] + "..."
-    # Of names such as "template:grief" only the last part makes them alike.
+    # Of names such as "template:grief" only the last part is compared.
     family, _, part = got.upper().rpartition(":")
     parts = {name.rpartition(":")[2]: name for name in names if name.rpartition(":")[0] == family}
     near = difflib.get_close_matches(part, list(parts), n=3)

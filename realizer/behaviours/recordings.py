@@ -1,4 +1,4 @@
-"""Recordings that documents name: clips that clients sent, and files of the media folder."""
+"""Recordings that documents name: clips of clients, and files of the media folder."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ CLIP = "clip:"  # before the id of a clip
 
 
 def recording(name: str, context: PlanningContext) -> Recording:
-    """The recording of a name.
+    """Return the recording with a name.
 
     Raises:
         MediaError: there is none, or it cannot be read.
@@ -24,7 +24,7 @@ def recording(name: str, context: PlanningContext) -> Recording:
 
 
 def faults(name: str, context: PlanningContext) -> tuple[Fault, ...]:
-    """Why a recording cannot be played."""
+    """Return why a recording cannot be played."""
     id = _clip(name)
     if id is None:
         return media.faults(name, context, read_sound)

@@ -1,4 +1,4 @@
-"""The registry of behaviours: one row for each module that brings behaviour elements."""
+"""The registry of behaviours: one row for each module with behaviour elements."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ def _kinds() -> Mapping[str, BehaviourKind]:
     kinds: dict[str, BehaviourKind] = {}
     for _, family in FAMILIES.working():
         for kind in family:
-            kinds.setdefault(kind.tag, kind)  # the first counts: a plug-in replaces no element of ours
+            kinds.setdefault(kind.tag, kind)  # the first counts: a plug-in cannot replace our elements
     return MappingProxyType(kinds)
 
 
-# Clark tag of an element -> its behaviour; -> the class that the parser makes of it.
+# Clark tag of an element -> its BehaviourKind, and -> its node class for the parser.
 KINDS: Mapping[str, BehaviourKind] = _kinds()
 VOCABULARY: Mapping[str, type[Any]] = MappingProxyType({tag: kind.node for tag, kind in KINDS.items()})

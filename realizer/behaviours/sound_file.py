@@ -13,8 +13,8 @@ from realizer.core.array_types import Int16
 from realizer.core.errors import RealizerError
 from realizer.speech.utterance import Recording
 
-# How a file begins -> FFmpeg's name of its kind. Only these are handed over, each by its name: FFmpeg also
-# takes playlists, which lead to other files.
+# First bytes of a file -> FFmpeg's name of its format. The format is always given, because FFmpeg would
+# also read playlists, which lead to other files.
 KINDS = (
     (b"fLaC", "flac"),
     (b"OggS", "ogg"),
@@ -25,16 +25,16 @@ KINDS = (
     (b"\xff\xf2", "mp3"),
     (b"\x1aE\xdf\xa3", "matroska"),
 )
-LONGEST = 1800.0  # s; a small file can hold days of silence
+LONGEST = 1800.0  # s; a small file can contain days of silence
 RATES = (1000, 384_000)  # Hz
 INSTALL = "wanted a WAV file, or pip install 'bml-realizer[film]' for {}"
 
 
 def read_sound(content: bytes) -> Recording:
-    """What sounds in a file: WAV, or FLAC, Ogg (Opus, Vorbis), MP3 or WebM by PyAV; all channels as one.
+    """Read WAV, or FLAC, Ogg (Opus, Vorbis), MP3 or WebM by PyAV; all channels are mixed to one.
 
     Raises:
-        RealizerError: no sound, or none that can be read here.
+        RealizerError: no sound, or a format that cannot be read.
     """
     kind = next((kind for begin, kind in KINDS if content.startswith(begin)), None)
     if kind is None:

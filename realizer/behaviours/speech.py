@@ -19,16 +19,16 @@ from realizer.scheduling.timing import Timing
 from realizer.speech.utterance import MAX_TEXT, Recording, SpeechRequest, Utterance
 
 SSML = "application/ssml+xml"
-# 1/s: a second of speech resists as much as a stiff gap of the face; shorter gaps than SHORT count as such.
+# 1/s: a second of speech is as stiff as a stiff gap of the face. Gaps are at least SHORT for this.
 BEND, SHORT = 1000.0, 0.01
-# s; what has no word in it, such as a full stop, takes a moment all the same.
+# s; minimum duration, for text without words such as a full stop.
 LEAST = 0.1
 LANG = "{http://www.w3.org/XML/1998/namespace}lang"
 
 
 @dataclass(frozen=True)
 class SpokenContent:
-    """What is really said: inner SSML, its marks in order, its language if it says so."""
+    """The spoken content: inner SSML, its marks in order, and its language or None."""
 
     ssml: str
     marks: tuple[str, ...]
@@ -36,10 +36,10 @@ class SpokenContent:
 
 
 def speech_request(node: Speech, context: PlanningContext) -> SpeechRequest | None:
-    """The description of highest priority that is SSML, or else the text with its syncs as marks.
+    """Return the SSML description of highest priority, or else the text with its syncs as marks.
 
-    A description that is an audio file says how it sounds; what is said in it stands in the others, or came
-    with the clip. Where nobody tells, the mouth goes by loudness.
+    A description that is an audio file replaces the voice; its text is in the others, or came with the clip.
+    Without text, the mouth follows the loudness.
     """
     recording = _recording(node, context)
     spoken = _spoken_content(node)
@@ -52,21 +52,21 @@ def speech_request(node: Speech, context: PlanningContext) -> SpeechRequest | No
 
 
 def timing(node: Speech, context: PlanningContext) -> Timing:
-    """Rigid: start, the sync points in the order of their times, end.
+    """Return the rigid timing: start, the sync points in the order of their times, end.
 
     Raises:
-        KeyError: the voice has not spoken: no `world.utterances[node.id]`.
+        KeyError: there is no `context.utterances[node.id]` yet.
     """
     utterance = context.utterances[node.id]
     spoken = _spoken_content(node) or SpokenContent("", ())
-    heard = {
+    measured = {
         name: min(max(time, 0.0), utterance.duration)
         for name, time in utterance.marks.items()
         if name not in Speech.sync_points
     }
-    # A sync that the SSML or the voice left out comes as far into the sound as into the text.
+    # A sync that the SSML or the voice left out is as far into the sound as into the text.
     guessed = {name: part * utterance.duration for name, part in _places(node).items()}
-    times = guessed | heard
+    times = guessed | measured
     order = {name: i for i, name in enumerate((*spoken.marks, *guessed))}
     names = sorted(times, key=lambda name: (times[name], order.get(name, len(order))))
     points = ("start", *names, "end")
@@ -75,30 +75,30 @@ def timing(node: Speech, context: PlanningContext) -> Timing:
 
 
 def stretch(node: Speech, context: PlanningContext) -> Timing | None:
-    """As `timing`, but evenly longer or shorter as far as the voice can make it; None where it cannot."""
+    """Return `timing` that can stretch evenly within the limits of the voice, or None if it cannot."""
     least, most = context.utterances[node.id].stretch
     if least == most:
         return None
     natural = timing(node, context)
     gaps = natural.preferred
-    # Springs as stiff as their gaps are short give way evenly, as one rate of speech does.
+    # With stiffness inverse to length all gaps stretch evenly, as with one rate of speech.
     stiffness = BEND / np.maximum(gaps, SHORT)
     return Timing(natural.points, gaps, gaps * least, stiffness, most=gaps * most)
 
 
 def expand(node: Speech, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
-    """Lips, jaw and tongue, from the phonemes."""
+    """Return the channels of lips, jaw and tongue, from the phonemes."""
     utterance, start = context.utterances[node.id], float(times[0])
     parts = utterance.sections or ((0.0, utterance),)
     return tuple(channel.named(node.id) for at, part in parts for channel in _lips(part, start + at))
 
 
-# Utterance -> its lips, and when it starts. A long text grows part by part: what was there is not made again.
+# Utterance -> its start and lips. A long text grows part by part, and the lips of earlier parts are reused.
 _made: WeakKeyDictionary[Utterance, tuple[float, tuple[Channel, ...]]] = WeakKeyDictionary()
 
 
 def _lips(utterance: Utterance, start: float) -> tuple[Channel, ...]:
-    # Imported here: it reads its tables, which a block without speech does not need.
+    # Imported here, because it reads tables that a block without speech does not need.
     from realizer.animation.lips.lip_sync import lip_channels
 
     if utterance not in _made:
@@ -111,9 +111,9 @@ def _lips(utterance: Utterance, start: float) -> tuple[Channel, ...]:
 
 
 def check(node: Speech, context: PlanningContext) -> tuple[Fault, ...]:
-    """Nothing to say is fatal, and more than a voice takes; a recording that is not there is spoken.
+    """Return faults: no text, and too much for a voice, is fatal; text replaces a missing recording.
 
-    What the voice could not say as it is written is one fault that is not fatal.
+    What the voice could not speak as written is one fault that is not fatal.
     """
     spoken = _spoken_content(node)
     name = _audio_file(node)
@@ -155,7 +155,7 @@ def _spoken_content(node: Speech) -> SpokenContent | None:
 
 
 def _audio_file(node: Speech) -> str | None:
-    """The name of the recording: of the highest <bmlt:audiofile> among the descriptions."""
+    """Return the name of the recording: of the highest <bmlt:audiofile> among the descriptions."""
     for description in sorted(node.descriptions, key=lambda d: -d.priority):
         try:
             element = ElementTree.fromstring(description.content)
@@ -167,7 +167,7 @@ def _audio_file(node: Speech) -> str | None:
 
 
 def _recording(node: Speech, context: PlanningContext) -> Recording | None:
-    """What is played instead of a voice; `check` has said why where there is none."""
+    """Return the recording that replaces the voice, or None; `check` reports why."""
     name = _audio_file(node)
     if name is None:
         return None
@@ -178,9 +178,9 @@ def _recording(node: Speech, context: PlanningContext) -> Recording | None:
 
 
 def _inside(content: str) -> SpokenContent | None:
-    """What stands inside <speak>, without namespaces; None for what is not one whole element.
+    """Return the content of <speak>, without namespaces, or None if it is not one element.
 
-    The content comes from the parser, which lets no DTD and no entities through.
+    The content comes from the parser, which allows no DTD and no entities.
     """
     try:
         speak = ElementTree.fromstring(content)
@@ -196,7 +196,7 @@ def _inside(content: str) -> SpokenContent | None:
 
 
 def _places(node: Speech) -> dict[str, float]:
-    """Sync of the core text -> how far into the text it stands, 0..1."""
+    """Return sync of the core text -> its relative position in the text, 0..1."""
     if node.text is None:
         return {}
     length, places = 0, {}
@@ -213,7 +213,7 @@ def sound(node: Speech, context: PlanningContext) -> Utterance | None:
 
 
 def claims(node: Speech, context: PlanningContext) -> frozenset[str]:
-    """A character has one voice."""
+    """Return the claim on the character's voice."""
     return frozenset({"voice"})
 
 

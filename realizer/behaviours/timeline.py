@@ -17,20 +17,20 @@ from realizer.expressions.timeline import Timeline, Track, faults_of, remarks
 from realizer.expressions.timeline_reader import read_timeline
 from realizer.scheduling.timing import Timing
 
-# 1/s^2; it bends like an expression, as far as what it is tied to asks.
+# 1/s^2; as stiff as an expression.
 STIFFNESS = 4.0
-# s; the mixer changes over so long, or what else the face shows would jump.
+# s; duration of a change of the mixer, so that the face does not jump.
 CHANGE = 0.2
 
 
 def timing(node: Node, context: PlanningContext) -> Timing:
-    """As long as its longest channel; it stretches as a whole."""
+    """Return the duration of its longest channel; it can stretch as a whole."""
     length = duration_of(_timeline(node, context), context.library)
     return Timing(("start", "end"), np.array([length]), np.array([0.04]), np.array([STIFFNESS]))
 
 
 def expand(node: Node, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
-    """Its tracks side by side; where two show one action unit the stronger one shows."""
+    """Return channels of all tracks; of several values for one action unit the highest is visible."""
     timeline = _timeline(node, context)
     start, end = float(times[0]), float(times[-1])
     scale = (end - start) / duration_of(timeline, context.library)
@@ -41,9 +41,9 @@ def expand(node: Node, times: Float64, context: PlanningContext) -> tuple[Channe
 
 
 def check(node: Node, context: PlanningContext) -> tuple[Fault, ...]:
-    """A file that cannot be read, and expressions that are not in the library, are fatal: all in one.
+    """Return faults: an unreadable file and unknown expressions are fatal, all in one.
 
-    What the face cannot mix as the file asks is told, and it plays.
+    Mixing that the face cannot do is not fatal.
     """
     if faults := media.faults(node.file_name, context, read_timeline):
         return tuple(replace(fault, text=fault.text.replace("\n", "; ")) for fault in faults)
@@ -70,7 +70,7 @@ def _channels(
     for span in shown:
         keys += [start + span.reached * scale, start + span.left * scale]
     times = np.array([*keys, start + shown[-1].end * scale])
-    # Two keys at one time are one: what is whole for an instant, or begins without an onset.
+    # Two keys at one time become one: an apex without duration, or a missing onset.
     kept = np.append(np.diff(times) > 1e-9, True)
     channels = []
     for target in sorted({target for pose in whole for target in pose}, key=lambda target: target.column):
@@ -84,12 +84,12 @@ def _channels(
 
 
 def _mixing(timeline: Timeline, start: float, end: float, source: str) -> list[Channel]:
-    """How far the successive mixer is at work, and how early it takes each unit that the order names."""
+    """Return channels of the weight of the successive mixer, and of the rank of each unit in its order."""
     if timeline.mixer == "additive":
         return []
     change = min(CHANGE, (end - start) / 4)
     times = np.array([start, start + change, end - change, end])
-    # Ranks add up to 1 at most: two timelines at once stay below it, or their orders would be lost.
+    # Ranks are at most 0.5, so that those of two timelines at once add up to at most 1.
     ranks = np.linspace(0.5, 0.0, len(timeline.order), endpoint=False)
     targets = [(mask_channel("successive"), 1.0), *zip(map(mixing_order, timeline.order), ranks, strict=True)]
     return [

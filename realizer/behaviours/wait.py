@@ -13,12 +13,12 @@ from realizer.behaviours.table_timing import timing_from_table
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
-# 1/s^2. A duration that was written down bends less than any gap of the table with which it is tied.
+# 1/s^2; a stated duration is stiffer than any gap of the table.
 STATED = 1000.0
 
 
 def timing(node: Wait, context: PlanningContext) -> Timing:
-    """As long as `duration` says; without one, as long as its references say."""
+    """Return the `duration`; without one, the default, which references can stretch."""
     wanted = timing_from_table("wait")
     if not node.duration:
         return wanted

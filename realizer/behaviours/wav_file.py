@@ -16,9 +16,9 @@ SUPPORTED = "PCM of 8, 16, 24 or 32 bits, or 32-bit floats"
 
 
 # Not the standard library's `wave`: before Python 3.12 it refuses the extensible header, which most programs
-# write for 24 bits, and it knows no floats.
+# write for 24 bits, and it cannot read floats.
 def read_wav(content: bytes) -> tuple[int, Int16]:
-    """Sample rate in Hz and (n,) int16 samples, the mean of all channels.
+    """Return sample rate in Hz and (n,) int16 samples, the mean of all channels.
 
     Raises:
         RealizerError: no WAV, or a coding that is not supported.
@@ -47,7 +47,7 @@ def read_wav(content: bytes) -> tuple[int, Int16]:
 
 
 def _chunks(content: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """Name and content of each chunk; one that is cut off, or has no true length, is what there is."""
+    """Yield the name and content of each chunk; a chunk may be cut off at the end."""
     if content[:4] != b"RIFF" or content[8:12] != b"WAVE":
         raise RealizerError("wanted a WAV file, got something else")
     at = 12
@@ -58,7 +58,7 @@ def _chunks(content: bytes) -> Iterator[tuple[bytes, bytes]]:
 
 
 def _samples(data: bytes, coding: int, bits: int) -> Float32:
-    """Samples in 16-bit units, however they are written."""
+    """Return samples in 16-bit units."""
     if coding == FLOAT:
         floats = np.frombuffer(data, "<f4")
         scaled: Float32 = np.nan_to_num(np.clip(floats, -1, 1), nan=0.0) * np.float32(32767)
