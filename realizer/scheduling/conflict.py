@@ -11,7 +11,7 @@ from realizer.scheduling.problem import ORIGIN, Part, Problem, Relation
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """A behaviour's least length between two of its points; its greatest if `most`."""
+    """The least length of a behaviour between two of its points, or the greatest if `most`."""
 
     part: Part
     begin: str
@@ -24,7 +24,7 @@ class Gap:
 class Link:
     """One inequality of a cycle: time[v] >= time[u] + seconds.
 
-    `order` is what stated it, None for a gap or a bound; a bound (nothing starts sooner) has u = ORIGIN.
+    `order` is its relation, None for a gap or a bound; a bound (the earliest start) has u = ORIGIN.
     """
 
     u: int
@@ -35,13 +35,13 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class Conflict:
-    """A conflict: a set of relations that cannot hold together; without any one of them, the rest can.
+    """A minimal set of relations that cannot hold together.
 
     Attributes:
-        relations: the equalities and orders, in the order in which they chain.
+        relations: the equalities and orders, in the order of their chain.
         gaps: least and greatest lengths, one for each stretch of a behaviour.
-        earliest: the point that starts too early, and its bound in seconds; None if no bound takes part.
-        named: the behaviours whose points occur, even if they state nothing themselves.
+        earliest: the point that starts too early, and its bound in seconds, or None.
+        named: the behaviours of the points, also if they are only referred to.
     """
 
     relations: tuple[Relation, ...]
@@ -51,20 +51,20 @@ class Conflict:
 
     @property
     def parts(self) -> list[Part]:
-        """Return the statements and needs of the conflict, each once."""
+        """The parts that state the relations and gaps, each once."""
         return _once([r.part for r in self.relations] + [g.part for g in self.gaps])
 
     @property
     def statements(self) -> int:
-        """Return the number of statements needed to explain it."""
+        """The number of statements in the conflict."""
         return len(self.relations) + len(self.gaps) + (self.earliest is not None)
 
 
 class ConstraintGraph:
-    """The equalities of a problem, to look for the shortest chains in, less those that do not fit.
+    """A graph of the equalities of a problem, for searching the shortest chains.
 
     Args:
-        unfit: numbers of equalities.
+        unfit: numbers of equalities that are left out.
     """
 
     def __init__(self, problem: Problem, unfit: Iterable[int] = ()) -> None:
@@ -77,12 +77,12 @@ class ConstraintGraph:
                 self._beside.setdefault(relation.v, []).append((relation.u, relation))
 
     def loop(self, unfit: int) -> Conflict:
-        """The loop that an equality, by its number, cannot close."""
+        """Return the conflict of an equality, by its number, that does not close its loop."""
         last = self.problem.equalities[unfit]
         return _conflict(self.problem, [*self._chain(last.u, last.v), last], [])
 
     def cycle(self, links: Sequence[Link]) -> Conflict:
-        """A cycle of inequalities: each link's end is tied, by equalities, to the next one's beginning."""
+        """Return the conflict of a cycle of inequalities, whose links are connected by equalities."""
         relations: list[Relation] = []
         for link, after in zip(links, (*links[1:], links[0]), strict=True):
             if link.order is not None:
@@ -91,13 +91,13 @@ class ConstraintGraph:
         return _conflict(self.problem, relations, links)
 
     def conflict(self, steps: Sequence[tuple[int, float, Relation | Link]]) -> Conflict:
-        """A cycle of steps, each to a point by some seconds, and what says so."""
+        """Return the conflict of a cycle of steps (point, seconds, reason)."""
         links = [why for *_, why in steps if isinstance(why, Link)]
         relations = [why if isinstance(why, Relation) else why.order for *_, why in steps]
         return _conflict(self.problem, [r for r in relations if r is not None], links)
 
     def _chain(self, begin: int, end: int) -> list[Relation]:
-        """The fewest equalities that tie one point to another."""
+        """Return the fewest equalities that connect one point to another."""
         came: dict[int, tuple[int, Relation] | None] = {begin: None}
         queue = deque([begin])
         while queue and end not in came:
@@ -140,7 +140,7 @@ def _conflict(problem: Problem, relations: Sequence[Relation], links: Sequence[L
 
 
 def _joined(one: Gap, after: Gap) -> list[Gap]:
-    """Two lengths that follow each other in a cycle as one, where they are of one kind and meet."""
+    """Join two successive lengths of a cycle, if they are of one kind and meet."""
     if one.part is after.part and one.most is after.most:
         seconds = one.seconds + after.seconds
         if one.most and one.begin == after.end:

@@ -23,7 +23,7 @@ class _GroupProblem:
     Attributes:
         points: the points to solve. number: (n,) the node of each point's class.
         gaps, bounded, orders, starts: the sources of the inequalities, in this order: least lengths of gaps,
-            the greatest of those that have one, orders, and first points of behaviours, not too soon.
+            greatest lengths, orders, and earliest starts of behaviours.
     """
 
     quadratic: Quadratic
@@ -35,18 +35,18 @@ class _GroupProblem:
     starts: Index
 
     def start(self, clusters: RigidClusters) -> Float64:
-        """(size,) where the shapes are now."""
+        """Return the present positions of the clusters, (size,)."""
         start = np.zeros(self.quadratic.size)
         nodes = np.flatnonzero(self.number)
         start[self.number[nodes]] = clusters.at[nodes]
         return start
 
     def keep(self, clusters: RigidClusters) -> tuple[Float64, list[int] | None]:
-        """From where the shapes are, times that keep every inequality, or the numbers of a cycle of them."""
+        """Return feasible times near the present positions, or the numbers of a cycle of inequalities."""
         return feasible_start(self.quadratic, self.start(clusters))
 
     def link(self, model: Model, k: int) -> Link:
-        """Inequality k, in terms of the problem."""
+        """Return inequality k in terms of the problem."""
         if k < len(self.gaps):
             p = int(model.gap[self.gaps[k]])
             return Link(p, p + 1, float(model.least[self.gaps[k]]))
@@ -63,12 +63,12 @@ class _GroupProblem:
 
 
 def solve_groups(model: Model, clusters: RigidClusters, groups: Sequence[Group]) -> list[list[Link]]:
-    """Put the points of some groups, in place, at the least cost that keeps gaps and orders.
+    """Move the points of some groups, in place, to the least cost within gaps and orders.
 
     Returns:
-        For each group that cannot keep them a cycle of inequalities; nothing is changed then.
+        For each infeasible group a cycle of inequalities; no point is moved then.
     """
-    # A group that can slide is brought to where its class of node 0 is at 0, as that node is.
+    # A group that can slide is moved so that its class of node 0 is at 0.
     begin = np.zeros(len(clusters.label))
     for group in groups:
         if not group.held:
@@ -80,7 +80,7 @@ def solve_groups(model: Model, clusters: RigidClusters, groups: Sequence[Group])
         cycles = [cycle for group in groups if (cycle := _impossible(model, clusters, group))]
         if cycles:
             return cycles
-        # Least gaps may have given way.
+        # Some least gaps may have been dropped.
         whole = _group_problem(model, clusters, groups)
         x = active_set(whole.quadratic, whole.start(clusters))
     if x is None:
@@ -152,7 +152,7 @@ def _anchor(model: Model, group: Group) -> int:
 
 
 def _yield_to_stated(model: Model, gaps: Index) -> bool:
-    """A length that the document itself states wins over the least gaps in it, but where they are bounded."""
+    """Drop the least gaps within a length that the document states, except in bounded behaviours."""
     changed = False
     owners, firsts = np.unique(model.owner[model.gap[gaps]], return_index=True)
     for b, k in zip(owners.tolist(), gaps[firsts].tolist(), strict=True):

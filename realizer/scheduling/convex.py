@@ -1,4 +1,4 @@
-"""An active-set solver for convex problems of differences; it returns the cycle if there is no solution."""
+"""An active-set solver for convex problems of differences; it returns a cycle if there is no solution."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from realizer.scheduling.model import LOOSE, TIGHT, Index
 from realizer.scheduling.rigid_clusters import least_squares
 from realizer.scheduling.union_find import UnionFind
 
-# Active sets tried before the interior point method, which is hardly ever needed.
+# Active sets tried before the interior point method, which is rarely needed.
 GUESSES = 12
-# Rounds of mending, after the interior point, which inequalities bind; one is the rule.
+# Corrections of the active set after the interior point method; mostly one is enough.
 ROUNDS = 20
 # A force counts as none below this part of the greatest stiffness.
 RESTS = 1e-11
@@ -44,10 +44,10 @@ class Quadratic:
 def feasible_start(
     quadratic: Quadratic, start: Float64, slack: float = LOOSE
 ) -> tuple[Float64, list[int] | None]:
-    """The least x from a start on that keeps every inequality to within the slack.
+    """Return the least x from a start on that satisfies every inequality within the slack.
 
     Returns:
-        x, and None; or anything, and the numbers of inequalities that form a cycle of positive length.
+        x and None; or an arbitrary x, and the numbers of inequalities that form a cycle of positive length.
     """
     u, v, w = quadratic.u, quadratic.v, quadratic.w
     order = np.argsort(start[u], kind="stable")
@@ -62,8 +62,8 @@ def feasible_start(
 def active_set(quadratic: Quadratic, x: Float64) -> Float64 | None:
     """Return the optimal x (size,) by an active-set method, or None if it does not converge.
 
-    Violated inequalities become active, those with negative force inactive, until neither is left: then it is
-    optimum. Mostly that takes two or three rounds from the least squares that know no inequalities.
+    Violated inequalities become active, those with negative force inactive, until there are neither. Mostly
+    that takes two or three rounds from the unconstrained least squares.
     """
     u, v, w = quadratic.u, quadratic.v, quadratic.w
     differ = u != v
@@ -78,7 +78,7 @@ def active_set(quadratic: Quadratic, x: Float64) -> Float64 | None:
         if not wrong.any():
             return exact
         binding = (binding & ~wrong) | broken
-        # From elsewhere the same guess may mean other ties, but not for ever.
+        # The same guess may be worth a second try, because it starts from another x.
         seen.append(binding.tobytes())
         if seen.count(seen[-1]) > 2:
             return None
@@ -95,7 +95,7 @@ def optimum(quadratic: Quadratic, level: Float64) -> Float64:
     tight = np.flatnonzero(level[v] - level[u] - quadratic.w <= 2 * LOOSE)
     circle = np.array(components(quadratic.size, [(int(u[k]), int(v[k]), 0.0) for k in tight]))
     _, first, number = np.unique(circle, return_index=True, return_inverse=True)
-    # Numbered by their first nodes, so that node 0 stays node 0.
+    # Circles are numbered by their first nodes, so that node 0 stays node 0.
     first, number = np.sort(first), np.argsort(np.argsort(first))[number]
     if len(first) == quadratic.size:
         return _optimum(quadratic, level)
@@ -121,7 +121,7 @@ def optimum(quadratic: Quadratic, level: Float64) -> Float64:
 
 
 def _optimum(quadratic: Quadratic, level: Float64) -> Float64:
-    """The interior point's answer, then the inequalities that bind it as equalities, until none is wrong."""
+    """Correct the result of the interior point method: solve with its active set until no force is wrong."""
     u, v, w = quadratic.u, quadratic.v, quadratic.w
     found = _interior_point(quadratic)
     if found is None:
@@ -164,13 +164,13 @@ def _bound(quadratic: Quadratic, binding: Bool, x: Float64) -> tuple[Float64, Fl
     m = quadratic.size
     root, shift, whole = np.arange(m), np.zeros(m), quadratic.piece
     beside: dict[int, list[tuple[int, int]]] = {}
-    held = np.flatnonzero(binding)
+    active = np.flatnonzero(binding)
     # The most violated comes first: of several that tie the same nodes, the first counts.
-    held = held[np.argsort((x[quadratic.v] - x[quadratic.u] - quadratic.w)[held], kind="stable")]
-    if len(held):
+    active = active[np.argsort((x[quadratic.v] - x[quadratic.u] - quadratic.w)[active], kind="stable")]
+    if len(active):
         ties, pieces = UnionFind(m), UnionFind(m)
-        ends = [end[held].tolist() for end in (quadratic.u, quadratic.v, quadratic.w)]
-        for k, u, v, w in zip(held.tolist(), *ends, strict=True):
+        ends = [end[active].tolist() for end in (quadratic.u, quadratic.v, quadratic.w)]
+        for k, u, v, w in zip(active.tolist(), *ends, strict=True):
             if ties.find(u) != ties.find(v):
                 ties.tie(v, u, w)
                 beside.setdefault(u, []).append((v, k))
@@ -178,7 +178,7 @@ def _bound(quadratic: Quadratic, binding: Bool, x: Float64) -> tuple[Float64, Fl
         touched = list(beside)
         root[touched] = [ties.find(k) for k in touched]
         shift[touched] = [ties.shift[k] for k in touched]
-        tails, heads = whole[quadratic.u[held]], whole[quadratic.v[held]]
+        tails, heads = whole[quadratic.u[active]], whole[quadratic.v[active]]
         apart = np.flatnonzero(tails != heads)
         if len(apart):
             for a, b in zip(tails[apart].tolist(), heads[apart].tolist(), strict=True):
@@ -199,7 +199,7 @@ def _bound(quadratic: Quadratic, binding: Bool, x: Float64) -> tuple[Float64, Fl
 
 
 def _forces(pull: list[float], beside: dict[int, list[tuple[int, int]]], quadratic: Quadratic) -> Float64:
-    """(inequalities,) what holds trees of tied nodes against the pull of springs, leaves first."""
+    """Return (inequalities,) the forces that balance the springs on trees of tied nodes, leaves first."""
     force = np.zeros(len(quadratic.u))
     seen: set[int] = set()
     for root in sorted(beside):
@@ -253,8 +253,8 @@ def _interior_point(quadratic: Quadratic) -> tuple[Float64, Float64, Float64] | 
     settings.verbose = False
     # Close enough to tell active inequalities from those that are merely near.
     settings.tol_gap_abs = settings.tol_gap_rel = 1e-11
-    # Now and then Clarabel's own scaling, which matrices of -1, 0 and 1 do not need, leads it astray; less
-    # often it is the only way.
+    # Matrices of -1, 0 and 1 do not need Clarabel's scaling, which sometimes makes it fail; in rare cases it
+    # only succeeds with it.
     for scaled in (False, True):
         settings.equilibrate_enable = scaled
         solution = clarabel.DefaultSolver(upper, linear, matrix, -w, cones, settings).solve()
@@ -267,9 +267,9 @@ def _interior_point(quadratic: Quadratic) -> tuple[Float64, Float64, Float64] | 
 
 
 class _Sparse:
-    """A matrix by compressed columns, as Clarabel reads it; spares importing SciPy's, a third of a second.
+    """A compressed-column matrix for Clarabel; importing SciPy's would take a third of a second.
 
-    Entries with a negative row or column are left out, those at the same place are added.
+    Entries with a negative row or column are left out, entries at the same place are added.
     """
 
     has_canonical_format = True

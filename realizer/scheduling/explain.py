@@ -1,4 +1,4 @@
-"""Explanation of conflicts: which relation gives way, and why, in words."""
+"""Explanation of conflicts: which part is dropped, and why, in words."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from realizer.scheduling.problem import Part, Relation
 from realizer.scheduling.timing import Clause, Warning
 
 IMPOSSIBLE = "IMPOSSIBLE_TO_SCHEDULE"
-# Enough for people; `Warning.clash` has all.
+# In a sentence; `Warning.clash` has all.
 MAX_CLAUSES = 30
 
 
 def choose(clash: Conflict) -> Part | None:
-    """Select what gives way: an optional constraint before any behaviour, then the lowest priority.
+    """Return the part to drop: an optional constraint before any behaviour, then the lowest priority.
 
-    Of equals the later one in the document. A behaviour that is merely referred to is spared while one that
-    states or hinders something can go. None where everything is required.
+    Of equal ones it is the later in the document. A behaviour that is only referred to stays if another one
+    states a relation or gap. Return None if everything is required.
     """
     return max(_candidates(clash), key=lambda part: (-part.priority, part.order), default=None)
 
 
 def warning_of(clash: Conflict, dropped: Part) -> Warning:
-    """The one warning of something that was dropped."""
+    """Return the warning about a dropped part."""
     name = dropped.name or "a constraint"
     if dropped.is_constraint:
         name = f"constraint {dropped.name}" if dropped.name else "a constraint without an id"
@@ -35,7 +35,7 @@ def warning_of(clash: Conflict, dropped: Part) -> Warning:
 
 
 def refusal(block: str, clash: Conflict) -> Warning:
-    """The warning of a block that fails, because everything in the clash is required."""
+    """Return the warning about a block in which all parts of a conflict are required."""
     text = f"{in_words(clash)}, and all of this is required"
     return Warning(block, IMPOSSIBLE, text, clauses(clash))
 
@@ -47,9 +47,8 @@ def fault_warning(part: Part, text: str) -> Warning:
 
 
 def in_words(clash: Conflict) -> str:
-    """The clash as the clauses of one sentence, in the order in which they chain."""
-    said = [f"{clause.text}{_placed(part, clause.line)}" for part, clause in _clauses(clash)]
-    unique = list(dict.fromkeys(said))
+    """Return the conflict as the clauses of one sentence, in the order of their chain."""
+    unique = list(dict.fromkeys(f"{c.text}{_placed(part, c.line)}" for part, c in _clauses(clash)))
     how = "all " if len(unique) > 2 else "both " if len(unique) > 1 else ""
     if len(unique) > MAX_CLAUSES:
         unique[MAX_CLAUSES - 1 :] = [f"{len(unique) - MAX_CLAUSES + 1} more such things"]
@@ -57,13 +56,13 @@ def in_words(clash: Conflict) -> str:
 
 
 def clauses(clash: Conflict) -> tuple[Clause, ...]:
-    """The clash as things to read or to process one by one."""
+    """Return the conflict as single clauses."""
     return tuple(dict.fromkeys(clause for _, clause in _clauses(clash)))
 
 
 def _clauses(clash: Conflict) -> list[tuple[Part, Clause]]:
-    said = [(r.part, _relation(r)) for r in clash.relations] + [(g.part, _gap(g)) for g in clash.gaps]
-    found = [(part, Clause(part.id, part.line, text)) for part, text in said]
+    texts = [(r.part, _relation(r)) for r in clash.relations] + [(g.part, _gap(g)) for g in clash.gaps]
+    found = [(part, Clause(part.id, part.line, text)) for part, text in texts]
     if clash.earliest is not None:
         part, point, seconds = clash.earliest
         found.append((part, Clause(part.id, None, f"{point} is not before {_seconds(seconds)}")))

@@ -13,7 +13,7 @@ from realizer.scheduling.rigid_clusters import RigidClusters
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Shapes that cannot slide apart, with the orders that hold them together.
+    """Clusters that cannot slide apart, with the orders that connect them.
 
     `held`: they cannot slide without limit, because some of them are tied to fixed times.
     """
@@ -24,11 +24,11 @@ class Group:
 
 
 def groups_of(model: Model, clusters: RigidClusters) -> list[Group]:
-    """The groups among the shapes that orders name.
+    """Return the groups among the clusters that orders name.
 
-    A cluster from which orders lead, directly or not, to a fixed one cannot slide without limit: those
-    together as far as orders connect them. Of the rest, only shapes in a circle of orders bind each other;
-    any other order can be satisfied by sliding the later cluster, at no cost.
+    A cluster from which orders lead, directly or not, to a fixed one cannot slide without limit; a group has
+    all such clusters that orders connect. Of the rest, only clusters in a circle of orders form a group; any
+    other order can be satisfied by sliding the later cluster, at no cost.
     """
     orders = model.problem.orders
     if not orders:
@@ -69,7 +69,7 @@ def groups_of(model: Model, clusters: RigidClusters) -> list[Group]:
 def slides(
     model: Model, clusters: RigidClusters, orders: Sequence[Relation]
 ) -> Iterator[tuple[int, int, float]]:
-    """Each order as (shape, shape, by how much more than the first the second has to slide)."""
+    """Return each order as (cluster, cluster, by how much more than the first the second has to slide)."""
     if not orders:
         return iter(())
     u, v = [r.u for r in orders], [r.v for r in orders]

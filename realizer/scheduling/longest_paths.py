@@ -12,11 +12,11 @@ def longest_path_levels(level: list[float], edges: Sequence[Edge], slack: float)
 
     An edge (u, v, w) is satisfied if level[v] + slack >= level[u] + w.
 
-    This is Bellman-Ford's longest path from the levels given. It takes one sweep where the edges come in the
-    order of the paths, so give them sorted by (roughly) where their tails end up.
+    This is Bellman-Ford's longest path from the given levels. It takes one sweep if the edges come in the
+    order of the paths, so pass them sorted by the approximate final level of their tails.
 
     Returns:
-        None; or, where that has no end, the numbers of edges that form a cycle of positive length, in order.
+        None; or, if there is no end, the numbers of edges that form a cycle of positive length, in order.
     """
     cause: dict[int, int] = {}
     sweep = 0
@@ -31,7 +31,7 @@ def longest_path_levels(level: list[float], edges: Sequence[Edge], slack: float)
                 moved = True
         if not moved:
             return None
-        # To look for a cycle costs as much as a sweep; one that is there is there to stay, sooner or later.
+        # The search for a cycle costs as much as a sweep, so it is done after some sweeps only.
         looks = sweep & (sweep - 1) == 0 or sweep % 8 == 0
         if looks and (cycle := _cycle(cause, edges)):
             return cycle
@@ -57,7 +57,7 @@ def _cycle(cause: dict[int, int], edges: Sequence[Edge]) -> list[int]:
 
 
 def components(n: int, edges: Sequence[Edge]) -> list[int]:
-    """The strong component of each of n nodes, numbered so that no edge leads to a lower number.
+    """Return the strong component of each of n nodes, numbered so that no edge leads to a lower number.
 
     Source: Tarjan (1972), without recursion.
     """

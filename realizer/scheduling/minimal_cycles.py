@@ -11,18 +11,18 @@ from realizer.scheduling.conflict import Conflict, ConstraintGraph, Link
 from realizer.scheduling.model import LOOSE, Model
 from realizer.scheduling.problem import ORIGIN, Relation
 
-# Steps tried for one clash, some tens of milliseconds; enough for any that a person would read to the end.
+# Steps tried for one conflict, some tens of milliseconds.
 MAX_STEPS = 50_000
 
-# To which point, by how many seconds, and what says so.
+# The next point, the seconds to it, and the reason.
 Step: TypeAlias = tuple[int, float, Relation | Link]
 
 
 def minimal_cycles(model: Model, web: ConstraintGraph, cycles: Sequence[Sequence[Link]]) -> list[Conflict]:
-    """A clash for each cycle of inequalities, each of the fewest statements that some cycle there has.
+    """Return a conflict for each cycle of inequalities, with the fewest statements of all cycles through it.
 
-    Such a cycle visits no point twice; so without any one statement, the others are a path and can
-    hold. No shorter one passes through any of its points; what clashes elsewhere is another clash.
+    Such a cycle visits no point twice; so without any one statement the others are a path, and can hold. No
+    shorter cycle passes through any of its points.
     """
     ways = _StepGraph(model)
     found = []
@@ -45,7 +45,7 @@ def minimal_cycles(model: Model, web: ConstraintGraph, cycles: Sequence[Sequence
 
 
 class _StepGraph:
-    """The steps from point to point that constraints, gaps and bounds are, as a graph of statements."""
+    """A graph of statements: the steps from point to point that constraints, gaps and bounds are."""
 
     def __init__(self, model: Model) -> None:
         self.model = model
@@ -64,11 +64,11 @@ class _StepGraph:
         self._known: dict[int, list[Step]] = {}
 
     def back_to(self, start: int, statements: int, steps: int) -> tuple[list[Step], int]:
-        """The steps of a positive cycle through a point of at most so many statements, the fewest there are.
+        """Return the positive cycle through a point with the fewest statements, up to a maximum.
 
         Returns:
-            The steps, [] if there is no such cycle or the search takes more steps than allowed; and how
-            many steps were tried.
+            The steps, [] if there is no such cycle or the search takes too many steps; and the number of
+            steps tried.
         """
         best, layer = {start: 0.0}, {start: 0.0}
         came: list[dict[int, tuple[int, Step]]] = []
@@ -118,9 +118,9 @@ class _StepGraph:
 
 
 def _simple(start: int, steps: list[Step]) -> list[Step]:
-    """A positive cycle among the steps of a positive walk from a point back to it that visits nothing twice.
+    """Return a positive cycle without repeated points, from a positive closed walk.
 
-    The walk through one point that has the fewest steps may go round a cycle elsewhere and come back.
+    The shortest walk through a point may go round a cycle elsewhere and come back.
     """
     points, trail = [start], list[Step]()
     for step in steps:
@@ -137,7 +137,7 @@ def _simple(start: int, steps: list[Step]) -> list[Step]:
 
 
 def _walk(came: list[dict[int, tuple[int, Step]]], at: int, last: Step) -> list[Step]:
-    """The steps that led to a point, layer by layer, and the one that closes the cycle."""
+    """Return the steps that led to a point, layer by layer, and the one that closes the cycle."""
     steps = [last]
     for layer in reversed(came[:-1]):
         at, step = layer[at]

@@ -1,4 +1,4 @@
-"""The numeric form of a problem: tied points merged into classes; gaps and orders as arrays."""
+"""The numeric form of a problem: tied points as classes, gaps and orders as arrays."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from realizer.scheduling.union_find import UnionFind
 
 Index: TypeAlias = npt.NDArray[np.intp]
 
-# Two ways to the same point may differ by this much: sums of decimal fractions and of spoken lengths do.
+# Two ways to the same point may differ by this much, by the rounding of sums.
 LOOSE = 1e-7  # s
 # Tolerance of an order: the rounding of double precision.
 TIGHT = 1e-10  # s
@@ -30,11 +30,11 @@ class Model:
         owner: (n,) behaviour of each point; B for the block's start.
         root, shift: (n,) time[p] = time[root[p]] + shift[p]; untied points are their own root.
         tied: points other than the block's start that some equality names, ascending.
-        chain: (n,) seconds after the behaviour's first point when every gap has its preferred length.
-        slack: (n,) the same for 1 / stiffness: how much a unit of force lengthens the gaps up to a point.
+        chain: (n,) seconds after the behaviour's first point if every gap has its preferred length.
+        slack: (n,) the same for 1 / stiffness: how much a unit of force lengthens the gaps before a point.
         gap: (g,) the point where each gap starts; it ends at the next point.
         wanted, least, most, stiffness: (g,) of each gap; most is inf if there is no upper bound.
-        earliest: (B,) no first point is sooner.
+        earliest: (B,) the earliest time of each first point.
     """
 
     problem: Problem
@@ -54,12 +54,12 @@ class Model:
     earliest: Float64
 
     def points_of(self, chosen: Bool) -> Index:
-        """The points of the behaviours that are chosen; chosen is (B + 1,) bool, its last entry False."""
+        """Return the points of chosen behaviours; chosen is (B + 1,) bool, with its last entry False."""
         return np.flatnonzero(chosen[self.owner])
 
 
 def model_of(problem: Problem) -> Model | list[Conflict]:
-    """The problem as arrays, or the loops of equalities that do not close."""
+    """Return the problem as arrays, or the loops of equalities that do not close."""
     n = len(problem.owner)
     ties = UnionFind(n)
     unfit = [
@@ -121,7 +121,7 @@ def model_of(problem: Problem) -> Model | list[Conflict]:
 
 
 def _along(gap: Index, length: Float64, first: Index, owner: Index) -> Float64:
-    """(n,) the sum of a behaviour's lengths before each of its points."""
+    """Return (n,) the sum of a behaviour's lengths before each of its points."""
     step = np.zeros(len(owner))
     step[gap + 1] = length
     total = np.cumsum(step)

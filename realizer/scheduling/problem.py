@@ -20,14 +20,14 @@ ORIGIN = 0
 
 @dataclass(slots=True, eq=False)
 class Part:
-    """Something that can be dropped: a behaviour or a constraint.
+    """A part of a document that can be dropped: a behaviour or a constraint.
 
     Attributes:
-        id: as warnings name it, "block:behaviour" or a constraint's own id or its block's.
-        name: as sentences name it, "nod1"; "" for a constraint without an id.
-        order: place in the document, among its own kind.
+        id: for warnings, "block:behaviour" or a constraint's own id or its block's.
+        name: for sentences, "nod1"; "" for a constraint without an id.
+        order: position in the document, among its own kind.
         line: the line in the document, or None if unknown.
-        names: the behaviours that a constraint names, as "block:behaviour"; it goes with any of them.
+        names: the behaviours that a constraint names, as "block:behaviour"; it is dropped with any of them.
     """
 
     id: str
@@ -41,10 +41,10 @@ class Part:
 
 
 class Relation(NamedTuple):
-    """As an equality: time[u] = time[v] + seconds. As an order: time[v] >= time[u] + seconds.
+    """A relation between two points.
 
-    `part` stated it; `words` is the sentence's left side, sign and right side, put into words only on a
-    clash.
+    As an equality: time[u] = time[v] + seconds. As an order: time[v] >= time[u] + seconds. `part` stated it;
+    `words` are the left side, sign and right side for messages, which are formatted when needed.
     """
 
     u: int
@@ -56,17 +56,17 @@ class Relation(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """A block that is solved together with others, all on one clock: seconds from the new block's start.
+    """A block that is solved together with others, in seconds from the new block's start.
 
     Attributes:
-        timings: behaviour id -> preferred timing; a behaviour without one is absent, and what
-            refers to it vanishes.
+        timings: behaviour id -> preferred timing; a behaviour without one is absent, and references to it
+            are ignored.
         start: of the block.
-        earliest: no behaviour starts sooner.
-        passed_times: behaviour id -> sync point -> when it was; what has passed stays. The points after these
-            are not before `earliest`.
-        is_fixed: nothing of it is ever dropped, as it plays already.
-        priorities: behaviour id -> priority; 0 where absent, the lower goes first in a clash.
+        earliest: the earliest start of its behaviours.
+        passed_times: behaviour id -> sync point -> its past time, which is fixed. Later points are not before
+            `earliest`.
+        is_fixed: its behaviours are never dropped, because it plays already.
+        priorities: behaviour id -> priority, 0 if absent; in a conflict the lowest is dropped.
     """
 
     block: Block
@@ -86,9 +86,9 @@ class Problem:
     of a behaviour that is not rigid cost stiffness * (gap - preferred)^2 and are at least `least`.
 
     Attributes:
-        earliest: (behaviours,) seconds, no behaviour starts sooner.
+        earliest: (behaviours,) seconds, the earliest start of each.
         owner: (points,) behaviour number of each point; -1 for the block's start.
-        faults: parts that cannot even be stated, and why: a reference to a sync point that is not there.
+        faults: invalid parts with the reason: a reference to a sync point that does not exist.
     """
 
     behaviours: list[Part] = field(default_factory=list)
@@ -101,7 +101,7 @@ class Problem:
     faults: list[tuple[Part, str]] = field(default_factory=list)
 
     def add(self, part: Part, timing: Timing, earliest: float = 0.0) -> int:
-        """Add a behaviour; returns the number of its first point."""
+        """Add a behaviour; return the number of its first point."""
         first, k = len(self.owner), len(timing.points)
         self.owner += [len(self.behaviours)] * k
         self.behaviours.append(part)
@@ -116,14 +116,14 @@ class Problem:
         return first
 
     def name_of(self, point: int) -> str:
-        """The point as documents write it: "nod1:start"; "bml:start" for the block's start."""
+        """Return the point as in documents: "nod1:start"; "bml:start" for the block's start."""
         if point == ORIGIN:
             return "bml:start"
         b = self.owner[point]
         return f"{self.behaviours[b].name}:{self.timings[b].points[point - self.first[b]]}"
 
     def without(self, dropped: Iterable[Part]) -> Problem:
-        """The problem without some parts, and without what referred to them."""
+        """Return the problem without some parts and the references to them."""
         gone = {id(part): part.id for part in dropped}
         lost = {part.id for part in self.behaviours if id(part) in gone}
         gone.update((id(r.part), "") for r in (*self.equalities, *self.orders) if r.part.names & lost)
@@ -134,7 +134,7 @@ class Problem:
                 old, new = self.first[b], smaller.add(part, self.timings[b], self.earliest[b])
                 number.update((old + i, new + i) for i in range(len(self.timings[b].points)))
         for u, v, seconds, part, says in self.equalities:
-            # `add` has already made what holds a rigid behaviour together.
+            # `add` has already made the equalities of a rigid behaviour.
             if id(part) not in gone and u in number and v in number and says[1] != "rigid":
                 smaller.equalities.append(Relation(number[u], number[v], seconds, part, says))
         for u, v, seconds, part, says in self.orders:
@@ -147,12 +147,12 @@ class Problem:
 def problem_of(
     members: Sequence[Member], outside: Callable[[SyncRef], float | None] = lambda ref: None
 ) -> Problem:
-    """The problem of one or more blocks.
+    """Return the problem of one or more blocks.
 
     Args:
-        members: the new block first; sentences name the behaviours of the others with their block.
-        outside: a reference into a block that is no member, offset included -> seconds on the members'
-            clock, or None.
+        members: the new block first; messages name the behaviours of the others with their block.
+        outside: a reference into a block that is no member, with its offset -> seconds on the members' clock,
+            or None.
     """
     problem, own = Problem(), members[0].block.id
     first: dict[tuple[str, str], int] = {}
@@ -172,21 +172,21 @@ def problem_of(
                 order,
                 place.line if place is not None else None,
             )
-            # The points to come of a block that has begun are fixed by `_pass`.
+            # `_pass` bounds the future points of a block that has begun.
             earliest = -np.inf if id in member.passed_times else member.earliest
             first[block.id, id] = problem.add(part, member.timings[id], earliest)
             present.append((member, node, part))
-    fillers = {
+    resolvers = {
         m.block.id: _ReferenceResolver(m, {o.block.id: o for o in members}, first, outside) for m in members
     }
     for member, node, part in present:
         start, points = first[member.block.id, node.id], member.timings[node.id].points
         if node.id in member.passed_times:
             _pass(problem, member, part, start, points, member.passed_times[node.id])
-        filler = fillers[member.block.id]
+        resolver = resolvers[member.block.id]
         for sync, ref in _references(node):
             try:
-                if (target := filler.point(ref)) is None:
+                if (target := resolver.point(ref)) is None:
                     continue
                 if sync not in points:
                     raise LookupError(f"{node.id} has no {sync}, only {', '.join(points)}")
@@ -194,12 +194,12 @@ def problem_of(
                 problem.faults.append((part, str(fault)))
                 break
             if target[0] == ORIGIN and sync in member.passed_times.get(node.id, ()):
-                continue  # its other end may have moved since
+                continue  # the other end may have moved since
             says = (f"{part.name}:{sync}", "=", ref)
             problem.equalities.append(Relation(start + points.index(sync), *target, part, says))
     for member in members:
         for order, constraint in enumerate(member.block.constraints):
-            _add_constraint(problem, fillers[member.block.id], constraint, order)
+            _add_constraint(problem, resolvers[member.block.id], constraint, order)
     return problem
 
 
@@ -224,7 +224,7 @@ def _pass(
 
 
 def _references(node: Behaviour) -> Iterator[tuple[str, SyncRef]]:
-    """Every sync point a behaviour ties, as attribute or inside its text."""
+    """Yield every sync point that a behaviour ties, as attribute or inside its text."""
     yield from node.syncs.items()
     text = getattr(node, "text", None)
     for mark in getattr(text, "parts", ()):
@@ -232,13 +232,15 @@ def _references(node: Behaviour) -> Iterator[tuple[str, SyncRef]]:
             yield mark.id, mark.ref
 
 
-def _add_constraint(problem: Problem, filler: _ReferenceResolver, constraint: Constraint, order: int) -> None:
-    member = filler.member
+def _add_constraint(
+    problem: Problem, resolver: _ReferenceResolver, constraint: Constraint, order: int
+) -> None:
+    member = resolver.member
     block = member.block
     refs = [ref for piece in constraint.parts for ref in piece.refs]
     refs += [piece.ref for piece in constraint.parts if not isinstance(piece, Synchronize)]
-    named = {ref.behaviour for ref in refs if filler.is_own(ref)} - {None, "bml"}
-    if not all((block.id, name) in filler.first for name in named):
+    named = {ref.behaviour for ref in refs if resolver.is_own(ref)} - {None, "bml"}
+    if not all((block.id, name) in resolver.first for name in named):
         return
     place = block.places.get(constraint.id) if constraint.id else constraint.place
     part = Part(
@@ -252,9 +254,9 @@ def _add_constraint(problem: Problem, filler: _ReferenceResolver, constraint: Co
     )
     try:
         for piece in constraint.parts:
-            members = [(*filler.required_point(ref), ref) for ref in piece.refs]
+            members = [(*resolver.required_point(ref), ref) for ref in piece.refs]
             target = piece.refs[0] if isinstance(piece, Synchronize) else piece.ref
-            r, there = filler.required_point(target)
+            r, there = resolver.required_point(target)
             for x, here, ref in members:
                 if isinstance(piece, Before):
                     says = (ref, "not after", target)
@@ -269,7 +271,7 @@ def _add_constraint(problem: Problem, filler: _ReferenceResolver, constraint: Co
 
 
 class _ReferenceResolver:
-    """Sync references of one member -> (point, seconds after it)."""
+    """Maps sync references of one member to (point, seconds after it)."""
 
     def __init__(
         self,
@@ -284,7 +286,7 @@ class _ReferenceResolver:
         return ref.block is None or ref.block == self.member.block.id
 
     def required_point(self, ref: SyncRef) -> tuple[int, float]:
-        """As `point`, of a behaviour that is present."""
+        """Return the point of a reference, as `point`; raise LookupError if its behaviour is absent."""
         found = self.point(ref)
         if found is None:
             raise LookupError(f"{ref} is not known")
@@ -298,10 +300,10 @@ class _ReferenceResolver:
         return float(time)
 
     def point(self, ref: SyncRef) -> tuple[int, float] | None:
-        """Return None if the behaviour is absent.
+        """Return the point of a reference, or None if its behaviour is absent.
 
         Raises:
-            LookupError: there is no such sync point; the text says what there is.
+            LookupError: there is no such sync point; the message has the existing ones.
         """
         there = self.member if ref.block is None else self.members.get(ref.block)
         name = ref.behaviour

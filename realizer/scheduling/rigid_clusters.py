@@ -15,19 +15,19 @@ from realizer.scheduling.model import Index, Model
 from realizer.scheduling.problem import ORIGIN
 from realizer.scheduling.union_find import UnionFind
 
-# Lengths that meet as closely as this count as fitting exactly.
+# Lengths that differ by less than this count as equal.
 FITS = 1e-9  # s
 # From this many unknowns on a sparse factorisation is as fast; and OpenBLAS starts threads for a dense one of
-# 90, which costs hundreds of milliseconds where other work keeps the cores busy.
+# 90, which costs hundreds of milliseconds if the cores are busy.
 SPARSE_FROM = 64
 
 
 @dataclass(slots=True, eq=False)
 class RigidClusters:
-    """Which behaviours hold each other, and where their points are.
+    """The clusters of tied behaviours, and the positions of their points.
 
     Attributes:
-        label: (B + 1,) the shape of each behaviour, named by one of them; B is the block's start.
+        label: (B + 1,) the cluster of each behaviour, named by one of them; B is the block's start.
         held: (B + 1,) bool by label: the cluster is tied to a fixed time and cannot slide.
         at: (n,) seconds: from the block's start for fixed clusters, relative for others.
     """
@@ -38,10 +38,10 @@ class RigidClusters:
 
 
 def clusters_of(model: Model) -> RigidClusters:
-    """The shapes of all behaviours, each at its least squares, inequalities aside."""
+    """Return the clusters of all behaviours, each at its least squares solution without inequalities."""
     size = len(model.first)
     tied = model.tied
-    # The first point of a behaviour is so long after the root of the class of one of its points.
+    # The seconds from the root of a point's class to the first point of its behaviour.
     ahead = (model.shift[tied] - model.chain[tied]).tolist()
     knots = zip(model.owner[tied].tolist(), model.root[tied].tolist(), ahead, strict=True)
     ties, strained, held_at = attach(size, knots)
@@ -75,12 +75,12 @@ def clusters_of(model: Model) -> RigidClusters:
 def attach(
     size: int, knots: Iterable[tuple[int, int, float]]
 ) -> tuple[UnionFind, list[int], list[tuple[int, float]]]:
-    """Hang behaviours on each other at their preferred lengths.
+    """Attach behaviours to each other at their preferred lengths.
 
     Args:
-        size: how many there are.
-        knots: of each tied point its behaviour, the root of its class, and how long after that the first
-            point of the behaviour is.
+        size: number of behaviours.
+        knots: of each tied point its behaviour, the root of its class, and the seconds from that root to the
+            first point of the behaviour.
 
     Returns:
         ties between behaviours (of their first points), the behaviours that do not fit, and for each point at
@@ -104,7 +104,7 @@ def attach(
 
 
 def _relax(model: Model, clusters: RigidClusters, chosen: Bool) -> None:
-    """Put the points of whole shapes, in place, where the sum of a (gap - preferred)^2 is least.
+    """Move the points of whole clusters, in place, to the least sum of a (gap - preferred)^2.
 
     A stretch between two tied points is one spring, whatever is between; so only tied points are unknowns.
     """
@@ -142,7 +142,7 @@ def _relax(model: Model, clusters: RigidClusters, chosen: Bool) -> None:
 
 
 def warm_up() -> None:
-    """Load what only large blocks need, a third of a second, which else the first of them would wait for."""
+    """Import the modules for large blocks, which takes a third of a second."""
     chain = np.arange(SPARSE_FROM)
     ones, fixed = np.ones(SPARSE_FROM), np.zeros(SPARSE_FROM + 1, np.bool_)
     fixed[0] = True
@@ -150,10 +150,10 @@ def warm_up() -> None:
 
 
 def _each(numbers: Index, size: int) -> Index:
-    """Each of some numbers below a size once, ascending; np.unique takes several times as long for few."""
-    there = np.zeros(size, np.bool_)
-    there[numbers] = True
-    return np.flatnonzero(there)
+    """Return some numbers below a size once each, ascending; faster than np.unique for few numbers."""
+    present = np.zeros(size, np.bool_)
+    present[numbers] = True
+    return np.flatnonzero(present)
 
 
 def least_squares(
@@ -164,7 +164,7 @@ def least_squares(
     Args:
         i, j: (s,) the two nodes of each spring. wanted, stiffness: (s,).
         fixed: (m,) bool; at least one node of each set that springs connect.
-        x: (m,) where the fixed nodes are.
+        x: (m,) the positions of the fixed nodes.
 
     Returns:
         (m,) float64.

@@ -1,4 +1,4 @@
-"""Scheduling of blocks: solve, drop what conflicts, solve the rest again."""
+"""Scheduling of blocks: solve, drop parts in conflicts, and solve the rest again."""
 
 from __future__ import annotations
 
@@ -25,20 +25,19 @@ def schedule_block(
 ) -> Schedule:
     """Return the sync times of a block: constraints hold, gaps are as near as possible to their preference.
 
-    Free behaviours start as early as they can. In a conflict, an optional constraint is
-    dropped, or else the behaviour of the lowest priority that is not required (of equals the later one), with
-    one warning each.
+    Free behaviours start as early as they can. In a conflict, an optional constraint is dropped, or else the
+    behaviour of the lowest priority that is not required (of equals the later one), with one warning each.
 
     Args:
-        timings: behaviour id -> preferred timing. A behaviour without one counts as absent, and
-            references to it vanish silently.
-        earliest: seconds from block start; nothing starts sooner.
-        outside: a reference into another block, its offset included -> seconds from this block's start; None
-            where it is unknown, which drops what refers to it.
-        priorities: behaviour id -> priority, 0 where absent.
+        timings: behaviour id -> preferred timing. A behaviour without one counts as absent, and references to
+            it are ignored.
+        earliest: the earliest start of any behaviour, seconds from block start.
+        outside: a reference into another block, with its offset -> seconds from this block's start; None if
+            it is unknown, which drops the referring part.
+        priorities: behaviour id -> priority, 0 if absent.
 
     Returns:
-        The schedule; `failed`, without times, where required things clash.
+        The schedule; `failed`, without times, if required parts are in conflict.
     """
     member = Member(block, timings, earliest=earliest, priorities=priorities or {})
     return schedule_together([member], outside=outside)[0]
@@ -47,14 +46,14 @@ def schedule_block(
 def schedule_together(
     members: Sequence[Member], *, outside: Callable[[SyncRef], float | None] = lambda ref: None
 ) -> list[Schedule]:
-    """The sync times of a new block and of blocks that play, solved as one.
+    """Return the sync times of a new block and of playing blocks, solved together.
 
     Args:
-        members: the new block first; what has passed of the others stays, all else may move.
+        members: the new block first; past points of the others are fixed, all else may move.
         outside: a reference into a block that is no member -> seconds on the members' clock.
 
     Returns:
-        A schedule for each member, from its own start. Where the new block fails, the first alone, failed.
+        A schedule for each member, from its own start. If the new block fails, only its own.
     """
     new = members[0].block
     problem = problem_of(members, outside)
@@ -93,7 +92,7 @@ def schedule_together(
 
 
 def _attempt(problem: Problem, block: str) -> Solution | list[tuple[Part, Warning]] | Warning:
-    """The solution; or what has to go first, with its warnings; or the block's warning if it fails."""
+    """Return the solution, or the parts to drop with their warnings, or the warning of a failed block."""
     if problem.faults:
         required = next((fault for fault in problem.faults if fault[0].required), None)
         if required is not None:

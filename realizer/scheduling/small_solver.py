@@ -1,8 +1,7 @@
-"""A fast solver for problems of few points, for cases where plain least squares violates nothing.
+"""A fast solver for small problems without violated inequalities.
 
 Most blocks are such: a handful of behaviours, no orders, and time enough for all. For so few numbers arrays
-cost more than they save; so this is in plain floats what `solve` does in arrays for any problem, and it gives
-up in harder cases.
+are slower than floats; so this does the same as `solve` with plain floats, and gives up in harder cases.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from realizer.scheduling.timing import TimingArrays
 from realizer.scheduling.union_find import UnionFind
 
 NEVER = float("-inf")
-# A NamedTuple is made in a third of the time without its own `__new__`, which is Python.
+# NamedTuples are made in a third of the time without their own `__new__`, which is Python code.
 made = tuple.__new__
 
 
@@ -33,9 +32,9 @@ class _Knot(NamedTuple):
 
 
 def solve_small(problem: Problem) -> tuple[list[float], float] | None:
-    """(points,) seconds from the block's start, and the cost, as of a Solution.
+    """Return (points,) seconds from the block's start, and the cost, as in a Solution.
 
-    None if an order, a conflict, the length of a gap or an early start must be handled.
+    Return None if an order, a conflict, the length of a gap or an early start must be handled.
     """
     if problem.orders:
         return None
@@ -89,7 +88,7 @@ def solve_small(problem: Problem) -> tuple[list[float], float] | None:
     for label, times in zip(labels, at, strict=True):
         slide = 0.0 if label in begins or late[label] == NEVER else late[label]
         time += [seconds + slide for seconds in times]
-    # Exactly equal where the document says so, exactly in order, exactly not too early, despite rounding.
+    # Remove rounding errors from equalities, orders and earliest starts.
     for p in named:
         time[p] = time[ties.find(p)] + ties.shift[p]
     for first, own, earliest in zip(problem.first, lists, problem.earliest, strict=True):
@@ -114,9 +113,9 @@ def _fits(at: list[float], own: TimingArrays) -> bool:
 def _relax(
     lists: list[TimingArrays], knots: list[list[_Knot]], members: Sequence[int], at: list[list[float]]
 ) -> float | None:
-    """Put the points of one shape, in place, where the sum of a (gap - preferred)^2 is least; returns that.
+    """Move the points of a cluster, in place, to the least sum of a (gap - preferred)^2; return that sum.
 
-    A stretch between two knots is one spring, whatever is between. None for more than a few unknowns.
+    A stretch between two knots is one spring, whatever is between. Return None for many unknowns.
     """
     # The block's start is at 0; a free cluster has its first knot at 0, and slides to its place later.
     roots = {knot.root for b in members for knot in knots[b]}
@@ -150,7 +149,7 @@ def _relax(
         chain, slack = lists[b].chain, lists[b].slack
         places = [knot.place for knot in knots[b]]
         times = [where[knot.root] + knot.shift for knot in knots[b]]
-        # Each stretch from a knot to the next; before the first and after the last nothing strains.
+        # Each stretch from a knot to the next; before the first and after the last there is no strain.
         own = [times[0] + seconds - chain[places[0]] for seconds in chain[: places[0]]]
         for n, (place, time) in enumerate(zip(places, times, strict=True)):
             end, strain = len(chain), 0.0

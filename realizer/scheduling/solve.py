@@ -1,7 +1,7 @@
 """The solver: a time for every point of a problem, or the conflicts that prevent a solution.
 
-Two stages (Paul 2010, 3.3.3, says only the first): behaviours that hold each other take the least squares of
-their gaps, then every such shape that nothing holds slides to the earliest place that its orders allow. Only
+It has two stages (Paul 2010, 3.3.3, has only the first): clusters of tied behaviours get the least squares
+solution of their gaps, then every free cluster slides to the earliest place that its orders allow. Only
 clusters whose least squares violate an inequality go to the convex solver.
 """
 
@@ -22,7 +22,7 @@ from realizer.scheduling.problem import ORIGIN, Problem
 from realizer.scheduling.rigid_clusters import RigidClusters, clusters_of
 from realizer.scheduling.small_solver import solve_small
 
-# Points up to which plain floats are quicker than arrays.
+# Up to this many points plain floats are faster than arrays.
 FEW = 128
 
 
@@ -35,9 +35,9 @@ class Solution:
 
 
 def solve(problem: Problem) -> Solution | list[Conflict]:
-    """The least-cost times of a problem, everything as early as it can be; or its clashes, at least one.
+    """Return the least-cost times of a problem, as early as possible; or some of its conflicts.
 
-    The clashes that are returned have to be resolved; there may be more behind them.
+    There may be more conflicts after the returned ones are resolved.
     """
     if len(problem.owner) <= FEW and (found := solve_small(problem)) is not None:
         return Solution(np.array(found[0]), found[1])
@@ -49,7 +49,7 @@ def solve(problem: Problem) -> Solution | list[Conflict]:
     if clashes:
         return clashes
     time = _slide(model, clusters)
-    # Exactly equal where the document says so, exactly in order, exactly not too early, despite rounding.
+    # Remove rounding errors from equalities, orders and earliest starts.
     time = time[model.root] + model.shift
     time[model.first] = np.maximum(time[model.first], model.earliest)
     length = time[model.gap + 1] - time[model.gap]
@@ -63,7 +63,7 @@ def solve(problem: Problem) -> Solution | list[Conflict]:
 
 
 def _keep_inequalities(model: Model, clusters: RigidClusters) -> list[Conflict]:
-    """Squeeze, in place, the groups of shapes that break a gap or an order which sliding cannot mend."""
+    """Solve, in place, the groups of clusters that violate an inequality which sliding cannot satisfy."""
     at, label = clusters.at, clusters.label
     length = at[model.gap + 1] - at[model.gap]
     misfit = (length < model.least - TIGHT) | (length > model.most + TIGHT)
@@ -100,14 +100,14 @@ def _fits(model: Model, clusters: RigidClusters, group: Group, begin: Float64) -
 
 
 def _earliest(model: Model, clusters: RigidClusters) -> Float64:
-    """(B + 1,) by label: how far a shape has to slide so that nothing of it is too soon."""
+    """Return (B + 1,) by label: the least slide of a cluster with which no behaviour is too early."""
     level = np.full(len(clusters.label), -np.inf)
     np.maximum.at(level, clusters.label[:-1], model.earliest - clusters.at[model.first])
     return level
 
 
 def _slide(model: Model, clusters: RigidClusters) -> Float64:
-    """Place every free cluster as early as possible; returns (n,)."""
+    """Place every free cluster as early as possible; return (n,) times."""
     ground = len(model.first)
     free = ~clusters.held
     level = np.where(free, _earliest(model, clusters), 0.0)

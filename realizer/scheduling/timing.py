@@ -1,4 +1,4 @@
-"""The values of steps 2 and 3: the timing that a behaviour prefers, and the schedule it gets."""
+"""The values of steps 2 and 3: the timing that a behaviour prefers, and the schedule of a block."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class TimingArrays(NamedTuple):
     """The numbers of a Timing of k points as plain floats.
 
     Attributes:
-        chain: (k,) seconds after the first point when every gap has its preferred length.
-        slack: (k,) the same for 1 / stiffness: how much a unit of force lengthens the gaps up to a point.
+        chain: (k,) seconds after the first point if every gap has its preferred length.
+        slack: (k,) the same for 1 / stiffness: how much a unit of force lengthens the gaps before a point.
         least, most: (k-1,) of each gap.
         fits: whether all preferred lengths are within their bounds, as those of rigid behaviours are.
     """
@@ -36,13 +36,13 @@ class Timing:
 
     Attributes:
         points: k sync point names in chronological order, such as ("start", "attackPeak", "relax", "end").
-        preferred: (k-1,) float64 seconds, the length each gap would like.
-        least: (k-1,) float64 seconds, the length each gap must have.
+        preferred: (k-1,) float64 seconds, the preferred length of each gap.
+        least: (k-1,) float64 seconds, the least length of each gap.
         stiffness: (k-1,) float64 > 0, the a of a (t[i+1] - t[i] - preferred[i])^2 (Paul 2010, 3.3.3).
-        rigid: every gap is exactly its preferred length; stiffness, least and most do not count then.
-        most: (k-1,) float64 seconds >= least, the greatest length of each gap, inf if there is none;
-            None: nowhere. A behaviour that has any is bounded: least and most hold against every time that
-            the document states, where otherwise a stated length wins over the least gaps in it.
+        rigid: every gap has exactly its preferred length; stiffness, least and most are ignored.
+        most: (k-1,) float64 seconds >= least, the greatest length of each gap, inf if there is none; None if
+            no gap has one. With it, least and most take precedence over lengths that the document states;
+            otherwise a stated length takes precedence over the least gaps in it.
     """
 
     points: tuple[str, ...]
@@ -86,7 +86,7 @@ class Timing:
 
 @dataclass(frozen=True)
 class Clause:
-    """One part of a conflict: the statement or need, its line, in words."""
+    """One clause of a conflict: a statement or gap in words, with its line."""
 
     id: str
     line: int | None
@@ -98,9 +98,9 @@ class Clause:
 
 @dataclass(frozen=True)
 class Warning:  # the standard's word
-    """One BML warning: `id` is a block or "block:behaviour", `type` of the standard's list.
+    """One BML warning: `id` is a block or "block:behaviour", `type` is of the standard's list.
 
-    `clash`: what cannot hold together, where that is why; without any one of it the rest of it could.
+    `clash`: the minimal conflict that is the reason, if any.
     """
 
     id: str
@@ -125,12 +125,11 @@ class Schedule:
         points: behaviour id -> its k sync point names, in order. Dropped behaviours are absent.
         times: behaviour id -> (k,) float64, seconds from block start.
         start: seconds on the session clock; 0 for a block planned on its own.
-        warnings: one per thing that was dropped.
-        cost: the sum of a (gap - preferred)^2 that remains.
+        warnings: one for each dropped part.
+        cost: the sum of a (gap - preferred)^2.
         failed: the whole block was refused (a required part cannot hold); times is empty then.
-        lengths: speech -> its points, with "end" -> seconds from its start at which they would have to be
-            for more of the block to fit. Where there are any, nothing was planned: speak again and plan with
-            what comes.
+        lengths: speech -> its points, with "end" -> seconds from its start that would let more of the block
+            fit. If there are any, the block was not planned: plan it again with speech of these lengths.
     """
 
     block: str
@@ -160,7 +159,7 @@ class Schedule:
 
     @property
     def dropped(self) -> tuple[str, ...]:
-        """Ids, "block:behaviour", of the behaviours that warnings say are missing."""
+        """Ids, "block:behaviour", of the behaviours that warnings report as dropped."""
         prefix = f"{self.block}:"
         return tuple(
             w.id
@@ -170,7 +169,7 @@ class Schedule:
         )
 
     def at(self, behaviour: str, sync: str) -> float:
-        """Seconds from block start of one sync point.
+        """Return the seconds from block start of one sync point.
 
         Raises:
             KeyError: no such behaviour (or it was dropped), or no such sync point.
@@ -184,7 +183,7 @@ class Schedule:
         return {p: float(t) for p, t in zip(self.points[behaviour], self.times[behaviour], strict=True)}
 
     def to_json(self) -> dict[str, Any]:
-        """The JSON of `realizer schedule --json`."""
+        """Return the JSON of `realizer schedule --json`."""
         return {
             "block": self.block,
             "start": self.start,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 class UnionFind:
-    """n points; those tied together move as one. The smallest number of a class is its root.
+    """n points; tied points move together. The smallest number of a class is its root.
 
     Attributes:
         parent, shift: time[i] = time[parent[i]] + shift[i]; after `find(i)` the parent is the root.
@@ -17,7 +17,7 @@ class UnionFind:
         self.shift = [0.0] * n
 
     def find(self, i: int) -> int:
-        """The root of i's class."""
+        """Return the root of i's class."""
         parent = self.parent
         root = parent[i]
         if parent[root] == root:
@@ -34,10 +34,10 @@ class UnionFind:
         return i
 
     def tie(self, u: int, v: int, seconds: float) -> float:
-        """Hold time[u] = time[v] + seconds.
+        """Tie two points: time[u] = time[v] + seconds.
 
         Returns:
-            0.0; or, where u and v were tied already, how much farther apart than they are this wants them.
+            0.0; or, if u and v were tied already, the difference to their present distance.
         """
         parent = self.parent
         a, b = parent[u], parent[v]
