@@ -8,7 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from hypothesis import strategies as st
 
+from bml_schema import parse
 from realizer.core.array_types import Float64
+from realizer.scheduling import Schedule, schedule_block
 from realizer.scheduling.problem import ORIGIN, Part, Problem, Relation
 from realizer.scheduling.timing import Timing
 
@@ -209,3 +211,17 @@ def linear(problem: Problem) -> tuple[Float64, Float64, Float64, Float64]:
     rows: list[Any] = [*zip(*equal, strict=True), *zip(*more, strict=True)]
     matrix, right, lower, bound = (np.array(column) for column in rows)
     return matrix, right, lower, bound
+
+
+FACE = ("start", "attackPeak", "relax", "end")
+
+
+def schedule(body: str, timings: dict[str, Timing], **more: object) -> Schedule:
+    """The schedule of a block; its first behaviour is on line 2."""
+    text = f'<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0" id="b1">\n{body}</bml>'
+    return schedule_block(parse(text, strict=True), timings, **more)  # type: ignore[arg-type]
+
+
+def lasting(*preferred: float, least: float = 0.02) -> Timing:
+    points = FACE if len(preferred) == 3 else ("start", "end")
+    return Timing(points, np.array(preferred), np.full(len(preferred), least), np.ones(len(preferred)))

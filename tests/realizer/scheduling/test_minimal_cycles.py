@@ -8,30 +8,15 @@ import numpy as np
 from hypothesis import given, settings
 from scipy.optimize import linprog
 
-from bml_schema import parse
 from realizer.core.array_types import Float64
-from realizer.scheduling import Schedule, Timing, schedule_block
 from realizer.scheduling.conflict import Conflict, Gap
 from realizer.scheduling.explain import in_words
 from realizer.scheduling.problem import ORIGIN, Problem, Relation
 from realizer.scheduling.solve import Solution, solve
-from tests.realizer.scheduling.recipes import Recipe, built, spans, wild
-
-FACE = ("start", "attackPeak", "relax", "end")
+from tests.realizer.scheduling.recipes import Recipe, built, lasting, schedule, spans, wild
 
 # From point to point: the second is not sooner than the first and so many seconds.
 Edge = tuple[int, int, float]
-
-
-def schedule(body: str, timings: dict[str, Timing], **more: object) -> Schedule:
-    """The schedule of a block; its first behaviour is on line 2."""
-    text = f'<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0" id="b1">\n{body}</bml>'
-    return schedule_block(parse(text, strict=True), timings, **more)  # type: ignore[arg-type]
-
-
-def lasting(*preferred: float, least: float = 0.02) -> Timing:
-    points = FACE if len(preferred) == 3 else ("start", "end")
-    return Timing(points, np.array(preferred), np.full(len(preferred), least), np.ones(len(preferred)))
 
 
 def statements(problem: Problem, clash: Conflict) -> list[list[Edge]]:
@@ -144,46 +129,6 @@ def test_where_there_is_a_short_way_and_a_long_one_the_short_one_is_told() -> No
     assert [clause.id for clause in short.clash] == ["k", "l"]
     # Three waits, that each of the later ones follows, and what wants the last one not to be after the first.
     assert len(long.clash) == 7
-
-
-def test_a_clash_goes_out_as_data_too() -> None:
-    body = (
-        '<wait id="a" start="1"/>\n<wait id="b" start="2"/>\n'
-        '<constraint id="same"><synchronize><sync ref="a:start"/><sync ref="b:start"/></synchronize>'
-        "</constraint>"
-    )
-    found = schedule(body, {"a": lasting(1.0), "b": lasting(1.0)})
-    (warning,) = found.to_json()["warnings"]
-    assert warning["id"] == "same"
-    assert warning["type"] == "IMPOSSIBLE_TO_SCHEDULE"
-    assert sorted(warning["clash"], key=lambda clause: clause["line"]) == [
-        {"id": "b1:a", "line": 2, "text": "a:start = 1"},
-        {"id": "b1:b", "line": 3, "text": "b:start = 2"},
-        {"id": "same", "line": 4, "text": "a:start = b:start"},
-    ]
-    for clause in warning["clash"]:
-        assert clause["text"] in warning["text"]
-
-
-def test_what_behaviours_need_names_them_too() -> None:
-    body = '<faceLexeme id="a" lexeme="SMILE" end="0.5"/>\n<wait id="b" start="2" end="a:attackPeak"/>'
-    found = schedule(body, {"a": lasting(1, 1, 1, least=0.3), "b": lasting(1.0)})
-    (warning,) = found.warnings
-    told = {(c.id, c.line, c.text) for c in warning.clash}
-    assert ("b1:a", 2, "a:end = 0.5") in told
-    assert all(id in ("b1:a", "b1:b") for id, _, _ in told)
-
-
-def test_a_warning_without_a_clash_has_three_keys() -> None:
-    found = schedule('<wait id="a" start="b0:x:end"/>', {"a": lasting(1.0)})
-    assert [set(w) for w in found.to_json()["warnings"]] == [{"id", "type", "text"}]
-
-
-def test_a_failing_block_tells_its_clash() -> None:
-    body = '<required><wait id="a" start="b:end"/><wait id="b" start="a:end"/></required>'
-    found = schedule(body, {"a": lasting(1.0), "b": lasting(1.0)})
-    assert found.failed
-    assert {clause.id for clause in found.warnings[0].clash} == {"b1:a", "b1:b"}
 
 
 def test_a_search_that_takes_too_long_leaves_the_clash_that_was_found() -> None:

@@ -435,13 +435,6 @@ def test_lengths_that_follow_each_other_are_added_up_in_the_words() -> None:
     assert "a takes at most 2.3 s from start to relax" in found.warnings[0].text
 
 
-def test_bounds_have_a_length_for_each_gap_and_leave_room() -> None:
-    with pytest.raises(ValueError, match=r"most: wanted shape \(1,\)"):
-        timing([1.0], most=[1.0, 2.0])
-    with pytest.raises(ValueError, match="most: wanted at least"):
-        timing([1.0], least=0.5, most=[0.4])
-
-
 # What cannot hold.
 
 
