@@ -18,31 +18,31 @@ from tests.conformance import FILE, Rule, elsewhere, gaps, proofs, render, rules
 ROOT = Path(__file__).parent.parent
 
 
-def test_the_file_is_current() -> None:
+def test_conformance_file_is_current() -> None:
     assert FILE.read_text("utf-8") == render(), "run: python -m tests.conformance"
 
 
 @pytest.mark.parametrize("case", CASES, ids=[case.name for case in CASES])
-def test_a_case_says_which_known_rules_it_proves(case: Case) -> None:
+def test_conformance_cases_prove_known_rules(case: Case) -> None:
     assert case.proves, "a case names the rules that it proves"
     assert len(set(case.proves)) == len(case.proves)
     assert set(case.proves) <= rules().keys()
 
 
-def test_nothing_is_unproved_without_a_reason() -> None:
+def test_conformance_gaps_have_a_reason() -> None:
     proved = proofs().keys() | elsewhere().keys()
     missing = sorted(rules().keys() - proved - gaps().keys())
     assert not missing, f"add cases to tests/corpus whose `proves` names: {', '.join(missing)}"
 
 
-def test_gaps_and_tests_elsewhere_are_of_known_rules_and_not_of_proved_ones() -> None:
+def test_conformance_gaps_and_other_tests_are_of_known_rules() -> None:
     assert gaps().keys() | elsewhere().keys() <= rules().keys()
     assert not gaps().keys() & (proofs().keys() | elsewhere().keys())
     assert all(gaps().values()), "a gap has a reason"
 
 
 @pytest.mark.parametrize("rule", sorted(elsewhere()))
-def test_a_test_elsewhere_is_there(rule: str) -> None:
+def test_conformance_tests_elsewhere_exist(rule: str) -> None:
     path, _, test = elsewhere()[rule].partition("::")
     assert f"def {test}(" in (ROOT / path).read_text("utf-8")
 
@@ -53,7 +53,7 @@ CLAIMS = [
 
 
 @pytest.mark.parametrize(("case", "rule"), CLAIMS, ids=[f"{case.name}-{rule.id}" for case, rule in CLAIMS])
-def test_what_a_case_claims_of_an_element_is_in_its_document(case: Case, rule: Rule) -> None:
+def test_conformance_claims_are_in_the_documents_of_cases(case: Case, rule: Rule) -> None:
     found = elements(case, rule.element)
     assert found, f"no <{rule.element.tag}>"
     expectations = case.path.read_text("utf-8")

@@ -31,7 +31,7 @@ every_case = pytest.mark.parametrize("case", CASES, ids=[case.name for case in C
 
 
 @every_case
-def test_what_a_case_says_holds(case: Case) -> None:
+def test_corpus_case_holds(case: Case) -> None:
     wanted = case.wanted
     assert wanted["says"], "a case says in a sentence what must be true"
     played = play(case, looks=case.looks, watches=[*case.looks, *case.watches])
@@ -157,7 +157,7 @@ def plain(case: Case) -> Played:
 
 
 @every_case
-def test_feedback_keeps_its_laws(case: Case) -> None:
+def test_corpus_feedback_keeps_its_laws(case: Case) -> None:
     """BML 1.0: in the order of time, once each, nothing of a block outside its start and end."""
     played = plain(case)
     clock = 0.0
@@ -195,7 +195,7 @@ def test_feedback_keeps_its_laws(case: Case) -> None:
 
 
 @every_case
-def test_what_was_predicted_last_is_what_happens(case: Case) -> None:
+def test_corpus_predictions_are_what_happens(case: Case) -> None:
     """Of blocks: start and end; of behaviours: every sync point, in the order in which they pass."""
     blocks: dict[str, tuple[float | None, float | None]] = {}
     points: dict[str, dict[str, float]] = {}
@@ -226,7 +226,7 @@ def predicted_points(node: Behaviour) -> dict[str, float]:
 
 
 @every_case
-def test_nothing_is_warned_of_twice(case: Case) -> None:
+def test_corpus_warns_of_nothing_twice(case: Case) -> None:
     """One warning a behaviour, until its block has ended and its id is free again."""
     warned: set[str] = set()
     for feedback in plain(case).feedback:
@@ -242,7 +242,7 @@ UNHURRIED = [case for case in CASES if "behaviour.short" not in case.proves]
 
 
 @pytest.mark.parametrize("case", UNHURRIED, ids=[case.name for case in UNHURRIED])
-def test_no_face_jumps_when_something_happens(case: Case) -> None:
+def test_corpus_faces_never_jump(case: Case) -> None:
     """Where a block starts, is replaced or interrupted, where a point passes and a plan changes."""
     played = plain(case)
     times = {*case.wanted.get("sent", ()), *(time for line in played.log for time in line.times)}
@@ -260,7 +260,7 @@ STEADY = [case for case in CASES if b"interrupt" not in case.document]
 
 
 @pytest.mark.parametrize("case", STEADY, ids=[case.name for case in STEADY])
-def test_a_block_that_is_done_has_passed_every_sync_point_in_order(case: Case) -> None:
+def test_corpus_blocks_pass_every_sync_point_in_order(case: Case) -> None:
     played = plain(case)
     lines = [line for line in played.log if line.kind == "sync"]
     for id, schedule in played.schedules.items():
@@ -275,13 +275,13 @@ def test_a_block_that_is_done_has_passed_every_sync_point_in_order(case: Case) -
 
 
 @every_case
-def test_who_hears_of_the_time_seldom_is_told_the_same(case: Case) -> None:
+def test_corpus_feedback_does_not_depend_on_how_often_time_passes(case: Case) -> None:
     """Live and offline agree: `due` at every deadline, or only when something is sent."""
     punctual, seldom = plain(case), play(case, punctual=False)
     assert list(map(str, seldom.log)) == list(map(str, punctual.log))
 
 
 @every_case
-def test_what_was_read_can_be_written_and_read_again(case: Case) -> None:
+def test_corpus_documents_can_be_written_and_read_again(case: Case) -> None:
     for block in plain(case).blocks:
         assert parse(write(block), VOCABULARY) == block

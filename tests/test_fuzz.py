@@ -32,7 +32,7 @@ def seed(pytestconfig: pytest.Config) -> int:
     return int(pytestconfig.getoption("seed"))
 
 
-def test_whatever_is_read_gives_blocks_and_errors_and_blocks_play_to_their_end(
+def test_fuzz_of_any_text_gives_errors_and_blocks_that_play_to_the_end(
     count: int, seed: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
     results: Counter[str] = Counter()
@@ -63,11 +63,11 @@ def test_whatever_is_read_gives_blocks_and_errors_and_blocks_play_to_their_end(
     # Of as many seeds as there are mutants, so many: one try costs as much more.
     [("faps", 10), ("tasks", 80), ("controls", 40), ("sessions", 300)],
 )
-def test_what_is_broken_in_every_way_is_stood(target: str, part: int, count: int, seed: int) -> None:
+def test_fuzz_stands_every_kind_of_damage(target: str, part: int, count: int, seed: int) -> None:
     tried(target, range(seed, seed + max(1, count // part)))
 
 
-def test_a_law_that_is_broken_is_noticed_with_its_seed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_fuzz_reports_a_broken_law_with_its_seed(monkeypatch: pytest.MonkeyPatch) -> None:
     # One message in three is not numbered: clients of the session see the gap.
     real = FeedbackLog.add
 
@@ -81,7 +81,7 @@ def test_a_law_that_is_broken_is_noticed_with_its_seed(monkeypatch: pytest.Monke
     assert "after" in str(caught.value.__cause__)
 
 
-def test_no_mutant_ends_a_connection(count: int, seed: int) -> None:
+def test_fuzz_of_a_connection_never_ends_it(count: int, seed: int) -> None:
     some = islice(mutants(corpus(), count, seed + 1), min(count, OVER_THE_WIRE))
 
     async def run() -> None:

@@ -35,7 +35,7 @@ LATEST = 600.0  # s; no document of the grammar takes so long
 APART = 0.3  # s between the documents of a text
 
 
-def test_random_valid_documents_play_to_their_end_and_are_well_told_of(pytestconfig: pytest.Config) -> None:
+def test_grammar_documents_play_to_their_end_with_complete_feedback(pytestconfig: pytest.Config) -> None:
     wanted = pytestconfig.getoption("documents") or 5 * settings().max_examples
 
     @settings(max_examples=wanted, suppress_health_check=list(HealthCheck))
@@ -46,7 +46,7 @@ def test_random_valid_documents_play_to_their_end_and_are_well_told_of(pytestcon
     holds()
 
 
-def test_the_grammar_writes_every_behaviour_there_is() -> None:
+def test_grammar_writes_every_behaviour() -> None:
     assert KINDS.keys() == {tag.rpartition("}")[2] for tag in VOCABULARY}
 
 
@@ -62,11 +62,11 @@ def feedback_of(text: str) -> tuple[Block, Schedule, list[Feedback]]:
     return block, schedule, run(player, LATEST)
 
 
-def test_sound_feedback_passes() -> None:
+def test_check_feedback_accepts_sound_feedback() -> None:
     well_told(*feedback_of(SOUND), calm=True)
 
 
-def test_feedback_that_lacks_a_message_or_tells_it_twice_or_too_late_is_noticed() -> None:
+def test_check_feedback_notices_missing_repeated_and_late_messages() -> None:
     block, schedule, told = feedback_of(SOUND)
     for n, message in enumerate(told):
         if isinstance(message, PredictionFeedback):

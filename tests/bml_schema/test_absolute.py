@@ -66,7 +66,7 @@ def told(block: Block) -> dict[str, dict[str, float]]:
 
 
 @given(scheduled())
-def test_every_time_of_every_behaviour_is_said_to_the_last_bit(given_: tuple[Block, Times]) -> None:
+def test_with_absolute_times_writes_every_time_exactly(given_: tuple[Block, Times]) -> None:
     block, times = given_
     result = with_absolute_times(block, times)
     back = parse(write(result))
@@ -80,7 +80,7 @@ def test_every_time_of_every_behaviour_is_said_to_the_last_bit(given_: tuple[Blo
         }
 
 
-def test_a_block_with_its_times_reads_as_people_would_write_it() -> None:
+def test_with_absolute_times_is_readable() -> None:
     block = parse(
         f"<bml id='b' xmlns:a='{BMLA}' a:appendAfter='x'>"
         "<speech id='s' start='gone:end'><text>a<sync id='m'/></text></speech>"
@@ -118,7 +118,7 @@ def test_a_block_with_its_times_reads_as_people_would_write_it() -> None:
     )
 
 
-def test_a_mark_of_a_description_stands_in_a_constraint() -> None:
+def test_with_absolute_times_puts_marks_of_descriptions_into_a_constraint() -> None:
     speak = "<speak xmlns='http://www.w3.org/2001/10/synthesis'>a<mark name='m'/>b</speak>"
     inside = f"<description priority='1' type='application/ssml+xml'>{speak}</description>"
     block = parse(f"<bml id='b'><speech id='s'>{inside}</speech></bml>")
@@ -129,12 +129,12 @@ def test_a_mark_of_a_description_stands_in_a_constraint() -> None:
 
 
 @pytest.mark.parametrize("time", [math.nan, math.inf, 86401.0, -1e9])
-def test_a_time_no_document_can_say_is_a_value_error(time: float) -> None:
+def test_with_absolute_times_refuses_times_beyond_a_day(time: float) -> None:
     with pytest.raises(ValueError, match="w:end: wanted at most 86400 seconds, got"):
         with_absolute_times(Block(id="b", children=(Wait(id="w"),)), {"w": {"start": 0.0, "end": time}})
 
 
-def test_a_constraint_that_the_times_break_was_dropped_and_is_not_said_again() -> None:
+def test_with_absolute_times_removes_a_constraint_that_the_times_break() -> None:
     block = parse(
         "<bml id='b'><wait id='w'/>"
         "<constraint id='k'><synchronize><sync ref='w:end'/><sync ref='2'/></synchronize></constraint>"
@@ -157,7 +157,7 @@ CASES = sorted(p for folder in ("core", "constraints", "ext") for p in (CORPUS /
 
 
 @pytest.mark.parametrize("case", CASES, ids=[f"{c.parent.name}/{c.stem}" for c in CASES])
-def test_scheduling_it_again_gives_the_same_times(case: Path) -> None:
+def test_with_absolute_times_is_scheduled_to_the_same_times(case: Path) -> None:
     for block in read(case.read_bytes()):
         assert isinstance(block, Block)
         first = schedule(write(block), voice=SilentVoice())

@@ -57,7 +57,7 @@ EACH = pytest.mark.parametrize(
 
 
 @EACH
-def test_its_required_attributes_are_enough(cls: type[Behaviour]) -> None:
+def test_behaviour_with_its_required_attributes_is_enough(cls: type[Behaviour]) -> None:
     block = parse(sample(cls))
     assert not block.problems
     assert type(block["x"]) is cls
@@ -65,7 +65,7 @@ def test_its_required_attributes_are_enough(cls: type[Behaviour]) -> None:
 
 
 @EACH
-def test_each_required_attribute_is_missed_when_it_is_not_there(cls: type[Behaviour]) -> None:
+def test_behaviour_misses_each_required_attribute(cls: type[Behaviour]) -> None:
     for spec in schema_of(cls).required:
         if spec.name == "id":
             continue
@@ -75,7 +75,7 @@ def test_each_required_attribute_is_missed_when_it_is_not_there(cls: type[Behavi
 
 
 @EACH
-def test_each_of_its_sync_points_can_be_given_and_referred_to(cls: type[Behaviour]) -> None:
+def test_behaviour_sync_points_can_be_given_and_referred_to(cls: type[Behaviour]) -> None:
     for n, point in enumerate(cls.sync_points):
         block = parse(sample(cls, extra=f"{point}='{n}'"))
         assert block["x"].syncs[point].offset == n
@@ -84,7 +84,7 @@ def test_each_of_its_sync_points_can_be_given_and_referred_to(cls: type[Behaviou
 
 
 @EACH
-def test_each_closed_set_refuses_another_word(cls: type[Behaviour]) -> None:
+def test_behaviour_refuses_a_word_outside_a_closed_set(cls: type[Behaviour]) -> None:
     for spec in schema_of(cls).attributes.values():
         if spec.value.words and not spec.required:
             problems = parse(sample(cls, extra=f"{spec.name}='SIDEWAYS'")).problems
@@ -92,7 +92,7 @@ def test_each_closed_set_refuses_another_word(cls: type[Behaviour]) -> None:
 
 
 @EACH
-def test_each_number_refuses_what_is_none(cls: type[Behaviour]) -> None:
+def test_behaviour_refuses_invalid_numbers(cls: type[Behaviour]) -> None:
     for spec in schema_of(cls).attributes.values():
         if spec.value.low is not None and not spec.required:
             for bad in ("nan", "inf", "1e308", "x", "", "99999999999"):
@@ -101,7 +101,7 @@ def test_each_number_refuses_what_is_none(cls: type[Behaviour]) -> None:
 
 
 @EACH
-def test_unknown_attributes_are_kept(cls: type[Behaviour]) -> None:
+def test_behaviour_keeps_unknown_attributes(cls: type[Behaviour]) -> None:
     block = parse(sample(cls, extra="xmlns:q='urn:q' q:a='1' unheardOf='2'"))
     assert block["x"].unknown_attributes == {"{urn:q}a": "1", "unheardOf": "2"}
     assert parse(write(block)) == block
@@ -111,7 +111,7 @@ def only(inside: str) -> Block:
     return parse(f"<bml id='b'>{inside}</bml>")
 
 
-def test_the_parts_of_a_face_share_its_timing_and_need_no_id() -> None:
+def test_face_parts_share_its_timing_and_need_no_id() -> None:
     block = only(
         "<face id='f' start='1'><faceLexeme lexeme='SMILE' end='9'/><faceFacs au='4' side='LEFT'/></face>"
     )
@@ -124,18 +124,18 @@ def test_the_parts_of_a_face_share_its_timing_and_need_no_id() -> None:
     assert not face.parts[0].syncs
 
 
-def test_a_face_without_parts_says_what_it_wants() -> None:
+def test_face_without_parts_is_refused() -> None:
     assert only("<face id='f'/>").problems[0].text == "wanted <faceLexeme> or <faceFacs>, got none"
 
 
-def test_a_bad_part_takes_the_whole_face() -> None:
+def test_face_with_a_bad_part_is_dropped() -> None:
     block = only("<face id='f'><faceFacs au='4'/>\n<faceFacs au='x'/></face>")
     assert [str(p) for p in block.problems] == [
         'line 2, /bml/face[1]/faceFacs[2]: au: wanted a whole number 1..999, got "x"'
     ]
 
 
-def test_facefacs_is_found_in_the_core_namespace_and_in_none() -> None:
+def test_face_facs_is_found_in_the_core_namespace_and_in_none() -> None:
     for space in ("", f"xmlns='{CORE}'", "xmlns='http://www.mindmakers.org/projects/BML'"):
         block = parse(f"<bml id='b' {space}><faceFacs id='f' au='1'/></bml>")
         assert type(block["f"]) is FaceFacs
@@ -160,13 +160,13 @@ def test_speech_keeps_every_blank_and_every_sync() -> None:
     assert parse(write(block)) == block
 
 
-def test_an_empty_text_is_not_no_text() -> None:
+def test_speech_distinguishes_an_empty_text_from_none() -> None:
     block = only("<speech id='s'><text/></speech>")
     assert block["s"] == Speech(id="s", text=SpeechText())
     assert parse(write(block)) == block
 
 
-def test_a_text_keeps_its_language() -> None:
+def test_speech_text_keeps_its_language() -> None:
     block = only("<speech id='s'><text xml:lang='nl'>Dag</text></speech>")
     assert block["s"] == Speech(id="s", text=SpeechText(parts=("Dag",), language="nl"))
     assert parse(write(block)) == block
@@ -184,13 +184,13 @@ def test_a_text_keeps_its_language() -> None:
         ("<txt>Hello</txt>", "wanted <text>, got <txt>"),
     ],
 )
-def test_what_speech_does_not_take(inside: str, said: str) -> None:
+def test_speech_refuses_wrong_content(inside: str, said: str) -> None:
     block = only(f"<speech id='s'>{inside}</speech>")
     assert not block.behaviours
     assert block.problems[0].text.startswith(said)
 
 
-def test_a_posture_has_one_stance_and_any_poses() -> None:
+def test_posture_has_one_stance_and_any_poses() -> None:
     block = only("<posture id='p'><pose part='HEAD' lexeme='X'/><stance type='LYING'/></posture>")
     posture = block["p"]
     assert isinstance(posture, Posture)
@@ -202,14 +202,14 @@ def test_a_posture_has_one_stance_and_any_poses() -> None:
     )
 
 
-def test_the_duration_of_a_wait_may_have_the_name_of_the_drafts() -> None:
+def test_wait_reads_the_name_of_its_duration_in_drafts() -> None:
     assert only("<wait id='w' max-wait='2'/>").children == (Wait(id="w", duration=2.0),)
     both = only("<wait id='w' max-wait='2' duration='1'/>").children
     assert both == (Wait(id="w", duration=1.0, unknown_attributes={"max-wait": "2"}),)
     assert only("<wait id='w' max-wait='x'/>").problems[0].text.startswith("max-wait: wanted seconds")
 
 
-def test_a_speech_without_text_says_nothing() -> None:
+def test_speech_without_text_is_empty() -> None:
     block = only("<speech id='s'/>")
     assert block.children == (Speech(id="s"),)
     assert not block.problems

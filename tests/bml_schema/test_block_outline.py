@@ -17,7 +17,7 @@ def outline(inside: str) -> tuple[BlockOutline, list[object]]:
     return found, list(found.entries(root, "/bml", required=False))
 
 
-def test_a_required_is_a_list_and_one_inside_another_adds_nothing() -> None:
+def test_entries_of_required_are_a_flat_list() -> None:
     found, tree = outline("<head id='a'/><required><head/><required><wait id=' c '/></required></required>")
     first, inside = tree
     assert isinstance(inside, list)
@@ -30,13 +30,13 @@ def test_a_required_is_a_list_and_one_inside_another_adds_nothing() -> None:
     assert set(found.owners) == {"a", "c"}
 
 
-def test_the_first_of_two_with_an_id_has_it() -> None:
+def test_owners_have_the_first_of_two_with_an_id() -> None:
     found, _ = outline("<head id='a'/><speech id='a'/><constraint id='k'/>")
     assert found.owners["a"].kind.cls is Head
     assert set(found.names.points) == {"a"}
 
 
-def test_references_may_name_sync_points_strokes_and_marks_and_anything_of_the_unknown() -> None:
+def test_names_have_sync_points_strokes_marks_and_unknown_elements() -> None:
     speak = "<description><speak><mark name='n'/><mark name='no:name'/></speak></description>"
     found, _ = outline(
         f"<speech id='s'><text>a<sync id='m'/></text>{speak}</speech>"
@@ -50,6 +50,6 @@ def test_references_may_name_sync_points_strokes_and_marks_and_anything_of_the_u
     assert found.names.points["w"] is None
 
 
-def test_text_between_elements_is_noted_with_its_place() -> None:
+def test_loose_text_has_its_place() -> None:
     found, _ = outline(" <required> oops <head/></required> ")
     assert [(text, path) for text, _, path in found.loose] == [("oops", "/bml/required[1]")]

@@ -36,7 +36,7 @@ def document(inside: str) -> Block:
 
 
 @pytest.mark.parametrize("listed", ["n1,n-2", "n1, n-2", "n1 n-2", " n1 ,, n-2 "])
-def test_an_interrupt_names_behaviours_with_commas_or_blanks_between_them(listed: str) -> None:
+def test_interrupt_separates_behaviours_by_commas_or_blanks(listed: str) -> None:
     assert only(f"<bmla:interrupt id='i' target='b1' include='{listed}'/>") == Interrupt(
         id="i", target="b1", include=("n1", "n-2")
     )
@@ -45,13 +45,13 @@ def test_an_interrupt_names_behaviours_with_commas_or_blanks_between_them(listed
     )
 
 
-def test_an_empty_list_of_an_interrupt_is_none() -> None:
+def test_interrupt_with_an_empty_list_has_none() -> None:
     assert only("<bmla:interrupt id='i' target='b1' include='' exclude=' '/>") == Interrupt(
         id="i", target="b1"
     )
 
 
-def test_a_list_of_names_cannot_hold_a_name_with_a_comma() -> None:
+def test_interrupt_refuses_to_write_a_name_with_a_comma() -> None:
     node = Interrupt(id="i", target="b1", include=("a,b",))
     with pytest.raises(ValueError, match='wanted a name without ","'):
         write(Block(id="b", children=(node,)))
@@ -65,7 +65,7 @@ def test_activate_names_a_block() -> None:
 @pytest.mark.parametrize(
     "tag", ["bmla:trajectory", "bmlt:trajectory", "trajectory", "x:trajectory xmlns:x=''"]
 )
-def test_a_trajectory_is_found_in_any_namespace_it_may_have_been_left_in(tag: str) -> None:
+def test_trajectory_is_found_in_any_namespace(tag: str) -> None:
     if tag.startswith("x:"):
         tag = "trajectory xmlns=''"
     inside = f"<{tag} type='linear' initialValue='1' targetValue='-0.5'/>"
@@ -95,20 +95,20 @@ def test_a_trajectory_is_found_in_any_namespace_it_may_have_been_left_in(tag: st
         ("b1:s", "<trajectory type='instant' targetValue='1'/>" * 2, "wanted one <trajectory>, got 2"),
     ],
 )
-def test_what_a_change_of_a_parameter_does_not_take(target: str, inside: str, said: str) -> None:
+def test_parameter_value_change_refuses_wrong_content(target: str, inside: str, said: str) -> None:
     start = f"<bmla:parametervaluechange id='p' target='{target}' paramId='volume'>"
     block = document(f"{start}{inside}</bmla:parametervaluechange>")
     assert [(p.id, p.text) for p in block.problems] == [("b:p", said)]
 
 
-def test_a_sound_file_has_a_name() -> None:
+def test_audio_file_has_a_name() -> None:
     assert only("<bmlt:audiofile id='a' fileName='a b.wav' start='1'/>").id == "a"
     node = only("<bmlt:audiofile id='a' fileName='a b.wav'/>")
     assert node == AudioFile(id="a", file_name="a b.wav")
 
 
 @pytest.mark.parametrize("tag", ["bmlt:FaceInterpolator", "bmla:FaceInterpolator", "FaceInterpolator"])
-def test_the_keys_of_a_face_animation_are_kept_as_they_stand(tag: str) -> None:
+def test_face_keyframe_keeps_its_keys_as_written(tag: str) -> None:
     inside = f"<{tag} parts='1.BOTH 12.LEFT'>\n 0 0 0\n 0.5 1 .5\n</{tag.split()[0]}>"
     node = only(f"<bmlt:facekeyframe id='k' type='FACS' end='2'>{inside}</bmlt:facekeyframe>")
     assert isinstance(node, FaceKeyframe)
@@ -116,11 +116,11 @@ def test_the_keys_of_a_face_animation_are_kept_as_they_stand(tag: str) -> None:
     assert node.interpolator == FaceInterpolator(parts="1.BOTH 12.LEFT", keys="\n 0 0 0\n 0.5 1 .5\n")
 
 
-def test_a_face_animation_by_name_needs_no_keys() -> None:
+def test_face_keyframe_by_name_needs_no_keys() -> None:
     assert only("<bmlt:facekeyframe id='k' name='smile.xml'/>") == FaceKeyframe(id="k", name="smile.xml")
 
 
-def test_the_priority_of_a_behaviour_is_bmlas() -> None:
+def test_priority_of_a_behaviour_is_in_the_namespace_of_bmla() -> None:
     assert only("<head id='h' lexeme='NOD' bmla:priority='2.5'/>").priority == 2.5
     block = document("<head id='h' lexeme='NOD' bmla:priority='high'/>")
     assert block.problems[0].text.endswith('wanted -1e+06..1e+06, got "high"')

@@ -32,28 +32,28 @@ def cut(text: str) -> list[str]:
         ("<actor><bml/></actor>", ["!<actor>", "<bml/>", "!</actor>"]),
     ],
 )
-def test_a_text_is_cut_where_its_documents_begin_and_end(text: str, wanted: list[str]) -> None:
+def test_document_spans_begin_and_end_with_documents(text: str, wanted: list[str]) -> None:
     assert cut(text) == wanted
 
 
-def test_a_stretch_knows_its_start_tag_or_why_it_is_none() -> None:
+def test_document_spans_have_their_start_tag_or_a_fault() -> None:
     junk, document = document_spans("oops<bml id='a'></bml>")
     assert (junk.tag, junk.fault) == ("", 'wanted <bml>, got "oops"')
     assert (document.tag, document.fault) == ("<bml id='a'>", "")
 
 
-def test_only_a_part_of_a_text_may_be_cut() -> None:
+def test_document_spans_of_a_part_of_a_text() -> None:
     text = "<bml/><bml id='x'/><bml/>"
     assert [(s.start, s.end) for s in document_spans(text, 6, 19)] == [(6, 19)]
 
 
-def test_more_marks_than_anybody_writes_are_an_error() -> None:
+def test_document_spans_refuse_too_many_marks() -> None:
     with pytest.raises(BMLError, match="wanted at most 100000 tags"):
         list(document_spans("<!---->" * 100_001))
 
 
 @given(st.lists(st.sampled_from(["<bml>", "</bml>", "<bml/>", "<!--", "-->", "<act>", "</act>", "x", " "])))
-def test_stretches_stand_in_order_and_do_not_overlap(words: list[str]) -> None:
+def test_document_spans_are_in_order_and_do_not_overlap(words: list[str]) -> None:
     text = "".join(words)
     ends = [0, *(end for s in document_spans(text) for end in (s.start, s.end))]
     assert ends == sorted(ends)

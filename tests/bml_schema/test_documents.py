@@ -18,17 +18,17 @@ def told(text: str | bytes) -> list[str]:
     return [found.id if isinstance(found, Block) else str(found) for found in read(text)]
 
 
-def test_several_documents_are_read_in_order() -> None:
+def test_read_several_documents_in_order() -> None:
     assert told(A + B + C) == ["a", "b", "c"]
 
 
-def test_declarations_comments_and_blanks_may_stand_before_each() -> None:
+def test_read_declarations_comments_and_blanks_before_documents() -> None:
     declaration = '<?xml version="1.0" encoding="UTF-8"?>'
     text = f'\ufeff \n{declaration}<!-- <bml id="no"/> -->\n{A}\n{declaration}\ufeff{B}<!---->'
     assert told(text) == ["a", "b"]
 
 
-def test_an_empty_text_holds_nothing() -> None:
+def test_read_an_empty_text_gives_nothing() -> None:
     assert told("") == told(" \n\ufeff<!-- nothing -->") == []
 
 
@@ -57,13 +57,13 @@ def test_an_empty_text_holds_nothing() -> None:
         ("<bml ", ["line 1: not well-formed"]),
     ],
 )
-def test_after_a_broken_stretch_reading_goes_on_at_the_next_bml(text: str, wanted: list[str]) -> None:
+def test_read_goes_on_at_the_next_bml_after_a_broken_stretch(text: str, wanted: list[str]) -> None:
     found = told(text)
     assert len(found) == len(wanted)
     assert all(f.startswith(w) for f, w in zip(found, wanted, strict=True)), found
 
 
-def test_an_error_knows_the_id_that_could_be_read() -> None:
+def test_read_errors_have_the_id_if_possible() -> None:
     (error,) = read("<bml xmlns='urn:q' \n id = 'x' ><head</bml>")
     assert isinstance(error, BMLSyntaxError)
     assert error.block == "x"
@@ -79,7 +79,7 @@ def test_an_error_knows_the_id_that_could_be_read() -> None:
         "<!DOCTYPE bml>",
     ],
 )
-def test_a_document_with_a_dtd_is_refused_and_only_that(dtd: str) -> None:
+def test_read_refuses_a_document_with_a_dtd_only(dtd: str) -> None:
     found = list(read(f'{A}\n<?xml version="1.0"?>{dtd}<bml id="x"><wait id="w"/></bml>{B}'))
     error = found[1]
     assert [f.id for f in found if isinstance(f, Block)] == ["a", "b"]
@@ -88,7 +88,7 @@ def test_a_document_with_a_dtd_is_refused_and_only_that(dtd: str) -> None:
     assert (error.line, error.block) == (2, "x")
 
 
-def test_an_entity_bomb_costs_nothing() -> None:
+def test_read_an_entity_bomb_costs_nothing() -> None:
     entities = '<!ENTITY e0 "lol">' + "".join(f'<!ENTITY e{i} "{f"&e{i - 1};" * 10}">' for i in range(1, 10))
     text = f'<!DOCTYPE bml [{entities}]><bml id="b"><speech id="s"><text>&e9;</text></speech></bml>'
     with pytest.raises(BMLSyntaxError, match="without DTD"):
@@ -96,20 +96,20 @@ def test_an_entity_bomb_costs_nothing() -> None:
 
 
 @pytest.mark.parametrize("reference", ["&nobody;", "&#0;", "&#xD800;", "&"])
-def test_entities_without_a_dtd_are_not_well_formed(reference: str) -> None:
+def test_read_refuses_entities_without_a_dtd(reference: str) -> None:
     with pytest.raises(BMLSyntaxError, match="not well-formed"):
         parse(f'<bml id="b"><speech id="s"><text>{reference}</text></speech></bml>')
 
 
 @pytest.mark.parametrize("depth", [300, 10_000])
 @pytest.mark.parametrize("tag", ["head", "bml", "required"])
-def test_deep_nesting_is_one_clear_error(tag: str, depth: int) -> None:
+def test_read_deep_nesting_is_one_clear_error(tag: str, depth: int) -> None:
     (error,) = read(f'<bml id="b">{f"<{tag}>" * depth}{f"</{tag}>" * depth}</bml>')
     assert isinstance(error, BMLSyntaxError)
     assert "elements nested too deep, wanted at most 256" in str(error)
 
 
-def test_a_text_of_two_megabytes_is_refused() -> None:
+def test_read_refuses_two_megabytes() -> None:
     text = f'<bml id="b"><speech id="s"><text>{"x" * 2_000_000}</text></speech></bml>'
     with pytest.raises(
         BMLError, match=f"wanted at most {MAX_BYTES} bytes in a document, got 20000"
@@ -119,7 +119,7 @@ def test_a_text_of_two_megabytes_is_refused() -> None:
     assert isinstance(parse(text, max_bytes=1 << 22)["s"], Speech)
 
 
-def test_the_limit_counts_bytes_and_counts_each_document() -> None:
+def test_read_limits_the_bytes_of_each_document() -> None:
     text = '<bml id="b"><speech id="s"><text>ééé</text></speech></bml>'
     assert parse(text, max_bytes=len(text.encode()))
     with pytest.raises(BMLError, match="bytes"):
@@ -127,7 +127,7 @@ def test_the_limit_counts_bytes_and_counts_each_document() -> None:
     assert len(list(read(text * 5, max_bytes=len(text.encode())))) == 5
 
 
-def test_too_many_documents_in_one_text_are_not_read() -> None:
+def test_read_limits_the_number_of_documents() -> None:
     found = list(read(A * (MAX_DOCUMENTS + 5)))
     assert len(found) == MAX_DOCUMENTS + 1
     assert "wanted at most 1000 documents in one text" in str(found[-1])
@@ -157,12 +157,12 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE.keys())
-def test_hostile_texts_end_in_few_answers(text: str) -> None:
+def test_read_hostile_texts_gives_few_errors(text: str) -> None:
     # Each of them once took minutes or a flood of warnings: this test ends, or somebody notices.
     assert 1 <= len(list(read(text))) <= MAX_DOCUMENTS + 1
 
 
-def test_bytes_are_decoded_by_mark_declaration_or_as_utf8() -> None:
+def test_read_decodes_bytes_by_mark_declaration_or_as_utf8() -> None:
     text = '<bml id="ä"/>'
     assert told(text.encode()) == ["ä"]
     assert told(text.encode("utf-8-sig")) == ["ä"]
@@ -186,18 +186,18 @@ def test_bytes_are_decoded_by_mark_declaration_or_as_utf8() -> None:
         ),
     ],
 )
-def test_bytes_that_are_no_text_are_one_error(data: bytes, said: str) -> None:
+def test_read_undecodable_bytes_is_one_error(data: bytes, said: str) -> None:
     assert told(data) == [said]
 
 
 @pytest.mark.parametrize("bad", ["\0", "\x1b", "\ud800", "\uffff"])
-def test_characters_xml_cannot_hold_are_an_error_with_a_line(bad: str) -> None:
+def test_read_characters_xml_cannot_hold_is_an_error_with_a_line(bad: str) -> None:
     (error,) = read(f'<bml id="b">\n{bad}</bml>')
     assert isinstance(error, BMLSyntaxError)
     assert error.line == 2
 
 
-def test_marks_inside_cdata_and_comments_are_text() -> None:
+def test_read_ignores_marks_inside_cdata_and_comments() -> None:
     text = (
         '<bml id="a"><speech id="s"><text><![CDATA[</bml><bml id="x">]]></text></speech><!-- </bml> --></bml>'
     )
@@ -208,12 +208,12 @@ def test_marks_inside_cdata_and_comments_are_text() -> None:
 
 
 @pytest.mark.parametrize("text", ["", A + B, A + "oops"])
-def test_parse_wants_exactly_one_document(text: str) -> None:
+def test_parse_refuses_none_and_several_documents(text: str) -> None:
     with pytest.raises(BMLError, match=r"wanted"):
         parse(text)
 
 
-def test_strict_makes_the_first_problem_an_error() -> None:
+def test_parse_strict_raises_the_first_problem() -> None:
     text = '<bml id="b">\n<head id="h"/><wait id="w"/></bml>'
     assert len(parse(text).behaviours) == 1
     with pytest.raises(
@@ -224,7 +224,7 @@ def test_strict_makes_the_first_problem_an_error() -> None:
     assert parse(A, strict=True).id == "a"
 
 
-def test_lines_are_counted_over_the_whole_text() -> None:
+def test_read_counts_lines_over_the_whole_text() -> None:
     found = list(read(f'\n{C}\n\n<bml id="x">\n<head id="h"/>\n</bml>'))
     assert isinstance(found[1], Block)
     assert found[1].problems[0].line == 6
@@ -272,7 +272,7 @@ SEEDS = [
 
 @given(st.lists(st.sampled_from(WORDS), max_size=25).map("".join) | st.text(max_size=40))
 @example("<bml id='a'/>" * 3)
-def test_any_text_gives_blocks_and_errors_and_nothing_else(text: str) -> None:
+def test_read_any_text_gives_blocks_and_errors_only(text: str) -> None:
     for found in read(text):
         assert isinstance(found, Block | BMLError)
         if isinstance(found, Block):
@@ -280,7 +280,7 @@ def test_any_text_gives_blocks_and_errors_and_nothing_else(text: str) -> None:
 
 
 @given(st.data())
-def test_a_mutated_document_gives_blocks_and_errors_and_nothing_else(data: st.DataObject) -> None:
+def test_read_a_mutated_document_gives_blocks_and_errors_only(data: st.DataObject) -> None:
     text = data.draw(st.sampled_from(SEEDS) | blocks().map(write))
     for _ in range(data.draw(st.integers(1, 4))):
         start = data.draw(st.integers(0, len(text)))
@@ -298,7 +298,7 @@ def test_a_mutated_document_gives_blocks_and_errors_and_nothing_else(data: st.Da
 
 
 @given(st.binary(max_size=60) | st.lists(st.sampled_from(WORDS)).map(lambda w: "".join(w).encode("utf-16")))
-def test_any_bytes_give_blocks_and_errors_and_nothing_else(data: bytes) -> None:
+def test_read_any_bytes_gives_blocks_and_errors_only(data: bytes) -> None:
     assert all(isinstance(found, Block | BMLError) for found in read(data))
 
 
@@ -310,13 +310,13 @@ def test_any_bytes_give_blocks_and_errors_and_nothing_else(data: bytes) -> None:
         ('<bml id="x"><bml id="y"><broken</bml></bml><bml id="z"/>', [None, "z"]),
     ],
 )
-def test_a_broken_stretch_is_told_of_once_and_hides_no_good_document(
+def test_read_reports_a_broken_stretch_once_and_keeps_good_documents(
     text: str, read_as: list[object]
 ) -> None:
     assert [x.id if isinstance(x, Block) else None for x in read(text)] == read_as
 
 
-def test_the_act_around_smartbodys_documents_is_not_seen() -> None:
+def test_read_ignores_the_act_around_smartbodys_documents() -> None:
     inner = '<bml id="b"><q:head id="x"/>\n<wait id="w" start="1"/></bml>'
     text = f'<?xml version="1.0"?>\n<act xmlns:q="{CORE}"><participant id="Brad" role="actor"/>{inner}</act>'
     block = parse(text)
@@ -325,13 +325,13 @@ def test_the_act_around_smartbodys_documents_is_not_seen() -> None:
     assert block.places["w"] == Place(3, "/bml/wait[1]")
 
 
-def test_an_act_may_hold_several_documents_and_so_may_a_text_several_acts() -> None:
+def test_read_an_act_with_several_documents_and_several_acts() -> None:
     assert told(f"<act>{A}{B}</act>") == ["a", "b"]
     assert told(f"<act>{A}</act>\n<act><participant id='p'></participant>{B}</act>") == ["a", "b"]
     assert told(f"<act>{A}<bml id='x'><head </bml></act>{B}")[0::2] == ["a", "b"]
 
 
-def test_an_act_hides_no_text_that_is_none() -> None:
+def test_read_reports_text_in_an_act() -> None:
     assert told(f"<act>{A}</act>oops <active/>") == ["a", 'line 1: wanted <bml>, got "oops <active/>"']
     assert told("<act/>") == []
 
@@ -350,14 +350,14 @@ LONG = """<bml
 </bml>"""
 
 
-def test_the_line_of_an_element_is_that_where_its_tag_begins() -> None:
+def test_read_lines_of_elements_are_where_their_tags_begin() -> None:
     block = parse(LONG)
     assert block.places == {"h": Place(3, "/bml/head[1]"), "w": Place(6, "/bml/wait[1]")}
     assert [(p.id, p.line) for p in block.problems] == [("b:f", 7), ("b:g", 10)]
     assert [p.line for p in list(read(f"\n{A}\n{LONG}"))[1].problems] == [9, 12]  # type: ignore[union-attr]
 
 
-def test_long_tags_without_end_cost_no_more_than_others() -> None:
+def test_read_long_tags_without_end_in_linear_time() -> None:
     text = (
         f'<bml id="b"><speech id="s"><text><![CDATA[{"<a" * 90_000}{"<a" + chr(10)}]]></text></speech></bml>'
     )
@@ -367,7 +367,7 @@ def test_long_tags_without_end_cost_no_more_than_others() -> None:
 
 
 @given(blocks())
-def test_one_document_alone_is_read_as_among_others(block: Block) -> None:
+def test_read_gives_the_same_for_one_document_and_for_one_among_others(block: Block) -> None:
     text = write(block)
     alone, *_ = read(text)
     _, among = read(A + text)

@@ -29,7 +29,7 @@ def only(inside: str) -> Block:
 BAD = "<wait id='bad' duration='x'/>"
 
 
-def test_references_to_a_dropped_behaviour_vanish_and_are_listed() -> None:
+def test_dropped_references_vanish_and_are_listed() -> None:
     block = only(f"<wait id='a' start='bad:end+1' end='9'/>{BAD}<wait id='c' end='bad:start'/>")
     assert block["a"] == Wait(id="a", syncs={"end": SyncRef(offset=9.0)})
     assert block["c"] == Wait(id="c")
@@ -40,7 +40,7 @@ def test_references_to_a_dropped_behaviour_vanish_and_are_listed() -> None:
     assert not problem.fatal
 
 
-def test_a_sync_of_speech_loses_its_reference_and_stays() -> None:
+def test_dropped_references_of_syncs_in_speech_leave_the_sync() -> None:
     block = only(
         f"{BAD}<speech id='s'><text>a<sync id='m' ref='bad:end'/>b<sync id='n' ref='1'/></text></speech>"
     )
@@ -51,7 +51,7 @@ def test_a_sync_of_speech_loses_its_reference_and_stays() -> None:
     assert block.problems[0].lost_references == ("s:m",)
 
 
-def test_a_constraint_that_names_a_dropped_behaviour_vanishes_whole() -> None:
+def test_dropped_references_drop_whole_constraints() -> None:
     block = only(
         f"{BAD}<wait id='a'/><constraint id='c'><synchronize><sync ref='a:end'/><sync ref='2'/></synchronize>"
         "<before ref='bad:end'><sync ref='a:end'/></before></constraint>"
@@ -62,34 +62,34 @@ def test_a_constraint_that_names_a_dropped_behaviour_vanishes_whole() -> None:
     assert [p.lost_references for p in block.problems] == [("c", "/bml/constraint[2]")]
 
 
-def test_a_required_constraint_that_cannot_hold_is_fatal() -> None:
+def test_dropped_references_of_a_required_constraint_are_fatal() -> None:
     synchronize = "<synchronize><sync ref='bad:end'/><sync ref='2'/></synchronize>"
     block = only(f"{BAD}<required><constraint>{synchronize}</constraint></required>")
     assert [p.fatal for p in block.problems] == [True]
 
 
-def test_a_chain_of_dropped_behaviours_gives_each_its_own_problem_only() -> None:
+def test_dropped_references_in_a_chain_have_a_problem_each() -> None:
     block = only("<wait id='a' start='nobody:end'/><wait id='c' start='a:end'/><wait id='d' start='c:end'/>")
     assert [p.id for p in block.problems] == ["b:a"]
     assert block.problems[0].lost_references == ("c:start",)
     assert [x.id for x in block.behaviours] == ["c", "d"]
 
 
-def test_references_to_an_unsupported_element_vanish() -> None:
+def test_dropped_references_to_an_unsupported_element_vanish() -> None:
     block = only("<blink id='x'/><wait id='a' start='x:middle'/>")
     assert [(p.id, p.type, p.lost_references) for p in block.problems] == [
         ("b:x", "BEHAVIOR_TYPE_NOT_SUPPORTED", ("a:start",))
     ]
 
 
-def test_many_losses_are_counted_in_the_text_and_named_in_the_tuple() -> None:
+def test_dropped_references_are_counted_in_the_text_and_all_listed() -> None:
     waits = "".join(f"<wait id='w{i}' start='bad:end'/>" for i in range(30))
     problem: Problem = only(BAD + waits).problems[0]
     assert len(problem.lost_references) == 30
     assert problem.text.endswith("w9:start and 20 more")
 
 
-def test_a_node_that_names_nothing_dropped_is_itself() -> None:
+def test_without_returns_unaffected_nodes_unchanged() -> None:
     losses = ReferenceRemover({"gone"})
     node = Wait(id="a", syncs={"start": SyncRef(behaviour="here", sync="end")})
     other = Wait(id="a", syncs={"start": SyncRef(block="x", behaviour="gone", sync="end")})
@@ -98,7 +98,7 @@ def test_a_node_that_names_nothing_dropped_is_itself() -> None:
     assert not losses.lost_references
 
 
-def test_without_gives_the_rest_of_a_block_and_what_went() -> None:
+def test_without_returns_the_rest_of_a_block_and_the_lost_references() -> None:
     synchronize = "<synchronize><sync ref='a:end'/><sync ref='2'/></synchronize>"
     block = only(
         f"<wait id='a'/><wait id='c' start='a:end+1' end='9'/><constraint id='k'>{synchronize}</constraint>"
@@ -115,7 +115,7 @@ def test_without_gives_the_rest_of_a_block_and_what_went() -> None:
     assert left.places == block.places
 
 
-def test_without_tells_whose_loss_breaks_a_required_constraint() -> None:
+def test_without_reports_ids_that_a_required_constraint_names() -> None:
     before = "<before ref='a:end'><sync ref='c:end'/></before>"
     block = only(f"<wait id='a'/><wait id='c'/><required><constraint>{before}</constraint></required>")
     left, lost, fatal = without(block, {"a"})
@@ -130,9 +130,7 @@ def test_without_tells_whose_loss_breaks_a_required_constraint() -> None:
 
 
 @given(blocks(), st.data())
-def test_what_is_left_names_nothing_that_went_and_is_a_sound_document(
-    block: Block, data: st.DataObject
-) -> None:
+def test_without_leaves_a_sound_document(block: Block, data: st.DataObject) -> None:
     ids = [b.id for b in block.behaviours]
     gone = data.draw(st.sets(st.sampled_from(ids)) if ids else st.just(set()))
     left = without(block, gone).block

@@ -28,7 +28,7 @@ def described(description: str) -> Block:
     return only(f"<head id='h' lexeme='NOD'>{description}</head>")
 
 
-def test_a_description_of_any_type_is_kept_as_text() -> None:
+def test_description_of_any_type_is_kept_as_text() -> None:
     block = described(
         '<description priority="1" type="x/y"> a &lt; <q xmlns="urn:q" k="1"><r/></q> b </description>'
     )
@@ -37,7 +37,7 @@ def test_a_description_of_any_type_is_kept_as_text() -> None:
     assert parse(write(block)) == block
 
 
-def test_of_ssml_exactly_the_speak_element_is_kept() -> None:
+def test_description_of_ssml_is_exactly_the_speak_element() -> None:
     inside = f'\n <speak xmlns="{SSML}">Hi <mark name="m"/></speak>\n'
     block = described(f'<description priority="1" type="application/ssml+xml">{inside}</description>')
     assert block["h"].descriptions[0].content == f'<speak xmlns="{SSML}">Hi <mark name="m"/></speak>'
@@ -52,7 +52,7 @@ def test_of_ssml_exactly_the_speak_element_is_kept() -> None:
         ("<description priority='1' type='application/ssml+xml'>Hi</description>", "wanted one <speak>"),
     ],
 )
-def test_a_bad_description_is_the_behaviours_fault(description: str, said: str) -> None:
+def test_description_with_a_fault_drops_the_behaviour(description: str, said: str) -> None:
     block = described(description)
     assert not block.behaviours
     assert [p.id for p in block.problems] == ["b:h"]
@@ -60,19 +60,19 @@ def test_a_bad_description_is_the_behaviours_fault(description: str, said: str) 
     assert block.problems[0].path == "/bml/head[1]/description[1]"
 
 
-def test_a_description_without_namespace_stays_without() -> None:
+def test_description_without_namespace_stays_without() -> None:
     block = described("<description priority='1' type='x'><q/></description>")
     assert parse(write(block)) == block
     assert block["h"].descriptions[0].content == "<q/>"
 
 
-def test_elements_of_others_inside_a_behaviour_are_left_to_them() -> None:
+def test_unknown_children_of_other_languages_are_no_fault() -> None:
     block = only("<head id='h' lexeme='NOD'><q:parameter xmlns:q='urn:q'/></head>")
     assert not block.problems
     assert [b.id for b in block.behaviours] == ["h"]
 
 
-def test_elements_of_ours_in_the_wrong_place_are_a_fault() -> None:
+def test_children_of_ours_in_the_wrong_place_are_a_fault() -> None:
     block = only("<head id='h' lexeme='NOD'><stance type='LYING'/></head>")
     assert block.problems[0].text == "wanted <description>, got <stance>"
 
@@ -85,7 +85,7 @@ CONSTRAINT = """<wait id='a'/><wait id='b'/>
 </constraint>"""
 
 
-def test_a_constraint_has_its_parts_in_order() -> None:
+def test_constraint_has_its_parts_in_order() -> None:
     block = only(CONSTRAINT)
     a, b, end = (SyncRef(behaviour="a", sync="end"), SyncRef(behaviour="b", sync="start", offset=1.0), "end")
     assert block.constraints == (
@@ -103,7 +103,7 @@ def test_a_constraint_has_its_parts_in_order() -> None:
     assert parse(write(block)) == block
 
 
-def test_the_ref_of_a_drafts_synchronize_is_one_of_its_points() -> None:
+def test_constraint_of_a_draft_has_the_ref_of_synchronize_as_a_point() -> None:
     block = only(
         "<wait id='a'/><constraint><synchronize ref='a:start'><sync ref='1'/></synchronize></constraint>"
     )
@@ -125,7 +125,7 @@ def test_the_ref_of_a_drafts_synchronize_is_one_of_its_points() -> None:
         ("text", 'wanted elements, got the text "text"', ""),
     ],
 )
-def test_a_bad_constraint_goes_alone(inside: str, said: str, path: str) -> None:
+def test_constraint_with_a_fault_goes_alone(inside: str, said: str, path: str) -> None:
     block = only(f"<wait id='a'/><constraint id='c'>{inside}</constraint>")
     assert [b.id for b in block.behaviours] == ["a"]
     assert not block.constraints
@@ -135,11 +135,11 @@ def test_a_bad_constraint_goes_alone(inside: str, said: str, path: str) -> None:
     assert not problem.fatal
 
 
-def test_a_bad_constraint_without_id_is_told_of_under_the_blocks() -> None:
+def test_constraint_without_id_is_reported_under_the_block() -> None:
     assert [p.id for p in only("<constraint/>").problems] == ["b"]
 
 
-def test_elements_of_others_inside_a_behaviour_are_kept_in_their_namespaces() -> None:
+def test_unknown_children_are_kept_in_their_namespaces() -> None:
     block = described(
         "<q:parameter xmlns:q='urn:q' xmlns:z='urn:z' z:a='&lt;'> x <q:b/></q:parameter>\n<r xmlns='urn:r'/>"
     )
@@ -151,7 +151,7 @@ def test_elements_of_others_inside_a_behaviour_are_kept_in_their_namespaces() ->
     assert parse(write(block)) == block
 
 
-def test_a_number_of_strokes_may_have_blanks_around_it() -> None:
+def test_attributes_may_have_blanks_around_numbers() -> None:
     block = only("<head id='h' lexeme='NOD' repetition=' 3 '/><wait id='w' start='h:stroke:3'/>")
     assert not block.problems
     # A gesture has one stroke, whatever its author hoped for.

@@ -10,38 +10,38 @@ from bml_schema import BMLError, BMLSyntaxError, Problem
 from bml_schema.errors import at, did_you_mean, quoted
 
 
-def test_an_error_reads_like_line_path_wanted_got() -> None:
+def test_bml_error_has_line_path_wanted_and_got() -> None:
     error = BMLError("amount: wanted 0..1, got 7", line=3, path="/bml/head[1]")
     assert str(error) == "line 3, /bml/head[1]: amount: wanted 0..1, got 7"
 
 
-def test_an_error_without_place_is_its_text() -> None:
+def test_bml_error_without_place_is_its_text() -> None:
     assert str(BMLError("nothing")) == "nothing"
     assert at(2, "", "odd") == "line 2: odd"
 
 
-def test_an_error_survives_a_process_border() -> None:
+def test_bml_error_can_be_pickled() -> None:
     error = BMLSyntaxError("odd", line=3, path="/bml", block="b")
     back = pickle.loads(pickle.dumps(error))
     assert type(back) is BMLSyntaxError
     assert (back.text, back.line, back.path, back.block) == ("odd", 3, "/bml", "b")
 
 
-def test_a_problem_reads_like_an_error() -> None:
+def test_problem_reads_like_an_error() -> None:
     problem = Problem(id="b:h", type="PARSING_FAILURE", text="odd", line=3, path="/bml/head[1]")
     assert str(problem) == "line 3, /bml/head[1]: odd"
 
 
 @pytest.mark.parametrize(("value", "said"), [("7", "7"), ("-0.5", "-0.5"), ("left", '"left"'), ("", '""')])
-def test_numbers_are_shown_bare_and_words_quoted(value: str, said: str) -> None:
+def test_quoted_shows_numbers_bare_and_words_quoted(value: str, said: str) -> None:
     assert quoted(value) == said
 
 
-def test_a_long_value_is_cut() -> None:
+def test_quoted_cuts_a_long_value() -> None:
     assert len(quoted("x" * 1000)) < 80
 
 
-def test_a_near_name_is_suggested() -> None:
+def test_did_you_mean_suggests_a_near_name() -> None:
     assert did_you_mean("nod2", ["speech1", "nod1"]) == ', did you mean "nod1"?'
     assert did_you_mean("nod2", ["speech1"]) == ""
     assert did_you_mean("n" * 1000, ["n" * 999]) == ""

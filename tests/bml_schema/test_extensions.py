@@ -22,7 +22,7 @@ def only(inside: str) -> Behaviour:
     return behaviour
 
 
-def test_an_emotion_has_a_word_or_a_place_on_the_wheel() -> None:
+def test_emotion_has_a_word_or_a_place_on_the_wheel() -> None:
     assert only("<r:emotion id='e' name='worried' intensity='1'/>") == Emotion(
         id="e", name="worried", intensity=1.0
     )
@@ -54,11 +54,11 @@ def test_an_emotion_has_a_word_or_a_place_on_the_wheel() -> None:
         ("name='joy' intensity='1.5'", "intensity: wanted 0..1, got 1.5"),
     ],
 )
-def test_what_an_emotion_does_not_take(tag: str, attributes: str, said: str) -> None:
+def test_emotion_refuses_wrong_attributes(tag: str, attributes: str, said: str) -> None:
     assert [p.text for p in document(f"<r:{tag} id='e' {attributes}/>").problems] == [said]
 
 
-def test_raw_faps_have_numbers_and_values_in_their_units() -> None:
+def test_faps_have_numbers_and_values_in_their_units() -> None:
     node = only(
         "<r:faps id='f' attackPeak='1'><r:fap number='3' value='-200'/><fap number='68' value='.5'/></r:faps>"
     )
@@ -75,17 +75,17 @@ def test_raw_faps_have_numbers_and_values_in_their_units() -> None:
         ("<r:fap number='3' value='1'>x</r:fap>", 'wanted elements, got the text "x"'),
     ],
 )
-def test_what_raw_faps_do_not_take(inside: str, said: str) -> None:
+def test_faps_refuse_wrong_values(inside: str, said: str) -> None:
     assert [p.text for p in document(f"<r:faps id='f'>{inside}</r:faps>").problems] == [said]
 
 
-def test_files_and_idle_motion() -> None:
+def test_extensions_have_files_and_idle_motion() -> None:
     assert only("<r:timeline id='t' fileName='a.toml'/>") == Timeline(id="t", file_name="a.toml")
     assert only("<r:fapFile id='f' fileName='a.fap'/>") == FapFile(id="f", file_name="a.fap")
     assert only("<r:idle id='i' blinks='0'/>") == Idle(id="i", blinks=0.0)
 
 
-def test_ours_outside_our_namespace_are_pointed_to_it() -> None:
+def test_extensions_outside_our_namespace_get_a_hint() -> None:
     (problem,) = document("<blink id='x'/>").problems
     assert (problem.id, problem.type) == ("b:x", "BEHAVIOR_TYPE_NOT_SUPPORTED")
     assert problem.text == f"no behaviour <blink> in BML 1.0, but one in the namespace {OWN}"

@@ -78,12 +78,12 @@ feedback = st.one_of(
 
 
 @given(feedback)
-def test_feedback_reads_back_as_it_was(told: Feedback) -> None:
+def test_parse_feedback_reads_back_every_message(told: Feedback) -> None:
     assert parse_feedback(told.to_xml()) == told
 
 
 @given(feedback, st.integers(1, 10**9))
-def test_the_number_of_a_message_is_in_our_own_namespace(told: Feedback, seq: int) -> None:
+def test_to_xml_writes_the_number_of_a_message_in_our_namespace(told: Feedback, seq: int) -> None:
     text = told.to_xml(seq)
     root = etree.fromstring(text.encode())
     assert root.get(f"{{{OWN}}}seq") == str(seq)
@@ -94,7 +94,7 @@ def test_the_number_of_a_message_is_in_our_own_namespace(told: Feedback, seq: in
 
 
 @given(feedback)
-def test_every_element_is_in_a_known_namespace_and_names_are_plain(told: Feedback) -> None:
+def test_to_xml_uses_known_namespaces_and_plain_names(told: Feedback) -> None:
     root = etree.fromstring(told.to_xml(7, 1.7e9).encode())
     assert str(root.tag).startswith(f"{{{CORE}}}")
     for name in root.attrib:
@@ -103,7 +103,7 @@ def test_every_element_is_in_a_known_namespace_and_names_are_plain(told: Feedbac
 
 
 @given(feedback, st.integers(0, 2 * 10**9))
-def test_wall_clock_times_come_beside_those_of_the_session(told: Feedback, epoch: int) -> None:
+def test_to_xml_writes_wall_clock_times_beside_those_of_the_session(told: Feedback, epoch: int) -> None:
     back = parse_feedback(told.to_xml(1, epoch))
     assert back == told
     if isinstance(back, BlockProgress | SyncPointProgress):
@@ -115,19 +115,19 @@ def test_wall_clock_times_come_beside_those_of_the_session(told: Feedback, epoch
     assert back.to_xml() == told.to_xml(1, epoch), "what was read can be passed on as it was"
 
 
-def test_a_predicted_behaviour_of_ours_and_a_number_share_a_prefix() -> None:
+def test_to_xml_shares_a_prefix_of_a_predicted_behaviour_and_a_number() -> None:
     told = PredictionFeedback(behaviours=(Blink(id="b:x"),))
     root = etree.fromstring(told.to_xml(4).encode())
     assert root.get(f"{{{OWN}}}seq") == "4"
     assert parse_feedback(told.to_xml(4)) == told
 
 
-def test_block_progress_looks_like_the_standards() -> None:
+def test_to_xml_of_block_progress_is_as_in_the_standard() -> None:
     text = BlockProgress(id="b1:start", global_time=1.5, character_id="A").to_xml()
     assert text == f'<blockProgress xmlns="{CORE}" id="b1:start" globalTime="1.5" characterId="A"/>'
 
 
-def test_sync_point_progress_looks_like_the_standards() -> None:
+def test_to_xml_of_sync_point_progress_is_as_in_the_standard() -> None:
     text = SyncPointProgress(id="b1:nod1:stroke:2", time=0.1 + 0.2, global_time=100000.123).to_xml(3)
     assert text == (
         f'<syncPointProgress xmlns="{CORE}" id="b1:nod1:stroke:2" time="0.3" globalTime="100000.123"'
@@ -135,12 +135,12 @@ def test_sync_point_progress_looks_like_the_standards() -> None:
     )
 
 
-def test_the_status_of_a_block_is_in_bmlas_namespace() -> None:
+def test_to_xml_writes_the_status_of_a_block_in_bmlas_namespace() -> None:
     text = BlockProgress(id="b1:end", global_time=0.0, status="INTERRUPTED").to_xml()
     assert etree.fromstring(text.encode()).get(f"{{{BMLA}}}status") == "INTERRUPTED"
 
 
-def test_a_warning_has_plain_text_only() -> None:
+def test_to_xml_of_a_warning_has_plain_text_only() -> None:
     text = WarningFeedback(id="b1:h", type="PARSING_FAILURE", text='a < b & "c" \0').to_xml()
     assert "CDATA" not in text
     root = etree.fromstring(text.encode())
@@ -149,12 +149,12 @@ def test_a_warning_has_plain_text_only() -> None:
 
 
 @pytest.mark.parametrize("time", [1e-7, 1e300, -0.0])
-def test_no_time_has_an_exponent(time: float) -> None:
+def test_to_xml_writes_no_exponents(time: float) -> None:
     text = BlockProgress(id="b:end", global_time=time).to_xml()
     assert "e" not in text.partition('globalTime="')[2].partition('"')[0]
 
 
-def test_no_time_is_nan() -> None:
+def test_to_xml_refuses_nan() -> None:
     with pytest.raises(ValueError, match="finite"):
         BlockProgress(id="b:end", global_time=float("nan")).to_xml()
 
@@ -164,7 +164,7 @@ SPEECH = """<bml id="b"><speech id="s" start="h:end"><text>Hi <sync id="m" ref="
 <head id="h" lexeme="NOD" repetition="2" amount="1" odd="1"/></bml>"""
 
 
-def test_a_predicted_behaviour_has_its_required_attributes_and_its_times() -> None:
+def test_prediction_of_has_required_attributes_and_times() -> None:
     block = parse(SPEECH)
     head = prediction_of(
         block["h"], "b", {"start": 0.0, "stroke:1": 0.25, "stroke": 0.5, "end": 1.0000000004}
@@ -175,7 +175,7 @@ def test_a_predicted_behaviour_has_its_required_attributes_and_its_times() -> No
     assert '<head id="b:h" lexeme="NOD" repetition="2" amount="1" start="0" stroke="0.5" end="1"/>' in text
 
 
-def test_predicted_speech_tells_its_syncs_in_the_text() -> None:
+def test_prediction_of_speech_has_its_syncs_in_the_text() -> None:
     speech = prediction_of(parse(SPEECH)["s"], "b", {"start": 0.0, "m": 2.0, "end": 3.0})
     assert isinstance(speech, Speech)
     assert speech.text is not None
@@ -184,21 +184,21 @@ def test_predicted_speech_tells_its_syncs_in_the_text() -> None:
     assert '<sync id="m" ref="2"/>' in PredictionFeedback(behaviours=(speech,)).to_xml()
 
 
-def test_what_is_predicted_tells_no_keys_and_nothing_of_others() -> None:
+def test_prediction_of_leaves_out_keys_and_unknown_parts() -> None:
     keys = FaceInterpolator(parts="31", keys="0 1\n" * 1000)
     node = FaceKeyframe(id="k", type="FAPS", interpolator=keys, unknown_children=('<a xmlns="urn:a"/>',))
     told = prediction_of(node, "b", {"start": 0.0, "end": 1.0})
     assert told == FaceKeyframe(id="b:k", type="FAPS", syncs={"start": SyncRef(), "end": SyncRef(offset=1.0)})
 
 
-def test_unknown_children_of_a_prediction_are_skipped() -> None:
+def test_parse_feedback_skips_unknown_children_of_a_prediction() -> None:
     text = (
         f'<predictionFeedback xmlns="{CORE}"><blink id="b:x" start="1"/><head id="b:h"/></predictionFeedback>'
     )
     assert parse_feedback(text) == PredictionFeedback()
 
 
-def test_times_of_others_may_have_exponents() -> None:
+def test_parse_feedback_reads_times_with_exponents() -> None:
     text = f'<blockProgress xmlns="{CORE}" id="b:start" globalTime="1.0E-4"/>'
     assert parse_feedback(text) == BlockProgress(id="b:start", global_time=0.0001)
 
@@ -223,12 +223,12 @@ def test_times_of_others_may_have_exponents() -> None:
         ("<a>\ud800</a>", "characters XML can hold"),
     ],
 )
-def test_what_is_no_feedback_is_an_error(text: str, said: str) -> None:
+def test_parse_feedback_refuses_other_elements(text: str, said: str) -> None:
     with pytest.raises(BMLError, match=said):
         parse_feedback(text)
 
 
-def test_marks_that_only_a_description_names_are_predicted_behind_the_text() -> None:
+def test_prediction_of_speech_appends_marks_of_descriptions() -> None:
     node = parse('<bml id="b"><speech id="s"><text>a <sync id="m"/> b</text></speech></bml>')["s"]
     told = prediction_of(node, "b", {"start": 0.0, "m": 0.5, "x": 0.75, "end": 1.0})
     text = text_of(told)
@@ -249,7 +249,7 @@ def text_of(node: Behaviour) -> str:
     return xml[xml.index("<text>") + 6 : xml.index("</text>")]
 
 
-def test_the_end_of_a_block_says_how_far_its_speech_came() -> None:
+def test_block_progress_has_the_words_spoken_before_a_cut() -> None:
     told = BlockProgress(id="b:end", global_time=1.0, status="INTERRUPTED", said="I think that")
     root = etree.fromstring(told.to_xml(3).encode())
     assert root.get(f"{{{OWN}}}said") == "I think that"
@@ -264,6 +264,6 @@ def test_the_end_of_a_block_says_how_far_its_speech_came() -> None:
     | st.integers(-(10**12), 10**12)
     | st.integers(-(10**7), 10**7).map(lambda n: n / 2e6)
 )
-def test_times_are_written_to_the_microsecond_as_rounding_has_them(time: float) -> None:
+def test_to_xml_writes_times_to_the_microsecond(time: float) -> None:
     told = BlockProgress(id="b:end", global_time=time).to_xml()
     assert f'globalTime="{decimal(round(float(time), 6))}"' in told

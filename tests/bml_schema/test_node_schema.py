@@ -66,7 +66,7 @@ def document(inside: str) -> str:
     return f'<bml id="b" xmlns="{core}" xmlns:x="{OURS}">{inside}</bml>'
 
 
-def test_an_extension_is_read_and_written_like_a_core_behaviour() -> None:
+def test_node_class_is_read_and_written_like_a_core_behaviour() -> None:
     inside = '<x:wink id="w" side="LEFT" attackPeak="1"/><head id="h" lexeme="NOD" start="w:attackPeak+1"/>'
     block = parse(document(inside), OPEN)
     wink = block["w"]
@@ -77,25 +77,25 @@ def test_an_extension_is_read_and_written_like_a_core_behaviour() -> None:
     assert parse(write(block), OPEN) == block
 
 
-def test_without_its_class_the_extension_is_not_supported() -> None:
+def test_node_class_missing_from_the_vocabulary_is_not_supported() -> None:
     block = parse(document('<x:wink id="w" side="LEFT"/>'))
     assert [(p.id, p.type) for p in block.problems] == [("b:w", "CUSTOM_BEHAVIOR_NOT_SUPPORTED")]
 
 
-def test_a_field_has_its_name_in_camel_case() -> None:
+def test_node_class_field_has_its_name_in_camel_case() -> None:
     block = parse(document('<x:wink id="w" side="LEFT" howMuch="0.25"/>'), OPEN)
     assert isinstance(block["w"], Wink)
     assert block["w"].how_much == 0.25
     assert camel("offset_angle") == "offsetAngle"
 
 
-def test_a_fault_of_an_extension_reads_like_any_other() -> None:
+def test_node_class_fault_reads_like_any_other() -> None:
     block = parse(document('\n<x:wink id="w" howMuch="2"/>'), OPEN)
     said = "line 2, /bml/wink[1]: howMuch: wanted 0..1, got 2; side: wanted LEFT or RIGHT, got none"
     assert [str(p) for p in block.problems] == [said]
 
 
-def test_children_text_and_references_inside_are_read_and_written() -> None:
+def test_node_class_reads_children_text_and_references_inside() -> None:
     inside = (
         '<x:change id="c"><x:trajectory targetValue="3" after="c:start+1">0 1 &lt; 2</x:trajectory>'
         '<x:note/><x:note by="me"/></x:change>'
@@ -110,7 +110,7 @@ def test_children_text_and_references_inside_are_read_and_written() -> None:
     assert parse(write(block), OPEN) == block
 
 
-def test_children_in_the_core_namespace_are_taken_as_the_extensions_own() -> None:
+def test_node_class_reads_children_in_the_core_namespace() -> None:
     block = parse(document('<x:change id="c"><trajectory targetValue="3"/></x:change>'), OPEN)
     assert block["c"] == Change(id="c", trajectory=Trajectory(to=3.0), notes=())
 
@@ -124,20 +124,20 @@ def test_children_in_the_core_namespace_are_taken_as_the_extensions_own() -> Non
         ("<head/>", "wanted <trajectory> or <note>, got <head>"),
     ],
 )
-def test_wrong_children_drop_the_behaviour(inside: str, said: str) -> None:
+def test_node_class_with_wrong_children_drops_the_behaviour(inside: str, said: str) -> None:
     block = parse(document(f'<x:change id="c">{inside}</x:change>'), OPEN)
     assert not block.behaviours
     assert [p.text for p in block.problems] == [said]
 
 
-def test_nodes_are_frozen_and_have_no_dict() -> None:
+def test_node_is_frozen_and_has_no_dict() -> None:
     wink = Wink(id="w", side="LEFT")
     with pytest.raises(FrozenInstanceError):
         wink.side = "RIGHT"  # type: ignore[misc]
     assert not hasattr(wink, "__dict__")
 
 
-def test_nodes_are_made_as_dataclasses_are() -> None:
+def test_node_is_made_as_a_dataclass_is() -> None:
     assert Wink(id="w", side="LEFT") == replace(Wink(id="x", side="LEFT"), id="w")
     one, two = Wink(id="a", side="LEFT"), Wink(id="b", side="LEFT")
     assert one.syncs is not two.syncs, "each has a dict of its own"
@@ -149,12 +149,12 @@ def test_nodes_are_made_as_dataclasses_are() -> None:
         Wink("w")  # type: ignore[call-arg, misc]
 
 
-def test_the_shape_of_a_class_is_made_once() -> None:
+def test_schema_of_a_class_is_made_once() -> None:
     assert schema_of(Block) is schema_of(Block)
     assert local("{urn:x}a") == local("a") == "a"
 
 
-def test_a_changed_node_is_as_it_was_but_for_what_was_changed() -> None:
+def test_changed_replaces_the_given_fields_only() -> None:
     nod = parse('<bml id="b"><head id="n" lexeme="NOD" start="1" amount="0.3"/></bml>')["n"]
     other = changed(nod, id="m", syncs={})
     assert other == replace(nod, id="m", syncs={})

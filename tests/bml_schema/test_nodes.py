@@ -11,7 +11,7 @@ from bml_schema import Behaviour, Block, Constraint, Head, Required, Synchronize
 from tests.strategies import blocks
 
 
-def test_behaviours_and_constraints_are_listed_in_document_order() -> None:
+def test_block_lists_behaviours_and_constraints_in_document_order() -> None:
     a, b, c = Wait(id="a"), Head(id="b", lexeme="NOD"), Wait(id="c")
     refs = (SyncRef(behaviour="a", sync="end"), SyncRef(behaviour="b", sync="start"))
     one = Constraint(id="one", parts=(Synchronize(refs=refs),))
@@ -25,13 +25,13 @@ def test_behaviours_and_constraints_are_listed_in_document_order() -> None:
         block["nobody"]
 
 
-def test_nodes_can_be_keys_of_a_dict() -> None:
+def test_block_nodes_can_be_keys_of_a_dict() -> None:
     assert len({Wait(id="a"), Wait(id="a"), Wait(id="b")}) == 2
     assert len({Block(id="a"), Block(id="a", unknown_attributes={})}) == 1
 
 
 @given(blocks())
-def test_a_block_survives_a_process_border_and_is_hashable(block: Block) -> None:
+def test_block_can_be_pickled_and_hashed(block: Block) -> None:
     back = pickle.loads(pickle.dumps(block))
     assert back == block
     assert hash(back) == hash(block)

@@ -12,32 +12,32 @@ def only(inside: str, attributes: str = "id='b'") -> Block:
 
 
 @pytest.mark.parametrize("attributes", ["", "id=''", "id=' '", "id='bml'", "id='a:b'", f"id='{'x' * 257}'"])
-def test_without_a_usable_id_there_is_no_block(attributes: str) -> None:
+def test_parser_needs_a_usable_id(attributes: str) -> None:
     with pytest.raises(BMLError, match="line 1, /bml: id: wanted") as caught:
         only("<head id='h' lexeme='NOD'/>", attributes)
     assert caught.value.path == "/bml"
     assert caught.value.line == 1
 
 
-def test_a_document_may_have_the_namespace_any_prefix_or_none() -> None:
+def test_parser_reads_the_namespace_with_any_prefix_or_none() -> None:
     plain = parse("<bml id='b'><wait id='w'/></bml>")
     assert parse(f"<bml xmlns='{CORE}' id='b'><wait id='w'/></bml>") == plain
     assert parse(f"<q:bml xmlns:q='{CORE}' id='b'><q:wait id='w'/></q:bml>") == plain
 
 
-def test_another_language_is_refused() -> None:
+def test_parser_refuses_another_language() -> None:
     with pytest.raises(BMLError, match=r'wanted <bml> in namespace http.*bml-1\.0, got "\{urn:x\}bml"'):
         parse("<bml xmlns='urn:x' id='b'/>")
 
 
 @pytest.mark.parametrize("word", ["APPEND", "append", " Append "])
-def test_composition_is_read_in_any_case(word: str) -> None:
+def test_parser_reads_composition_in_any_case(word: str) -> None:
     block = only("", f"id='b' composition='{word}'")
     assert block.composition == "APPEND"
     assert not block.problems
 
 
-def test_an_unknown_composition_is_told_of_and_taken_as_merge() -> None:
+def test_parser_takes_an_unknown_composition_as_merge_with_a_problem() -> None:
     block = only("<wait id='w'/>", "id='b' composition='BLEND'")
     assert block.composition == "MERGE"
     assert len(block.behaviours) == 1
@@ -57,7 +57,7 @@ LISTS = {
 
 
 @pytest.mark.parametrize("field", LISTS)
-def test_bmlas_lists_of_blocks_have_commas_and_may_be_empty(field: str) -> None:
+def test_parser_reads_lists_of_blocks_with_commas_or_empty(field: str) -> None:
     def read(listed: str) -> object:
         block = only("", f"id='b' xmlns:a='{BMLA}' a:{LISTS[field]}='{listed}'")
         assert not block.problems
@@ -79,12 +79,12 @@ def test_bmlas_lists_of_blocks_have_commas_and_may_be_empty(field: str) -> None:
         ("APPEND-AFTER(b)", ()),
     ],
 )
-def test_append_after_may_stand_in_the_composition(composition: str, after: tuple[str, ...]) -> None:
+def test_parser_reads_append_after_in_composition(composition: str, after: tuple[str, ...]) -> None:
     block = only("", f"id='b' composition='{composition}'")
     assert (block.composition, block.append_after, block.problems) == ("MERGE", after, ())
 
 
-def test_append_after_in_both_places_is_both() -> None:
+def test_parser_joins_append_after_of_both_places() -> None:
     for attributes in (
         "a:appendAfter='b1,b2' composition='APPEND-AFTER(b2,b3)'",
         "composition='APPEND-AFTER(b1,b2)' a:appendAfter='b3'",
@@ -93,7 +93,7 @@ def test_append_after_in_both_places_is_both() -> None:
         assert sorted(block.append_after) == ["b1", "b2", "b3"]
 
 
-def test_wrong_attributes_of_a_block_are_one_problem_and_leave_their_defaults() -> None:
+def test_parser_reports_wrong_attributes_of_a_block_and_takes_defaults() -> None:
     attributes = "composition='MIX' a:preplan='maybe' a:chunkAfter='a:b' a:appendAfter='bml' a:onStart='b2'"
     block = only("<wait id='w'/>", f"id='b' xmlns:a='{BMLA}' {attributes}")
     assert block == Block(id="b", on_start=("b2",), children=(Wait(id="w"),))
@@ -107,14 +107,14 @@ def test_wrong_attributes_of_a_block_are_one_problem_and_leave_their_defaults() 
     )
 
 
-def test_the_character_is_read_and_an_empty_one_is_none() -> None:
+def test_parser_reads_the_character_and_an_empty_one_as_none() -> None:
     assert only("", "id='b' characterId='Alice'").character_id == "Alice"
     block = only("", "id='b' characterId=''")
     assert block.character_id is None
     assert not block.problems
 
 
-def test_a_fault_drops_its_behaviour_and_no_other() -> None:
+def test_parser_drops_a_behaviour_with_a_fault_and_no_other() -> None:
     block = only("<wait id='a'/>\n<head id='h' lexeme='NOD' amount='7'/>\n<wait id='c'/>")
     assert [b.id for b in block.behaviours] == ["a", "c"]
     (problem,) = block.problems
@@ -127,7 +127,7 @@ def test_a_fault_drops_its_behaviour_and_no_other() -> None:
     assert str(problem) == "line 2, /bml/head[1]: amount: wanted 0..1, got 7"
 
 
-def test_several_faults_of_one_behaviour_are_one_problem() -> None:
+def test_parser_joins_faults_of_one_behaviour_in_one_problem() -> None:
     (problem,) = only("<head id='h' amount='7' start='nobody:end' repetition='0'/>").problems
     assert problem.text == (
         'amount: wanted 0..1, got 7; start: no behaviour "nobody" in this block; '
@@ -135,7 +135,7 @@ def test_several_faults_of_one_behaviour_are_one_problem() -> None:
     )
 
 
-def test_a_fault_inside_required_is_fatal() -> None:
+def test_parser_reports_a_fault_inside_required_as_fatal() -> None:
     block = only("<required><wait id='a'/><head id='h'/></required><wait id='c'/>")
     assert [(p.id, p.fatal, p.path) for p in block.problems] == [("b:h", True, "/bml/required[1]/head[1]")]
 
@@ -143,23 +143,23 @@ def test_a_fault_inside_required_is_fatal() -> None:
 @pytest.mark.parametrize(
     "inside", ["<blink id='x'/>", "<x:y xmlns:x='urn:x' id='x'/>", "<constraint id='x'/>"]
 )
-def test_what_is_not_known_inside_required_is_fatal_too(inside: str) -> None:
+def test_parser_reports_an_unknown_element_inside_required_as_fatal(inside: str) -> None:
     assert [p.fatal for p in only(f"<required>{inside}</required>").problems] == [True]
 
 
-def test_a_required_inside_a_required_adds_nothing() -> None:
+def test_parser_flattens_required_inside_required() -> None:
     block = only("<required><wait id='a'/><required><wait id='c'/></required></required>")
     assert block.children == (Required(children=(Wait(id="a"), Wait(id="c"))),)
     assert block.places["c"] == Place(1, "/bml/required[1]/required[1]/wait[1]")
 
 
-def test_a_behaviour_without_id_is_told_of_by_its_path() -> None:
+def test_parser_names_a_behaviour_without_id_by_its_path() -> None:
     block = only("<wait/><wait id='bml'/><wait id='a:b'/><wait id='a b'/>")
     assert not block.behaviours
     assert [p.id for p in block.problems] == ["b:/bml/wait[1]", "b:bml", "b:a:b", "b:a b"]
 
 
-def test_of_two_same_ids_the_later_goes() -> None:
+def test_parser_drops_the_later_of_two_with_one_id() -> None:
     block = only("<wait id='a' duration='1'/>\n<head id='a' lexeme='NOD'/><wait id='c' start='a:end'/>")
     assert block["a"] == Wait(id="a", duration=1.0)
     assert block["c"].syncs == {"start": SyncRef(behaviour="a", sync="end")}
@@ -169,7 +169,7 @@ def test_of_two_same_ids_the_later_goes() -> None:
     assert problem.path == "/bml/head[1]"
 
 
-def test_the_later_goes_even_when_the_first_is_bad() -> None:
+def test_parser_drops_the_later_of_two_even_if_the_first_is_bad() -> None:
     block = only("<wait id='a' duration='x'/><wait id='a'/><wait id='c' start='a:end'/>")
     assert block.behaviours == (Wait(id="c"),)
     assert [p.id for p in block.problems] == ["b:a", "b:a"]
@@ -193,7 +193,7 @@ def test_the_later_goes_even_when_the_first_is_bad() -> None:
         ),
     ],
 )
-def test_unknown_elements_are_dropped_by_name(inside: str, type: str, said: str) -> None:
+def test_parser_drops_unknown_elements_by_name(inside: str, type: str, said: str) -> None:
     assert [(p.id, p.type, p.text) for p in only(inside).problems] == [("b:x", type, said)]
 
 
@@ -207,42 +207,42 @@ def test_unknown_elements_are_dropped_by_name(inside: str, type: str, said: str)
         ("s:mid", 'no sync point "mid" on "s"'),
     ],
 )
-def test_a_reference_that_leads_nowhere_drops_who_holds_it(point: str, said: str) -> None:
+def test_parser_drops_a_behaviour_with_a_reference_to_nothing(point: str, said: str) -> None:
     known = "<head id='nod' lexeme='NOD' repetition='2'/><speech id='s'><text>a<sync id='m'/></text></speech>"
     block = only(f"{known}<wait id='w' start='{point}'/>")
     assert [(p.id, p.text) for p in block.problems] == [("b:w", f"start: {said}")]
     assert [b.id for b in block.behaviours] == ["nod", "s"]
 
 
-def test_references_lead_forwards_and_to_oneself() -> None:
+def test_parser_reads_references_forwards_and_to_the_behaviour_itself() -> None:
     block = only("<wait id='a' start='z:end' end='a:start+1'/><wait id='z'/>")
     assert not block.problems
     assert block["a"].syncs["end"] == SyncRef(behaviour="a", sync="start", offset=1.0)
 
 
-def test_the_marks_of_an_ssml_description_are_sync_points() -> None:
+def test_parser_takes_marks_of_an_ssml_description_as_sync_points() -> None:
     speak = "<speak xmlns='http://www.w3.org/2001/10/synthesis'>a<mark name='m'/></speak>"
     inside = f"<description priority='1' type='application/ssml+xml'>{speak}</description>"
     assert not only(f"<speech id='s'>{inside}</speech><wait id='w' start='s:m'/>").problems
 
 
-def test_references_into_other_blocks_are_not_looked_up() -> None:
+def test_parser_does_not_check_references_into_other_blocks() -> None:
     block = only("<wait id='a' start='other:whatever:odd'/>")
     assert block["a"].syncs["start"] == SyncRef(block="other", behaviour="whatever", sync="odd")
 
 
-def test_text_between_behaviours_is_told_of_and_costs_nothing() -> None:
+def test_parser_reports_text_between_behaviours() -> None:
     block = only("\n oops <wait id='a'/> more")
     assert len(block.behaviours) == 1
     assert [(p.id, p.text) for p in block.problems] == [("b", 'wanted elements, got the text "oops"')]
 
 
-def test_comments_and_instructions_are_not_seen() -> None:
+def test_parser_ignores_comments_and_instructions() -> None:
     block = only("<!-- a --><?b c?><wait id='a'><!-- d --></wait>")
     assert block.children == (Wait(id="a"),)
 
 
-def test_places_tell_line_and_path() -> None:
+def test_places_have_line_and_path() -> None:
     block = only("<wait id='a'/>\n<wait\nid='c'/><head id='d' lexeme='NOD'/>")
     assert block.places == {
         "a": Place(1, "/bml/wait[1]"),
@@ -251,7 +251,7 @@ def test_places_tell_line_and_path() -> None:
     }
 
 
-def test_attributes_nobody_knows_are_kept() -> None:
+def test_parser_keeps_unknown_attributes() -> None:
     block = only("", "id='b' xmlns:q='urn:q' q:a='1' odd='2' xml:lang='de'")
     assert block.unknown_attributes == {
         "{urn:q}a": "1",
@@ -260,7 +260,7 @@ def test_attributes_nobody_knows_are_kept() -> None:
     }
 
 
-def test_too_many_behaviours_are_refused() -> None:
+def test_parser_refuses_too_many_behaviours() -> None:
     waits = "".join(f"<wait id='w{i}'/>" for i in range(11))
     text = f"<bml id='b'><required>{waits}</required></bml>"
     assert len(parse(text, max_behaviours=11).behaviours) == 11
@@ -271,7 +271,7 @@ def test_too_many_behaviours_are_refused() -> None:
     assert caught.value.block == "b"
 
 
-def test_too_many_attributes_are_refused_or_drop_their_behaviour() -> None:
+def test_parser_refuses_too_many_attributes() -> None:
     many = " ".join(f"a{i}=''" for i in range(101))
     assert only(f"<wait id='a' {many}/>").problems[0].text == "wanted at most 100 attributes, got 102"
     with pytest.raises(BMLError, match="wanted at most 100 attributes, got 102"):

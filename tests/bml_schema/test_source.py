@@ -45,26 +45,26 @@ def under(source: Source, spot: Spot) -> str:
         ("", "", 999, ""),
     ],
 )
-def test_a_path_and_an_attribute_have_a_place(path, attribute, line, value) -> None:
+def test_locate_finds_a_path_and_an_attribute(path, attribute, line, value) -> None:
     source = Source(TEXT)
     spot = source.locate(path, attribute, line=line)
     assert under(source, spot) == value
     assert spot.length == max(1, len(value))
 
 
-def test_documents_are_told_apart_by_their_id() -> None:
+def test_locate_distinguishes_documents_by_id() -> None:
     source = Source('<bml id="a"><wait id="w"/></bml><bml id="b"><wait id="w"/></bml>')
     assert source.locate("/bml/wait[1]", "id", line=1, block="b").column == 55
     assert source.locate("/bml/wait[1]", "id", line=1, block="a").column == 23
 
 
-def test_a_value_over_several_lines_is_marked_on_its_first() -> None:
+def test_locate_marks_a_value_over_several_lines_on_its_first() -> None:
     source = Source('<bml id="b"><gaze id="g" target="one\r\ntwo"/></bml>')
     assert under(source, source.locate("/bml/gaze[1]", "target")) == "one"
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "latin-1"])
-def test_bytes_are_read_as_the_parser_reads_them(encoding: str) -> None:
+def test_source_decodes_bytes_as_the_parser_does(encoding: str) -> None:
     text = f'<?xml version="1.0" encoding="{encoding}"?><bml id="é"/>'
     data = text.replace("utf-8-sig", "utf-8").encode(encoding)
     source = Source(data)
@@ -72,7 +72,7 @@ def test_bytes_are_read_as_the_parser_reads_them(encoding: str) -> None:
 
 
 @given(blocks(foreign=False))
-def test_every_behaviour_the_parser_placed_is_found(block: Block) -> None:
+def test_find_has_every_behaviour_of_the_parser(block: Block) -> None:
     text = "<!-- one -->\n" + write(block)
     source = Source(text)
     (parsed,) = read(text)
@@ -87,7 +87,7 @@ def test_every_behaviour_the_parser_placed_is_found(block: Block) -> None:
 
 
 @given(st.text("<>/='\" abml!-[]?&;:\n", max_size=200))
-def test_any_text_is_taken_and_every_place_is_inside_it(text: str) -> None:
+def test_source_takes_any_text_and_has_every_place_inside(text: str) -> None:
     source = Source(text)
     for element in source.elements:
         for spot in (source.name_spot(element), *(source.locate_in(element, a) for a in element.attributes)):

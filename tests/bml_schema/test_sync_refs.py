@@ -57,7 +57,7 @@ def names() -> Names:
         ("my-block:my-nod:end", SyncRef(block="my-block", behaviour="my-nod", sync="end")),
     ],
 )
-def test_a_reference_is_read_as(text: str, ref: SyncRef) -> None:
+def test_read_sync_ref_reads_every_form(text: str, ref: SyncRef) -> None:
     assert read_sync_ref(text, names()) == ref
     assert read_sync_ref(str(ref), names()) == ref
 
@@ -90,7 +90,7 @@ def test_a_reference_is_read_as(text: str, ref: SyncRef) -> None:
         "1:",
     ],
 )
-def test_what_is_no_reference_is_refused(text: str) -> None:
+def test_read_sync_ref_refuses_other_forms(text: str) -> None:
     with pytest.raises(ValueError, match=r"wanted|no sync point|no behaviour"):
         read_sync_ref(text, names())
 
@@ -113,13 +113,13 @@ def test_what_is_no_reference_is_refused(text: str) -> None:
         ("1e308", "no exponent, NaN or infinity"),
     ],
 )
-def test_a_message_says_what_is_wrong(text: str, said: str) -> None:
+def test_read_sync_ref_explains_what_is_wrong(text: str, said: str) -> None:
     with pytest.raises(ValueError) as caught:  # noqa: PT011
         read_sync_ref(text, names())
     assert said in str(caught.value)
 
 
-def test_suggestions_are_given_a_few_times_only() -> None:
+def test_suggest_gives_up_after_some_suggestions() -> None:
     known = names()
     for _ in range(50):
         with pytest.raises(ValueError, match="no behaviour"):
@@ -131,14 +131,14 @@ words = st.text("ab-+.01", min_size=1, max_size=5)
 
 
 @given(words, words, st.none() | st.integers(1, 9), st.just(0.0) | numbers)
-def test_a_written_reference_reads_back(behaviour: str, sync: str, index: int | None, offset: float) -> None:
+def test_sync_ref_reads_back_as_written(behaviour: str, sync: str, index: int | None, offset: float) -> None:
     known = Names("b", {behaviour: Points((sync, "stroke"), 9)})
     ref = SyncRef(behaviour=behaviour, sync="stroke" if index else sync, index=index, offset=offset)
     assert read_sync_ref(str(ref), known) == ref
 
 
 @given(words, words, words, st.just(0.0) | numbers)
-def test_a_written_reference_into_another_block_reads_back(
+def test_sync_ref_into_another_block_reads_back_as_written(
     block: str, behaviour: str, sync: str, offset: float
 ) -> None:
     ref = SyncRef(block=block, behaviour=behaviour, sync=sync, offset=offset)
@@ -146,7 +146,7 @@ def test_a_written_reference_into_another_block_reads_back(
 
 
 @given(st.text(":+- 0.1astrokebml", max_size=20))
-def test_any_text_is_a_reference_or_a_value_error(text: str) -> None:
+def test_read_sync_ref_of_any_text_is_a_reference_or_a_value_error(text: str) -> None:
     try:
         ref = read_sync_ref(text)
     except ValueError:

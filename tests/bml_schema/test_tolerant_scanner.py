@@ -7,7 +7,7 @@ import pytest
 from bml_schema.tolerant_scanner import scan
 
 
-def test_tags_know_their_parents_their_number_and_the_places_of_their_values() -> None:
+def test_scan_has_parents_numbers_and_places_of_values() -> None:
     text = "<?a <b?><x:bml id='one'><a/><!-- <a/> --><b n = \"2>\"><a/></b><a></a></x:bml><c/>"
     elements, slips = scan(text)
     assert not slips
@@ -40,14 +40,14 @@ def test_tags_know_their_parents_their_number_and_the_places_of_their_values() -
         ("<bml id='a' <x/></bml>", "wanted an attribute or the end of <bml>", "<"),
     ],
 )
-def test_what_is_not_well_formed_is_named(text: str, said: str, place: str) -> None:
+def test_scan_names_what_is_not_well_formed(text: str, said: str, place: str) -> None:
     _, slips = scan(text)
     slip = next(s for s in slips if s.text == said)
     assert text[slip.offset : slip.offset + slip.length] == place
 
 
 @pytest.mark.parametrize("piece", ["<a>", "<!--", "</a>", "<bml id='", "&", "<a b='c' ", "<bml>", "<a\n"])
-def test_a_hostile_text_is_taken_too(piece: str) -> None:
+def test_scan_takes_hostile_texts(piece: str) -> None:
     # A scan that was not linear in the text would take hours.
     elements, slips = scan(piece * 50_000)
     assert slips

@@ -13,7 +13,7 @@ def document(inside: str, more: str = "") -> Block:
     return parse(f"<bml id='b' xmlns='{CORE}' xmlns:e='{EXTENSIONS}' xmlns:r='{OWN}' {more}>{inside}</bml>")
 
 
-def test_a_slip_is_told_with_its_place_what_is_known_and_what_was_meant() -> None:
+def test_unknown_attribute_is_reported_with_place_and_suggestion() -> None:
     block = document("\n<head id='h' lexeme='NOD'\n amout='1'/>")
     (problem,) = block.problems
     assert (problem.id, problem.type, problem.line, problem.path) == ("b:h", TYPE, 2, "/bml/head[1]")
@@ -25,7 +25,7 @@ def test_a_slip_is_told_with_its_place_what_is_known_and_what_was_meant() -> Non
     assert block["h"] == Head(id="h", lexeme="NOD", unknown_attributes={"amout": "1"})
 
 
-def test_several_slips_of_one_element_are_one_warning() -> None:
+def test_unknown_attributes_of_one_element_are_one_problem() -> None:
     (problem,) = document("<wait id='w' durration='1' style='x'/>").problems
     assert problem.text == (
         'durration: no attribute of <wait>, so it does nothing, did you mean "duration"?; '
@@ -42,13 +42,13 @@ def test_several_slips_of_one_element_are_one_warning() -> None:
         "xmlns:x='http://www.w3.org/2001/XMLSchema-instance' x:schemaLocation='a b'",
     ],
 )
-def test_what_other_languages_put_there_is_theirs(attribute: str) -> None:
+def test_unknown_attributes_of_other_namespaces_are_not_reported(attribute: str) -> None:
     block = document(f"<head id='h' lexeme='NOD' {attribute}/>", attribute)
     assert block.problems == ()
     assert len(block.unknown_attributes) == len(block["h"].unknown_attributes) == 1
 
 
-def test_a_name_with_the_prefix_of_bml_is_not_the_name_itself() -> None:
+def test_unknown_attribute_with_the_prefix_of_bml_is_reported() -> None:
     (problem,) = document("<head id='h' lexeme='NOD' e:amount='1'/>").problems
     assert problem.text.startswith(f"{{{EXTENSIONS}}}amount: no attribute of <head>")
     assert problem.text.endswith('did you mean "amount"?')
@@ -80,7 +80,7 @@ def test_a_name_with_the_prefix_of_bml_is_not_the_name_itself() -> None:
         ),
     ],
 )
-def test_it_is_told_where_it_stands(inside: str, path: str, said: str) -> None:
+def test_unknown_attribute_of_a_part_is_reported_with_its_place(inside: str, path: str, said: str) -> None:
     block = document(inside)
     (problem,) = block.problems
     assert (problem.id, problem.path) == ("b:x", path)
@@ -88,7 +88,7 @@ def test_it_is_told_where_it_stands(inside: str, path: str, said: str) -> None:
     assert block["x"]
 
 
-def test_what_is_dropped_is_told_of_once_with_its_slips() -> None:
+def test_unknown_attributes_of_a_dropped_behaviour_are_in_its_problem() -> None:
     (problem,) = document("<faceLexeme id='f' lexem='SMILE'/>").problems
     assert problem.type == "PARSING_FAILURE"
     assert problem.dropped
@@ -98,7 +98,7 @@ def test_what_is_dropped_is_told_of_once_with_its_slips() -> None:
     assert [p.type for p in again.problems] == ["PARSING_FAILURE"]
 
 
-def test_a_block_and_a_constraint_are_told_of_too() -> None:
+def test_unknown_attributes_of_a_block_and_a_constraint_are_reported() -> None:
     block = document(
         "<constraint id='c' kind='x'><synchronize><sync ref='1'/></synchronize></constraint>", "by='me'"
     )
@@ -109,11 +109,11 @@ def test_a_block_and_a_constraint_are_told_of_too() -> None:
     assert len(block.constraints) == 1
 
 
-def test_what_a_draft_called_otherwise_is_no_slip() -> None:
+def test_unknown_attributes_with_names_of_drafts_are_not_reported() -> None:
     assert document("<wait id='w' max-wait='2' duration='1'/>").problems == ()
 
 
-def test_a_slip_costs_a_required_behaviour_nothing() -> None:
+def test_unknown_attribute_of_a_required_behaviour_is_not_fatal() -> None:
     block = document("<required><head id='h' lexeme='NOD' amout='1'/></required>")
     assert [p.fatal for p in block.problems] == [False]
     assert block.required == {"h"}

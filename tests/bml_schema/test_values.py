@@ -16,20 +16,20 @@ AMOUNT = number(0, 1)
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False))
-def test_a_number_is_written_without_exponent_and_reads_back(value: float) -> None:
+def test_decimal_has_no_exponent_and_reads_back(value: float) -> None:
     text = decimal(value)
     assert "e" not in text.lower()
     assert float(text) == value
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_nan_and_infinity_cannot_be_written(value: float) -> None:
+def test_decimal_refuses_nan_and_infinity(value: float) -> None:
     with pytest.raises(ValueError, match="finite"):
         decimal(value)
 
 
 @pytest.mark.parametrize(("text", "value"), [("0", 0), (" 1 ", 1), ("+.5", 0.5), ("0.", 0), ("00.25", 0.25)])
-def test_ordinary_decimals_are_read(text: str, value: float) -> None:
+def test_number_reads_ordinary_decimals(text: str, value: float) -> None:
     assert AMOUNT.read(text) == value
 
 
@@ -54,13 +54,13 @@ BAD_NUMBERS = [
 
 
 @pytest.mark.parametrize("text", [*BAD_NUMBERS, "0." + "0" * 500, "1" * 5000])
-def test_other_spellings_and_values_out_of_range_are_refused(text: str) -> None:
+def test_number_refuses_other_spellings_and_values_out_of_range(text: str) -> None:
     with pytest.raises(ValueError):  # noqa: PT011 - the sentence is made by who knows the attribute
         AMOUNT.read(text)
 
 
 @pytest.mark.parametrize("text", ["nan", "-inf", "1e308", "1.5E+3"])
-def test_the_message_for_an_exponent_says_what_is_wrong_with_it(text: str) -> None:
+def test_number_message_for_an_exponent_has_a_hint(text: str) -> None:
     assert (
         describe_mismatch("0..1", text, text)
         == f"wanted 0..1 (a plain decimal number, no exponent, NaN or infinity), got {text}"
@@ -68,12 +68,12 @@ def test_the_message_for_an_exponent_says_what_is_wrong_with_it(text: str) -> No
 
 
 @pytest.mark.parametrize("text", ["1.0", "", "1e2", "101", "²", "9" * 5000])
-def test_an_integer_is_digits_in_range(text: str) -> None:
+def test_integer_is_digits_in_range(text: str) -> None:
     with pytest.raises(ValueError):  # noqa: PT011
         integer(1, 100).read(text)
 
 
-def test_a_closed_set_is_case_sensitive_unless_it_says_otherwise() -> None:
+def test_one_of_is_case_sensitive_by_default() -> None:
     with pytest.raises(ValueError, match="left"):
         one_of("LEFT", "RIGHT").read("left")
     assert one_of("LEFT", "RIGHT", any_case=True).read("left") == "LEFT"
@@ -82,35 +82,35 @@ def test_a_closed_set_is_case_sensitive_unless_it_says_otherwise() -> None:
 
 
 @pytest.mark.parametrize("text", ["", " ", "bml", "a:b", "a b", "a\tb", "x" * 257])
-def test_a_name_has_no_blank_and_no_colon(text: str) -> None:
+def test_name_has_no_blank_and_no_colon(text: str) -> None:
     with pytest.raises(ValueError):  # noqa: PT011
         name.read(text)
 
 
 @pytest.mark.parametrize("text", ["nod-1", "a.b", "1", "-", "Ünïcode", "x" * 256])
-def test_a_name_may_hold_anything_else(text: str) -> None:
+def test_name_may_have_any_other_character(text: str) -> None:
     assert name.read(f" {text} ") == text
 
 
-def test_a_block_may_have_a_blank_in_its_id() -> None:
+def test_block_name_may_have_a_blank() -> None:
     assert block_name.read("my block") == "my block"
 
 
 @pytest.mark.parametrize(("text", "value"), [("true", True), ("1", True), ("false", False), (" 0 ", False)])
-def test_a_flag_is_true_or_false(text: str, value: bool) -> None:
+def test_flag_is_true_or_false(text: str, value: bool) -> None:
     assert flag.read(text) is value
     with pytest.raises(ValueError):  # noqa: PT011
         flag.read("yes")
 
 
-def test_names_in_a_list_have_commas_between_them_and_those_of_behaviours_blanks_too() -> None:
+def test_names_have_commas_or_blanks_between_them_block_names_commas() -> None:
     assert names.read(" a,b  c ,") == ("a", "b", "c")
     assert block_names.read(" a b,c ,") == ("a b", "c")
     assert names.read(" ") == block_names.read("") == ()
 
 
 @given(st.data())
-def test_each_value_reads_back_what_it_writes(data: st.DataObject) -> None:
+def test_value_reads_back_what_it_writes(data: st.DataObject) -> None:
     kinds = [AMOUNT, integer(-3, 3), one_of("A", "B"), flag, word, seconds, string, names, block_names]
     kind = data.draw(st.sampled_from(kinds))
     value = data.draw(attribute_values(kind))

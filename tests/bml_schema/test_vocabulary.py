@@ -14,11 +14,11 @@ ELEMENTS = {
 }
 
 
-def test_the_vocabulary_is_the_core_and_the_extensions() -> None:
+def test_vocabulary_is_the_core_and_the_extensions() -> None:
     assert set(VOCABULARY) == {
         f"{{{space}}}{name}" for space, names in ELEMENTS.items() for name in names.split()
     }
 
 
-def test_each_element_becomes_the_class_that_names_it() -> None:
+def test_vocabulary_has_the_class_of_each_element() -> None:
     assert all(cls.tag == tag for tag, cls in VOCABULARY.items())

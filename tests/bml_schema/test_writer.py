@@ -13,7 +13,7 @@ from tests.strategies import blocks
 
 
 @given(blocks())
-def test_a_written_block_reads_back_as_the_same(block: Block) -> None:
+def test_write_reads_back_as_the_same(block: Block) -> None:
     text = write(block)
     back = parse(text)
     assert back == block, text
@@ -22,7 +22,7 @@ def test_a_written_block_reads_back_as_the_same(block: Block) -> None:
     assert parse(text.encode()) == block
 
 
-def test_a_document_is_written_for_people_to_read() -> None:
+def test_write_is_readable() -> None:
     text = (
         "<bml id='b' characterId='A' composition='append'>"
         "<required><head id='h' end='2' lexeme='NOD' start='1'/></required>"
@@ -49,7 +49,7 @@ def test_a_document_is_written_for_people_to_read() -> None:
     )
 
 
-def test_foreign_namespaces_get_the_prefixes_people_know() -> None:
+def test_write_uses_well_known_prefixes() -> None:
     known = "{http://www.asap-project.org/bmla}unheardOf"
     text = write(Block(id="b", unknown_attributes={known: "x", "{urn:a}k": "1", "{urn:b}k": "2"}))
     assert 'bmla:unheardOf="x" ns2:k="1" ns3:k="2"' in text
@@ -72,7 +72,7 @@ def test_foreign_namespaces_get_the_prefixes_people_know() -> None:
         ),
     ],
 )
-def test_what_cannot_be_written_is_a_value_error(node: Behaviour, said: str) -> None:
+def test_write_refuses_what_xml_cannot_hold(node: Behaviour, said: str) -> None:
     with pytest.raises(ValueError, match=re.escape(said)):
         write(Block(id="b", children=(node,)))
 
@@ -80,7 +80,7 @@ def test_what_cannot_be_written_is_a_value_error(node: Behaviour, said: str) -> 
 @pytest.mark.parametrize(
     "content", ["<!DOCTYPE a><a/>", '<?xml version="1.0"?>', "&nobody;", "</x><x>", "</x>"]
 )
-def test_a_description_cannot_break_out_of_its_element(content: str) -> None:
+def test_write_keeps_a_description_inside_its_element(content: str) -> None:
     node = Wait(id="w", descriptions=(Description(priority=1, type="x", content=content),))
     with pytest.raises(ValueError, match="wanted well-formed content"):
         write(Block(id="b", children=(node,)))
@@ -89,6 +89,6 @@ def test_a_description_cannot_break_out_of_its_element(content: str) -> None:
 @pytest.mark.parametrize(
     "other", ["<a/>", "<a xmlns='urn:a'/>x", "<a xmlns='urn:a'", "", "<a xmlns='u'/><a xmlns='u'/>"]
 )
-def test_what_is_others_stays_one_element_in_a_namespace(other: str) -> None:
+def test_write_refuses_unknown_children_without_a_namespace(other: str) -> None:
     with pytest.raises(ValueError, match="wanted one well-formed element in a namespace of its own"):
         write(Block(id="b", children=(Wait(id="w", unknown_children=(other,)),)))

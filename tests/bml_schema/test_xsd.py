@@ -153,11 +153,11 @@ def own_attributes(cls: type[Any]) -> dict[str, Attribute]:
     return {name: spec for name, spec in schema_of(cls).attributes.items() if not name.startswith("{")}
 
 
-def test_the_schema_of_our_namespace_is_current() -> None:
+def test_xsd_of_our_namespace_is_current() -> None:
     assert schema.FILE.read_text("utf-8") == schema.render(), "run: python -m tests.schema"
 
 
-def test_bmlas_attributes_of_blocks_and_behaviours_are_declared_and_no_others() -> None:
+def test_xsd_of_bmla_declares_attributes_of_blocks_and_behaviours_only() -> None:
     specs = {**schema_of(Block).attributes, **schema_of(Behaviour).attributes}
     wanted = {name: spec for name, spec in specs.items() if name.startswith("{")}
     assert {f"{{{BMLA}}}{e.get('name')}" for e in SCHEMAS[BMLA] if e.tag == XS + "attribute"} == set(wanted)
@@ -166,7 +166,7 @@ def test_bmlas_attributes_of_blocks_and_behaviours_are_declared_and_no_others() 
 
 
 @EACH
-def test_a_node_and_its_schema_have_the_same_attributes(cls: type[Any]) -> None:
+def test_xsd_has_the_attributes_of_each_node(cls: type[Any]) -> None:
     declared = attributes(declaration_of(cls))
     specs = own_attributes(cls)
     points = cls.sync_points if issubclass(cls, Behaviour) else ()
@@ -179,7 +179,7 @@ def test_a_node_and_its_schema_have_the_same_attributes(cls: type[Any]) -> None:
 
 
 @EACH
-def test_a_node_and_its_schema_have_the_same_children(cls: type[Any]) -> None:
+def test_xsd_has_the_children_of_each_node(cls: type[Any]) -> None:
     kinds = {c.tag.partition("}")[2] for kind in schema_of(cls).children for c in kind.classes}
     declared = children(declaration_of(cls))
     if issubclass(cls, Behaviour):
@@ -195,11 +195,11 @@ def test_a_node_and_its_schema_have_the_same_children(cls: type[Any]) -> None:
         assert declared == kinds
 
 
-def test_required_takes_what_a_block_takes_but_itself() -> None:
+def test_xsd_required_takes_what_a_block_takes_but_itself() -> None:
     assert children(declaration_of(Required)) == children(declaration_of(Block)) - {"required"}
 
 
-def test_the_sync_of_speech_is_that_of_the_schema() -> None:
+def test_xsd_sync_of_speech_is_that_of_the_node() -> None:
     text = declaration_of(SpeechText)
     assert text.get("mixed") == "true"
     sync = text.find(f"{XS}sequence/{XS}element")
@@ -209,7 +209,7 @@ def test_the_sync_of_speech_is_that_of_the_schema() -> None:
 
 
 @pytest.mark.parametrize(("part", "space"), [("faceLexeme", CORE), ("faceFacs", EXTENSIONS)])
-def test_the_parts_of_a_face_are_behaviours_without_timing(part: str, space: str) -> None:
+def test_xsd_parts_of_a_face_are_behaviours_without_timing(part: str, space: str) -> None:
     declared = attributes(named("complexType", space, f"{part}Part"))
     specs = own_attributes(VOCABULARY[f"{{{space}}}{part}"])
     assert set(declared) == set(specs)
@@ -220,7 +220,7 @@ def test_the_parts_of_a_face_are_behaviours_without_timing(part: str, space: str
             assert_agrees(spec, declared[name])
 
 
-def test_the_schema_declares_no_element_the_vocabulary_does_not_know() -> None:
+def test_xsd_declares_no_element_outside_the_vocabulary() -> None:
     declared = {e.get("name") for root in SCHEMAS.values() for e in root if e.tag == XS + "element"}
     known = {tag.partition("}")[2] for tag in VOCABULARY}
     others = {c.tag.partition("}")[2] for c in (*NODES, Required, SpeechText)}
@@ -228,13 +228,13 @@ def test_the_schema_declares_no_element_the_vocabulary_does_not_know() -> None:
 
 
 @given(blocks(foreign=False))
-def test_what_is_written_is_valid(block: Block) -> None:
+def test_xsd_accepts_what_is_written(block: Block) -> None:
     text = write(block)
     assert SCHEMA.validate(etree.fromstring(text.encode())), (SCHEMA.error_log, text)
 
 
 @pytest.mark.parametrize("change", ['amount="7"', 'lexeme=""', 'start="nod"', 'odd="1"', 'repetition="0"'])
-def test_the_schema_refuses_what_the_parser_refuses(change: str) -> None:
+def test_xsd_refuses_what_the_parser_refuses(change: str) -> None:
     name = change.partition("=")[0]
     given_ = {"lexeme": 'lexeme="NOD"', name: change}
     text = f'<bml xmlns="{CORE}" id="b"><head id="h" {" ".join(given_.values())}/></bml>'
@@ -255,7 +255,7 @@ def test_the_schema_refuses_what_the_parser_refuses(change: str) -> None:
         ("", '<realizer:faps id="f"><realizer:fap number="1" value="0"/></realizer:faps>'),
     ],
 )
-def test_the_schemas_of_the_extensions_refuse_what_the_parser_refuses(on_block: str, inside: str) -> None:
+def test_xsd_of_extensions_refuses_what_the_parser_refuses(on_block: str, inside: str) -> None:
     spaces = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in PREFIXES.items())
     text = f'<bml xmlns="{CORE}" {spaces} id="b" {on_block}>{inside}</bml>'
     assert not SCHEMA.validate(etree.fromstring(text))

@@ -14,7 +14,7 @@ from realizer.core.options import PlayOptions
 NOD = '<bml id="b"><head id="n" lexeme="NOD"/></bml>'
 
 
-def test_realize_takes_the_options_of_playing_with_their_defaults() -> None:
+def test_realize_has_the_options_of_playing_with_their_defaults() -> None:
     parameters = inspect.signature(realize).parameters
     options = {name: p.default for name, p in parameters.items() if name not in ("documents", "voice")}
     assert options == {f.name: f.default for f in fields(PlayOptions)}
@@ -30,11 +30,11 @@ def test_realize_refuses_a_rate_that_is_not_above_0() -> None:
         realize(NOD, fps=0)
 
 
-def test_schedule_gives_the_times_that_realize_plays() -> None:
+def test_schedule_has_the_times_that_realize_plays() -> None:
     (played,) = realize(NOD, idle=False).schedules
     assert schedule(NOD).behaviours == played.behaviours
 
 
-def test_schedule_refuses_a_document_that_is_no_block() -> None:
+def test_schedule_refuses_a_document_without_a_block() -> None:
     with pytest.raises(BMLError, match="id"):
         schedule("<bml/>")

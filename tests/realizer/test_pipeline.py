@@ -25,13 +25,13 @@ HELLO = examples()["greeting"]
 
 
 @pytest.mark.parametrize("name", examples())
-def test_the_examples_play_without_a_warning(name: str) -> None:
+def test_play_examples_without_a_warning(name: str) -> None:
     played = realize(examples()[name], voice=SilentVoice())
     assert played.warnings == ()
     assert played.duration > 1
 
 
-def test_several_documents_are_composed() -> None:
+def test_play_composes_several_documents() -> None:
     nod = '<bml id="{}" composition="APPEND"><head id="n" lexeme="NOD"/></bml>'
     played = realize([nod.format("a"), nod.format("b")])
     first, second = played.schedules
@@ -39,32 +39,32 @@ def test_several_documents_are_composed() -> None:
     assert played.duration == pytest.approx(second.end)
 
 
-def test_two_characters_stand_side_by_side() -> None:
+def test_play_two_characters_side_by_side() -> None:
     nod = '<bml id="{0}" characterId="{0}"><head id="n" lexeme="NOD"/></bml>'
     played = realize([nod.format("Ann"), nod.format("Bob")])
     assert list(played.characters) == ["Ann", "Bob"]
     assert set(played.to_json()["characters"]) == {"Bob"}
 
 
-def test_a_broken_document_is_refused_and_the_next_one_plays() -> None:
+def test_play_refuses_a_broken_document_and_plays_the_next() -> None:
     played = realize(['<bml id="x"><head', '<bml id="b"><head id="n" lexeme="NOD"/></bml>'])
     assert len(played.refusals) == 1
     assert played.duration > 0
 
 
-def test_the_same_seed_gives_the_same_frames_and_another_seed_does_not() -> None:
+def test_play_gives_the_same_frames_for_the_same_seed_only() -> None:
     document = '<bml id="b"><wait id="w" duration="12"/></bml>'
     one, two, other = (realize(document, seed=s).faps.values for s in (1, 1, 2))
     assert np.array_equal(one, two)
     assert not np.array_equal(one, other)
 
 
-def test_without_idle_an_empty_stretch_is_neutral() -> None:
+def test_play_without_idle_is_neutral_between_behaviours() -> None:
     played = realize('<bml id="b"><wait id="w" duration="3"/></bml>', idle=False)
     assert not played.faps.values.any()
 
 
-def test_long_documents_have_no_seam_between_windows() -> None:
+def test_play_long_documents_without_a_seam_between_windows() -> None:
     document = (
         '<bml id="b"><faceLexeme id="f" lexeme="SMILE" start="8" attackPeak="10" relax="12" end="14"/></bml>'
     )
@@ -73,7 +73,7 @@ def test_long_documents_have_no_seam_between_windows() -> None:
 
 
 @pytest.mark.parametrize("name", ["greeting", "nod-on-a-word", "gaze-and-back"])
-def test_frames_are_the_golden_ones(name: str, request: pytest.FixtureRequest) -> None:
+def test_play_gives_the_golden_frames(name: str, request: pytest.FixtureRequest) -> None:
     """FAP frames at 25 fps as text, one frame a line: a change is a diff that can be read."""
     played = realize(examples()[name], voice=SilentVoice())
     used = [i for i in range(68) if played.faps.integers()[:, i].any()]
@@ -97,7 +97,7 @@ NOD = (
 )
 
 
-def test_steps_pass_on_the_golden_values(
+def test_play_passes_the_golden_values_between_steps(
     request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Every step runs under its name, in order, and what it gives is what the golden file says."""
@@ -160,7 +160,7 @@ def flat(value: Any, path: str = "") -> dict[str, Any]:
 
 
 @pytest.mark.gl
-def test_pictures_draw_the_frames_that_are_asked_for() -> None:
+def test_pictures_draw_the_given_frames() -> None:
     from realizer.render.renderer import Renderer
 
     played = pipeline.play([NOD], PlayOptions(idle=False), SilentVoice())
@@ -181,7 +181,7 @@ def spoken() -> Realization:
 
 
 @pytest.mark.espeak
-def test_the_nods_deepest_frame_falls_on_its_word(spoken: Realization) -> None:
+def test_play_nods_deepest_on_the_word(spoken: Realization) -> None:
     planned = spoken.schedules[0]
     (start, utterance), word = spoken.speech[0], planned.at("yes", "really")
     heard = next(w for w in utterance.words if w.text.strip(".,").lower() == "really")
@@ -191,7 +191,7 @@ def test_the_nods_deepest_frame_falls_on_its_word(spoken: Realization) -> None:
 
 
 @pytest.mark.espeak
-def test_the_sound_lasts_as_long_as_the_words_and_starts_with_them(spoken: Realization) -> None:
+def test_play_gives_sound_as_long_as_the_words(spoken: Realization) -> None:
     (start, utterance), sound = spoken.speech[0], spoken.sound(22050)
     assert utterance.pcm is not None
     assert len(sound) == round(spoken.duration * 22050)
@@ -202,7 +202,7 @@ def test_the_sound_lasts_as_long_as_the_words_and_starts_with_them(spoken: Reali
 
 
 @pytest.mark.espeak
-def test_the_lips_meet_in_every_p_b_m_as_streamed() -> None:
+def test_play_closes_the_lips_in_every_p_b_m_as_streamed() -> None:
     document = '<bml id="b"><speech id="s"><text>My baby came up to me, maybe.</text></speech></bml>'
     played = realize(document, voice="espeak", idle=False)
     ((start, utterance),) = played.speech
@@ -218,7 +218,7 @@ def test_the_lips_meet_in_every_p_b_m_as_streamed() -> None:
     assert gap.max() > 150, "between them the mouth opens"
 
 
-def test_warnings_that_arise_while_blocks_play_are_among_the_warnings() -> None:
+def test_play_collects_warnings_that_arise_while_blocks_play() -> None:
     bmla = 'xmlns:bmla="http://www.asap-project.org/bmla"'
     played = realize(f'<bml id="b" {bmla} bmla:onStart="q"><bmla:interrupt id="i" target="nobody"/></bml>')
     assert [(w.id, w.type) for w in played.warnings] == [

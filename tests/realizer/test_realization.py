@@ -18,14 +18,14 @@ from realizer.speech.utterance import Phoneme, Utterance
 HELLO = examples()["greeting"]
 
 
-def test_frames_reach_from_0_to_the_end() -> None:
+def test_frame_times_reach_from_0_to_the_end() -> None:
     played = realize(HELLO, voice=SilentVoice(), fps=30)
     assert played.frames == int(played.duration * 30 + 1e-6) + 1
     assert played.faps.values.shape == (played.frames, 68)
     assert played.aus.times[1] == pytest.approx(1 / 30)
 
 
-def test_the_json_holds_what_it_promises() -> None:
+def test_to_json_has_every_part() -> None:
     out = json.loads(json.dumps(realize(HELLO, voice=SilentVoice()).to_json()))
     assert {"fps", "frames", "duration", "face", "schedule", "fap", "au", "feedback", "warnings"} <= set(out)
     assert len(out["fap"]["names"]) == len(out["fap"]["mask"]) == 68
@@ -38,7 +38,7 @@ def test_the_json_holds_what_it_promises() -> None:
     assert out["feedback"][0].startswith("<predictionFeedback")
 
 
-def test_sound_is_mixed_where_it_belongs() -> None:
+def test_sound_is_mixed_at_its_time() -> None:
     played = realize('<bml id="b"><wait id="w" duration="2"/></bml>', idle=False)
     tone = Utterance(0.5, (), (), {}, 8000, np.full(4000, 1000, np.int16))
     object.__setattr__(
@@ -52,7 +52,7 @@ def test_sound_is_mixed_where_it_belongs() -> None:
     assert sound[int(1.4 * 16000)] == 1000
 
 
-def test_visemes_are_those_of_their_character_and_end_where_the_speech_is_cut_off() -> None:
+def test_visemes_are_those_of_their_character_until_a_cut() -> None:
     played = realize('<bml id="b"><wait id="w" duration="2"/></bml>', idle=False, fps=50)
     vowel = Utterance(1.0, (), (Phoneme(0.0, 1.0, "ɑ"),), {})
     object.__setattr__(
@@ -67,7 +67,7 @@ def test_visemes_are_those_of_their_character_and_end_where_the_speech_is_cut_of
     assert played.visemes(1)[50, 10] > 0.9
 
 
-def test_frames_are_counted_up_to_a_most() -> None:
+def test_frames_until_has_a_limit() -> None:
     assert frames_until(2.0, 25) == 51
     with pytest.raises(RealizerError, match=rf"wanted at most {MAX_FRAMES} frames, got 900001 of 36000 s"):
         frames_until(36000, 25)

@@ -16,7 +16,7 @@ def sound(played, rate: int = 8000) -> np.ndarray:
     return np.abs(played.realization.sound(rate).astype(float))
 
 
-def test_a_file_sounds_from_its_start_for_as_long_as_it_is(play, media: Path) -> None:
+def test_audio_sounds_from_its_start_for_its_duration(play, media: Path) -> None:
     played = play(
         '<bmlt:audiofile id="a" fileName="hello.wav" start="1"/><wait id="w" duration="3"/>', media=media
     )
@@ -28,7 +28,7 @@ def test_a_file_sounds_from_its_start_for_as_long_as_it_is(play, media: Path) ->
     assert not heard[12000:].any()
 
 
-def test_others_hang_on_its_end_and_cannot_stretch_it(play, media: Path) -> None:
+def test_audio_ties_others_to_its_end_and_does_not_stretch(play, media: Path) -> None:
     played = play(
         '<bmlt:audiofile id="a" fileName="sounds/bell.wav"/><head id="h" lexeme="NOD" start="a:end"/>'
         '<faceLexeme id="f" lexeme="SMILE" start="a:start" end="a:end"/>',
@@ -38,7 +38,7 @@ def test_others_hang_on_its_end_and_cannot_stretch_it(play, media: Path) -> None
     assert played.times("h")["start"] == played.times("f")["end"] == 0.25
 
 
-def test_it_is_cut_off_where_the_document_ends_it(play, media: Path) -> None:
+def test_audio_is_cut_off_at_an_end_in_the_document(play, media: Path) -> None:
     played = play(
         '<bmlt:audiofile id="a" fileName="hello.wav" end="0.2"/><wait id="w" duration="1"/>', media=media
     )
@@ -48,20 +48,20 @@ def test_it_is_cut_off_where_the_document_ends_it(play, media: Path) -> None:
     assert not heard[2100:].any()
 
 
-def test_an_end_after_its_own_is_silence(play, media: Path) -> None:
+def test_audio_with_a_later_end_is_silent_after_its_own(play, media: Path) -> None:
     played = play('<bmlt:audiofile id="a" fileName="hello.wav" start="0" end="2"/>', media=media)
     assert played.times("a")["end"] == 2
     assert not sound(played)[4000:].any()
 
 
-def test_it_ends_with_another_and_starts_early_enough(play, media: Path) -> None:
+def test_audio_tied_at_its_end_starts_early_enough(play, media: Path) -> None:
     played = play(
         '<bmlt:audiofile id="a" fileName="hello.wav" end="w:end"/><wait id="w" duration="2"/>', media=media
     )
     assert played.times("a") == pytest.approx({"start": 1.5, "end": 2})
 
 
-def test_a_file_that_is_no_sound_is_dropped_and_the_rest_plays(play, media: Path) -> None:
+def test_audio_file_that_cannot_be_read_is_dropped(play, media: Path) -> None:
     (media / "not.wav").write_bytes(b"ID3 this is an mp3")
     played = play('<bmlt:audiofile id="a" fileName="not.wav"/><head id="h" lexeme="NOD"/>', media=media)
     assert played.warnings == [("b:a", "CANNOT_CREATE_BEHAVIOR")]
@@ -69,7 +69,7 @@ def test_a_file_that_is_no_sound_is_dropped_and_the_rest_plays(play, media: Path
     assert played.times("h")
 
 
-def test_its_volume_changes_while_it_sounds(play, media: Path) -> None:
+def test_audio_volume_changes_while_it_sounds(play, media: Path) -> None:
     played = play(
         '<bmlt:audiofile id="a" fileName="hello.wav"/>'
         '<bmla:parametervaluechange id="p" target="b:a" paramId="volume" start="0.25">'
@@ -81,7 +81,7 @@ def test_its_volume_changes_while_it_sounds(play, media: Path) -> None:
     assert heard[2800:4000].max() == pytest.approx(0.1 * 32767, rel=0.02)
 
 
-def test_a_speech_with_a_recording_moves_its_lips_and_its_syncs_with_it(play, media: Path) -> None:
+def test_speech_with_a_recording_moves_its_lips_and_syncs(play, media: Path) -> None:
     if fix := install_hint():
         pytest.skip(fix)
     voice = EspeakVoice()
@@ -107,7 +107,7 @@ def test_a_speech_with_a_recording_moves_its_lips_and_its_syncs_with_it(play, me
     assert opening[0] > opening[1] + 50, "the mouth is open in the vowel and closed in the p"
 
 
-def test_a_speech_whose_recording_is_missing_is_spoken_with_a_warning(play, media: Path) -> None:
+def test_speech_without_its_recording_is_synthesized_with_a_warning(play, media: Path) -> None:
     played = play(
         '<speech id="s"><text>Hello there</text>'
         '<description priority="1" type="audiofile"><bmlt:audiofile fileName="none.wav"/></description>'
@@ -119,7 +119,7 @@ def test_a_speech_whose_recording_is_missing_is_spoken_with_a_warning(play, medi
     assert played.times("s")["end"] > 0.3
 
 
-def test_a_speech_whose_recording_says_nothing_plays_it_and_guesses_its_syncs(play, media: Path) -> None:
+def test_speech_with_a_recording_without_text_guesses_its_syncs(play, media: Path) -> None:
     (media / "still.wav").write_bytes(wav(bytes(16_000)))
     played = play(
         '<speech id="s"><text>Hello <sync id="x"/>there</text>'

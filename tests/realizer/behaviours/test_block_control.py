@@ -27,7 +27,7 @@ def act(element: str) -> Interrupt | Activate | Change:
         ('<bmla:activate id="i" target="a"/>', Activate("a")),
     ],
 )
-def test_it_says_whom_it_means(element: str, does: Interrupt | Activate) -> None:
+def test_command_names_its_target(element: str, does: Interrupt | Activate) -> None:
     assert act(element) == does
 
 
@@ -41,9 +41,7 @@ def test_it_says_whom_it_means(element: str, does: Interrupt | Activate) -> None
         ('start="1" end="3"', "instant", None),
     ],
 )
-def test_a_parameter_changes_evenly_only_where_there_is_an_end(
-    sync: str, type: str, curve: str | None
-) -> None:
+def test_change_is_even_only_with_an_end(sync: str, type: str, curve: str | None) -> None:
     change = act(
         f'<bmla:parametervaluechange id="p" target="a:x" paramId="volume" {sync}>'
         f'<bmla:trajectory type="{type}" initialValue="20" targetValue="90"/></bmla:parametervaluechange>'
@@ -51,7 +49,7 @@ def test_a_parameter_changes_evenly_only_where_there_is_an_end(
     assert change == Change("a", "x", "volume", to=90, initial=20, curve=curve)
 
 
-def test_without_an_initial_value_it_goes_on_from_where_it_is() -> None:
+def test_change_without_an_initial_value_starts_where_it_is() -> None:
     change = act(
         '<bmla:parametervaluechange id="p" target="a:x" paramId="amount">'
         '<bmla:trajectory type="instant" targetValue="1"/></bmla:parametervaluechange>'
@@ -68,7 +66,7 @@ ELEMENTS = {
 
 
 @pytest.mark.parametrize("name", ["activate", "change"])
-def test_it_is_over_at_once_unless_its_end_is_given(play, name: str) -> None:
+def test_block_control_is_instant_without_an_end(play, name: str) -> None:
     wait = '<wait id="w" duration="4"/>'
     assert play(wait + ELEMENTS[name].format(sync='start="w:start+1"')).times("i") == {"start": 1, "end": 1}
     long = play(wait + ELEMENTS[name].format(sync='start="1" end="w:end"')).times("i")

@@ -42,7 +42,7 @@ def same(got: dict[str, float], wanted: dict[str, float]) -> bool:
 
 
 @pytest.mark.parametrize("name", ["anger", "DISGUST", "Fear", "HAPPINESS", "joy", "sadness", "SURPRISE"])
-def test_a_word_shows_what_the_face_lexeme_of_its_name_shows(play, name: str) -> None:
+def test_emotion_of_a_word_shows_the_face_lexeme_of_its_name(play, name: str) -> None:
     shown = play(f'<own:emotion id="e" name="{name}" intensity="0.6" {AT}/>')
     asked = play(f'<faceLexeme id="e" lexeme="{name}" amount="0.6" {AT}/>')
     assert shown.warnings == []
@@ -52,14 +52,14 @@ def test_a_word_shows_what_the_face_lexeme_of_its_name_shows(play, name: str) ->
 
 
 @pytest.mark.parametrize("name", emotion_faces())
-def test_the_angle_of_an_archetype_shows_that_archetype_whatever_the_turn(play, name: str) -> None:
+def test_emotion_at_the_angle_of_an_archetype_shows_that_archetype(play, name: str) -> None:
     by_name = asked(play(f'<own:emotion id="e" name="{name}" intensity="1" {AT}/>'), 1.0)
     place = ring("paul")[name].angle
     for angle in (place, place - 720, place + 1080):
         assert asked(play(f'<own:emotion id="e" angle="{angle}" intensity="1" {AT}/>'), 1.0) == by_name
 
 
-def test_between_two_archetypes_both_show_the_nearer_one_more(play) -> None:
+def test_emotion_between_two_archetypes_shows_the_nearer_one_more(play) -> None:
     mixed = asked(play(f'<own:emotion id="e" angle="123.75" intensity="1" {AT}/>'), 1.0)
     assert mixed["15L"] == pytest.approx(0.75 * SAD, abs=1e-3)  # only sadness has it
     assert mixed["2L"] == pytest.approx(0.25 * 1.0, abs=1e-3)  # only surprise
@@ -69,7 +69,7 @@ def test_between_two_archetypes_both_show_the_nearer_one_more(play) -> None:
     assert by_name == asked(play(f'<own:emotion id="e" angle="112.5" intensity="1" {AT}/>'), 1.0)
 
 
-def test_a_word_that_was_rated_lies_on_plutchiks_ring_as_strong_as_its_place_there(play) -> None:
+def test_emotion_of_a_rated_word_is_on_plutchiks_ring(play) -> None:
     near_sad = 0.8377  # (102.3 - 70.3) / (108.5 - 70.3)
     activation = 0.1623 * 4.9 + near_sad * 3.9
     guilty = asked(play(f'<own:emotion id="e" name="guilty" intensity="1" {AT}/>'), 1.0)
@@ -80,7 +80,7 @@ def test_a_word_that_was_rated_lies_on_plutchiks_ring_as_strong_as_its_place_the
 
 
 @pytest.mark.parametrize("profile", ["published", "raw"])
-def test_a_published_profile_plays_as_faps_with_nothing_added(play, profile: str) -> None:
+def test_emotion_with_a_published_profile_plays_as_faps_only(play, profile: str) -> None:
     played = play(f'<own:emotion id="e" name="afraid" profile="{profile}" intensity="0.5" {AT}/>')
     assert played.warnings == []
     assert played.aus(1.0) == {}
@@ -90,7 +90,7 @@ def test_a_published_profile_plays_as_faps_with_nothing_added(play, profile: str
     assert play(at).fap(3, 1.0) == pytest.approx(place_on(67.5, 5, profile).frame()[2], abs=0.1)
 
 
-def test_a_less_activated_emotion_is_a_weaker_one(play) -> None:
+def test_emotion_with_less_activation_is_weaker(play) -> None:
     worried = asked(play(f'<own:emotion id="e" name="worried" intensity="1" {AT}/>'), 1.0)
     afraid = asked(play(f'<own:emotion id="e" name="fear" intensity="1" {AT}/>'), 1.0)
     terrified = asked(play(f'<own:emotion id="e" name="terrified" intensity="1" {AT}/>'), 1.0)
@@ -99,7 +99,7 @@ def test_a_less_activated_emotion_is_a_weaker_one(play) -> None:
     assert max(terrified.values()) == 1
 
 
-def test_an_emotion_takes_its_time_as_its_face_lexeme_does_and_a_mix_a_time_between(play) -> None:
+def test_emotion_timing_is_of_its_face_lexeme_or_between_two(play) -> None:
     lengths = {}
     for words_ in ('name="surprise"', 'angle="247.5"', 'name="anger"'):
         lengths[words_] = play(f'<own:emotion id="e" {words_}/>').times("e")["end"]
@@ -108,14 +108,14 @@ def test_an_emotion_takes_its_time_as_its_face_lexeme_does_and_a_mix_a_time_betw
     assert surprise < between < anger
 
 
-def test_an_unknown_word_is_dropped_and_what_was_meant_is_named(play) -> None:
+def test_emotion_of_an_unknown_word_is_dropped_with_a_suggestion(play) -> None:
     played = play('<own:emotion id="e" name="hapy"/><head id="h" lexeme="NOD"/>')
     assert played.warnings == [("b:e", "CANNOT_CREATE_BEHAVIOR")]
     assert "got 'hapy', did you mean happy" in played.told
     assert played.times("h")
 
 
-def test_a_profile_that_is_not_there_is_said_and_the_usual_one_shows(play) -> None:
+def test_emotion_with_an_unknown_profile_warns_and_shows_the_default(play) -> None:
     assert play(f'<own:emotion id="e" name="fear" profile="default" {AT}/>').warnings == []
     played = play(f'<own:emotion id="e" name="fear" profile="P_F(8)" {AT}/>')
     assert played.warnings == [("b:e", "CUSTOM_ATTRIBUTE_NOT_SUPPORTED")]
@@ -123,13 +123,13 @@ def test_a_profile_that_is_not_there_is_said_and_the_usual_one_shows(play) -> No
     assert played.aus(1.0) == play(f'<own:emotion id="e" name="fear" {AT}/>').aus(1.0)
 
 
-def test_an_emotion_shows_whole_unless_it_says_how_much_of_it(play) -> None:
+def test_emotion_shows_fully_without_an_intensity(play) -> None:
     """A word is already as strong as it says; half of anger reads as no emotion at all."""
     full = play(f'<own:emotion id="e" name="anger" {AT}/>')
     assert full.aus(1.0) == play(f'<own:emotion id="e" name="anger" intensity="1" {AT}/>').aus(1.0)
 
 
-def test_valence_and_arousal_are_a_place_too(play) -> None:
+def test_emotion_by_valence_and_arousal_is_a_place(play) -> None:
     row = whissell_words()["joyful"]
     away = {"valence": (row.evaluation - 4) / 3, "arousal": (row.activation - 4) / 3}
     length = math.hypot(*away.values())
@@ -149,7 +149,7 @@ def test_valence_and_arousal_are_a_place_too(play) -> None:
     assert shown == pytest.approx(list(affect(-0.6, 0.4, "published").frame()), abs=0.1)
 
 
-def test_an_archetype_and_a_number_is_that_published_profile(play) -> None:
+def test_emotion_of_an_archetype_and_a_number_is_a_published_profile(play) -> None:
     played = play(f'<own:emotion id="e" name="Fear 3" profile="published" {AT}/>')
     assert played.warnings == []
     shown = [played.fap(number, 1.0) for number in range(1, 69)]
@@ -167,7 +167,7 @@ def test_an_archetype_and_a_number_is_that_published_profile(play) -> None:
         ('name="accepting"', "accepting: nobody rated how activated it is"),
     ],
 )
-def test_a_profile_that_nobody_has_is_dropped_and_what_was_meant_is_named(
+def test_emotion_with_an_unknown_number_is_dropped_with_a_suggestion(
     play, attributes: str, said: str
 ) -> None:
     played = play(f'<own:emotion id="e" {attributes}/>')
@@ -175,7 +175,7 @@ def test_a_profile_that_nobody_has_is_dropped_and_what_was_meant_is_named(
     assert said in played.told
 
 
-def test_a_seed_draws_within_a_published_profile_the_same_each_time(play) -> None:
+def test_emotion_with_a_seed_varies_a_published_profile_reproducibly(play) -> None:
     def faps(seed: int) -> list[float]:
         played = play(f'<own:emotion id="e" name="fear 8" profile="published" seed="{seed}" {AT}/>')
         assert played.warnings == []
@@ -189,7 +189,7 @@ def test_a_seed_draws_within_a_published_profile_the_same_each_time(play) -> Non
         assert low - 0.1 <= one[fap - 1] <= high + 0.1
 
 
-def test_a_seed_draws_our_own_face_as_action_units_both_sides_alike(play) -> None:
+def test_emotion_with_a_seed_varies_action_units_equally_on_both_sides(play) -> None:
     middle = asked(play(f'<own:emotion id="e" name="joy" intensity="0.5" {AT}/>'), 1.0)
     draws = [
         asked(play(f'<own:emotion id="e" name="joy" seed="{seed}" intensity="0.5" {AT}/>'), 1.0)
@@ -203,7 +203,7 @@ def test_a_seed_draws_our_own_face_as_action_units_both_sides_alike(play) -> Non
     assert draws[0]["12L"] == draws[0]["12R"]
 
 
-def test_a_mood_rises_and_stays_and_a_neutral_one_takes_it_back(play) -> None:
+def test_mood_rises_and_stays_and_a_neutral_one_ends_it(play) -> None:
     sad = '<own:mood id="m" name="sadness" intensity="1" start="0" end="1"/><wait id="w" duration="5"/>'
     played = play(sad)
     assert played.aus(0) == {}
@@ -217,7 +217,7 @@ def test_a_mood_rises_and_stays_and_a_neutral_one_takes_it_back(play) -> None:
     assert back.aus(3.5) == {}
 
 
-def test_a_mood_shows_under_an_expression(play) -> None:
+def test_mood_is_below_an_expression(play) -> None:
     played = play(
         '<own:mood id="m" name="sadness" intensity="1" start="0" end="0.5"/>'
         f'<own:expression id="e" name="SMILE" intensity="1" {AT.replace("2", "3")}/>'
@@ -227,7 +227,7 @@ def test_a_mood_shows_under_an_expression(play) -> None:
 
 
 @pytest.mark.parametrize("word", known_words())
-def test_every_word_plays_in_either_case(play, word: str) -> None:
+def test_emotion_plays_every_word_in_any_case(play, word: str) -> None:
     played = play(f'<own:emotion id="e" name="{word.upper()}" {AT}/>')
     assert played.warnings == []
     assert bool(played.aus(1.0)) == (word != "neutral")

@@ -12,7 +12,7 @@ AT = 'start="0" attackPeak="0.5" relax="1.5" end="2"'
 
 
 @pytest.mark.parametrize("template", templates().values(), ids=lambda t: t.name)
-def test_a_template_shows_its_action_units(play, template) -> None:
+def test_expression_shows_the_action_units_of_a_template(play, template) -> None:
     played = play(f'<own:expression id="e" name="template:{template.name.lower()}" intensity="0.5" {AT}/>')
     assert played.warnings == []
     shown = {int(name.rstrip("LR")): value for name, value in played.aus(1.0).items()}
@@ -21,7 +21,7 @@ def test_a_template_shows_its_action_units(play, template) -> None:
 
 
 @pytest.mark.parametrize("name", face_lexemes())
-def test_a_face_lexeme_is_an_expression_too(play, name: str) -> None:
+def test_expression_of_a_face_lexeme_is_the_same(play, name: str) -> None:
     shown = play(f'<own:expression id="e" name="{name.lower()}" intensity="0.7" {AT}/>')
     asked = play(f'<faceLexeme id="e" lexeme="{name}" amount="0.7" {AT}/>')
     assert shown.aus(1.0) == asked.aus(1.0)
@@ -29,7 +29,7 @@ def test_a_face_lexeme_is_an_expression_too(play, name: str) -> None:
     assert free.times("e") == pytest.approx(free.times("f"))
 
 
-def test_a_template_is_not_the_emotion_of_its_name(play) -> None:
+def test_expression_of_a_template_differs_from_the_emotion_of_its_name(play) -> None:
     template = play(f'<own:expression id="e" name="template:anger" {AT}/>').aus(1.0)
     emotion = play(f'<own:expression id="e" name="anger" {AT}/>').aus(1.0)
     assert set(template) == {"4L", "4R"}
@@ -39,12 +39,12 @@ def test_a_template_is_not_the_emotion_of_its_name(play) -> None:
 @pytest.mark.parametrize(
     "name", ["TEMPLATE:Ironic_Smile", "template:ironic-smile", "template: ironic  smile"]
 )
-def test_a_name_may_be_written_in_several_ways(play, name: str) -> None:
+def test_expression_name_has_several_spellings(play, name: str) -> None:
     assert set(play(f'<own:expression id="e" name="{name}" {AT}/>').aus(1.0)) == {"10L", "10R", "12L", "12R"}
 
 
 @pytest.mark.parametrize("template", templates().values(), ids=lambda t: t.name)
-def test_a_template_lasts_as_long_as_it_was_seen_within_what_is_probable(play, template) -> None:
+def test_expression_of_a_template_lasts_as_long_as_measured(play, template) -> None:
     times = play(f'<own:expression id="e" name="template:{template.name}"/>').times("e")
     half = (times["attackPeak"] - times["start"]) / 2, (times["end"] - times["relax"]) / 2
     evident = (times["end"] - half[1]) - (times["start"] + half[0])
@@ -63,14 +63,14 @@ def test_a_template_lasts_as_long_as_it_was_seen_within_what_is_probable(play, t
         ("zzz", "template:grief"),
     ],
 )
-def test_an_unknown_name_is_dropped_and_the_near_ones_are_named(play, name: str, meant: str) -> None:
+def test_expression_with_an_unknown_name_is_dropped_with_suggestions(play, name: str, meant: str) -> None:
     played = play(f'<own:expression id="e" name="{name}"/><head id="h" lexeme="NOD"/>')
     assert played.warnings == [("b:e", "CANNOT_CREATE_BEHAVIOR")]
     assert meant in played.told
     assert played.times("h")
 
 
-def test_ones_own_expressions_are_played_by_both_elements(tmp_path) -> None:
+def test_expression_of_the_user_is_played_by_both_elements(tmp_path) -> None:
     (tmp_path / "smirk.toml").write_text(
         "aus = { 12L = 0.6, 2R = 0.3 }\nonset = 0.2\napex = 0.5\noffset = 0.4\n", "utf-8"
     )
@@ -85,7 +85,7 @@ def test_ones_own_expressions_are_played_by_both_elements(tmp_path) -> None:
     assert list(played.schedules[0]["e"].values()) == pytest.approx([0, 0.2, 0.7, 1.1])
 
 
-def test_a_template_may_be_a_lexeme_too(play) -> None:
+def test_expression_of_a_template_may_be_a_lexeme(play) -> None:
     played = play(f'<faceLexeme id="f" lexeme="template:grief" amount="1" {AT}/>')
     assert played.warnings == []
     assert set(played.aus(1.0)) == {"1L", "1R"}

@@ -22,7 +22,7 @@ def clip(values: np.ndarray, *used: int, fps: float = 25) -> FAPClip:
 
 
 @pytest.mark.parametrize("fps", [2, 12.5, 25, 30, 29.97])
-def test_it_plays_as_the_clip_says_at_its_own_rate(fps: float) -> None:
+def test_document_of_a_clip_plays_it_at_its_rate(fps: float) -> None:
     course = np.round(300 * np.sin(np.linspace(0, np.pi, 31)))
     played = realize(document_of(clip(course[:, None], 3, fps=fps), "b"), fps=fps, idle=False)
     assert played.warnings == ()
@@ -30,7 +30,7 @@ def test_it_plays_as_the_clip_says_at_its_own_rate(fps: float) -> None:
     np.testing.assert_allclose(played.faps.values[:31, 2], course, atol=2)
 
 
-def test_what_the_clip_gives_as_0_is_held_there() -> None:
+def test_document_of_a_clip_holds_its_faps_of_0() -> None:
     document = document_of(clip(np.zeros((50, 1)), 12), "b")
     smile = '<bml id="s"><faceLexeme id="l" lexeme="SMILE" start="0" end="1.9"/></bml>'
     played = realize([smile, document], idle=False)
@@ -38,7 +38,7 @@ def test_what_the_clip_gives_as_0_is_held_there() -> None:
     assert played.faps.values[25, 12] > 20
 
 
-def test_values_beyond_the_range_are_limited_and_nothing_is_said() -> None:
+def test_document_of_a_clip_limits_values_without_a_warning() -> None:
     played = realize(document_of(clip(np.full((50, 1), 99_999), 3), "b"), idle=False)
     assert played.warnings == ()
     assert played.faps.values[25, 2] == 4320
@@ -51,6 +51,6 @@ def test_values_beyond_the_range_are_limited_and_nothing_is_said() -> None:
         (clip(np.zeros((5, 0))), "got 5 frames of 0 FAPs"),
     ],
 )
-def test_what_has_nothing_to_play_is_refused(given: FAPClip, says: str) -> None:
+def test_document_of_an_empty_clip_is_refused(given: FAPClip, says: str) -> None:
     with pytest.raises(RealizerError, match=re.escape(says)):
         document_of(given, "b")

@@ -19,7 +19,7 @@ def faps(*pairs: tuple[int, float], sync: str = AT, id: str = "f") -> str:
     return f'<own:faps id="{id}" {sync}>{inside}</own:faps>'
 
 
-def test_values_are_reached_at_attack_peak_held_to_relax_and_gone_at_end(play) -> None:
+def test_faps_hold_their_values_from_attack_peak_to_relax(play) -> None:
     played = play(faps((31, 150), (5, -80)))
     assert [played.fap(31, t) for t in (0, 0.5, 1.0, 1.5, 2.0)] == [0, 150, 150, 150, 0]
     assert [played.fap(5, t) for t in (0, 0.5, 1.0, 1.5, 2.0)] == [0, -80, -80, -80, 0]
@@ -27,7 +27,7 @@ def test_values_are_reached_at_attack_peak_held_to_relax_and_gone_at_end(play) -
     assert played.fap(32, 1.0) == 0
 
 
-def test_they_stand_in_place_of_what_else_moves_the_face(play) -> None:
+def test_faps_override_other_behaviours(play) -> None:
     smile = '<faceLexeme id="s" lexeme="SMILE" amount="0.5" start="0" attackPeak="0.5" relax="1.5" end="2"/>'
     alone = play(smile).fap(12, 1.0)
     assert alone > 0
@@ -37,27 +37,27 @@ def test_they_stand_in_place_of_what_else_moves_the_face(play) -> None:
         assert both.fap(13, 1.0) == pytest.approx(alone)
 
 
-def test_a_value_beyond_its_range_is_said_and_limited(play) -> None:
+def test_faps_beyond_their_range_are_limited_with_a_warning(play) -> None:
     played = play(faps((19, 5000)))
     assert played.warnings == [("b:f", "CUSTOM_ATTRIBUTE_NOT_SUPPORTED")]
     assert "wanted -1080..1080, got 5000" in played.told
     assert played.fap(19, 1.0) == 1080
 
 
-def test_a_number_that_comes_twice_is_a_fault(play) -> None:
+def test_faps_with_a_repeated_number_are_a_fault(play) -> None:
     played = play(faps((31, 10), (31, 20)))
     assert played.warnings == [("b:f", "CANNOT_CREATE_BEHAVIOR")]
     assert "31 (raise_l_i_eyebrow) twice" in played.told
 
 
-def test_two_behaviours_cannot_have_the_same_fap_at_one_time(play) -> None:
+def test_faps_of_two_behaviours_conflict(play) -> None:
     played = play(faps((31, 10), id="one") + faps((31, 20), (33, 5), id="two"))
     assert [id for id, _ in played.warnings] == ["b:two"]
     assert played.fap(31, 1.0) == 10
     assert play(faps((31, 10), id="one") + faps((33, 20), id="two")).warnings == []
 
 
-def test_a_file_plays_from_start_to_end(play, media: Path) -> None:
+def test_fap_file_plays_from_start_to_end(play, media: Path) -> None:
     played = play('<own:fapFile id="f" fileName="smile.fap" start="1"/>', media=media)
     assert played.warnings == []
     assert played.times("f") == {"start": 1, "end": 1.4}
@@ -67,12 +67,12 @@ def test_a_file_plays_from_start_to_end(play, media: Path) -> None:
     assert played.fap(31, 1.2) == 0
 
 
-def test_a_file_stretches_to_the_times_it_is_given(play, media: Path) -> None:
+def test_fap_file_stretches_to_its_times(play, media: Path) -> None:
     played = play('<own:fapFile id="f" fileName="smile.fap" start="1" end="3"/>', media=media)
     assert [played.fap(13, t) for t in (1.0, 1.5, 2.0, 2.5, 3.0)] == pytest.approx([0, 100, 200, 100, 0])
 
 
-def test_what_we_write_plays_back_as_it_was(play, media: Path) -> None:
+def test_fap_file_plays_back_what_we_write(play, media: Path) -> None:
     document = '<bml id="b"><faceLexeme id="s" lexeme="SURPRISE"/><head id="h" lexeme="NOD"/></bml>'
     first = realize(document, fps=25, idle=False)
     (media / "own.fap").write_text(encode(FAPClip.of(first.faps, 25, "own")), "utf-8")
@@ -81,7 +81,7 @@ def test_what_we_write_plays_back_as_it_was(play, media: Path) -> None:
     np.testing.assert_allclose(again.realization.faps.values[::4], first.faps.integers(), atol=0.01)
 
 
-def test_a_file_that_does_not_begin_at_rest_gets_there_smoothly(play, media: Path) -> None:
+def test_fap_file_that_does_not_begin_at_rest_is_eased(play, media: Path) -> None:
     values = np.zeros((51, 68), np.int32)
     values[:, 30] = 200
     mask = np.arange(68) == 30
@@ -101,7 +101,7 @@ def with_compound(media: Path, viseme: str, expression: str) -> None:
     (media / "v.fap").write_text("\n".join(["2.1 v 25 26", *lines]), "utf-8")
 
 
-def test_visemes_and_expressions_of_a_file_are_shown(play, media: Path) -> None:
+def test_fap_file_shows_visemes_and_expressions(play, media: Path) -> None:
     with_compound(media, "10 0 63 0", "6 63 0 0 0 0")
     played = play('<own:fapFile id="f" fileName="v.fap"/>', media=media)
     assert played.warnings == []
@@ -110,7 +110,7 @@ def test_visemes_and_expressions_of_a_file_are_shown(play, media: Path) -> None:
     assert played.fap(31, 0.52) == pytest.approx(10), "the other one is as the file says"
 
 
-def test_what_a_viseme_cannot_show_is_said(play, media: Path) -> None:
+def test_fap_file_warns_of_visemes_that_cannot_be_shown(play, media: Path) -> None:
     with_compound(media, "500 0 63 0", "7 63 0 0 0 0")
     played = play('<own:fapFile id="f" fileName="v.fap"/>', media=media)
     assert played.warnings == [("b:f", "CUSTOM_ATTRIBUTE_NOT_SUPPORTED")]
@@ -126,9 +126,7 @@ def test_what_a_viseme_cannot_show_is_said(play, media: Path) -> None:
         ("#" * (8 * 2**20 + 1), "wanted at most 8 MiB of FAP text"),
     ],
 )
-def test_a_file_that_is_none_is_dropped_and_the_rest_plays(
-    play, media: Path, content: str, says: str
-) -> None:
+def test_fap_file_that_cannot_be_read_is_dropped(play, media: Path, content: str, says: str) -> None:
     (media / "bad.fap").write_text(content, "utf-8")
     played = play('<own:fapFile id="f" fileName="bad.fap"/><head id="h" lexeme="NOD"/>', media=media)
     assert played.warnings == [("b:f", "CANNOT_CREATE_BEHAVIOR")]

@@ -43,20 +43,20 @@ def mouth(viseme: int) -> np.ndarray:
     return out
 
 
-def test_a_clip_without_them_is_as_it_was() -> None:
+def test_expand_compound_leaves_a_clip_without_fap_1_and_2() -> None:
     plain = clip(fap3=[1, 2])
     assert expand_compound(plain) is plain
 
 
 @pytest.mark.parametrize("viseme", range(15))
-def test_a_viseme_alone_is_its_mouth(viseme: int) -> None:
+def test_expand_compound_of_one_viseme_is_its_mouth(viseme: int) -> None:
     got = expand_compound(clip([[viseme, 0, 63, 0]]))
     np.testing.assert_allclose(got.values[0], mouth(viseme), atol=0.5)
     assert not got.mask[:2].any()
     assert got.mask[JAW] == (viseme > 0)
 
 
-def test_two_visemes_are_mixed_by_the_blend() -> None:
+def test_expand_compound_mixes_two_visemes_by_the_blend() -> None:
     got = expand_compound(clip([[10, 1, 42, 0], [0, 10, 0, 0], [10, 14, 0, 0]]))
     np.testing.assert_allclose(got.values[0], mouth(10) * 2 / 3 + mouth(1) / 3, atol=0.5)
     np.testing.assert_allclose(got.values[1], mouth(10), atol=0.5)
@@ -64,19 +64,19 @@ def test_two_visemes_are_mixed_by_the_blend() -> None:
 
 
 @pytest.mark.parametrize("row", fap_expressions())
-def test_an_expression_is_the_profile_of_its_emotion_as_far_as_its_intensity(row: FapExpression) -> None:
+def test_expand_compound_scales_the_profile_of_an_expression(row: FapExpression) -> None:
     got = expand_compound(clip(None, [[row.number, 63, 0, 0, 0, 0], [0, 0, row.number, 21, 0, 0]]))
     profile = archetypes("own")[row.emotion][0].frame()
     np.testing.assert_allclose(got.values[0], profile, atol=0.5)
     np.testing.assert_allclose(got.values[1], profile / 3, atol=0.5)
 
 
-def test_the_six_expressions_are_numbered_as_in_the_standard() -> None:
+def test_expand_compound_numbers_the_six_expressions_as_the_standard() -> None:
     names = ["joy", "sadness", "anger", "fear", "disgust", "surprise"]
     assert [(row.number, row.emotion) for row in fap_expressions()] == list(enumerate(names, 1))
 
 
-def test_a_fap_that_the_clip_gives_stands_also_where_it_is_0() -> None:
+def test_expand_compound_keeps_faps_of_the_clip_also_at_0() -> None:
     got = expand_compound(clip([[10, 0, 63, 0]] * 2, [[6, 63, 0, 0, 0, 0]] * 2, fap3=[0, 77], fap31=[0, -5]))
     assert got.values[:, JAW].tolist() == [0, 77]
     assert got.values[:, BROW].tolist() == [0, -5]
@@ -84,13 +84,13 @@ def test_a_fap_that_the_clip_gives_stands_also_where_it_is_0() -> None:
     assert got.values[0, BROW + 1] > 100, "and the other brow goes up"
 
 
-def test_with_init_face_a_fap_is_relative_to_the_expression() -> None:
+def test_expand_compound_adds_faps_to_the_expression_with_init_face() -> None:
     alone = expand_compound(clip(None, [[6, 63, 0, 0, 0, 0]])).values[0, BROW]
     got = expand_compound(clip(None, [[6, 63, 0, 0, 1, 0]], fap31=[-5]))
     assert got.values[0, BROW] == alone - 5
 
 
-def test_a_viseme_has_the_lips_of_a_face_that_smiles() -> None:
+def test_expand_compound_lets_a_viseme_have_the_lips_of_a_smile() -> None:
     smile = [[1, 63, 0, 0, 0, 0]]
     got, alone = expand_compound(clip([[1, 0, 63, 0]], smile)), expand_compound(clip(None, smile))
     assert alone.values[0, LIP] < -20
@@ -114,12 +114,12 @@ ODD = {
 
 
 @pytest.mark.parametrize(("odd", "says"), ODD.values(), ids=ODD)
-def test_what_cannot_be_shown_is_said(odd: FAPClip, says: str) -> None:
+def test_expand_compound_notes_what_cannot_be_shown(odd: FAPClip, says: str) -> None:
     (note,) = expand_compound(odd).notes
     assert note.startswith(says)
 
 
-def test_a_clip_that_says_nothing_of_a_mouth_leaves_it_to_others() -> None:
+def test_expand_compound_leaves_a_mouth_that_the_clip_does_not_move() -> None:
     assert not expand_compound(clip([[500, 0, 0, 0]] * 2)).mask.any()
 
 
@@ -127,9 +127,7 @@ NUMBERS = st.integers(-(2**31) + 1, 2**31 - 1)
 
 
 @given(arrays(np.int32, (3, 4), elements=NUMBERS), arrays(np.int32, (3, 6), elements=NUMBERS))
-def test_whatever_is_given_the_face_stays_within_what_two_expressions_ask(
-    visemes: np.ndarray, expressions: np.ndarray
-) -> None:
+def test_expand_compound_stays_within_two_expressions(visemes: np.ndarray, expressions: np.ndarray) -> None:
     got = expand_compound(
         replace(clip([[0] * 4] * 3, [[0] * 6] * 3), visemes=visemes, expressions=expressions)
     )

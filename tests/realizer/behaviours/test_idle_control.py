@@ -26,20 +26,20 @@ def blinks(frames: np.ndarray) -> list[int]:
     return np.flatnonzero(lid[1:] & ~lid[:-1]).tolist()
 
 
-def test_a_face_without_blinks_and_motion_is_still(play) -> None:
+def test_idle_without_blinks_and_motion_is_still(play) -> None:
     still = aus(play, '<own:idle id="i" blinks="0" motion="0" start="0" end="0.1"/>')
     assert not still[10:].any()
     assert aus(play, "")[10:].any()
 
 
-def test_motion_shrinks_evenly_and_blinks_stay(play) -> None:
+def test_idle_motion_shrinks_evenly_and_blinks_stay(play) -> None:
     usual = aus(play, "")
     less = aus(play, '<own:idle id="i" motion="0.25" start="0" end="0.1"/>')
     np.testing.assert_allclose(less[10:, MOVING], usual[10:, MOVING] * 0.25, atol=1e-6)
     np.testing.assert_array_equal(less[:, LID], usual[:, LID])
 
 
-def test_fewer_blinks_are_some_of_the_usual_ones_and_shut_the_eyes(play) -> None:
+def test_idle_blinks_are_some_of_the_usual_ones_and_close_the_eyes(play) -> None:
     usual, fewer = aus(play, ""), aus(play, '<own:idle id="i" blinks="0.5" start="0" end="0.1"/>')
     assert set(blinks(fewer)) < set(blinks(usual))
     assert 0.2 < len(blinks(fewer)) / len(blinks(usual)) < 0.8
@@ -47,7 +47,7 @@ def test_fewer_blinks_are_some_of_the_usual_ones_and_shut_the_eyes(play) -> None
         np.testing.assert_array_equal(fewer[begin : begin + 31, LID], usual[begin : begin + 31, LID])
 
 
-def test_half_of_the_half_is_among_the_half(play) -> None:
+def test_idle_blinks_of_a_quarter_are_among_those_of_a_half(play) -> None:
     some = [
         set(blinks(aus(play, f'<own:idle id="i" blinks="{part}" start="0" end="0.1"/>')))
         for part in (0.25, 0.5, 1)
@@ -55,7 +55,7 @@ def test_half_of_the_half_is_among_the_half(play) -> None:
     assert some[0] <= some[1] <= some[2]
 
 
-def test_a_later_one_gives_back_what_was_taken(play) -> None:
+def test_idle_of_a_later_behaviour_replaces_an_earlier_one(play) -> None:
     usual = aus(play, "")
     back = aus(
         play,
@@ -66,7 +66,7 @@ def test_a_later_one_gives_back_what_was_taken(play) -> None:
     np.testing.assert_allclose(back[2100:], usual[2100:], atol=1e-6)
 
 
-def test_motion_goes_away_smoothly_and_no_lid_jumps(play) -> None:
+def test_idle_motion_fades_and_no_lid_jumps(play) -> None:
     usual = aus(play, "")
     begin = blinks(usual)[3] / 100 + 0.05  # while the lids close
     control = f'<own:idle id="i" blinks="0" motion="0" start="{begin}" end="{begin + 0.1}"/>'
@@ -78,7 +78,7 @@ def test_motion_goes_away_smoothly_and_no_lid_jumps(play) -> None:
 
 
 @pytest.mark.parametrize("late", [-0.06, -0.02, 0.02, 0.1, 0.2])
-def test_live_frames_are_those_of_the_film_when_blinks_come_back_within_a_blink(late: float) -> None:
+def test_idle_frames_live_are_those_offline_when_blinks_return(late: float) -> None:
     times = np.arange(0, 12, 0.04)
     begins = times[blinks(Player().frames(times).aus)][1] + 0.04
     body = '<own:idle id="i" blinks="0" start="0" end="0.1"/>'
@@ -92,6 +92,6 @@ def test_live_frames_are_those_of_the_film_when_blinks_come_back_within_a_blink(
     assert set(film[film > 0]) <= set(Player().frames(times).aus[:, LID])
 
 
-def test_blinks_that_are_asked_for_come_all_the_same(play) -> None:
+def test_idle_leaves_blinks_of_the_document(play) -> None:
     frames = aus(play, '<own:idle id="i" blinks="0" start="0" end="0.1"/><own:blink id="k" start="5"/>')
     assert blinks(frames) == [500]

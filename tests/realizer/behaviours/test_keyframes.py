@@ -17,7 +17,7 @@ def keyframe(type: str, parts: str, keys: str, sync: str = "") -> str:
 KEYS = "\n0 0 0\n0.5 100 -50\n2 0 0\n"
 
 
-def test_faps_go_through_their_keys(play) -> None:
+def test_keyframes_of_faps_are_reached(play) -> None:
     played = play(keyframe("FAPS", "31 5", KEYS, 'start="1"'))
     assert played.warnings == []
     assert played.times("k") == {"start": 1, "end": 3}
@@ -25,12 +25,12 @@ def test_faps_go_through_their_keys(play) -> None:
     assert [played.fap(5, t) for t in (1, 1.25, 1.5, 2.25, 3)] == pytest.approx([0, -25, -50, -25, 0])
 
 
-def test_the_first_key_is_at_start_whatever_its_time_and_all_stretch_to_end(play) -> None:
+def test_keyframes_begin_at_start_and_stretch_to_end(play) -> None:
     played = play(keyframe("FAPS", "31", "10 0\n11 100\n12 0", 'start="1" end="5"'))
     assert [played.fap(31, t) for t in (1, 2, 3, 4, 5)] == pytest.approx([0, 50, 100, 50, 0])
 
 
-def test_action_units_by_side_go_through_their_keys(play) -> None:
+def test_keyframes_of_action_units_have_sides(play) -> None:
     played = play(keyframe("FACS", "1.BOTH 12.LEFT 26 4.right", "0 0 0 0 0\n1 0.5 1 0.25 0.75\n2 0 0 0 0"))
     assert played.warnings == []
     assert played.aus(1.0) == {"1L": 0.5, "1R": 0.5, "4R": 0.75, "12L": 1.0, "26": 0.25}
@@ -38,7 +38,7 @@ def test_action_units_by_side_go_through_their_keys(play) -> None:
     assert played.aus(2.0) == {}
 
 
-def test_keys_that_do_not_begin_or_end_at_rest_are_reached_without_a_jump(play) -> None:
+def test_keyframes_that_are_not_at_rest_are_eased(play) -> None:
     played = play(keyframe("FACS", "12.BOTH", "0 1\n2 1"))
     course = [played.aus(t / 100).get("12L", 0) for t in range(201)]
     assert course[0] == course[-1] == 0
@@ -73,14 +73,14 @@ def test_keys_that_do_not_begin_or_end_at_rest_are_reached_without_a_jump(play) 
         (keyframe("FAPS", "31", ""), "wanted at least two lines, got 0"),
     ],
 )
-def test_what_is_no_animation_is_dropped_and_the_rest_plays(play, element: str, says: str) -> None:
+def test_keyframes_that_cannot_be_read_are_dropped(play, element: str, says: str) -> None:
     played = play(element + '<head id="h" lexeme="NOD"/>')
     assert played.warnings == [("b:k", "CANNOT_CREATE_BEHAVIOR")]
     assert says in played.told
     assert played.times("h")
 
 
-def test_a_fap_beyond_its_range_is_said_and_limited(play) -> None:
+def test_keyframes_of_faps_beyond_their_range_are_limited_with_a_warning(play) -> None:
     played = play(keyframe("FAPS", "19", "0 0\n1 3000\n2 0"))
     assert played.warnings == [("b:k", "CUSTOM_ATTRIBUTE_NOT_SUPPORTED")]
     assert played.fap(19, 1.0) == 1080

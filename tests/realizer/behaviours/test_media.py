@@ -28,7 +28,7 @@ from realizer.behaviours.media import MediaError, faults, load, media_file
         ("file:///home/somebody/hello%2Ewav", "hello.wav"),
     ],
 )
-def test_a_name_is_found_in_the_folder(media: Path, name: str, found: str) -> None:
+def test_media_file_is_found_in_the_folder(media: Path, name: str, found: str) -> None:
     assert media_file(name, PlanningContext(media=media)) == (media / found).resolve()
 
 
@@ -54,7 +54,7 @@ def test_a_name_is_found_in_the_folder(media: Path, name: str, found: str) -> No
         ("circle/x.wav", "wanted a file of the media folder"),
     ],
 )
-def test_a_name_that_leads_elsewhere_is_refused_in_words(media: Path, name: str, says: str) -> None:
+def test_media_file_refuses_names_that_lead_elsewhere(media: Path, name: str, says: str) -> None:
     secret = media.parent / "secret.wav"
     secret.write_bytes(b"secret")
     (media / "out.wav").symlink_to(secret)
@@ -67,7 +67,9 @@ def test_a_name_that_leads_elsewhere_is_refused_in_words(media: Path, name: str,
 
 
 @given(st.text(st.sampled_from("ab./\\:%2eE~") | st.characters(exclude_categories=["Cs"]), max_size=30))
-def test_no_name_at_all_leads_out(tmp_path_factory: pytest.TempPathFactory, name: str) -> None:
+def test_media_file_never_leads_out_of_the_folder(
+    tmp_path_factory: pytest.TempPathFactory, name: str
+) -> None:
     folder = tmp_path_factory.getbasetemp() / "media"
     folder.mkdir(exist_ok=True)
     (folder / "a").write_bytes(b"inside")
@@ -79,18 +81,18 @@ def test_no_name_at_all_leads_out(tmp_path_factory: pytest.TempPathFactory, name
     assert path.is_relative_to(folder.resolve())
 
 
-def test_a_link_inside_the_folder_is_followed(media: Path) -> None:
+def test_media_file_follows_a_link_inside_the_folder(media: Path) -> None:
     (media / "same.wav").symlink_to("sounds/bell.wav")
     assert media_file("same.wav", PlanningContext(media=media)) == (media / "sounds/bell.wav").resolve()
 
 
-def test_without_a_folder_the_fault_says_how_to_name_one(play) -> None:
+def test_media_file_without_a_folder_is_a_fault_with_a_hint(play) -> None:
     played = play('<bmlt:audiofile id="a" fileName="hello.wav"/><own:fapFile id="f" fileName="smile.fap"/>')
     assert played.warnings == [("b:a", "CANNOT_CREATE_BEHAVIOR"), ("b:f", "CANNOT_CREATE_BEHAVIOR")]
     assert all("--media DIR" in warning.text for warning in played.realization.warnings)
 
 
-def test_a_file_that_is_too_large_is_not_read(media: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_load_refuses_a_file_that_is_too_large(media: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with (media / "large.wav").open("wb") as file:
         file.truncate(files.MAX_BYTES + 1)  # sparse: it takes no place
 
@@ -102,7 +104,7 @@ def test_a_file_that_is_too_large_is_not_read(media: Path, monkeypatch: pytest.M
     assert "wanted at most 64 MiB" in fault.text
 
 
-def test_a_file_is_read_once_and_again_when_it_has_changed(media: Path) -> None:
+def test_load_reads_a_file_again_only_after_a_change(media: Path) -> None:
     world, reads = PlanningContext(media=media), []
 
     def read(content: bytes) -> int:

@@ -28,7 +28,7 @@ def encoded(kind: str, codec: str, rate: int = 48_000) -> bytes:
 @pytest.mark.parametrize(
     ("kind", "codec"), [("flac", "flac"), ("ogg", "libopus"), ("mp3", "libmp3lame"), ("webm", "libopus")]
 )
-def test_the_tone_is_heard_from_any_kind_of_file(kind, codec) -> None:
+def test_read_sound_reads_every_format(kind, codec) -> None:
     recording = read_sound(encoded(kind, codec))
     assert recording.rate == 48_000
     assert len(recording.pcm) == pytest.approx(24_000, abs=2500)
@@ -39,6 +39,6 @@ def test_the_tone_is_heard_from_any_kind_of_file(kind, codec) -> None:
 @pytest.mark.parametrize(
     "content", [b"ID3 is no music", b"OggS" + b"\0" * 40, b"fLaC", b"RIFF", b"", b"#EXTM3U\nx"]
 )
-def test_what_is_none_is_refused_in_words(content) -> None:
+def test_read_sound_refuses_other_files(content) -> None:
     with pytest.raises(RealizerError, match="wanted"):
         read_sound(content)

@@ -31,7 +31,7 @@ def course(played, name: str) -> np.ndarray:
     return played.realization.aus.before_rules[:, names.index(name)]
 
 
-def test_an_expression_grows_out_of_the_one_before_without_a_neutral_face(timeline) -> None:
+def test_timeline_moves_between_expressions_without_a_neutral_face(timeline) -> None:
     played = timeline({"entries": [SURPRISE, ANGER]})
     assert played.warnings == []
     assert played.times("t") == pytest.approx({"start": 0, "end": 2})
@@ -45,7 +45,7 @@ def test_an_expression_grows_out_of_the_one_before_without_a_neutral_face(timeli
 
 
 @pytest.mark.parametrize(("joins", "leaves", "there"), [("onset", 100, 130), ("offset", 50, 100)])
-def test_onset_or_offset_alone_may_lead_from_one_to_the_next(timeline, joins, leaves, there) -> None:
+def test_timeline_onset_or_offset_alone_leads_to_the_next_entry(timeline, joins, leaves, there) -> None:
     played = timeline({"joins": joins, "entries": [SURPRISE, ANGER]})
     brows, frown = course(played, "1L"), course(played, "4L")
     assert brows[leaves] == pytest.approx(0.9, abs=1e-5)
@@ -58,7 +58,7 @@ def test_onset_or_offset_alone_may_lead_from_one_to_the_next(timeline, joins, le
     assert frown[[150, 175, 200]] == pytest.approx([1, 0.5, 0], abs=1e-5)
 
 
-def test_a_neutral_entry_is_a_break(timeline) -> None:
+def test_timeline_neutral_entry_is_a_break(timeline) -> None:
     entries = [SURPRISE, {"expression": "neutral", "duration": 0.5}, ANGER]
     for joins in ("both", "onset", "offset"):
         played = timeline({"joins": joins, "entries": entries})
@@ -68,7 +68,7 @@ def test_a_neutral_entry_is_a_break(timeline) -> None:
         assert np.abs(np.diff(shown)).max() < 0.05, joins
 
 
-def test_smooth_joins_begin_and_end_softly(timeline) -> None:
+def test_timeline_smooth_joins_begin_and_end_softly(timeline) -> None:
     straight = course(timeline({"entries": [SURPRISE, ANGER]}), "4L")
     smooth = course(timeline({"curve": "smooth", "entries": [SURPRISE, ANGER]}), "4L")
     assert smooth[52] < straight[52]
@@ -76,7 +76,7 @@ def test_smooth_joins_begin_and_end_softly(timeline) -> None:
     assert smooth[130] == pytest.approx(1, abs=1e-5)
 
 
-def test_channels_play_together_and_the_stronger_of_two_shows(timeline) -> None:
+def test_timeline_channels_play_together_and_the_stronger_shows(timeline) -> None:
     first = {"entries": [{"expression": "smile", "intensity": 0.5, "duration": 2.0}]}
     second = {"start": 0.5, "entries": [{"expression": "smile", "intensity": 1.0, "duration": 1.3}, SURPRISE]}
     played = timeline(first, second)
@@ -87,20 +87,20 @@ def test_channels_play_together_and_the_stronger_of_two_shows(timeline) -> None:
     assert played.times("t")["end"] == pytest.approx(2.8)
 
 
-def test_it_stretches_as_a_whole(timeline) -> None:
+def test_timeline_stretches_as_a_whole(timeline) -> None:
     played = timeline({"entries": [SURPRISE, ANGER]}, attributes='start="1" end="5"')
     brows = course(played, "1L")
     assert brows[[100, 160, 200, 280]] == pytest.approx([0, 0.9, 0.9, 0.45], abs=1e-5)
 
 
-def test_an_entry_too_short_for_its_onset_and_offset_is_whole_for_an_instant(timeline) -> None:
+def test_timeline_entry_shorter_than_onset_and_offset_has_a_short_apex(timeline) -> None:
     played = timeline({"entries": [{"expression": "template:anger", "duration": 0.4}]})
     frown = course(played, "4L")
     assert frown[15] == pytest.approx(1, abs=1e-5)
     assert frown[40] == 0
 
 
-def test_it_can_be_tied_to_what_is_said(timeline) -> None:
+def test_timeline_can_be_tied_to_speech(timeline) -> None:
     played = timeline(
         {"entries": [SURPRISE]}, attributes='end="n:stroke"', also='<head id="n" lexeme="NOD"/>'
     )
@@ -118,7 +118,7 @@ def test_it_can_be_tied_to_what_is_said(timeline) -> None:
         ({"entries": [{"expression": "smile", "intensity": 3}]}, ["channel 1, entry 1, intensity: wanted"]),
     ],
 )
-def test_every_fault_of_a_file_is_told_in_one_warning(timeline, channel, told) -> None:
+def test_timeline_faults_of_a_file_are_one_warning(timeline, channel, told) -> None:
     played = timeline(channel)
     assert played.warnings == [("b:t", "CANNOT_CREATE_BEHAVIOR")]
     for part in told:
@@ -134,7 +134,7 @@ def mixed(played, face, name: str) -> np.ndarray:
     return played.realization.poses[:, face.inputs.index(name)]
 
 
-def test_the_mixer_and_the_order_reach_the_face_while_it_plays(timeline) -> None:
+def test_timeline_mixer_and_order_reach_the_face(timeline) -> None:
     """Softly, so that what else the face shows does not jump; between, wholly, in the file's order."""
     face = load_face(deformer="au")
     asked = {"mixer": "successive", "order": [26, 12, 1]}
@@ -149,7 +149,7 @@ def test_the_mixer_and_the_order_reach_the_face_while_it_plays(timeline) -> None
     assert not ranks[3].any()
 
 
-def test_another_mixer_and_another_order_give_other_faces(timeline) -> None:
+def test_timeline_mixers_and_orders_give_different_faces(timeline) -> None:
     """Her figures 5.1 and 5.2; before and after it, and of its own accord, units are added up."""
     face = load_face(deformer="au")
 
@@ -165,7 +165,7 @@ def test_another_mixer_and_another_order_give_other_faces(timeline) -> None:
         assert np.linalg.norm(one[1] - other[1], axis=1).max() > 5e-4
 
 
-def test_what_it_asks_of_a_mixer_in_vain_is_told_and_it_plays(timeline) -> None:
+def test_timeline_warns_of_mixing_that_the_face_cannot_do(timeline) -> None:
     played = timeline(GRIN, mixing={"mixer": "successive"}, deformer="mpeg4")
     assert played.warnings == [("b:t", "CUSTOM_ATTRIBUTE_NOT_SUPPORTED")]
     assert "fileName: 't.json': mixer: no effect, FAPs move this face; wanted" in played.told
@@ -174,7 +174,7 @@ def test_what_it_asks_of_a_mixer_in_vain_is_told_and_it_plays(timeline) -> None:
     assert "order: no effect, a sum has no order" in played.told
 
 
-def test_two_timelines_at_once_keep_an_order(play, tmp_path: Path) -> None:
+def test_timeline_orders_of_two_at_once_are_kept(play, tmp_path: Path) -> None:
     face = load_face(deformer="au")
     for name, order in (("a", [4, 12, 1]), ("b", [4, 1, 12])):
         told = {"mixer": "successive", "order": order, "channel": [GRIN]}
@@ -188,7 +188,7 @@ def test_two_timelines_at_once_keep_an_order(play, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "mixing", [{"mixer": "sum"}, {"order": [51]}, {"mixer": "successive", "order": [1, 1]}]
 )
-def test_a_mixer_or_an_order_that_is_none_is_refused(timeline, mixing) -> None:
+def test_timeline_refuses_an_unknown_mixer_or_order(timeline, mixing) -> None:
     played = timeline(GRIN, mixing=mixing)
     assert played.warnings == [("b:t", "CANNOT_CREATE_BEHAVIOR")]
     assert "'t.json': timeline, " in played.told

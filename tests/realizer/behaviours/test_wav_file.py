@@ -32,21 +32,21 @@ def encoded(bits: int, coding: int = 1, values: np.ndarray = TONE) -> bytes:
 @pytest.mark.parametrize(
     ("bits", "coding", "within"), [(8, 1, 260), (16, 1, 1), (24, 1, 1), (32, 1, 1), (32, 3, 1)]
 )
-def test_every_coding_gives_the_same_sound(bits: int, coding: int, within: int) -> None:
+def test_read_wav_gives_the_same_sound_for_every_coding(bits: int, coding: int, within: int) -> None:
     rate, pcm = read_wav(wav(encoded(bits, coding), bits=bits, coding=coding))
     assert rate == 8000
     assert pcm.dtype == np.int16
     np.testing.assert_allclose(pcm, TONE * 32767, atol=within)
 
 
-def test_several_channels_are_mixed() -> None:
+def test_read_wav_mixes_channels() -> None:
     both = np.stack([TONE, np.zeros_like(TONE)], axis=1).ravel()
     rate, pcm = read_wav(wav(encoded(16, values=both), channels=2, rate=44100))
     assert rate == 44100
     np.testing.assert_allclose(pcm, TONE * 32767 / 2, atol=1)
 
 
-def test_what_the_standard_library_writes_is_read() -> None:
+def test_read_wav_reads_files_of_the_standard_library() -> None:
     file = io.BytesIO()
     with wave.open(file, "wb") as out:
         out.setparams((1, 3, 22050, 0, "NONE", ""))
@@ -55,7 +55,7 @@ def test_what_the_standard_library_writes_is_read() -> None:
     assert (rate, len(pcm)) == (22050, len(TONE))
 
 
-def test_the_extensible_header_is_read() -> None:
+def test_read_wav_reads_the_extensible_header() -> None:
     form = struct.pack("<HHIIHH", 0xFFFE, 1, 8000, 24000, 3, 24) + struct.pack("<HHI", 22, 24, 4)
     form += struct.pack("<H", 1) + bytes.fromhex("000000001000800000aa00389b71")
     data = encoded(24)
@@ -65,7 +65,7 @@ def test_the_extensible_header_is_read() -> None:
     np.testing.assert_allclose(pcm, TONE * 32767, atol=1)
 
 
-def test_a_file_that_is_cut_off_gives_what_is_there() -> None:
+def test_read_wav_of_a_cut_file_gives_what_is_left() -> None:
     _, pcm = read_wav(wav(encoded(16))[:-101])
     assert len(pcm) == len(TONE) - 51
 
@@ -82,13 +82,13 @@ def test_a_file_that_is_cut_off_gives_what_is_there() -> None:
         (wav(b"12345678", channels=0), "got 0"),
     ],
 )
-def test_what_is_no_sound_is_refused_in_words(content: bytes, says: str) -> None:
+def test_read_wav_refuses_other_files(content: bytes, says: str) -> None:
     with pytest.raises(RealizerError, match=says):
         read_wav(content)
 
 
 @given(st.data())
-def test_no_damage_breaks_the_reader(data: st.DataObject) -> None:
+def test_read_wav_of_damaged_files_reads_or_refuses(data: st.DataObject) -> None:
     content = bytearray(wav(encoded(16)[:40]))
     for _ in range(data.draw(st.integers(1, 6))):
         content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))

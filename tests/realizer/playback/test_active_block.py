@@ -24,7 +24,7 @@ def playing(inside: str = FACE, start: float = 10.0) -> ActiveBlock:
     return made
 
 
-def test_a_block_laid_at_another_start_takes_channels_claims_and_ends_along() -> None:
+def test_apply_plan_at_another_start_moves_channels_claims_and_ends() -> None:
     made = playing('<gaze id="g" target="x" start="0" ready="0.5" relax="1" end="2"/>')
     (claim,) = made.plan.claims
     assert (claim.begin, claim.end, made.end) == (10.0, 11.0, 12.0)
@@ -34,7 +34,7 @@ def test_a_block_laid_at_another_start_takes_channels_claims_and_ends_along() ->
     assert {c.span[0] for c in made.moving_channels()} == {20.0}
 
 
-def test_nothing_is_shown_while_the_start_is_not_known() -> None:
+def test_active_block_shows_nothing_before_its_start_is_known() -> None:
     made = playing()
     made.apply_plan(made.plan, float("inf"))
     assert not list(made.moving_channels())
@@ -51,7 +51,7 @@ def test_nothing_is_shown_while_the_start_is_not_known() -> None:
         (13.5, ("start", "attackPeak", "relax", "end"), [0.0, 0.5, 2.0, 3.0]),
     ],
 )
-def test_of_a_behaviour_that_is_cut_what_passed_stays_then_it_relaxes_and_ends(
+def test_cut_keeps_past_points_then_relaxes_and_ends(
     at: float, points: tuple[str, ...] | None, times: list[float] | None
 ) -> None:
     made = playing()
@@ -61,21 +61,21 @@ def test_of_a_behaviour_that_is_cut_what_passed_stays_then_it_relaxes_and_ends(
         assert list(made.schedule.times["s"]) == pytest.approx(times)
 
 
-def test_what_has_not_begun_never_comes() -> None:
+def test_cut_removes_behaviours_that_have_not_begun() -> None:
     made = playing()
     made.cut(["s"], 10.0)
     assert not list(made.moving_channels())
     assert made.end == 10.0
 
 
-def test_only_what_is_named_is_cut() -> None:
+def test_cut_ends_the_named_behaviours_only() -> None:
     made = playing(FACE + FACE.replace('"s"', '"t"'))
     made.cut(["s"], 11.0)
     assert made.unfinished(12.0) == {"t"}
     assert made.end == 13.0
 
 
-def test_gains_go_to_what_is_shown_and_volume_to_what_sounds() -> None:
+def test_scale_changes_channels_or_sound() -> None:
     made = playing()
     made.scale("s", [Gain(10.0, 11.0, 0.5)], sound=False)
     assert all(c.gains for c in made.moving_channels())
@@ -83,7 +83,7 @@ def test_gains_go_to_what_is_shown_and_volume_to_what_sounds() -> None:
     assert not made.speech
 
 
-def test_a_block_starts_when_all_that_it_waits_for_is_over() -> None:
+def test_earliest_start_is_after_all_dependencies() -> None:
     first, second = playing(), playing()
     second.add_dependency(Dependency(first, subsiding=True))
     assert second.earliest == 12.0

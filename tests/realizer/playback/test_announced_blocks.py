@@ -9,7 +9,7 @@ from realizer.playback.block_states import BlockEvent
 BLOCK = parse('<bml id="a"/>')
 
 
-def test_a_block_is_expected_from_its_announcement_until_it_arrives() -> None:
+def test_announced_block_is_known_until_it_arrives() -> None:
     expected = AnnouncedBlocks()
     assert "a" not in expected
     expected.add(BLOCK)
@@ -18,7 +18,7 @@ def test_a_block_is_expected_from_its_announcement_until_it_arrives() -> None:
     assert "a" not in expected
 
 
-def test_what_was_done_meanwhile_is_its_fate_once() -> None:
+def test_pop_returns_the_commands_so_far_once() -> None:
     expected = AnnouncedBlocks()
     expected.add(BLOCK)
     fate = expected.get("a")
@@ -28,5 +28,5 @@ def test_what_was_done_meanwhile_is_its_fate_once() -> None:
     assert not expected.pop(BLOCK).revoked
 
 
-def test_nothing_is_known_of_a_block_nobody_announced() -> None:
+def test_pop_of_a_block_that_was_not_announced_is_new() -> None:
     assert AnnouncedBlocks().get("a") is None

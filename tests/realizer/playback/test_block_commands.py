@@ -34,7 +34,7 @@ def interrupt(more: str = "", start: float = 1.0, target: str = "a") -> str:
     return f'<bmla:interrupt id="i" target="{target}" start="{start}"{more}/>'
 
 
-def test_an_interrupt_ends_the_whole_block_where_nothing_else_is_said() -> None:
+def test_interrupt_ends_the_whole_block_by_default() -> None:
     played = play(SMILE, interrupt())
     (end,) = told(played, '"a:end"')
     assert 'globalTime="1"' in end
@@ -42,7 +42,7 @@ def test_an_interrupt_ends_the_whole_block_where_nothing_else_is_said() -> None:
     assert not told(played, "a:s:relax")
 
 
-def test_an_interrupted_face_relaxes_without_a_jump() -> None:
+def test_interrupt_relaxes_the_face_without_a_jump() -> None:
     played = play(SMILE, interrupt())
     steps = np.abs(np.diff(played.aus.aus, axis=0)).max()
     assert played.aus.aus[49].max() > 0.3
@@ -51,7 +51,7 @@ def test_an_interrupted_face_relaxes_without_a_jump() -> None:
     assert steps < 0.12  # in a fiftieth of a second
 
 
-def test_some_behaviours_relax_and_the_block_goes_on() -> None:
+def test_interrupt_of_some_behaviours_lets_the_block_go_on() -> None:
     nod = '<head id="n" lexeme="NOD" start="2"/>'
     played = play(SMILE + nod, interrupt(' include="s"'))
     (relax,), (end,) = told(played, "a:s:relax"), told(played, "a:s:end")
@@ -62,25 +62,25 @@ def test_some_behaviours_relax_and_the_block_goes_on() -> None:
     assert played.schedules[0].at("s", "end") == pytest.approx(1.3)
 
 
-def test_what_is_excluded_goes_on() -> None:
+def test_interrupt_spares_excluded_behaviours() -> None:
     nod = '<head id="n" lexeme="NOD" start="2"/>'
     played = play(SMILE + nod, interrupt(' exclude="s"'))
     assert not told(played, "a:n:")
     assert 'time="5"' in told(played, "a:s:end")[0]
 
 
-def test_a_set_that_is_all_that_is_left_ends_the_block() -> None:
+def test_interrupt_of_all_remaining_behaviours_ends_the_block() -> None:
     played = play(SMILE + '<head id="n" lexeme="NOD"/>', interrupt(' include="s"', start=3.0))
     assert "INTERRUPTED" in told(played, '"a:end"')[0]
 
 
-def test_interrupting_a_block_that_has_ended_is_nothing_and_one_never_heard_of_is_a_warning() -> None:
+def test_interrupt_of_a_past_block_is_ignored_of_an_unknown_one_warned() -> None:
     assert not play('<wait id="w" duration="0.2"/>', interrupt()).warnings
     played = play(SMILE, interrupt(target="nobody"))
     assert [f for f in told(played, "warningFeedback") if "b:i" in f and "nobody" in f]
 
 
-def test_a_required_interrupt_that_cannot_be_done_ends_its_own_block() -> None:
+def test_interrupt_that_is_required_and_fails_ends_its_own_block() -> None:
     played = play(f"<required>{interrupt(target='nobody')}</required>{SMILE}")
     (end,) = told(played, '"a:end"')
     assert "INTERRUPTED" in end
@@ -96,7 +96,7 @@ def test_activate_starts_a_preplanned_block() -> None:
     assert played.duration == 7.0
 
 
-def test_activating_what_does_not_wait_is_a_warning() -> None:
+def test_activate_of_a_block_that_does_not_wait_warns() -> None:
     played = play(SMILE, '<bmla:activate id="x" target="a" start="2"/>')
     assert [f for f in told(played, "warningFeedback") if "b:x" in f]
 
@@ -112,20 +112,20 @@ def strongest(played: Realization, time: float) -> float:
     return float(played.aus.aus[round(time * played.fps)].max())
 
 
-def test_an_amount_goes_evenly_to_its_new_value() -> None:
+def test_change_moves_an_amount_evenly_to_its_new_value() -> None:
     linear = change("amount", 'type="linear" targetValue="1"', 'start="1" end="3"')
     plain, played = play(SMILE), play(SMILE, linear)
     ratios = [strongest(played, t) / strongest(plain, t) for t in (1.0, 2.0, 3.0, 3.5)]
     assert ratios == pytest.approx([1.0, 1.5, 2.0, 2.0], abs=0.01)
 
 
-def test_an_amount_changes_at_once_but_without_a_jump() -> None:
+def test_change_at_once_does_not_jump() -> None:
     played = play(SMILE, change("amount", 'type="instant" targetValue="0.1"', 'start="1"'))
     assert strongest(played, 1.2) == pytest.approx(strongest(played, 0.9) / 5, abs=0.01)
     assert np.abs(np.diff(played.aus.aus, axis=0)).max() < 0.2
 
 
-def test_an_initial_value_comes_first() -> None:
+def test_change_starts_with_the_initial_value() -> None:
     linear = change("amount", 'type="linear" initialValue="1" targetValue="0.5"', 'start="1" end="3"')
     plain, played = play(SMILE), play(SMILE, linear)
     assert strongest(played, 1.12) / strongest(plain, 1.12) == pytest.approx(2.0, abs=0.05)
@@ -135,13 +135,13 @@ def test_an_initial_value_comes_first() -> None:
 @pytest.mark.parametrize(
     ("parameter", "target"), [("colour", "a:s"), ("amount", "a:nobody"), ("amount", "nobody:s")]
 )
-def test_a_parameter_that_is_not_there_is_a_warning(parameter: str, target: str) -> None:
+def test_change_of_an_unknown_parameter_warns(parameter: str, target: str) -> None:
     played = play(SMILE, change(parameter, 'type="instant" targetValue="1"', 'start="1"', target))
     assert [f for f in told(played, "warningFeedback") if "b:p" in f and "EXECUTION_FAILURE" in f]
 
 
 @pytest.mark.espeak
-def test_the_volume_of_a_speech_falls() -> None:
+def test_change_lowers_the_volume_of_a_speech() -> None:
     from realizer.speech.registry import find_voice
 
     voice = find_voice("espeak")

@@ -39,7 +39,7 @@ def ids(waits: list[Dependency]) -> list[tuple[str, bool]]:
     return [(w.block.block.id, w.subsiding) for w in waits]
 
 
-def test_append_names_only_the_last_of_those_that_wait_for_each_other() -> None:
+def test_dependencies_of_append_are_only_the_last_of_a_chain() -> None:
     first = alive("a")
     second = alive("b", waits=[Dependency(first)])
     apart = alive("c")
@@ -49,36 +49,36 @@ def test_append_names_only_the_last_of_those_that_wait_for_each_other() -> None:
     assert ids(dependencies(block("x", 'composition="APPEND"'), 0, everyone)) == [("b", False), ("c", False)]
 
 
-def test_one_that_waits_for_the_subsiding_only_may_end_sooner_and_both_are_named() -> None:
+def test_dependencies_on_the_end_and_the_subsiding_are_both_named() -> None:
     first = alive("a")
     second = alive("b", waits=[Dependency(first, subsiding=True)])
     assert len(dependencies(block("x", 'composition="APPEND"'), 0, [first, second])) == 2
 
 
-def test_what_is_before_a_block_is_found_by_any_chain() -> None:
+def test_all_dependencies_follow_any_chain() -> None:
     first = alive("a")
     second = alive("b", waits=[Dependency(first)])
     assert all_dependencies([Dependency(second, subsiding=True)]) == {id(first), id(second)}
 
 
-def test_lists_name_blocks_of_any_character_and_forget_the_unknown() -> None:
+def test_dependencies_by_list_are_of_any_character_and_known() -> None:
     everyone = [alive("a"), alive("b", character=1), alive("c")]
     said = 'bmla:appendAfter="b,nobody" bmla:chunkAfter="c"'
     assert ids(dependencies(block("x", said), 0, everyone)) == [("b", False), ("c", True)]
 
 
-def test_followers_are_named_with_what_they_wait_for() -> None:
+def test_followers_are_named_with_their_kind_of_dependency() -> None:
     said = 'bmla:prependBefore="a" bmla:chunkBefore="b"'
     assert followers(block("x", said)) == [("a", False), ("b", True)]
 
 
-def test_replace_ends_its_character_and_interrupt_whom_it_names() -> None:
+def test_blocks_to_end_are_replaced_or_interrupted() -> None:
     everyone = [alive("a"), alive("b", character=1), alive("c", character=1)]
     assert [p.block.id for p in blocks_to_end(block("x", 'composition="REPLACE"'), 0, everyone)] == ["a"]
     assert [p.block.id for p in blocks_to_end(block("x", 'bmla:interrupt="c"'), 0, everyone)] == ["c"]
 
 
-def test_what_is_held_is_what_the_others_of_a_character_claim() -> None:
+def test_existing_claims_are_those_of_the_others_of_a_character() -> None:
     everyone = [alive("a"), alive("b", start=5.0), alive("c", character=1)]
     assert [(c.block, c.begin) for c in existing_claims(0, everyone)] == [("a", 0.0), ("b", 5.0)]
     assert [c.block for c in existing_claims(0, everyone, without=everyone[:1])] == ["b"]
@@ -104,7 +104,5 @@ SCHEDULES = {
         (SyncRef(block="nobody", behaviour="h", sync="end"), None),
     ],
 )
-def test_a_point_of_another_block_has_an_instant_where_that_is_known(
-    ref: SyncRef, time: float | None
-) -> None:
+def test_external_times_are_known_for_known_points(ref: SyncRef, time: float | None) -> None:
     assert external_times(SCHEDULES.get, 10.0)(ref) == time

@@ -80,7 +80,7 @@ def gaze(id: str = "g", target: str = "x") -> str:
     return f'<gaze id="{id}" target="{target}" start="0" ready="0.4" relax="1.5" end="2"/>'
 
 
-def test_a_block_goes_through_its_states(stage: Stage) -> None:
+def test_manager_moves_a_block_through_its_states(stage: Stage) -> None:
     stage.send("a", smile())
     assert stage.until(9) == [
         "a IN_PREP 0-",
@@ -92,7 +92,7 @@ def test_a_block_goes_through_its_states(stage: Stage) -> None:
     ]
 
 
-def test_an_empty_block_starts_and_ends_at_once(stage: Stage) -> None:
+def test_manager_starts_and_ends_an_empty_block_at_once(stage: Stage) -> None:
     stage.send("a", at=3.0)
     assert stage.progress() == ["a:start IN_EXEC 3", "a:end DONE 3"]
 
@@ -108,7 +108,7 @@ def test_append_waits_for_all_of_its_character(stage: Stage) -> None:
     assert "c:start IN_EXEC 3.5" in stage.progress()
 
 
-def test_append_after_waits_for_the_blocks_it_names_and_for_no_others(stage: Stage) -> None:
+def test_append_after_waits_for_the_named_blocks_only(stage: Stage) -> None:
     stage.send("a", wait(1))
     stage.send("b", wait(5))
     stage.send("c", wait(1), appendAfter="a,nobody")
@@ -122,7 +122,7 @@ def test_append_after_in_composition_means_the_same(stage: Stage) -> None:
     assert "c:start IN_EXEC 2" in stage.progress()
 
 
-def test_an_empty_list_waits_for_nothing(stage: Stage) -> None:
+def test_append_after_with_an_empty_list_waits_for_nothing(stage: Stage) -> None:
     stage.send("a", wait(1))
     stage.send("c", wait(1), composition="APPEND-AFTER()")
     assert "c:start IN_EXEC 0" in stage.progress()
@@ -134,7 +134,7 @@ def test_chunk_after_starts_when_the_other_subsides(stage: Stage) -> None:
     assert stage.progress() == ["a:start IN_EXEC 0", "b:start IN_EXEC 1.5", "a:end DONE 2", "b:end DONE 2.5"]
 
 
-def test_prepend_before_lets_a_waiting_block_wait_longer_and_says_so(stage: Stage) -> None:
+def test_prepend_before_delays_a_waiting_block_and_reports_it(stage: Stage) -> None:
     stage.send("a", wait(1))
     stage.send("c", wait(1), composition="APPEND")
     stage.send("b", wait(3), prependBefore="c")
@@ -142,7 +142,7 @@ def test_prepend_before_lets_a_waiting_block_wait_longer_and_says_so(stage: Stag
     assert "c:start IN_EXEC 3" in stage.progress()
 
 
-def test_what_is_put_before_a_block_ends_before_that_starts_and_so_on_down_the_line(stage: Stage) -> None:
+def test_prepend_before_delays_all_followers_too(stage: Stage) -> None:
     stage.send("a", wait(4))
     stage.send("c", composition="APPEND")
     stage.send("e", composition="APPEND")
@@ -151,28 +151,28 @@ def test_what_is_put_before_a_block_ends_before_that_starts_and_so_on_down_the_l
     assert stage.progress()[-5:] == told
 
 
-def test_chunk_before_lets_it_wait_for_the_subsiding_only(stage: Stage) -> None:
+def test_chunk_before_waits_for_the_subsiding_only(stage: Stage) -> None:
     stage.send("a", wait(1))
     stage.send("c", wait(1), composition="APPEND")
     stage.send("b", smile(), chunkBefore="c")
     assert "c:start IN_EXEC 1.5" in stage.progress()
 
 
-def test_a_block_that_has_started_cannot_be_put_behind_another(stage: Stage) -> None:
+def test_prepend_before_of_a_started_block_is_refused(stage: Stage) -> None:
     stage.send("a", wait(1))
     assert stage.send("b", wait(1), prependBefore="a").failed
     assert "! b TargetBlockAlreadyStartedException" in stage.log
     assert not any(line.startswith("b:") for line in stage.progress())
 
 
-def test_a_circle_of_waits_is_refused(stage: Stage) -> None:
+def test_prepend_before_refuses_a_circle_of_dependencies(stage: Stage) -> None:
     stage.send("a", wait(1))
     stage.send("b", wait(1), composition="APPEND")
     assert stage.send("c", wait(1), appendAfter="b", prependBefore="b").failed
     assert "! c IMPOSSIBLE_TO_SCHEDULE" in stage.log
 
 
-def test_a_chain_of_appended_blocks_follows_when_the_first_is_stopped(stage: Stage) -> None:
+def test_append_chain_follows_when_the_first_block_is_stopped(stage: Stage) -> None:
     stage.send("a", smile(5))
     stage.send("b", wait(2), composition="APPEND")
     stage.send("c", wait(1), composition="APPEND")
@@ -182,7 +182,7 @@ def test_a_chain_of_appended_blocks_follows_when_the_first_is_stopped(stage: Sta
     assert stage.progress()[-3:] == ["b:end DONE 3", "c:start IN_EXEC 3", "c:end DONE 4"]
 
 
-def test_a_reference_into_another_block_keeps_its_instant_when_the_start_moves(stage: Stage) -> None:
+def test_external_reference_keeps_its_time_when_the_start_moves(stage: Stage) -> None:
     stage.send("a", wait(4))
     stage.send("m", '<head id="n" lexeme="NOD" stroke="5"/>')
     later = stage.send("b", '<head id="k" lexeme="NOD" stroke="m:n:stroke + 1"/>', appendAfter="a")
@@ -196,7 +196,7 @@ def test_a_reference_into_another_block_keeps_its_instant_when_the_start_moves(s
 # REPLACE and interrupt
 
 
-def test_replace_ends_what_plays_and_waits_first_and_its_ids_can_be_used_again(stage: Stage) -> None:
+def test_replace_ends_playing_and_waiting_blocks_and_frees_their_ids(stage: Stage) -> None:
     stage.send("a", smile(5))
     stage.send("b", wait(1), composition="APPEND")
     stage.send("a", wait(1), composition="REPLACE", at=1.0)
@@ -216,7 +216,7 @@ def test_replace_leaves_other_characters_alone(stage: Stage) -> None:
     assert "b:end DONE 5" in stage.progress()
 
 
-def test_a_block_that_is_replaced_relaxes_without_a_jump(stage: Stage) -> None:
+def test_replace_relaxes_the_face_without_a_jump(stage: Stage) -> None:
     stage.send("a", smile(5))
     stage.send("b", wait(1), composition="REPLACE", at=2.0)
     times = list(np.arange(1.9, 2.6, 0.001))
@@ -226,7 +226,7 @@ def test_a_block_that_is_replaced_relaxes_without_a_jump(stage: Stage) -> None:
     assert np.abs(np.diff(face, axis=0)).max() < 0.01
 
 
-def test_the_interrupt_attribute_ends_blocks_when_the_block_is_scheduled(stage: Stage) -> None:
+def test_interrupt_attribute_ends_blocks_when_the_block_is_scheduled(stage: Stage) -> None:
     stage.send("a", smile(5))
     stage.send("b", smile(5))
     stage.send("c", wait(1), interrupt="a", at=1.0)
@@ -235,7 +235,7 @@ def test_the_interrupt_attribute_ends_blocks_when_the_block_is_scheduled(stage: 
     assert "b:end DONE 5" in told
 
 
-def test_a_refused_block_interrupts_nobody(stage: Stage) -> None:
+def test_interrupt_attribute_of_a_refused_block_ends_nothing(stage: Stage) -> None:
     stage.send("a", smile(5))
     stage.send("c", '<required><faceLexeme id="f" lexeme="NOTHING"/></required>', interrupt="a", at=1.0)
     assert "a:end DONE 5" in stage.progress()
@@ -244,14 +244,14 @@ def test_a_refused_block_interrupts_nobody(stage: Stage) -> None:
 # preplan
 
 
-def test_a_preplanned_block_waits_until_another_ones_start_activates_it(stage: Stage) -> None:
+def test_preplan_waits_until_another_block_activates_it(stage: Stage) -> None:
     stage.send("p", smile(), preplan="true")
     assert "p PENDING 0-2" in stage.until(1.0)
     stage.send("a", wait(1), onStart="p", at=3.0)
     assert stage.progress() == ["a:start IN_EXEC 3", "p:start IN_EXEC 3", "a:end DONE 4", "p:end DONE 5"]
 
 
-def test_a_block_after_a_preplanned_one_waits_with_it(stage: Stage) -> None:
+def test_preplan_delays_a_block_that_waits_for_it(stage: Stage) -> None:
     stage.send("p", wait(2), preplan="true")
     stage.send("b", wait(1), appendAfter="p")
     assert stage.progress() == []
@@ -260,24 +260,24 @@ def test_a_block_after_a_preplanned_one_waits_with_it(stage: Stage) -> None:
     assert told == ["b:start IN_EXEC 15002", "b:end DONE 15003"]
 
 
-def test_append_does_not_wait_for_a_block_nobody_may_ever_start(stage: Stage) -> None:
+def test_preplan_does_not_delay_an_append(stage: Stage) -> None:
     stage.send("p", wait(2), preplan="true")
     stage.send("b", wait(1), composition="APPEND")
     assert "b:start IN_EXEC 0" in stage.progress()
 
 
-def test_a_preplanned_block_that_is_replaced_is_revoked(stage: Stage) -> None:
+def test_preplan_block_that_is_replaced_is_revoked(stage: Stage) -> None:
     stage.send("p", wait(2), preplan="true")
     stage.send("b", wait(1), composition="REPLACE", at=1.0)
     assert "p:end REVOKED 1" in stage.progress()
 
 
-def test_on_start_of_a_block_that_is_not_there_is_a_warning(stage: Stage) -> None:
+def test_on_start_of_an_unknown_block_warns(stage: Stage) -> None:
     stage.send("a", wait(1), onStart="nobody")
     assert "! a EXECUTION_FAILURE" in stage.until(9)
 
 
-def test_a_preplanned_block_is_planned_again_beside_what_plays_when_it_is_activated(stage: Stage) -> None:
+def test_preplan_block_is_planned_again_when_it_is_activated(stage: Stage) -> None:
     stage.send("p", gaze() + smile(), preplan="true")
     stage.send("a", gaze("h"), onStart="p", at=1.0)
     assert stage.until(9).count("! p:g CANNOT_CREATE_BEHAVIOR") == 1
@@ -287,7 +287,7 @@ def test_a_preplanned_block_is_planned_again_beside_what_plays_when_it_is_activa
 # arbitration
 
 
-def test_a_newer_block_does_not_disturb_the_gaze_of_an_earlier_one(stage: Stage) -> None:
+def test_claims_of_an_earlier_block_keep_its_gaze(stage: Stage) -> None:
     stage.send("a", gaze())
     schedule = stage.send("b", gaze("h") + smile(), at=1.0)
     assert list(schedule.times) == ["s"]
@@ -297,46 +297,46 @@ def test_a_newer_block_does_not_disturb_the_gaze_of_an_earlier_one(stage: Stage)
 
 
 @pytest.mark.parametrize("spoken", [lambda t: f'<speech id="s{t}"><text>{t}</text></speech>'])
-def test_a_character_speaks_one_speech_at_a_time(stage: Stage, spoken: Callable[[str], str]) -> None:
+def test_claims_allow_one_speech_of_a_character_at_a_time(stage: Stage, spoken: Callable[[str], str]) -> None:
     schedule = stage.send("a", spoken("one") + spoken("two"))
     assert list(schedule.times) == ["sone"]
     assert [line for line in stage.log if line[0] == "!"] == ["! a:stwo CANNOT_CREATE_BEHAVIOR"]
 
 
-def test_priority_decides_within_a_block(stage: Stage) -> None:
+def test_claims_within_a_block_follow_priority(stage: Stage) -> None:
     schedule = stage.send("a", gaze("g") + gaze("h").replace("<gaze", '<gaze bmla:priority="5"'))
     assert list(schedule.times) == ["h"]
 
 
-def test_a_required_gaze_stays_and_the_other_goes(stage: Stage) -> None:
+def test_claims_of_a_required_gaze_win(stage: Stage) -> None:
     schedule = stage.send("a", gaze("g") + f"<required>{gaze('h')}</required>")
     assert list(schedule.times) == ["h"]
 
 
-def test_two_required_gazes_at_one_time_fail_their_block(stage: Stage) -> None:
+def test_claims_of_two_required_gazes_fail_their_block(stage: Stage) -> None:
     assert stage.send("a", f"<required>{gaze('g')}{gaze('h')}</required>").failed
     assert [line for line in stage.log if line[0] == "!"] == ["! a CANNOT_CREATE_BEHAVIOR"]
 
 
-def test_what_waited_for_a_behaviour_that_goes_is_named_in_its_warning(stage: Stage) -> None:
+def test_claims_lost_are_named_with_the_lost_references(stage: Stage) -> None:
     nod = '<head id="n" lexeme="NOD" start="h:relax"/>'
     schedule = stage.send("a", gaze("g") + gaze("h") + nod)
     assert list(schedule.times) == ["g", "n"]
     assert "with it went n:start" in stage.texts[0]
 
 
-def test_a_required_constraint_on_a_behaviour_that_goes_fails_the_block(stage: Stage) -> None:
+def test_claims_lost_by_a_required_constraint_fail_the_block(stage: Stage) -> None:
     tie = '<required><constraint><after ref="h:end"><sync ref="g:end"/></after></constraint></required>'
     assert stage.send("a", gaze("g") + gaze("h") + tie).failed
 
 
-def test_two_characters_look_where_they_want(stage: Stage) -> None:
+def test_claims_of_two_characters_are_independent(stage: Stage) -> None:
     stage.send("a", gaze(), characterId="Ann")
     stage.send("b", gaze(), characterId="Bob")
     assert not stage.texts
 
 
-def test_a_gaze_that_another_block_is_done_with_is_free(stage: Stage) -> None:
+def test_claims_end_with_the_relax_of_another_block(stage: Stage) -> None:
     stage.send("a", gaze())
     stage.send("b", gaze(), at=1.5)
     assert not stage.texts
@@ -345,7 +345,7 @@ def test_a_gaze_that_another_block_is_done_with_is_free(stage: Stage) -> None:
 # ids
 
 
-def test_an_id_in_use_is_refused(stage: Stage) -> None:
+def test_submit_refuses_an_id_in_use(stage: Stage) -> None:
     stage.send("a", smile())
     assert stage.send("a", smile(), at=1.0).failed
     stage.send("a", smile(), at=2.0)
@@ -353,7 +353,7 @@ def test_an_id_in_use_is_refused(stage: Stage) -> None:
 
 
 @pytest.mark.slow
-def test_a_thousand_appended_blocks_follow_one_another_and_move_together(stage: Stage) -> None:
+def test_append_of_a_thousand_blocks_moves_together(stage: Stage) -> None:
     for n in range(1000):
         stage.send(f"b{n}", wait(1), composition="APPEND")
     stage.player.stop(0.5, ["b0"])
@@ -365,7 +365,7 @@ def test_a_thousand_appended_blocks_follow_one_another_and_move_together(stage: 
 
 @pytest.mark.parametrize("said", [{"interrupt": "b"}, {"composition": "REPLACE"}])
 @pytest.mark.parametrize("before", ["prependBefore", "chunkBefore"])
-def test_a_block_that_is_ended_by_the_one_put_before_it_stays_ended(
+def test_prepend_before_that_ends_its_follower_leaves_it_ended(
     stage: Stage, said: dict[str, str], before: str
 ) -> None:
     stage.send("a", wait(0.5))
@@ -377,7 +377,7 @@ def test_a_block_that_is_ended_by_the_one_put_before_it_stays_ended(
     assert not any(line.startswith("b:start") for line in told)
 
 
-def test_replace_does_not_take_the_id_of_another_characters_block(stage: Stage) -> None:
+def test_replace_refuses_the_id_of_another_characters_block(stage: Stage) -> None:
     stage.send("b", wait(0.5), characterId="Ann")
     stage.send("x", wait(0.5), characterId="Bob")
     assert stage.send("x", wait(1), composition="REPLACE", characterId="Ann").failed
@@ -385,14 +385,14 @@ def test_replace_does_not_take_the_id_of_another_characters_block(stage: Stage) 
     assert "x:end DONE 0.5" in stage.progress()
 
 
-def test_what_is_interrupted_of_a_preplanned_block_does_not_come_when_it_is_activated(stage: Stage) -> None:
+def test_interrupt_of_a_preplanned_block_holds_after_activation(stage: Stage) -> None:
     stage.send("p", wait(0.5) + wait(0.2, id="s"), preplan="true")
     stage.send("i", '<bmla:interrupt id="x" target="p" include="w"/>')
     stage.send("a", '<bmla:activate id="k" target="p"/>', at=1.0)
     assert "p:end DONE 1.2" in stage.progress()
 
 
-def test_a_wait_that_is_interrupted_ends_at_once(stage: Stage) -> None:
+def test_interrupt_of_a_wait_ends_it_at_once(stage: Stage) -> None:
     stage.send("a", wait(2) + wait(1, id="v"))
     stage.send("i", '<bmla:interrupt id="x" target="a" include="w" start="0.3"/>')
     assert "a:end DONE 1" in stage.progress()

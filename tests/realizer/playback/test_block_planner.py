@@ -16,20 +16,20 @@ def planned(content: str, world: PlanningContext = PlanningContext()) -> Plan:  
     return plan(parse(f'<bml id="b">{content}</bml>', VOCABULARY), KINDS, world)
 
 
-def test_every_behaviour_that_is_scheduled_is_expanded() -> None:
+def test_plan_expands_every_scheduled_behaviour() -> None:
     made = planned('<head id="h" lexeme="NOD"/><gesture id="g" lexeme="BEAT"/>')
     assert set(made.schedule.times) == set(made.channels) == {"h", "g"}
     assert made.channels["h"]
     assert made.channels["g"] == (), "a face shows no gesture"
 
 
-def test_a_problem_of_the_parser_is_one_warning_with_its_place() -> None:
+def test_plan_warns_once_of_a_parser_problem_with_its_place() -> None:
     (warning,) = planned('<head id="h" lexeme="NOD" amount="7"/>').schedule.warnings
     assert (warning.id, warning.type) == ("b:h", "PARSING_FAILURE")
     assert warning.text.count("line 1") == 1
 
 
-def test_a_fault_of_a_kind_drops_the_behaviour_with_one_warning() -> None:
+def test_plan_drops_a_behaviour_with_a_fatal_fault() -> None:
     made = planned('<faceLexeme id="f" lexeme="SMIRKLE"/><head id="h" lexeme="NOD"/>')
     (warning,) = made.schedule.warnings
     assert warning.id == "b:f"
@@ -37,13 +37,13 @@ def test_a_fault_of_a_kind_drops_the_behaviour_with_one_warning() -> None:
     assert set(made.channels) == {"h"}
 
 
-def test_a_target_that_is_not_in_the_scene_warns_and_plays() -> None:
+def test_plan_keeps_a_behaviour_with_an_unknown_target() -> None:
     made = planned('<gaze id="g" target="cupp"/>', PlanningContext(scene={"cup": (0.1, 0.0, 0.5)}))
     assert [w.type for w in made.schedule.warnings] == ["NO_SUCH_TARGET"]
     assert made.channels["g"]
 
 
-def test_a_required_fault_fails_the_block_with_one_warning_of_its_own() -> None:
+def test_plan_fails_for_a_required_fault_with_one_warning() -> None:
     made = planned('<required><faceLexeme id="f" lexeme="SMIRKLE"/></required><head id="h" lexeme="NOD"/>')
     assert made.schedule.failed
     assert [w.id for w in made.schedule.warnings] == ["b"]
@@ -58,7 +58,7 @@ def natural() -> float:
 
 
 @pytest.mark.parametrize("ratio", [0.7, 1.5])
-def test_a_speech_is_spoken_at_another_rate_where_it_fits_no_other_way(ratio: float) -> None:
+def test_plan_stretches_a_speech_if_nothing_else_fits(ratio: float) -> None:
     end = natural() * ratio
     said = SPEECH.format(f' start="0" end="{end}"')
     played = realize(f'<bml id="b">{said}</bml>', voice=SilentVoice())
@@ -67,20 +67,20 @@ def test_a_speech_is_spoken_at_another_rate_where_it_fits_no_other_way(ratio: fl
     assert played.speech[0][1].duration == pytest.approx(end)
 
 
-def test_a_speech_is_left_as_it_is_where_others_can_give_way() -> None:
+def test_plan_leaves_a_speech_if_others_can_stretch() -> None:
     face = '<faceLexeme id="f" lexeme="SMILE" start="s:start" attackPeak="s:m" end="s:end"/>'
     played = realize(f'<bml id="b">{SPEECH.format("")}{face}</bml>', voice=SilentVoice())
     assert played.schedules[0].at("s", "end") == pytest.approx(natural())
 
 
-def test_a_speech_that_would_have_to_be_gabbled_is_dropped() -> None:
+def test_plan_drops_a_speech_that_would_be_too_fast() -> None:
     said = SPEECH.format(f' start="0" end="{natural() * 0.3}"')
     played = realize(f'<bml id="b">{said}</bml>', voice=SilentVoice())
     assert [w.id for w in played.warnings] == ["b:s"]
     assert played.speech == ()
 
 
-def test_two_speeches_tied_at_both_ends_meet() -> None:
+def test_plan_stretches_two_speeches_tied_at_both_ends() -> None:
     both = (
         '<speech id="s"><text>one two three</text></speech>'
         '<speech id="t" start="s:end + 0.1" end="4"><text>four five six seven</text></speech>'
@@ -92,7 +92,7 @@ def test_two_speeches_tied_at_both_ends_meet() -> None:
 
 @pytest.mark.parametrize("mark", [0.5, 0.7])
 @pytest.mark.parametrize("voice", ["silent", pytest.param("espeak", marks=pytest.mark.espeak)])
-def test_a_speech_tied_at_a_mark_is_spoken_at_the_rate_that_brings_it_there(mark: float, voice: str) -> None:
+def test_plan_stretches_a_speech_tied_at_a_mark_to_the_rate_that_fits(mark: float, voice: str) -> None:
     tie = f'<constraint><synchronize><sync ref="s:m"/><sync ref="{mark}"/></synchronize></constraint>'
     text = '<speech id="s" start="0"><text>hello my <sync id="m"/> dear friend of mine</text></speech>'
     played = realize(f'<bml id="b">{text}<required>{tie}</required></bml>', voice=voice)

@@ -30,7 +30,7 @@ def ended(cast: BlockStore, id: str, start: float = 0.0) -> ActiveBlock:
     return made
 
 
-def test_a_block_is_found_by_its_id_while_it_is_alive() -> None:
+def test_find_has_a_block_while_it_is_active() -> None:
     cast = BlockStore()
     made = added(cast, "a")
     assert cast.find("a") is made
@@ -42,13 +42,13 @@ def test_a_block_is_found_by_its_id_while_it_is_alive() -> None:
     assert cast.all() == [made], "it may still be seen"
 
 
-def test_those_of_a_character_are_told_apart() -> None:
+def test_of_character_has_the_blocks_of_one_character() -> None:
     cast = BlockStore()
     first, second = added(cast, "a"), added(cast, "b", character=1)
     assert (cast.of_character(0), cast.of_character(1)) == ([first], [second])
 
 
-def test_what_is_forgotten_keeps_its_schedule_for_a_while() -> None:
+def test_forget_keeps_schedules_for_a_while() -> None:
     cast = BlockStore()
     ended(cast, "a")
     assert cast.forget(1.0) == []
@@ -65,7 +65,7 @@ def test_what_is_forgotten_keeps_its_schedule_for_a_while() -> None:
 
 
 @pytest.mark.parametrize("anew", [False, True])
-def test_of_very_long_blocks_fewer_schedules_are_kept_but_always_the_last(
+def test_forget_keeps_fewer_long_schedules_but_always_the_last(
     monkeypatch: pytest.MonkeyPatch, anew: bool
 ) -> None:
     points = 2  # of a <wait>
@@ -85,7 +85,7 @@ def test_of_very_long_blocks_fewer_schedules_are_kept_but_always_the_last(
     assert [cast.has_seen(name) for name in "abcde"] == [False, False, False, False, True]
 
 
-def test_the_newest_of_an_id_counts() -> None:
+def test_schedule_of_an_id_is_that_of_the_newest_block() -> None:
     cast = BlockStore()
     ended(cast, "a")
     added(cast, "a", start=5.0)
@@ -94,7 +94,7 @@ def test_the_newest_of_an_id_counts() -> None:
     assert schedule.start == 5.0
 
 
-def test_points_that_lapse_are_known_no_more_and_the_others_are() -> None:
+def test_drop_anticipators_removes_their_points_only() -> None:
     cast = BlockStore()
     for id in ("clock", "music"):
         cast.anticipate(id, {"beat": 3.0})
@@ -106,7 +106,7 @@ def test_points_that_lapse_are_known_no_more_and_the_others_are() -> None:
     assert "clock" not in schedule.times
 
 
-def test_anticipated_points_are_those_of_a_block_of_their_own() -> None:
+def test_anticipate_makes_points_of_a_reserved_block() -> None:
     cast = BlockStore()
     cast.anticipate("clock", {"beat": 3.0})
     cast.anticipate("clock", {"bar": 4.0, "beat": 2.0})

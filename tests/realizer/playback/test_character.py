@@ -29,7 +29,7 @@ def shown(character: Character, time: float, target=SMILE) -> float:
     return float(blend(character.channels(), np.array([time])).values[0, target.column])
 
 
-def test_a_shift_holds_until_the_next_of_its_region() -> None:
+def test_shift_holds_until_the_next_of_its_region() -> None:
     ann = Character("Ann")
     ann.add_shifts([shift(0, 1, 0.6)])
     ann.add_shifts([shift(5, 6, 0.2)])
@@ -38,14 +38,14 @@ def test_a_shift_holds_until_the_next_of_its_region() -> None:
     )
 
 
-def test_a_shift_of_another_region_leaves_it_alone() -> None:
+def test_shift_of_another_region_leaves_it_alone() -> None:
     ann = Character("Ann")
     ann.add_shifts([shift(0, 1, 0.6), shift(2, 3, 0.5, HEAD, "head")])
     assert shown(ann, 10) == pytest.approx(0.6)
     assert shown(ann, 10, HEAD) == pytest.approx(0.5)
 
 
-def test_a_shift_that_has_not_begun_can_be_cancelled() -> None:
+def test_cancel_drops_a_shift_that_has_not_begun() -> None:
     ann = Character("Ann")
     begun, waiting = shift(0, 1, 0.6), shift(5, 6, 0.2)
     ann.add_shifts([begun, waiting])
@@ -53,7 +53,7 @@ def test_a_shift_that_has_not_begun_can_be_cancelled() -> None:
     assert shown(ann, 50) == pytest.approx(0.6)
 
 
-def test_forgetting_changes_nothing_that_can_still_be_seen() -> None:
+def test_forget_changes_nothing_visible() -> None:
     ann = Character("Ann")
     ann.add_shifts([shift(i, i + 0.5, 0.1 + 0.01 * i) for i in range(20)])
     before = [shown(ann, t) for t in (18.7, 19.2, 30)]
@@ -62,7 +62,7 @@ def test_forgetting_changes_nothing_that_can_still_be_seen() -> None:
     assert [shown(ann, t) for t in (18.7, 19.2, 30)] == before
 
 
-def test_what_is_set_holds_and_an_unknown_name_changes_nothing() -> None:
+def test_set_direct_holds_and_an_unknown_name_changes_nothing() -> None:
     ann = Character("Ann")
     ann.set_direct({"12L": 0.8, "open_jaw": 200.0}, now=1.0)
     assert shown(ann, 9.0) == pytest.approx(0.8)
@@ -82,7 +82,9 @@ ASKED = (
 
 
 @given(st.permutations(ASKED), st.floats(1.0, 2.0))
-def test_the_order_of_sending_does_not_matter(order: list[tuple[str, dict[str, float]]], now: float) -> None:
+def test_set_direct_and_set_emotion_do_not_depend_on_their_order(
+    order: list[tuple[str, dict[str, float]]], now: float
+) -> None:
     times = np.linspace(0.0, 4.0, 101)
     shown = []
     for some in (ASKED, order):
@@ -99,7 +101,7 @@ def test_the_order_of_sending_does_not_matter(order: list[tuple[str, dict[str, f
 
 
 @given(st.lists(st.tuples(st.floats(0.0, 0.5), st.none() | st.floats(-300, 300)), min_size=1, max_size=6))
-def test_nothing_jumps_however_often_a_fap_is_set_and_let_go(
+def test_set_direct_never_jumps(
     steps: list[tuple[float, float | None]],
 ) -> None:
     """Each message changes nothing of the frame in which it comes."""
@@ -115,7 +117,7 @@ def test_nothing_jumps_however_often_a_fap_is_set_and_let_go(
         np.testing.assert_allclose(after[1:], before, atol=1.5)
 
 
-def test_a_unit_that_is_held_at_0_does_not_let_the_mood_through_when_it_changes() -> None:
+def test_set_direct_at_0_hides_the_mood_while_it_changes() -> None:
     ann = Character(None)
     ann.set_emotion({"12L": 0.8}, 0.0)
     ann.set_direct({"12L": 0.0}, 1.0)

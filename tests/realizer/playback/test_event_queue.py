@@ -22,7 +22,7 @@ def playing(number: int, start: float) -> ActiveBlock:
     return made
 
 
-def test_events_come_in_order_and_not_before_their_time() -> None:
+def test_due_yields_events_in_order_when_they_are_due() -> None:
     calendar = EventQueue()
     calendar.add(playing(1, 2.0))
     calendar.add(playing(0, 0.0))
@@ -33,7 +33,7 @@ def test_events_come_in_order_and_not_before_their_time() -> None:
     assert calendar.next == 2.5
 
 
-def test_what_is_put_in_while_events_happen_comes_in_its_turn() -> None:
+def test_due_yields_events_that_are_added_meanwhile() -> None:
     calendar = EventQueue()
     calendar.add(playing(0, 0.0))
     seen = []
@@ -45,7 +45,7 @@ def test_what_is_put_in_while_events_happen_comes_in_its_turn() -> None:
     assert (0.25, 1) in seen
 
 
-def test_of_a_block_that_is_dropped_nothing_more_comes_and_the_others_go_on() -> None:
+def test_drop_removes_the_events_of_one_block_only() -> None:
     calendar = EventQueue()
     first, second = playing(0, 0.0), playing(1, 0.0)
     calendar.add(first)
@@ -58,7 +58,7 @@ def test_of_a_block_that_is_dropped_nothing_more_comes_and_the_others_go_on() ->
     assert calendar.next is None
 
 
-def test_a_block_that_is_put_in_again_comes_once() -> None:
+def test_add_of_a_block_again_yields_its_events_once() -> None:
     calendar = EventQueue()
     block = playing(0, 0.0)
     calendar.add(block)
@@ -67,7 +67,7 @@ def test_a_block_that_is_put_in_again_comes_once() -> None:
     assert [e.phase for e in calendar.due(10.0)].count(Phase.END) == 1
 
 
-def test_a_block_that_is_moved_often_comes_once_and_leaves_nothing_behind() -> None:
+def test_add_of_a_block_that_moves_often_leaves_nothing_behind() -> None:
     calendar = EventQueue()
     beside = playing(1, 5.0)
     calendar.add(beside)
@@ -81,7 +81,7 @@ def test_a_block_that_is_moved_often_comes_once_and_leaves_nothing_behind() -> N
     assert calendar.next is None
 
 
-def test_a_block_that_plays_does_not_start_or_subside_again() -> None:
+def test_add_of_a_playing_block_does_not_start_it_again() -> None:
     calendar = EventQueue()
     block = playing(0, 0.0)
     block.change_state(BlockEvent.START)

@@ -26,23 +26,23 @@ SCHEDULE = Schedule(
 )
 
 
-def test_sync_points_come_in_the_order_of_time_then_of_the_document() -> None:
+def test_events_are_in_the_order_of_time_then_of_the_document() -> None:
     due = sorted(events(BLOCK, SCHEDULE, 0, 7))
     assert [f"{e.name}:{e.sync}" for e in due] == ["g:start", "h:start", "h:stroke", "g:end", "h:end"]
     assert [e.time for e in due] == [10.0, 10.0, 10.5, 11.0, 11.0]
 
 
-def test_a_sync_point_is_told_on_both_clocks() -> None:
+def test_sync_progress_has_the_time_on_both_clocks() -> None:
     told = sync_progress(BLOCK, "h", "stroke", 10.5, 10.0)
     assert (told.id, told.time, told.global_time, told.character_id) == ("b:h:stroke", 0.5, 10.5, "Ann")
 
 
-def test_at_one_instant_the_earlier_block_ends_before_the_later_one_starts() -> None:
+def test_events_of_an_earlier_block_end_before_a_later_one_starts() -> None:
     due = [Event(11.0, 1, Phase.START), Event(11.0, 0, Phase.END), *events(BLOCK, SCHEDULE, 0, 7)]
     assert [(e.order, e.phase) for e in sorted(due)[-2:]] == [(0, Phase.END), (1, Phase.START)]
 
 
-def test_feedback_reads_back_as_it_was_written() -> None:
+def test_feedback_reads_back_as_written() -> None:
     for told in (
         acknowledgement(BLOCK, 10.0),
         prediction(BLOCK, SCHEDULE, State.LURKING, SCHEDULE.behaviours),
@@ -51,7 +51,7 @@ def test_feedback_reads_back_as_it_was_written() -> None:
         assert parse_feedback(told.to_xml()) == told
 
 
-def test_a_prediction_names_the_sync_points_it_is_given() -> None:
+def test_prediction_has_the_given_sync_points() -> None:
     told = prediction(BLOCK, SCHEDULE, State.PENDING, SCHEDULE.behaviours)
     assert (told.blocks[0].global_start, told.blocks[0].global_end) == (10.0, 11.0)
     assert told.blocks[0].status == "PENDING"

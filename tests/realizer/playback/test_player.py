@@ -44,7 +44,7 @@ def au(player: Player, name: str, *times: float, character: int = 0) -> list[flo
 SMILE = '<faceLexeme id="s" lexeme="SMILE" amount="1" start="0" attackPeak="0.4" relax="2" end="2.6"/>'
 
 
-def test_a_block_is_acknowledged_predicted_started_and_ended() -> None:
+def test_player_acknowledges_predicts_starts_and_ends_a_block() -> None:
     player = Player()
     submit(player, SMILE, now=5.0)
     first, planned, *rest = player.due(100.0)
@@ -63,7 +63,7 @@ def test_a_block_is_acknowledged_predicted_started_and_ended() -> None:
     ]
 
 
-def test_feedback_comes_due_at_its_time_and_once() -> None:
+def test_due_returns_feedback_at_its_time_and_once() -> None:
     player = Player()
     submit(player, SMILE)
     player.due(0.0)
@@ -78,13 +78,13 @@ def test_feedback_comes_due_at_its_time_and_once() -> None:
     assert player.next_deadline() is None
 
 
-def test_an_empty_block_starts_and_ends_at_once() -> None:
+def test_player_starts_and_ends_an_empty_block_at_once() -> None:
     player = Player()
     submit(player, "", now=2.0)
     assert progress(player.due(2.0)) == [("b:start", 2.0), ("b:end", 2.0)]
 
 
-def test_append_starts_when_all_earlier_blocks_end_and_after_their_end_is_reported() -> None:
+def test_append_starts_after_the_reported_end_of_earlier_blocks() -> None:
     player = Player()
     submit(player, SMILE, "first")
     submit(player, SMILE, "second", 'composition="APPEND"')
@@ -92,13 +92,13 @@ def test_append_starts_when_all_earlier_blocks_end_and_after_their_end_is_report
     assert told.index(("first:end", 2.6)) < told.index(("second:start", 2.6))
 
 
-def test_append_with_nothing_to_wait_for_starts_now() -> None:
+def test_append_without_earlier_blocks_starts_now() -> None:
     player = Player()
     submit(player, SMILE, "a", 'composition="APPEND"', now=3.0)
     assert ("a:start", 3.0) in progress(player.due(3.0))
 
 
-def test_merge_plays_beside() -> None:
+def test_merge_plays_beside_earlier_blocks() -> None:
     player = Player()
     submit(player, SMILE, "first")
     submit(player, SMILE, "second", now=1.0)
@@ -118,7 +118,7 @@ def test_replace_ends_earlier_blocks_first_and_silences_them() -> None:
     assert not any(id.startswith(("first:s", "waiting:s")) for id in told)
 
 
-def test_ids_can_be_used_again_after_the_end_and_after_a_replace() -> None:
+def test_player_allows_an_id_again_after_its_end_or_a_replace() -> None:
     player = Player()
     submit(player, SMILE, "b")
     player.due(1.0)
@@ -129,7 +129,7 @@ def test_ids_can_be_used_again_after_the_end_and_after_a_replace() -> None:
     assert ("b:start", 20.0) in told
 
 
-def test_an_id_that_still_plays_is_refused_with_one_warning() -> None:
+def test_player_refuses_an_id_that_still_plays() -> None:
     player = Player()
     submit(player, SMILE)
     player.due(0.5)
@@ -156,7 +156,7 @@ def test_stop_ends_a_block_without_a_jump_of_the_face() -> None:
     assert player.due(100.0) == []
 
 
-def test_a_nod_lands_on_its_word() -> None:
+def test_player_nods_on_the_word() -> None:
     player = Player(PlayOptions(idle=False))
     made = block(
         '<speech id="say"><text>Yes I <sync id="really"/>really do</text></speech>'
@@ -168,7 +168,7 @@ def test_a_nod_lands_on_its_word() -> None:
     assert au(player, "54", plan.at("nod", "stroke"))[0] > 0.05
 
 
-def test_a_shift_stays_and_the_next_shift_takes_it_over() -> None:
+def test_player_keeps_a_shift_until_the_next() -> None:
     player = Player(PlayOptions(idle=False))
     shift = '<faceShift id="{}" start="0" end="1"><faceLexeme lexeme="SMILE" amount="{}"/></faceShift>'
     submit(player, shift.format("f", 0.6), "one")
@@ -181,7 +181,7 @@ def test_a_shift_stays_and_the_next_shift_takes_it_over() -> None:
     assert au(player, "12L", 11.5)[0] == pytest.approx(0, abs=1e-6)
 
 
-def test_the_first_name_heard_is_the_first_characters_and_others_stand_beside() -> None:
+def test_player_gives_the_first_name_to_the_first_character() -> None:
     player = Player(PlayOptions(idle=False))
     submit(player, SMILE, "a", 'characterId="Ann"')
     submit(player, SMILE, "b", 'characterId="Bob" composition="APPEND"')
@@ -190,7 +190,7 @@ def test_the_first_name_heard_is_the_first_characters_and_others_stand_beside() 
     assert au(player, "12L", 1.0, character=1)[0] > 0.4
 
 
-def test_a_reference_into_a_running_block_is_pinned_to_it() -> None:
+def test_player_fixes_a_reference_into_a_running_block() -> None:
     player = Player()
     submit(player, SMILE, "first")
     player.due(1.0)
@@ -199,7 +199,7 @@ def test_a_reference_into_a_running_block_is_pinned_to_it() -> None:
     assert told["second:n:stroke"] == pytest.approx(2.6)
 
 
-def test_a_required_behaviour_that_cannot_be_played_takes_the_block_with_one_warning() -> None:
+def test_player_refuses_a_block_with_a_failed_required_behaviour() -> None:
     player = Player()
     submit(player, f'{SMILE}<required><faceLexeme id="x" lexeme="WAGGLE_EARS"/></required>')
     told = player.due(100.0)
@@ -209,7 +209,7 @@ def test_a_required_behaviour_that_cannot_be_played_takes_the_block_with_one_war
     assert "WAGGLE_EARS" in warnings[0].text
 
 
-def test_a_dropped_behaviour_does_not_hold_up_the_end() -> None:
+def test_player_ends_a_block_without_its_dropped_behaviours() -> None:
     player = Player()
     submit(player, f'{SMILE}<faceLexeme id="x" lexeme="WAGGLE_EARS" start="0" end="60"/>')
     told = player.due(100.0)
@@ -217,7 +217,7 @@ def test_a_dropped_behaviour_does_not_hold_up_the_end() -> None:
     assert progress(told)[-1] == ("b:end", pytest.approx(2.6))
 
 
-def test_directly_set_values_hold_until_let_go() -> None:
+def test_set_direct_holds_values_until_they_are_released() -> None:
     player = Player(PlayOptions(idle=False))
     player.set_direct({"12L": 0.8}, now=1.0)
     assert au(player, "12L", 1.0, 5.0) == pytest.approx([0, 0.8])
@@ -227,7 +227,7 @@ def test_directly_set_values_hold_until_let_go() -> None:
         player.set_direct({"99X": 1.0}, now=8.0)
 
 
-def test_a_long_session_forgets_what_is_past() -> None:
+def test_player_forgets_what_is_past_in_a_long_session() -> None:
     player = Player()
     for i in range(50):
         submit(player, SMILE, f"b{i}", now=10.0 * i)
@@ -246,7 +246,7 @@ def test_frames_at_25_fps_are_every_second_of_50(seed: int, start: float) -> Non
 
 
 @given(st.lists(st.floats(0, 4), min_size=1, max_size=8))
-def test_however_often_it_is_asked_the_feedback_is_the_same(asked: list[float]) -> None:
+def test_due_gives_the_same_feedback_however_often_it_is_called(asked: list[float]) -> None:
     def told(times: list[float]) -> list[str]:
         player = Player()
         submit(player, SMILE, "a")
@@ -262,7 +262,7 @@ WORDS = "Whoever follows the river to the tower, will discover a little door."
 TALK = f'<speech id="t"><text>{WORDS}</text></speech>'
 
 
-def test_without_prosody_a_face_that_speaks_is_as_idle_as_one_that_is_silent() -> None:
+def test_prosody_off_leaves_a_speaking_face_as_idle_as_a_silent_one() -> None:
     times = np.arange(0.0, 8.0, 0.04)
     own = np.array([name in OWN for name in AU_NAMES()])
     silent, still, lively = (
@@ -276,7 +276,7 @@ def test_without_prosody_a_face_that_speaks_is_as_idle_as_one_that_is_silent() -
     assert not np.array_equal(lively.frames(times).aus[:, own], silent.frames(times).aus[:, own])
 
 
-def test_without_idle_motion_there_is_no_prosody() -> None:
+def test_prosody_needs_idle_motion() -> None:
     times = np.arange(0.0, 8.0, 0.04)
     one, other = Player(PlayOptions(idle=False)), Player(PlayOptions(idle=False, prosody=False))
     submit(one, TALK)
@@ -284,7 +284,7 @@ def test_without_idle_motion_there_is_no_prosody() -> None:
     np.testing.assert_array_equal(one.frames(times).values, other.frames(times).values)
 
 
-def test_a_face_that_keeps_still_does_so_while_it_speaks() -> None:
+def test_prosody_of_a_still_face_is_still() -> None:
     times = np.arange(0.2, 8.0, 0.04)
     still = '<own:idle id="i" blinks="0" motion="0" start="0" end="0.1"/>'
     player = Player()
@@ -294,7 +294,7 @@ def test_a_face_that_keeps_still_does_so_while_it_speaks() -> None:
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_a_nod_that_a_document_asks_for_is_the_same_while_the_face_speaks(seed: int) -> None:
+def test_prosody_leaves_a_nod_of_the_document_unchanged(seed: int) -> None:
     nod = '<head id="n" lexeme="NOD" start="1.5" end="3"/>'
     lively, still = Player(PlayOptions(seed=seed)), Player(PlayOptions(seed=seed, prosody=False))
     for player in (lively, still):
@@ -307,7 +307,7 @@ def test_a_nod_that_a_document_asks_for_is_the_same_while_the_face_speaks(seed: 
 
 @settings(max_examples=12)
 @given(st.integers(0, 1000), st.lists(st.floats(0.0, 12.0), min_size=1, max_size=3), st.floats(0.0, 12.0))
-def test_a_face_that_is_looked_at_as_it_speaks_moves_as_one_that_is_played_back(
+def test_frames_while_speech_grows_are_those_of_the_playback(
     seed: int, starts: list[float], nod: float
 ) -> None:
     """Blocks that have ended are forgotten by and by; what was shown and what comes stay what they are."""

@@ -18,12 +18,12 @@ def test_references_of_attributes_texts_and_constraints_are_found() -> None:
     assert sorted(map(str, references(block))) == ["1", "2", "3", "4", "h:end", "s:start", "x:y:end"]
 
 
-def test_references_abroad_are_those_into_other_blocks() -> None:
+def test_external_refs_are_those_into_other_blocks() -> None:
     block = parse('<bml id="b"><head id="h" lexeme="NOD" start="x:y:end" relax="b:h:stroke + 1"/></bml>')
     assert [str(ref) for ref in external_refs(block)] == ["x:y:end"]
 
 
-def test_every_reference_can_be_made_to_another() -> None:
+def test_with_references_replaces_every_reference() -> None:
     block = parse(
         """<bml id="b"><head id="h" lexeme="NOD" start="1" stroke="x:y:end"/>
         <speech id="s"><text>a <sync id="m" ref="2"/> b</text></speech>

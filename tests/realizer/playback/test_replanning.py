@@ -50,7 +50,7 @@ def stage() -> Stage:
     return Stage()
 
 
-def test_a_new_block_and_a_running_one_share_the_stretch_between_them(stage: Stage) -> None:
+def test_replanning_shares_the_stretch_between_a_new_and_a_running_block(stage: Stage) -> None:
     alone = stage.send("a", FACE.format(""))
     # A wait of 9 s is tied to the whole of the face, at half a second: the face must be longer, it shorter.
     stage.send("b", '<wait id="w" duration="9" start="0" end="a:f:end"/>', at=0.1)
@@ -60,7 +60,7 @@ def test_a_new_block_and_a_running_one_share_the_stretch_between_them(stage: Sta
     assert times["a:f:start"] == 0.0
 
 
-def test_what_has_passed_stays_and_what_was_reported_never_changes(stage: Stage) -> None:
+def test_replanning_never_changes_what_has_passed(stage: Stage) -> None:
     stage.send("a", FACE.format(""))
     stage.until(0.6)
     early = {f.id: f.global_time for f in stage.told}
@@ -70,7 +70,7 @@ def test_what_has_passed_stays_and_what_was_reported_never_changes(stage: Stage)
     assert times["a:f:relax"] > 0.6
 
 
-def test_a_point_that_has_passed_is_a_fixed_time(stage: Stage) -> None:
+def test_replanning_fixes_a_point_that_has_passed(stage: Stage) -> None:
     stage.send("a", FACE.format(' attackPeak="0.4"'))
     stage.until(1.0)
     before = stage.player.end
@@ -79,7 +79,7 @@ def test_a_point_that_has_passed_is_a_fixed_time(stage: Stage) -> None:
     assert stage.player.end == pytest.approx(max(before, stage.player.end))
 
 
-def test_new_predictions_tell_of_what_has_moved_and_of_nothing_else(stage: Stage) -> None:
+def test_replanning_predicts_what_has_moved_only(stage: Stage) -> None:
     stage.send("a", FACE.format("") + '<wait id="apart" duration="1"/>')
     stage.predicted.clear()
     stage.send("b", '<wait id="w" duration="9" start="0" end="a:f:end"/>', at=0.1)
@@ -89,13 +89,13 @@ def test_new_predictions_tell_of_what_has_moved_and_of_nothing_else(stage: Stage
     assert of_a[0].behaviours[0].syncs["end"].offset == pytest.approx(stage.times()["a:f:end"], abs=1e-6)
 
 
-def test_a_block_nobody_refers_to_is_left_alone(stage: Stage) -> None:
+def test_replanning_leaves_unrelated_blocks_alone(stage: Stage) -> None:
     first = stage.send("a", FACE.format(""))
     stage.send("b", FACE.format(""), at=0.2)
     assert stage.player.latest(first).end == first.end
 
 
-def test_a_demand_that_cannot_be_met_costs_the_newer_behaviour(stage: Stage) -> None:
+def test_replanning_drops_the_newer_behaviour_of_an_impossible_tie(stage: Stage) -> None:
     first = stage.send("a", FACE.format(' start="0" end="2"'))
     late = stage.send("b", '<wait id="w" start="a:f:end" end="bml:start + 1"/>', at=0.5)
     assert not late.times
@@ -104,7 +104,7 @@ def test_a_demand_that_cannot_be_met_costs_the_newer_behaviour(stage: Stage) -> 
     assert stage.player.latest(first).end == 2.0
 
 
-def test_the_face_passes_into_its_new_course_without_a_jump(stage: Stage) -> None:
+def test_replanning_moves_the_face_without_a_jump(stage: Stage) -> None:
     stage.send("a", FACE.format(""))
     for at in (0.2, 0.7, 1.2):
         stage.send(f"b{at}", f'<wait id="w" duration="{9 * at}" start="0" end="a:f:end"/>', at=at)
@@ -116,14 +116,14 @@ def test_the_face_passes_into_its_new_course_without_a_jump(stage: Stage) -> Non
     assert np.abs(np.diff(course, 2)).max() < 4e-4
 
 
-def test_a_block_that_waits_for_one_that_moves_starts_when_that_ends(stage: Stage) -> None:
+def test_replanning_moves_a_block_that_waits_for_a_moved_one(stage: Stage) -> None:
     stage.send("a", FACE.format(""))
     after = stage.send("c", '<wait id="w" duration="1"/>', said='composition="APPEND"')
     stage.send("b", '<wait id="w" duration="9" start="0" end="a:f:end"/>', at=0.1)
     assert stage.player.latest(after).start == pytest.approx(stage.times()["a:f:end"])
 
 
-def test_a_block_tied_to_a_behaviour_that_is_interrupted_follows_it(stage: Stage) -> None:
+def test_replanning_follows_an_interrupted_behaviour(stage: Stage) -> None:
     stage.send(
         "a", FACE.format(' start="0" attackPeak="0.5" relax="4" end="5"') + '<wait id="w" duration="9"/>'
     )
@@ -132,7 +132,7 @@ def test_a_block_tied_to_a_behaviour_that_is_interrupted_follows_it(stage: Stage
     assert stage.times()["b:n:start"] == pytest.approx(1.3)
 
 
-def test_blocks_are_touched_by_any_chain_of_points_to_come() -> None:
+def test_affected_blocks_are_connected_by_future_points() -> None:
     stage = Stage()
     stage.send("a", FACE.format(""))
     stage.send("b", '<head id="n" lexeme="NOD" start="a:f:end"/>')
@@ -147,7 +147,7 @@ def test_blocks_are_touched_by_any_chain_of_points_to_come() -> None:
 BEAT = '<head id="n" lexeme="NOD" stroke="anticipators:clock:beat"/>'
 
 
-def test_a_behaviour_follows_a_point_that_is_anticipated(stage: Stage) -> None:
+def test_anticipate_moves_a_behaviour_tied_to_the_point(stage: Stage) -> None:
     stage.player.anticipate("clock", {"beat": 3.0}, 0.0)
     stage.send("a", BEAT)
     stage.until(1.0)
@@ -158,7 +158,7 @@ def test_a_behaviour_follows_a_point_that_is_anticipated(stage: Stage) -> None:
     assert times["a:n:start"] < 2.2, "it had begun by then"
 
 
-def test_of_many_anticipators_the_oldest_are_forgotten_but_not_what_a_block_is_tied_to(stage: Stage) -> None:
+def test_anticipate_forgets_the_oldest_that_no_block_is_tied_to(stage: Stage) -> None:
     stage.player.anticipate("clock", {"beat": 3.0}, 0.0)
     stage.send("a", BEAT)
     for number in range(ANTICIPATORS + 5):
@@ -171,7 +171,7 @@ def test_of_many_anticipators_the_oldest_are_forgotten_but_not_what_a_block_is_t
     assert stage.times()["a:n:stroke"] == pytest.approx(4.0)
 
 
-def test_what_has_passed_does_not_follow_an_estimate_that_comes_late(stage: Stage) -> None:
+def test_anticipate_late_does_not_move_what_has_passed(stage: Stage) -> None:
     stage.player.anticipate("clock", {"beat": 1.0}, 0.0)
     stage.send("a", BEAT)
     stage.until(1.2)
@@ -179,7 +179,7 @@ def test_what_has_passed_does_not_follow_an_estimate_that_comes_late(stage: Stag
     assert stage.times()["a:n:stroke"] == pytest.approx(1.0)
 
 
-def test_a_point_that_should_have_been_already_is_to_be_at_once(stage: Stage) -> None:
+def test_anticipate_in_the_past_means_at_once(stage: Stage) -> None:
     stage.player.anticipate("clock", {"beat": 9.0}, 0.0)
     stage.send("a", BEAT)
     stage.until(3.0)
@@ -189,13 +189,13 @@ def test_a_point_that_should_have_been_already_is_to_be_at_once(stage: Stage) ->
     assert 3.0 < times["a:n:stroke"] < 3.1, "its preparation takes its least time"
 
 
-def test_a_point_nobody_anticipates_costs_the_behaviour(stage: Stage) -> None:
+def test_anticipated_point_that_is_unknown_drops_the_behaviour(stage: Stage) -> None:
     schedule = stage.send("a", BEAT)
     assert not schedule.times
     assert [w.id for w in schedule.warnings] == ["a:n"]
 
 
-def test_a_preplanned_block_moves_nobody_before_it_is_activated(stage: Stage) -> None:
+def test_preplanned_block_moves_no_block_before_its_activation(stage: Stage) -> None:
     first = stage.send("a", FACE.format(""))
     stage.send("p", '<wait id="w" duration="9" start="0" end="a:f:end"/>', said='bmla:preplan="true"')
     assert stage.player.latest(first).end == first.end
@@ -210,7 +210,7 @@ def spoken(mark: float, end: float) -> Utterance:
     return Utterance(end, (), (Phoneme(0.0, end, "a"),), {"m": mark})
 
 
-def test_a_voice_that_turns_out_slower_takes_the_rest_with_it() -> None:
+def test_update_speech_moves_the_rest_with_a_slower_voice() -> None:
     stage = Stage()
     stage.player.submit(stage.block("a", TALK), 0.0, {"s": spoken(1.0, 2.0)})
     stage.until(0.5)
@@ -220,7 +220,7 @@ def test_a_voice_that_turns_out_slower_takes_the_rest_with_it() -> None:
     assert times["a:s:end"] == pytest.approx(3.0)
 
 
-def test_a_mark_that_was_told_stays_where_it_was() -> None:
+def test_update_speech_leaves_reported_marks() -> None:
     stage = Stage()
     stage.player.submit(stage.block("a", TALK), 0.0, {"s": spoken(1.0, 2.0)})
     stage.until(1.2)
@@ -230,7 +230,7 @@ def test_a_mark_that_was_told_stays_where_it_was() -> None:
     assert times["a:s:end"] == pytest.approx(3.0)
 
 
-def test_a_speech_that_is_over_is_not_spoken_again() -> None:
+def test_update_speech_of_a_past_speech_does_nothing() -> None:
     stage = Stage()
     stage.player.submit(stage.block("a", TALK), 0.0, {"s": spoken(1.0, 2.0)})
     stage.until(9.0)
@@ -238,7 +238,7 @@ def test_a_speech_that_is_over_is_not_spoken_again() -> None:
     assert not stage.player.update_speech_timing("nobody", "s", spoken(1.6, 3.0), 9.0)
 
 
-def test_a_block_that_fails_moves_nobody(stage: Stage) -> None:
+def test_replanning_for_a_failed_block_moves_nothing(stage: Stage) -> None:
     first = stage.send("a", FACE.format(""))
     refused = stage.send("b", '<required><wait id="w" start="a:f:end" end="0"/></required>', at=0.1)
     assert refused.failed

@@ -18,41 +18,41 @@ def lost(wanted: list[ResourceClaim], held: list[ResourceClaim] | None = None) -
     return [loss.claim.behaviour for loss in conflicts(wanted, held or [])]
 
 
-def test_of_two_that_want_the_voice_the_later_one_goes() -> None:
+def test_conflicts_drop_the_later_of_two_that_claim_the_voice() -> None:
     assert lost([claim("a", 0, 2), claim("b", 1, 3, rank=1)]) == ["b"]
 
 
-def test_what_only_touches_does_not_disturb() -> None:
+def test_conflicts_allow_claims_that_touch() -> None:
     assert lost([claim("a", 0, 2), claim("b", 2, 3, rank=1)]) == []
 
 
-def test_different_things_do_not_disturb() -> None:
+def test_conflicts_allow_different_resources() -> None:
     assert lost([claim("a", 0, 2), claim("b", 0, 2, what="gaze", rank=1)]) == []
 
 
-def test_what_an_earlier_block_holds_stays_with_it() -> None:
+def test_conflicts_keep_the_claims_of_an_earlier_block() -> None:
     held = [claim("old", 0, 2, what="gaze", block="a")]
     assert lost([claim("new", 1, 3, what="gaze")], held) == ["new"]
 
 
-def test_a_gaze_passes_into_the_next_of_its_block_but_not_into_one_it_contains() -> None:
+def test_conflicts_let_a_gaze_pass_within_its_block_but_not_contain_one() -> None:
     assert lost([claim("a", 0, 2, what="gaze"), claim("b", 1, 3, what="gaze", rank=1)]) == []
     assert lost([claim("a", 0, 2, what="gaze"), claim("b", 0, 2, what="gaze", rank=1)]) == ["b"]
     assert lost([claim("a", 0.5, 1, what="gaze"), claim("b", 0, 2, what="gaze", rank=1)]) == ["b"]
 
 
-def test_a_base_state_passes_into_that_of_another_block() -> None:
+def test_conflicts_let_a_base_state_pass_to_another_block() -> None:
     held = [claim("old", 0, 0.5, what="base gaze", block="a")]
     assert lost([claim("new", 0.3, 0.8, what="base gaze")], held) == []
 
 
-def test_one_that_goes_does_not_stand_in_the_way_of_a_third() -> None:
+def test_conflicts_ignore_a_refused_claim() -> None:
     both = [claim("b", 0, 9, rank=1), claim("b", 0, 9, what="gaze", rank=1)]
     third = claim("c", 3, 4, what="gaze", rank=2)
     assert lost([claim("a", 0, 2), *both, third]) == ["b"]
 
 
-def test_the_sentence_counts_from_the_start_of_the_block() -> None:
+def test_conflict_message_counts_from_the_start_of_the_block() -> None:
     (loss,) = conflicts([claim("n", 11, 13)], [claim("s", 10, 12, block="x")], 10.0)
     assert str(loss) == "wanted the voice from 1 to 3 s, but x:s has it from 0 to 2 s"
 
@@ -69,7 +69,7 @@ def test_the_sentence_counts_from_the_start_of_the_block() -> None:
         max_size=12,
     )
 )
-def test_what_is_left_does_not_disturb_and_everything_lost_has_a_winner(
+def test_conflicts_leave_compatible_claims_and_name_winners(
     rows: list[tuple[str, int, int, int]],
 ) -> None:
     wanted = [

@@ -32,7 +32,7 @@ def course() -> BlockTimeline:
     return BlockTimeline(KINDS, [Character(None)])
 
 
-def test_a_block_that_is_stopped_gives_its_place_to_its_followers() -> None:
+def test_stop_moves_the_followers_of_a_block() -> None:
     blocks = course()
     first = taken_in(blocks, "a")
     second = taken_in(blocks, "b", after=first)
@@ -45,7 +45,7 @@ def test_a_block_that_is_stopped_gives_its_place_to_its_followers() -> None:
     assert [(f.id, f.status) for f in ends] == [("a:end", "INTERRUPTED")]
 
 
-def test_one_that_has_not_started_is_revoked_and_nothing_happens_in_it_any_more() -> None:
+def test_stop_of_a_waiting_block_revokes_it() -> None:
     blocks = course()
     first = taken_in(blocks, "a")
     blocks.stop(first, 0.0)
@@ -54,7 +54,7 @@ def test_one_that_has_not_started_is_revoked_and_nothing_happens_in_it_any_more(
     assert blocks.blocks.find("a") is None
 
 
-def test_a_block_that_is_not_activated_is_on_no_calendar() -> None:
+def test_timeline_has_no_events_of_a_block_that_is_not_activated() -> None:
     blocks = course()
     pending = taken_in(blocks, "p", state=State.PENDING)
     assert blocks.events.next is None
@@ -63,7 +63,7 @@ def test_a_block_that_is_not_activated_is_on_no_calendar() -> None:
     assert blocks.events.next == pending.start == 0.0
 
 
-def test_blocks_line_up_behind_all_others_and_in_their_own_order() -> None:
+def test_reorder_moves_blocks_behind_all_others_in_their_own_order() -> None:
     blocks = course()
     first = taken_in(blocks, "a")
     second = taken_in(blocks, "b", after=first)
@@ -72,7 +72,7 @@ def test_blocks_line_up_behind_all_others_and_in_their_own_order() -> None:
     assert third.order < first.order < second.order
 
 
-def test_blocks_line_up_once_however_many_paths_lead_to_them() -> None:
+def test_reorder_visits_each_block_once() -> None:
     blocks = course()
     first = taken_in(blocks, "a")
     layers = [[first]]
@@ -87,7 +87,7 @@ def test_blocks_line_up_once_however_many_paths_lead_to_them() -> None:
     assert orders == list(range(orders[0], orders[0] + len(orders)))
 
 
-def test_blocks_that_wait_for_each_other_cannot_line_up() -> None:
+def test_reorder_refuses_blocks_that_wait_for_each_other() -> None:
     blocks = course()
     first = taken_in(blocks, "a")
     first.add_dependency(Dependency(taken_in(blocks, "b", after=first)))
@@ -95,7 +95,7 @@ def test_blocks_that_wait_for_each_other_cannot_line_up() -> None:
         blocks.reorder(first)
 
 
-def test_whatever_changes_what_is_shown_is_a_new_revision() -> None:
+def test_version_increases_with_every_visible_change() -> None:
     blocks = course()
     before = blocks.version
     first = taken_in(blocks, "a")

@@ -30,7 +30,7 @@ def quadratics(draw: st.DrawFn) -> Quadratic:
 
 @settings(max_examples=100)
 @given(quadratics())
-def test_guesses_end_where_the_interior_point_does(quadratic: Quadratic) -> None:
+def test_active_set_finds_the_optimum_of_the_interior_point_method(quadratic: Quadratic) -> None:
     start = np.zeros(NODES)
     level, cycle = feasible_start(quadratic, start)
     assert cycle is None
@@ -42,7 +42,7 @@ def test_guesses_end_where_the_interior_point_does(quadratic: Quadratic) -> None
         np.testing.assert_allclose(quickly, surely, atol=1e-6)
 
 
-def test_no_guess_answers_a_question_without_an_answer() -> None:
+def test_active_set_of_an_infeasible_problem_is_none() -> None:
     springs = np.arange(NODES - 1)
     one = np.ones(NODES - 1)
     impossible = Quadratic(

@@ -111,7 +111,7 @@ def check_same(one: Schedule, other: Schedule) -> None:
 
 @settings(max_examples=60)
 @given(documents())
-def test_what_was_dropped_leaves_no_trace_on_the_rest(document: Document) -> None:
+def test_schedule_block_leaves_no_trace_of_dropped_parts(document: Document) -> None:
     """The rest has the times that it has in a document in which nothing else ever was."""
     found = document.schedule()
     assume(found.warnings)
@@ -125,7 +125,7 @@ def test_what_was_dropped_leaves_no_trace_on_the_rest(document: Document) -> Non
 
 @settings(max_examples=60)
 @given(possible(), st.randoms(use_true_random=False))
-def test_elements_may_stand_in_any_order_where_nothing_clashes(document: Document, chance: Random) -> None:
+def test_schedule_block_does_not_depend_on_the_order_of_elements(document: Document, chance: Random) -> None:
     found = document.schedule()
     names = [*document.waits, *document.orders]
     chance.shuffle(names)
@@ -137,7 +137,7 @@ def test_elements_may_stand_in_any_order_where_nothing_clashes(document: Documen
 
 @settings(max_examples=40)
 @given(documents(fixed=False), st.integers(0, 500).map(lambda k: k / 10))
-def test_without_fixed_times_all_moves_along_with_the_earliest(document: Document, earliest: float) -> None:
+def test_schedule_block_moves_with_the_earliest_start(document: Document, earliest: float) -> None:
     found = document.schedule()
     later = document.schedule(earliest=earliest)
     assert [w.id for w in later.warnings] == [w.id for w in found.warnings]

@@ -29,7 +29,7 @@ def test_components_are_those_of_scipy_and_in_order(edges: list[tuple[int, int, 
 
 
 @given(edge_lists, st.lists(st.integers(0, 9).map(float), min_size=NODES, max_size=NODES))
-def test_levels_are_the_least_that_keep_every_edge(
+def test_longest_path_levels_are_the_least_that_satisfy_every_edge(
     edges: list[tuple[int, int, float]], start: list[float]
 ) -> None:
     level = list(start)

@@ -66,7 +66,7 @@ def clashes_of(recipe: Recipe) -> tuple[Problem, list[Conflict]]:
 
 @settings(max_examples=90)
 @given(wild)
-def test_without_any_one_of_what_is_named_the_rest_of_it_can_hold(recipe: Recipe) -> None:
+def test_minimal_cycles_can_hold_without_any_one_statement(recipe: Recipe) -> None:
     problem, clashes = clashes_of(recipe)
     n = len(problem.owner)
     for clash in clashes[:2]:
@@ -100,7 +100,7 @@ def ways(problem: Problem) -> Float64:
 
 @settings(max_examples=100)
 @given(wild)
-def test_no_fewer_statements_clash_at_any_of_its_points(recipe: Recipe) -> None:
+def test_minimal_cycles_have_the_fewest_statements_at_their_points(recipe: Recipe) -> None:
     # A length that the document states wins over least gaps, so that these do not clash.
     recipe = recipe._replace(bodies=[body._replace(least=0.0) for body in recipe.bodies])
     problem, clashes = clashes_of(recipe)
@@ -116,7 +116,7 @@ def test_no_fewer_statements_clash_at_any_of_its_points(recipe: Recipe) -> None:
             walk = np.maximum(walk, (walk[:, :, None] + one[None, :, :]).max(axis=1))
 
 
-def test_where_there_is_a_short_way_and_a_long_one_the_short_one_is_told() -> None:
+def test_minimal_cycles_prefer_the_short_of_two_cycles() -> None:
     body = (
         '<wait id="a" start="1"/>\n<wait id="b" start="a:end"/>\n<wait id="c" start="b:end"/>\n'
         '<wait id="d" start="c:end"/>\n'
@@ -131,7 +131,7 @@ def test_where_there_is_a_short_way_and_a_long_one_the_short_one_is_told() -> No
     assert len(long.clash) == 7
 
 
-def test_a_search_that_takes_too_long_leaves_the_clash_that_was_found() -> None:
+def test_minimal_cycles_keep_the_given_cycle_if_the_search_is_too_long() -> None:
     n = 300
     body = "".join(f'<wait id="w{k}" start="w{(k - 1) % n}:end"/>' for k in range(n))
     found = schedule(body, {f"w{k}": lasting(1.0) for k in range(n)})

@@ -12,7 +12,7 @@ from realizer.scheduling.rigid_clusters import SPARSE_FROM, least_squares
 
 
 @pytest.mark.parametrize("size", [3, SPARSE_FROM, 5 * SPARSE_FROM])
-def test_pulls_cancel_at_every_node_that_is_free(size: int) -> None:
+def test_least_squares_balances_forces_at_every_free_node(size: int) -> None:
     rng = np.random.default_rng(size)
     i = np.concatenate([np.arange(size - 1), rng.integers(0, size, size)])
     j = np.concatenate([np.arange(1, size), (i[size - 1 :] + 1 + rng.integers(0, size - 1, size)) % size])
@@ -27,7 +27,7 @@ def test_pulls_cancel_at_every_node_that_is_free(size: int) -> None:
     np.testing.assert_array_equal(x[fixed], before[fixed])
 
 
-def test_what_large_blocks_need_is_loaded_only_when_asked_for() -> None:
+def test_warm_up_imports_scipy() -> None:
     script = (
         "import sys\n"
         "from realizer.scheduling import warm_up\n"

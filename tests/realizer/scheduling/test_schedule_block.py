@@ -90,7 +90,7 @@ def dropped(found: Schedule) -> list[str]:
 # What Paul describes.
 
 
-def test_shift_one_behaviour() -> None:
+def test_schedule_shifts_one_behaviour() -> None:
     """Paul's figure 3.5: one shared point, nothing is scaled."""
     found = schedule(wait("a") + wait("b", start="a:end"), {"a": timing([3.0]), "b": timing([2.0])})
     assert found["a"] == {"start": 0.0, "end": 3.0}
@@ -98,7 +98,7 @@ def test_shift_one_behaviour() -> None:
     assert found.cost == pytest.approx(0, abs=1e-12)
 
 
-def test_three_and_two_seconds_tied_at_both_ends_give_two_and_a_half() -> None:
+def test_schedule_of_3_and_2_seconds_tied_at_both_ends_is_2_5_seconds() -> None:
     """Paul's figure 3.6, simple scale."""
     found = schedule(
         wait("a") + wait("b", start="a:start", end="a:end"), {"a": timing([3.0]), "b": timing([2.0])}
@@ -108,7 +108,7 @@ def test_three_and_two_seconds_tied_at_both_ends_give_two_and_a_half() -> None:
     assert found.cost == pytest.approx(0.5)
 
 
-def test_stiffness_decides_who_gives() -> None:
+def test_schedule_stretches_the_less_stiff_behaviour_more() -> None:
     """Minimum of 3 (t - 3)^2 + (t - 2)^2 (Paul 2010, 3.3.3)."""
     found = schedule(
         wait("a") + wait("b", start="a:start", end="a:end"),
@@ -118,7 +118,7 @@ def test_stiffness_decides_who_gives() -> None:
 
 
 @pytest.mark.parametrize("length", [1.0, 2.0, 5.0])
-def test_three_interlocked_behaviours_all_move_when_one_changes(length: float) -> None:
+def test_schedule_moves_three_interlocked_behaviours_together(length: float) -> None:
     """Paul's figure 3.7: 1 and 2 follow each other, 3 spans both, and 2 shares its end with 4."""
     found = schedule(
         wait("one") + wait("two", start="one:end") + wait("three", start="one:start", end="two:end"),
@@ -130,7 +130,7 @@ def test_three_interlocked_behaviours_all_move_when_one_changes(length: float) -
     assert found.at("one", "end") == pytest.approx(total / 2)
 
 
-def test_virtual_conductor_nods_on_every_beat() -> None:
+def test_schedule_of_a_virtual_conductor_nods_on_every_beat() -> None:
     """Paul 3.3.2: the tempo has authority, nods are tied to it by their strokes."""
     beats = [0.5 * (k + 1) for k in range(8)]
     body = saying("tempo", marks=8) + "".join(head(f"n{k}", stroke=f"tempo:m{k + 1}") for k in range(8))
@@ -141,7 +141,7 @@ def test_virtual_conductor_nods_on_every_beat() -> None:
     assert found.cost == pytest.approx(0, abs=1e-12)
 
 
-def test_a_conductor_of_waits_drives_hands_head_and_face() -> None:
+def test_schedule_of_a_conductor_of_waits_drives_head_and_face() -> None:
     """Paul 3.3.2 without a speech: beats tied to nothing but each other; what is too long for them gives."""
     beats = "".join(
         wait(f"beat{k}", end=f"beat{k}:start + 0.5", **({"start": f"beat{k - 1}:end"} if k else {}))
@@ -173,7 +173,7 @@ def test_a_conductor_of_waits_drives_hands_head_and_face() -> None:
 
 
 @pytest.mark.parametrize("backwards", [False, True])
-def test_a_chain_of_offsets_in_either_document_order(backwards: bool) -> None:
+def test_schedule_of_a_chain_of_offsets_in_either_document_order(backwards: bool) -> None:
     nodes = [face("f0")] + [face(f"f{k}", start=f"f{k - 1}:end + 0.5") for k in range(1, 50)]
     body = "".join(nodes[::-1] if backwards else nodes)
     found = schedule(body, {f"f{k}": timing([0.1, 0.3, 0.2]) for k in range(50)})
@@ -181,7 +181,7 @@ def test_a_chain_of_offsets_in_either_document_order(backwards: bool) -> None:
         np.testing.assert_allclose(found.times[f"f{k}"], np.array([0, 0.1, 0.4, 0.6]) + 1.1 * k, atol=1e-9)
 
 
-def test_speech_marks_drive_several_behaviours() -> None:
+def test_schedule_ties_several_behaviours_to_speech_marks() -> None:
     body = saying("s", marks=2) + head("n", stroke="s:m1") + face("f", start="s:m1", end="s:m2 + 0.1")
     found = schedule(body, {"s": speech(1.0, 2.0, 2.5), "n": timing([0.1] * 6), "f": timing([0.2, 0.6, 0.3])})
     assert found["s"] == pytest.approx({"start": 0, "m1": 1.0, "m2": 2.0, "end": 2.5})
@@ -190,13 +190,13 @@ def test_speech_marks_drive_several_behaviours() -> None:
     assert [found.at("f", p) for p in ("start", "end")] == pytest.approx([1.0, 2.1])
 
 
-def test_a_mark_can_be_tied_from_inside_the_text() -> None:
+def test_schedule_ties_a_mark_from_inside_the_text() -> None:
     body = wait("w") + '<speech id="s"><text>One <sync id="m1" ref="w:end"/> two</text></speech>'
     found = schedule(body, {"w": timing([3.0]), "s": speech(1.0, 2.0)})
     assert found["s"] == pytest.approx({"start": 2.0, "m1": 3.0, "end": 4.0})
 
 
-def test_an_early_stroke_pushes_the_speech_later_and_leaves_the_nod_alone() -> None:
+def test_schedule_delays_speech_for_an_early_stroke() -> None:
     body = saying("s", marks=1) + head("n", stroke="s:m1")
     found = schedule(body, {"s": speech(0.1, 2.0), "n": timing([0.1, 0.1, 0.2, 0.2, 0.1, 0.1])})
     assert found.at("n", "start") == 0
@@ -205,7 +205,7 @@ def test_an_early_stroke_pushes_the_speech_later_and_leaves_the_nod_alone() -> N
     assert found.cost == pytest.approx(0, abs=1e-12)
 
 
-def test_a_pinned_speech_squeezes_the_nod_instead() -> None:
+def test_schedule_shortens_a_nod_for_a_pinned_speech() -> None:
     body = saying("s", marks=1, start="0") + head("n", stroke="s:m1")
     found = schedule(body, {"s": speech(0.1, 2.0), "n": timing([0.1, 0.1, 0.2, 0.2, 0.1, 0.1])})
     assert found["s"] == pytest.approx({"start": 0, "m1": 0.1, "end": 2.0})
@@ -213,14 +213,14 @@ def test_a_pinned_speech_squeezes_the_nod_instead() -> None:
     np.testing.assert_allclose(np.diff(found.times["n"]), [0.02, 0.02, 0.06, 0.2, 0.1, 0.1], atol=1e-9)
 
 
-def test_two_marks_of_one_speech_fix_two_points_of_one_nod() -> None:
+def test_schedule_fixes_two_points_of_a_nod_to_two_marks() -> None:
     body = saying("s", marks=2) + head("n", strokeStart="s:m1", strokeEnd="s:m2")
     found = schedule(body, {"s": speech(1.0, 1.6, 2.0), "n": timing([0.2, 0.1, 0.1, 0.3, 0.1, 0.2])})
     # 0.6 s for what prefers 0.1 and 0.3: both 0.1 longer.
     np.testing.assert_allclose(found.times["n"], [0.7, 0.9, 1.0, 1.2, 1.6, 1.7, 1.9], atol=1e-9)
 
 
-def test_two_rigid_speeches_cannot_be_tied_at_both_ends() -> None:
+def test_schedule_drops_one_of_two_rigid_speeches_tied_at_both_ends() -> None:
     found = schedule(
         saying("s") + saying("r", start="s:start", end="s:end"), {"s": speech(1.0), "r": speech(2.0)}
     )
@@ -230,7 +230,7 @@ def test_two_rigid_speeches_cannot_be_tied_at_both_ends() -> None:
     assert list(found.times) == ["s"]
 
 
-def test_absolute_times_and_the_blocks_own_start() -> None:
+def test_schedule_has_absolute_times_and_the_start_of_the_block() -> None:
     body = face("a", start="1.5") + face("b", start="bml:start + 2", end="4") + face("c", end="a:start")
     found = schedule(body, {k: timing([0.2, 0.4, 0.4]) for k in "abc"})
     assert found.at("a", "start") == 1.5
@@ -238,32 +238,32 @@ def test_absolute_times_and_the_blocks_own_start() -> None:
     np.testing.assert_allclose(found.times["c"], [0.5, 0.7, 1.1, 1.5])
 
 
-def test_a_negative_offset_pushes_the_other_behaviour_later() -> None:
+def test_schedule_delays_a_behaviour_for_a_negative_offset() -> None:
     found = schedule(wait("a") + wait("b", start="a:start - 2"), {"a": timing([1.0]), "b": timing([1.0])})
     assert found.at("b", "start") == 0
     assert found.at("a", "start") == pytest.approx(2)
 
 
-def test_nothing_starts_before_the_earliest_time() -> None:
+def test_schedule_starts_nothing_before_the_earliest_time() -> None:
     body = face("a") + face("b", start="a:start - 0.5")
     found = schedule(body, {k: timing([0.2, 0.4, 0.4]) for k in "ab"}, earliest=3.0)
     assert found.at("b", "start") == 3.0
     assert found.at("a", "start") == pytest.approx(3.5)
 
 
-def test_a_behaviour_may_refer_to_itself() -> None:
+def test_schedule_allows_a_behaviour_to_refer_to_itself() -> None:
     found = schedule(face("a", end="a:start + 3"), {"a": timing([0.2, 0.4, 0.4])})
     np.testing.assert_allclose(found.times["a"], [0, 0.2 + 2 / 3, 0.6 + 4 / 3, 3.0])
 
 
-def test_zero_length_behaviours() -> None:
+def test_schedule_of_zero_length_behaviours() -> None:
     body = wait("a") + wait("b", start="a:end", end="a:end") + wait("c", start="b:end")
     found = schedule(body, {"a": timing([0.0], least=0), "b": timing([1.0], least=0), "c": timing([1.0])})
     assert found["b"] == {"start": 0.0, "end": 0.0}
     assert found["c"] == {"start": 0.0, "end": 1.0}
 
 
-def test_zero_length_behaviours_pass_orders_on() -> None:
+def test_schedule_of_zero_length_behaviours_passes_orders_on() -> None:
     body = wait("a") + wait("b") + wait("c")
     body += constraint(after("a:end", "b:start") + after("b:end", "c:start"))
     found = schedule(body, {"a": timing([1.0]), "b": timing([0.0], least=0), "c": timing([1.0])})
@@ -271,13 +271,13 @@ def test_zero_length_behaviours_pass_orders_on() -> None:
     assert found["c"] == pytest.approx({"start": 1.0, "end": 2.0})
 
 
-def test_an_end_too_soon_after_the_blocks_start_shortens_what_can_be_shortened() -> None:
+def test_schedule_shortens_a_behaviour_with_an_early_end() -> None:
     found = schedule(wait("a", end="0.5") + wait("b", start="a:start"), {k: timing([1.0]) for k in "ab"})
     assert found["a"] == {"start": 0.0, "end": 0.5}
     assert found["b"] == {"start": 0.0, "end": 1.0}
 
 
-def test_an_end_too_soon_for_what_cannot_be_shortened_is_a_clash() -> None:
+def test_schedule_drops_a_rigid_behaviour_with_an_early_end() -> None:
     found = schedule(
         saying("s", end="0.5") + wait("b", start="s:start"), {"s": speech(1.0), "b": timing([1.0])}
     )
@@ -287,14 +287,14 @@ def test_an_end_too_soon_for_what_cannot_be_shortened_is_a_clash() -> None:
     assert found["b"] == {"start": 0.0, "end": 1.0}
 
 
-def test_a_stated_length_wins_over_the_least_gaps() -> None:
+def test_schedule_prefers_a_stated_length_to_least_gaps() -> None:
     found = schedule(face("a", start="1", end="1.03"), {"a": timing([0.2, 0.4, 0.4], least=0.1)})
     assert not found.warnings
     assert found.at("a", "end") == pytest.approx(1.03)
     assert (np.diff(found.times["a"]) >= 0).all()
 
 
-def test_two_hundred_behaviours_on_one_point() -> None:
+def test_schedule_of_two_hundred_behaviours_on_one_point() -> None:
     body = saying("s", marks=1) + "".join(face(f"f{k}", attackPeak="s:m1") for k in range(200))
     timings = {f"f{k}": timing([0.001 * (k + 1), 0.5, 0.5], least=0) for k in range(200)}
     found = schedule(body, {"s": speech(0.05, 1.0), **timings})
@@ -304,7 +304,7 @@ def test_two_hundred_behaviours_on_one_point() -> None:
     assert found.cost == pytest.approx(0, abs=1e-12)
 
 
-def test_an_empty_block() -> None:
+def test_schedule_of_an_empty_block() -> None:
     found = schedule("", {})
     assert found.duration == 0
     assert not found.failed
@@ -314,21 +314,21 @@ def test_an_empty_block() -> None:
 # Before and after.
 
 
-def test_after_that_is_idle_changes_nothing() -> None:
+def test_schedule_ignores_an_inactive_after() -> None:
     body = wait("a") + wait("b", start="5")
     found = schedule(body + constraint(after("a:end", "b:start")), {k: timing([1.0]) for k in "ab"})
     assert found["a"] == {"start": 0.0, "end": 1.0}
     assert found["b"] == {"start": 5.0, "end": 6.0}
 
 
-def test_before_that_is_idle_changes_nothing() -> None:
+def test_schedule_ignores_an_inactive_before() -> None:
     body = wait("a") + wait("b", start="5") + constraint(before("b:end - 1", "a:end"))
     found = schedule(body, {k: timing([1.0]) for k in "ab"})
     assert found["a"] == {"start": 0.0, "end": 1.0}
     assert found["b"] == {"start": 5.0, "end": 6.0}
 
 
-def test_before_that_is_active_between_free_behaviours_moves_the_later_one() -> None:
+def test_schedule_delays_the_later_behaviour_for_an_active_before() -> None:
     found = schedule(
         wait("a") + wait("b") + constraint(before("b:start", "a:end")), {k: timing([1.0]) for k in "ab"}
     )
@@ -336,14 +336,14 @@ def test_before_that_is_active_between_free_behaviours_moves_the_later_one() -> 
     assert found["b"] == pytest.approx({"start": 1.0, "end": 2.0})
 
 
-def test_after_that_is_active_slides_without_cost() -> None:
+def test_schedule_slides_for_an_active_after_without_cost() -> None:
     body = wait("a") + wait("b") + constraint(after("a:end + 1", "b:start + 0.25"))
     found = schedule(body, {k: timing([1.0]) for k in "ab"})
     assert found["b"] == pytest.approx({"start": 1.75, "end": 2.75})
     assert found.cost == pytest.approx(0, abs=1e-12)
 
 
-def test_before_a_pinned_point_shortens() -> None:
+def test_schedule_shortens_for_a_before_of_a_pinned_point() -> None:
     body = wait("a") + wait("b", start="2") + constraint(before("b:start", "a:end"))
     found = schedule(body, {"a": timing([3.0]), "b": timing([1.0])})
     assert found["a"] == pytest.approx({"start": 0.0, "end": 2.0})
@@ -351,14 +351,14 @@ def test_before_a_pinned_point_shortens() -> None:
     assert found.cost == pytest.approx(1.0)
 
 
-def test_orders_with_numbers() -> None:
+def test_schedule_of_orders_with_numbers() -> None:
     body = wait("a") + wait("b") + constraint(after("2", "a:start") + before("1.5", "b:end"))
     found = schedule(body, {"a": timing([1.0]), "b": timing([3.0])})
     assert found.at("a", "start") == 2
     assert found.at("b", "end") == pytest.approx(1.5)
 
 
-def test_orders_that_form_a_circle_share_the_strain() -> None:
+def test_schedule_shares_the_strain_of_a_circle_of_orders() -> None:
     """One inside two at both ends: the cheapest lengths, then everything as early as it can."""
     body = (
         wait("one") + wait("two") + constraint(after("one:start", "two:start") + before("one:end", "two:end"))
@@ -368,7 +368,7 @@ def test_orders_that_form_a_circle_share_the_strain() -> None:
     assert found["two"] == pytest.approx({"start": 0.0, "end": 2.5})
 
 
-def test_a_long_chain_of_orders() -> None:
+def test_schedule_of_a_long_chain_of_orders() -> None:
     n = 100
     body = "".join(wait(f"w{k}") for k in range(n))
     body += "".join(constraint(after(f"w{k}:end", f"w{k - 1}:start")) for k in range(1, n))
@@ -384,7 +384,7 @@ def bounded(least: float, preferred: float, most: float) -> Timing:
     return timing([preferred], least=least, most=[most])
 
 
-def test_a_bounded_gap_gives_as_far_as_it_can_and_others_give_the_rest() -> None:
+def test_schedule_stretches_a_bounded_gap_to_its_bound() -> None:
     body = wait("a") + wait("b", start="a:start", end="a:end")
     found = schedule(body, {"a": bounded(0.5, 1.0, 1.2), "b": timing([2.0])})
     assert found["a"] == found["b"] == pytest.approx({"start": 0.0, "end": 1.2}, abs=1e-9)
@@ -393,27 +393,27 @@ def test_a_bounded_gap_gives_as_far_as_it_can_and_others_give_the_rest() -> None
     assert found.duration == pytest.approx(1.5)
 
 
-def test_several_bounded_gaps_share_what_they_can() -> None:
+def test_schedule_shares_a_stretch_among_bounded_gaps() -> None:
     points = ("start", "m1", "m2", "end")
     voice = Timing(points, np.ones(3), np.full(3, 0.8), np.ones(3), most=np.array([1.1, 3.0, np.inf]))
     found = schedule(wait("a", start="0", end="4"), {"a": voice})
     np.testing.assert_allclose(found.times["a"], [0, 1.1, 2.55, 4.0], atol=1e-9)
 
 
-def test_a_preferred_length_over_the_most_is_cut_down_to_it() -> None:
+def test_schedule_cuts_a_preferred_length_to_its_bound() -> None:
     found = schedule(wait("a") + wait("b", start="a:end"), {"a": bounded(0, 2.0, 1.5), "b": timing([1.0])})
     assert found["a"] == pytest.approx({"start": 0.0, "end": 1.5}, abs=1e-9)
     assert found["b"] == pytest.approx({"start": 1.5, "end": 2.5}, abs=1e-9)
 
 
-def test_bounds_without_any_room_hold_exactly() -> None:
+def test_schedule_keeps_bounds_without_room_exactly() -> None:
     found = schedule(
         wait("a") + wait("b", start="a:start", end="a:end"), {"a": bounded(1.0, 1.0, 1.0), "b": timing([2.0])}
     )
     assert found["b"] == pytest.approx({"start": 0.0, "end": 1.0}, abs=1e-9)
 
 
-def test_orders_meet_bounds_and_push_what_is_not_bounded() -> None:
+def test_schedule_of_orders_with_bounds_moves_what_is_not_bounded() -> None:
     body = wait("a", start="0") + wait("b") + constraint(after("a:end", "b:start") + before("2.5", "b:end"))
     found = schedule(body, {"a": bounded(1.0, 2.0, 3.0), "b": timing([1.0], least=0.9)})
     assert found["a"] == pytest.approx({"start": 0.0, "end": 1.6}, abs=1e-9)
@@ -421,14 +421,14 @@ def test_orders_meet_bounds_and_push_what_is_not_bounded() -> None:
 
 
 @pytest.mark.parametrize(("end", "words"), [("9", "at most 3 s"), ("0.2", "at least 1 s")])
-def test_a_stated_length_cannot_break_bounds(end: str, words: str) -> None:
+def test_schedule_keeps_bounds_against_a_stated_length(end: str, words: str) -> None:
     found = schedule(wait("a", start="0", end=end) + wait("b"), {"a": bounded(1, 2, 3), "b": timing([1.0])})
     assert dropped(found) == ["b1:a"]
     assert f"a takes {words} from start to end" in found.warnings[0].text
     assert f"a:end = {end} (line 2)" in found.warnings[0].text
 
 
-def test_lengths_that_follow_each_other_are_added_up_in_the_words() -> None:
+def test_schedule_adds_up_successive_lengths_in_a_warning() -> None:
     expression = Timing(FACE, np.ones(3), np.full(3, 0.8), np.ones(3), most=np.array([1.1, 1.2, 1.3]))
     found = schedule(face("a", start="0", relax="5"), {"a": expression})
     assert dropped(found) == ["b1:a"]
@@ -438,14 +438,14 @@ def test_lengths_that_follow_each_other_are_added_up_in_the_words() -> None:
 # What cannot hold.
 
 
-def test_a_cycle_that_closes() -> None:
+def test_schedule_keeps_a_cycle_that_closes() -> None:
     body = wait("a", start="b:end - 1") + wait("b", start="a:end - 1")
     found = schedule(body, {"a": timing([1.0]), "b": timing([1.0])})
     assert not found.warnings
     assert found["a"] == found["b"] == pytest.approx({"start": 0.0, "end": 1.0})
 
 
-def test_a_cycle_that_cannot_close_drops_the_later_behaviour() -> None:
+def test_schedule_drops_the_later_behaviour_of_an_impossible_cycle() -> None:
     body = head("nod1", start="nod2:end") + head("nod2", start="nod1:end")
     found = schedule(body, {k: timing([0.1] * 6) for k in ("nod1", "nod2")})
     assert dropped(found) == ["b1:nod2"]
@@ -456,35 +456,35 @@ def test_a_cycle_that_cannot_close_drops_the_later_behaviour() -> None:
     np.testing.assert_allclose(found.times["nod1"], np.arange(7) * 0.1)
 
 
-def test_equalities_that_contradict_each_other_drop_the_behaviour_that_states_them() -> None:
+def test_schedule_drops_a_behaviour_with_contradicting_equalities() -> None:
     body = face("a", start="b:start + 1", end="b:start") + face("b")
     found = schedule(body, {k: timing([0.2, 0.4, 0.4]) for k in "ab"})
     assert dropped(found) == ["b1:a"]
     assert list(found.times) == ["b"]
 
 
-def test_a_time_before_the_block_is_a_clash() -> None:
+def test_schedule_drops_a_behaviour_before_the_block() -> None:
     found = schedule(wait("a", start="-1") + wait("b", start="a:start"), {k: timing([1.0]) for k in "ab"})
     assert dropped(found) == ["b1:a"]
     assert "a:start = -1 (line 2)" in found.warnings[0].text
     assert found["b"] == {"start": 0.0, "end": 1.0}
 
 
-def test_each_time_before_the_block_is_a_clash_of_its_own() -> None:
+def test_schedule_drops_each_behaviour_before_the_block() -> None:
     body = "".join(wait(f"w{k}", start="-1" if k % 2 else "1") for k in range(10))
     found = schedule(body, {f"w{k}": timing([1.0]) for k in range(10)})
     assert sorted(dropped(found)) == [f"b1:w{k}" for k in range(1, 10, 2)]
     assert list(found.times) == [f"w{k}" for k in range(0, 10, 2)]
 
 
-def test_a_speech_that_is_pinned_too_early_for_a_nod_costs_the_nod() -> None:
+def test_schedule_drops_a_nod_too_early_for_a_pinned_speech() -> None:
     body = saying("s", marks=1, start="0") + head("n", stroke="s:m1")
     found = schedule(body, {"s": speech(0.1, 2.0), "n": timing([0.2] * 6, least=0.05)})
     assert dropped(found) == ["b1:n"]
     assert "n takes at least 0.15 s from start to stroke" in found.warnings[0].text
 
 
-def test_an_optional_constraint_goes_before_any_behaviour() -> None:
+def test_schedule_drops_an_optional_constraint_before_any_behaviour() -> None:
     body = wait("a", start="1") + wait("b", start="2") + constraint(together("a:start", "b:start"), "same")
     found = schedule(body, {k: timing([1.0]) for k in "ab"})
     assert dropped(found) == ["same"]
@@ -492,7 +492,7 @@ def test_an_optional_constraint_goes_before_any_behaviour() -> None:
     assert found["b"] == {"start": 2.0, "end": 3.0}
 
 
-def test_a_constraint_without_an_id_is_warned_of_under_its_block() -> None:
+def test_schedule_names_a_constraint_without_id_by_its_block() -> None:
     body = wait("a", start="1") + wait("b", start="2") + constraint(after("b:start", "a:start"))
     found = schedule(body, {k: timing([1.0]) for k in "ab"})
     assert dropped(found) == ["b1"]
@@ -501,7 +501,7 @@ def test_a_constraint_without_an_id_is_warned_of_under_its_block() -> None:
     assert found["a"] == {"start": 1.0, "end": 2.0}
 
 
-def test_a_required_constraint_costs_the_later_behaviour() -> None:
+def test_schedule_drops_the_later_behaviour_of_a_required_constraint() -> None:
     body = wait("a", start="1") + wait("b", start="2")
     found = schedule(
         body + required(constraint(together("a:start", "b:start"))), {k: timing([1.0]) for k in "ab"}
@@ -510,7 +510,7 @@ def test_a_required_constraint_costs_the_later_behaviour() -> None:
     assert found["a"] == {"start": 1.0, "end": 2.0}
 
 
-def test_the_required_behaviour_stays() -> None:
+def test_schedule_keeps_the_required_behaviour() -> None:
     body = wait("a", start="b:end") + required(wait("b", start="a:end"))
     found = schedule(body, {k: timing([1.0]) for k in "ab"})
     assert dropped(found) == ["b1:a"]
@@ -518,14 +518,14 @@ def test_the_required_behaviour_stays() -> None:
     assert list(found.times) == ["b"]
 
 
-def test_the_lowest_priority_goes() -> None:
+def test_schedule_drops_the_lowest_priority() -> None:
     body = wait("a", start="b:end") + wait("b", start="a:end")
     found = schedule(body, {k: timing([1.0]) for k in "ab"}, priorities={"a": -1.0})
     assert dropped(found) == ["b1:a"]
     assert "its priority is the lowest" in found.warnings[0].text
 
 
-def test_a_block_fails_when_everything_that_clashes_is_required() -> None:
+def test_schedule_fails_if_everything_in_a_conflict_is_required() -> None:
     body = required(wait("a", start="b:end") + wait("b", start="a:end")) + wait("c")
     found = schedule(body, {k: timing([1.0]) for k in "abc"})
     assert found.failed
@@ -533,7 +533,7 @@ def test_a_block_fails_when_everything_that_clashes_is_required() -> None:
     assert dropped(found) == ["b1"]
 
 
-def test_what_names_a_dropped_behaviour_vanishes_silently() -> None:
+def test_schedule_ignores_references_to_absent_behaviours() -> None:
     body = wait("a", start="gone:end + 7", end="c:end") + wait("gone") + wait("c")
     body += constraint(after("gone:end", "c:start") + after("4", "c:start"))
     found = schedule(body, {k: timing([1.0]) for k in "ac"})
@@ -541,21 +541,21 @@ def test_what_names_a_dropped_behaviour_vanishes_silently() -> None:
     assert found["a"] == found["c"] == {"start": 0.0, "end": 1.0}
 
 
-def test_a_behaviour_that_was_dropped_takes_its_constraints_along() -> None:
+def test_schedule_drops_the_constraints_of_a_dropped_behaviour() -> None:
     body = wait("a", start="-1") + wait("b") + constraint(after("a:end + 5", "b:start"))
     found = schedule(body, {k: timing([1.0]) for k in "ab"})
     assert dropped(found) == ["b1:a"]
     assert found["b"] == {"start": 0.0, "end": 1.0}
 
 
-def test_several_clashes_are_each_warned_of_once() -> None:
+def test_schedule_warns_of_each_of_several_conflicts_once() -> None:
     pairs = "".join(wait(f"a{k}", start=f"b{k}:end") + wait(f"b{k}", start=f"a{k}:end") for k in range(20))
     timings = {f"{c}{k}": timing([1.0]) for c in "ab" for k in range(20)}
     found = schedule(pairs, timings)
     assert sorted(dropped(found)) == sorted(f"b1:b{k}" for k in range(20))
 
 
-def test_three_in_a_circle_lose_one() -> None:
+def test_schedule_drops_one_of_three_in_a_circle() -> None:
     body = wait("a", start="c:end") + wait("b", start="a:end") + wait("c", start="b:end")
     found = schedule(body, {k: timing([1.0]) for k in "abc"})
     assert dropped(found) == ["b1:c"]
@@ -566,7 +566,7 @@ def test_three_in_a_circle_lose_one() -> None:
 # Other blocks.
 
 
-def test_points_of_other_blocks_pin() -> None:
+def test_schedule_fixes_points_of_other_blocks() -> None:
     times = {"b0:x:end": 2.0}
     found = schedule(
         wait("a", start="b0:x:end + 1"),
@@ -576,21 +576,21 @@ def test_points_of_other_blocks_pin() -> None:
     assert found.at("a", "start") == 3.0
 
 
-def test_an_unknown_point_of_another_block_drops_the_behaviour() -> None:
+def test_schedule_drops_a_reference_to_an_unknown_point_of_another_block() -> None:
     found = schedule(wait("a", start="b0:x:end") + wait("b"), {k: timing([1.0]) for k in "ab"})
     assert dropped(found) == ["b1:a"]
     assert "b0:x:end" in found.warnings[0].text
     assert "line 2" in found.warnings[0].text
 
 
-def test_an_unknown_mark_drops_what_refers_to_it() -> None:
+def test_schedule_drops_a_reference_to_an_unknown_mark() -> None:
     body = saying("s", marks=1) + head("n", stroke="s:m1")
     found = schedule(body, {"s": timing([1.0], rigid=True), "n": timing([0.1] * 6)})
     assert dropped(found) == ["b1:n"]
     assert "s has no m1, only start, end" in found.warnings[0].text
 
 
-def test_a_required_behaviour_with_an_unknown_reference_fails_the_block() -> None:
+def test_schedule_fails_for_an_unknown_reference_of_a_required_behaviour() -> None:
     found = schedule(required(wait("a", start="b0:x:end")) + wait("b"), {k: timing([1.0]) for k in "ab"})
     assert found.failed
     assert dropped(found) == ["b1"]

@@ -24,7 +24,7 @@ def in_arrays(recipe: Recipe, earliest: float = 0.0) -> solver.Solution:
 
 @settings(max_examples=200)
 @given(possible() | wild, tenths)
-def test_the_times_and_the_cost_are_those_found_in_arrays(recipe: Recipe, earliest: float) -> None:
+def test_solve_small_agrees_with_the_solver_in_arrays(recipe: Recipe, earliest: float) -> None:
     recipe = recipe._replace(orders=[])
     found = solve_small(built(recipe, earliest=earliest))
     assume(found is not None)
@@ -39,7 +39,7 @@ def test_the_times_and_the_cost_are_those_found_in_arrays(recipe: Recipe, earlie
     assert time[ORIGIN] == 0.0
 
 
-def test_two_that_hold_each_other_share_what_is_missing_and_start_at_once() -> None:
+def test_solve_small_shares_the_strain_and_starts_at_once() -> None:
     short, long = FREE, Body([1.0, 2.0], 0.1, 1.0, False, None)
     found = solve_small(built(Recipe([short, long], [((0, 0), (1, 0), 0.0), ((0, 2), (1, 2), 0.0)], [], [])))
     assert found is not None
@@ -59,5 +59,5 @@ def test_two_that_hold_each_other_share_what_is_missing_and_start_at_once() -> N
     ],
     ids=["an order", "a clash", "least gaps", "greatest gaps", "too soon"],
 )
-def test_what_has_more_to_it_is_left_to_arrays(recipe: Recipe) -> None:
+def test_solve_small_gives_up_in_harder_cases(recipe: Recipe) -> None:
     assert solve_small(built(recipe)) is None

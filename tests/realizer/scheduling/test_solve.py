@@ -87,7 +87,7 @@ def by_scipy(problem: Problem) -> Float64 | None:
 
 @settings(max_examples=80)
 @given(possible())
-def test_times_are_those_of_a_slow_general_solver(recipe: Recipe) -> None:
+def test_solve_agrees_with_a_slow_general_solver(recipe: Recipe) -> None:
     problem = built(recipe)
     found, reference = solve(problem), by_scipy(problem)
     assert isinstance(found, Solution)
@@ -100,7 +100,7 @@ def test_times_are_those_of_a_slow_general_solver(recipe: Recipe) -> None:
 
 @settings(max_examples=120)
 @given(wild)
-def test_a_clash_is_found_where_a_linear_program_finds_no_times_and_only_there(recipe: Recipe) -> None:
+def test_solve_finds_a_conflict_iff_a_linear_program_is_infeasible(recipe: Recipe) -> None:
     # No least gaps: a length that the document states wins over them, which a linear program does not know.
     recipe = recipe._replace(bodies=[body._replace(least=0.0) for body in recipe.bodies])
     problem = built(recipe)
@@ -111,7 +111,7 @@ def test_a_clash_is_found_where_a_linear_program_finds_no_times_and_only_there(r
 
 @settings(max_examples=200)
 @given(anything, st.sampled_from([0.0, 0.5]))
-def test_everything_is_kept_exactly(recipe: Recipe, earliest: float) -> None:
+def test_solve_keeps_everything_exactly(recipe: Recipe, earliest: float) -> None:
     problem = built(recipe, earliest=earliest)
     found = solve(problem)
     if isinstance(found, Solution):
@@ -174,13 +174,13 @@ def check_any_order(recipe: Recipe, everyone: list[int]) -> None:
 @example(CLOSED, [2, 0, 1, 3, 4, 5])
 @example(JOINED, [2, 1, 0, 3, 4, 5])
 @example(ROUNDED, [0, 1, 2, 3, 4, 5])
-def test_document_order_does_not_matter(recipe: Recipe, everyone: list[int]) -> None:
+def test_solve_does_not_depend_on_document_order(recipe: Recipe, everyone: list[int]) -> None:
     check_any_order(recipe, everyone)
 
 
 @settings(max_examples=100)
 @given(possible(stiffness=(1e-3, 1.0, 1e3)), st.permutations(range(MOST_BODIES)))
-def test_nor_does_it_where_some_gaps_are_a_million_times_as_stiff_as_others(
+def test_solve_does_not_depend_on_order_with_very_different_stiffness(
     recipe: Recipe, everyone: list[int]
 ) -> None:
     check_any_order(recipe, everyone)
@@ -188,7 +188,7 @@ def test_nor_does_it_where_some_gaps_are_a_million_times_as_stiff_as_others(
 
 @settings(max_examples=100)
 @given(possible(), st.sampled_from([0.0, 0.5]), st.integers(-50, 1000).map(lambda k: k / 10))
-def test_all_moves_along_when_fixed_times_do(recipe: Recipe, earliest: float, late: float) -> None:
+def test_solve_moves_everything_with_fixed_times(recipe: Recipe, earliest: float, late: float) -> None:
     problem = built(recipe, earliest=earliest)
     if not isinstance(solve(problem), Solution):
         return
@@ -199,7 +199,7 @@ def test_all_moves_along_when_fixed_times_do(recipe: Recipe, earliest: float, la
 
 @settings(max_examples=120)
 @given(anything)
-def test_no_feasible_nudge_is_cheaper(recipe: Recipe) -> None:
+def test_solve_has_no_cheaper_feasible_neighbour(recipe: Recipe) -> None:
     problem = built(recipe)
     found = solve(problem)
     if not isinstance(found, Solution):
@@ -216,7 +216,7 @@ def test_no_feasible_nudge_is_cheaper(recipe: Recipe) -> None:
 
 @settings(max_examples=120)
 @given(anything)
-def test_nothing_free_could_start_sooner(recipe: Recipe) -> None:
+def test_solve_starts_free_behaviours_as_early_as_possible(recipe: Recipe) -> None:
     problem = built(recipe)
     found = solve(problem)
     if not isinstance(found, Solution):
@@ -240,7 +240,7 @@ def test_nothing_free_could_start_sooner(recipe: Recipe) -> None:
 
 
 @given(st.lists(st.floats(0.01, 5), min_size=1, max_size=8), st.floats(0.1, 10), st.floats(0, 3))
-def test_a_lone_behaviour_gets_its_preferred_gaps(
+def test_solve_gives_a_lone_behaviour_its_preferred_gaps(
     gaps: list[float], stiffness: float, earliest: float
 ) -> None:
     time = solved(Recipe([Body(gaps, 0.01, stiffness, False, None)], [], [], []), earliest=earliest)
@@ -251,9 +251,7 @@ def test_a_lone_behaviour_gets_its_preferred_gaps(
 @settings(max_examples=100)
 @given(anything, spots, spots, tenths)
 @example(Recipe([Body([1.0], 0.0, 1.0, False, None)], [], [], []), (0, 0), (0, 1), 0.0)
-def test_a_constraint_that_already_holds_changes_nothing(
-    recipe: Recipe, u: Spot, v: Spot, less: float
-) -> None:
+def test_solve_ignores_a_constraint_that_already_holds(recipe: Recipe, u: Spot, v: Spot, less: float) -> None:
     problem = built(recipe)
     found = solve(problem)
     if not isinstance(found, Solution):
@@ -274,7 +272,7 @@ def test_a_constraint_that_already_holds_changes_nothing(
 
 @settings(max_examples=80)
 @given(wild)
-def test_what_remains_after_dropping_is_feasible(recipe: Recipe) -> None:
+def test_solve_is_feasible_after_dropping_behaviours(recipe: Recipe) -> None:
     problem = built(recipe)
     size = len(problem.behaviours)
     for _ in range(size + 1):

@@ -87,7 +87,7 @@ def same(one: Schedule, other: Schedule) -> None:
 
 @settings(max_examples=80)
 @given(tied, st.integers(0, 30).map(lambda k: k / 10), st.integers(1, 30).map(lambda k: k / 10))
-def test_what_has_passed_stays_and_what_is_to_come_is_not_before_now(
+def test_schedule_together_keeps_the_past_and_moves_the_future_after_now(
     faces: Faces, late: float, length: float
 ) -> None:
     """A wait of a new block is tied to the last face of one that plays."""
@@ -117,9 +117,7 @@ def test_what_has_passed_stays_and_what_is_to_come_is_not_before_now(
 
 @settings(max_examples=60)
 @given(tied, tied, st.integers(0, 20).map(lambda k: k / 10))
-def test_a_block_that_nobody_ties_to_another_is_as_if_it_were_alone(
-    one: Faces, other: Faces, late: float
-) -> None:
+def test_schedule_together_of_unrelated_blocks_is_as_alone(one: Faces, other: Faces, late: float) -> None:
     a, b = drawn("a", one), drawn("b", other)
     first, second = schedule_block(*a), schedule_block(*b)
     both = schedule_together(
@@ -133,7 +131,7 @@ def test_a_block_that_nobody_ties_to_another_is_as_if_it_were_alone(
 
 @settings(max_examples=40)
 @given(tied, st.integers(-50, 5000).map(lambda k: k / 10))
-def test_where_the_clock_began_does_not_matter(faces: Faces, origin: float) -> None:
+def test_schedule_together_does_not_depend_on_the_origin_of_the_clock(faces: Faces, origin: float) -> None:
     first, timings = drawn("a", faces)
     new = block("b", '<wait id="w" start="a:f0:end + 0.5"/>')
     here = schedule_together([member(new, {"w": lasting(1.0)}), member(first, timings)])
@@ -147,7 +145,7 @@ def test_where_the_clock_began_does_not_matter(faces: Faces, origin: float) -> N
         same(one, other)
 
 
-def test_both_give_alike() -> None:
+def test_schedule_together_stretches_both_blocks_equally() -> None:
     """Paul's figure 3.6 over two blocks: 3 s that play and 2 s that come, tied at both ends."""
     first = block("a", '<wait id="w"/>')
     new = block("b", '<wait id="v" start="a:w:start" end="a:w:end"/>')
@@ -155,7 +153,7 @@ def test_both_give_alike() -> None:
     assert found[0]["v"] == found[1]["w"] == pytest.approx({"start": 0.0, "end": 2.5})
 
 
-def test_bounds_hold_for_what_plays_already() -> None:
+def test_schedule_together_keeps_bounds_of_a_playing_block() -> None:
     first, timings = block("a", '<wait id="w"/>'), {"w": lasting(3.0, most=3.2)}
     plays = schedule_block(first, timings)
     new = block("b", '<wait id="v" start="0" end="a:w:end"/>')
@@ -166,7 +164,7 @@ def test_bounds_hold_for_what_plays_already() -> None:
     assert found[0]["v"] == pytest.approx({"start": 0.0, "end": 2.2}, abs=1e-9)
 
 
-def test_of_a_clash_the_new_behaviour_goes_and_the_words_name_the_old_one_with_its_block() -> None:
+def test_schedule_together_drops_the_new_behaviour_and_names_the_old_block() -> None:
     first, timings = block("a", '<wait id="w"/>'), {"w": lasting(3.0, most=3.2)}
     plays = schedule_block(first, timings)
     new = block("b", '<wait id="v" start="0" end="a:w:end"/><wait id="u"/>')
@@ -186,7 +184,7 @@ def test_of_a_clash_the_new_behaviour_goes_and_the_words_name_the_old_one_with_i
     assert found[0]["u"] == {"start": 0.0, "end": 1.0}
 
 
-def test_a_new_block_fails_alone_where_it_wants_what_cannot_be() -> None:
+def test_schedule_together_fails_the_new_block_alone() -> None:
     first, timings = block("a", '<wait id="w" start="0" end="3"/>'), {"w": lasting(3.0)}
     plays = schedule_block(first, timings)
     new = block(
