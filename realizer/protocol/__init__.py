@@ -1,1 +1,1 @@
-"""Messages and frames of the wire, which client and server share."""
+"""The protocol that clients and the service share: messages, streams, binary frames."""

@@ -1,7 +1,7 @@
-"""The table of streams: names, encodings, options of `subscribe`, and what binary messages hold.
+"""The table of streams: names, encodings, options of `subscribe`, and contents of binary messages.
 
-The models of messages, the binary format, the documentation and the constants of realizer.js are made from
-it. A new stream of numbers is a row here and a source in `realizer.server.streams.frame_windows`.
+The message models, the binary format, the documentation and the constants of realizer.js are derived from it.
+A new stream of numbers needs a row here and a source in `realizer.server.streams.frame_windows`.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ class Stream:
     """A row of the table.
 
     Attributes:
-        name: as `subscribe` takes it.
+        name: its name in `subscribe`.
         encodings: the default first.
-        options: fields of `subscribe` that it takes beside `encoding`.
+        options: the fields of `subscribe` that apply to it, beside `encoding`.
         kind: the first byte of its binary messages; None if it has none.
-        dtype: NumPy's name of the numbers in a binary message; None if they are no numbers.
-        width: how many numbers belong together, as the three coordinates of a vertex do.
-        payload: what follows the header of a binary message, for the documentation.
-        flushes: whether a binary message can have the flag FORGET.
+        dtype: NumPy's name of the numbers in a binary message; None if the payload is not numeric.
+        width: how many numbers belong together, such as the three coordinates of a vertex.
+        payload: description of what follows the header of a binary message.
+        flushes: whether a binary message can have the flag FLUSH.
     """
 
     name: str

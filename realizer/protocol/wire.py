@@ -18,25 +18,25 @@ VERSION = 1
 # u8 kind, u8 version, u16 flags, u32 frame, f64 time; little-endian. 16 bytes, so the payload stays aligned
 # for a Float32Array or an Int32Array over the message.
 HEADER = struct.Struct("<BBHId")
-# On a sound packet: forget every sample from this packet's time on; what follows replaces it.
+# Flag of a sound packet: forget every sample from this packet's time on; later packets replace them.
 FLUSH = 0x100
-# On a piece of a sound clip that comes in: it is the last one.
+# Flag of the last piece of a sound clip from a client.
 FINAL = 0x200
 # Behind the header of such a piece: u32 rate, u8 length of the id, the id (UTF-8), then sound.
 CLIP = struct.Struct("<IB")
 
 
 class WireError(RealizerError):
-    """A binary message that is no frame of ours; the text says what was wanted and what came."""
+    """A binary message is invalid."""
 
 
 @dataclass(frozen=True, slots=True)
 class WireFrame:
-    """One binary message taken apart.
+    """A decoded binary message.
 
     Attributes:
-        character: the index that `subscribed` told.
-        told: what `subscribed`, or `changed` since, told of its stream, where a client has put it here.
+        character: index of the character, as in `subscribed`.
+        told: the fields of the last `subscribed` or `changed` of its stream, if a client has added them.
     """
 
     kind: int
@@ -49,7 +49,7 @@ class WireFrame:
 
     @property
     def stream(self) -> str:
-        """Name of the stream that it belongs to."""
+        """The name of its stream."""
         return KINDS[self.kind].name
 
     @property
@@ -57,7 +57,7 @@ class WireFrame:
         """The payload as numbers: (68,) int32, (n,) or (59,) float32, (samples,) int16 or (n, 3) int16.
 
         Raises:
-            WireError: a picture has none.
+            WireError: the payload is a picture.
         """
         row = KINDS[self.kind]
         if row.dtype is None:
@@ -67,10 +67,10 @@ class WireFrame:
 
     @property
     def vertices(self) -> Float32:
-        """(n, 3) float32, metres.
+        """The vertices of a mesh, (n, 3) float32 in metres.
 
         Raises:
-            WireError: it is no mesh, or nobody has told its scale.
+            WireError: it is no mesh, or its scale is unknown.
         """
         if self.stream != "mesh" or self.told is None:
             raise WireError(f"wanted a mesh whose stream was told of, got {self.stream}")
@@ -87,7 +87,7 @@ def pack(
     character: int = 0,
     flush: bool = False,
 ) -> bytes:
-    """One binary message. `frame` counts from the session's start, `time` is seconds on its clock."""
+    """Encode a binary message. `frame` counts from the session's start, `time` is seconds on its clock."""
     kind = STREAMS[stream].kind
     return HEADER.pack(kind, VERSION, (character & 0xFF) | (FLUSH if flush else 0), frame, time) + payload
 
@@ -95,12 +95,12 @@ def pack(
 def pack_frames(
     stream: str, first: int, times: Float64, rows: Int32 | Float32, *, character: int = 0
 ) -> tuple[bytes, int]:
-    """What `pack` says of each of many frames, one behind the other, and the length of one.
+    """Encode many frames in one call. Return their messages, joined, and the length of one.
 
     Args:
-        first: number of the first; the others follow it.
+        first: number of the first frame; the others follow it.
         times: (n,) seconds.
-        rows: (n, k) their payloads.
+        rows: (n, k) the payloads.
     """
     whole = np.empty(
         len(rows),
@@ -120,10 +120,10 @@ def pack_frames(
 
 
 def unpack(message: bytes) -> WireFrame:
-    """A binary message taken apart.
+    """Decode a binary message.
 
     Raises:
-        WireError: too short, another version, or a kind that is not known.
+        WireError: it is too short, or its version or kind is unknown.
     """
     if len(message) < HEADER.size:
         raise WireError(f"wanted a header of {HEADER.size} bytes, got {len(message)} bytes")
@@ -137,14 +137,14 @@ def unpack(message: bytes) -> WireFrame:
 
 @dataclass(frozen=True, slots=True)
 class ClipPiece:
-    """A piece of a sound clip that a client sends: kind 4, as sound that goes out.
+    """A piece of a sound clip from a client: kind 4, like outgoing sound.
 
     Attributes:
-        id: of the clip.
-        number: 0, 1, 2, ...: the header's `frame`; a 0 begins the clip anew.
-        rate: Hz of raw mono int16 PCM; 0 where the pieces together are a sound file.
-        sound: the bytes.
-        final: it is the last one.
+        id: id of the clip.
+        number: 0, 1, 2, ...: the header's `frame`; 0 begins the clip anew.
+        rate: Hz of raw mono int16 PCM; 0 if the pieces together are a sound file.
+        sound: its bytes.
+        final: whether it is the last piece.
     """
 
     id: str
@@ -155,14 +155,14 @@ class ClipPiece:
 
 
 def pack_clip(piece: ClipPiece) -> bytes:
-    """One binary message; the header's time is 0 and not looked at."""
+    """Encode a piece of a clip; the header's time is 0 and ignored."""
     flags, id = FINAL if piece.final else 0, piece.id.encode()
     head = HEADER.pack(STREAMS["audio"].kind, VERSION, flags, piece.number, 0.0)
     return head + CLIP.pack(piece.rate, len(id)) + id + piece.sound
 
 
 def unpack_clip(message: bytes) -> ClipPiece:
-    """A binary message from a client taken apart.
+    """Decode a piece of a clip.
 
     Raises:
         WireError: it is no piece of a sound clip.
@@ -187,7 +187,7 @@ def unpack_clip(message: bytes) -> ClipPiece:
 def json_frame(
     stream: str, frame: int, time: float, values: list[int] | list[float], character: str | None = None
 ) -> str:
-    """One frame as a text message, such as `{"type":"fap","frame":3,"time":0.12,"values":[...]}`."""
+    """Encode a frame as text, such as `{"type":"fap","frame":3,"time":0.12,"values":[...]}`."""
     message = {"type": stream, "frame": frame, "time": round(time, 6), "values": values}
     if character is not None:
         message["character"] = character

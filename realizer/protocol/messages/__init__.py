@@ -1,1 +1,1 @@
-"""The messages of the WebSocket protocol, as models: requests in, replies out, JSON text to either."""
+"""Pydantic models of the WebSocket protocol's messages, and the parser of requests."""

@@ -1,4 +1,4 @@
-"""Base classes of messages; protocol version, streams and encodings."""
+"""Base classes of messages, and types of their fields."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from realizer.protocol.streams import STREAMS
 # Version of the protocol that `hello` and `welcome` name.
 PROTOCOL = 1
 
-# Type of a control message -> type of its answer; the others have none.
+# Type of a control message -> type of its answer; other messages have none.
 ANSWERS: Mapping[str, str] = {
     "hello": "welcome",
     "subscribe": "subscribed",
@@ -25,23 +25,23 @@ MAX_CONTROL = 256 * 1024  # bytes
 # The highest rate of frames; ten times as fast as a film.
 MAX_FPS = 240
 
-# Beyond these a float skips numbers.
+# Larger floats skip whole numbers.
 EXACT = 2**53
 
 
 def _whole(value: object) -> object:
-    """JSON has one kind of number, and what writes it may write 25 as 25.0."""
+    """Convert 25.0 to 25, because some JSON writers have only floats."""
     if isinstance(value, float) and value.is_integer() and abs(value) < EXACT:
         return int(value)
     return value
 
 
-# A whole number of a message in; and what makes one that has bounds of its own, given behind them.
+# A whole number in a request. For one with bounds: Annotated[int, Field(...), WHOLE].
 WHOLE = BeforeValidator(_whole)
 Whole = Annotated[int, WHOLE]
-# Of a time no more is told than anybody can mean.
+# Times are rounded to microseconds.
 Seconds = Annotated[float, AfterValidator(lambda time: round(time, 6))]
-# mypy takes no names for a Literal that are not written out.
+# mypy accepts only literals that are written out.
 if TYPE_CHECKING:
     StreamName = str
     NumericStream = str
@@ -51,21 +51,21 @@ else:
     NumericStream = Literal[tuple(row.name for row in STREAMS.values() if row.numeric)]
     Encoding = Literal[tuple(sorted({name for row in STREAMS.values() for name in row.encodings}))]
 Picture = Literal["jpeg", "png", "webp"]
-# What pictures of the stream `video` are, the default first -> their media type.
+# Format of pictures, the default first -> media type.
 PICTURES: dict[str, str] = {"jpeg": "image/jpeg", "png": "image/png", "webp": "image/webp"}
 
 
 class Message(BaseModel):
-    """A message in: no unknown fields, no NaN, numbers that are numbers: neither `true` nor "25"."""
+    """A request: without unknown fields, NaN, or `true` or "25" in place of numbers."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
 
 
 class Reply(BaseModel):
-    """A message out."""
+    """A message of the service."""
 
     model_config = ConfigDict(frozen=True)
 
     def text(self) -> str:
-        """As it goes over the wire; fields that are None are left out."""
+        """Return the message as JSON without the fields that are None."""
         return self.model_dump_json(exclude_none=True)

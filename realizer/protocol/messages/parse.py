@@ -54,7 +54,7 @@ SUPPORTED: tuple[str, ...] = (
     "state",
     "ping",
 )
-# Kind of a pydantic error -> what was wanted, in the words of our other messages.
+# Kind of a pydantic error -> what was wanted, in the style of our other messages.
 _WANTED = {
     "missing": "a value",
     "extra_forbidden": "no field of that name",
@@ -82,13 +82,13 @@ _WANTED = {
     "dict_type": "an object",
     "model_type": "an object",
 }
-# JSON can say what is no character: half of one that takes two.
+# JSON can contain half of a surrogate pair, which is no character.
 _SURROGATE = re.compile(r"[\ud800-\udfff]|\\u[dD][89a-fA-F]")
 _ADAPTER: TypeAdapter[Control] = TypeAdapter(Annotated[Control, Field(discriminator="type")])
 
 
 def parse_control(text: str) -> Control | ErrorMessage:
-    """A control message, or the error to answer with: code bad-json, too-large, unsupported or invalid."""
+    """Parse a control message, or return the error: code bad-json, too-large, unsupported or invalid."""
     if len(text) > MAX_CONTROL:
         return ErrorMessage(
             code="too-large",
@@ -126,7 +126,7 @@ def parse_control(text: str) -> Control | ErrorMessage:
 
 
 def _where(error: ErrorDetails, message: object) -> str:
-    """The path to what is wrong, without the names of the types that it could have had."""
+    """Return the path to the wrong value, without pydantic's names of the members of unions."""
     kind, *parts = error["loc"]
     path, value = [str(kind)], message
     for part in parts:
@@ -141,7 +141,7 @@ def _where(error: ErrorDetails, message: object) -> str:
 
 
 def _is_text(message: object) -> bool:
-    """Whether what was read of JSON can be written as UTF-8."""
+    """Whether a JSON value can be encoded as UTF-8."""
     try:
         json.dumps(message, ensure_ascii=False).encode()
     except UnicodeEncodeError:
@@ -150,7 +150,7 @@ def _is_text(message: object) -> bool:
 
 
 def _said(errors: list[ErrorDetails]) -> str:
-    """What was wanted, one or the other, and what came."""
+    """Return what was wanted and what came."""
     first = errors[0]
     got = "nothing" if first["type"] == "missing" else _short(first["input"])
     if first["type"] not in _WANTED:

@@ -1,1 +1,1 @@
-"""Documents between their arrival and their planning."""
+"""Documents from their arrival to their planning: queue, limits, speech requests."""

@@ -1,4 +1,4 @@
-"""The documents of a session until their blocks play: they are read, spoken, then submitted."""
+"""The queue of a session's documents, and their submission: parsed, synthesized, then planned."""
 
 from __future__ import annotations
 
@@ -29,26 +29,26 @@ _BLOCK_ID = re.compile(r"<(?:\w+:)?bml\b[^<>]*?\bid\s*=\s*[\"']([^\"'<>]{1,256})
 
 @dataclass(frozen=True, slots=True)
 class CancelledBlock:
-    """A block that somebody stopped after it had come and before it was read."""
+    """A block that was stopped after its document arrived and before it was read."""
 
     block: Block
 
 
 class DocumentQueue:
-    """Documents that have come and are not prepared yet: no more messages than blocks may wait."""
+    """A queue of unread messages with documents, at most `settings.max_blocks`."""
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
         self._unread: deque[Iterator[Block | BMLError]] = deque()
-        self._received = 0  # so many messages
-        self._all_cancelled = 0  # every block up to that message
-        self._cancelled: dict[str, int] = {}  # a block -> if it is in a message up to that one
+        self._received = 0  # number of the last message
+        self._all_cancelled = 0  # all blocks up to this message are cancelled
+        self._cancelled: dict[str, int] = {}  # id of a block -> cancelled up to this message
 
     def __bool__(self) -> bool:
         return bool(self._unread)
 
     def put(self, text: str) -> Warning | None:
-        """Take a message; or say why it is not taken."""
+        """Add a message, or return why it is refused."""
         limits = self._settings
         if len(self._unread) >= limits.max_blocks:
             words = f"{limits.max_blocks} messages wait to be read: wanted fewer at a time"
@@ -61,7 +61,7 @@ class DocumentQueue:
         return None
 
     def cancel(self, blocks: Iterable[str] | None) -> None:
-        """Let none of these, or of all (None), play that have come so far and are not read."""
+        """Cancel blocks, or all (None), that have arrived and are not read."""
         if not self._unread:
             return
         if blocks is None:
@@ -70,7 +70,7 @@ class DocumentQueue:
             self._cancelled |= dict.fromkeys(blocks, self._received)
 
     def next(self) -> Block | CancelledBlock | Warning | None:
-        """The next block, or why there is none; None where all is read."""
+        """Return the next block or the warning that replaces it; None if the queue is empty."""
         while self._unread:
             try:
                 item = next(self._unread[0], None)
@@ -84,7 +84,7 @@ class DocumentQueue:
                 return CancelledBlock(item) if stopped else item
             if item is not None:
                 refused = parse_warning(item)
-                if isinstance(item, BMLSizeError):  # of behaviours: the bytes were counted before
+                if isinstance(item, BMLSizeError):  # too many behaviours: `put` has counted the bytes
                     refused = replace(refused, text=f"{refused.text} {raises('max_behaviours')}")
                 return refused
             self._unread.popleft()
@@ -92,19 +92,19 @@ class DocumentQueue:
         return None
 
     def clear(self) -> None:
-        """Nobody wants it any more."""
+        """Remove all messages."""
         self._unread.clear()
 
 
 class Submission:
-    """What a session does with documents until they play.
+    """The submission of a session's documents: it reads them, requests their speech, and plans their blocks.
 
     Args:
-        name: of the session.
-        add_effects: takes what is to be done for them.
+        name: the session's name, for the log.
+        add_effects: takes the requests to voices.
 
     Attributes:
-        voices: index of a character -> the voice it was given.
+        voices: index of a character -> name of its voice.
     """
 
     def __init__(
@@ -122,21 +122,21 @@ class Submission:
 
     @property
     def has_work(self) -> bool:
-        """Something can be read or planned at once."""
+        """Whether something can be read or planned now."""
         return bool(self.queue or self.speeches.has_next or self.pending.has_ready)
 
     @property
     def is_idle(self) -> bool:
-        """Nothing is being read, spoken, prepared or said piece by piece."""
+        """Whether no document is being read or prepared and no speech is open."""
         return not (self.queue or len(self.pending) or len(self.speeches) or len(self.tts))
 
     def enqueue(self, text: str, t: float) -> None:
-        """Take a message with documents, or refuse it."""
+        """Add a message with documents to the queue, or refuse it."""
         if (refused := self.queue.put(text)) is not None:
             self.refuse(refused, t)
 
     def parse_next(self, t: float) -> bool:
-        """Prepare what comes next in a speech, or in the inbox; False where there is nothing."""
+        """Prepare the next block of a speech or of the queue. Return False if there is none."""
         item = self.speeches.next() or self.queue.next()
         if isinstance(item, Warning):
             self.refuse(item, t)
@@ -147,13 +147,13 @@ class Submission:
         return item is not None
 
     def stop(self, blocks: Collection[str] | None, t: float) -> set[str]:
-        """Give up what is not planned yet, read or not.
+        """Cancel blocks that are not planned yet, read or not.
 
         Args:
-            blocks: which; None for all.
+            blocks: their ids; None for all.
 
         Returns:
-            Those that had been read.
+            The ids of those that had been read.
         """
         self.queue.cancel(blocks)
         for block in self.speeches.cancel(blocks):
@@ -163,7 +163,7 @@ class Submission:
         return {w.block.id for w in pending}
 
     def _prepare(self, block: Block, t: float, *, stopped: bool = False) -> None:
-        """Ask for the block's voice and acknowledge it; it is planned when nothing is missing."""
+        """Request the speech of a block and acknowledge it. It is planned when nothing is missing."""
         if (fault := self._limit_error(block)) is not None:
             self.refuse(Warning(block.id, "CANNOT_CREATE_BEHAVIOR", fault), t, block.character_id)
             return
@@ -186,7 +186,7 @@ class Submission:
             self._request_speech(pending, requests)
 
     def plan_next(self, t: float) -> bool:
-        """Plan the first block that waits for nothing; False where all wait."""
+        """Plan the first block that is ready. Return False if there is none."""
         pending = self.pending.first_ready()
         if pending is None:
             return False
@@ -194,7 +194,7 @@ class Submission:
             pending.block = self.speeches.with_links(pending.block)
             schedule = self._player.submit(pending.block, t, pending.utterances)
             if schedule.lengths and pending.final:
-                # Time has passed while the voice spoke, and it never comes exactly: what is left is little.
+                # The voice never meets a length exactly, and time has passed: stretch the small difference.
                 pending.utterances = stretch_to_fit(pending.utterances, schedule.lengths)
                 schedule = self._player.submit(pending.block, t, pending.utterances)
         except Exception:
@@ -216,7 +216,7 @@ class Submission:
     def _request_again(
         self, pending: PendingBlock, lengths: Mapping[str, Mapping[str, float]], t: float
     ) -> None:
-        """More of the block fits if its speech lasts so long; what comes back is taken as it is."""
+        """Request speech again with the lengths that let more of the block fit. The result is final."""
         requests = self._player.speech_requests(pending.block)
         again = {b: requests[b] for b in self.tts.unfinished(pending)}
         again |= {b: replace(requests[b], seconds=times["end"]) for b, times in lengths.items()}
@@ -225,13 +225,13 @@ class Submission:
         self._request_speech(pending, again)
 
     def _request_speech(self, pending: PendingBlock, requests: Mapping[str, SpeechRequest]) -> None:
-        """Order what a voice has to say."""
+        """Request speech from the character's voice."""
         voice = self.voices.get(pending.character) or self._settings.voice
         chosen = {b: replace(request, voice=request.voice or voice) for b, request in requests.items()}
         self._add_effects(self.tts.request(pending, chosen))
 
     def withdraw(self, gone: list[PendingBlock], t: float) -> None:
-        """Give up blocks that are not planned yet."""
+        """Remove blocks that are not planned yet."""
         for pending in gone:
             self._player.withdraw(pending.block, t)
             self.speeches.on_refused(pending.block.id)
@@ -247,18 +247,18 @@ class Submission:
         return block_limit_error(block, self._settings, busy, self._player.characters)
 
     def _internal(self, block: Block, t: float) -> None:
-        """A bug: the traceback is ours, the client gets the block's id."""
+        """Log a bug with its traceback, and refuse the block."""
         log.exception("session %s: block %s failed", self._name, block.id)
         text = "internal error while planning this block"
         self.refuse(Warning(block.id, "EXECUTION_EXCEPTION", text), t, block.character_id)
 
     def refuse(self, warning: Warning, t: float, character: str | None = None) -> None:
-        """Report what is not taken."""
+        """Publish a warning about a block that is not accepted."""
         self._player.refuse(warning, t, character)
         self.speeches.on_refused(warning.id)
 
 
 def block_id_of(message: str) -> str:
-    """The block id of a document that is not parsed, where it can be read near its start."""
+    """Return the block id near the start of an unparsed document, or "<no id>"."""
     found = _BLOCK_ID.search(message, 0, 4096)
     return found.group(1) if found else "<no id>"

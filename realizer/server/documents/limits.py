@@ -1,4 +1,4 @@
-"""Limits of the service on texts, blocks, plans and streams."""
+"""Limits on documents, blocks, schedules, pictures and memory. Each check returns an error text or None."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from realizer.core.settings import Settings, raises
 from realizer.playback.references import external_refs
 from realizer.scheduling.timing import Schedule
 
-MEMORY = Path("/proc/self/statm")  # its second number: pages that are in memory
+MEMORY = Path("/proc/self/statm")  # the second number: resident pages
 
-# The index of a character is one byte on the wire; sixteen faces in one session are a crowd.
+# The wire has one byte for the index of a character, and part of its range is for views.
 MAX_CHARACTERS = 16
 
 
 def size_error(text: str, settings: Settings) -> str | None:
-    """Why documents in one message are not read; None where they are."""
+    """Return why the documents of a message are refused, or None."""
     size = len(text) if text.isascii() else len(text.encode("utf-8", "surrogatepass"))
     if size > settings.max_document:
         words = f"wanted at most {settings.max_document} bytes of BML in a message, got {size}"
         return f"{words} {raises('max_document')}"
-    # Whatever else begins so is counted with them: nobody's comments are that many.
+    # Comments are counted as elements too; a document has few of them.
     count = text.count("<") - text.count("</")
     if count > settings.max_elements:
         words = f"wanted at most {settings.max_elements} elements in a message, got {count}"
@@ -35,11 +35,11 @@ def size_error(text: str, settings: Settings) -> str | None:
 def block_limit_error(
     block: Block, settings: Settings, busy: int, characters: Collection[str | None]
 ) -> str | None:
-    """Why a session refuses a block; None where it takes it.
+    """Return why a session refuses a block, or None.
 
     Args:
-        busy: how many blocks play or wait there.
-        characters: those it has.
+        busy: number of blocks that play or wait in the session.
+        characters: ids of the session's characters.
     """
     longest = _longest(block)
     if longest > settings.max_speech:
@@ -54,10 +54,10 @@ def block_limit_error(
 
 
 def duration_error(block: Block, schedule: Schedule, settings: Settings) -> str | None:
-    """Why what was planned is not played; None where it is.
+    """Return why a planned block is too long, or None.
 
-    A block that is tied to points of others, or to what a client anticipates, lasts as these say: an open
-    speech for example has no end yet.
+    A block that refers to points of other blocks or of anticipators has no limit: for example, an open speech
+    has no end yet.
     """
     if schedule.duration <= settings.max_duration or external_refs(block):
         return None
@@ -68,10 +68,10 @@ def duration_error(block: Block, schedule: Schedule, settings: Settings) -> str 
 def pixel_rate_error(
     size: tuple[int, int], fps: float, settings: Settings, beside: float = 0.0
 ) -> str | None:
-    """Why pictures of that size are not drawn at that rate; None where they are.
+    """Return why pictures of this size are not drawn at this rate, or None.
 
     Args:
-        beside: pixels a second of the other pictures of the session; one that several look at counts once.
+        beside: pixels a second of the session's other pictures; a shared picture counts once.
     """
     pixels = size[0] * size[1] * fps
     if pixels + beside <= settings.max_pixels:
@@ -82,14 +82,14 @@ def pixel_rate_error(
 
 
 def memory_error(settings: Settings) -> str | None:
-    """Why there is no memory for one more session; None where there is."""
+    """Return why there is no memory for another session, or None."""
     if settings.max_memory is None or (used := memory() / 1e6) <= settings.max_memory:
         return None
     return f"the service uses {used:.0f} MB: wanted at most {settings.max_memory} {raises('max_memory')}"
 
 
 def memory() -> int:
-    """Bytes of this process in memory; the most there ever were, or 0, where the system says no more."""
+    """Return the resident bytes of this process; their maximum so far, or 0, on systems without /proc."""
     try:
         return int(MEMORY.read_text("ascii").split()[1]) * os.sysconf("SC_PAGE_SIZE")
     except (OSError, ValueError, IndexError):
@@ -103,7 +103,7 @@ def memory() -> int:
 
 
 def _longest(block: Block) -> int:
-    """The characters of its longest speech, whichever of its forms is said."""
+    """Return the length of a block's longest speech in any of its forms, in characters."""
     longest = 0
     for node in block.behaviours:
         if isinstance(node, Speech):

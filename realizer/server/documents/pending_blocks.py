@@ -1,4 +1,4 @@
-"""Blocks that wait for speech, or for the blocks they refer to."""
+"""Blocks that wait for their speech or for other blocks."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ class PendingBlock:
     """A block in preparation.
 
     Attributes:
-        requests: speak id -> (behaviour, what it says): what the voice still owes.
-        utterances: behaviour -> what the voice has made.
+        requests: id of a request -> (behaviour, its speech): requests without an answer.
+        utterances: behaviour -> its synthesized speech.
         predecessors: blocks in preparation that must be planned first.
-        final: what the voice makes now is not asked for again.
-        is_incomplete: whether something the block names is still to come.
-        is_streaming: what it says is a part of a sentence: the rest follows in another block.
+        final: whether the requested speech is used as it comes, without another request.
+        is_incomplete: whether a block refers to a sync point that has not arrived.
+        is_streaming: whether the block speaks part of a sentence, which another block continues.
     """
 
     block: Block
@@ -36,12 +36,12 @@ class PendingBlock:
 
     @property
     def is_ready(self) -> bool:
-        """It waits for nothing."""
+        """Whether the block waits for nothing."""
         return not self.requests and not self.predecessors and not self.is_incomplete(self.block)
 
 
 class PendingBlocks:
-    """The blocks that wait, in the order in which they came."""
+    """The waiting blocks in order of arrival."""
 
     def __init__(self) -> None:
         self.blocks: list[PendingBlock] = []
@@ -52,11 +52,12 @@ class PendingBlocks:
     def add(
         self, block: Block, character: int, requests: dict[int, tuple[str, SpeechRequest]], now: float
     ) -> PendingBlock:
-        """Let a block wait for its voice, and for the earlier blocks it depends on.
+        """Add a block, which waits for its speech and for the earlier blocks it depends on.
 
-        It depends on blocks whose sync points it names, on those it is to follow, on one with its own id,
-        and, where it is appended, on all of its character. A replacing block waits for nobody:
-        `replaced_by` says what it ends. Blocks that are to follow this one depend on it.
+        It depends on blocks whose sync points it names, on those it follows, on one with its own id, on a
+        replacing block of its character, and, if it is appended, on all blocks of its character. A replacing
+        block depends on none: it ends those that `replaced_by` returns. Blocks that must follow this one
+        depend on it.
         """
         named = {ref.block for ref in references(block)} | {*block.append_after, *block.chunk_after}
         after = {
@@ -80,32 +81,32 @@ class PendingBlocks:
         return pending
 
     def add_utterance(self, speak: int, utterance: Utterance) -> None:
-        """The voice has made one utterance; one nobody waits for any more is dropped."""
+        """Store the answer to a request. It is dropped if no block waits for it."""
         for pending in self.blocks:
             if speak in pending.requests:
                 behaviour, _ = pending.requests.pop(speak)
                 pending.utterances[behaviour] = allow_small_warp(utterance) if pending.final else utterance
 
     def give_up(self, speak: int) -> None:
-        """No voice can say it: the block goes on without, its speech is dropped when it is planned."""
+        """Remove a request that no voice can fulfil: the block is planned without that speech."""
         for pending in self.blocks:
             pending.requests.pop(speak, None)
 
     def request_of(self, speak: int) -> SpeechRequest | None:
-        """What a speak id asked for; None where nobody waits for it."""
+        """Return the speech of a request, or None if no block waits for it."""
         return next((w.requests[speak][1] for w in self.blocks if speak in w.requests), None)
 
     @property
     def has_ready(self) -> bool:
-        """Whether `first_ready` would give a block."""
+        """Whether `first_ready` would return a block."""
         return any(w.is_ready for w in self.blocks)
 
     def first_ready(self) -> PendingBlock | None:
-        """The first block that waits for nothing; None where all wait. `remove` it when it is planned."""
+        """Return the first block that is ready, or None. The caller removes it once it is planned."""
         return next((w for w in self.blocks if w.is_ready), None)
 
     def replaced_by(self, pending: PendingBlock) -> list[PendingBlock]:
-        """The blocks in preparation that came before a replacing block of their character."""
+        """Return the blocks of the same character that arrived no later than a replacing block."""
         return [
             w
             for w in self.blocks
@@ -113,15 +114,15 @@ class PendingBlocks:
         ]
 
     def overdue(self, before: float) -> Iterator[int]:
-        """Speak ids asked for before that time and not answered."""
+        """Yield the ids of requests from before that time without an answer."""
         return iter([speak for w in self.blocks if w.waiting_since < before for speak in w.requests])
 
     def deadline(self, patience: float) -> float | None:
-        """When the first voice that owes something will have taken longer than `patience` seconds."""
+        """Return the time at which the oldest request is `patience` seconds old; None without requests."""
         return min((w.waiting_since + patience for w in self.blocks if w.requests), default=None)
 
     def remove(self, gone: Iterable[PendingBlock]) -> None:
-        """Take blocks out; nobody waits for them any more."""
+        """Remove blocks, also from the predecessors of others."""
         ids = {id(w) for w in gone}
         self.blocks = [w for w in self.blocks if id(w) not in ids]
         for pending in self.blocks:

@@ -14,19 +14,19 @@ from realizer.server.speech.long_text import LongText, trim_final_pause
 from realizer.speech.duration_fit import silent_fallback
 from realizer.speech.utterance import SpeechRequest, Utterance
 
-# A voice that has not answered by then is taken for silent.
+# The silent voice replaces one that has not answered by then.
 PATIENCE = 20.0  # s
-# A part that comes too late for what is heard already follows so soon.
+# A part of a long text that comes too late begins so much after the present.
 SOON = 0.05  # s
 
 
 @dataclass(eq=False)
 class _Text:
-    """A long text, of which one part is ordered.
+    """A long text of which one part is requested.
 
     Attributes:
-        part: what was asked for last.
-        given: what the block was given so far.
+        part: the request.
+        given: the utterance that the block has so far.
     """
 
     pending: PendingBlock
@@ -37,11 +37,11 @@ class _Text:
 
 
 class TtsRequests:
-    """What the voices of a session are asked for.
+    """The requests of a session to voices.
 
     Attributes:
-        fault: why a voice failed last; None where none did.
-        request_count: how many orders were given; the last one has this number.
+        fault: why a voice failed last; None if none did.
+        request_count: how many requests were made; the id of the last one.
     """
 
     def __init__(self, player: Player, preparation: PendingBlocks) -> None:
@@ -50,17 +50,17 @@ class TtsRequests:
         self._preparation = preparation
         self.request_count = 0
         self._texts: dict[int, _Text] = {}
-        self._streaming: set[int] = set()  # what is a sentence only with the piece that follows
+        self._streaming: set[int] = set()  # requests for a part of a sentence
 
     def __len__(self) -> int:
-        """Long texts of which a part is being said."""
+        """Return the number of long texts of which a part is requested."""
         return len(self._texts)
 
     def request(self, pending: PendingBlock, requests: Mapping[str, SpeechRequest]) -> list[Speak]:
-        """Ask for what a block wants said, of a long text for its first clause.
+        """Request the speech of a block; of a long text only the first clause.
 
         Args:
-            requests: behaviour -> what it says, the voice chosen.
+            requests: behaviour -> its speech, with the voice chosen.
         """
         speaks = []
         for behaviour, request in requests.items():
@@ -76,14 +76,14 @@ class TtsRequests:
         return speaks
 
     def unfinished(self, pending: PendingBlock) -> set[str]:
-        """The behaviours of a block that are still being said."""
+        """Return the behaviours of a block whose texts are not complete."""
         return {text.behaviour for text in self._texts.values() if text.pending is pending}
 
     def answer(self, speak: int, result: Utterance | RealizerError, t: float) -> list[Speak]:
-        """What a voice made; where it failed, the silent voice takes over.
+        """Take the answer to a request. If the voice failed, the silent voice replaces it.
 
         Returns:
-            What to ask for now.
+            The next requests.
         """
         text = self._texts.pop(speak, None)
         flows = speak in self._streaming
@@ -113,13 +113,13 @@ class TtsRequests:
         return [order]
 
     def expire(self, t: float) -> list[Speak]:
-        """Take voices for silent that have not answered for too long."""
+        """Answer overdue requests with the silent voice, and return the next requests."""
         fault = VoiceError(f"the voice has not answered for {PATIENCE:g} s")
         late = list(self._preparation.overdue(t - PATIENCE))
         return [speak for id in late for speak in self.answer(id, fault, t)]
 
     def deadline(self) -> float | None:
-        """When `expire` will have something."""
+        """Return the time at which `expire` is due; None without requests."""
         return self._preparation.deadline(PATIENCE)
 
     def _speak(self, request: SpeechRequest) -> Speak:
@@ -127,7 +127,7 @@ class TtsRequests:
         return Speak(self.request_count, request)
 
     def _extend(self, text: _Text, speak: int, part: Utterance, t: float) -> bool:
-        """Give a block one more part of its text; False where it wants no more."""
+        """Add a part of its text to a block. Return False if the block needs no more parts."""
         pending, behaviour = text.pending, text.behaviour
         before, block = text.given, pending.block.id
         if before is None:
@@ -151,7 +151,7 @@ class TtsRequests:
         )
         if not self._player.update_speech_timing(block, behaviour, text.given, t):
             return False
-        # Planning has told what was said of the parts before.
+        # The warnings of earlier parts have been published.
         for fault in text.given.warnings[len(before.warnings) :]:
             warning = Warning(f"{block}:{behaviour}", "CUSTOM_ATTRIBUTE_NOT_SUPPORTED", f"speech: {fault}")
             self._player.refuse(warning, t, playing.block.character_id)

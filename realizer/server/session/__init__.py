@@ -1,1 +1,1 @@
-"""One session: messages in, effects to carry out; no sockets and no clock."""
+"""Sessions: the state that documents and control messages change, without sockets and clock."""

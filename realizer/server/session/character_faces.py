@@ -14,13 +14,13 @@ if TYPE_CHECKING:
 
 
 class CharacterFaces:
-    """The faces of characters, which are told by their index.
+    """The faces of characters, by the characters' indices.
 
     Args:
-        settings: the face of who has been given none, and what moves faces.
+        settings: the default face, the deformer and the mapping.
 
     Attributes:
-        assigned: index -> the face a client asked for, as it named it.
+        assigned: index -> the face that a client requested, as the client named it.
     """
 
     def __init__(self, settings: Settings) -> None:
@@ -28,35 +28,37 @@ class CharacterFaces:
         self.assigned: dict[int, str] = {}
 
     def check(self, name: str) -> None:
-        """Whether it could be given: it is one of those that are listed.
+        """Check that a face is listed and can be loaded.
 
         Raises:
-            FaceError: there is none of that name, or it cannot be loaded.
-            TableError: its mapping cannot be used.
+            FaceError: no such face, or it cannot be loaded.
+            TableError: its mapping is invalid.
         """
         from realizer.face.load import face_name, list_faces
 
         known = [info.name for info in list_faces()]
         if face_name(name) not in known:
-            # Where the folders lie is no client's business.
+            # Clients must not learn the paths of folders.
             raise FaceError(f"wanted one of {', '.join(known)}, got {name!r}")
         self._load(name)
         mapping_of(name, self._settings.mapping)
 
     def name(self, index: int) -> str:
+        """Return the name of a character's face."""
         from realizer.face.load import face_name
 
         return face_name(self.assigned.get(index, self._settings.face))
 
     def of(self, index: int) -> Face:
-        """
+        """Return the face of a character.
+
         Raises:
             FaceError: it cannot be loaded.
         """
         return self._load(self.name(index))
 
     def mapping(self, index: int) -> FapMapping:
-        """What its AUs ask of FAPs."""
+        """Return the mapping from AUs to FAPs of a character's face."""
         return mapping_of(self.name(index), self._settings.mapping)
 
     def _load(self, name: str) -> Face:

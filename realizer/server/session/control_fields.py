@@ -1,4 +1,4 @@
-"""Resolve the characters, action units, FAPs and emotions that control messages name."""
+"""Lookup of the characters, action units, FAPs and emotions that control messages name."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from realizer.tables import faps
 
 
 class FieldError(Exception):
-    """A control message whose field `where` cannot be followed."""
+    """A field of a control message, `where`, has an invalid value."""
 
     def __init__(self, where: str, text: str) -> None:
         super().__init__(text)
@@ -26,7 +26,7 @@ def character_index(player: Player, character: str | None) -> int:
     """Return the index of a character of the session, which is added if it is new.
 
     Raises:
-        Wrong: there are too many.
+        FieldError: the session has too many characters.
     """
     known = player.characters
     if character not in (None, *known) and len(known) >= MAX_CHARACTERS:
@@ -35,13 +35,13 @@ def character_index(player: Player, character: str | None) -> int:
 
 
 def direct_values(message: SetMessage, before: Collection[str]) -> dict[str, float | None]:
-    """AUs (0..1) and FAPs (FAPU) by name, as a message holds them; None lets go.
+    """Return the AUs (0..1) and FAPs (FAPU) that a message sets, by name; None releases one.
 
     Args:
-        before: names of what is held.
+        before: names that earlier messages set.
 
     Raises:
-        Wrong: it names what is none.
+        FieldError: the message names an unknown AU or FAP.
     """
     rows = faps()
     values: dict[str, float | None] = {}
@@ -65,10 +65,10 @@ def direct_values(message: SetMessage, before: Collection[str]) -> dict[str, flo
 
 
 def emotion_values(asked: EmotionFields | None) -> dict[str, float]:
-    """Name of AU -> 0..1; {} for none.
+    """Return the AUs of an emotion: name -> 0..1; {} for None.
 
     Raises:
-        Wrong: there is no such feeling.
+        FieldError: the emotion is unknown or its values are invalid.
     """
     if asked is None:
         return {}

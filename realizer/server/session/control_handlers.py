@@ -1,4 +1,4 @@
-"""Control messages: what each of them does to a session, and the errors that answer them."""
+"""Handlers of the control messages that change a session."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ from realizer.server.streams.connection import Connection
 
 
 class ControlHandlers:
-    """Carries out the control messages that change what a session shows or whom it sends what.
+    """The handlers of the control messages that change what a session shows or sends.
 
     Args:
-        reply: sends a message to the connection of that id.
+        reply: sends a message to a connection, by its id.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class ControlHandlers:
         self._reply = reply
 
     def handle(self, connection: Connection, message: Control, t: float) -> None:
-        """Do what a control message asks, or reply an error alone.
+        """Handle a control message, or reply with an error and change nothing.
 
         Args:
             t: seconds on the session clock.
@@ -97,9 +97,9 @@ class ControlHandlers:
                 self._stop(message, t)
 
     def _stop(self, message: Stop, t: float) -> None:
-        """End what is known of these blocks; one that has ended by itself has only been quicker."""
+        """End blocks. A block that has just ended by itself is no error."""
         submission, wanted = self._submission, None if message.blocks is None else set(message.blocks)
-        # What is not read may hold any of them.
+        # Unread documents may contain any of the blocks.
         unread = bool(submission.queue)
         known = submission.stop(wanted, t)
         self._player.stop(t, wanted)
@@ -127,7 +127,7 @@ class ControlHandlers:
         if message.voice is not None:
             from realizer.speech.registry import find_voice
 
-            find_voice(message.voice).close()  # one that is not there is said before anything is spoken
+            find_voice(message.voice).close()  # report an unknown voice now, not with the next speech
         index = character_index(self._player, message.id)
         if message.face is not None:
             self._faces.assigned[index] = message.face
@@ -144,5 +144,5 @@ class ControlHandlers:
 
 
 def _has_annotation(message: SpeechMessage) -> bool:
-    """Whether it says what is in its clip; one that only names it changes nothing of that."""
+    """Whether a message describes its clip; one that only names the clip changes no annotation."""
     return bool(message.text is not None or message.words or message.phonemes or message.visemes)

@@ -18,7 +18,7 @@ class Send(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Speak:
-    """Let a voice say it and answer `session.spoken(id, utterance or error, now)`."""
+    """Synthesize speech and call `session.on_speech(id, utterance or error, now)`."""
 
     id: int
     request: SpeechRequest
@@ -26,10 +26,11 @@ class Speak:
 
 @dataclass(frozen=True, slots=True)
 class RenderOptions:
-    """How pictures are drawn: `size` is width, height; the rest as `realizer.render.Renderer` takes it.
+    """Options of a picture, as `realizer.render.Renderer` takes them.
 
     Attributes:
-        quality: of a JPEG or a WebP.
+        size: width and height in pixels.
+        quality: 1..100, of a JPEG or a WebP.
         form: "jpeg", "png" or "webp".
     """
 
@@ -43,9 +44,9 @@ class RenderOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Draw:
-    """Draw one picture and answer `session.on_picture(id, its bytes or error, now)`.
+    """Draw one picture and call `session.on_picture(id, its bytes or error, now)`.
 
-    `pose` is (k,) float32, a column for each thing the face takes.
+    `pose` is (k,) float32, one value for each of the face's inputs.
     """
 
     id: int
@@ -56,7 +57,7 @@ class Draw:
 
 @dataclass(frozen=True, slots=True)
 class MoveConnection:
-    """Take a connection to another session and let it have the feedback after `seen`; then say welcome."""
+    """Move a connection to another session, send `welcome` and the feedback after `seen`."""
 
     connection: int
     session: str
@@ -65,7 +66,7 @@ class MoveConnection:
 
 @dataclass(frozen=True, slots=True)
 class Close:
-    """Close a connection, with the code and the reason of the WebSocket close."""
+    """Close a connection with a WebSocket close code and reason."""
 
     connection: int
     code: int

@@ -11,20 +11,19 @@ from typing import NamedTuple
 
 from bml_schema import Feedback, parse_feedback
 
-# What is kept in any case, and how many messages at most; of what is older only so many characters.
-FRESH = 60.0  # s
-MOST = 10_000
-ROOM = 2**17
-# Messages are much alike: so many characters, once they are not the newest, take a ninth of that together.
+FRESH = 60.0  # s; newer messages are kept, unless there are more than MOST
+MOST = 10_000  # messages
+ROOM = 2**17  # characters of older messages
+# Messages are much alike: packs of so many characters are compressed to a ninth.
 PACK = 2**14
-# Of what was told, a checkpoint has the last so many messages and characters: minutes of talk. Who comes back
-# has the rest already, or is told of a gap.
+# A checkpoint contains at most so many messages and characters: some minutes of talk. A client that resumes
+# has the rest already, or gets `gap`.
 LAST, LAST_TEXT = 1000, 2**19
-BETWEEN = "\0"  # no XML has it
+BETWEEN = "\0"  # not allowed in XML
 
 
 class _Pack(NamedTuple):
-    """Messages that belong together, and when the last of them was told."""
+    """Compressed messages, and the time of the last of them."""
 
     messages: int
     characters: int
@@ -34,34 +33,34 @@ class _Pack(NamedTuple):
 
 @dataclass(frozen=True)
 class FeedbackFilter:
-    """Which feedback a connection gets; the numbers of what it does not get are missing in what it gets.
+    """A filter of the feedback for one connection. Messages keep their numbers, so there are gaps.
 
     Attributes:
-        elements: names of feedback elements; None takes all.
-        character: of whom; None takes all. What is of no character comes always.
+        elements: names of feedback elements; None accepts all.
+        character: id of a character; None accepts all. Feedback without a character is always accepted.
     """
 
     elements: frozenset[str] | None = None
     character: str | None = None
 
     def accepts(self, text: str) -> bool:
-        """Whether a message is to be sent."""
+        """Whether the filter lets a message pass."""
         if self.elements is not None and text[1:].split(maxsplit=1)[0] not in self.elements:
             return False
         return self.character is None or parse_feedback(text).character_id in (None, self.character)
 
 
 class FeedbackLog:
-    """The newest messages of a session, each with its `seq` 1, 2, ...
+    """The newest messages of a session, numbered by `seq` 1, 2, ...
 
-    Who comes back after a minute finds all that was told since; of what is older some is kept, so that the
-    memory of a session that talks for days has a bound.
+    A client that resumes within a minute gets all that it missed. Of older messages only some are kept, so
+    that the memory of a long session is bounded.
 
     Args:
-        epoch: POSIX seconds at which the session clock was 0; None where nobody need know.
+        epoch: POSIX seconds at which the session clock was 0; None leaves them out of messages.
 
     Attributes:
-        newest: seq of the last message, 0 while there is none.
+        newest: seq of the last message, 0 before the first.
     """
 
     def __init__(self, epoch: float | None = None) -> None:
@@ -69,17 +68,17 @@ class FeedbackLog:
         self._epoch = epoch
         self._packs: deque[_Pack] = deque()
         self._recent: list[str] = []
-        self._unpacked = 0  # characters of these
-        self._count = 0  # of all that is kept
-        self._size = 0
+        self._unpacked = 0  # characters of `_recent`
+        self._count = 0  # stored messages
+        self._size = 0  # their characters
 
     @property
     def first(self) -> int:
-        """Seq of the oldest message that is kept; of the next one where none is."""
+        """Seq of the oldest stored message; of the next message if none is stored."""
         return self.newest - self._count + 1
 
     def add(self, feedback: Feedback, now: float) -> str:
-        """Number a message and keep it; its text.
+        """Number and store a message, and return its text.
 
         Args:
             now: seconds on the session clock.
@@ -90,13 +89,13 @@ class FeedbackLog:
         return text
 
     def restore(self, newest: int, texts: Iterable[str], now: float) -> None:
-        """Have told these messages, the last of which has the number `newest`."""
+        """Fill the log with messages, the last of which has the number `newest`."""
         self.newest = newest
         for text in texts:
             self._store(text, now)
 
     def last(self) -> list[str]:
-        """Return the newest messages, the oldest first: as many as a checkpoint has room for."""
+        """Return the newest messages for a checkpoint, the oldest first."""
         found: list[str] = []
         size = 0
         for text in reversed(self.since(self.newest - LAST + 1)):
@@ -119,7 +118,7 @@ class FeedbackLog:
             self._size -= packs.popleft().characters
 
     def _pack(self, now: float) -> None:
-        """Put the older half of what is not packed together."""
+        """Compress the older half of the recent messages."""
         count = size = 0
         while size < PACK:
             size += len(self._recent[count])
@@ -130,7 +129,7 @@ class FeedbackLog:
         self._unpacked -= size
 
     def since(self, seq: int) -> list[str]:
-        """The kept messages from `seq` on, in order."""
+        """Return the stored messages from `seq` on, in order."""
         wanted = min(self.newest - seq + 1, self._count)
         if wanted <= len(self._recent):
             return self._recent[len(self._recent) - wanted :] if wanted > 0 else []

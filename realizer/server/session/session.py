@@ -1,15 +1,15 @@
-"""One session: documents and control messages in, effects out. No sockets, no clock: it is told `now`.
+"""A session: it takes documents, control messages and the time, and returns effects.
 
-A document's way from the socket to its schedule:
+It opens no sockets and reads no clock. The path of a document from the socket to its schedule:
 
-    transports.websocket.connection  reads the message, no faster than a client may send
+    transports.websocket.connection  reads the message, not faster than a client may send
     runtime.session_host             finds the session of the connection
-    Session.receive                  publishes what is due, writes the journal
-    documents.document_queue         keeps the text; parses one document a tick, checks limits, acknowledges
-    documents.pending_blocks         keeps the block until its speech and the blocks before it are there
-    documents.tts_requests           asks voices for its speech, by effects `Speak` that runtime.engines does
-    Session.spoken                   takes the voice's answer; the next tick submits the block
-    playback.player                  resolves, schedules and places it; its feedback comes due by and by
+    Session.receive                  publishes due feedback, writes the journal
+    documents.document_queue         stores the text; parses one document a tick, checks limits, acknowledges
+    documents.pending_blocks         holds the block until its speech and its predecessors are ready
+    documents.tts_requests           requests its speech by effects `Speak`, which runtime.engines carries out
+    Session.on_speech                takes the voice's answer; the next tick submits the block
+    playback.player                  resolves, schedules and places the block; its feedback becomes due
 """
 
 from __future__ import annotations
@@ -59,30 +59,31 @@ from realizer.speech.utterance import Utterance
 
 log = logging.getLogger(__name__)
 
-# Messages that change nothing for others, nor for who comes later.
+# Messages that affect only their own connection: they are not written to the journal.
 PASSING = (Hello, Ping, StateQuery, Subscribe, Unsubscribe)
 
 
 class Session:
-    """A clock, characters, blocks, a scene and the feedback log; and the connections that share them.
+    """A clock, characters, blocks, a scene and a feedback log, and the connections that share them.
+
+    The host calls `receive`, `on_speech`, `on_picture` and `tick`, and carries out `take_effects` after each
+    call. It calls `tick` at `next_due`, and immediately while the session `has_documents`. Parameters `now`
+    are seconds on the host's clock, `t` seconds on the session clock.
 
     Args:
-        id: its name.
+        id: the session's name.
         settings: limits and defaults.
-        now: seconds on the caller's clock; the session's own clock starts here.
-        named: it was asked for by name, and outlives its last connection by `settings.keep`.
-        scene: where targets are, to begin with.
-        capabilities: what `send_welcome` tells.
-        epoch: POSIX seconds at `now`, told with every time; None leaves them out.
-        log: the feedback log, in place of a new one.
+        now: the session clock starts here.
+        named: whether a client chose the name: then the session outlives its last connection by
+            `settings.keep`.
+        scene: the initial positions of targets.
+        capabilities: of the service, for `welcome`.
+        epoch: POSIX seconds at `now`, added to every time in feedback; None leaves them out.
+        log: the feedback log of another session, to continue it.
 
     Attributes:
-        ending: no more documents are taken.
-        feedback_log: the feedback that it has published.
-
-    `receive`, `on_speech`, `on_picture` and `tick` do the work; `take_effects` gives what the shell has to do
-    after each of them. `tick` is wanted when something is due (`next_due`), and at once while the session
-    `has_documents`.
+        ending: whether documents are refused because the service is ending.
+        feedback_log: the published feedback.
     """
 
     def __init__(
@@ -132,11 +133,11 @@ class Session:
 
     @property
     def connections(self) -> tuple[int, ...]:
-        """Ids of the connections that share the session."""
+        """The ids of the connections that share the session."""
         return tuple(self._connections)
 
     def connect(self, connection: int, now: float, seen: int | None = None) -> None:
-        """A client joins; with `seen` it gets the feedback that followed, otherwise what is to come."""
+        """Add a connection. With `seen` it gets all feedback after that one, without it only new feedback."""
         self._wakeups.invalidate()
         self._connections[connection] = Connection(connection, self.feedback_log.newest + 1)
         if not self.log_entry(now - self.opened, "join", connection):
@@ -146,7 +147,7 @@ class Session:
             self.send_missed_feedback(connection, seen)
 
     def disconnect(self, connection: int, now: float) -> None:
-        """A client is gone. A session nobody named ends with it."""
+        """Remove a connection. An unnamed session closes with its last connection."""
         if self._connections.pop(connection, None) is not None:
             self.log_entry(now - self.opened, "leave", connection)
         self.submission.speeches.on_disconnect(connection)
@@ -158,16 +159,16 @@ class Session:
                 self.close()
 
     def dropped_count(self, connection: int) -> int:
-        """How many frames, pictures and packets a client did not get because it was slow."""
+        """Return how many frames, pictures and packets a client missed because it was slow."""
         known = self._connections.get(connection)
         return 0 if known is None else known.dropped
 
     def is_expired(self, now: float) -> bool:
-        """Nobody has been here for `settings.keep` seconds."""
+        """Whether the session has had no connection for `settings.keep` seconds."""
         return self.empty_since is not None and now >= self.empty_since + self.settings.keep
 
     def close(self) -> None:
-        """End: nothing is done and nothing is sent after it."""
+        """Close the session: it does and sends nothing any more."""
         self.closed = True
         self._wakeups.invalidate()
         self._connections.clear()
@@ -175,7 +176,7 @@ class Session:
         self._effects.clear()
 
     def update_backlog(self, connection: int, waiting: int) -> None:
-        """How many bytes wait to be sent to a client: a slow one loses frames, a stuck one is closed."""
+        """Take the number of unsent bytes of a client: a slow one misses frames, a stuck one is closed."""
         if (known := self._connections.get(connection)) is not None:
             known.is_slow = waiting > SLOW
             if known.is_slow:
@@ -187,13 +188,12 @@ class Session:
     # messages in --------------------------------------------------------------------------------
 
     def receive(self, connection: int, message: str | bytes, now: float) -> None:
-        """A WebSocket message: bytes are a sound clip; text is control if it starts with `{`, or else BML."""
+        """Handle a message: bytes are a sound clip, text that starts with `{` is control, all else is BML."""
         if self.closed or connection not in self._connections:
             return
         t = now - self.opened
-        # What was due is told before anything changes, whether somebody woke the session in time or not:
-        # who does all of it again from the journal is not woken in between. Frames whose time has come are
-        # sent as they were planned then.
+        # Feedback and frames that are due go out before anything changes, also if the session was woken too
+        # late: a replay of the journal has no wake-ups in between and must publish the same.
         self._publish(t)
         if self.broadcast.active:
             self._effects += self.broadcast.frames_due(t)[0]
@@ -204,7 +204,7 @@ class Session:
             self.log_entry(t, "tick")
 
     def _dispatch(self, connection: Connection, message: str | bytes, t: float) -> bool:
-        """Do what a message asks for, or reply why not; returns whether it is in the journal."""
+        """Handle a message, or reply with an error. Return whether it was written to the journal."""
         if isinstance(message, bytes):
             return self._receive_sound(connection, message, t)
         if (text := message.lstrip("\ufeff \t\r\n")).startswith("{"):
@@ -220,8 +220,8 @@ class Session:
         if words is None:
             self.submission.enqueue(message, t)
         else:
-            # Not by the player, which would number it: it is not in the journal, and who goes on with the
-            # session from there would number all else otherwise.
+            # Without a number: the message is not in the journal, and a session that is restored from the
+            # journal must number all other feedback in the same way.
             told = WarningFeedback(id=block_id_of(message), type="CANNOT_CREATE_BEHAVIOR", text=words)
             self.send_unnumbered(told.to_xml())
         return words is None
@@ -243,7 +243,7 @@ class Session:
             known = self.player.characters
             self._handle(connection, control, t)
             for name in self.player.characters:
-                if name not in known:  # who is named first is who moves where nobody is named
+                if name not in known:  # the order of characters matters: the first is the default
                     self.log_entry(t, "text", connection.id, json.dumps({"type": "character", "id": name}))
             return False
         if (words := self._write_journal(t, "text", connection, message)) is not None:
@@ -300,7 +300,7 @@ class Session:
     def _write_journal(
         self, t: float, kind: Kind, connection: Connection, message: str | bytes
     ) -> str | None:
-        """Write a message to the journal; returns why it is not taken, or None once it is there."""
+        """Write a message to the journal. Return why it cannot be accepted, or None."""
         try:
             self.journal.append(t, kind, connection.id, message)
         except TakenOver as error:
@@ -312,7 +312,7 @@ class Session:
         return None
 
     def log_entry(self, t: float, kind: Kind, number: int = 0, body: str = "") -> bool:
-        """Write into the journal what has happened; False where the session is another process's now."""
+        """Write an event to the journal. Return False if another process has taken over the session."""
         try:
             self.journal.try_append(t, kind, number, body)
         except TakenOver as error:
@@ -321,13 +321,11 @@ class Session:
         return True
 
     def _compact(self, t: float) -> bool:
-        """Replace the journal by a checkpoint if nothing plays; False if another process has the session.
+        """Replace the journal by a checkpoint if nothing plays. All feedback due by `t` was published.
 
-        One whose journal is long, as its face never comes to rest, need only have nothing that plays: then a
-        blink or a nod of the next seconds, which goes by what was said last, may be another after a takeover.
-
-        Args:
-            t: seconds on the session clock; what was due until then was told.
+        Return False if another process has taken over the session. Normally the face must be at rest too. If
+        the journal is far too long, this is not required: then a blink or a nod of the next seconds, which
+        depends on the last speech, may differ after a takeover.
         """
         if not (
             self.submission.is_idle
@@ -361,16 +359,16 @@ class Session:
         )
 
     def restore(self, parts: Mapping[str, str]) -> float:
-        """Become, as a new session opened at 0, what one was at its checkpoint, with its connections.
+        """Restore the state and the connections of a checkpoint. The session must be new and opened at 0.
 
         Args:
-            parts: as `Kept` has them.
+            parts: the parts of the checkpoint, as in `SavedSession`.
 
         Returns:
-            Seconds on its clock.
+            The time of the checkpoint on the session clock.
 
         Raises:
-            JournalError: these are no parts, or of another version.
+            JournalError: the parts are invalid, or of another version.
         """
         state, clips = checkpoint.read(self.id, parts)
         self.player.set_scene(state.scene)
@@ -385,14 +383,14 @@ class Session:
         return state.at
 
     def hand_over(self, error: TakenOver) -> None:
-        """Another process has the session: let everybody go, to come back there."""
+        """Close all connections because another process has taken over; clients reconnect there."""
         log.warning("%s", error)
         closing: list[Effect] = [Close(connection, 1012, str(error)) for connection in self._connections]
         self.close()
         self._effects = closing
 
     def on_speech(self, speak: int, result: Utterance | RealizerError, now: float) -> None:
-        """The voice's answer to a Speak. Where it failed, the silent voice takes over."""
+        """Take the answer to an effect `Speak`. If the voice failed, the silent voice replaces it."""
         if self.closed:
             return
         t = now - self.opened
@@ -404,7 +402,7 @@ class Session:
             self._work(t)
 
     def on_picture(self, draw: int, result: bytes | RealizerError, now: float) -> None:
-        """The renderer's answer to a Draw: a picture. Where it failed, pictures end with an error."""
+        """Take the answer to an effect `Draw`. If it is an error, the subscriptions to the picture end."""
         if self.closed:
             return
         self._wakeups.invalidate()
@@ -421,20 +419,15 @@ class Session:
     # time ---------------------------------------------------------------------------------------
 
     def tick(self, now: float, *, read_documents: bool = True) -> None:
-        """Do what is due: feedback, sound and frames first, then read or plan one document at most.
-
-        Args:
-            read_documents: or leave documents for another time.
-        """
+        """Send due feedback, sound and frames; then, with `read_documents`, read or plan one document."""
         t = now - self.opened
         if not self.closed and self._work(t, read_documents):
             self.log_entry(t, "tick")
 
     def frames(self, now: float) -> tuple[list[Effect], float] | None:
-        """These, and feedback, and the `next_due` after them where nothing else is due.
+        """Return due frames and feedback, and the next deadline; None if `tick` must be called instead.
 
-        Returns:
-            None where `tick` is wanted, which does the same and more.
+        This is the fast way for a session in which nothing but frames and feedback is due.
         """
         t = now - self.opened
         rhythm = self._wakeups
@@ -450,11 +443,11 @@ class Session:
 
     @property
     def fast_path(self) -> FrameRun | None:
-        """The frames of its only client for which nobody need ask it; None where there is more to it."""
+        """The frames of the only client, which need no call of the session; None if more is due."""
         return self._wakeups.fast_path
 
     def compact_journal(self, now: float) -> None:
-        """Keep the journal short, where it has grown; what is due is told first."""
+        """Replace the journal by a checkpoint if it has grown; due feedback is published first."""
         if self.journal.needs_checkpoint and not self.closed:
             self._wakeups.invalidate()
             self._publish(now - self.opened)
@@ -463,11 +456,11 @@ class Session:
     def replay_until(
         self, t: float, look: Callable[[float], None] = lambda t: None, *, since: float = 0.0
     ) -> None:
-        """Tell what comes due before `t` on the session clock, each at its own time; for who replays it.
+        """Publish the feedback that is due before `t`, each at its own time, for a replay.
 
         Args:
-            look: is called with each of those times, before anything happens then.
-            since: what is owed at once is told then.
+            look: called with each of those times, before the feedback is published.
+            since: the time of feedback that is due immediately.
         """
         while (due := self.player.next_deadline()) is not None and due < t and not self.closed:
             due = max(due, since)
@@ -475,7 +468,7 @@ class Session:
             self._publish(due)
 
     def _work(self, t: float, read_documents: bool = True) -> bool:
-        """What `tick` does; False where nothing came of it but what plays."""
+        """Do the work of `tick`. Return whether a document or a speech changed the state."""
         self._wakeups.unsettled = False
         self._wakeups.invalidate()
         self._publish(t)
@@ -484,8 +477,8 @@ class Session:
             self.broadcast.send_due(t, self._effects)
         if self.submission.pending.blocks:
             self._effects += self.submission.tts.expire(t + EPSILON)
-        # Reading and planning are ticks of their own: the acknowledgement is on its way before planning
-        # begins, and frames that are due come in between.
+        # A tick reads or plans, not both: so the acknowledgement is sent before planning begins, and due
+        # frames are sent in between.
         if not read_documents:
             return False
         done = self.submission.plan_next(t) or self.submission.parse_next(t)
@@ -496,16 +489,16 @@ class Session:
 
     @property
     def has_documents(self) -> bool:
-        """A document can be read or planned at once."""
+        """Whether a document can be read or planned now."""
         return not self.closed and self._wakeups.has_documents
 
     def next_due(self) -> float:
-        """When something is due that is no document, on the caller's clock; infinite where nothing is."""
+        """Return the time of the next event other than documents; infinity if there is none."""
         return float("inf") if self.closed else self._wakeups.next() + self.opened
 
     @property
     def busy(self) -> bool:
-        """A block plays, waits or is being prepared."""
+        """Whether a block plays, waits or is being prepared."""
         return bool(
             self.submission.queue or len(self.submission.pending) or self.player.next_deadline() is not None
         )
@@ -514,14 +507,14 @@ class Session:
         self._effects += effects
 
     def take_effects(self) -> list[Effect]:
-        """What the shell has to do, in order; each is told once."""
+        """Return the effects since the last call, in order."""
         effects, self._effects = self._effects, []
         return effects
 
     # feedback -----------------------------------------------------------------------------------
 
     def _publish(self, t: float) -> None:
-        """Number the feedback that is due, and send it to all connections that take it."""
+        """Number the feedback that is due and send it to its subscribers."""
         texts: list[str] = []
         while due := self.player.due(t + EPSILON):
             for feedback in due:
@@ -539,13 +532,13 @@ class Session:
             self._effects += [Send(connection.id, text) for text in texts if wanted.accepts(text)]
 
     def send_unnumbered(self, feedback: str) -> None:
-        """Send everybody who takes it feedback that has no number: nobody who comes back gets it again."""
+        """Send feedback without a number to its subscribers. It is not sent again after a reconnect."""
         for one in self._connections.values():
             if one.feedback is not None and one.feedback.accepts(feedback):
                 self._effects.append(Send(one.id, feedback))
 
     def send_missed_feedback(self, connection: int, seen: int) -> None:
-        """Send what followed `seen`, after a `gap` where some of it is gone or was never there."""
+        """Send the feedback after `seen`, and `gap` first if some of it is not stored or never existed."""
         first = self.feedback_log.first
         if seen + 1 < first or seen > self.feedback_log.newest:
             self.reply(connection, Gap(seen=seen, first=first))
@@ -555,10 +548,11 @@ class Session:
         self._send_feedback(known, self.feedback_log.since(known.next_seq))
 
     def send_welcome(self, connection: int, now: float) -> None:
-        """Tell a client where it is and what there is."""
+        """Send `welcome` to a connection."""
         t, seq = now - self.opened, self.feedback_log.newest
         self.reply(connection, build_welcome(self.id, t, seq, self.settings, self.capabilities))
 
     def reply(self, connection: int, reply: Reply) -> None:
+        """Send a message to a connection."""
         if not self.closed:
             self._effects.append(Send(connection, reply.text()))

@@ -35,9 +35,9 @@ class _Request:
     """A message `subscribe` of a connection.
 
     Attributes:
-        index: of the character.
+        index: index of the character.
         fps: frames a second.
-        old: the subscription that it replaces.
+        old: the subscription that is replaced.
         t: seconds on the session clock.
     """
 
@@ -50,16 +50,16 @@ class _Request:
     t: float
 
 
-# A subscription, and what the message `subscribed` says of it.
+# A subscription and the fields of the reply `subscribed`.
 _Answer = tuple[Subscription, dict[str, Any]]
 
 
 class Subscriptions:
-    """Subscribes the connections of one session to its streams.
+    """The subscriptions of a session's connections to its streams.
 
     Args:
-        connections: those of the session, by id.
-        reply: sends a message to the connection of that id.
+        connections: the session's own dictionary of connections, by id.
+        reply: sends a message to a connection, by its id.
     """
 
     def __init__(
@@ -79,11 +79,11 @@ class Subscriptions:
         self._reply = reply
 
     def subscribe(self, connection: Connection, message: Subscribe, t: float) -> None:
-        """Give a connection a stream in place of the one it has of that kind, and reply what it is.
+        """Subscribe a connection to a stream, replace its earlier subscription, and reply `subscribed`.
 
         Raises:
-            Wrong: it cannot be had.
-            FaceError: its face cannot be loaded.
+            FieldError: the stream has no such encoding, or an option is invalid.
+            FaceError: the character's face cannot be loaded.
         """
         stream = message.stream
         encodings = STREAMS[stream].encodings
@@ -100,7 +100,7 @@ class Subscriptions:
             key = self._key(message)
             fps, old = message.fps or self._settings.fps, connection.subscriptions.get(key)
             request = _Request(connection, message, encoding, index, fps, old, t)
-            # All other streams are frames.
+            # All other streams consist of frames.
             make = {"schedule": _schedule, "audio": self._audio, "video": self._video}.get(
                 stream, self._frames
             )
@@ -109,19 +109,19 @@ class Subscriptions:
         self._reply(connection.id, Subscribed(**told))
 
     def unsubscribe(self, connection: Connection, message: Unsubscribe) -> None:
-        """End a stream; one that does not run has ended."""
+        """End a subscription. It is no error if there is none."""
         if message.stream == "feedback":
             connection.feedback = None
         connection.subscriptions.pop(self._key(message), None)
 
     def announce_face_change(self, index: int) -> None:
-        """Tell the subscribers of a character's meshes what these mean from now on."""
+        """Send the new scale of a character's meshes to their subscribers."""
         for connection, mesh in self._broadcast.face_changed(index):
             told = {"stream": "mesh", "character": mesh.name, "index": index, "frame": mesh.next}
             self._reply(connection, FaceChanged(**told, **self._mesh(index)))
 
     def views(self, but: Subscription | None = None) -> list[VideoView]:
-        """Return the pictures that are drawn, each once, without those of one subscription."""
+        """Return the views that are drawn, each once, without that of one subscription."""
         subscriptions = [s for c in self._connections.values() for s in c.subscriptions.values()]
         looking = [s for s in subscriptions if isinstance(s, VideoSubscription) and s is not but]
         return list({s.view.key: s.view for s in looking}.values())
@@ -133,7 +133,7 @@ class Subscriptions:
         one = None if message.character is None else request.index
         made = self._broadcast.subscribe_audio(one, message.rate, request.t)
         if isinstance(old, AudioSubscription) and old.sound is made.sound:
-            made = old  # what was sent ahead is not sent again
+            made = old  # do not send again what was sent ahead
         return made, {"index": request.index, "rate": message.rate, "frame": made.next, "fps": 50.0}
 
     def _video(self, request: _Request) -> _Answer:
@@ -189,7 +189,7 @@ class Subscriptions:
                 raise FieldError(
                     "background", "wanted the format png or webp for what is transparent, got jpeg"
                 )
-            behind = None  # the service's own: a JPEG has the light's backdrop instead
+            behind = None  # the service's own default: a JPEG has the light's backdrop instead
         return RenderOptions(
             size=message.size,
             camera=message.camera or settings.camera,
@@ -212,9 +212,10 @@ class Subscriptions:
         }
 
     def _key(self, message: Subscribe | Unsubscribe) -> tuple[str, str | None, str | None]:
-        """Return what a subscription is replaced by; without a name the first character is meant.
+        """Return the key of a subscription: a new one with the same key replaces it.
 
-        Subscriptions to sound and schedules without a name are of all characters. Only videos have views.
+        Without a name the first character is meant, for sound and schedules all characters. Only videos have
+        views.
         """
         stream, character = message.stream, message.character
         if stream not in ("audio", "schedule") and character == self._player.characters[0]:
@@ -228,7 +229,7 @@ def _schedule(request: _Request) -> _Answer:
 
 
 def _index_of_view(request: _Request) -> int:
-    """Return the index of a view's pictures, which no other view of its connection has."""
+    """Return an index for a view's pictures that no other view of its connection has."""
     if isinstance(request.old, VideoSubscription):
         return request.old.index
     others = request.connection.subscriptions.values()

@@ -13,14 +13,14 @@ from realizer.server.streams.frame_windows import EPSILON
 
 
 class WakeupPlan:
-    """Times are seconds on the session clock.
+    """The cached deadlines of a session, in seconds on its clock.
 
     Args:
-        connections: who shares the session, as it goes on.
+        connections: the session's own dictionary of connections, which changes.
 
     Attributes:
-        fast_path: the frames of its only client for which nobody need ask it; None where there is more to it.
-        unsettled: who has left may have left speeches, which end now: nothing else says when.
+        fast_path: the frames of the only client, which need no call of the session; None if more is due.
+        unsettled: whether a client has left, whose open speeches must be ended now.
     """
 
     def __init__(
@@ -36,43 +36,42 @@ class WakeupPlan:
         self._submission = submission
         self._broadcast = broadcast
         self._connections = connections
-        # Until then nothing is due but frames and what blocks tell as they play; None where that is not
-        # known. And when they tell something.
+        # Time of the next event that is neither a frame nor feedback; None if unknown.
         self._next_other: float | None = None
         self._next_feedback = 0.0
 
     def invalidate(self) -> None:
-        """Something may change: nobody knows what is due before all of it has been looked at."""
+        """Forget the cached deadline; `next` computes it again."""
         self._next_other = self.fast_path = None
 
     def only_frames_due(self, t: float) -> bool:
-        """Nothing is due but frames and feedback."""
+        """Whether nothing but frames and feedback can be due at `t`."""
         return self._next_other is not None and t + EPSILON < self._next_other
 
     def feedback_due(self, t: float) -> bool:
-        """Feedback is due."""
+        """Whether feedback is due at `t`."""
         return t + EPSILON >= self._next_feedback
 
     def feedback_sent(self, plans: int) -> None:
-        """Feedback has been told; `plans`: the player's revision before."""
+        """Note that feedback was published; `plans` is the player's version before that."""
         self._next_feedback = self._player.next_change()
         if self._player.version != plans:
             self.invalidate()
 
     @property
     def has_documents(self) -> bool:
-        """A document can be read or planned at once."""
+        """Whether a document can be read or planned now."""
         return self._next_other is None and (self.unsettled or self._submission.has_work)
 
     def next(self) -> float:
-        """When something is due that is no document; infinite where nothing is."""
+        """Return the time of the next event other than documents; infinity if there is none."""
         other, streams = self._next_other, self._broadcast
         if other is None:
             self._next_feedback, asked = self._player.next_change(), self._submission.tts.deadline()
             other = streams.next_other if streams.active else math.inf
             other = other if asked is None else min(other, asked)
-            # Speeches that last and clients that are slow are looked at with every frame, plans with whatever
-            # is told.
+            # Open speeches and slow clients are checked with every frame, schedules with all feedback: then
+            # the deadline cannot be cached.
             slow = any(connection.is_slow for connection in self._connections.values())
             shown = streams.active and streams.has_schedule_subscribers
             if not (self.has_documents or slow or self._submission.speeches.has_open or shown):
@@ -80,11 +79,11 @@ class WakeupPlan:
         return min(other, self._next_feedback, streams.next_frame if streams.active else math.inf)
 
     def next_after_frames(self, following: float, opened: float) -> float:
-        """As `next`, when frames have been sent; those that follow need nobody to ask for them, if they can.
+        """Return the same as `next` after frames were sent, and renew `fast_path`.
 
         Args:
-            following: when the next frame is due.
-            opened: when the session's clock was 0, on the caller's clock.
+            following: time of the next frame.
+            opened: the caller's clock when the session clock was 0.
         """
         if self._next_other is None:
             return self.next()

@@ -17,10 +17,10 @@ def build_welcome(id: str, t: float, seq: int, s: Settings, capabilities: Mappin
     """Return the answer to `hello`.
 
     Args:
-        id: of the session.
+        id: name of the session.
         t: seconds on the session clock.
-        seq: of the newest feedback.
-        capabilities: of the service.
+        seq: number of the newest feedback.
+        capabilities: result of `capabilities_of`.
     """
     return Welcome(
         session=id,
@@ -53,7 +53,7 @@ def build_welcome(id: str, t: float, seq: int, s: Settings, capabilities: Mappin
 
 
 def capabilities_of(settings: Settings) -> dict[str, Any]:
-    """What `welcome` tells beside streams; names, as documents and messages take them."""
+    """Return the capabilities of the service without its streams: names that documents and messages use."""
     from realizer.animation.axis import AU_NAMES
     from realizer.behaviours.registry import KINDS
     from realizer.emotions.words import known_words

@@ -1,1 +1,1 @@
-"""Speech that clients send piece by piece, and their sound clips."""
+"""Speech that clients send in chunks, and their sound clips."""

@@ -19,13 +19,13 @@ from realizer.protocol.wire import ClipPiece
 from realizer.speech.recorded.viseme_names import sound_of
 from realizer.speech.utterance import Phoneme, Recording, Word
 
-MAX_BYTES = 64 * 2**20  # of all clips of a session: half an hour of speech; the oldest go
+MAX_BYTES = 64 * 2**20  # of all clips of a session: half an hour of speech; the oldest are removed
 MAX_CLIPS = 1000  # of a session
 MAX_TIMES = 20_000  # words, or phonemes, of one clip
 
 
 class ClipError(RealizerError):
-    """A clip, or what is told of one, that cannot be used; `where` is the field."""
+    """A clip or its annotation is invalid; `where` is the field."""
 
     def __init__(self, where: str, text: str) -> None:
         super().__init__(text)
@@ -34,7 +34,14 @@ class ClipError(RealizerError):
 
 @dataclass(eq=False)
 class Clip:
-    """What has come of one clip: `sound` is there when its last piece is."""
+    """A clip, complete or not.
+
+    Attributes:
+        pieces: the bytes received so far, until the last piece has arrived.
+        rate: Hz of raw PCM; 0 for a sound file.
+        sound: rate and int16 samples; None until the last piece has arrived.
+        is_annotated: whether the annotation is complete.
+    """
 
     pieces: list[bytes] = field(default_factory=list)
     rate: int = 0
@@ -49,7 +56,7 @@ class Clip:
         return sum(map(len, self.pieces)) if self.sound is None else self.sound[1].nbytes
 
     def to_json(self) -> dict[str, Any]:
-        """All of it, as JSON can hold it."""
+        """Return all fields as JSON values."""
         sound = None
         if self.sound is not None:
             sound = {"rate": self.sound[0], "pcm": _text(self.sound[1].astype("<i2").tobytes())}
@@ -68,7 +75,7 @@ class Clip:
         """Return the clip that `to_json` wrote.
 
         Raises:
-            KeyError, TypeError, ValueError: it is none.
+            KeyError, TypeError, ValueError: it is not one.
         """
         sound = None
         if told["sound"] is not None:
@@ -83,7 +90,7 @@ class AudioClips:
     """The sound clips of one session.
 
     Attributes:
-        recordings: id -> what is whole: sound that has come to its end, with all that was told of it.
+        recordings: id -> clip whose sound and annotation are complete.
     """
 
     def __init__(self) -> None:
@@ -93,18 +100,18 @@ class AudioClips:
 
     @property
     def ids(self) -> list[str]:
-        """Of all clips, whole or not, the oldest first."""
+        """The ids of all clips, complete or not, the oldest first."""
         return list(self._clips)
 
     def changes(self) -> dict[str, str | None]:
-        """Id -> JSON of each clip that has changed since `settle`, None of one that is gone."""
+        """Return the clips that changed since `settle`: id -> JSON, or None for a removed clip."""
         return {
             id: json.dumps(clip.to_json(), ensure_ascii=False) if (clip := self._clips.get(id)) else None
             for id in sorted(self._changed)
         }
 
     def settle(self) -> None:
-        """What `changes` told of is kept."""
+        """Forget the changes, because they are saved."""
         self._changed.clear()
 
     def restore(self, clips: Mapping[str, Clip]) -> None:
@@ -114,11 +121,11 @@ class AudioClips:
             self._publish(id, clip)
 
     def add_chunk(self, piece: ClipPiece) -> None:
-        """One more piece of a clip.
+        """Add a piece to a clip.
 
         Raises:
-            ClipError: out of order, too much, or no sound; the clip is as before then, or gone where it
-                could not be read.
+            ClipError: the piece is out of order, too large or has a wrong rate; or the sound file is invalid,
+                and the clip is removed.
         """
         where = f"clip:{piece.id}"
         self._changed.add(piece.id)
@@ -145,10 +152,10 @@ class AudioClips:
         self._make_room(piece.id)
 
     def annotate(self, message: SpeechMessage) -> None:
-        """What is said in a clip, and when.
+        """Set the text and the times of a clip, or add to them after an annotation that was not final.
 
         Raises:
-            ClipError: no such viseme, times that go back, or too many of them.
+            ClipError: a viseme is unknown, times decrease, or there are too many of them.
         """
         assert message.clip is not None
         phonemes = [*message.phonemes, *_sounds(message)]
@@ -204,7 +211,7 @@ class AudioClips:
         self.recordings[id] = Recording(rate, pcm, text, words, phonemes)
 
     def _make_room(self, newest: str) -> None:
-        """Forget the oldest clips where there are too many; what plays has its sound already."""
+        """Remove the oldest clips if there are too many. Blocks that play have their own reference."""
         sizes = {id: clip.size for id, clip in self._clips.items()}
         while sum(sizes.values()) > MAX_BYTES or len(sizes) > MAX_CLIPS:
             oldest = next(id for id in sizes if id != newest)
@@ -218,7 +225,7 @@ def _text(data: bytes) -> str:
 
 
 def _sounds(message: SpeechMessage) -> list[TimedText]:
-    """Visemes as sounds with such mouths."""
+    """Return the visemes of a message as phonemes of the same mouth shape."""
     try:
         return [
             one.model_copy(update={"text": sound_of(message.viseme_set, one.text)}) for one in message.visemes
@@ -228,9 +235,11 @@ def _sounds(message: SpeechMessage) -> list[TimedText]:
 
 
 def _spans(timed: Sequence[TimedText], whole: float) -> list[tuple[float, float, str]]:
-    """(start, end, text): without an end up to the next one's start."""
+    """Return (start, end, text); a missing end is the start of the next one."""
     starts = [*(one.start for one in timed[1:]), whole]
     return [
         (one.start, max(one.start, following if one.end is None else one.end), one.text)
-        for one, following in zip(timed, starts, strict=False)  # of none, only the end is left
+        for one, following in zip(
+            timed, starts, strict=False
+        )  # `starts` has one item even if `timed` is empty
     ]

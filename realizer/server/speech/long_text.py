@@ -1,4 +1,4 @@
-"""Long texts spoken in parts, so that sound starts early."""
+"""Synthesis of long texts in parts, so that sound starts early."""
 
 from __future__ import annotations
 
@@ -15,55 +15,54 @@ from realizer.server.speech.sentence_splitter import TAG, SentenceSplitter, is_s
 from realizer.speech.ssml import NAMED
 from realizer.speech.utterance import Phoneme, SpeechRequest, Utterance, Word
 
-# Characters up to which a text is said in one: espeak needs 15 ms for so many.
+# A text of at most so many characters is spoken in one part: espeak needs 15 ms for it.
 SHORT = 160
-# And of which a part is made, from the second one on. Each is planned by itself while frames are due.
+# Least length of the second and further parts. Each is planned separately, so that frames are not delayed.
 PART = 400
-CHUNK = 500  # characters that are looked through at a time
-# Elements that are the same of each part as of the whole.
+CHUNK = 500  # characters that are split at a time
+# Elements that can be repeated around each part of their content.
 MANNERS = frozenset({"emphasis", "lang", "prosody", "voice"})
 ELEMENT = re.compile(r"\s*(<([a-z-]+)\b[^<>]*>)(.*)(</\2\s*>)\s*", re.DOTALL)
-# What a second of speech is taken for while little of it is there: this many characters, with the weight of
-# so many characters of what is there.
+# The prior of the speaking rate: characters a second, and its weight in characters of synthesized speech.
 PACE, WEIGHT = 15.0, 60
-# A voice ends whatever it says as it ends a sentence; behind a comma this much of the pause is left.
+# Voices end every request with the pause of a full stop. After a comma this much of it is kept.
 COMMA = 0.15  # s
 QUOTES: Mapping[str, str] = {"&quot;": '"', "&apos;": "'"}
 
 
 class LongText:
-    """A text that is said part by part.
+    """A text that is synthesized part by part.
 
     Args:
-        request: the whole of it.
+        request: the whole text.
 
     Attributes:
-        ready_until: seconds of sound that are there.
+        ready_until: seconds of finished sound.
     """
 
     def __init__(self, request: SpeechRequest) -> None:
         self.ready_until = 0.0
         self._say = request
-        # Taken apart as it is said: that of a long text takes a while too.
+        # An iterator, because splitting a long text takes a while too.
         self._parts = _parts(request.ssml)
         self._coming = next(self._parts, None)
         self._asked: str | None = None
-        self._characters = 0  # that are there
+        self._characters = 0  # of the finished parts
         self._joined: list[tuple[float, Utterance]] = []
         self._words: list[Word] = []
         self._phonemes: list[Phoneme] = []
         self._marks: dict[str, float] = {}
-        self._room: Int16 = np.zeros(0, np.int16)  # for the sound, and more
+        self._room: Int16 = np.zeros(0, np.int16)  # the sound, with spare space
         self._length = 0
         self._rate = 0
 
     @staticmethod
     def is_applicable(request: SpeechRequest) -> bool:
-        """Whether it is better said in parts."""
+        """Whether a request should be synthesized in parts."""
         return len(request.ssml) > SHORT and request.seconds is None and request.recording is None
 
     def next(self) -> SpeechRequest | None:
-        """The next part, which is to be said now; None where there is no more."""
+        """Return the request of the next part; None after the last."""
         if self._coming is None:
             return None
         self._asked, self._coming = self._coming, next(self._parts, None)
@@ -72,17 +71,18 @@ class LongText:
 
     @property
     def is_complete(self) -> bool:
-        """Whether `next` has given the last part."""
+        """Whether `next` has returned the last part."""
         return self._coming is None
 
     def add_part(self, part: Utterance, soonest: float = 0.0) -> Utterance:
-        """What a voice made of the last `next`, behind all the others.
+        """Append the synthesized part that `next` returned last.
 
         Args:
-            soonest: seconds from the start of the first one; what is there before that was heard already.
+            soonest: earliest start of the part, in seconds from the start of the text, because sound before
+                that has been played.
 
         Returns:
-            All of it; its end and the marks that are still to come are guessed.
+            The whole utterance; its end and the marks of missing parts are estimated.
         """
         assert self._asked is not None
         if self._coming is not None and not is_sentence(self._asked):
@@ -90,7 +90,7 @@ class LongText:
         start = max(self.ready_until, soonest) if self._joined else 0.0
         self._sound(part, start)
         if self._rate:
-            # The parts follow each other to the sample.
+            # Parts begin at whole samples.
             start = round(start * self._rate) / self._rate
         self._joined.append((start, part))
         self._words += [Word(w.start + start, w.end + start, w.text) for w in part.words]
@@ -112,7 +112,7 @@ class LongText:
         )
 
     def _sound(self, part: Utterance, start: float) -> None:
-        """Put the sound of a part behind the others, with silence between where it comes late."""
+        """Append the sound of a part, after silence if it comes late."""
         if part.pcm is None or not part.sample_rate:
             return
         self._rate = self._rate or part.sample_rate
@@ -124,12 +124,12 @@ class LongText:
         if last > len(self._room):
             room = np.zeros(2 * last, np.int16)
             room[: self._length] = self._room[: self._length]
-            self._room = room  # what was given out before keeps the old one
+            self._room = room  # earlier utterances keep the old array
         self._room[first:last] = pcm
         self._length = last
 
     def _estimate(self) -> tuple[dict[str, float], float]:
-        """The marks of what is left, and how long that is."""
+        """Return the marks and the duration of the missing parts."""
         spoken = sum(part.duration for _, part in self._joined)
         pace = (spoken + WEIGHT / PACE) / (self._characters + WEIGHT)  # s a character
         if self._coming is None:
@@ -144,7 +144,7 @@ class LongText:
 
 
 def _parts(text: str) -> Iterator[str]:
-    """The first clause alone, then as many as are a part."""
+    """Yield the first clause, then parts of several clauses."""
     part, wanted = "", 1
     for piece in _pieces(text):
         part += piece
@@ -156,7 +156,7 @@ def _parts(text: str) -> Iterator[str]:
 
 
 def _pieces(text: str) -> Iterator[str]:
-    """Sentences and clauses; a long element that only says how to speak is around each part in it."""
+    """Yield sentences and clauses; the tags of a long element of MANNERS are repeated around its parts."""
     clauses = SentenceSplitter()
     for at in range(0, len(text), CHUNK):
         for piece in clauses.feed(text[at : at + CHUNK], close=at + CHUNK >= len(text)):
@@ -173,7 +173,7 @@ def _names(text: str) -> set[str]:
 
 
 def _marks(text: str) -> Iterator[tuple[str, int]]:
-    """Name of a mark, and how many characters that are said stand before it."""
+    """Yield the name of each mark and the number of spoken characters before it."""
     length, last = 0, 0
     for tag in TAG.finditer(text):
         length += tag.start() - last
@@ -183,7 +183,7 @@ def _marks(text: str) -> Iterator[tuple[str, int]]:
 
 
 def trim_final_pause(part: Utterance) -> Utterance:
-    """With the pause of a comma at its end, where the voice has made that of a full stop."""
+    """Return an utterance whose final pause is at most that of a comma."""
     last = part.phonemes[-1] if part.phonemes else None
     if last is None or last.ipa or last.end - last.start <= COMMA:
         return part

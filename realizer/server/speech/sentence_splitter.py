@@ -8,29 +8,30 @@ from typing import Any
 
 from realizer import tables
 
-# A tag; groups: "/" of an end, name, attributes, "/" of one without an inside.
+# A tag; groups: "/" of an end tag, name, attributes, "/" of an empty element.
 TAG = re.compile(r"<(/?)([A-Za-z_][\w.-]*(?::[\w.-]+)?)((?:[^<>\"']|\"[^\"]*\"|'[^']*')*?)(/?)>")
-BEGUN = re.compile(r"</?(?:[A-Za-z_][^<>]*)?$")  # a tag of which more is to come
-ENTITY = re.compile(r"&#?\w{1,10}$")  # of which the semicolon is to come
-LONGEST_TAG = 2000  # characters; what is longer is no tag
-MOST = 20_000  # characters; what waits no longer for its end tag
+BEGUN = re.compile(r"</?(?:[A-Za-z_][^<>]*)?$")  # an incomplete tag
+ENTITY = re.compile(r"&#?\w{1,10}$")  # an entity without its semicolon
+LONGEST_TAG = 2000  # characters; longer text after "<" is no tag
+MOST = 20_000  # characters; longer text does not wait for an end tag
 
 
 class SentenceSplitter:
-    """What has come of a text and is not spoken yet."""
+    """A splitter that is fed text in chunks and returns sentences and clauses as they become complete."""
 
     def __init__(self) -> None:
         self._rest = ""
         self._first = True
 
     def feed(self, text: str, *, close: bool = False) -> list[str]:
-        """Take more of the text.
+        """Add text and return the pieces that are complete.
 
-        A sentence is whole when a blank follows it; tags that follow it at once are part of it. Where one is
-        long (the first of all: not short) it is given out by clauses. Elements are never divided.
+        A sentence is complete when white space follows it; tags directly behind it belong to it. A long
+        sentence, and the first one already if it is not short, is split into clauses. Elements are never
+        split.
 
         Args:
-            close: nothing follows: what is left is given out too.
+            close: whether this is the end of the text: then the rest is returned too.
 
         Returns:
             Pieces in order; together they are the text.
@@ -47,18 +48,18 @@ class SentenceSplitter:
 
 
 def is_sentence(piece: str) -> bool:
-    """Whether a piece ends as a sentence does."""
+    """Whether a piece ends like a sentence."""
     said = TAG.sub("", piece).rstrip()
     return bool(_ending().search(said)) and not _abbreviated(said)
 
 
 def _end(text: str, *, first: bool, closed: bool) -> int | None:
-    """How long the first piece of a text is; None while it is not whole."""
+    """Return the length of the first piece of a text; None while it is incomplete."""
     facts = _facts()
     limit = facts["first"] if first else facts["longest"]
     at = depth = length = 0
-    blank: int | None = None  # behind the last one that is in no element
-    ended = False  # a sentence, up to here
+    blank: int | None = None  # behind the last white space outside of elements
+    ended = False  # whether a sentence ends here
     while at < len(text):
         if text[at] == "<":
             tag = TAG.match(text, at)
@@ -68,7 +69,7 @@ def _end(text: str, *, first: bool, closed: bool) -> int | None:
                 continue
             if not closed and BEGUN.match(text[at : at + LONGEST_TAG]):
                 return None
-            # It is a sign like others.
+            # A plain "<" is handled like any character.
         end = text.find("<", at + 1)
         end = len(text) if end < 0 else end
         run = text[at:end]
@@ -83,7 +84,7 @@ def _end(text: str, *, first: bool, closed: bool) -> int | None:
                 if sign[0][0] == ";" and ENTITY.search(run[: sign.start()]):
                     continue
                 if not follows and kind == "sentence" and end < len(text):
-                    break  # a tag follows at once: it is seen when that is past
+                    break  # a tag follows directly: decide behind it
                 if not (follows.isspace() or sign[0][-1] in facts["alone"] + facts["wide"]):
                     continue
                 if kind == "sentence" or length + stop >= limit:
@@ -101,7 +102,7 @@ def _end(text: str, *, first: bool, closed: bool) -> int | None:
 
 
 def _abbreviated(text: str) -> bool:
-    """Whether a full stop at its end is that of an abbreviation, an initial or a number in a list."""
+    """Whether the full stop at the end belongs to an abbreviation, an initial or a list number."""
     found = re.search(r"([^\W_][\w.]*)\.$", text)
     if found is None:
         return False

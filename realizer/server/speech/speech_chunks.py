@@ -1,4 +1,4 @@
-"""Blocks that speak chunks of text with syncs, SSML and behaviours."""
+"""Conversion of chunks of text, with syncs, SSML and behaviours, to blocks."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from realizer.server.speech.sentence_splitter import TAG
 from realizer.speech.ssml import EMPTY, SPOKEN
 
 ATTRIBUTE = re.compile(r"([\w:.-]+)\s*=\s*(\"[^\"]*\"|'[^']*')")
-# A tag of which the rest never came.
+# An incomplete tag at the end of the text.
 BROKEN = re.compile(r"</?(?:[\w.-]+:)?([A-Za-z][\w.-]+)(?:\s[^<>]*)?$")
 PREFIXES = {"bmla": BMLA, "bmlt": BMLT, "realizer": OWN}
-# Elements beside behaviours that stand in a block and not in its text.
+# Elements that, like behaviours, belong in the block and not in its text.
 BESIDE = frozenset({"constraint", "required"})
 SYNCS = frozenset({"sync", "mark", "bookmark"})
 QUOTES = {"&quot;": '"', "&apos;": "'"}
@@ -27,12 +27,12 @@ QUOTES = {"&quot;": '"', "&apos;": "'"}
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """What is the same for all pieces of a speech, and the number of this one.
+    """The options of a speech and the number of a chunk.
 
     Attributes:
-        speech: the id of the speech, and of the behaviour that says it in each block.
+        speech: id of the speech, and of the speech behaviour in each of its blocks.
         number: 1, 2, ...
-        marks: sync of an earlier piece -> its block.
+        marks: sync of an earlier chunk -> its block.
     """
 
     speech: str
@@ -43,22 +43,23 @@ class Chunk:
 
     @property
     def block(self) -> str:
+        """The id of the chunk's block."""
         return f"{self.speech}.{self.number}"
 
     def document(self, inside: str) -> str:
-        """The block with what stands in it."""
+        """Return the XML of the block with its content."""
         declared = "".join(f" xmlns:{prefix}={quoteattr(name)}" for prefix, name in PREFIXES.items())
         who = "" if self.character is None else f" characterId={quoteattr(self.character)}"
         return f'<bml xmlns="{CORE}"{declared} id="{self.block}"{who}>{inside}</bml>'
 
 
 def text_block(text: str, chunk: Chunk) -> Block:
-    """The block that says a text.
+    """Return the block that speaks a text.
 
-    <sync id="m"/> is a sync point of the behaviour, other SSML is handed to the voice. A behaviour needs no
-    id; one without a sync reference starts where it stands in the text. References to syncs of the speech are
-    `ID:m`, also to those of earlier pieces. What is no XML, or has syncs that cannot be, is spoken without
-    its tags. A tag that breaks off at the end is left out.
+    <sync id="m"/> is a sync point of the speech, other SSML goes to the voice. A behaviour needs no id;
+    without a sync reference it starts at its place in the text. `ID:m` refers to a sync of the speech, also
+    in earlier chunks. Text that is no XML or has invalid syncs is spoken without its tags. An incomplete tag
+    at the end is removed.
     """
     work = _Text(chunk)
     work.read(sanitized(text))
@@ -72,13 +73,13 @@ def text_block(text: str, chunk: Chunk) -> Block:
     assert isinstance(spoken, Block)
     if block is None:
         return spoken
-    # The words count for more than what is wrong with their syncs, which is told all the same.
+    # Speak the words although their syncs are invalid; the block's own children keep the warnings about them.
     children = (*spoken.children, *block.children)
     return replace(block, children=children, places={**block.places, **spoken.places})
 
 
 def clip_block(clip: str, chunk: Chunk) -> Block:
-    """The block that plays a clip as speech."""
+    """Return the block that plays a clip as speech."""
     sound = f"<bmlt:audiofile fileName={quoteattr('clip:' + clip)}/>"
     said = f'<description priority="1" type="audio/x-clip">{sound}</description>'
     (block,) = read(chunk.document(f'<speech id="{chunk.speech}">{said}</speech>'), VOCABULARY)
@@ -87,18 +88,18 @@ def clip_block(clip: str, chunk: Chunk) -> Block:
 
 
 class _Text:
-    """A text while it is read."""
+    """A parser of a chunk's text."""
 
     def __init__(self, chunk: Chunk) -> None:
         self.chunk = chunk
         self.core: list[str] = []  # <text>
         self.ssml: list[str] = []  # <speak>
         self.behaviours: list[str] = []
-        self.spoken = False  # there is something that a voice could say
+        self.spoken = False  # whether there are words
         self.marked = False
 
     def read(self, text: str) -> None:
-        """Take the text apart."""
+        """Parse the text into words, marks and behaviours."""
         at = 0
         while (tag := TAG.search(text, at)) is not None:
             self.say(text[at : tag.start()])
@@ -122,14 +123,14 @@ class _Text:
         self.say(rest)
 
     def say(self, text: str) -> None:
-        """Plain text; & and < need not be escaped in it."""
+        """Add plain text, in which & and < need not be escaped."""
         self.spoken |= any(map(str.isalnum, text))
         written = escape(unescape(text, QUOTES))
         self.core.append(written)
         self.ssml.append(written)
 
     def inside(self) -> str:
-        """What stands in the block."""
+        """Return the content of the block."""
         if not self.spoken and not self.marked:
             return "".join(self.behaviours)
         language = self.chunk.language
@@ -147,7 +148,7 @@ class _Text:
         self.ssml.append(f"<mark name={quoteattr(name)}/>")
 
     def _markup(self, tag: re.Match[str], name: str) -> None:
-        """SSML goes to the voice, without prefix; what nobody knows is left out."""
+        """Add an SSML tag without its prefix; unknown tags are left out."""
         if name in SPOKEN or name in EMPTY:
             self.ssml.append(f"<{tag[1]}{name}{tag[3]}{tag[4]}>")
 
@@ -161,7 +162,7 @@ class _Text:
         self.behaviours.append(f"{head}{tag[4]}>{self._referring(inner)}")
 
     def _here(self) -> str:
-        """A reference to this place in the text."""
+        """Return a reference to this place in the text."""
         if not self.spoken:
             return "0"
         name = f"at-{self.chunk.number}-{len(self.behaviours) + 1}"
@@ -169,7 +170,7 @@ class _Text:
         return f"{self.chunk.speech}:{name}"
 
     def _referring(self, value: str) -> str:
-        """References to syncs of earlier pieces say in which block they are."""
+        """Add the block to references to syncs of earlier chunks."""
         speech = re.escape(self.chunk.speech)
 
         def place(found: re.Match[str]) -> str:
@@ -184,7 +185,7 @@ def _written(values: Mapping[str, str], names: Iterable[str]) -> str:
 
 
 def _closed(text: str, tag: re.Match[str]) -> int:
-    """Behind the end tag of an element; the end of the text where there is none."""
+    """Return the position behind an element's end tag; the end of the text if there is none."""
     depth = 1
     for other in TAG.finditer(text, tag.end()):
         if other[2] == tag[2] and not other[4]:
@@ -196,7 +197,7 @@ def _closed(text: str, tag: re.Match[str]) -> int:
 
 @cache
 def _behaviours() -> Mapping[str, frozenset[str]]:
-    """Name of a behaviour -> its sync points."""
+    """Return the sync points of behaviours, by the elements' names."""
     return {tag.rpartition("}")[2]: frozenset(node.sync_points) for tag, node in VOCABULARY.items()}
 
 

@@ -1,4 +1,4 @@
-"""One streaming speech: text chunks and clips, and the block that spans them."""
+"""A streaming speech: chunks of text and clips, and the block that spans them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from realizer.server.speech.speech_chunks import Chunk, clip_block, text_block
 
 @dataclass(frozen=True, slots=True)
 class _Clip:
-    """A recording that is said after the text before it."""
+    """A recording that is played after the preceding text."""
 
     id: str
 
@@ -22,19 +22,22 @@ class _Clip:
 class SpeechStream:
     """One speech.
 
+    Its own block is a <wait> that lasts from the first chunk to the last. Times are seconds on the session
+    clock.
+
     Attributes:
-        chunk: the last one that was made.
-        unspoken: what is in no piece yet.
-        marks: sync -> the piece it stands in.
-        partial_chunks: pieces that are part of a sentence only.
-        unplanned: pieces that were made and are not planned yet, in order.
-        scheduled: pieces that are planned and have not ended, in order.
-        words: the words that were heard of the pieces that have ended.
-        is_announced: its own block was given out.
-        is_closed: nothing follows.
-        is_finished: it was cut off.
-        last_end: when the last piece that has ended did, seconds on the session clock.
-        end: when its own block is anticipated to end.
+        chunk: the last chunk.
+        unspoken: sentences and clips that are in no block yet.
+        marks: sync -> id of its chunk's block.
+        partial_chunks: ids of blocks that speak only part of a sentence.
+        unplanned: ids of blocks that are not planned yet, in order.
+        scheduled: ids of blocks that are planned and have not ended, in order.
+        words: the spoken words of blocks that have ended.
+        is_announced: whether `own_block` was called.
+        is_closed: whether the client has closed the speech.
+        is_finished: whether the speech was cut off.
+        last_end: when the last ended block ended.
+        end: the anticipated end of its own block.
     """
 
     id: str
@@ -54,33 +57,33 @@ class SpeechStream:
     last_end: float = 0.0
     end: float = 0.0
 
-    # what comes ---------------------------------------------------------------------------------
+    # from the client ------------------------------------------------------------------------------
 
     def add(self, text: str, clip: str | None) -> None:
-        """More of it: a text, and a clip behind that."""
+        """Add text, and a clip after it."""
         self.unspoken.extend(self.splitter.feed(text, close=clip is not None))
         if clip is not None:
             self.unspoken.append(_Clip(clip))
 
     def close(self) -> None:
-        """Nothing follows: what is left is whole."""
+        """End the text: its rest is complete."""
         self.unspoken.extend(self.splitter.feed("", close=True))
         self.is_closed = True
 
     @property
     def unspoken_length(self) -> int:
-        """Characters that are in no piece yet."""
+        """The number of characters that are in no block yet."""
         return sum(len(one) for one in self.unspoken if isinstance(one, str))
 
-    # blocks out ---------------------------------------------------------------------------------
+    # blocks ---------------------------------------------------------------------------------------
 
     @property
     def anticipator(self) -> str:
-        """The name of what says when its own block ends."""
+        """The id of the anticipator of its own block's end."""
         return f"speech-{self.id}"
 
     def own_block(self) -> Block:
-        """Its own block: a <wait> for the end of its last piece."""
+        """Return its own block: a <wait> for the end of the last chunk."""
         self.is_announced = True
         wait = f'<wait id="{self.id}" start="0" end="anticipators:{self.anticipator}:end"/>'
         (block,) = read(replace(self.chunk, number=0).document(wait), VOCABULARY)
@@ -88,7 +91,7 @@ class SpeechStream:
         return replace(block, id=self.id, composition=self.composition)
 
     def next_chunk(self) -> Block:
-        """The block of the first of what is unsaid."""
+        """Return the block of the next sentence or clip."""
         one = self.unspoken.popleft()
         chunk = self.chunk = replace(self.chunk, number=self.chunk.number + 1, marks=dict(self.marks))
         block = clip_block(one.id, chunk) if isinstance(one, _Clip) else text_block(one, chunk)
@@ -99,26 +102,26 @@ class SpeechStream:
             self.partial_chunks.add(block.id)
         return block
 
-    # what became of them ------------------------------------------------------------------------
+    # their states ---------------------------------------------------------------------------------
 
     @property
     def open_chunks(self) -> list[str]:
-        """The pieces that were made and have not ended, in order."""
+        """The ids of blocks that have not ended, in order."""
         return [*self.scheduled, *self.unplanned]
 
     def on_planned(self, chunk: str) -> None:
-        """A piece was taken in."""
+        """Note that a block was planned."""
         if chunk in self.unplanned:
             self.on_done(chunk)
             self.scheduled.append(chunk)
 
     def on_done(self, chunk: str) -> None:
-        """A piece has ended, or never comes."""
+        """Note that a block has ended or was refused."""
         for pieces in (self.unplanned, self.scheduled):
             if chunk in pieces:
                 pieces.remove(chunk)
 
     def awaits_sync(self, sync: str) -> bool:
-        """Whether a sync of its text may still come."""
+        """Whether a sync of the text may still arrive or is not planned yet."""
         chunk = self.marks.get(sync)
         return chunk in self.unplanned or (chunk is None and not (self.is_closed and not self.unspoken))

@@ -12,20 +12,20 @@ from realizer.protocol.messages.speech import SpeechMessage
 from realizer.server.speech.speech_chunks import Chunk
 from realizer.server.speech.speech_stream import SpeechStream
 
-# An open speech ends so much later than now, as long as nobody knows when.
+# The anticipated end of an open speech is so much later than now.
 OPEN = 1e6  # s
-# Its block ends so much behind its last piece, so that what is told of that one comes first.
+# Its own block ends so much after its last chunk, so that the feedback of the chunk comes first.
 BEHIND = 1e-3  # s
 SAME = 1e-6  # s
-# So many pieces are made ahead of the one that is heard. More is work that an interruption makes useless.
+# So many chunks are prepared ahead. An interruption makes the work for more useless.
 AHEAD = 6
-MOST = 500_000  # characters of one speech that wait; nine hours
+MOST = 500_000  # waiting characters of one speech; nine hours
 MAX_SPEECHES = 1_000  # of a session
 CUT_OFF = ("INTERRUPTED", "REVOKED")
 
 
 class SpeechError(ValueError):
-    """A message of a speech that cannot be followed; `where` is its field."""
+    """A message `speech` is invalid; `where` is the field."""
 
     def __init__(self, where: str, text: str) -> None:
         super().__init__(text)
@@ -33,10 +33,10 @@ class SpeechError(ValueError):
 
 
 class SpeechStreams:
-    """The speeches of a session.
+    """The streaming speeches of a session.
 
-    Block `ID` is a <wait> from the first piece to the last: others can follow, interrupt and replace it as
-    any block. Piece k is block `ID.k` and starts when the one before it has ended.
+    Block `ID` is a <wait> from the first chunk to the last: documents can follow, interrupt and replace it
+    like any block. Chunk k is block `ID.k` and starts when the previous one has ended.
     """
 
     def __init__(self, player: Player) -> None:
@@ -49,12 +49,12 @@ class SpeechStreams:
     # from clients -------------------------------------------------------------------------------
 
     def handle(self, message: SpeechMessage, connection: int, t: float) -> None:
-        """More of a speech.
+        """Begin, continue or close a speech.
 
-        What comes for one that was cut off is left out; its id is free again when it is closed.
+        Messages for a speech that was cut off are ignored; its id is free again after `close`.
 
         Raises:
-            SpeechError: too much of it waits to be said, or it was closed and is still being said.
+            SpeechError: too many speeches or characters wait, or the speech is already closed.
         """
         assert message.id is not None
         speech = self._speeches.get(message.id)
@@ -81,27 +81,27 @@ class SpeechStreams:
             speech.close()
 
     def on_disconnect(self, connection: int) -> None:
-        """Who spoke is gone: what is left is said, then its speeches end."""
+        """Close the speeches of a connection that has left; the rest of their text is spoken."""
         for speech in [s for s in self._speeches.values() if s.connection == connection and not s.is_closed]:
             speech.close()
             if speech.is_finished:
                 self._forget(speech.id)
 
     def __contains__(self, block: str) -> bool:
-        """Whether a block is one of a speech that is not over."""
+        """Whether a block belongs to a speech that is not over."""
         return self._of(block) is not None
 
-    # blocks out ---------------------------------------------------------------------------------
+    # blocks ---------------------------------------------------------------------------------------
 
     def next(self) -> Block | None:
-        """The next block that is to be prepared."""
+        """Return the next block to prepare, or None."""
         speech = next(filter(self._has_next, self._speeches.values()), None)
         if speech is None:
             return None
         return speech.next_chunk() if speech.is_announced else speech.own_block()
 
     def cancel(self, blocks: Collection[str] | None) -> list[Block]:
-        """The own blocks of these speeches, or of all (None), that `next` would have given."""
+        """Return the own blocks of speeches, or of all (None), that `next` has not returned."""
         held = [
             s
             for s in self._speeches.values()
@@ -111,11 +111,11 @@ class SpeechStreams:
 
     @property
     def has_next(self) -> bool:
-        """Whether `next` would give a block."""
+        """Whether `next` would return a block."""
         return any(map(self._has_next, self._speeches.values()))
 
     def with_links(self, block: Block) -> Block:
-        """A piece behind those before it; any other block with what it says of `ID:ID:m` of the piece."""
+        """Return a chunk's block with its predecessors, any other block with its `ID:ID:m` resolved."""
         speech = self._of(block.id)
         if speech is None or block.id == speech.id:
             return (
@@ -130,32 +130,32 @@ class SpeechStreams:
         return replace(block, append_after=tuple(before))
 
     def is_streaming(self, block: Block) -> bool:
-        """Whether a piece is part of a sentence of which more has come."""
+        """Whether a block speaks part of a sentence that the next chunk continues."""
         speech = self._of(block.id)
         return speech is not None and block.id in speech.partial_chunks
 
     def awaits_sync(self, block: Block) -> bool:
-        """Whether it names a sync of a speech that may still come."""
+        """Whether a block refers to a sync of a speech that may still arrive."""
         named = filter(self._is_speech_sync, references(block))
         return any(self._speeches[ref.block or ""].awaits_sync(ref.sync or "") for ref in named)
 
-    # what became of them ------------------------------------------------------------------------
+    # their states ---------------------------------------------------------------------------------
 
     def on_planned(self, block: str) -> None:
-        """A block was taken in."""
+        """Note that a block was planned."""
         speech = self._of(block)
         if speech is not None:
             speech.on_planned(block)
 
     def on_refused(self, block: str) -> None:
-        """A block will not play; without the one that holds it together a speech is over."""
+        """Note that a block will not play. If it is a speech's own block, the speech is over."""
         speech = self._of(block)
         if speech is not None:
             speech.on_done(block)
             speech.is_finished |= block == speech.id
 
     def process_feedback(self, feedback: Feedback) -> tuple[Feedback, frozenset[str]]:
-        """Feedback as it is to go out, and the blocks that end with what it tells of."""
+        """Return feedback, with the spoken words added if a speech ended, and the blocks to end with it."""
         if not isinstance(feedback, BlockProgress) or not feedback.id.endswith(":end"):
             return feedback, frozenset()
         block = feedback.id.removesuffix(":end")
@@ -179,21 +179,21 @@ class SpeechStreams:
 
     @property
     def open_ids(self) -> list[str]:
-        """Ids of those whose end nobody knows yet."""
+        """The ids of speeches that are not over."""
         return [speech.id for speech in self._speeches.values() if not speech.is_finished]
 
     @property
     def has_open(self) -> bool:
-        """Whether `advance` may have something to do as time passes."""
+        """Whether `advance` must be called as time passes."""
         return bool(self.open_ids)
 
     def advance(self, t: float) -> bool:
-        """Let the block of each speech end with its last piece; True where one ends at another time."""
+        """Update the anticipated ends of speeches. Return whether one has changed."""
         moved = False
         for speech in self._speeches.values():
             if speech.is_finished:
                 continue
-            # Before its own block starts nobody knows when that is: it must not end before.
+            # Until its own block is placed, its start is unknown, and it must not end before that.
             placed = self._player.blocks.find(speech.id) is not None
             if not (speech.is_closed and placed) or speech.unplanned or speech.unspoken:
                 end = t + OPEN if speech.end < t + OPEN / 2 else speech.end
@@ -221,12 +221,12 @@ class SpeechStreams:
         return ready and self._player.blocks.find(speech.id) is not None
 
     def _is_speech_sync(self, ref: SyncRef) -> bool:
-        """Whether it is a sync in the text of a speech: `ID:ID:m`."""
+        """Whether a reference is to a sync in the text of a speech: `ID:ID:m`."""
         known = ref.block is not None and ref.block in self._speeches and ref.behaviour == ref.block
         return known and ref.sync not in ("start", "end")
 
     def _chunk_reference(self, ref: SyncRef) -> SyncRef:
-        """A reference to a sync of a speech, as one to the piece it stands in."""
+        """Return a reference to a sync of a speech as one to the chunk's block."""
         if not self._is_speech_sync(ref):
             return ref
         chunk = self._speeches[ref.block or ""].marks.get(ref.sync or "")
@@ -240,7 +240,7 @@ class SpeechStreams:
         self._player.anticipate(speech.anticipator, {"end": end}, t)
 
     def _words(self, chunk: str, t: float) -> list[str]:
-        """The words of a piece that have sounded."""
+        """Return the words of a chunk that have been spoken."""
         playing = next((p for p in reversed(self._player.blocks.all()) if p.block.id == chunk), None)
         if playing is None:
             return []

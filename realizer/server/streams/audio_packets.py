@@ -1,4 +1,4 @@
-"""Sound out: the packets that a subscription is due at `now`, and when the next one is."""
+"""Sender of sound packets: due packets of a subscription, and the time of the next one."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from realizer.server.streams.frame_windows import EPSILON
 
 
 def send_packets(connection: Connection, s: AudioSubscription, now: float, effects: list[Effect]) -> None:
-    """Every packet whose time has come; those that a change of plans has made untrue are taken back."""
+    """Send the packets that are due, after taking back those that a change of plans has made wrong."""
     sound, current = s.sound, math.floor((now + EPSILON) / PACKET)
     if s.version != sound.player.version:
         s.version = sound.player.version
@@ -36,7 +36,7 @@ def send_packets(connection: Connection, s: AudioSubscription, now: float, effec
 
 
 def packets_due(s: AudioSubscription) -> float:
-    """When `send_packets` will next have something; infinite where nothing sounds."""
+    """Return the time at which `send_packets` is due next; infinity if nothing sounds."""
     if s.version != s.sound.player.version:
         return -math.inf
     span = s.sound.span()
@@ -46,7 +46,7 @@ def packets_due(s: AudioSubscription) -> float:
 
 
 def _changed(s: AudioSubscription, current: int) -> int | None:
-    """The first packet that was sent ahead and would be another one now."""
+    """Return the number of the first packet sent ahead that would differ now, or None."""
     ahead = sorted((number, pcm) for number, pcm in dict(s.sent).items() if number >= current)
     return next((number for number, pcm in ahead if s.sound.packet(number) != pcm), None)
 

@@ -1,4 +1,4 @@
-"""A player's sound, computed ahead: packet n of it is a slice."""
+"""The sound of a player in packets, mixed ahead in blocks."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from realizer.playback.player import Player
 # A sound packet, and how far ahead of its time it is sent.
 PACKET = 0.02  # s
 AHEAD = 0.1  # s
-# Sound is made in blocks of so many seconds, of which so many are kept.
+# Sound is mixed in blocks of so many seconds, of which so many are cached.
 BLOCK, BLOCKS = 4, 16
 
 
 class AudioStream:
-    """What a player says, in packets of 20 ms; packet n begins at n x 0.02 s on the session clock."""
+    """The sound of one character or all, in packets of 20 ms; packet n begins at n x 0.02 s."""
 
     def __init__(self, player: Player, rate: int, character: int | None) -> None:
         self.player = player
@@ -29,7 +29,7 @@ class AudioStream:
         self._cache: dict[tuple[int, int], tuple[ScheduledSpeech, Float32]] = {}  # the latest at the end
 
     def speeches(self) -> list[ScheduledSpeech]:
-        """What sounds or will sound, in order of its start."""
+        """Return the speeches that sound or will sound, in order of their start."""
         return [
             s
             for s in self.player.speech()
@@ -37,14 +37,14 @@ class AudioStream:
         ]
 
     def span(self) -> tuple[float, float] | None:
-        """(first, last) seconds of all that sounds or will sound; None where nothing does."""
+        """Return the start of the first speech and the end of the last, in seconds; None without speech."""
         speaking = self.speeches()
         if not speaking:
             return None
         return min(s.start for s in speaking), max(_end(s) for s in speaking)
 
     def packet(self, number: int) -> bytes | None:
-        """The PCM of one packet; None in silence."""
+        """Return the PCM of one packet; None in silence."""
         first = number * self._samples
         mix: Float32 | None = None
         for speaking in self.speeches():
@@ -63,7 +63,7 @@ class AudioStream:
         return np.clip(np.rint(mix), -32768, 32767).astype("<i2").tobytes()
 
     def _pcm(self, speaking: ScheduledSpeech, first: int, last: int) -> Float32:
-        """Samples first .. last of a speech at the stream's rate, as a film has it; fewer at its end."""
+        """Return samples first .. last of a speech at the stream's rate; fewer at its end."""
         size = BLOCK * self.rate
         blocks = [self._block(speaking, n) for n in range(first // size, -(-last // size))]
         whole = blocks[0] if len(blocks) == 1 else np.concatenate([np.zeros(0, np.float32), *blocks])
@@ -71,7 +71,7 @@ class AudioStream:
         return whole[first - begin : last - begin]
 
     def _block(self, speaking: ScheduledSpeech, number: int) -> Float32:
-        """`BLOCK` seconds of a speech: of one that lasts for minutes no more is made than is heard."""
+        """Return `BLOCK` seconds of a speech, so that a long one is mixed only as far as it is heard."""
         key = (id(speaking), number)
         known = self._cache.pop(key, None)
         if known is None or known[0] is not speaking:
@@ -84,7 +84,7 @@ class AudioStream:
     def _made(self, speaking: ScheduledSpeech, second: int) -> Float32:
         utterance = speaking.utterance
         assert utterance.pcm is not None
-        # A second more on either side, so that filters and fades are those of the whole.
+        # A second more on either side, so that filters and fades do not begin anew in each block.
         first, rate = max(0, second - 1), utterance.sample_rate
         pcm = utterance.pcm[first * rate : (second + BLOCK + 1) * rate]
         part = replace(utterance, pcm=pcm, duration=len(pcm) / rate)

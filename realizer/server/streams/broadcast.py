@@ -1,4 +1,4 @@
-"""Streams out: what every subscription is due at `now`, and when the next one is."""
+"""The broadcast of a session: it sends due frames, packets, pictures and schedules to subscribers."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ from realizer.server.streams.frame_windows import (
 from realizer.server.streams.schedule_stream import ScheduleStream, schedule_message
 from realizer.server.streams.video_stream import VideoStream
 
-# Frames later than this are not sent at all: what a stalled process owes is not worth catching up with.
+# Frames that are later than this, after the process stalled, are not sent.
 LATE = 0.5  # s
-# How long after a client was too slow for what is planned it is tried again.
+# A slow client gets schedules again after this time.
 RETRY = 0.1  # s
 
 
 class Fanout:
-    """The frames of one timeline and all who get them.
+    """The distribution of one timeline's frames.
 
     Attributes:
-        members: who, with what of them.
+        members: the subscriptions with their connections.
     """
 
     def __init__(self, timeline: FrameTimeline, members: list[tuple[Connection, FrameSubscription]]) -> None:
@@ -50,17 +50,17 @@ class Fanout:
 
     @property
     def next(self) -> int:
-        """The first frame that somebody has not got."""
+        """The first frame that a subscriber has not received."""
         members = self.members
         return members[0][1].next if len(members) == 1 else min(s.next for _, s in members)
 
     @property
     def packed(self) -> PackedFrames | None:
-        """What follows, where only one gets it and it is still what is planned."""
+        """The packed next frames, if there is one subscriber and the plan has not changed."""
         return self._packed if self.timeline.is_current else None
 
     def send(self, newest: int, now: float, sends: list[Send]) -> None:
-        """All up to `newest`, to everybody who has not got it."""
+        """Send all frames up to `newest` to the subscribers that have not received them."""
         timeline, first = self.timeline, self.next
         oldest = first if first == newest else first_frame_at(now - LATE, timeline.fps)
         window = timeline.window(max(first, oldest), newest)
@@ -85,18 +85,18 @@ class Fanout:
 
 
 class FrameRun:
-    """Frames that need nothing of their session but to be sent: nearly all there are.
+    """A run of packed frames for one connection, which are sent without a call of the session.
 
     Args:
-        connection: who gets them.
-        subscription: of theirs; it is told how far they have got.
+        connection: id of the connection.
+        subscription: its subscription, which is advanced.
         strip: the frames.
-        zero: when the session's clock was 0, on the caller's clock.
+        zero: the caller's clock when the session clock was 0.
 
     Attributes:
-        connection: who gets them.
-        until: something else is due then, on the caller's clock.
-        wake_at: when `next_message` is wanted, or something else is due.
+        connection: id of the connection.
+        until: time of the next other event, on the caller's clock.
+        wake_at: time at which `next_message` or another event is due, on the caller's clock.
     """
 
     __slots__ = (
@@ -125,7 +125,7 @@ class FrameRun:
         self.wake_at = min(self._due, until)
 
     def next_message(self, now: float) -> bytes | None:
-        """The frame that is due as a message; None where none is, or more than one, or something else too."""
+        """Return the message of the due frame; None if not exactly one frame and nothing else is due."""
         number, passed = self._next, now + EPSILON
         following = (number + 1) / self._fps + self._zero
         if not self._due <= passed < min(following, self.until) or number >= self._strip.end:
@@ -137,17 +137,17 @@ class FrameRun:
 
 
 class Broadcast:
-    """The timelines, sounds and pictures of one session, each computed once for all who get it.
+    """The streams of one session; each timeline, sound and picture is computed once for all subscribers.
 
     Attributes:
-        active: a connection has a subscription: otherwise nothing is ever due.
+        active: whether there is a subscription; without one nothing is ever due.
     """
 
     def __init__(self, player: Player, faces: CharacterFaces) -> None:
         self.player = player
         self.video = VideoStream(faces)
         self._faces = faces
-        # Subscriptions hold them: what nobody gets any more is gone, however many rates were asked for.
+        # Weak, since subscriptions hold them: the last subscriber takes its timeline with it.
         self._timelines = WeakValueDictionary[tuple[int, float], FrameTimeline]()
         self._audio = WeakValueDictionary[tuple[int | None, int], AudioStream]()
         self._schedules = ScheduleStream(player.blocks)
@@ -158,7 +158,7 @@ class Broadcast:
         self.active = False
 
     def timeline(self, index: int, fps: float) -> FrameTimeline:
-        """The frames of one character at one rate."""
+        """Return the frames of one character at one rate."""
         known = self._timelines.get((index, fps))
         if known is None:
             known = self._timelines[index, fps] = FrameTimeline(
@@ -169,25 +169,25 @@ class Broadcast:
     def subscribe_frames(
         self, stream: str, encoding: str, index: int, name: str | None, fps: float, now: float
     ) -> FrameSubscription:
-        """A subscription to fap, au or mesh, from `now` on."""
+        """Return a subscription to a stream of frames from `now` on."""
         timeline = self.timeline(index, fps)
         return FrameSubscription(stream, encoding, timeline, index, name, first_frame_at(now, fps))
 
     def subscribe_audio(self, index: int | None, rate: int, now: float) -> AudioSubscription:
-        """A subscription to sound, from `now` on; of one character or of all."""
+        """Return a subscription to the sound of one character or all from `now` on."""
         sound = self._audio.setdefault((index, rate), AudioStream(self.player, rate, index))
         return AudioSubscription(sound, index or 0, math.ceil((now - EPSILON) / PACKET), self.player.version)
 
     def subscribe_video(self, index: int, fps: float, look: RenderOptions, now: float) -> VideoSubscription:
-        """A subscription to pictures, from `now` on."""
-        self.active = True  # it may be refused yet: then `send_due` forgets its view
+        """Return a subscription to pictures from `now` on."""
+        self.active = True  # so that `send_due` runs and removes the view if the subscription is refused
         return self.video.subscription(self.timeline(index, fps), index, look, now)
 
     def face_changed(self, index: int) -> list[tuple[int, FrameSubscription]]:
-        """The face of a character is another one: meshes and pictures follow from the next frame on.
+        """Use a character's new face from the next frame on.
 
         Returns:
-            Who gets meshes of it, each with the id of its connection: they must be told what these mean now.
+            Its subscriptions to meshes, each with the id of its connection: they need the new scale.
         """
         for (character, _), timeline in self._timelines.items():
             if character == index:
@@ -197,7 +197,7 @@ class Broadcast:
         return [(c.id, s) for c, s in members if s.stream == "mesh" and s.index == index]
 
     def set_subscribers(self, connections: Iterable[Connection]) -> None:
-        """Who gets what from now on."""
+        """Set the connections whose subscriptions are served."""
         lanes: dict[FrameTimeline, list[tuple[Connection, FrameSubscription]]] = {}
         self._schedule_subscribers, self._audio_subscribers, self._video_subscribers = [], [], []
         for connection in connections:
@@ -216,7 +216,7 @@ class Broadcast:
         )
 
     def send_due(self, now: float, effects: list[Effect]) -> None:
-        """Every frame, packet and drawing whose time has come, to those of the last `set_subscribers`."""
+        """Send all that is due to the subscribers of the last `set_subscribers`."""
         self._send_schedules(self._schedule_subscribers, now, effects)
         for connection, sound in self._audio_subscribers:
             send_packets(connection, sound, now, effects)
@@ -224,7 +224,7 @@ class Broadcast:
         self.video.due(self._video_subscribers, now, effects)
 
     def frames_due(self, now: float) -> tuple[list[Send], float]:
-        """Every frame of fap, au, arkit and mesh whose time has come, and when the next one's comes."""
+        """Return the due frames of fap, au, arkit and mesh, and the time of the next one."""
         sends: list[Send] = []
         soonest = math.inf
         for lane in self._fanouts:
@@ -236,11 +236,11 @@ class Broadcast:
         return sends, soonest
 
     def fast_path(self, zero: float, until: float) -> FrameRun | None:
-        """The frames that one client alone gets, as long as nothing changes; None where there is more to it.
+        """Return the packed frames of the only subscriber; None if there are other or more subscribers.
 
         Args:
-            zero: when the session's clock was 0, on the caller's clock.
-            until: when something else is due, on the caller's clock.
+            zero: the caller's clock when the session clock was 0.
+            until: time of the next other event, on the caller's clock.
         """
         if len(self._fanouts) != 1 or (strip := self._fanouts[0].packed) is None:
             return None
@@ -249,17 +249,17 @@ class Broadcast:
 
     @property
     def has_schedule_subscribers(self) -> bool:
-        """Somebody follows the stream `schedule`."""
+        """Whether the stream `schedule` has subscribers."""
         return bool(self._schedule_subscribers)
 
     @property
     def next_frame(self) -> float:
-        """When `frames_due` will next have something; infinite where nobody gets frames."""
+        """The time of the next frame; infinity without subscribers."""
         return min([lane.next / lane.timeline.fps for lane in self._fanouts], default=math.inf)
 
     @property
     def next_other(self) -> float:
-        """When `send_due` will next have something that is no such frame."""
+        """The time of the next packet, picture or schedule; infinity if there is none."""
         first = [packets_due(s) for _, s in self._audio_subscribers]
         first.append(self.video.next(self._video_subscribers))
         if self._schedule_subscribers:
@@ -272,7 +272,7 @@ class Broadcast:
     def _send_schedules(
         self, looking: list[tuple[Connection, ScheduleSubscription]], now: float, effects: list[Effect]
     ) -> None:
-        """What has changed, to all who know the rest; all of it to those who do not."""
+        """Send changed blocks to subscribers that know the rest, all blocks to the others."""
         if not looking:
             self._schedules.reset()
             return
@@ -280,7 +280,7 @@ class Broadcast:
         for connection, s in looking:
             news = [text for character, text in changes if s.index in (None, character)]
             if connection.is_slow:
-                # What is not sent now is in the whole that is sent later.
+                # The full update that is sent later includes these changes.
                 s.needs_full_update = s.needs_full_update or bool(news)
                 s.retry_at = now + RETRY
             elif s.needs_full_update:

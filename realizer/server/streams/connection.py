@@ -1,4 +1,4 @@
-"""What a session keeps of one connection: its streams, its place in the feedback log, how far it lags."""
+"""The state of one connection of a session: its subscriptions and its place in the feedback log."""
 
 from __future__ import annotations
 
@@ -10,15 +10,20 @@ from realizer.server.session.feedback_log import FeedbackFilter
 from realizer.server.streams.audio_stream import AudioStream
 from realizer.server.streams.frame_windows import FrameTimeline
 
-# Bytes that wait to be sent above which a connection loses frames: two thirds of a second of a mesh.
+# With more unsent bytes than this a connection misses frames: two thirds of a second of a mesh.
 SLOW = 512 * 1024
-# And above which it has stopped reading: it is closed, and can come back with `seen`.
+# With more than this it is closed. The client can resume with `seen`.
 STUCK = 32 * 2**20
 
 
 @dataclass(eq=False)
 class FrameSubscription:
-    """fap, au or mesh frames: `next` is the frame to send; `raw`: AUs before the rules of co-occurrence."""
+    """A subscription to fap, au, arkit or mesh.
+
+    Attributes:
+        next: number of the next frame to send.
+        raw: whether AUs are sent as they are before the rules of co-occurrence.
+    """
 
     stream: str
     encoding: str
@@ -31,7 +36,7 @@ class FrameSubscription:
 
 @dataclass(eq=False)
 class AudioSubscription:
-    """Sound packets: `next` is the one to send, `sent` the last few that went out."""
+    """A subscription to sound: `next` is the next packet to send, `sent` the last few that were sent."""
 
     sound: AudioStream
     index: int
@@ -42,7 +47,14 @@ class AudioSubscription:
 
 @dataclass(eq=False)
 class VideoView:
-    """A picture that is drawn once for everybody who looks at it; `busy` while it is being drawn."""
+    """A view, drawn once for all its subscribers.
+
+    Attributes:
+        next: number of the next frame to draw.
+        busy: id of the effect `Draw` in progress; None while there is none.
+        drawing: number of the frame that is being drawn.
+        started_at: when its drawing started.
+    """
 
     timeline: FrameTimeline
     index: int
@@ -50,18 +62,18 @@ class VideoView:
     options: RenderOptions
     next: int
     busy: int | None = None
-    drawing: int = 0  # the frame that is being drawn
+    drawing: int = 0
     started_at: float = 0.0
 
     @property
     def key(self) -> tuple[object, ...]:
-        """What two subscriptions must share to see the same picture."""
+        """The values by which two subscriptions share a view."""
         return (self.index, self.timeline.fps, self.face, self.options)
 
 
 @dataclass(eq=False)
 class VideoSubscription:
-    """Pictures of a view; `next` is the oldest frame that is still of use, `index` what tells them apart."""
+    """A subscription to a view: `next` is the oldest useful frame, `index` the low byte of the flags."""
 
     view: VideoView
     next: int
@@ -70,8 +82,7 @@ class VideoSubscription:
 
 @dataclass(eq=False)
 class ScheduleSubscription:
-    """What blocks are planned as: `needs_full_update` until it has been sent all of them, `retry_at` when to
-    try that."""
+    """A subscription to schedules; with `needs_full_update` all blocks are sent, not before `retry_at`."""
 
     index: int | None  # of the character; None: all
     name: str | None
@@ -88,10 +99,10 @@ class Connection:
 
     Attributes:
         next_seq: seq of the next feedback to send.
-        feedback: which of it; None for none.
-        is_slow: more than SLOW bytes wait to be sent, as the shell told.
-        dropped: frames, pictures and sound packets it did not get because it was slow.
-        subscriptions: (stream, character, view) -> what it gets.
+        feedback: filter of its feedback; None for no feedback.
+        is_slow: whether more than SLOW bytes are unsent.
+        dropped: number of frames, pictures and sound packets it missed because it was slow.
+        subscriptions: (stream, character, view) -> subscription.
     """
 
     id: int

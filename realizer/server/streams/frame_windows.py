@@ -1,4 +1,4 @@
-"""A player's face, computed ahead: frame k of a rate is a slice."""
+"""Frames of a player's face, computed ahead in windows; a frame is a slice of its window."""
 
 from __future__ import annotations
 
@@ -24,28 +24,28 @@ from realizer.tables import faps
 if TYPE_CHECKING:
     from realizer.face.model import Face
 
-# Frames computed in one call. 250 cost half as much again as 25; a longer window is thrown away more often,
-# when a plan changes.
+# Length of the frames computed in one call. 250 frames cost only 1.5 times as much as 25, but a longer window
+# is discarded more often, when the plan changes.
 WINDOW = 10.0  # s
-# Meshes computed in one call: each costs as much as the frames of a whole window, so a few at a time.
+# Meshes computed in one call; each costs as much as all frames of a window.
 MESHES = 8
-# What follows the 52 weights of a frame of the stream arkit, in radians.
+# Radians; they follow the 52 weights in a frame of the stream arkit.
 TURNS = (
     *("headYaw", "headPitch", "headRoll"),
     *("leftEyeYaw", "leftEyePitch", "rightEyeYaw", "rightEyePitch"),
 )
-# Rounding of k / fps, and of times that go from one clock to another and back, on a clock of days.
+# Rounding of k / fps and of times converted between clocks that have run for days.
 EPSILON = 1e-6  # s
 
 
 @dataclass(frozen=True)
 class FrameSource:
-    """What a stream of numbers holds.
+    """The source of a stream of numbers.
 
     Attributes:
-        names: of the values of a frame.
-        rows: (n, k) the values of n frames, from the AUs, what AUs ask of FAPs, and whether AUs are wanted
-            as they were before the rules of co-occurrence.
+        names: returns the names of the values of a frame.
+        rows: (AUs, mapping to FAPs, whether AUs are wanted as they were before the rules of co-occurrence)
+            -> (n, k) the values of n frames.
     """
 
     names: Callable[[], list[str]]
@@ -71,17 +71,17 @@ SOURCES: Mapping[str, FrameSource] = {
 
 
 def first_frame_at(now: float, fps: float) -> int:
-    """The first frame whose time is not before `now`."""
+    """Return the number of the first frame that is not before `now`."""
     return math.ceil((now - EPSILON) * fps)
 
 
 def last_frame_at(now: float, fps: float) -> int:
-    """The newest frame whose time has come."""
+    """Return the number of the last frame that is not after `now`."""
     return math.floor((now + EPSILON) * fps)
 
 
 class PackedFrames:
-    """The messages of frames `first` .. `end - 1`, which are numbers, made at once: each is a slice."""
+    """The binary messages of frames `first` .. `end - 1`, encoded in one call; each is a slice."""
 
     def __init__(
         self, stream: str, first: int, times: Float64, rows: Float32 | Int32, character: int
@@ -95,16 +95,17 @@ class PackedFrames:
         return self._bytes[at : at + self._size]
 
     def row(self, frame: int) -> Float32 | Int32:
-        """(k,) what the message of a frame holds."""
+        """Return the (k,) values of a frame."""
         row: Float32 | Int32 = np.frombuffer(self[frame], self._dtype, offset=HEADER.size)
         return row
 
 
 class FrameWindow:
-    """Frames `first` .. `first + n - 1` of one character; each kind of them is made when first asked for.
+    """Frames `first` .. `first + count - 1` of one character; each stream of them is computed on first use.
 
     Args:
-        aus: (times) -> the AUs at those times.
+        aus: returns the AUs at times in seconds.
+        face: returns the face for meshes and poses.
     """
 
     def __init__(
@@ -130,13 +131,13 @@ class FrameWindow:
 
     @property
     def aus(self) -> AUFrames:
-        """All that follows is made of these."""
+        """The AUs of the frames, from which all streams are computed."""
         if self._aus is None:
             self._aus = self._make(np.arange(self.first, self.end) / self.fps)
         return self._aus
 
     def drop_source(self) -> None:
-        """What is streamed has been made: let go of what it was made of, which is several times as large."""
+        """Free the AUs, which are several times as large as the streamed frames."""
         self._aus = None
 
     @property
@@ -145,24 +146,24 @@ class FrameWindow:
 
     @property
     def faps(self) -> FAPFrames:
-        """In FAPU."""
+        """The FAPs of the frames, in FAPU."""
         return to_fap(self.aus, self._mapping)
 
     def rows(self, stream: str, asked: bool = False) -> Float32 | Int32:
-        """(n, k) what a frame of fap, au or arkit holds, as the wire tells it.
+        """Return the (n, k) values of fap, au or arkit, as on the wire.
 
         Args:
-            asked: AUs as asked for, before the rules of co-occurrence.
+            asked: whether AUs are wanted as they are before the rules of co-occurrence.
         """
         return SOURCES[stream].rows(self.aus, self._mapping, asked)
 
     @cached_property
     def poses(self) -> Float32:
-        """(n, k) float32: what the face is drawn by."""
+        """(n, k) float32, the values of the face's inputs."""
         return poses(self.aus, self._face().inputs, self._mapping)
 
     def message(self, request: StreamRequest, frame: int) -> str | bytes:
-        """One of its frames as a WebSocket message."""
+        """Return the WebSocket message of a frame."""
         if request.encoding == "binary" and request.stream != "mesh":
             return self.packed(request)[frame]
         key = (request.stream, request.encoding, request.raw, request.name)
@@ -173,7 +174,7 @@ class FrameWindow:
         return message
 
     def packed(self, request: StreamRequest) -> PackedFrames:
-        """All of its messages of fap, au or arkit."""
+        """Return the binary messages of all frames of fap, au or arkit."""
         known = self._packed.get((request.stream, request.raw))
         if known is None:
             rows = self.rows(request.stream, request.raw)
@@ -183,7 +184,7 @@ class FrameWindow:
         return known
 
     def _encode(self, request: StreamRequest, frame: int) -> str | bytes:
-        """What is not made for the whole window at once: meshes, and all that is JSON."""
+        """Return the message of a single frame: meshes, and all streams in JSON."""
         n, time = frame - self.first, frame / self.fps
         row = self.mesh(n) if request.stream == "mesh" else self.packed(request).row(frame)
         if request.encoding == "binary":
@@ -192,7 +193,7 @@ class FrameWindow:
         return json_frame(request.stream, frame, time, values, request.name)
 
     def mesh(self, row: int) -> Int16:
-        """(n_vertices, 3) int16 of one frame, counted from the first."""
+        """Return the (n_vertices, 3) int16 mesh of a frame; `row` counts from the window's first frame."""
         from realizer.face.deform import deform
         from realizer.face.surface import quantise
 
@@ -205,11 +206,11 @@ class FrameWindow:
 
 
 class FrameTimeline:
-    """One character at one rate: frames in windows, dropped when the player's plan changes.
+    """The frames of one character at one rate, in windows that are discarded when the plan changes.
 
     Args:
-        face: what is drawn; called when the first mesh or pose is asked for.
-        mapping: what its AUs ask of FAPs; called again when the face has changed.
+        face: returns the face; called when the first mesh or pose is needed.
+        mapping: returns the mapping from AUs to FAPs; called again when the face has changed.
     """
 
     def __init__(
@@ -230,7 +231,7 @@ class FrameTimeline:
         self._version = -1
 
     def window(self, first: int, last: int) -> FrameWindow:
-        """A window that holds frames first .. last, and more to come."""
+        """Return a window that contains the frames first .. last."""
         window = self._window
         if window is None or not self.is_current or first < window.first or last >= window.end:
             count = max(math.ceil(WINDOW * self.fps), last - first + 1)
@@ -246,18 +247,20 @@ class FrameTimeline:
 
     @property
     def is_current(self) -> bool:
-        """What was computed last is still what is planned."""
+        """Whether the plan has not changed since the window was computed."""
         return self._version == self.player.version
 
     def invalidate(self) -> None:
-        """Compute anew what comes next: the face has changed."""
+        """Discard the window because the face has changed."""
         self._window = self._mapping = None
 
 
 class StreamRequest(Protocol):
-    """What a subscription wants of a window.
+    """The options of a subscription that a window needs.
 
-    `raw`: AUs as asked for, before the rules of co-occurrence; `name`: the character's, where it was given.
+    Attributes:
+        raw: whether AUs are sent as they are before the rules of co-occurrence.
+        name: the character's name, if the client named it.
     """
 
     stream: str

@@ -1,4 +1,4 @@
-"""The blocks of a session as they are planned in, messages of the stream `schedule` out."""
+"""The stream `schedule`: changes of planned blocks as JSON."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from realizer.scheduling.timing import Schedule
 
 @dataclass(eq=False)
 class Snapshot:
-    """A block as it was last told.
+    """A block as it was last sent.
 
     Attributes:
         others: ids of the blocks it refers to.
-        schedules: its own and those of `others`; whatever moves a block gives it a new one. Empty until it
-            is told.
-        text: all of it as JSON, made when it is first wanted.
+        schedules: its own schedule and those of `others`; a block that moves gets a new object. Empty before
+            the first message.
+        text: the whole block as JSON, computed on first use.
     """
 
     playing: ActiveBlock
@@ -34,18 +34,18 @@ class Snapshot:
 
 
 class ScheduleStream:
-    """What became of blocks since they were looked at last, written once for all who get it."""
+    """The changes of blocks since the last look, encoded once for all subscribers."""
 
     def __init__(self, cast: BlockStore) -> None:
         self._cast = cast
         self._snapshots: dict[int, Snapshot] = {}
 
     def reset(self) -> None:
-        """Nobody looks any more."""
+        """Forget all blocks, as there are no subscribers."""
         self._snapshots.clear()
 
     def has_changes(self) -> bool:
-        """Whether `changes` would give something."""
+        """Whether `changes` would return something."""
         schedules = self._schedules()
         return any(p.number not in self._snapshots for p in self._cast.active()) or any(
             seen.state is not seen.playing.state or self._has_moved(seen, schedules)
@@ -53,10 +53,10 @@ class ScheduleStream:
         )
 
     def changes(self) -> list[tuple[int, str]]:
-        """(character index, JSON) of every block that was planned, moved, re-timed, cut, started or ended.
+        """Return (character index, JSON) of each block that was planned, moved, cut, started or ended.
 
-        Of one whose times are as they were only its state, start and end are told. One that has ended is
-        told once more, and never again.
+        If the times of a block have not changed, the JSON has only its state, start and end. A block that has
+        ended is returned once more and then forgotten.
         """
         for playing in self._cast.active():
             if playing.number not in self._snapshots:
@@ -76,19 +76,19 @@ class ScheduleStream:
         return found
 
     def full_message(self, character: int | None) -> str:
-        """All blocks that play or wait, of one character or of all, as `changes` found them."""
+        """Return all blocks of one character or all as of the last `changes`, separated by commas."""
         wanted = (s for s in self._snapshots.values() if character in (None, s.playing.character))
         return ",".join(self._text(seen) for seen in wanted)
 
     def _has_moved(self, seen: Snapshot, schedules: Callable[[str], Schedule | None]) -> bool:
-        """Whether its own times are others, or those of a block it refers to."""
+        """Whether the block or one that it refers to has a new schedule."""
         now = [seen.playing.schedule, *map(schedules, seen.others)]
         return len(now) != len(seen.schedules) or any(
             a is not b for a, b in zip(now, seen.schedules, strict=True)
         )
 
     def _schedules(self) -> Callable[[str], Schedule | None]:
-        """The id of a block -> its schedule now."""
+        """Return a function from the id of a block to its present schedule."""
         newest = {playing.block.id: playing.schedule for playing in self._cast.all()}
 
         return lambda id: newest[id] if id in newest else self._cast.schedule_of(id)
@@ -103,13 +103,13 @@ class ScheduleStream:
 
 
 def schedule_message(time: float, blocks: str, character: str | None, *, whole: bool) -> str:
-    """One message of the stream.
+    """Return a message of the stream.
 
     Args:
         time: seconds on the session clock.
-        blocks: JSON, separated by commas.
-        character: whose blocks; None where those of all.
-        whole: these are all blocks; otherwise those that have changed.
+        blocks: JSON objects separated by commas.
+        character: the character that the client named, or None.
+        whole: whether these are all blocks, not only the changed ones.
     """
     head = {"type": "schedule", "time": round(time, 6), "whole": whole}
     if character is not None:

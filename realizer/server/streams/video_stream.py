@@ -1,4 +1,4 @@
-"""Pictures out: what is to be drawn now, each once for all who look at it, and who gets what was drawn."""
+"""The stream `video`: requests to draw due pictures, and their distribution."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from realizer.server.session.effects import Draw, Effect, RenderOptions, Send
 from realizer.server.streams.connection import Connection, VideoSubscription, VideoView
 from realizer.server.streams.frame_windows import EPSILON, FrameTimeline, first_frame_at, last_frame_at
 
-# A picture that was not drawn by then never will be.
+# A picture that takes longer is given up.
 DEADLINE = 10.0  # s
 
 
 class VideoStream:
-    """The views of one session. Each is drawn one picture at a time, the newest."""
+    """The views of one session. A view has one picture at a time in progress, the newest."""
 
     def __init__(self, faces: CharacterFaces) -> None:
         self._faces = faces
@@ -26,19 +26,19 @@ class VideoStream:
     def subscription(
         self, timeline: FrameTimeline, index: int, look: RenderOptions, now: float
     ) -> VideoSubscription:
-        """A look at one character, from `now` on."""
+        """Return a subscription to a view of one character from `now` on."""
         first = first_frame_at(now, timeline.fps)
         view = VideoView(timeline, index, self._faces.name(index), look, first)
         return VideoSubscription(self._views.setdefault(view.key, view), first, index)
 
     def face_changed(self, index: int) -> None:
-        """The next pictures show another face."""
+        """Show a character's new face in the next pictures."""
         for view in self._views.values():
             if view.index == index:
                 view.face = self._faces.name(index)
 
     def due(self, subscribers: list[VideoSubscription], now: float, effects: list[Effect]) -> None:
-        """Ask for every picture whose time has come."""
+        """Request the pictures that are due."""
         self._views = {s.view.key: s.view for s in subscribers}
         for view in self._views.values():
             fps = view.timeline.fps
@@ -56,7 +56,7 @@ class VideoStream:
 
     @staticmethod
     def next(subscribers: list[VideoSubscription]) -> float:
-        """When `due` will next have something."""
+        """Return the time of the next picture; infinity without subscribers."""
         times = (
             s.view.started_at + DEADLINE if s.view.busy is not None else s.view.next / s.view.timeline.fps
             for s in subscribers
@@ -66,7 +66,7 @@ class VideoStream:
     def on_picture(
         self, draw: int, picture: bytes | None, connections: Iterable[Connection]
     ) -> tuple[list[Effect], list[Connection]]:
-        """A picture is there, or (None) cannot be: what to send, and who looked at it."""
+        """Take a picture, or None if it failed. Return what to send, and the view's connections."""
         view = next((v for v in self._views.values() if v.busy == draw), None)
         if view is None:
             return [], []
