@@ -8,16 +8,15 @@ from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from bml_schema import Block, BMLError, BMLSizeError, read
+from bml_schema import Block, BMLError, BMLSizeError, Speech, read
 from realizer.behaviours.registry import VOCABULARY
 from realizer.core.settings import Settings, raises
 from realizer.playback.feedback_events import parse_warning
 from realizer.playback.player import Player
 from realizer.playback.speaking import stretch_to_fit, without_stretch
 from realizer.scheduling.timing import Warning
-from realizer.server.documents.limits import block_limit_error, size_error
-from realizer.server.documents.pending_blocks import PendingBlock, PendingBlocks
-from realizer.server.documents.tts_requests import TtsRequests
+from realizer.server.documents.limits import MAX_CHARACTERS
+from realizer.server.documents.pending_blocks import PendingBlock, PendingBlocks, TtsRequests
 from realizer.server.session.effects import Effect
 from realizer.server.speech.speech_streams import SpeechStreams
 from realizer.speech.utterance import SpeechRequest
@@ -123,7 +122,7 @@ class Submission:
     @property
     def has_work(self) -> bool:
         """Whether something can be read or planned now."""
-        return bool(self.queue or self.speeches.has_next or self.pending.has_ready)
+        return bool(self.queue or self.speeches.has_next or self.pending.first_ready())
 
     @property
     def is_idle(self) -> bool:
@@ -171,11 +170,9 @@ class Submission:
             block = self.speeches.with_links(block)
             requests = self._player.speech_requests(block)
             character = self._player.character_index(block.character_id)
-            pending = self.pending.add(block, character, {}, t)
-            pending.is_incomplete, pending.is_streaming = (
-                self.speeches.awaits_sync,
-                self.speeches.is_streaming(block),
-            )
+            pending = self.pending.add(block, character, t)
+            pending.is_incomplete = self.speeches.awaits_sync
+            pending.is_streaming = self.speeches.is_streaming(block)
             self._player.announce(block, t)
         except Exception:
             self._internal(block, t)
@@ -262,3 +259,45 @@ def block_id_of(message: str) -> str:
     """Return the block id near the start of an unparsed document, or "<no id>"."""
     found = _BLOCK_ID.search(message, 0, 4096)
     return found.group(1) if found else "<no id>"
+
+
+def size_error(text: str, settings: Settings) -> str | None:
+    """Return why the documents of a message are refused, or None."""
+    size = len(text) if text.isascii() else len(text.encode("utf-8", "surrogatepass"))
+    if size > settings.max_document:
+        words = f"wanted at most {settings.max_document} bytes of BML in a message, got {size}"
+        return f"{words} {raises('max_document')}"
+    # Comments are counted as elements too; a document has few of them.
+    count = text.count("<") - text.count("</")
+    if count > settings.max_elements:
+        words = f"wanted at most {settings.max_elements} elements in a message, got {count}"
+        return f"{words} {raises('max_elements')}"
+    return None
+
+
+def block_limit_error(
+    block: Block, settings: Settings, busy: int, characters: Collection[str | None]
+) -> str | None:
+    """Return why a session refuses a block, or None.
+
+    Args:
+        busy: number of blocks that play or wait in the session.
+        characters: ids of the session's characters.
+    """
+    longest = _longest_speech(block)
+    if longest > settings.max_speech:
+        words = f"wanted at most {settings.max_speech} characters in one speech, got {longest}"
+        return f"{words} {raises('max_speech')}"
+    if busy >= settings.max_blocks:
+        words = f"{settings.max_blocks} blocks play or wait: wanted fewer at a time"
+        return f"{words} {raises('max_blocks')}"
+    if block.character_id not in (None, *characters) and len(characters) >= MAX_CHARACTERS:
+        return f"wanted at most {MAX_CHARACTERS} characters in a session"
+    return None
+
+
+def _longest_speech(block: Block) -> int:
+    """Return the length of a block's longest speech in any of its forms, in characters."""
+    speeches = [node for node in block.behaviours if isinstance(node, Speech)]
+    texts = [sum(len(part) for part in s.text.parts if isinstance(part, str)) for s in speeches if s.text]
+    return max([0, *texts, *(len(form.content) for s in speeches for form in s.descriptions)])

@@ -1,13 +1,12 @@
-"""Limits on documents, blocks, schedules, pictures and memory. Each check returns an error text or None."""
+"""Limits on schedules, pictures and memory. Each check returns an error text or None."""
 
 from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Collection
 from pathlib import Path
 
-from bml_schema import Block, Speech
+from bml_schema import Block
 from realizer.core.settings import Settings, raises
 from realizer.playback.references import external_refs
 from realizer.scheduling.timing import Schedule
@@ -16,41 +15,6 @@ MEMORY = Path("/proc/self/statm")  # the second number: resident pages
 
 # The wire has one byte for the index of a character, and part of its range is for views.
 MAX_CHARACTERS = 16
-
-
-def size_error(text: str, settings: Settings) -> str | None:
-    """Return why the documents of a message are refused, or None."""
-    size = len(text) if text.isascii() else len(text.encode("utf-8", "surrogatepass"))
-    if size > settings.max_document:
-        words = f"wanted at most {settings.max_document} bytes of BML in a message, got {size}"
-        return f"{words} {raises('max_document')}"
-    # Comments are counted as elements too; a document has few of them.
-    count = text.count("<") - text.count("</")
-    if count > settings.max_elements:
-        words = f"wanted at most {settings.max_elements} elements in a message, got {count}"
-        return f"{words} {raises('max_elements')}"
-    return None
-
-
-def block_limit_error(
-    block: Block, settings: Settings, busy: int, characters: Collection[str | None]
-) -> str | None:
-    """Return why a session refuses a block, or None.
-
-    Args:
-        busy: number of blocks that play or wait in the session.
-        characters: ids of the session's characters.
-    """
-    longest = _longest(block)
-    if longest > settings.max_speech:
-        words = f"wanted at most {settings.max_speech} characters in one speech, got {longest}"
-        return f"{words} {raises('max_speech')}"
-    if busy >= settings.max_blocks:
-        words = f"{settings.max_blocks} blocks play or wait: wanted fewer at a time"
-        return f"{words} {raises('max_blocks')}"
-    if block.character_id not in (None, *characters) and len(characters) >= MAX_CHARACTERS:
-        return f"wanted at most {MAX_CHARACTERS} characters in a session"
-    return None
 
 
 def duration_error(block: Block, schedule: Schedule, settings: Settings) -> str | None:
@@ -100,13 +64,3 @@ def memory() -> int:
         return 0
     most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return most if sys.platform == "darwin" else most * 1024
-
-
-def _longest(block: Block) -> int:
-    """Return the length of a block's longest speech in any of its forms, in characters."""
-    longest = 0
-    for node in block.behaviours:
-        if isinstance(node, Speech):
-            text = sum(len(part) for part in node.text.parts if isinstance(part, str)) if node.text else 0
-            longest = max([longest, text, *(len(form.content) for form in node.descriptions)])
-    return longest

@@ -1,14 +1,29 @@
-"""Blocks that wait for their speech or for other blocks."""
+"""Blocks that wait for their speech or for other blocks, and the requests to voices.
+
+Long texts are requested in parts.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 from bml_schema import Block
+from realizer.core.errors import RealizerError, VoiceError
+from realizer.playback.player import Player
 from realizer.playback.references import references
-from realizer.speech.duration_fit import allow_small_warp
+from realizer.scheduling.timing import Warning
+from realizer.server.session.effects import Speak
+from realizer.server.speech.long_text import LongText, trim_final_pause
+from realizer.speech.duration_fit import allow_small_warp, silent_fallback
 from realizer.speech.utterance import SpeechRequest, Utterance
+
+# Longer texts are synthesized in parts: espeak needs 15 ms for so many characters.
+SHORT = 160
+# The silent voice replaces one that has not answered by then.
+PATIENCE = 20.0  # s
+# A part of a long text that comes too late begins so much after the present.
+SOON = 0.05  # s
 
 
 @dataclass(eq=False)
@@ -16,7 +31,7 @@ class PendingBlock:
     """A block in preparation.
 
     Attributes:
-        requests: id of a request -> (behaviour, its speech): requests without an answer.
+        requests: ids of requests without an answer.
         utterances: behaviour -> its synthesized speech.
         predecessors: blocks in preparation that must be planned first.
         final: whether the requested speech is used as it comes, without another request.
@@ -27,7 +42,7 @@ class PendingBlock:
     block: Block
     character: int
     waiting_since: float
-    requests: dict[int, tuple[str, SpeechRequest]]
+    requests: set[int] = field(default_factory=set)
     utterances: dict[str, Utterance] = field(default_factory=dict)
     predecessors: set[PendingBlock] = field(default_factory=set)
     final: bool = False
@@ -39,6 +54,11 @@ class PendingBlock:
         """Whether the block waits for nothing."""
         return not self.requests and not self.predecessors and not self.is_incomplete(self.block)
 
+    def add_utterance(self, id: int, behaviour: str, utterance: Utterance) -> None:
+        """Store the answer to a request."""
+        self.requests.discard(id)
+        self.utterances[behaviour] = allow_small_warp(utterance) if self.final else utterance
+
 
 class PendingBlocks:
     """The waiting blocks in order of arrival."""
@@ -49,9 +69,7 @@ class PendingBlocks:
     def __len__(self) -> int:
         return len(self.blocks)
 
-    def add(
-        self, block: Block, character: int, requests: dict[int, tuple[str, SpeechRequest]], now: float
-    ) -> PendingBlock:
+    def add(self, block: Block, character: int, now: float) -> PendingBlock:
         """Add a block, which waits for its speech and for the earlier blocks it depends on.
 
         It depends on blocks whose sync points it names, on those it follows, on one with its own id, on a
@@ -73,33 +91,12 @@ class PendingBlocks:
                 )
             )
         }
-        pending = PendingBlock(block, character, now, requests, predecessors=after)
+        pending = PendingBlock(block, character, now, predecessors=after)
         for other in self.blocks:
             if other.block.id in (*block.prepend_before, *block.chunk_before) and other not in after:
                 other.predecessors.add(pending)
         self.blocks.append(pending)
         return pending
-
-    def add_utterance(self, speak: int, utterance: Utterance) -> None:
-        """Store the answer to a request. It is dropped if no block waits for it."""
-        for pending in self.blocks:
-            if speak in pending.requests:
-                behaviour, _ = pending.requests.pop(speak)
-                pending.utterances[behaviour] = allow_small_warp(utterance) if pending.final else utterance
-
-    def give_up(self, speak: int) -> None:
-        """Remove a request that no voice can fulfil: the block is planned without that speech."""
-        for pending in self.blocks:
-            pending.requests.pop(speak, None)
-
-    def request_of(self, speak: int) -> SpeechRequest | None:
-        """Return the speech of a request, or None if no block waits for it."""
-        return next((w.requests[speak][1] for w in self.blocks if speak in w.requests), None)
-
-    @property
-    def has_ready(self) -> bool:
-        """Whether `first_ready` would return a block."""
-        return any(w.is_ready for w in self.blocks)
 
     def first_ready(self) -> PendingBlock | None:
         """Return the first block that is ready, or None. The caller removes it once it is planned."""
@@ -113,17 +110,145 @@ class PendingBlocks:
             if w.character == pending.character and w.waiting_since <= pending.waiting_since
         ]
 
-    def overdue(self, before: float) -> Iterator[int]:
-        """Yield the ids of requests from before that time without an answer."""
-        return iter([speak for w in self.blocks if w.waiting_since < before for speak in w.requests])
-
-    def deadline(self, patience: float) -> float | None:
-        """Return the time at which the oldest request is `patience` seconds old; None without requests."""
-        return min((w.waiting_since + patience for w in self.blocks if w.requests), default=None)
-
     def remove(self, gone: Iterable[PendingBlock]) -> None:
-        """Remove blocks, also from the predecessors of others."""
-        ids = {id(w) for w in gone}
-        self.blocks = [w for w in self.blocks if id(w) not in ids]
+        """Remove blocks, also from the predecessors of others; answers to their requests are dropped."""
+        removed = set(gone)
+        self.blocks = [w for w in self.blocks if w not in removed]
         for pending in self.blocks:
-            pending.predecessors = {w for w in pending.predecessors if id(w) not in ids}
+            pending.predecessors -= removed
+        for pending in removed:
+            pending.requests.clear()
+
+
+@dataclass(eq=False)
+class _Request:
+    """A request to a voice, of a whole speech or of a part of a long text.
+
+    Attributes:
+        part: what is requested now.
+        utterance: what the block has of a long text so far.
+    """
+
+    pending: PendingBlock
+    behaviour: str
+    part: SpeechRequest
+    long_text: LongText | None
+    utterance: Utterance | None = None
+
+
+class TtsRequests:
+    """The requests of a session to voices.
+
+    Attributes:
+        fault: why a voice failed last; None if none did.
+        request_count: how many requests were made; the id of the last one.
+    """
+
+    def __init__(self, player: Player, pending: PendingBlocks) -> None:
+        self.fault: str | None = None
+        self.request_count = 0
+        self._player = player
+        self._pending = pending
+        self._requests: dict[int, _Request] = {}
+
+    def __len__(self) -> int:
+        """Return the number of long texts of which a part is requested."""
+        return sum(request.long_text is not None for request in self._requests.values())
+
+    def request(self, pending: PendingBlock, requests: Mapping[str, SpeechRequest]) -> list[Speak]:
+        """Request the speech of a block; of a long text only the first clause.
+
+        Args:
+            requests: behaviour -> its speech, with the voice chosen.
+        """
+        speaks = []
+        for behaviour, whole in requests.items():
+            long_text = LongText(whole) if is_long(whole) and not pending.final else None
+            part = None if long_text is None else long_text.next()
+            speaks.append(self._speak(_Request(pending, behaviour, part or whole, long_text)))
+            pending.requests.add(self.request_count)
+        return speaks
+
+    def unfinished(self, pending: PendingBlock) -> set[str]:
+        """Return the behaviours of a block whose texts are not complete."""
+        requests = self._requests.values()
+        return {r.behaviour for r in requests if r.pending is pending and r.long_text is not None}
+
+    def answer(self, id: int, result: Utterance | RealizerError, t: float) -> list[Speak]:
+        """Take the answer to a request. If the voice failed, the silent voice replaces it.
+
+        Returns:
+            The next requests.
+        """
+        request = self._requests.pop(id, None)
+        if request is None or (request.long_text is None and id not in request.pending.requests):
+            return []
+        pending, long_text = request.pending, request.long_text
+        if not isinstance(result, Utterance):
+            self.fault = str(result)
+            try:
+                result = silent_fallback(request.part, self.fault)
+            except VoiceError:
+                pending.requests.discard(id)  # the block is planned without this speech
+                return []
+        if pending.is_streaming and (long_text is None or long_text.is_complete):
+            result = trim_final_pause(result)
+        if long_text is None:
+            pending.add_utterance(id, request.behaviour, result)
+            return []
+        if not self._extend(request, long_text, id, result, t) or (part := long_text.next()) is None:
+            return []
+        request.part = part
+        return [self._speak(request)]
+
+    def expire(self, t: float) -> list[Speak]:
+        """Answer overdue requests with the silent voice, and return the next requests."""
+        fault = VoiceError(f"the voice has not answered for {PATIENCE:g} s")
+        late = [w for w in self._pending.blocks if w.waiting_since < t - PATIENCE]
+        overdue = [id for pending in late for id in sorted(pending.requests)]
+        return [speak for id in overdue for speak in self.answer(id, fault, t)]
+
+    def deadline(self) -> float | None:
+        """Return the time at which `expire` is due; None without requests."""
+        return min((w.waiting_since + PATIENCE for w in self._pending.blocks if w.requests), default=None)
+
+    def _speak(self, request: _Request) -> Speak:
+        self.request_count += 1
+        self._requests[self.request_count] = request
+        return Speak(self.request_count, request.part)
+
+    def _extend(self, request: _Request, long_text: LongText, id: int, part: Utterance, t: float) -> bool:
+        """Add a part of its text to a block. Return False if the block needs no more parts."""
+        pending, behaviour, before = request.pending, request.behaviour, request.utterance
+        if before is None:
+            request.utterance = long_text.add_part(part)
+            if id in pending.requests:
+                pending.add_utterance(id, behaviour, request.utterance)
+            return bool(pending.utterances)
+        if pending in self._pending.blocks:
+            if pending.utterances.get(behaviour) is not before:
+                return False
+            pending.utterances[behaviour] = request.utterance = long_text.add_part(part)
+            return True
+        block = pending.block.id
+        playing = self._player.blocks.find(block)
+        if playing is None or playing.context.utterances.get(behaviour) is not before:
+            return False
+        times = playing.schedule.times.get(behaviour)
+        if times is None:
+            return False
+        elapsed = t - playing.start - float(times[0])
+        is_late = elapsed > long_text.ready_until - SOON
+        request.utterance = long_text.add_part(part, elapsed + SOON if is_late else 0.0)
+        if not self._player.update_speech_timing(block, behaviour, request.utterance, t):
+            return False
+        # The warnings of earlier parts have been published.
+        for fault in request.utterance.warnings[len(before.warnings) :]:
+            warning = Warning(f"{block}:{behaviour}", "CUSTOM_ATTRIBUTE_NOT_SUPPORTED", f"speech: {fault}")
+            self._player.refuse(warning, t, playing.block.character_id)
+        return True
+
+
+def is_long(request: SpeechRequest) -> bool:
+    """Whether a request should be synthesized in parts."""
+    return len(request.ssml) > SHORT and request.seconds is None and request.recording is None

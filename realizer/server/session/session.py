@@ -7,7 +7,7 @@ It opens no sockets and reads no clock. The path of a document from the socket t
     Session.receive                  publishes due feedback, writes the journal
     documents.document_queue         stores the text; parses one document a tick, checks limits, acknowledges
     documents.pending_blocks         holds the block until its speech and its predecessors are ready
-    documents.tts_requests           requests its speech by effects `Speak`, which runtime.engines carries out
+                                     and requests its speech by effects `Speak`, for runtime.engines
     Session.on_speech                takes the voice's answer; the next tick submits the block
     playback.player                  resolves, schedules and places the block; its feedback becomes due
 """

@@ -15,8 +15,6 @@ from realizer.server.speech.sentence_splitter import TAG, SentenceSplitter, is_s
 from realizer.speech.ssml import NAMED
 from realizer.speech.utterance import Phoneme, SpeechRequest, Utterance, Word
 
-# A text of at most so many characters is spoken in one part: espeak needs 15 ms for it.
-SHORT = 160
 # Least length of the second and further parts. Each is planned separately, so that frames are not delayed.
 PART = 400
 CHUNK = 500  # characters that are split at a time
@@ -56,10 +54,6 @@ class LongText:
         self._length = 0
         self._rate = 0
 
-    @staticmethod
-    def is_applicable(request: SpeechRequest) -> bool:
-        """Whether a request should be synthesized in parts."""
-        return len(request.ssml) > SHORT and request.seconds is None and request.recording is None
 
     def next(self) -> SpeechRequest | None:
         """Return the request of the next part; None after the last."""

@@ -1,82 +1,94 @@
-"""Documents are read one by one, in the order in which they came, and what is too much is said."""
+"""The queue of documents, and the limits of what it accepts."""
 
 from __future__ import annotations
 
 import pytest
 
-from bml_schema import Block
+from bml_schema import Block, parse
+from realizer.behaviours.registry import VOCABULARY
 from realizer.core.settings import Settings
 from realizer.scheduling.timing import Warning
 from realizer.server.documents import document_queue
-from realizer.server.documents.document_queue import CancelledBlock, DocumentQueue
+from realizer.server.documents.document_queue import (
+    CancelledBlock,
+    DocumentQueue,
+    block_limit_error,
+    size_error,
+)
+from realizer.server.documents.limits import MAX_CHARACTERS
 
+SPEECH = '<bml id="b"><speech id="s"><text>{}</text></speech></bml>'
+SSML = (
+    '<bml id="b"><speech id="s"><text>Oh</text>'
+    '<description priority="1" type="application/ssml+xml"><speak>{}</speak></description></speech></bml>'
+)
 WAIT = '<bml id="{}"><wait id="w" duration="1"/></bml>'
 
 
-def read(box: DocumentQueue) -> list[Block | CancelledBlock | Warning]:
+def read(queue: DocumentQueue) -> list[Block | CancelledBlock | Warning]:
     found = []
-    while (item := box.next()) is not None:
+    while (item := queue.next()) is not None:
         found.append(item)
     return found
 
 
-def test_documents_come_out_in_order_with_faults_where_they_stand() -> None:
-    box = DocumentQueue(Settings())
-    assert box.put(WAIT.format("a") + "<bml id='x'><oops" + WAIT.format("b")) is None
-    assert box.put(WAIT.format("c")) is None
-    items = read(box)
+def test_document_queue_returns_blocks_and_warnings_in_order() -> None:
+    queue = DocumentQueue(Settings())
+    assert queue.put(WAIT.format("a") + "<bml id='x'><oops" + WAIT.format("b")) is None
+    assert queue.put(WAIT.format("c")) is None
+    items = read(queue)
     assert [i.id for i in items if isinstance(i, Block)] == ["a", "b", "c"]
     assert len([i for i in items if isinstance(i, Warning)]) == 1
-    assert not box
+    assert not queue
 
 
-def test_a_message_that_is_too_long_is_refused_by_name() -> None:
-    box = DocumentQueue(Settings(max_document=40))
-    refused = box.put(WAIT.format("a"))
+def test_document_queue_refuses_a_long_message_with_its_block_id() -> None:
+    queue = DocumentQueue(Settings(max_document=40))
+    refused = queue.put(WAIT.format("a"))
     assert refused is not None
     assert (refused.id, refused.type) == ("a", "PARSING_FAILURE")
     assert "at most 40 bytes" in refused.text
-    assert not box
+    assert not queue
 
 
-def names(box: DocumentQueue) -> str:
-    """Ids in order, those that are stopped in brackets."""
-    return " ".join(f"({i.block.id})" if isinstance(i, CancelledBlock) else i.id for i in read(box))
+def names(queue: DocumentQueue) -> str:
+    """Return the ids in order, those of cancelled blocks in brackets."""
+    return " ".join(f"({i.block.id})" if isinstance(i, CancelledBlock) else i.id for i in read(queue))
 
 
-def test_what_is_stopped_before_it_is_read_comes_out_as_such_and_what_comes_later_does_not() -> None:
-    box = DocumentQueue(Settings())
-    box.put(WAIT.format("a") + WAIT.format("b") + WAIT.format("c"))
-    first = box.next()
+def test_document_queue_cancels_only_what_has_arrived() -> None:
+    queue = DocumentQueue(Settings())
+    queue.put(WAIT.format("a") + WAIT.format("b") + WAIT.format("c"))
+    first = queue.next()
     assert isinstance(first, Block)
     assert first.id == "a"
-    box.put(WAIT.format("b"))
-    box.cancel(["b", "x"])
-    box.put(WAIT.format("b") + WAIT.format("x"))
-    assert names(box) == "(b) c (b) b x"
-    box.cancel(["b"])  # there is none
-    box.put(WAIT.format("b"))
-    box.put(WAIT.format("c"))
-    box.cancel(None)
-    box.put(WAIT.format("d"))
-    assert names(box) == "(b) (c) d"
+    queue.put(WAIT.format("b"))
+    queue.cancel(["b", "x"])
+    queue.put(WAIT.format("b") + WAIT.format("x"))
+    assert names(queue) == "(b) c (b) b x"
+    queue.cancel(["b"])  # there is none
+    queue.put(WAIT.format("b"))
+    queue.put(WAIT.format("c"))
+    queue.cancel(None)
+    queue.put(WAIT.format("d"))
+    assert names(queue) == "(b) (c) d"
 
 
-def test_too_many_messages_are_refused() -> None:
-    box = DocumentQueue(Settings(max_blocks=1))
-    assert box.put(WAIT.format("a")) is None
-    refused = box.put(WAIT.format("b"))
+def test_document_queue_refuses_too_many_messages() -> None:
+    queue = DocumentQueue(Settings(max_blocks=1))
+    assert queue.put(WAIT.format("a")) is None
+    refused = queue.put(WAIT.format("b"))
     assert refused is not None
     assert "wanted fewer at a time (REALIZER_MAX_BLOCKS sets it)" in refused.text
-    box.clear()
-    assert read(box) == []
+    queue.clear()
+    assert read(queue) == []
 
 
-def test_too_many_behaviours_are_refused_where_they_stand_and_reading_goes_on() -> None:
-    box = DocumentQueue(Settings(max_behaviours=1))
+def test_document_queue_goes_on_after_a_block_of_too_many_behaviours() -> None:
+    queue = DocumentQueue(Settings(max_behaviours=1))
     two = '<bml id="two"><wait id="a"/><wait id="b"/></bml>'
-    assert box.put(two + WAIT.format("one")) is None
-    refused, read_on = read(box)
+    assert queue.put(two + WAIT.format("one")) is None
+    refused, read_on = read(queue)
     assert isinstance(refused, Warning)
     assert refused.id == "two"
     assert "wanted at most 1 behaviours" in refused.text
@@ -84,28 +96,76 @@ def test_too_many_behaviours_are_refused_where_they_stand_and_reading_goes_on() 
     assert isinstance(read_on, Block)
 
 
-def test_what_the_limits_let_in_is_read_however_large() -> None:
+def test_document_queue_reads_all_that_the_limits_allow() -> None:
     waits = "".join(f'<wait id="w{k}"/>' for k in range(10_001))
     text = f'<bml id="b"><!--{"x" * 2**20}-->{waits}</bml>'
-    box = DocumentQueue(Settings(max_document=2 * 2**20, max_behaviours=20_000))
-    assert box.put(text) is None
-    (block,) = read(box)
+    queue = DocumentQueue(Settings(max_document=2 * 2**20, max_behaviours=20_000))
+    assert queue.put(text) is None
+    (block,) = read(queue)
     assert isinstance(block, Block)
     assert len(block.behaviours) == 10_001
 
 
-def test_a_bug_of_the_reader_costs_one_message(monkeypatch: pytest.MonkeyPatch, caplog) -> None:
-    box = DocumentQueue(Settings())
+def test_document_queue_loses_one_message_by_a_bug_of_the_reader(
+    monkeypatch: pytest.MonkeyPatch, caplog
+) -> None:
+    queue = DocumentQueue(Settings())
 
     def broken(*_, **__):
         raise RuntimeError("a bug")
         yield
 
     monkeypatch.setattr(document_queue, "read", broken)
-    box.put("<bml/>")
+    queue.put("<bml/>")
     monkeypatch.undo()
-    box.put(WAIT.format("b"))
-    first, second = read(box)
+    queue.put(WAIT.format("b"))
+    first, second = read(queue)
     assert isinstance(first, Warning)
     assert "internal error" in first.text
     assert isinstance(second, Block)
+
+
+def block(text: str) -> Block:
+    return parse(text, VOCABULARY)
+
+
+@pytest.mark.parametrize(
+    ("most", "text", "busy", "says"),
+    [
+        ({"max_speech": 20}, SPEECH.format("Hello " * 4), 0, "at most 20 characters in one speech, got 24"),
+        ({"max_speech": 60}, SSML.format("Hello " * 20), 0, "at most 60 characters in one speech"),
+        ({"max_blocks": 2}, '<bml id="b"/>', 2, "2 blocks play or wait: wanted fewer at a time"),
+    ],
+)
+def test_block_limit_error_names_the_limit_and_its_setting(
+    most: dict[str, int], text: str, busy: int, says: str
+) -> None:
+    words = block_limit_error(block(text), Settings(**most), busy, ())
+    assert words is not None
+    assert says in words
+    (name,) = most
+    assert words.endswith(f"(REALIZER_{name.upper()} sets it)")
+    assert block_limit_error(block(text), Settings(), busy, ()) is None
+
+
+def test_block_limit_error_bounds_the_number_of_characters() -> None:
+    crowd = [f"c{k}" for k in range(MAX_CHARACTERS)]
+    known, new = (block(f'<bml id="b" characterId="{name}"/>') for name in ("c3", "another"))
+    assert block_limit_error(new, Settings(), 0, crowd[:-1]) is None
+    assert block_limit_error(known, Settings(), 0, crowd) is None
+    assert (
+        block_limit_error(new, Settings(), 0, crowd)
+        == f"wanted at most {MAX_CHARACTERS} characters in a session"
+    )
+
+
+def test_size_error_counts_bytes_and_elements() -> None:
+    text = '<bml id="b"><!-- é --><wait id="w"/></bml>'
+    size = len(text.encode())
+    assert size_error(text, Settings(max_document=size, max_elements=3)) is None  # a comment counts
+    words = size_error(text, Settings(max_document=size - 1))
+    assert words == (
+        f"wanted at most {size - 1} bytes of BML in a message, got {size} (REALIZER_MAX_DOCUMENT sets it)"
+    )
+    words = size_error(text, Settings(max_elements=2))
+    assert words == "wanted at most 2 elements in a message, got 3 (REALIZER_MAX_ELEMENTS sets it)"

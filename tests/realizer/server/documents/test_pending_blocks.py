@@ -1,31 +1,45 @@
-"""Blocks in preparation: who waits for whom."""
+"""Blocks in preparation, and requests to voices; long texts are synthesized part by part."""
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from bml_schema import parse
+from bml_schema import Block, parse
+from bml_schema.feedback import PredictionFeedback, SyncPointProgress, WarningFeedback
 from realizer.behaviours.registry import VOCABULARY
-from realizer.server.documents.pending_blocks import PendingBlocks
-from realizer.speech.utterance import SpeechRequest
-from tests.realizer.server.conftest import spoken
+from realizer.core.errors import VoiceError
+from realizer.server.documents.pending_blocks import PATIENCE, SHORT, PendingBlock, PendingBlocks, is_long
+from realizer.speech.duration_fit import speak_to_length
+from realizer.speech.espeak.voice import EspeakVoice
+from realizer.speech.silent import SilentVoice
+from realizer.speech.utterance import Recording, SpeechRequest
+from tests.realizer.server.conftest import RATE, Client, Driver, spoken
+
+SENTENCE = "Number {} is here, and it is late; nobody knows why we should have been there. "
+TEXT = "".join(SENTENCE.format(n) for n in range(20)) + '<sync id="m"/>And so on. ' + SENTENCE.format(99)
+BLOCK = '<bml id="{}"{}><speech id="s"><text>{}</text></speech>{}</bml>'
+NOD = '<head id="n" lexeme="NOD" stroke="s:m"/>'
 
 
-def block(text: str):
+def block(text: str) -> Block:
     return parse(text, VOCABULARY)
 
 
 @pytest.fixture
-def talking() -> PendingBlocks:
-    """A block "a" whose speech 1 is still to be spoken."""
-    preparation = PendingBlocks()
-    preparation.add(
-        block('<bml id="a"><speech id="s"><text>Hi</text></speech></bml>'),
-        0,
-        {1: ("s", SpeechRequest("Hi"))},
-        0.0,
-    )
-    return preparation
+def speaking() -> PendingBlock:
+    return PendingBlocks().add(block('<bml id="a"><speech id="s"><text>Hi</text></speech></bml>'), 0, 0.0)
+
+
+@pytest.fixture
+def pending(speaking: PendingBlock) -> PendingBlocks:
+    """A block "a" that waits for the answer to request 1."""
+    blocks = PendingBlocks()
+    blocks.blocks.append(speaking)
+    speaking.requests.add(1)
+    return blocks
 
 
 @pytest.mark.parametrize(
@@ -45,30 +59,269 @@ def talking() -> PendingBlocks:
         ),
     ],
 )
-def test_a_block_waits_only_for_what_it_depends_on(talking, later, character, waits) -> None:
-    waiting = talking.add(block(later), character, {}, 1.0)
-    assert bool(waiting.predecessors) is waits
-    assert (talking.first_ready() is None) is waits
+def test_add_finds_the_blocks_that_a_block_depends_on(pending, later, character, waits) -> None:
+    added = pending.add(block(later), character, 1.0)
+    assert bool(added.predecessors) is waits
+    assert (pending.first_ready() is None) is waits
 
 
-def test_a_spoken_block_is_ready_and_lets_the_next_one_go(talking) -> None:
-    talking.add(block('<bml id="b" composition="APPEND"><wait id="w"/></bml>'), 0, {}, 1.0)
-    talking.add_utterance(1, spoken())
+def test_first_ready_returns_a_block_after_its_speech_and_predecessors(pending, speaking) -> None:
+    pending.add(block('<bml id="b" composition="APPEND"><wait id="w"/></bml>'), 0, 1.0)
+    speaking.add_utterance(1, "s", spoken())
     order = []
-    while (ready := talking.first_ready()) is not None:
-        order.append(ready)
-        talking.remove([ready])
-    assert [w.block.id for w in order] == ["a", "b"]
-    assert order[0].utterances["s"].duration == 1.0
+    while (ready := pending.first_ready()) is not None:
+        order.append(ready.block.id)
+        pending.remove([ready])
+    assert order == ["a", "b"]
+    assert speaking.utterances["s"].duration == 1.0
 
 
-def test_an_answer_nobody_waits_for_is_dropped(talking) -> None:
-    talking.add_utterance(99, spoken())
-    assert talking.request_of(99) is None
-    assert talking.request_of(1).ssml == "Hi"
+def test_remove_drops_the_requests_of_a_block(pending, speaking) -> None:
+    pending.remove([speaking])
+    assert not speaking.requests
+    assert len(pending) == 0
 
 
-def test_what_takes_too_long_is_told(talking) -> None:
-    assert talking.deadline(20.0) == 20.0
-    assert list(talking.overdue(-0.1)) == []
-    assert list(talking.overdue(0.1)) == [1]
+@pytest.mark.parametrize(
+    ("request_", "expected"),
+    [
+        (SpeechRequest("x" * SHORT), False),
+        (SpeechRequest("x" * (SHORT + 1)), True),
+        (SpeechRequest("x" * 1000, seconds=3.0), False),
+        (SpeechRequest("x" * 1000, recording=Recording(8000, np.zeros(8, np.int16))), False),
+    ],
+)
+def test_is_long_excludes_requests_of_given_length_and_recordings(request_, expected) -> None:
+    assert is_long(request_) is expected
+
+
+@pytest.fixture(scope="module")
+def voice():
+    voice = EspeakVoice()
+    yield voice
+    voice.close()
+
+
+def answer(driver: Driver, voice=None) -> bool:
+    """Answer the next request; return False if there is none."""
+    answered = getattr(driver, "answered", 0)
+    if answered == len(driver.spoken):
+        return False
+    driver.answered = answered + 1
+    speak = driver.spoken[answered]
+    driver.say(speak.id, speak_to_length(voice or SilentVoice(), speak.request))
+    return True
+
+
+def times(client: Client) -> dict[str, float]:
+    return {f.id: f.global_time for f in client.feedback if hasattr(f, "global_time")}
+
+
+def ends(client: Client, block: str) -> list[float]:
+    predicted = [b for f in client.feedback if isinstance(f, PredictionFeedback) for b in f.blocks]
+    return [b.global_end for b in predicted if b.id == block and b.global_end is not None]
+
+
+def test_tts_requests_play_the_first_clause_before_the_rest_is_made(voice) -> None:
+    driver = Driver(mute=True)
+    driver.send({"type": "subscribe", "stream": "audio", "rate": RATE})
+    driver.send(BLOCK.format("b", "", TEXT, NOD))
+    assert [len(o.request.ssml) < 160 for o in driver.spoken] == [True]
+    assert answer(driver, voice)
+    first = driver.run(0.1)
+    assert [f.stream for f in first.frames] == ["audio"] * len(first.frames)
+    assert first.frames, "it sounds"
+    while answer(driver, voice):
+        driver.run(driver.now + 0.2)
+    speaking = driver.session.player.speech()[0]
+    client = driver.run(200)
+    heard = np.concatenate([f.values for f in client.frames if not f.flush])
+    start = round((speaking.start - client.frames[0].time) * RATE)
+    assert np.array_equal(heard[start:][: len(speaking.utterance.pcm)], speaking.utterance.pcm)
+    assert not [f for f in client.frames if f.flush], "what was sent ahead stays true"
+    frames = [f.frame for f in client.frames]
+    assert frames == list(range(frames[0], frames[-1] + 1)), "no gap"
+
+
+def test_tts_requests_report_marks_when_they_sound(voice) -> None:
+    driver = Driver(mute=True)
+    driver.send(BLOCK.format("b", "", TEXT, NOD))
+    while answer(driver, voice):
+        driver.run(driver.now + 0.3)
+    speaking = driver.session.player.speech()[0]
+    at = times(driver.run(200))
+    mark = speaking.start + speaking.utterance.marks["m"]
+    assert at["b:s:m"] == pytest.approx(mark, abs=1e-6)
+    assert at["b:n:stroke"] == pytest.approx(mark, abs=1e-6)
+    word = next(w for w in speaking.utterance.words if w.text.lower() == "and" and w.start >= mark - 0.005)
+    assert speaking.start + word.start == pytest.approx(mark, abs=0.06)
+
+
+def test_tts_requests_predict_the_end_again_with_every_part() -> None:
+    driver = Driver(mute=True)
+    driver.send(BLOCK.format("b", "", TEXT, ""))
+    parts = 0
+    while answer(driver):
+        parts += 1
+    predicted = list(dict.fromkeys(ends(driver.clients[1], "b")))
+    assert len(predicted) == parts > 3
+    assert predicted[-1] == pytest.approx(driver.session.player.speech()[0].utterance.duration)
+    assert times(driver.run(300))["b:end"] == pytest.approx(predicted[-1])
+
+
+def test_tts_requests_move_lips_smoothly_across_parts() -> None:
+    driver = Driver(mute=True, idle=False)
+    driver.send({"type": "subscribe", "stream": "fap", "fps": 25})
+    driver.send(BLOCK.format("b", "", TEXT, ""))
+    while answer(driver):
+        driver.run(driver.now + 0.31)
+    lasts = driver.session.player.speech()[0].utterance
+    client = driver.run(lasts.duration + 1)
+    mouth = np.array([f.values[3:5] for f in client.frames if f.stream == "fap"])
+    for start, part in lasts.sections:
+        own = mouth[round(start * 25) : round((start + part.duration) * 25)]
+        assert np.abs(own).max() > 100
+    one = Driver(idle=False, mute=True)
+    one.send({"type": "subscribe", "stream": "fap", "fps": 25})
+    one.send(BLOCK.format("b", "", SENTENCE.format(1), ""))
+    one.say(1, SilentVoice().say(one.spoken[0].request))
+    usual = np.array([f.values[3:5] for f in one.run(10).frames if f.stream == "fap"])
+    assert np.abs(np.diff(mouth, axis=0)).max() < 1.5 * np.abs(np.diff(usual, axis=0)).max()
+
+
+def test_tts_requests_end_when_the_block_is_stopped() -> None:
+    driver = Driver(mute=True)
+    driver.send(BLOCK.format("b", "", TEXT, ""))
+    answer(driver)
+    driver.run(1.0)
+    driver.send({"type": "stop"})
+    answer(driver)
+    assert not answer(driver)
+    assert driver.run(5).feedback[-1].status == "INTERRUPTED"
+    driver.send(BLOCK.format("b", "", "Hello.", ""))
+    answer(driver)
+    assert times(driver.run(9))["b:end"] < 8, "nothing of the first text is in the second"
+
+
+def test_tts_requests_fill_a_part_that_failed_with_silence() -> None:
+    driver = Driver(mute=True)
+    driver.send(BLOCK.format("b", "", TEXT, ""))
+    answer(driver)
+    driver.say(driver.spoken[1].id, VoiceError("it died"))
+    driver.answered = 2
+    while answer(driver):
+        pass
+    client = driver.run(300)
+    assert client.feedback[-1].id == "b:end"
+    warnings = [(f.id, f.text) for f in client.feedback if isinstance(f, WarningFeedback)]
+    assert warnings == [("b:s", "speech: it died; this one has no sound")]
+    assert driver.send({"type": "state"}).of("state")[-1]["voice"]["fault"] == "it died"
+
+
+def test_tts_requests_play_a_late_part_when_it_arrives() -> None:
+    driver = Driver(mute=True)
+    driver.send(BLOCK.format("b", "", TEXT, ""))
+    answer(driver)
+    made = driver.session.player.speech()[0].utterance.sections[0][1].duration
+    driver.run(made + 2.0)
+    answer(driver)
+    parts = driver.session.player.speech()[0].utterance.sections
+    assert parts[1][0] == pytest.approx(made + 2.05, abs=0.01)
+
+
+def test_tts_requests_continue_while_the_block_waits() -> None:
+    driver = Driver(mute=True)
+    driver.send('<bml id="a"><wait id="w" duration="3"/></bml>')
+    driver.send(BLOCK.format("b", ' composition="APPEND"', TEXT, NOD))
+    while answer(driver):
+        pass
+    assert driver.session.player.speech()[0].start == pytest.approx(3.0)
+    at = times(driver.run(300))
+    assert at["b:n:stroke"] == pytest.approx(at["b:s:m"])
+
+
+def test_tts_requests_complete_the_text_before_a_late_activation() -> None:
+    driver = Driver(mute=True)
+    bmla = ' xmlns:bmla="http://www.asap-project.org/bmla" bmla:preplan="true"'
+    driver.send(BLOCK.format("b", bmla, TEXT, NOD))
+    while answer(driver):
+        pass
+    bmla = ' xmlns:bmla="http://www.asap-project.org/bmla" bmla:onStart="b"'
+    driver.send(f'<bml id="a"{bmla}><wait id="w" duration="1"/></bml>')
+    last = driver.session.player.speech()[0]
+    at = times(driver.run(300))
+    assert at["b:end"] - at["b:start"] == pytest.approx(last.utterance.duration)
+    assert at["b:n:stroke"] == pytest.approx(at["b:s:m"])
+    assert at["b:s:m"] - at["b:start"] == pytest.approx(last.utterance.marks["m"])
+
+
+def test_tts_requests_speak_a_stretched_text_again_as_a_whole(voice) -> None:
+    text = "".join(SENTENCE.format(n) for n in range(4))
+    asked = 1.1 * voice.say(SpeechRequest(text)).duration
+    driver = Driver(mute=True)
+    timed = f'<bml id="b"><speech id="s" start="0" end="{asked}"><text>{text}</text></speech></bml>'
+    driver.send(timed)
+    while answer(driver, voice):
+        pass
+    whole = [o for o in driver.spoken if o.request.seconds is not None]
+    assert [o.request.ssml.strip() for o in whole] == [text.strip()]
+    assert times(driver.run(60))["b:s:end"] == pytest.approx(asked, abs=0.01)
+
+
+def test_expire_replaces_a_voice_that_does_not_answer_part_by_part() -> None:
+    driver = Driver(mute=True)
+    driver.send(BLOCK.format("b", "", TEXT, ""))
+    driver.run(PATIENCE + 1)
+    assert len(driver.spoken) == 2, "and asked for the next part"
+    assert "b:start" in times(driver.clients[1])
+
+
+def test_tts_requests_report_each_sync_once() -> None:
+    driver = Driver(mute=True)
+    driver.send(BLOCK.format("b", "", TEXT, NOD))
+    while answer(driver):
+        driver.run(driver.now + 0.3)
+    ids = [f.id for f in driver.run(300).feedback if isinstance(f, SyncPointProgress)]
+    assert len(ids) == len(set(ids))
+    assert {"b:s:start", "b:s:m", "b:s:end"} <= set(ids)
+
+
+ACTS = st.lists(
+    st.one_of(
+        st.tuples(st.just("say"), st.sampled_from(["", ' composition="APPEND"', ' composition="REPLACE"'])),
+        st.tuples(st.just("answer"), st.sampled_from([0, 1])),
+        st.tuples(st.just("fail"), st.just(0)),
+        st.tuples(st.just("stop"), st.sampled_from(["b", "tie"])),
+        st.tuples(st.just("tie"), st.sampled_from(["b:s:m", "b:s:end", "b:s:start"])),
+        st.tuples(st.just("run"), st.sampled_from([0.1, 3.0, 30.0])),
+    ),
+    max_size=16,
+)
+
+
+@settings(max_examples=25, deadline=None)
+@given(ACTS)
+def test_tts_requests_finish_or_cut_off_every_text_in_any_order(acts) -> None:
+    driver = Driver(mute=True, idle=False)
+    driver.send({"type": "subscribe", "stream": "fap", "fps": 1})
+    for act, what in acts:
+        match act:
+            case "say":
+                driver.send(BLOCK.format("b", what, TEXT, NOD))
+            case "answer":
+                answer(driver)
+            case "fail" if getattr(driver, "answered", 0) < len(driver.spoken):
+                driver.answered = getattr(driver, "answered", 0) + 1
+                driver.say(driver.spoken[driver.answered - 1].id, VoiceError("no"))
+            case "stop":
+                driver.send({"type": "stop", "blocks": [what]})
+            case "tie":
+                driver.send(f'<bml id="tie"><head id="n" lexeme="NOD" start="{what}"/></bml>')
+            case "run":
+                driver.run(driver.now + float(what))
+    while answer(driver):
+        driver.run(driver.now + 0.1)
+    client = driver.run(driver.now + 600)
+    faults = [f.text for f in client.feedback if isinstance(f, WarningFeedback)]
+    assert not [text for text in faults if "internal" in text]
+    assert driver.send({"type": "state"}).of("state")[-1]["blocks"] == []

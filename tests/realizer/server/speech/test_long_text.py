@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.server.speech.long_text import PART, SHORT, LongText
+from realizer.server.speech.long_text import PART, LongText
 from realizer.speech.espeak.voice import EspeakVoice
 from realizer.speech.silent import SilentVoice
-from realizer.speech.utterance import Phoneme, Recording, SpeechRequest, Utterance, Word
+from realizer.speech.utterance import Phoneme, SpeechRequest, Utterance, Word
 
 SENTENCES = [
     "When all of them had come to the house by the sea, they sat down and waited for him.",
@@ -146,19 +146,6 @@ def test_parts_at_another_rate_sound_at_the_first_ones() -> None:
     both = growing.add_part(Utterance(0.05, (), (), {}, 16000, tone))
     assert both.sample_rate == 8000
     assert len(both.pcm) == 1200
-
-
-@pytest.mark.parametrize(
-    ("say", "suits"),
-    [
-        (SpeechRequest("x" * SHORT), False),
-        (SpeechRequest("x" * (SHORT + 1)), True),
-        (SpeechRequest("x" * 1000, seconds=3.0), False),
-        (SpeechRequest("x" * 1000, recording=Recording(8000, np.zeros(8, np.int16))), False),
-    ],
-)
-def test_only_long_texts_that_take_as_long_as_they_take_are_made_in_parts(say, suits) -> None:
-    assert LongText.is_applicable(say) is suits
 
 
 @given(
