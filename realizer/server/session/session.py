@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import json
 import logging
+import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -49,7 +50,6 @@ from realizer.server.session.control_handlers import ControlHandlers
 from realizer.server.session.effects import Close, Effect, MoveConnection, Send
 from realizer.server.session.feedback_log import FeedbackLog
 from realizer.server.session.subscriptions import Subscriptions
-from realizer.server.session.wakeup_plan import WakeupPlan
 from realizer.server.session.welcome import build_welcome
 from realizer.server.speech.audio_clips import AudioClips, ClipError
 from realizer.server.streams.broadcast import Broadcast, FrameRun
@@ -84,6 +84,7 @@ class Session:
     Attributes:
         ending: whether documents are refused because the service is ending.
         feedback_log: the published feedback.
+        fast_path: the frames of the only client, which need no call of the session; None if more is due.
     """
 
     def __init__(
@@ -120,8 +121,13 @@ class Session:
         self.submission = Submission(id, settings, self.player, self._add_effects)
         self._connections: dict[int, Connection] = {}
         self.feedback_log = log or FeedbackLog(epoch)
+        self.fast_path: FrameRun | None = None
         self._effects: list[Effect] = []
-        self._wakeups = WakeupPlan(self.player, self.submission, self.broadcast, self._connections)
+        # The cached deadlines on the session clock: of the next event that is neither a frame nor feedback
+        # (None if unknown), and of feedback.
+        self._next_other: float | None = None
+        self._next_feedback = 0.0
+        self._client_left = False  # its open speeches end with the next tick
         self.subscriptions = Subscriptions(
             settings, self.player, self.faces, self.broadcast, self._connections, self.reply
         )
@@ -138,7 +144,7 @@ class Session:
 
     def connect(self, connection: int, now: float, seen: int | None = None) -> None:
         """Add a connection. With `seen` it gets all feedback after that one, without it only new feedback."""
-        self._wakeups.invalidate()
+        self._forget_deadline()
         self._connections[connection] = Connection(connection, self.feedback_log.newest + 1)
         if not self.log_entry(now - self.opened, "join", connection):
             return
@@ -151,8 +157,8 @@ class Session:
         if self._connections.pop(connection, None) is not None:
             self.log_entry(now - self.opened, "leave", connection)
         self.submission.speeches.on_disconnect(connection)
-        self._wakeups.unsettled = True
-        self._wakeups.invalidate()
+        self._client_left = True
+        self._forget_deadline()
         if not self._connections:
             self.empty_since = now
             if not self.named:
@@ -170,7 +176,7 @@ class Session:
     def close(self) -> None:
         """Close the session: it does and sends nothing any more."""
         self.closed = True
-        self._wakeups.invalidate()
+        self._forget_deadline()
         self._connections.clear()
         self.submission.queue.clear()
         self._effects.clear()
@@ -180,7 +186,7 @@ class Session:
         if (known := self._connections.get(connection)) is not None:
             known.is_slow = waiting > SLOW
             if known.is_slow:
-                self._wakeups.invalidate()
+                self._forget_deadline()
             if waiting > STUCK:
                 reason = f"{waiting} bytes wait to be read; come back with the session's name and seen"
                 self._effects.append(Close(connection, 1013, reason))
@@ -405,7 +411,7 @@ class Session:
         """Take the answer to an effect `Draw`. If it is an error, the subscriptions to the picture end."""
         if self.closed:
             return
-        self._wakeups.invalidate()
+        self._forget_deadline()
         picture = result if isinstance(result, bytes) else None
         effects, lookers = self.broadcast.video.on_picture(draw, picture, self._connections.values())
         self._effects += effects
@@ -430,26 +436,26 @@ class Session:
         This is the fast way for a session in which nothing but frames and feedback is due.
         """
         t = now - self.opened
-        rhythm = self._wakeups
-        if not rhythm.only_frames_due(t):
+        if self._next_other is None or t + EPSILON >= self._next_other:
             return None
-        if rhythm.feedback_due(t):
-            plans = self.player.version
+        if t + EPSILON >= self._next_feedback:
+            version = self.player.version
             self._publish(t)
-            rhythm.feedback_sent(plans)
+            self._next_feedback = self.player.next_change()
+            if self.player.version != version:
+                self._forget_deadline()
         sends, following = self.broadcast.frames_due(t)
-        effects, self._effects = [*self._effects, *sends], []
-        return effects, rhythm.next_after_frames(following, self.opened) + self.opened
-
-    @property
-    def fast_path(self) -> FrameRun | None:
-        """The frames of the only client, which need no call of the session; None if more is due."""
-        return self._wakeups.fast_path
+        effects = [*self.take_effects(), *sends]
+        if self._next_other is None:
+            return effects, self.next_due()
+        other = min(self._next_other, self._next_feedback) + self.opened
+        self.fast_path = self.broadcast.fast_path(self.opened, other)
+        return effects, min(other, following + self.opened)
 
     def compact_journal(self, now: float) -> None:
         """Replace the journal by a checkpoint if it has grown; due feedback is published first."""
         if self.journal.needs_checkpoint and not self.closed:
-            self._wakeups.invalidate()
+            self._forget_deadline()
             self._publish(now - self.opened)
             self._compact(now - self.opened)
 
@@ -469,8 +475,8 @@ class Session:
 
     def _work(self, t: float, read_documents: bool = True) -> bool:
         """Do the work of `tick`. Return whether a document or a speech changed the state."""
-        self._wakeups.unsettled = False
-        self._wakeups.invalidate()
+        self._client_left = False
+        self._forget_deadline()
         self._publish(t)
         if self.broadcast.active or any(one.subscriptions for one in self._connections.values()):
             self.broadcast.set_subscribers(self._connections.values())
@@ -490,11 +496,30 @@ class Session:
     @property
     def has_documents(self) -> bool:
         """Whether a document can be read or planned now."""
-        return not self.closed and self._wakeups.has_documents
+        if self.closed or self._next_other is not None:
+            return False
+        return self._client_left or self.submission.has_work
 
     def next_due(self) -> float:
         """Return the time of the next event other than documents; infinity if there is none."""
-        return float("inf") if self.closed else self._wakeups.next() + self.opened
+        if self.closed:
+            return math.inf
+        other, streams = self._next_other, self.broadcast
+        if other is None:
+            self._next_feedback, answer_due = self.player.next_change(), self.submission.tts.deadline()
+            other = streams.next_other if streams.active else math.inf
+            other = other if answer_due is None else min(other, answer_due)
+            # Open speeches and slow clients are checked with every frame, schedules with all feedback: then
+            # the deadline cannot be cached.
+            slow = any(connection.is_slow for connection in self._connections.values())
+            shown = streams.active and streams.has_schedule_subscribers
+            if not (self.has_documents or slow or self.submission.speeches.open_ids or shown):
+                self._next_other = other
+        next_frame = streams.next_frame if streams.active else math.inf
+        return min(other, self._next_feedback, next_frame) + self.opened
+
+    def _forget_deadline(self) -> None:
+        self._next_other = self.fast_path = None
 
     @property
     def busy(self) -> bool:

@@ -182,11 +182,6 @@ class SpeechStreams:
         """The ids of speeches that are not over."""
         return [speech.id for speech in self._speeches.values() if not speech.is_finished]
 
-    @property
-    def has_open(self) -> bool:
-        """Whether `advance` must be called as time passes."""
-        return bool(self.open_ids)
-
     def advance(self, t: float) -> bool:
         """Update the anticipated ends of speeches. Return whether one has changed."""
         moved = False
