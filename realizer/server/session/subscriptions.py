@@ -21,13 +21,12 @@ from realizer.server.streams.broadcast import Broadcast
 from realizer.server.streams.connection import (
     AudioSubscription,
     Connection,
-    FrameSubscription,
     ScheduleSubscription,
     Subscription,
     VideoSubscription,
     VideoView,
 )
-from realizer.server.streams.frame_windows import SOURCES
+from realizer.server.streams.frame_windows import SOURCES, FrameSubscription
 
 
 @dataclass(frozen=True)

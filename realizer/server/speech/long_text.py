@@ -54,7 +54,6 @@ class LongText:
         self._length = 0
         self._rate = 0
 
-
     def next(self) -> SpeechRequest | None:
         """Return the request of the next part; None after the last."""
         if self._coming is None:

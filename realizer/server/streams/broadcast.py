@@ -14,12 +14,12 @@ from realizer.server.streams.audio_stream import PACKET, AudioStream
 from realizer.server.streams.connection import (
     AudioSubscription,
     Connection,
-    FrameSubscription,
     ScheduleSubscription,
     VideoSubscription,
 )
 from realizer.server.streams.frame_windows import (
     EPSILON,
+    FrameSubscription,
     FrameTimeline,
     PackedFrames,
     first_frame_at,
@@ -44,9 +44,7 @@ class Fanout:
     def __init__(self, timeline: FrameTimeline, members: list[tuple[Connection, FrameSubscription]]) -> None:
         self.timeline = timeline
         self.members = members
-        self._packed: PackedFrames | None = (
-            None  # of numbers that only one gets: the next ones are slices of it
-        )
+        self._packed: PackedFrames | None = None  # the next frames of a single subscriber
 
     @property
     def next(self) -> int:

@@ -8,30 +8,12 @@ from dataclasses import dataclass, field
 from realizer.server.session.effects import RenderOptions
 from realizer.server.session.feedback_log import FeedbackFilter
 from realizer.server.streams.audio_stream import AudioStream
-from realizer.server.streams.frame_windows import FrameTimeline
+from realizer.server.streams.frame_windows import FrameSubscription, FrameTimeline
 
 # With more unsent bytes than this a connection misses frames: two thirds of a second of a mesh.
 SLOW = 512 * 1024
 # With more than this it is closed. The client can resume with `seen`.
 STUCK = 32 * 2**20
-
-
-@dataclass(eq=False)
-class FrameSubscription:
-    """A subscription to fap, au, arkit or mesh.
-
-    Attributes:
-        next: number of the next frame to send.
-        raw: whether AUs are sent as they are before the rules of co-occurrence.
-    """
-
-    stream: str
-    encoding: str
-    timeline: FrameTimeline
-    index: int
-    name: str | None
-    next: int
-    raw: bool = False
 
 
 @dataclass(eq=False)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -162,35 +162,38 @@ class FrameWindow:
         """(n, k) float32, the values of the face's inputs."""
         return poses(self.aus, self._face().inputs, self._mapping)
 
-    def message(self, request: StreamRequest, frame: int) -> str | bytes:
+    def message(self, subscription: FrameSubscription, frame: int) -> str | bytes:
         """Return the WebSocket message of a frame."""
-        if request.encoding == "binary" and request.stream != "mesh":
-            return self.packed(request)[frame]
-        key = (request.stream, request.encoding, request.raw, request.name)
+        s = subscription
+        if s.encoding == "binary" and s.stream != "mesh":
+            return self.packed(s)[frame]
+        key = (s.stream, s.encoding, s.raw, s.name)
         number, message = self._latest.get(key, (None, b""))
         if number != frame:
-            message = self._encode(request, frame)
+            message = self._encode(s, frame)
             self._latest[key] = (frame, message)
         return message
 
-    def packed(self, request: StreamRequest) -> PackedFrames:
+    def packed(self, subscription: FrameSubscription) -> PackedFrames:
         """Return the binary messages of all frames of fap, au or arkit."""
-        known = self._packed.get((request.stream, request.raw))
-        if known is None:
-            rows = self.rows(request.stream, request.raw)
+        stream, raw = subscription.stream, subscription.raw
+        packed = self._packed.get((stream, raw))
+        if packed is None:
+            rows = self.rows(stream, raw)
             times = np.arange(self.first, self.end) / self.fps
-            known = PackedFrames(request.stream, self.first, times, rows, request.index)
-            self._packed[request.stream, request.raw] = known
-        return known
+            packed = self._packed[stream, raw] = PackedFrames(
+                stream, self.first, times, rows, subscription.index
+            )
+        return packed
 
-    def _encode(self, request: StreamRequest, frame: int) -> str | bytes:
+    def _encode(self, subscription: FrameSubscription, frame: int) -> str | bytes:
         """Return the message of a single frame: meshes, and all streams in JSON."""
-        n, time = frame - self.first, frame / self.fps
-        row = self.mesh(n) if request.stream == "mesh" else self.packed(request).row(frame)
-        if request.encoding == "binary":
-            return pack(request.stream, frame, time, row.tobytes(), character=request.index)
+        s, time = subscription, frame / self.fps
+        row = self.mesh(frame - self.first) if s.stream == "mesh" else self.packed(s).row(frame)
+        if s.encoding == "binary":
+            return pack(s.stream, frame, time, row.tobytes(), character=s.index)
         values = [v if isinstance(v, int) else round(v, 4) for v in row.tolist()]
-        return json_frame(request.stream, frame, time, values, request.name)
+        return json_frame(s.stream, frame, time, values, s.name)
 
     def mesh(self, row: int) -> Int16:
         """Return the (n_vertices, 3) int16 mesh of a frame; `row` counts from the window's first frame."""
@@ -234,14 +237,16 @@ class FrameTimeline:
         """Return a window that contains the frames first .. last."""
         window = self._window
         if window is None or not self.is_current or first < window.first or last >= window.end:
-            count = max(math.ceil(WINDOW * self.fps), last - first + 1)
-
-            def aus(times: Float64) -> AUFrames:
-                return self.player.frames(times, self.character)
-
             if self._mapping is None:
                 self._mapping = self._find_mapping()
-            window = self._window = FrameWindow(first, count, self.fps, aus, self._face, self._mapping)
+            window = self._window = FrameWindow(
+                first,
+                max(math.ceil(WINDOW * self.fps), last - first + 1),
+                self.fps,
+                lambda times: self.player.frames(times, self.character),
+                self._face,
+                self._mapping,
+            )
             self._version = self.player.version
         return window
 
@@ -255,16 +260,20 @@ class FrameTimeline:
         self._window = self._mapping = None
 
 
-class StreamRequest(Protocol):
-    """The options of a subscription that a window needs.
+@dataclass(eq=False)
+class FrameSubscription:
+    """A subscription to fap, au, arkit or mesh.
 
     Attributes:
-        raw: whether AUs are sent as they are before the rules of co-occurrence.
         name: the character's name, if the client named it.
+        next: number of the next frame to send.
+        raw: whether AUs are sent as they are before the rules of co-occurrence.
     """
 
     stream: str
     encoding: str
+    timeline: FrameTimeline
     index: int
     name: str | None
-    raw: bool
+    next: int
+    raw: bool = False

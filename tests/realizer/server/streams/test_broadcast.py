@@ -9,8 +9,7 @@ from realizer.core.options import PlayOptions
 from realizer.playback.player import Player
 from realizer.protocol.wire import unpack
 from realizer.server.streams.broadcast import FrameRun
-from realizer.server.streams.connection import FrameSubscription
-from realizer.server.streams.frame_windows import FrameTimeline, PackedFrames
+from realizer.server.streams.frame_windows import FrameSubscription, FrameTimeline, PackedFrames
 
 FPS = 25.0
 ZERO = 100.0
