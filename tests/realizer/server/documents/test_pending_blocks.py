@@ -214,7 +214,7 @@ def test_tts_requests_fill_a_part_that_failed_with_silence() -> None:
     client = driver.run(300)
     assert client.feedback[-1].id == "b:end"
     warnings = [(f.id, f.text) for f in client.feedback if isinstance(f, WarningFeedback)]
-    assert warnings == [("b:s", "speech: it died; this one has no sound")]
+    assert warnings == [("b:s", "speech: it died; the silent voice is used instead")]
     assert driver.send({"type": "state"}).of("state")[-1]["voice"]["fault"] == "it died"
 
 
