@@ -9,9 +9,7 @@ from realizer import tables
 from realizer.animation.axis import fap
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.fap.fap_clip import FAPClip
-from realizer.animation.fap.fap_reader import read_fap
 from realizer.behaviours import media
-from realizer.behaviours.fap_visemes import expand_compound
 from realizer.behaviours.key_channels import track
 from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
 from realizer.behaviours.table_timing import timing_from_table
@@ -100,6 +98,10 @@ def read(content: bytes) -> FAPClip:
         raise media.MediaError(
             f"wanted at most {MAX_BYTES // 2**20} MiB of FAP text, got {len(content)} bytes"
         )
+    # Few documents play files; the reader of their text is long.
+    from realizer.animation.fap.fap_reader import read_fap
+    from realizer.behaviours.fap_visemes import expand_compound
+
     clip = expand_compound(read_fap(content))
     if len(clip.values) < 2:
         raise media.MediaError(f"wanted at least two frames, got {len(clip.values)}")

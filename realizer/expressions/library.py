@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from realizer.expressions.expression import Expression, key
-from realizer.expressions.user_expressions import read_folder
 from realizer.tables.expression_words import expression_words
 from realizer.tables.lexemes import face_lexemes
 from realizer.tables.templates import Template, apex, templates
@@ -86,6 +85,8 @@ def library_of(folder: Path | None = None) -> Library:
 
 @lru_cache(maxsize=16)
 def _with_own(folder: Path) -> Library:
+    from realizer.expressions.user_expressions import read_folder
+
     own = read_folder(folder)
     library = Library([*builtin().values(), *own])
     for note in library.notes:

@@ -16,7 +16,6 @@ from realizer.scheduling.conflict import Conflict, ConstraintGraph, Link
 from realizer.scheduling.constrained_groups import solve_groups
 from realizer.scheduling.groups import Group, groups_of, slides
 from realizer.scheduling.longest_paths import components, longest_path_levels
-from realizer.scheduling.minimal_cycles import minimal_cycles
 from realizer.scheduling.model import LOOSE, TIGHT, Model, model_of
 from realizer.scheduling.problem import ORIGIN, Problem
 from realizer.scheduling.rigid_clusters import RigidClusters, clusters_of
@@ -80,8 +79,9 @@ def _keep_inequalities(model: Model, clusters: RigidClusters) -> list[Conflict]:
             cycles.append([Link(ORIGIN, ORIGIN, order.seconds, order)])
     if not cycles:
         return []
-    web = ConstraintGraph(model.problem)
-    return minimal_cycles(model, web, cycles)
+    from realizer.scheduling.minimal_cycles import minimal_cycles  # for documents that contradict themselves
+
+    return minimal_cycles(model, ConstraintGraph(model.problem), cycles)
 
 
 def _fits(model: Model, clusters: RigidClusters, group: Group, begin: Float64) -> bool:
