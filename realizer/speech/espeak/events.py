@@ -196,7 +196,7 @@ def _with_closures(begins: Sequence[int], sounds: Sequence[str], pcm: Int16, rat
 
 def _phonemes(begins: Sequence[int], sounds: Sequence[str], end: int, rate: int) -> tuple[Phoneme, ...]:
     found: list[tuple[int, str, int]] = [(0, "", 0)] if not begins or begins[0] > 0 else []
-    for sample, until, sound in zip(begins, [*begins[1:], end], sounds, strict=True):
+    for sample, until, sound in zip(begins, [*begins[1:], end], sounds, strict=False):
         if until <= sample:
             continue
         ipa, stress = _plain(sound)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import importlib.util
 import os
 import signal
 import subprocess
@@ -18,8 +17,7 @@ import pytest
 from realizer.core.errors import VoiceError
 from realizer.speech import engine_process
 from realizer.speech.cache import MOST
-from realizer.speech.engine_process import RUN
-from realizer.speech.espeak.voice import ENGINE, EspeakVoice, choose_voice
+from realizer.speech.espeak.voice import EspeakVoice, choose_voice
 from realizer.speech.utterance import SpeechRequest, Utterance
 
 pytestmark = pytest.mark.espeak
@@ -57,38 +55,6 @@ def test_marks_are_where_their_word_is_heard(voice: EspeakVoice) -> None:
     assert 2 < int(spectrum.argmax()) < 12  # 40-260 Hz: voiced from the mark on
 
 
-def test_phonemes_tile_the_sound(voice: EspeakVoice) -> None:
-    said = voice.say(HELLO)
-    assert said.phonemes[0].start == 0
-    assert said.phonemes[-1].end == said.duration
-    assert [p.end for p in said.phonemes[:-1]] == [p.start for p in said.phonemes[1:]]
-    assert all(p.end > p.start for p in said.phonemes)
-    assert [p.ipa for p in said.phonemes if p.stress == 1] == ["oʊ", "ɛ", "iː", "iː"]
-
-
-def test_pauses_are_silent_and_everything_else_is_not(voice: EspeakVoice) -> None:
-    said = voice.say(HELLO)
-    assert said.pcm is not None
-    for phoneme in said.phonemes:
-        part = said.pcm[round(phoneme.start * said.sample_rate) : round(phoneme.end * said.sample_rate)]
-        loud = np.abs(part.astype(int)).max()
-        if phoneme.ipa:
-            assert loud > 100, phoneme
-        elif phoneme.end - phoneme.start > 0.1:
-            assert np.sqrt(np.mean(part.astype(float) ** 2)) < 100, phoneme
-
-
-def test_a_closure_belongs_to_the_stop_that_it_closes(voice: EspeakVoice) -> None:
-    said = voice.say(SpeechRequest("My happy puppy."))
-    stops = [p for p in said.phonemes if p.ipa == "p"]
-    assert said.pcm is not None
-    assert len(stops) == 3
-    for stop in stops:
-        first = round(stop.start * said.sample_rate)
-        assert np.abs(said.pcm[first + 20 : first + 400].astype(int)).max() < 100
-        assert stop.end - stop.start > 0.06
-
-
 @pytest.mark.parametrize(
     ("language", "text"),
     [
@@ -108,35 +74,6 @@ def test_marks_at_sentence_starts_come_back(voice: EspeakVoice, language: str, t
     assert [w.text for w in said.words if w.start in set(said.marks.values())] == firsts
 
 
-def test_words_that_the_dictionary_merges_come_apart(voice: EspeakVoice) -> None:
-    said = voice.say(SpeechRequest("I am in the house, and it would have been the one of the best."))
-    assert [w.text for w in said.words] == [
-        *("I", "am", "in", "the", "house", "and", "it", "would"),
-        *("have", "been", "the", "one", "of", "the", "best"),
-    ]
-    assert all(word.end - word.start > 0.04 for word in said.words)
-    spans = {w.text: (w.start, w.end) for w in said.words[:2]}
-    within = lambda word: [p.ipa for p in said.phonemes if spans[word][0] <= p.start < spans[word][1]]  # noqa: E731
-    assert within("I") == ["aɪ"]
-    assert within("am") in (["ɐ", "m"], ["æ", "m"])
-
-
-@pytest.mark.parametrize(
-    ("language", "text", "word"),
-    [
-        ("en-US", 'I <mark name="m"/>am here.', "am"),
-        ("pl-PL", 'nie <mark name="m"/>wiem tego', "wiem"),
-        ("fr-FR", 'Je ne sais <mark name="m"/>pas.', "pas"),
-    ],
-)
-def test_marks_inside_merged_words_stay_there(
-    voice: EspeakVoice, language: str, text: str, word: str
-) -> None:
-    said = voice.say(SpeechRequest(text, ("m",), language))
-    assert said.marks["m"] == starts(said)[word] > 0.05
-    assert said.marks["m"] in {phoneme.start for phoneme in said.phonemes} | {w.end for w in said.words}
-
-
 @pytest.mark.parametrize(
     "mark", ["<mark name='x'/>", '<bookmark mark="x"/>', '<s:mark name="x"/>', "<mark name='x'></mark>"]
 )
@@ -152,45 +89,6 @@ def test_marks_may_have_any_name(voice: EspeakVoice) -> None:
     assert list(said.marks) == ["a\"b'ü"]
 
 
-@pytest.mark.parametrize(
-    ("language", "text", "word"),
-    [
-        ("de-DE", 'Das sind 42 Äpfel <mark name="m"/>und Birnen.', "und"),
-        ("nl-NL", 'Dat zijn 42 appels <mark name="m"/>en peren.', "en"),
-        ("pl-PL", 'To są 42 jabłka <mark name="m"/>i gruszki.', "i"),
-    ],
-)
-def test_a_mark_is_at_its_word_and_not_before_the_little_pause_that_the_engine_makes(
-    voice: EspeakVoice, language: str, text: str, word: str
-) -> None:
-    said = voice.say(SpeechRequest(text, ("m",), language))
-    assert said.marks["m"] == starts(said)[word]
-    assert said.marks["m"] in {phoneme.start for phoneme in said.phonemes if phoneme.ipa}
-
-
-def test_marks_of_five_languages_are_within_five_milliseconds_of_the_engines_own_words(
-    voice: EspeakVoice,
-) -> None:
-    path = Path(__file__).parents[3] / "benchmarks" / "marks.py"
-    spec = importlib.util.spec_from_file_location("marks", path)
-    assert spec is not None
-    assert spec.loader is not None
-    marks = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(marks)
-    found = list(marks.errors(voice, 60))
-    assert len(found) == 60
-    assert {language for language, _, _ in found} == set(marks.TEXTS)
-    assert max(ms for _, ms, _ in found) < 5
-
-
-def test_a_mark_before_a_break_is_before_the_silence(voice: EspeakVoice) -> None:
-    said = voice.say(
-        SpeechRequest('one <mark name="a"/><break time="800ms"/><mark name="b"/>two', ("a", "b"))
-    )
-    assert said.marks["a"] == pytest.approx(said.words[0].end, abs=0.05)
-    assert said.marks["b"] == said.words[1].start > said.marks["a"] + 0.7
-
-
 def test_the_same_request_gives_the_same_samples_whatever_came_before() -> None:
     first, second = EspeakVoice(), EspeakVoice()
     try:
@@ -201,27 +99,6 @@ def test_the_same_request_gives_the_same_samples_whatever_came_before() -> None:
     finally:
         first.close()
         second.close()
-
-
-def test_every_fork_says_the_same(voice: EspeakVoice) -> None:
-    process = voice._process
-    name, _ = choose_voice(process.hello(), None, "en-US")
-    request = {"op": "say", "text": "<speak>Hello, I am here.</speak>", "voice": name, "wpm": 175}
-    other = {**request, "text": "<speak>Something else in between.</speak>"}
-    first = process.ask(request)
-    for _ in range(12):
-        process.ask(other)
-        assert process.ask(request) == first
-
-
-def test_without_fork_the_samples_are_the_same(voice: EspeakVoice) -> None:
-    alone = EspeakVoice(options=("--no-fork",))
-    try:
-        assert same(alone.say(HELLO), voice.say(HELLO))
-        assert alone.say(SpeechRequest("Again, I am."))  # each request its own process
-        assert alone.pid is None
-    finally:
-        alone.close()
 
 
 def test_a_known_request_does_not_reach_the_engine(voice: EspeakVoice) -> None:
@@ -314,45 +191,6 @@ def test_a_closed_or_forgotten_voice_leaves_no_process() -> None:
             os.kill(pid, 0)
 
 
-def test_the_engine_ends_with_its_parent() -> None:
-    import subprocess
-    import sys
-
-    worker = subprocess.Popen(
-        [sys.executable, "-P", str(RUN), str(ENGINE.worker)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    )
-    assert worker.stdin is not None
-    assert worker.stdout is not None
-    assert worker.stdout.readline().startswith(b'{"rate"')
-    worker.stdin.close()  # what the system does for a parent that dies
-    assert worker.wait(10) == 0
-    worker.stdout.close()
-
-
-def test_data_behind_a_long_path_are_found(tmp_path: Path, voice: EspeakVoice) -> None:
-    import espeakng_loader  # the folder's name only; the engine stays in the worker
-
-    folder = tmp_path.joinpath(*["a" * 60] * 4)
-    folder.mkdir(parents=True)
-    data = folder / "espeak-ng-data"
-    data.symlink_to(espeakng_loader.get_data_path())
-    assert len(str(data)) > 200
-    lone = EspeakVoice(options=("--data", str(data)))
-    try:
-        assert same(lone.say(HELLO), voice.say(HELLO))
-        assert same(
-            lone.say(SpeechRequest("hallo", language="nl")), voice.say(SpeechRequest("hallo", language="nl"))
-        )
-    finally:
-        lone.close()
-
-
-def test_data_that_are_not_there_are_an_error_with_words(tmp_path: Path) -> None:
-    lone = EspeakVoice(options=("--data", str(tmp_path)))
-    with pytest.raises(VoiceError, match="does not start"):
-        lone.say(HELLO)
-
-
 @pytest.mark.parametrize(
     ("tag", "engine"),
     [
@@ -402,11 +240,6 @@ def test_what_it_does_not_speak_is_said_and_spoken_anyway(voice: EspeakVoice) ->
         "espeak-ng has no variant 'nothing'",
         "espeak-ng does not speak 'xx-YY'",
     ]
-
-
-def test_language_flags_are_no_phonemes(voice: EspeakVoice) -> None:
-    said = voice.say(SpeechRequest("c'est un weekend", language="fr"))
-    assert not any("(" in phoneme.ipa for phoneme in said.phonemes)
 
 
 @pytest.mark.parametrize(
@@ -469,15 +302,6 @@ def test_a_text_of_200_kilobytes_is_refused_with_words(voice: EspeakVoice) -> No
     with pytest.raises(VoiceError, match="at most 20000 characters, got 200000"):
         voice.say(SpeechRequest("word " * 40_000))
     assert voice.say(HELLO).duration > 2
-
-
-def test_a_long_text_is_spoken(voice: EspeakVoice) -> None:
-    lone = EspeakVoice()
-    said = lone.say(SpeechRequest("I am here, and it is late. " * 100 + '<mark name="end"/>', ("end",)))
-    lone.close()
-    assert len(said.words) == 700
-    assert said.words[-1].end <= said.marks["end"] <= said.duration
-    assert all(a.end <= b.start for a, b in zip(said.words, said.words[1:], strict=False))
 
 
 def test_files_are_not_opened(voice: EspeakVoice, tmp_path: Path) -> None:
