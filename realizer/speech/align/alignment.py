@@ -74,13 +74,14 @@ def build(
         start = min(max(phoneme.start, now), duration)
         end = min(max(phoneme.end, start), duration)
         following = sounds[0][k + 1].start if k + 1 < len(sounds[0]) else duration
-        if start - now >= MIN_PAUSE or (not tiled and start > 0):
-            tiled.append((Phoneme(now, start, ""), 1.0))
-        elif tiled:
+        paused = start - now >= MIN_PAUSE or (not tiled and start > 0)
+        if tiled and not paused:
             start = now
         if 0 < following - end < MIN_PAUSE:
             end = min(following, duration)
         if end > start:
+            if paused:
+                tiled.append((Phoneme(now, start, ""), 1.0))
             tiled.append((replace(phoneme, start=start, end=end), each[owner]))
             now = end
     if duration > now:
