@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from xml.sax.saxutils import escape
-
 import numpy as np
 import pytest
 
@@ -13,9 +11,8 @@ from realizer.speech.align.alignment import AlignError, Alignment
 from realizer.speech.align.sphinx import install_hint
 from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import MAX_TEXT
+from tests.realizer.speech.align.conftest import TEXT, WRONG
 
-TEXT = "The tall woman carried a basket of apples down the hill."
-WRONG = "Yesterday it rained all day; today the sun is shining."
 AFTER = "how quietly they came"
 
 both = pytest.mark.parametrize(
@@ -61,15 +58,6 @@ def test_phonemes_tile_the_recording_and_lie_in_their_words(aligner, sentence) -
     assert len(found.confidences) == len(found.words)
 
 
-@pytest.mark.espeak
-def test_another_language_is_aligned_by_espeak(zin) -> None:
-    text = escape("Mijn zus woont in een klein huis aan het water.")
-    found = align(zin.pcm, zin.rate, text, "nl-NL")
-    assert found.aligner == "espeak"
-    assert np.median(errors(found, zin.onsets)) < 0.02
-    assert found.confidence > 0.8
-
-
 @both
 def test_a_wrong_text_is_not_believed(aligner, sentence) -> None:
     try:
@@ -96,33 +84,11 @@ def test_a_text_of_another_language_is_not_believed(sentence) -> None:
 
 
 @pytest.mark.espeak
-def test_a_pause_that_the_text_does_not_tell_of_falls_between_words(sentence) -> None:
-    cut = round(sentence.onsets[3] * sentence.rate)
-    noise = sentence.pcm[: sentence.rate // 2]
-    pcm = np.concatenate([sentence.pcm[:cut], np.tile(noise, 4), sentence.pcm[cut:]])
-    onsets = sentence.onsets + 2.0 * (np.arange(len(sentence.onsets)) >= 3)
-    found = align(pcm, sentence.rate, TEXT, aligner="espeak")
-    assert errors(found, onsets).max() < 0.1
-    assert found.words[2].end < onsets[3] - 1.8
-
-
-@pytest.mark.espeak
-@pytest.mark.parametrize("rate", [8000, 11_025, 48_000])
-def test_channels_rates_and_kinds_of_samples_do_not_matter(sentence, rate) -> None:
-    times = np.arange(round(len(sentence.pcm) / sentence.rate * rate)) / rate
-    mono = np.interp(times, np.arange(len(sentence.pcm)) / sentence.rate, sentence.pcm / 32768)
-    found = align(np.stack([mono, mono], axis=1), rate, TEXT, aligner="espeak")
-    assert np.percentile(errors(found, sentence.onsets), 90) < 0.06
-
-
-@pytest.mark.espeak
-def test_words_that_no_dictionary_has_are_said_as_espeak_says_them(voice) -> None:
-    from realizer.speech.utterance import SpeechRequest
-
-    said = voice.say(SpeechRequest("Zorblat gave 27 florbs to Quixley.", voice="en-us+f2"))
-    found = align(said.pcm, said.sample_rate, "Zorblat gave 27 florbs to Quixley.")
-    assert np.median(errors(found, np.array([w.start for w in said.words]))) < 0.06
-    assert found.confidence > 0.5
+def test_align_uses_espeak_for_other_languages(zin) -> None:
+    found = align(zin.pcm, zin.rate, "Mijn zus woont in een klein huis aan het water.", "nl-NL")
+    assert found.aligner == "espeak"
+    assert np.median(errors(found, zin.onsets)) < 0.02
+    assert found.confidence > 0.8
 
 
 def test_without_any_aligner_the_words_are_spread_over_what_sounds(monkeypatch) -> None:
@@ -145,11 +111,6 @@ def test_without_any_aligner_the_words_are_spread_over_what_sounds(monkeypatch) 
     [
         (np.zeros(16_000, np.int16), 16_000, TEXT, "wanted speech, got silence"),
         ([], 16_000, TEXT, "of sound, got 0 s"),
-        (np.ones((2, 16_000)), 16_000, TEXT, r"samples, got the shape \(2, 16000\)"),
-        (np.ones(100, np.uint8), 16_000, TEXT, "got uint8"),
-        (np.full(9000, np.nan), 16_000, TEXT, "finite"),
-        (np.ones(9000), 0, TEXT, "rate: wanted a whole number of 1000..384000 Hz, got 0"),
-        (np.ones(9000), float("nan"), TEXT, "rate: .* got nan"),
         (np.ones(9000), 16_000, "", "text: wanted words"),
         (np.ones(9000), 16_000, " ...! ", "text: wanted words"),
         (np.ones(3200), 16_000, TEXT, "wanted about .* s for 11 words, got 0.20 s"),

@@ -15,13 +15,8 @@ import pytest
 from realizer.core.errors import VoiceError
 from realizer.speech import engine_process
 from realizer.speech.duration_fit import speak_to_length
-from realizer.speech.hibari.text import ProsodyRun, runs
-from realizer.speech.hibari.times import Lengths, sounds, word_spans
 from realizer.speech.hibari.voice import HibariVoice
-from realizer.speech.hibari.worker import LONGEST, split
 from realizer.speech.registry import find_voice
-from realizer.speech.ssml import read_script
-from realizer.speech.ssml_prosody import Prosody
 from realizer.speech.utterance import SpeechRequest, Utterance
 from realizer.tables.phonemes import phoneme_features
 
@@ -334,57 +329,3 @@ def test_a_voice_that_is_not_there_is_refused_in_words_and_not_fetched(
     with pytest.raises(VoiceError, match="'emma' is not on this machine; `hibari --voice emma"):
         find_voice("hibari:emma")
     assert find_voice("hibari:heart").name == "hibari:heart"
-
-
-def test_runs_end_at_breaks_and_where_the_manner_changes() -> None:
-    ssml = (
-        'a <mark name="m"/>b <break time="1s"/>c <prosody rate="slow"> d</prosody> <sub alias="e f">x</sub>.'
-    )
-    found, marks = runs(read_script(SpeechRequest(ssml)))
-    assert [(r.text.strip(), r.words, r.prosody.rate, r.pause) for r in found] == [
-        ("a b", ("a", "b"), 1.0, 0.0),
-        ("c", ("c",), 1.0, 1.0),
-        ("d", ("d",), 0.75, 0.0),
-        ("e f.", ("e", "f"), 1.0, 0.0),
-    ]
-    assert [(m.name, m.word, m.paused) for m in marks] == [("m", 1, False)]
-    assert runs(read_script(SpeechRequest('a<break time="1s"/>')))[0][-1] == ProsodyRun(
-        "", (), Prosody(), 1.0
-    )
-
-
-def test_stress_belongs_to_its_vowel_and_a_blank_to_the_sound_before() -> None:
-    sentence = [("Hi", "hˈI", True), ("you", "jˌu", False), (".", ".", False)]
-    told = sounds(sentence, Lengths(10, (2, 3, 4, 1, 5, 6, 7, 8), 9))
-    assert [(s.ipa, s.stress, s.start, s.end, s.token) for s in told] == [
-        ("", 0, 0, 10, 0),
-        ("h", 0, 10, 12, 0),
-        ("aɪ", 1, 12, 20, 0),
-        ("j", 0, 20, 25, 1),
-        ("u", 2, 25, 38, 1),
-        ("", 0, 38, 55, 2),
-    ]
-
-
-def test_words_that_are_written_out_share_their_sounds() -> None:
-    tokens = [("at", "æt", True), ("seven", "sɛvən", True), ("P.M.", "piɛm", True), ("now", "nW", False)]
-    heard = sounds(tokens, Lengths(0, (1,) * 16, 0))
-    alone = {"at": "æt", "7": "sɛvən", "pm": "piɛm"}
-    asked = []
-
-    def spoken(words: object) -> list[tuple[str, ...]]:
-        asked.append(words)
-        return [tuple(alone[word]) for word in words]  # type: ignore[attr-defined]
-
-    found = word_spans(["at", "7", "pm", "now"], tokens, heard, spoken)
-    assert ["".join(s.ipa for s in heard[a:b]) for a, b in found] == ["æt", "sɛvən", "piɛm", "naʊ"]
-    assert asked == [["at", "7", "pm"]]
-
-
-def test_a_sentence_too_long_for_the_model_is_cut_at_a_comma_or_else_at_a_blank() -> None:
-    words = [("w", "wɜd", True)] * (LONGEST // 5) + [(",", ",", True)] + [("w", "wɜd", True)] * LONGEST
-    pieces = split(words)
-    assert [word for piece in pieces for word in piece] == words
-    assert pieces[0][-1][0] == ","
-    assert all(sum(len(phonemes) for _, phonemes, _ in piece) <= LONGEST for piece in pieces)
-    assert len(split([("x", "a" * (3 * LONGEST), False)])) == 3

@@ -1,0 +1,48 @@
+"""Alignment by the acoustic model for English."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from realizer.speech.align.model_align import model_align
+from realizer.speech.align.recording import mono, to_aligner
+from realizer.speech.align.sphinx import install_hint
+from realizer.speech.espeak.voice import EspeakVoice
+from realizer.speech.utterance import SpeechRequest
+from tests.realizer.speech.align.conftest import TEXT, WRONG, Noisy
+
+pytestmark = [
+    pytest.mark.espeak,
+    pytest.mark.skipif(bool(install_hint()), reason=str(install_hint())),
+]
+
+
+def test_model_align_finds_words_phonemes_and_stress(voice: EspeakVoice, sentence: Noisy) -> None:
+    sound = to_aligner(mono(sentence.pcm, sentence.rate), sentence.rate)
+    duration = len(sentence.pcm) / sentence.rate
+    found = model_align(sound, duration, voice.say(SpeechRequest(TEXT)))
+    assert found is not None
+    assert np.median(np.abs([w.start for w in found.words] - sentence.onsets)) < 0.02
+    tall = found.words[1]
+    inside = [p for p in found.phonemes if tall.start - 0.005 <= p.start < tall.end - 0.005]
+    assert [p.ipa for p in inside] == ["t", "ɔ", "l"]
+    assert inside[1].stress == 1
+    assert found.confidence > 0.8
+
+
+def test_model_align_doubts_a_wrong_text(voice: EspeakVoice, sentence: Noisy) -> None:
+    sound = to_aligner(mono(sentence.pcm, sentence.rate), sentence.rate)
+    found = model_align(sound, len(sentence.pcm) / sentence.rate, voice.say(SpeechRequest(WRONG)))
+    assert found is None or found.confidence < 0.5
+
+
+def test_model_align_speaks_unknown_words_like_the_reference(voice: EspeakVoice) -> None:
+    text = "Zorblat gave 27 florbs to Quixley."
+    said = voice.say(SpeechRequest(text, voice="en-us+f2"))
+    assert said.pcm is not None
+    sound = to_aligner(mono(said.pcm, said.sample_rate), said.sample_rate)
+    found = model_align(sound, said.duration, voice.say(SpeechRequest(text)))
+    assert found is not None
+    assert np.median(np.abs([a.start - b.start for a, b in zip(found.words, said.words, strict=True)])) < 0.06
+    assert found.confidence > 0.5

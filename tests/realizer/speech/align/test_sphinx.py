@@ -1,0 +1,58 @@
+"""Alignment with pocketsphinx."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from realizer.speech.align.recording import mono, to_aligner
+from realizer.speech.align.sphinx import align_words, install_hint
+from tests.realizer.speech.align.conftest import TEXT, Noisy
+
+pytestmark = [
+    pytest.mark.espeak,
+    pytest.mark.skipif(bool(install_hint()), reason=str(install_hint())),
+]
+
+WORDS: list[tuple[str, tuple[str, ...]]] = [(word, ()) for word in TEXT.rstrip(".").split()]
+
+
+@pytest.fixture(scope="module")
+def sound(sentence: Noisy) -> np.ndarray:
+    return to_aligner(mono(sentence.pcm, sentence.rate), sentence.rate)
+
+
+def test_align_words_finds_words_of_the_dictionary(sound: np.ndarray, sentence: Noisy) -> None:
+    found = align_words(sound, WORDS)
+    assert found is not None
+    starts = [word.phones[0][0] for word in found if word is not None]
+    assert np.median(np.abs(np.array(starts) - sentence.onsets)) < 0.02
+    assert all(word.score <= 0 for word in found if word is not None)
+
+
+def test_align_words_gives_the_same_times_again(sound: np.ndarray) -> None:
+    first = align_words(sound, WORDS)
+    align_words(np.random.default_rng(0).normal(0, 0.1, 32_000).astype(np.float32), WORDS[:2])
+    assert align_words(sound, WORDS) == first
+
+
+def test_align_words_speaks_other_words_by_their_phones(sound: np.ndarray) -> None:
+    words = [*WORDS[:5], ("bzskt", ("B", "AE", "S", "K", "IH", "T")), *WORDS[6:]]
+    found, usual = align_words(sound, words), align_words(sound, WORDS)
+    assert found is not None
+    assert usual is not None
+    assert [name for _, _, name in found[5].phones] == ["B", "AE", "S", "K", "IH", "T"]  # type: ignore[union-attr]
+    assert found[5].phones[0][0] == pytest.approx(usual[5].phones[0][0], abs=0.03)  # type: ignore[union-attr]
+
+
+def test_align_words_ignores_words_that_it_cannot_speak(sound: np.ndarray) -> None:
+    found = align_words(sound, [*WORDS, ("bzskt", ())])
+    assert found is not None
+    assert found[-1] is None
+    assert found[:-1] == align_words(sound, WORDS)
+    assert align_words(sound, [("bzskt", ())]) is None
+
+
+def test_align_words_finds_nothing_in_a_short_sound(sound: np.ndarray) -> None:
+    assert align_words(sound[:1600], WORDS) is None
+    assert align_words(sound, WORDS) is not None

@@ -1,0 +1,47 @@
+"""A worker without speech, for the tests of processes: what it does is in its requests."""
+
+from __future__ import annotations
+
+import os
+import time
+from typing import Any
+
+
+class Fake:
+    """Counts its requests in `count`, which forks do not share.
+
+    Args:
+        arguments: "drifts", "broken" or "chatty".
+    """
+
+    def __init__(self, arguments: list[str]) -> None:
+        if "broken" in arguments:
+            raise RuntimeError("it has no data")
+        self.chatty = "chatty" in arguments
+        self.drifts = "drifts" in arguments
+        self.count = 0
+        self.operations = {"echo": self.echo, "sleep": self.sleep, "fail": self.fail, "die": self.die}
+
+    def hello(self) -> dict[str, Any]:
+        return {"rate": 8000, "chatty": self.chatty}
+
+    def echo(self, request: dict[str, Any]) -> tuple[dict[str, Any], list[bytes]]:
+        self.count += 1
+        if self.chatty:
+            print("this is no answer", flush=True)
+        text = request["text"].encode()
+        return {"count": self.count}, [text[:2], text[2:]]
+
+    def sleep(self, request: dict[str, Any]) -> tuple[dict[str, Any], list[bytes]]:
+        time.sleep(60)
+        return {}, []
+
+    def fail(self, request: dict[str, Any]) -> tuple[dict[str, Any], list[bytes]]:
+        raise ValueError("it cannot")
+
+    def die(self, request: dict[str, Any]) -> tuple[dict[str, Any], list[bytes]]:
+        os._exit(3)
+
+
+def load(arguments: list[str]) -> Fake:
+    return Fake(arguments)

@@ -1,0 +1,75 @@
+"""Times of words and phonemes from the readings of hibari."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from realizer.speech.hibari.times import (
+    KEPT_OF_LAST,
+    Lengths,
+    Sound,
+    guess_lengths,
+    sounds,
+    trim_to_sound,
+    word_spans,
+)
+
+
+def test_sounds_add_stress_signs_to_vowels_and_blanks_to_the_sound_before() -> None:
+    sentence = [("Hi", "hˈI", True), ("you", "jˌu", False), (".", ".", False)]
+    found = sounds(sentence, Lengths(10, (2, 3, 4, 1, 5, 6, 7, 8), 9))
+    assert [(s.ipa, s.stress, s.start, s.end, s.token) for s in found] == [
+        ("", 0, 0, 10, 0),
+        ("h", 0, 10, 12, 0),
+        ("aɪ", 1, 12, 20, 0),
+        ("j", 0, 20, 25, 1),
+        ("u", 2, 25, 38, 1),
+        ("", 0, 38, 55, 2),
+    ]
+
+
+def test_word_spans_divide_expanded_words_by_their_sounds() -> None:
+    tokens = [("at", "æt", True), ("seven", "sɛvən", True), ("P.M.", "piɛm", True), ("now", "nW", False)]
+    heard = sounds(tokens, Lengths(0, (1,) * 16, 0))
+    alone = {"at": "æt", "7": "sɛvən", "pm": "piɛm"}
+    separate = []
+
+    def spoken(words: object) -> list[tuple[str, ...]]:
+        separate.append(words)
+        return [tuple(alone[word]) for word in words]  # type: ignore[attr-defined]
+
+    found = word_spans(["at", "7", "pm", "now"], tokens, heard, spoken)
+    assert ["".join(s.ipa for s in heard[a:b]) for a, b in found] == ["æt", "sɛvən", "piɛm", "naʊ"]
+    assert separate == [["at", "7", "pm"]]
+
+
+def test_word_spans_are_empty_for_words_without_sounds() -> None:
+    heard = sounds([("one", "wʌn", False)], Lengths(0, (1,) * 3, 0))
+    assert word_spans(["one", "?"], [("one", "wʌn", False)], heard, lambda words: [("w",), ()]) == [
+        (0, 3),
+        (3, 3),
+    ]
+    assert word_spans(["one"], [], [], lambda words: []) == [(0, 0)]
+
+
+def test_trim_to_sound_lets_pauses_start_where_silence_does() -> None:
+    pcm = np.zeros(100, np.int16)
+    pcm[:30] = 1000
+    found = trim_to_sound([Sound("a", 0, 0, 60, 0), Sound("", 0, 60, 100, 0)], pcm)
+    assert [(s.start, s.end) for s in found] == [(0, 30), (30, 100)]
+    pcm[:] = 0  # never less than a part of the sound
+    found = trim_to_sound([Sound("a", 0, 0, 60, 0), Sound("", 0, 60, 100, 0)], pcm)
+    assert found[0].end == round(KEPT_OF_LAST * 60) == found[1].start
+
+
+def test_guess_lengths_divides_the_audible_part() -> None:
+    pcm = np.zeros(100, np.int16)
+    pcm[10:90] = 5000
+    sentence = [("aka", "aka", False)]
+    lengths = guess_lengths(sentence, pcm)
+    assert lengths.lead + sum(lengths.signs) + lengths.tail == len(pcm)
+    assert (lengths.lead, lengths.tail) == (10, 10)
+    assert lengths.signs[0] == pytest.approx(lengths.signs[2], abs=1)
+    assert lengths.signs[0] > lengths.signs[1]
+    assert guess_lengths([("", "", False)], pcm) == Lengths(0, (), 100)

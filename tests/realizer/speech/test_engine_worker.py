@@ -1,0 +1,69 @@
+"""The process around an engine."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from realizer.speech.engine_process import RUN
+
+FAKE = Path(__file__).with_name("engines.py")
+
+
+def run(*arguments: str, requests: list[dict[str, Any]] | None = None) -> tuple[dict[str, Any], list[Any]]:
+    """Return the first line and the answers (head, body) of a worker."""
+    text = "".join(json.dumps(request) + "\n" for request in requests or [])
+    done = subprocess.run(
+        [sys.executable, "-P", str(RUN), *arguments], input=text.encode(), stdout=subprocess.PIPE, timeout=60
+    )
+    hello, _, rest = done.stdout.partition(b"\n")
+    answers = []
+    while rest:
+        line, _, rest = rest.partition(b"\n")
+        head = json.loads(line)
+        answers.append((head, rest[: head["bytes"]]))
+        rest = rest[head["bytes"] :]
+    return json.loads(hello), answers
+
+
+def echo(text: str) -> dict[str, Any]:
+    return {"op": "echo", "text": text}
+
+
+def test_worker_answers_requests_until_its_input_ends() -> None:
+    hello, answers = run(str(FAKE), requests=[echo("one"), {"op": "fail"}, echo("")])
+    assert hello == {"rate": 8000, "chatty": False}
+    assert answers == [
+        ({"bytes": 3, "count": 1, "last": False}, b"one"),
+        ({"bytes": 0, "error": "it cannot", "last": False}, b""),
+        ({"bytes": 0, "count": 2, "last": False}, b""),
+    ]
+
+
+def test_worker_keeps_prints_of_libraries_out_of_its_answers() -> None:
+    _, answers = run(str(FAKE), "chatty", requests=[echo("one")])
+    assert answers == [({"bytes": 3, "count": 1, "last": False}, b"one")]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+def test_worker_serves_a_drifting_engine_in_forks() -> None:
+    _, answers = run(str(FAKE), "drifts", requests=[echo("one"), {"op": "die"}, echo("two")])
+    assert [head.get("count") for head, _ in answers] == [1, None, 1]
+    assert answers[1][0]["error"].startswith("it crashed")
+    assert not any(head["last"] for head, _ in answers)
+
+
+def test_worker_of_a_drifting_engine_ends_after_a_request_without_fork() -> None:
+    _, answers = run(str(FAKE), "drifts", "--no-fork", requests=[echo("one"), echo("two")])
+    assert answers == [({"bytes": 3, "count": 1, "last": True}, b"one")]
+
+
+def test_worker_reports_an_engine_that_does_not_load() -> None:
+    assert run(str(FAKE), "broken") == ({"error": "it has no data"}, [])
+    assert "nowhere.py" in run("nowhere.py")[0]["error"]
