@@ -39,7 +39,7 @@ def spoken():
     return realize(SPEECH, idle=False, voice="silent")
 
 
-def test_a_face_at_rest_is_no_shape():
+def test_arkit_of_a_face_at_rest_is_zero():
     assert not arkit(one()).weights.any()
 
 
@@ -54,18 +54,18 @@ def test_a_face_at_rest_is_no_shape():
         ({"AU24": 0.6}, {"mouthPressLeft": 0.6, "mouthPressRight": 0.6}),
     ],
 )
-def test_an_action_unit_with_a_shape_is_that_shape(shown, wanted):
+def test_arkit_copies_action_units_with_a_shape(shown, wanted):
     assert seen(one(**shown)) == pytest.approx(wanted, abs=0.01)
 
 
-def test_an_action_unit_without_a_shape_is_shown_by_those_that_come_nearest():
+def test_arkit_fits_action_units_without_a_shape():
     dropped = seen(one(AU26=1.0))
     assert 0.4 < dropped["jawOpen"] < 0.7  # the jaw falls half as far as at its widest
     closed = seen(one(AU43L=1.0))
     assert closed["eyeBlinkLeft"] > 0.95
 
 
-def test_eyes_and_head_turn_as_the_faps_say():
+def test_arkit_turns_eyes_and_head_like_the_faps():
     values = one().values.copy()
     for number, angle in ((23, 0.2), (24, 0.2), (25, -0.1), (26, -0.1), (48, 0.3), (49, -0.2), (50, 0.1)):
         values[0, fap(number).column] = angle * 1e5
@@ -79,7 +79,7 @@ def test_eyes_and_head_turn_as_the_faps_say():
     assert shown["eyeLookInLeft"] == shown["eyeLookOutRight"] == shown["eyeLookDownLeft"] == 0
 
 
-def test_speech_that_goes_out_and_comes_back_has_nearly_the_same_faps(spoken):
+def test_arkit_of_speech_reproduces_its_faps(spoken):
     back = arkit_faps(arkit(spoken.aus, spoken.mapping).weights, spoken.mapping)
     scale = np.array([UNITS.get(row.unit, 0.0) for row in faps()])
     wanted, off = spoken.faps.values * scale, (back - spoken.faps.values) * scale
@@ -93,7 +93,7 @@ def test_speech_that_goes_out_and_comes_back_has_nearly_the_same_faps(spoken):
     assert np.sqrt((off[:, inner] ** 2).mean()) < 0.2 * np.abs(wanted[:, inner]).max()
 
 
-def test_the_lips_leave_a_smile_as_far_as_speech_has_them(spoken):
+def test_arkit_reduces_a_smile_by_the_lips_of_speech(spoken):
     values = spoken.aus.values.copy()
     values[:, [AU_NAMES().index("12L"), AU_NAMES().index("12R")]] = 1
     smiling = arkit(AUFrames(spoken.aus.times, values), spoken.mapping).weights
@@ -103,7 +103,7 @@ def test_the_lips_leave_a_smile_as_far_as_speech_has_them(spoken):
     assert 0.1 < smiling[lips > 0.9, column].mean() < 0.9
 
 
-def test_weights_are_of_their_frame_alone(spoken):
+def test_arkit_converts_each_frame_by_itself(spoken):
     whole = arkit(spoken.aus, spoken.mapping).weights
     alone = [
         arkit(AUFrames(spoken.aus.times[k : k + 1], spoken.aus.values[k : k + 1]), spoken.mapping).weights[0]

@@ -17,7 +17,7 @@ from realizer.animation.axis import (
 )
 
 
-def test_the_axis_is_aus_then_68_faps_then_presences_then_ranks() -> None:
+def test_axis_has_aus_faps_masks_and_ranks_in_order() -> None:
     names = list(axis())
     faps = len(AU_NAMES())
     presences = faps + 68
@@ -29,7 +29,7 @@ def test_the_axis_is_aus_then_68_faps_then_presences_then_ranks() -> None:
     assert [target.column for target in axis().values()] == list(range(len(names)))
 
 
-def test_an_au_with_sides_has_two_columns_and_one_without_has_one() -> None:
+def test_au_has_a_column_for_each_side() -> None:
     assert [t.name for t in au(12)] == ["12L", "12R"]
     assert [t.name for t in au(12, "RIGHT")] == ["12R"]
     assert [t.name for t in au(26, "LEFT")] == ["26"]
@@ -37,7 +37,7 @@ def test_an_au_with_sides_has_two_columns_and_one_without_has_one() -> None:
         au(99)
 
 
-def test_every_au_but_those_that_turn_something_has_a_rank() -> None:
+def test_mixing_order_exists_for_all_aus_but_rotations() -> None:
     assert [mixing_order(number).name for number in (1, 12, 43)] == ["rank 1", "rank 12", "rank 43"]
     for turn in (51, 63, 99):
         with pytest.raises(KeyError):
@@ -64,5 +64,5 @@ def test_every_au_but_those_that_turn_something_has_a_rank() -> None:
         (mixing_order(12), "face"),
     ],
 )
-def test_a_target_belongs_to_a_region(target: object, wanted: str) -> None:
+def test_region_of_a_target(target: object, wanted: str) -> None:
     assert region(target) == wanted  # type: ignore[arg-type]

@@ -50,14 +50,14 @@ TIMES = np.arange(0, 5, 0.04)
 
 
 @given(many, st.randoms(use_true_random=False))
-def test_the_order_of_channels_does_not_matter(given: list[Channel], random: st.DataObject) -> None:
+def test_blend_ignores_the_order_of_channels(given: list[Channel], random: st.DataObject) -> None:
     other = list(given)
     random.shuffle(other)  # type: ignore[attr-defined]
     np.testing.assert_allclose(blend(given, TIMES).values, blend(other, TIMES).values, atol=1e-6)
 
 
 @given(targets, st.lists(st.floats(0.0, 1.0), min_size=4, max_size=4), st.sampled_from(Layer))
-def test_one_channel_blends_to_itself(target: Target, values: list[float], layer: Layer) -> None:
+def test_blend_of_one_channel_is_its_sample(target: Target, values: list[float], layer: Layer) -> None:
     channel = Channel(target, np.arange(4.0), np.array([0.0, *values[1:]]), layer=layer)
     got = blend([channel], np.arange(4.0)).values
     np.testing.assert_array_equal(got[:, target.column], channel.values.astype(np.float32))
@@ -65,19 +65,19 @@ def test_one_channel_blends_to_itself(target: Target, values: list[float], layer
 
 
 @given(many)
-def test_25_frames_a_second_are_every_second_of_50(given: list[Channel]) -> None:
+def test_blend_at_25_fps_is_every_second_frame_of_50(given: list[Channel]) -> None:
     fast, slow = np.arange(0, 5, 0.02), np.arange(0, 5, 0.02)[::2]
     np.testing.assert_array_equal(blend(given, fast).values[::2], blend(given, slow).values)
 
 
 @given(many)
-def test_action_units_and_presences_stay_within_0_and_1(given: list[Channel]) -> None:
+def test_blend_limits_action_units_and_masks(given: list[Channel]) -> None:
     values = np.delete(blend(given, TIMES).values, range(len(AU_NAMES()), len(AU_NAMES()) + 68), axis=1)
     assert values.min() >= 0
     assert values.max() <= 1
 
 
-def test_nothing_is_nothing() -> None:
+def test_blend_of_no_channels_is_zero() -> None:
     frames = blend([], TIMES)
     assert frames.values.shape == (len(TIMES), len(axis()))
     assert frames.values.dtype == np.float32
@@ -86,43 +86,43 @@ def test_nothing_is_nothing() -> None:
 
 
 @pytest.mark.parametrize("layer", [Layer.IDLE, Layer.EXPRESSION, Layer.SPEECH])
-def test_the_stronger_of_two_expressions_shows(layer: Layer) -> None:
+def test_blend_shows_the_stronger_expression(layer: Layer) -> None:
     assert value_of([still(SMILE, 0.3, layer), still(SMILE, 0.6)], SMILE) == pytest.approx(0.6)
 
 
-def test_a_mood_shows_under_a_weaker_expression() -> None:
+def test_blend_shows_a_mood_under_a_weaker_expression() -> None:
     assert value_of([still(SMILE, 0.5, Layer.BASE), still(SMILE, 0.2)], SMILE) == pytest.approx(0.5)
 
 
-def test_rotations_add_up() -> None:
+def test_blend_adds_rotations() -> None:
     nods = [still(NOD, 0.1, Layer.HEAD), still(NOD, 0.2, Layer.HEAD), still(NOD, 0.05, Layer.IDLE)]
     assert value_of(nods, NOD) == pytest.approx(0.35)
 
 
-def test_faps_add_up() -> None:
+def test_blend_adds_faps() -> None:
     assert value_of([still(JAW, 100, Layer.SPEECH), still(JAW, 50, Layer.SPEECH)], JAW) == 150
 
 
-def test_an_old_mood_passes_evenly_into_the_new_one() -> None:
+def test_blend_crossfades_moods() -> None:
     old = still(SMILE, 0.6, Layer.BASE).faded(1.0, 2.0)
     new = Channel(SMILE, np.array([1.0, 2.0]), np.array([0.0, 0.6]), layer=Layer.BASE, keeps_last=True)
     values = blend([old, new], np.linspace(0.5, 2.5, 51)).values[:, SMILE.column]
     assert values == pytest.approx(0.6)
 
 
-def test_a_gaze_takes_the_eyes_from_the_base_gaze_but_not_from_idle() -> None:
+def test_blend_masks_the_base_gaze_but_not_idle_eyes() -> None:
     base, idle = still(GAZE, 0.5, Layer.BASE), still(GAZE, 0.02, Layer.IDLE)
     look = [still(GAZE, 0.2, Layer.GAZE), still(mask_channel("eyes"), 0.75, Layer.GAZE)]
     assert value_of([base, idle, *look], GAZE) == pytest.approx(0.5 * 0.25 + 0.02 + 0.2)
 
 
-def test_a_gaze_of_the_eyes_leaves_the_head_where_it_was_turned() -> None:
+def test_blend_keeps_the_head_under_a_gaze_of_the_eyes() -> None:
     turned = au(51)[0]
     look = [still(GAZE, 0.2, Layer.GAZE), still(mask_channel("eyes"), 1.0, Layer.GAZE)]
     assert value_of([still(turned, 0.4, Layer.BASE), *look], turned) == pytest.approx(0.4)
 
 
-def test_what_takes_idle_motion_leaves_what_is_asked_for() -> None:
+def test_blend_masks_idle_motion_but_not_other_motion() -> None:
     motion = still(mask_channel("motion"), 0.75, Layer.BASE)
     face = [still(NOD, 0.4, Layer.IDLE), still(NOD, 0.2, Layer.HEAD), motion]
     assert value_of(face, NOD) == pytest.approx(0.4 * 0.25 + 0.2)
@@ -138,11 +138,11 @@ def lid_of(taking: Channel, draw: float, time: float) -> float:
 
 
 @pytest.mark.parametrize(("taken", "comes"), [(0.0, True), (0.25, True), (0.5, False), (1.0, False)])
-def test_a_blink_comes_whole_or_not_at_all(taken: float, comes: bool) -> None:
+def test_blend_shows_a_blink_whole_or_not_at_all(taken: float, comes: bool) -> None:
     assert lid_of(still(mask_channel("blinks"), taken, Layer.BASE), 0.6, 1.1) == comes
 
 
-def test_a_blink_that_has_begun_ends_as_it_was_whatever_window_is_looked_at() -> None:
+def test_blend_finishes_a_blink_in_any_window() -> None:
     soon = Channel(
         mask_channel("blinks"), np.array([1.05, 1.1]), np.array([0.0, 1.0]), layer=Layer.BASE, keeps_last=True
     )
@@ -154,7 +154,7 @@ def test_a_blink_that_has_begun_ends_as_it_was_whatever_window_is_looked_at() ->
     assert lid_of(gone, 0.0, 1.11) == 0
 
 
-def test_idle_motion_is_taken_as_far_as_a_document_asks() -> None:
+def test_blend_masks_idle_motion_in_part() -> None:
     idle, moves = (
         idle_face(0.0, 5.0, 3),
         [column for column, _ in enumerate(axis()) if column < len(AU_NAMES())],
@@ -169,7 +169,7 @@ def test_idle_motion_is_taken_as_far_as_a_document_asks() -> None:
     assert not still_.any()
 
 
-def test_what_a_document_asks_is_laid_on_idle_motion() -> None:
+def test_blend_adds_a_document_to_idle_motion() -> None:
     idle = idle_face(0.0, 5.0, 3)
     alone, both = (blend(some, TIMES, idle=idle).values for some in ([], [still(NOD, 0.25, Layer.HEAD)]))
     np.testing.assert_allclose(both[:, NOD.column], alone[:, NOD.column] + 0.25, atol=1e-6)
@@ -177,7 +177,7 @@ def test_what_a_document_asks_is_laid_on_idle_motion() -> None:
 
 
 @given(many, st.randoms(use_true_random=False))
-def test_the_order_of_times_does_not_matter(given: list[Channel], random: st.DataObject) -> None:
+def test_blend_ignores_the_order_of_times(given: list[Channel], random: st.DataObject) -> None:
     order = list(range(len(TIMES)))
     random.shuffle(order)  # type: ignore[attr-defined]
     idle = idle_face(0.0, 5.0, 1)
@@ -188,13 +188,13 @@ def test_the_order_of_times_does_not_matter(given: list[Channel], random: st.Dat
 
 
 @given(many)
-def test_all_other_columns_than_those_that_may_move_are_0(given: list[Channel]) -> None:
+def test_blend_names_all_columns_that_differ_from_0(given: list[Channel]) -> None:
     frames = blend(given, TIMES)
     assert frames.columns is not None
     assert not np.delete(frames.values, frames.columns, axis=1).any()
 
 
-def test_two_gazes_at_once_share_the_eyes_and_do_not_add_up() -> None:
+def test_blend_shares_the_eyes_between_gazes() -> None:
     left = [still(GAZE, 0.6, Layer.GAZE), still(mask_channel("eyes"), 1.0, Layer.GAZE)]
     up = [still(au(63)[0], 0.4, Layer.GAZE), still(mask_channel("eyes"), 1.0, Layer.GAZE)]
     assert value_of(left + up, GAZE) == pytest.approx(0.3)
@@ -202,7 +202,7 @@ def test_two_gazes_at_once_share_the_eyes_and_do_not_add_up() -> None:
     assert value_of(left + up, mask_channel("eyes")) == 1
 
 
-def test_what_is_set_directly_replaces_all_else_and_lets_go_smoothly() -> None:
+def test_blend_replaces_lower_layers_by_direct_values() -> None:
     rises = np.array([0.0, 1.0])
     held = Channel(SMILE, rises / 10, rises / 10, layer=Layer.DIRECT, keeps_last=True, weight=rises)
     face = [still(SMILE, 0.8), held.faded(2.0, 2.3)]
@@ -214,7 +214,7 @@ def test_what_is_set_directly_replaces_all_else_and_lets_go_smoothly() -> None:
     assert np.max(np.abs(np.diff(values))) < 0.02
 
 
-def test_a_nod_set_directly_replaces_the_sum() -> None:
+def test_blend_replaces_rotations_by_direct_values() -> None:
     face = [still(NOD, 0.3, Layer.HEAD), still(NOD, 0.1, Layer.DIRECT)]
     assert value_of(face, NOD) == pytest.approx(0.1)
 
@@ -242,9 +242,7 @@ below = st.lists(
 
 
 @given(below, set_faps())
-def test_a_set_fap_has_its_value_while_it_is_there_and_leaves_the_face_before_and_after(
-    face: list[Channel], one: Channel
-) -> None:
+def test_blend_replaces_a_fap_while_it_is_set(face: list[Channel], one: Channel) -> None:
     inside = np.linspace(one.times[1], one.times[2], 5)
     np.testing.assert_allclose(corner([*face, one], inside), one.values[1], atol=1e-3)
     outside = np.array([one.times[0], one.times[-1] + 0.01])
@@ -252,7 +250,7 @@ def test_a_set_fap_has_its_value_while_it_is_there_and_leaves_the_face_before_an
 
 
 @given(below, st.lists(set_faps(), min_size=1, max_size=4))
-def test_nothing_jumps_when_set_faps_come_and_go(face: list[Channel], some: list[Channel]) -> None:
+def test_blend_fades_set_faps_without_jumps(face: list[Channel], some: list[Channel]) -> None:
     times = np.arange(0.0, 4.2, 0.001)
     # Fastest is a whole change in the shortest rise, at 1.875 of its mean speed, both ways at once.
     most = np.abs(corner([*face], times)).max() + sum(np.abs(one.values).max() for one in some)
@@ -260,7 +258,7 @@ def test_nothing_jumps_when_set_faps_come_and_go(face: list[Channel], some: list
 
 
 @given(below, st.lists(set_faps(), max_size=4), st.randoms(use_true_random=False))
-def test_the_order_in_which_faps_are_set_does_not_matter(
+def test_blend_ignores_the_order_of_set_faps(
     face: list[Channel], some: list[Channel], random: st.DataObject
 ) -> None:
     given = [*face, *some]
@@ -269,7 +267,7 @@ def test_the_order_in_which_faps_are_set_does_not_matter(
     np.testing.assert_allclose(corner(given, TIMES), corner(other, TIMES), atol=1e-3)
 
 
-def test_a_client_stands_over_a_document_and_faps_that_nobody_sets_stay() -> None:
+def test_blend_prefers_a_client_to_a_document() -> None:
     face = [still(part, 0.8) for part in au(12)]
     document, client = still(CORNER, 50, Layer.FAPS), still(CORNER, -20, Layer.DIRECT)
     alone, both = (to_fap(blend(some, ONE)).values[0] for some in (face, [*face, document, client]))
@@ -278,6 +276,6 @@ def test_a_client_stands_over_a_document_and_faps_that_nobody_sets_stay() -> Non
     np.testing.assert_array_equal(np.delete(both, 11), np.delete(alone, 11))
 
 
-def test_two_of_one_layer_share_a_fap() -> None:
+def test_blend_shares_a_fap_in_one_layer() -> None:
     both = [still(CORNER, 50, Layer.FAPS), still(CORNER, 150, Layer.FAPS)]
     assert value_of(both, CORNER) == 100

@@ -15,7 +15,7 @@ def channel(**more: object) -> Channel:
     return Channel(au(12)[0], KEYS, np.array([0.0, 1.0, 0.0]), source="s", **more)  # type: ignore[arg-type]
 
 
-def test_all_that_is_timed_moves_and_all_else_stays() -> None:
+def test_channel_shifts_all_times_and_nothing_else() -> None:
     one = channel(
         layer=Layer.HEAD, gains=(Gain(0.5, 1.0, 0.0),), until=2.0, crossfade=Crossfade(0.25, 1.0, 0.0, 0.1)
     )
@@ -30,14 +30,14 @@ def test_all_that_is_timed_moves_and_all_else_stays() -> None:
     assert (one.times.tolist(), one.source) == ([0.0, 0.5, 1.0], "s")
 
 
-def test_channels_that_share_their_times_still_do_later() -> None:
+def test_later_channels_still_share_their_times() -> None:
     first, second, third = later([channel(), channel(), channel().shifted(1.0)], 2.0, "b:s")
     assert first.times is second.times
     assert third.times is not first.times
     assert third.times.tolist() == [3.0, 3.5, 4.0]
 
 
-def test_times_and_values_that_do_not_belong_together_are_refused() -> None:
+def test_channel_refuses_times_and_values_of_other_shapes() -> None:
     with pytest.raises(ValueError, match=r"wanted two \(k,\), got \(3,\) and \(2,\)"):
         Channel(au(12)[0], KEYS, np.zeros(2))
     with pytest.raises(ValueError, match="wanted two"):

@@ -33,7 +33,7 @@ def names(number: int) -> list[str]:
 
 
 @pytest.mark.parametrize("rule", rules().rules, ids=lambda rule: rule.text)
-def test_every_rule_silences_its_weaker_unit_when_the_stronger_ones_are_full(rule: Rule) -> None:
+def test_rules_silence_weaker_units_at_full_strength(rule: Rule) -> None:
     asked = {
         f"AU{name}": 1.0 for unit in (rule.weaker, *(s.au for s in rule.stronger)) for name in names(unit)
     }
@@ -42,41 +42,41 @@ def test_every_rule_silences_its_weaker_unit_when_the_stronger_ones_are_full(rul
 
 
 @pytest.mark.parametrize("rule", rules().rules, ids=lambda rule: rule.text)
-def test_every_unit_is_left_alone_when_nothing_is_stronger(rule: Rule) -> None:
+def test_rules_keep_every_unit_that_is_alone(rule: Rule) -> None:
     assert set(shown(**{f"AU{name}": 0.75 for name in names(rule.weaker)}).values()) == {0.75}
 
 
-def test_a_unit_is_weakened_by_what_its_dominator_takes() -> None:
+def test_domination_weakens_a_unit() -> None:
     assert shown(AU5L=0.9, AU63=0.3) == {"AU5L": 0.7, "AU63": 0.3}
 
 
-def test_a_combination_dominates_as_far_as_both_of_it_are_there() -> None:
+def test_domination_by_a_combination_needs_both_units() -> None:
     assert shown(AU16L=1.0, AU12L=0.8, AU22=0.3)["AU16L"] == 0.7
 
 
-def test_a_strong_unit_dominates_from_the_middle_of_its_range_on() -> None:
+def test_domination_by_a_strong_unit_starts_in_the_middle() -> None:
     assert shown(AU12L=1.0, AU15L=0.5)["AU12L"] == 1.0
     assert shown(AU12L=1.0, AU15L=0.75)["AU12L"] == 0.5
 
 
-def test_exclusion_leaves_a_unit_only_while_the_privileged_one_is_small() -> None:
+def test_exclusion_allows_a_unit_while_the_other_is_small() -> None:
     assert shown(AU12L=0.25, AU20L=1.0)["AU20L"] == 0.5
     assert shown(AU12L=0.5, AU20L=1.0)["AU20L"] == 0.0
 
 
-def test_opposed_movements_leave_their_difference() -> None:
+def test_opposition_leaves_the_difference() -> None:
     assert shown(AU51=0.75, AU52=0.25) == {"AU51": 0.5, "AU52": 0.0}
 
 
-def test_each_side_of_the_face_is_ruled_by_itself() -> None:
+def test_rules_apply_to_each_side_by_itself() -> None:
     assert shown(AU12L=1.0, AU12R=1.0, AU15R=1.0) == {"AU12L": 1.0, "AU12R": 0.0, "AU15R": 1.0}
 
 
-def test_a_unit_without_sides_gives_way_to_the_stronger_side() -> None:
+def test_rules_reduce_midline_units_by_the_stronger_side() -> None:
     assert shown(AU18=1.0, AU20L=0.25, AU20R=0.5, AU23=1.0)["AU18"] == 0.5
 
 
-def test_the_jaw_keeps_the_parting_of_the_lips_that_is_no_longer_scored() -> None:
+def test_inclusion_keeps_the_movement_that_is_not_scored() -> None:
     values = np.zeros((len(NAMES), 1), np.float32)
     values[[NAMES.index("25"), NAMES.index("26")]] = 1.0
     result = cooccur(values, rules())
@@ -85,13 +85,13 @@ def test_the_jaw_keeps_the_parting_of_the_lips_that_is_no_longer_scored() -> Non
 
 
 @given(INTENSITIES)
-def test_a_second_pass_changes_nothing(aus: Float32) -> None:
+def test_rules_change_nothing_in_a_second_pass(aus: Float32) -> None:
     once = cooccur(aus, rules()).aus
     assert np.array_equal(cooccur(once, rules()).aus, once)
 
 
 @given(INTENSITIES)
-def test_nothing_is_added_to_what_was_asked_for(aus: Float32) -> None:
+def test_rules_never_increase_a_unit(aus: Float32) -> None:
     result = cooccur(aus, rules())
     assert (result.overridden >= 0).all()
     assert (result.aus >= 0).all()
@@ -99,20 +99,20 @@ def test_nothing_is_added_to_what_was_asked_for(aus: Float32) -> None:
 
 
 @given(INTENSITIES, arrays(np.float32, (len(NAMES), 4), elements=st.sampled_from([-1.0, 0.0, 1.0])))
-def test_a_hair_more_or_less_never_makes_a_jump(aus: Float32, step: Float32) -> None:
+def test_rules_are_continuous(aus: Float32, step: Float32) -> None:
     moved = np.clip(aus + step / 1024, 0, 1, dtype=np.float32)
     before, after = cooccur(aus, rules()), cooccur(moved, rules())
     assert np.abs(after.aus - before.aus).max() <= 2 / 1024 + 1e-6
 
 
 @given(INTENSITIES)
-def test_what_is_asked_of_the_mirrored_face_is_shown_mirrored(aus: Float32) -> None:
+def test_rules_are_symmetrical(aus: Float32) -> None:
     twin = [NAMES.index(name.translate(str.maketrans("LR", "RL"))) for name in NAMES]
     assert np.array_equal(cooccur(aus[twin], rules()).aus, cooccur(aus, rules()).aus[twin])
 
 
 @given(INTENSITIES)
-def test_it_makes_no_difference_which_units_that_are_not_up_are_looked_at(aus: Float32) -> None:
+def test_rules_ignore_units_that_are_0(aus: Float32) -> None:
     known = bounds(rules(), tuple(range(len(NAMES))))
     moving = known.moving(aus)
     result = cooccur(aus, rules())

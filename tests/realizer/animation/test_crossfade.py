@@ -26,7 +26,7 @@ def shown(channels: tuple[Channel, ...], times: np.ndarray) -> np.ndarray:
 
 
 @given(st.floats(0.05, 2.9), st.floats(-0.5, 2.0), st.floats(-0.5, 2.0))
-def test_value_and_velocity_do_not_jump(now: float, first: float, second: float) -> None:
+def test_crossfade_keeps_value_and_velocity(now: float, first: float, second: float) -> None:
     old = hill(0.0, 0.5, 2.0, 3.0)
     new = hill(0.0, 0.5, 2.0 + max(first, -1.4), 3.0 + max(first, -1.4) + max(second, -0.9))
     both = crossfade([old], [new], now)
@@ -38,7 +38,7 @@ def test_value_and_velocity_do_not_jump(now: float, first: float, second: float)
     assert np.abs(np.diff(velocity)).max() < 0.25
 
 
-def test_before_it_is_the_old_course_and_healed_the_new_one() -> None:
+def test_crossfade_goes_from_the_old_to_the_new_channel() -> None:
     old, new = hill(0.0, 0.5, 2.0, 3.0), hill(0.0, 0.5, 3.0, 4.0)
     both = crossfade([old], [new], 2.5)
     early, late = np.linspace(0, 2.4, 20), np.linspace(2.5 + HEALS, 4, 20)
@@ -46,7 +46,7 @@ def test_before_it_is_the_old_course_and_healed_the_new_one() -> None:
     assert shown(both, late) == pytest.approx(shown((new,), late))
 
 
-def test_what_changed_before_stays_as_it_was() -> None:
+def test_crossfade_keeps_earlier_replacements() -> None:
     first = crossfade([hill(0.0, 0.5, 2.0, 3.0)], [hill(0.0, 0.5, 3.0, 4.0)], 1.0)
     second = crossfade(first, [hill(0.0, 0.5, 3.5, 4.5)], 2.0)
     early = np.linspace(0, 1.99, 40)
@@ -54,13 +54,13 @@ def test_what_changed_before_stays_as_it_was() -> None:
     assert shown(second, np.array([4.0])) > 0.1
 
 
-def test_gains_go_over_to_the_new_course() -> None:
+def test_crossfade_inherits_gains() -> None:
     old = hill(0.0, 0.5, 2.0, 3.0).scaled(Gain(0.6, 1.0, 0.5))
     both = crossfade([old], [hill(0.0, 0.5, 3.0, 4.0)], 1.5)
     assert shown(both, np.array([2.5])) == pytest.approx([0.4])
 
 
-def test_each_target_goes_on_in_its_own_and_one_that_is_gone_fades() -> None:
+def test_crossfade_pairs_targets_and_fades_the_others() -> None:
     old = [hill(0.0, 0.5, 2.0, 3.0), hill(0.0, 0.5, 2.0, 3.0, target=BROW)]
     both = crossfade(old, [hill(0.0, 0.5, 2.5, 3.5)], 1.0)
     rows = {c.target.name: 0.0 for c in both}
@@ -69,7 +69,7 @@ def test_each_target_goes_on_in_its_own_and_one_that_is_gone_fades() -> None:
     assert rows == {"12L": pytest.approx(0.8), "4L": pytest.approx(0.0)}
 
 
-def test_a_channel_that_is_as_it_was_stays_and_one_of_the_same_values_at_other_times_does_not() -> None:
+def test_crossfade_keeps_channels_that_did_not_change() -> None:
     stays, goes = hill(0.0, 0.5, 2.0, 3.0), hill(0.0, 0.5, 2.0, 3.0)
     later = replace(goes, times=goes.times * 1.5)
     both = crossfade([stays, goes], [replace(stays), later], 1.0)

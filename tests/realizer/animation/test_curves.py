@@ -32,29 +32,27 @@ def channels(draw: st.DrawFn) -> Channel:
 
 
 @given(st.lists(channels(), min_size=1, max_size=5))
-def test_every_channel_hits_its_keys(given: list[Channel]) -> None:
+def test_sample_hits_the_keys(given: list[Channel]) -> None:
     for row, channel in enumerate(given):
         np.testing.assert_array_equal(sample(given, channel.times)[row], channel.values)
 
 
 @given(channels(), st.floats(0.001, 50.0))
-def test_a_channel_is_zero_outside_its_keys_and_holds_where_it_says(channel: Channel, away: float) -> None:
+def test_sample_is_zero_outside_the_keys(channel: Channel, away: float) -> None:
     before, after = sample([channel], np.array([channel.times[0] - away, channel.times[-1] + away]))[0]
     assert before == 0
     assert after == (channel.values[-1] if channel.keeps_last else 0)
 
 
 @given(channels(), st.lists(st.floats(-10, 120), min_size=1, max_size=30))
-def test_a_value_does_not_depend_on_which_other_times_are_asked_nor_on_their_order(
-    channel: Channel, times: list[float]
-) -> None:
+def test_sample_is_independent_of_the_other_times(channel: Channel, times: list[float]) -> None:
     whole = sample([channel], np.array(times))[0]
     alone = [sample([channel], np.array([t]))[0, 0] for t in times]
     np.testing.assert_array_equal(whole, alone)
 
 
 @given(channels())
-def test_between_two_keys_the_value_lies_between_theirs(channel: Channel) -> None:
+def test_sample_stays_between_neighbouring_keys(channel: Channel) -> None:
     assume(len(channel.times) > 1)
     at = (channel.times[:-1] + channel.times[1:]) / 2
     values = sample([channel], at)[0]
@@ -62,7 +60,7 @@ def test_between_two_keys_the_value_lies_between_theirs(channel: Channel) -> Non
     assert np.all(values <= np.maximum(channel.values[:-1], channel.values[1:]) + 1e-12)
 
 
-def test_smooth_stands_still_at_both_ends() -> None:
+def test_smooth_has_no_velocity_at_both_ends() -> None:
     u = np.array([0.0, 1e-4, 0.5, 1 - 1e-4, 1.0])
     assert smooth(u)[[0, 2, 4]] == pytest.approx([0.0, 0.5, 1.0])
     assert smooth(u)[1] < 1e-10
@@ -70,7 +68,7 @@ def test_smooth_stands_still_at_both_ends() -> None:
 
 
 @given(st.floats(0.05, 2.0), st.floats(0.0, 3.0))
-def test_a_faded_channel_reaches_zero_without_a_jump(length: float, begin: float) -> None:
+def test_sample_of_a_faded_channel_reaches_zero_smoothly(length: float, begin: float) -> None:
     channel = Channel(TARGET, np.array([0.0, 1.0]), np.array([0.0, 1.0]), keeps_last=True)
     faded = channel.faded(begin, begin + length)
     times = np.linspace(0, begin + length + 0.5, 2000)
@@ -81,28 +79,28 @@ def test_a_faded_channel_reaches_zero_without_a_jump(length: float, begin: float
     assert np.max(np.abs(np.diff(values))) <= 1.9 * (times[1] - times[0]) * (1 + 1 / length)
 
 
-def test_a_held_channel_faded_while_another_rises_passes_evenly_into_it() -> None:
+def test_sample_of_a_faded_and_a_rising_channel_adds_up() -> None:
     old = Channel(TARGET, np.array([0.0]), np.array([0.7]), keeps_last=True).faded(1.0, 2.0)
     new = Channel(TARGET, np.array([1.0, 2.0]), np.array([0.0, 0.7]), keeps_last=True)
     assert sample([old, new], np.linspace(0, 3, 61)).sum(axis=0) == pytest.approx(0.7)
 
 
-def test_of_two_keys_at_one_time_the_later_counts() -> None:
+def test_sample_uses_the_later_of_two_keys_at_one_time() -> None:
     channel = Channel(TARGET, np.array([0.0, 1.0, 1.0, 2.0]), np.array([0.0, 0.2, 0.8, 0.0]), curve="linear")
     assert sample([channel], np.array([0.999999, 1.0, 1.5]))[0] == pytest.approx([0.2, 0.8, 0.4], abs=1e-5)
 
 
-def test_no_times_and_no_channels_are_no_values() -> None:
+def test_sample_of_nothing_is_empty() -> None:
     assert sample([], np.array([0.0, 1.0])).shape == (0, 2)
     assert sample([Channel(TARGET, np.array([0.0]), np.array([1.0]))], np.array([])).shape == (1, 0)
 
 
-def test_an_unknown_curve_is_a_key_error() -> None:
+def test_sample_refuses_an_unknown_curve() -> None:
     with pytest.raises(KeyError, match="wobbly"):
         sample([Channel(TARGET, np.array([0.0]), np.array([1.0]), curve="wobbly")], np.array([0.0]))
 
 
-def test_weights_say_how_much_of_a_channel_is_there() -> None:
+def test_weights_include_gains() -> None:
     ends = Channel(TARGET, np.array([1.0, 2.0]), np.array([0.3, 0.3]))
     stays = Channel(TARGET, np.array([1.0]), np.array([0.0]), keeps_last=True).faded(3.0, 4.0)
     times = np.array([0.9, 1.0, 2.0, 2.1, 3.5, 4.0])
@@ -110,7 +108,7 @@ def test_weights_say_how_much_of_a_channel_is_there() -> None:
 
 
 @given(at=st.floats(0.2, 1.8), later=st.floats(-0.15, 1.0), length=st.floats(0.1, 0.6))
-def test_a_channel_that_goes_on_in_anothers_place_joins_it_in_value_and_slope(
+def test_sample_of_a_crossfade_is_continuous_in_value_and_slope(
     at: float, later: float, length: float
 ) -> None:
     old = Channel(TARGET, np.array([0.0, 1.0, 2.0]), np.array([0.0, 0.8, 0.0]))
@@ -130,13 +128,13 @@ def test_a_channel_that_goes_on_in_anothers_place_joins_it_in_value_and_slope(
     assert sample(pair, before).sum(axis=0) == pytest.approx(sample([old], before)[0])
 
 
-def test_keys_that_fall_by_a_rounding_stand_at_one_time() -> None:
+def test_sample_tolerates_key_times_that_fall_by_a_rounding() -> None:
     keys, values = np.array([0.0, 1.0, 1.0 - 1e-9, 2.0]), np.array([0.0, 0.2, 0.8, 0.0])
     falling = Channel(TARGET, keys, values, curve="linear")
     assert sample([falling], np.array([0.5, 1.0 - 5e-10, 1.0, 1.5]))[0] == pytest.approx([0.1, 0.2, 0.8, 0.4])
 
 
-def test_each_of_many_channels_is_as_it_is_alone() -> None:
+def test_sample_of_many_channels_is_that_of_each_alone() -> None:
     times = np.linspace(0.0, 3.0, 40)
     keys = np.linspace(0.5, 2.0, MANY_KEYS)
     many = [
@@ -157,7 +155,7 @@ def test_each_of_many_channels_is_as_it_is_alone() -> None:
 
 
 @given(st.lists(st.floats(-1.0, 4.0), min_size=1, max_size=20))
-def test_a_channel_of_many_keys_is_interpolated_between_them(times: list[float]) -> None:
+def test_sample_interpolates_channels_with_many_keys(times: list[float]) -> None:
     keys = np.linspace(0.5, 2.0, MANY_KEYS) ** 2
     values = np.sin(9 * keys)
     both = [Channel(TARGET, keys, values, curve="linear", keeps_last=holds) for holds in (False, True)]

@@ -19,12 +19,12 @@ def rows(*columns: int) -> Float32:
     return values
 
 
-def test_columns_that_are_not_named_are_looked_up() -> None:
+def test_frames_find_their_moving_columns() -> None:
     assert AUFrames(np.arange(3.0), rows(SMILE, fap(3).column)).moving_columns == (SMILE, fap(3).column)
     assert AUFrames(np.arange(3.0), rows()).moving_columns == ()
 
 
-def test_it_makes_no_difference_whether_more_columns_are_named_than_move() -> None:
+def test_frames_ignore_named_columns_that_do_not_move() -> None:
     named = AUFrames(np.arange(3.0), rows(SMILE), rules(), columns=tuple(range(len(axis()))))
     found = AUFrames(np.arange(3.0), rows(SMILE), rules())
     np.testing.assert_array_equal(named.aus, found.aus)
@@ -33,7 +33,7 @@ def test_it_makes_no_difference_whether_more_columns_are_named_than_move() -> No
     np.testing.assert_array_equal(to_fap(named).mask, to_fap(found).mask)
 
 
-def test_joined_windows_may_move_what_any_of_them_may() -> None:
+def test_frames_concatenate_moving_columns() -> None:
     smile, brow, unknown = (
         AUFrames(np.arange(3.0), rows(column), columns=columns)
         for column, columns in ((SMILE, (SMILE,)), (BROW, (BROW,)), (BROW, None))
@@ -43,7 +43,7 @@ def test_joined_windows_may_move_what_any_of_them_may() -> None:
     assert AUFrames.concatenate([smile, unknown]).moving_columns == (BROW, SMILE)
 
 
-def test_what_moves_has_a_row_for_each_action_unit() -> None:
+def test_frames_have_a_moving_row_for_each_action_unit() -> None:
     frames = AUFrames(np.arange(3.0), rows(SMILE), rules())
     assert frames.moving.shape == (len(AU_NAMES()), 3)
     np.testing.assert_array_equal(frames.moving.T, frames.before_rules)

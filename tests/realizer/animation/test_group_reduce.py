@@ -12,7 +12,7 @@ from realizer.animation.group_reduce import GroupReduction
 
 @pytest.mark.parametrize("by", [np.add, np.maximum])
 @given(st.lists(st.integers(0, 9), max_size=30).map(sorted))
-def test_each_group_is_reduced_as_it_would_be_alone(by: np.ufunc, group: list[int]) -> None:
+def test_group_reduction_is_that_of_each_group_alone(by: np.ufunc, group: list[int]) -> None:
     rows = np.random.default_rng(len(group)).random((len(group), 3)).astype(np.float32)
     rounds = GroupReduction.of(np.array(group, int))
     found = rounds.reduced(rows[rounds.order], by)
@@ -22,5 +22,5 @@ def test_each_group_is_reduced_as_it_would_be_alone(by: np.ufunc, group: list[in
         np.testing.assert_allclose(row, alone, rtol=1e-6)
 
 
-def test_no_rows_are_no_groups() -> None:
+def test_group_reduction_of_no_rows_is_empty() -> None:
     assert GroupReduction.of(np.zeros(0, int)).reduced(np.zeros((0, 4), np.float32), np.add).shape == (0, 4)

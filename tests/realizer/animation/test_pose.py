@@ -30,15 +30,13 @@ faces = st.dictionaries(st.sampled_from(AU_NAMES()), st.floats(0, 1, width=32), 
 
 
 @given(st.lists(faces, min_size=1, max_size=4))
-def test_a_face_that_takes_faps_gets_what_the_fap_stream_gets(rows: list[dict[str, float]]) -> None:
+def test_poses_of_a_fap_face_are_those_of_the_fap_stream(rows: list[dict[str, float]]) -> None:
     clip = frames(*rows)
     assert np.array_equal(poses(clip, FAPS), to_fap(clip).values)
 
 
 @given(faces, st.sets(st.sampled_from(AU_NAMES())))
-def test_what_a_face_takes_as_a_unit_asks_no_fap_for_anything(
-    face: dict[str, float], taken: set[str]
-) -> None:
+def test_poses_exclude_faps_of_units_that_the_face_has(face: dict[str, float], taken: set[str]) -> None:
     names = (*FAPS, *sorted(taken), "lips")
     (row,) = poses(frames({**face, "lips": 0.25}), names)
     others = {name: value for name, value in face.items() if name not in taken}
@@ -47,7 +45,7 @@ def test_what_a_face_takes_as_a_unit_asks_no_fap_for_anything(
     assert row[-1] == 0.25
 
 
-def test_gaze_visemes_and_faps_set_directly_reach_a_face_that_takes_units() -> None:
+def test_poses_of_a_unit_face_include_gaze_speech_and_set_faps() -> None:
     names = (*FAPS, "12L", "12R", "lips")
     (row,) = poses(frames({"12L": 1, "61": 0.5, "51": 0.5, "open_jaw": 300, "lips": 1}), names)
     found = dict(zip(names, row, strict=True))
@@ -59,7 +57,7 @@ def test_gaze_visemes_and_faps_set_directly_reach_a_face_that_takes_units() -> N
 
 
 @given(faces, st.sets(st.sampled_from(AU_NAMES())), st.integers(3, 68), st.sampled_from([0.0, 0.5, 1.0]))
-def test_both_kinds_of_faces_show_a_fap_that_is_held_as_it_is_set(
+def test_poses_show_a_set_fap_on_both_kinds_of_faces(
     face: dict[str, float], taken: set[str], number: int, part: float
 ) -> None:
     held = np.zeros((1, 68), np.float32)
@@ -77,6 +75,6 @@ def test_both_kinds_of_faces_show_a_fap_that_is_held_as_it_is_set(
         assert whole == 50
 
 
-def test_a_name_that_is_not_of_the_axis_is_an_error() -> None:
+def test_poses_refuse_an_unknown_name() -> None:
     with pytest.raises(KeyError, match="wings"):
         poses(frames({}), (*FAPS, "wings"))

@@ -39,7 +39,7 @@ def spoken():
     return realize(SPEECH, idle=False, voice="silent")
 
 
-def test_the_file_has_the_columns_of_live_link_face(spoken, tmp_path):
+def test_arkit_csv_has_the_columns_of_live_link_face(spoken, tmp_path):
     path = tmp_path / "Take.ARKit.csv"
     output = output_for(path)
     assert output is OUTPUTS[".arkit.csv"]
@@ -57,7 +57,7 @@ def test_the_file_has_the_columns_of_live_link_face(spoken, tmp_path):
         np.testing.assert_allclose(column, found[:, ARKIT_NAMES().index(name)], atol=1e-6)
 
 
-def test_a_rate_that_is_no_whole_number_has_timecodes_that_go_up(tmp_path):
+def test_arkit_csv_timecodes_rise_at_fractional_rates(tmp_path):
     quiet = realize(SPEECH, idle=False, voice="silent", fps=29.97)
     OUTPUTS[".arkit.csv"].write(quiet, tmp_path / "x.arkit.csv", RenderSettings())
     codes = [line.split(",")[0] for line in (tmp_path / "x.arkit.csv").read_text().splitlines()[1:]]
@@ -65,12 +65,12 @@ def test_a_rate_that_is_no_whole_number_has_timecodes_that_go_up(tmp_path):
     assert len(set(codes)) == len(codes) == quiet.frames
 
 
-def test_other_csv_files_are_what_they_were():
+def test_arkit_csv_suffix_does_not_change_csv():
     assert output_for("x.csv") is OUTPUTS[".csv"]
     assert output_for("my.take.csv") is OUTPUTS[".csv"]
 
 
-def test_a_reader_of_live_link_face_finds_the_weights_at_their_times(spoken, tmp_path):
+def test_arkit_csv_is_read_by_a_reader_of_live_link_face(spoken, tmp_path):
     read_csv = pytest.importorskip("openfacefx.importers_csv", reason="pip install openfacefx").read_csv
     OUTPUTS[".arkit.csv"].write(spoken, tmp_path / "x.arkit.csv", RenderSettings())
     track, notes = read_csv(str(tmp_path / "x.arkit.csv"), fps=25, epsilon=0)

@@ -23,7 +23,7 @@ def spoken(realization, *told, until=99.0, also=()):
     return replace(realization, speeches=(says(told, 0), *([says(also, 1)] if also else ())))
 
 
-def test_a_line_ends_where_the_voice_rests_or_it_is_full(realization):
+def test_captions_break_lines_at_pauses_and_when_full(realization):
     words = [(0.3 * k, 0.3 * k + 0.3, f"wonderful{k}") for k in range(8)]
     found = captions(spoken(realization, *words, (4.0, 4.3, "after"), (4.3, 4.5, "all")))
     assert [line.text for line in found] == [
@@ -38,12 +38,12 @@ def test_a_line_ends_where_the_voice_rests_or_it_is_full(realization):
     assert found[-1].end == pytest.approx(5.9)  # a little longer than it is heard
 
 
-def test_a_word_longer_than_a_line_is_a_line(realization):
+def test_captions_have_lines_of_one_long_word(realization):
     found = captions(spoken(realization, (0, 1, "x" * 60), (1, 2, "y")))
     assert [line.text for line in found] == ["x" * 60, "y"]
 
 
-def test_what_is_said_at_once_stands_in_lines_of_its_own(realization):
+def test_captions_show_simultaneous_speech_in_separate_lines(realization):
     found = captions(spoken(realization, (0.0, 1.0, "one"), also=((0.5, 1.5, "two"),)))
     assert found == (
         Span(1.0, 1.5, "one"),
@@ -52,6 +52,6 @@ def test_what_is_said_at_once_stands_in_lines_of_its_own(realization):
     )
 
 
-def test_words_that_were_cut_off_are_in_no_line(realization):
+def test_captions_exclude_words_that_were_cut_off(realization):
     found = captions(spoken(realization, (0, 1, "heard"), (1, 2, "lost"), until=2.0))
     assert [line.text for line in found] == ["heard"]

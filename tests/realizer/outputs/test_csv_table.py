@@ -12,7 +12,7 @@ from realizer.outputs.csv_table import encode_csv
 from realizer.tables import faps
 
 
-def test_csv_has_a_row_a_frame_and_a_column_an_au_and_a_fap(realization):
+def test_csv_has_rows_for_frames_and_columns_for_aus_and_faps(realization):
     header, *rows = csv.reader(io.StringIO(encode_csv(realization)))
     assert header[0] == "time"
     assert header[1 : 1 + len(AU_NAMES())] == [f"AU{name}" for name in AU_NAMES()]

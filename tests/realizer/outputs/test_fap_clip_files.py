@@ -50,7 +50,7 @@ def same(one: FAPClip, other: FAPClip) -> bool:
 
 
 @given(clips(), st.lists(st.sampled_from(list(ENCODINGS)), min_size=1, max_size=3))
-def test_over_any_files_in_any_order_nothing_changes(original: FAPClip, suffixes: list[str]) -> None:
+def test_read_clip_inverts_all_encodings(original: FAPClip, suffixes: list[str]) -> None:
     clip = original
     for suffix in suffixes:
         clip = read_clip(ENCODINGS[suffix](clip).encode())
@@ -63,14 +63,14 @@ def test_over_any_files_in_any_order_nothing_changes(original: FAPClip, suffixes
 
 
 @pytest.mark.parametrize("encode", [encode_csv, encode_json])
-def test_what_realize_writes_is_read(encode) -> None:  # type: ignore[no-untyped-def]
+def test_read_clip_reads_outputs_of_realize(encode) -> None:  # type: ignore[no-untyped-def]
     played = realize('<bml id="b"><faceLexeme id="s" lexeme="SURPRISE"/></bml>', fps=30, idle=False)
     clip = read_clip(encode(played).encode())
     assert clip.fps == 30
     np.testing.assert_array_equal(clip.values, played.faps.integers())
 
 
-def test_a_fap_file_is_limited_to_the_ranges_and_says_so() -> None:
+def test_clip_to_range_limits_values_with_notes() -> None:
     values = np.zeros((2, 68), np.int32)
     values[:, 2] = -5, 99_999
     clip = FAPClip(
@@ -83,7 +83,7 @@ def test_a_fap_file_is_limited_to_the_ranges_and_says_so() -> None:
     assert read_clip(ENCODINGS[".json"](clip).encode()).values[:, 2].tolist() == [-5, 99_999]
 
 
-def test_a_table_of_a_spreadsheet_is_read() -> None:
+def test_read_clip_reads_a_table_of_a_spreadsheet() -> None:
     got = read_clip(b"\xef\xbb\xbftime, open_jaw ,comment\r\n1.0,10.4,a\r\n\r\n1.5,20,b\r\n")
     assert got.fps == 2
     assert got.values[:, 2].tolist() == [10, 20]
@@ -91,7 +91,7 @@ def test_a_table_of_a_spreadsheet_is_read() -> None:
     assert got.notes == ("1 columns are not FAPs and are ignored",)
 
 
-def test_a_table_of_one_frame_is_taken_as_25_a_second() -> None:
+def test_read_clip_takes_a_table_of_one_frame_as_25_fps() -> None:
     got = read_clip(b"time,open_jaw\n0,7\n")
     assert (got.fps, got.values[0, 2]) == (25, 7)
     assert "have no rate" in got.notes[0]
@@ -131,7 +131,7 @@ BAD = {
 
 
 @pytest.mark.parametrize(("text", "says"), BAD.values(), ids=BAD)
-def test_what_is_none_of_them_is_refused_with_its_place(text: str, says: str) -> None:
+def test_read_clip_refuses_other_files_with_the_place(text: str, says: str) -> None:
     with pytest.raises(RealizerError, match=re.escape(says)):
         read_clip(text.encode())
 
@@ -139,7 +139,7 @@ def test_what_is_none_of_them_is_refused_with_its_place(text: str, says: str) ->
 @given(
     st.one_of(st.binary(max_size=200), st.text('{}[]":,0123456789fap values\n', max_size=80).map(str.encode))
 )
-def test_any_bytes_are_a_clip_or_a_clear_refusal(content: bytes) -> None:
+def test_read_clip_reads_or_refuses_any_bytes(content: bytes) -> None:
     try:
         assert read_clip(content).values.shape[1:] == (68,)
     except RealizerError as error:

@@ -58,7 +58,7 @@ def heard(path):
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_a_film_has_every_picture_at_its_time(tmp_path, suffix):
+def test_film_has_every_picture_at_its_time(tmp_path, suffix):
     shown = seen(film_of(tmp_path / f"x{suffix}", suffix, beep(0.5)))
     assert len(shown) == COUNT
     assert [t for t, _ in shown] == pytest.approx([k / FPS for k in range(COUNT)], abs=0.002)
@@ -67,7 +67,7 @@ def test_a_film_has_every_picture_at_its_time(tmp_path, suffix):
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_a_sound_is_heard_when_its_picture_is_seen(tmp_path, suffix):
+def test_film_sound_is_synchronous(tmp_path, suffix):
     line = heard(film_of(tmp_path / f"x{suffix}", suffix, beep(0.5)))
     loud = np.flatnonzero(np.abs(line) > 0.1)
     assert loud[0] / RATE == pytest.approx(0.5, abs=0.01)
@@ -75,7 +75,7 @@ def test_a_sound_is_heard_when_its_picture_is_seen(tmp_path, suffix):
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_where_nobody_speaks_there_is_a_silent_track_to_the_end(tmp_path, suffix):
+def test_film_without_speech_has_a_silent_track(tmp_path, suffix):
     path = film_of(tmp_path / f"x{suffix}", suffix, np.zeros(0, np.int16))
     with av.open(str(path)) as film:
         (track,) = film.streams.audio
@@ -87,41 +87,41 @@ def test_where_nobody_speaks_there_is_a_silent_track_to_the_end(tmp_path, suffix
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_two_runs_write_the_same_film(tmp_path, suffix):
+def test_film_is_deterministic(tmp_path, suffix):
     films = {film_of(tmp_path / f"{k}{suffix}", suffix, beep(0.3)).read_bytes() for k in range(4)}
     assert len(films) == 1
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_odd_sizes_lose_a_row_and_not_the_film(tmp_path, suffix):
+def test_film_of_odd_size_loses_a_row(tmp_path, suffix):
     shown = seen(film_of(tmp_path / f"x{suffix}", suffix, beep(0.3), count=3, size=(121, 161)))
     assert shown[0][1].shape == (120, 160, 3)
 
 
 @pytest.mark.parametrize("fps", [10.0, 29.97, 50.0])
-def test_other_rates_keep_their_clock(tmp_path, fps):
+def test_film_of_other_rates_keeps_time(tmp_path, fps):
     shown = seen(film_of(tmp_path / "x.mp4", ".mp4", beep(0.3), fps=fps))
     assert shown[-1][0] == pytest.approx((COUNT - 1) / fps, abs=0.002)
 
 
-def test_an_mp4_starts_with_its_index_so_that_a_browser_can_begin(tmp_path):
+def test_film_in_mp4_starts_with_its_index(tmp_path):
     content = film_of(tmp_path / "x.mp4", ".mp4", beep(0.3)).read_bytes()
     assert 0 < content.index(b"moov") < content.index(b"mdat")
 
 
-def test_colours_are_tagged_bt709(tmp_path):
+def test_film_colours_are_tagged_bt709(tmp_path):
     with av.open(str(film_of(tmp_path / "x.mp4", ".mp4", beep(0.3)))) as film:
         context = film.streams.video[0].codec_context
         assert (context.colorspace, context.color_primaries, context.color_trc) == (1, 1, 1)
 
 
-def test_a_long_film_reports_its_progress(tmp_path, caplog):
+def test_film_reports_its_progress(tmp_path, caplog):
     with caplog.at_level(logging.INFO, "realizer.outputs.film"):
         film_of(tmp_path / "x.mp4", ".mp4", beep(0.3), count=260, size=(16, 16))
     assert [r.message for r in caplog.records] == ["film: 250 of 260 pictures"]
 
 
-def test_without_pyav_a_sentence_says_what_to_install(tmp_path):
+def test_film_without_pyav_says_what_to_install(tmp_path):
     code = (
         "import sys; sys.modules['av'] = None\n"
         "import numpy as np\n"
@@ -139,7 +139,7 @@ def test_without_pyav_a_sentence_says_what_to_install(tmp_path):
 
 @pytest.mark.gl
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_a_realization_becomes_a_film_of_its_face(realization, tmp_path, suffix):
+def test_film_of_a_realization_shows_its_face(realization, tmp_path, suffix):
     path = tmp_path / f"x{suffix}"
     OUTPUTS[suffix].write(realization, path, RenderSettings(size=(129, 128)))
     shown = seen(path)
@@ -170,7 +170,7 @@ LINES = (Span(0.2, 0.6, "Grüß Gott"), Span(0.6, 0.7, "a & <b>"), Span(0.9, 1.2
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_subtitles_are_read_as_they_were_given(tmp_path, suffix):
+def test_film_has_subtitles(tmp_path, suffix):
     path = tmp_path / f"x{suffix}"
     encode_film(path, FORMATS[suffix], pictures(), COUNT, FPS, beep(0.5), lines=LINES)
     assert subtitles(path) == [(line.start, line.end, line.text) for line in LINES]
@@ -178,7 +178,7 @@ def test_subtitles_are_read_as_they_were_given(tmp_path, suffix):
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_a_subtitle_does_not_make_a_film_longer(tmp_path, suffix):
+def test_film_is_not_longer_with_subtitles(tmp_path, suffix):
     path = tmp_path / f"x{suffix}"
     late = Span(1.0, 9.0, "and so on")
     encode_film(path, FORMATS[suffix], pictures(), COUNT, FPS, beep(0.5), lines=[late])
@@ -186,12 +186,12 @@ def test_a_subtitle_does_not_make_a_film_longer(tmp_path, suffix):
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_two_films_with_subtitles_are_the_same(tmp_path, suffix):
+def test_film_with_subtitles_is_deterministic(tmp_path, suffix):
     for k in range(2):
         encode_film(tmp_path / f"{k}{suffix}", FORMATS[suffix], pictures(), COUNT, FPS, beep(0), lines=LINES)
     assert (tmp_path / f"0{suffix}").read_bytes() == (tmp_path / f"1{suffix}").read_bytes()
 
 
-def test_where_nobody_speaks_there_are_no_subtitles(tmp_path):
+def test_film_without_speech_has_no_subtitles(tmp_path):
     with av.open(str(film_of(tmp_path / "x.mp4", ".mp4", beep(0.3)))) as film:
         assert len(film.streams) == 2

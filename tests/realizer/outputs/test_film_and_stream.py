@@ -61,7 +61,7 @@ def played(turn):
 
 
 @pytest.mark.gl
-def test_the_pictures_are_the_same_to_the_bit(streamed, played):
+def test_pictures_of_film_and_stream_are_equal(streamed, played):
     with RenderSettings(SIZE).make_renderer(played, SIZE) as renderer:
         drawn = renderer.draw(played.poses)
     assert set(range(len(drawn))) <= set(streamed)
@@ -72,7 +72,7 @@ def test_the_pictures_are_the_same_to_the_bit(streamed, played):
 
 @pytest.mark.gl
 @pytest.mark.slow
-def test_a_film_has_them_as_far_as_its_encoder_lets_it(streamed, played, tmp_path):
+def test_film_shows_the_pictures_of_the_stream(streamed, played, tmp_path):
     path = tmp_path / "x.mp4"
     OUTPUTS[".mp4"].write(played, path, RenderSettings(SIZE))
     with av.open(str(path)) as film:

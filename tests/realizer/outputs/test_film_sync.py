@@ -42,7 +42,7 @@ def decoded(path: Path) -> tuple[np.ndarray, list[float], np.ndarray]:
 @pytest.mark.gl
 @pytest.mark.espeak
 @pytest.mark.parametrize("suffix", [".mp4", pytest.param(".webm", marks=pytest.mark.slow)])
-def test_the_mouth_opens_in_the_picture_in_which_it_is_heard(tmp_path: Path, suffix: str) -> None:
+def test_film_mouth_opens_when_it_is_heard(tmp_path: Path, suffix: str) -> None:
     played = realize(SAID, fps=FPS, idle=False, prosody=False, voice="espeak")
     path = tmp_path / f"x{suffix}"
     write_film(played, path, RenderSettings((SIZE, SIZE), "close"))

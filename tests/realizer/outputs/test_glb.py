@@ -51,7 +51,7 @@ def far(got, wanted):
     return max(np.linalg.norm(np.asarray(got[name]) - wanted[name], axis=1).max() for name in wanted)
 
 
-def test_khronos_finds_no_fault_and_three_js_sees_the_face_that_is_drawn(played, path, read_by):
+def test_glb_is_valid_and_looks_like_the_face_in_three_js(played, path, read_by):
     frames = [0, 7, 12, 20, played.frames - 1]
     seen = read_by("gltf.mjs", path, *(str(k / FPS) for k in frames))
     assert seen["issues"]["messages"] == []
@@ -63,7 +63,7 @@ def test_khronos_finds_no_fault_and_three_js_sees_the_face_that_is_drawn(played,
         assert far(got, split(played.face, vertices)) < 1.5 * TRUE
 
 
-def test_the_head_that_the_service_serves_has_no_fault_either(tmp_path, read_by):
+def test_glb_of_the_service_is_valid(tmp_path, read_by):
     face = load_face("default")
     (tmp_path / "x.glb").write_bytes(to_glb(face))
     seen = read_by("gltf.mjs", tmp_path / "x.glb", "0")
@@ -71,7 +71,7 @@ def test_the_head_that_the_service_serves_has_no_fault_either(tmp_path, read_by)
     assert far(seen["frames"][0], {face.name: face.vertices}) < 1e-6
 
 
-def test_trimesh_opens_the_head_as_it_rests(played, path):
+def test_glb_is_read_by_trimesh(played, path):
     scene = trimesh.load(io.BytesIO(path.read_bytes()), file_type="glb")
     meshes = scene.geometry
     wanted = split(played.face, played.face.vertices)
@@ -82,7 +82,7 @@ def test_trimesh_opens_the_head_as_it_rests(played, path):
     assert np.allclose(scene.bounds, played.face.bounds, atol=1e-6)
 
 
-def test_its_arrays_make_every_frame_of_the_face(played, path):
+def test_glb_reproduces_every_frame(played, path):
     file = Gltf(path)
     nodes, (animation,) = file.json["nodes"], file.json["animations"]
     tracks = {
@@ -106,7 +106,7 @@ def test_its_arrays_make_every_frame_of_the_face(played, path):
         assert np.linalg.norm(got - wanted, axis=1).max() < 1.5 * TRUE
 
 
-def test_a_program_that_knows_no_weights_below_none_reads_them_all(played, path):
+def test_glb_weights_are_0_to_1(played, path):
     read_gltf = pytest.importorskip("openfacefx.importers_gltf", reason="pip install openfacefx").read_gltf
     track, notes = read_gltf(str(path), epsilon=0)
     assert notes == []
@@ -125,7 +125,7 @@ def turned_by(quaternion, vertices):
     return vertices + 2 * np.cross(axis, np.cross(axis, vertices) + w * vertices)
 
 
-def test_eyes_that_are_pushed_move_on_their_nodes(tmp_path, read_by):
+def test_glb_moves_pushed_eyes_by_their_nodes(tmp_path, read_by):
     face = load_face("default")
     poses = np.zeros((4, len(face.inputs)), np.float32)
     for number, value in ((27, 150), (28, -80), (23, 2e4), (24, -1e4), (49, 3e4)):
@@ -137,7 +137,7 @@ def test_eyes_that_are_pushed_move_on_their_nodes(tmp_path, read_by):
         assert far(got, split(face, vertices)) < 1.5 * TRUE
 
 
-def test_eyes_that_are_no_balls_are_part_of_the_face(tmp_path, read_by):
+def test_glb_includes_eyes_without_balls_in_the_face(tmp_path, read_by):
     face = load_face("default")
     flat = replace(face, basis={**face.basis, "eyes": tuple(((0, 0), at) for _, at in face.basis["eyes"])})
     poses = np.zeros((2, len(face.inputs)), np.float32)
@@ -150,7 +150,7 @@ def test_eyes_that_are_no_balls_are_part_of_the_face(tmp_path, read_by):
         assert far(got, {face.name: vertices}) < 1.5 * TRUE
 
 
-def test_a_head_that_rests_is_a_file_without_targets(tmp_path, read_by):
+def test_glb_of_a_face_at_rest_has_no_targets(tmp_path, read_by):
     face = load_face("default")
     (tmp_path / "x.glb").write_bytes(encode_glb(face, np.zeros((1, len(face.inputs)), np.float32), 25.0))
     seen = read_by("gltf.mjs", tmp_path / "x.glb", "0")
@@ -159,5 +159,5 @@ def test_a_head_that_rests_is_a_file_without_targets(tmp_path, read_by):
     assert far(seen["frames"][0], split(face, face.vertices)) < 1e-6
 
 
-def test_two_runs_write_the_same_bytes(played, path):
+def test_glb_is_deterministic(played, path):
     assert encode_glb(played.face, played.poses, FPS) == path.read_bytes()

@@ -32,7 +32,7 @@ def read(tmp_path, file: GlbFile) -> Gltf:
     return Gltf(tmp_path / "x.glb")
 
 
-def test_a_rigid_mesh_is_the_part_about_its_centre(tmp_path, face: Face, eye: np.ndarray) -> None:
+def test_rigid_mesh_is_a_part_about_its_centre(tmp_path, face: Face, eye: np.ndarray) -> None:
     file, centre = GlbFile(), np.array([0.032, 0, -0.015], np.float32)
     (primitive,) = rigid_mesh(file, face, eye, "eye", 3, centre)["primitives"]
     found = read(tmp_path, file)
@@ -46,7 +46,7 @@ def test_a_rigid_mesh_is_the_part_about_its_centre(tmp_path, face: Face, eye: np
     assert np.array_equal(triangles, own - face.parts["left_eye"][0])
 
 
-def test_a_mesh_is_darker_where_its_occlusion_is(tmp_path, face: Face, eye: np.ndarray) -> None:
+def test_rigid_mesh_is_darker_by_occlusion(tmp_path, face: Face, eye: np.ndarray) -> None:
     file = GlbFile()
     dark = replace(face, occlusion=np.full(len(face.vertices), 0.5, np.float32))
     (primitive,) = rigid_mesh(file, dark, eye, "eye", 0)["primitives"]
@@ -54,7 +54,7 @@ def test_a_mesh_is_darker_where_its_occlusion_is(tmp_path, face: Face, eye: np.n
     assert colours[:, :3] == pytest.approx(linear(face.colours[eye]) / 2, abs=1e-4)
 
 
-def test_a_morphing_mesh_has_its_targets_and_two_joints(tmp_path, face: Face, eye: np.ndarray) -> None:
+def test_morphing_mesh_has_targets_and_two_joints(tmp_path, face: Face, eye: np.ndarray) -> None:
     moves = np.zeros((1, *face.vertices.shape), np.float32)
     moves[0, np.flatnonzero(eye)[5]] = (0, 0.01, 0)
     none = np.zeros((0, 3), np.float32)

@@ -16,7 +16,7 @@ def test_json_is_the_realization_in_one_line(realization) -> None:
     assert text.index("\n") == len(text) - 1
 
 
-def test_json_has_no_word_for_a_number_that_is_not_finite(realization) -> None:
+def test_json_refuses_numbers_that_are_not_finite(realization) -> None:
     realization.aus.values[0, 0] = np.nan
     with pytest.raises(ValueError, match="JSON"):
         encode_json(realization)

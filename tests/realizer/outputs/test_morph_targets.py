@@ -27,7 +27,7 @@ def still(face, poses):
     return rows
 
 
-def test_no_vertex_of_any_frame_is_off_by_a_tenth_of_a_millimetre(played):
+def test_morph_targets_are_exact_to_a_tenth_of_a_millimetre(played):
     face, made = played.face, make_morph_targets(played.face, played.poses)
     wanted = deform(face, still(face, played.poses))
     got = face.vertices + np.einsum("nk,kvc->nvc", made.weights, made.moves)
@@ -35,7 +35,7 @@ def test_no_vertex_of_any_frame_is_off_by_a_tenth_of_a_millimetre(played):
     assert np.linalg.norm(got - wanted, axis=2).max() < 1.2 * TRUE
 
 
-def test_targets_are_what_the_face_takes_and_few_more(played):
+def test_morph_targets_are_inputs_and_few_corrections(played):
     names = make_morph_targets(played.face, played.poses).names
     own = [name for name in names if not name.startswith("correction ")]
     assert {name.removesuffix(" reversed") for name in own} <= set(played.face.inputs)
@@ -44,13 +44,13 @@ def test_targets_are_what_the_face_takes_and_few_more(played):
     assert len(set(names)) == len(names)
 
 
-def test_weights_are_never_less_than_none_nor_more_than_all(played):
+def test_morph_target_weights_are_0_to_1(played):
     weights = make_morph_targets(played.face, played.poses).weights
     assert weights.min() == 0
     np.testing.assert_allclose(weights.max(axis=0), 1, atol=1e-6)
 
 
-def test_head_and_eyes_are_no_targets(played):
+def test_morph_targets_exclude_head_and_eyes(played):
     made = make_morph_targets(played.face, played.poses)
     assert np.abs(made.head[:, 1]).max() > 0.05  # the head shakes
     assert np.abs(made.eyes).max() > 0.05  # the eyes look aside
@@ -58,7 +58,7 @@ def test_head_and_eyes_are_no_targets(played):
         assert not made.moves[:, slice(*ball)].any()
 
 
-def test_an_eyeball_that_is_pushed_goes_forward_and_its_lids_with_it():
+def test_morph_targets_move_lids_with_pushed_eyeballs():
     face = load_face("default")
     poses = np.zeros((3, len(face.inputs)), np.float32)
     poses[:, face.inputs.index(fap(27).name)] = (0, 100, 200)
@@ -72,7 +72,7 @@ def test_an_eyeball_that_is_pushed_goes_forward_and_its_lids_with_it():
     assert np.linalg.norm(got - wanted, axis=2).max() < 1.2 * TRUE
 
 
-def test_a_face_that_rests_has_no_targets():
+def test_morph_targets_of_a_face_at_rest_are_empty():
     face = load_face("default")
     made = make_morph_targets(face, np.zeros((2, len(face.inputs)), np.float32))
     assert made.names == ()

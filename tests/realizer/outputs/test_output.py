@@ -39,7 +39,7 @@ def test_output_is_read_by_the_reader_that_it_names(suffix):
 
 
 @pytest.mark.parametrize("suffix", EACH)
-def test_two_files_of_one_output_have_the_same_bytes(realization, tmp_path, suffix):
+def test_output_is_deterministic(realization, tmp_path, suffix):
     for name in ("a", "b"):
         OUTPUTS[suffix].write(realization, tmp_path / f"{name}{suffix}", SMALL)
     first, second = (path.read_bytes() for path in sorted(tmp_path.iterdir()))
@@ -47,7 +47,7 @@ def test_two_files_of_one_output_have_the_same_bytes(realization, tmp_path, suff
     assert first
 
 
-def test_a_failing_write_leaves_the_old_file(realization, tmp_path):
+def test_output_keeps_the_old_file_when_it_fails(realization, tmp_path):
     path = tmp_path / "out.json"
     path.write_text("old")
     broken = realization.faps.values
@@ -59,12 +59,12 @@ def test_a_failing_write_leaves_the_old_file(realization, tmp_path):
     assert len(list(tmp_path.iterdir())) == 1
 
 
-def test_a_pipe_is_written_to_as_it_is(realization):
+def test_output_writes_to_a_pipe(realization):
     OUTPUTS[".csv"].write(realization, Path("/dev/null"), RenderSettings())
     assert not Path("/dev/null").is_file()
 
 
-def test_fap_has_the_integers_of_the_frames(realization, tmp_path):
+def test_output_of_fap_has_the_integers_of_the_frames(realization, tmp_path):
     text = written(realization, tmp_path, ".fap").decode()
     assert text.splitlines()[0] == "2.1 greeting 25 38"
     clip = read_fap(text)
@@ -73,7 +73,7 @@ def test_fap_has_the_integers_of_the_frames(realization, tmp_path):
     assert np.array_equal(clip.mask, realization.faps.mask)
 
 
-def test_fap_1_is_written_where_it_is_asked_for(realization, tmp_path):
+def test_output_of_fap_has_fap_1_on_request(realization, tmp_path):
     sounds = (Phoneme(0.0, 0.3, ""), Phoneme(0.3, 0.5, "p"), Phoneme(0.5, 0.8, "a"), Phoneme(0.8, 1.0, ""))
     (speaking,) = realization.speeches
     said = replace(speaking, utterance=replace(speaking.utterance, phonemes=sounds))

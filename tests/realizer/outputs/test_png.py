@@ -14,7 +14,7 @@ from realizer.outputs.registry import OUTPUTS
 from realizer.scheduling.timing import Schedule
 
 
-def test_a_sheet_shows_first_last_and_every_sync_point(realization):
+def test_moments_include_first_last_and_sync_points(realization):
     shown = moments(realization)
     assert shown[0].frame == 0
     assert shown[-1].frame == 37
@@ -24,7 +24,7 @@ def test_a_sheet_shows_first_last_and_every_sync_point(realization):
     assert 8 <= len(shown) <= 24
 
 
-def test_a_crowded_sheet_keeps_24_pictures_from_first_to_last(realization):
+def test_moments_are_at_most_24(realization):
     from dataclasses import replace
 
     times = np.linspace(0, 1.4, 36)
@@ -36,11 +36,11 @@ def test_a_crowded_sheet_keeps_24_pictures_from_first_to_last(realization):
 
 
 @pytest.mark.parametrize(("seconds", "frame"), [(0, 0), (0.4, 10), (-1, 0), (99, 37)])
-def test_an_instant_on_a_frame_is_that_frame(realization, seconds, frame):
+def test_row_at_a_frame_is_that_frame(realization, seconds, frame):
     assert row_at(realization, seconds) == pytest.approx(realization.poses[frame], rel=1e-5, abs=1e-3)
 
 
-def test_an_instant_between_frames_lies_between_them(realization):
+def test_row_at_a_time_between_frames_is_interpolated(realization):
     wanted = realization.poses[10:12].mean(0)
     assert row_at(realization, 0.42) == pytest.approx(wanted, rel=1e-4, abs=0.01)
 
@@ -51,7 +51,7 @@ def drawn(realization, path, drawing) -> np.ndarray:
 
 
 @pytest.mark.gl
-def test_with_an_instant_the_png_is_one_picture_of_that_size(realization, tmp_path):
+def test_png_at_an_instant_is_one_picture(realization, tmp_path):
     picture = drawn(realization, tmp_path / "x.png", RenderSettings((160, 120), at=0.4))
     assert picture.shape == (120, 160, 3)
     assert picture.std() > 15
@@ -61,7 +61,7 @@ def test_with_an_instant_the_png_is_one_picture_of_that_size(realization, tmp_pa
 
 @pytest.mark.gl
 @pytest.mark.slow
-def test_without_one_it_is_a_sheet_and_two_runs_are_the_same(realization, tmp_path):
+def test_png_of_a_sheet_is_deterministic(realization, tmp_path):
     first = drawn(realization, tmp_path / "x.png", RenderSettings((160, 120)))
     drawn(realization, tmp_path / "y.png", RenderSettings((160, 120)))
     assert first.shape[1] > 3 * 80
@@ -71,7 +71,7 @@ def test_without_one_it_is_a_sheet_and_two_runs_are_the_same(realization, tmp_pa
 @pytest.mark.gl
 @pytest.mark.parametrize("at", [None, 0.4])
 @pytest.mark.slow
-def test_what_draws_may_be_started_before_there_is_anything_to_draw(realization, tmp_path, at):
+def test_output_begin_starts_a_renderer(realization, tmp_path, at):
     drawing = RenderSettings((160, 120), at=at)
     early = OUTPUTS[".png"].begin(drawing, realization.face_name, realization.deformer)
     assert early.renderer is not None
@@ -84,6 +84,6 @@ def test_what_draws_may_be_started_before_there_is_anything_to_draw(realization,
     )
 
 
-def test_nothing_starts_for_what_has_no_pictures(realization):
+def test_output_begin_starts_nothing_without_pictures(realization):
     drawing = RenderSettings()
     assert OUTPUTS[".fap"].begin(drawing, realization.face_name) is drawing

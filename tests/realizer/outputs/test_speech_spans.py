@@ -18,7 +18,7 @@ def test_words_end_where_the_speech_is_cut_off(realization) -> None:
     assert list(words(replace(speaking, until=0.2505))) == []
 
 
-def test_phonemes_are_given_without_the_pauses(realization) -> None:
+def test_phonemes_exclude_pauses(realization) -> None:
     (speaking,) = realization.speeches
     assert [span.text for span in phonemes(speaking)] == ["h", "o\u028a", "i\u02d0"]
 

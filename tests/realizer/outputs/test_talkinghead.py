@@ -56,7 +56,7 @@ def head() -> Iterator[object]:
 @pytest.mark.browser
 @pytest.mark.xdist_group("browser")
 @pytest.mark.filterwarnings("ignore::ResourceWarning")  # Playwright's own event loop closes its pipes late
-def test_talking_head_queues_every_word_viseme_and_frame(realization, tmp_path, head):
+def test_talkinghead_queues_every_word_viseme_and_frame(realization, tmp_path, head):
     said = written(realization, tmp_path)
     queued = head.evaluate("said => window.speak(said)", said)
     subtitles = [(part["ts"], part["vs"]) for part in queued["anim"] if part["name"] == "subtitles"]
@@ -76,7 +76,7 @@ def test_talking_head_queues_every_word_viseme_and_frame(realization, tmp_path, 
     assert queued["peak"] > 0.2
 
 
-def test_visemes_are_those_of_the_sounds_and_follow_one_another(tmp_path):
+def test_talkinghead_visemes_are_those_of_the_sounds(tmp_path):
     document = (
         '<bml id="a" xmlns="http://www.bml-initiative.org/bml/bml-1.0">'
         '<speech id="s" start="0.5"><text>Papa thinks of five blue boats</text></speech></bml>'
@@ -93,7 +93,7 @@ def test_visemes_are_those_of_the_sounds_and_follow_one_another(tmp_path):
     assert len(base64.b64decode(said["audio"])) == 2 * round(played.duration * said["sampleRate"])
 
 
-def test_the_face_beside_the_mouth_is_an_animation(turn, tmp_path):
+def test_talkinghead_animates_the_face_apart_from_the_mouth(turn, tmp_path):
     played = realize(turn, voice="silent")
     anim = written(played, tmp_path)["anim"]
     assert len(anim["dt"]) == played.frames - 1
@@ -104,7 +104,7 @@ def test_the_face_beside_the_mouth_is_an_animation(turn, tmp_path):
     assert not {"jawOpen", "mouthPucker", "mouthFunnel"} & set(anim["vs"])
 
 
-def test_sync_points_are_markers(realization, tmp_path):
+def test_talkinghead_has_sync_points_as_markers(realization, tmp_path):
     said = written(realization, tmp_path)
     assert dict(zip(said["markers"], said["mtimes"], strict=True)) == {
         "greeting:nod:start": 200, "greeting:nod:stroke": 810, "greeting:nod:end": 1400

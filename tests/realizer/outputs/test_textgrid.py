@@ -32,7 +32,7 @@ def entries(grid, tier):
     return [tuple(entry) for entry in grid.getTier(tier).entries]
 
 
-def test_words_phonemes_and_points_are_tiers(realization, tmp_path):
+def test_textgrid_has_tiers_of_words_phonemes_and_points(realization, tmp_path):
     grid = opened(realization, tmp_path)
     assert grid.tierNames == ("words", "phonemes", "syncs")
     assert (grid.minTimestamp, grid.maxTimestamp) == (0, 1.5)
@@ -45,7 +45,7 @@ def test_words_phonemes_and_points_are_tiers(realization, tmp_path):
     ]  # fmt: skip
 
 
-def test_a_tier_has_no_hole_and_no_overlap(turn, tmp_path):
+def test_textgrid_tiers_have_no_gaps_or_overlaps(turn, tmp_path):
     played = realize(turn, voice="silent", idle=False)
     grid = opened(played, tmp_path)
     for tier in ("words", "phonemes"):
@@ -61,21 +61,21 @@ def test_a_tier_has_no_hole_and_no_overlap(turn, tmp_path):
     assert len(points) < len(named)  # all of them start together
 
 
-def test_characters_have_tiers_of_their_own(tmp_path):
+def test_textgrid_has_tiers_for_each_character(tmp_path):
     grid = opened(realize(TWO, voice="silent", idle=False), tmp_path)
     assert grid.tierNames == ("words", "phonemes", "bob words", "bob phonemes", "syncs")
     assert [text for _, _, text in entries(grid, "words") if text] == ["Say", "cheese"]
     assert [text for _, _, text in entries(grid, "bob words") if text] == ["No"]
 
 
-def test_quotes_and_line_ends_come_through(realization, tmp_path):
+def test_textgrid_escapes_quotes_and_line_ends(realization, tmp_path):
     (speaking,) = realization.speeches
     odd = replace(speaking.utterance, words=(Word(0.0, 0.5, 'the "big\n one"'),))
     grid = opened(replace(realization, speeches=(replace(speaking, utterance=odd),)), tmp_path)
     assert entries(grid, "words")[1] == (0.25, 0.75, 'the "big one"')
 
 
-def test_a_face_that_is_silent_has_empty_tiers(realization, tmp_path):
+def test_textgrid_of_silence_has_empty_tiers(realization, tmp_path):
     grid = opened(replace(realization, speeches=(), schedules=(), duration=0.0), tmp_path)
     assert entries(grid, "words") == [(0, 0.04, "")]
     assert entries(grid, "syncs") == []

@@ -43,7 +43,7 @@ def seen(realization):
     }
 
 
-def test_three_vrm_reads_every_expression_the_head_and_the_gaze(played, tmp_path, read_by):
+def test_vrma_is_read_by_three_vrm(played, tmp_path, read_by):
     OUTPUTS[".vrma"].write(played, tmp_path / "x.vrma", RenderSettings())
     read = read_by("vrma.mjs", tmp_path / "x.vrma")
     assert read["warnings"] == []
@@ -66,7 +66,7 @@ def test_three_vrm_reads_every_expression_the_head_and_the_gaze(played, tmp_path
 
 
 @pytest.mark.parametrize(("text", "vowel"), [("bar bar", "aa"), ("bee bee", "ih"), ("boom boom", "ou")])
-def test_vowels_are_what_is_said(text, vowel):
+def test_vrma_vowels_are_those_of_the_speech(text, vowel):
     document = (
         '<bml id="a" xmlns="http://www.bml-initiative.org/bml/bml-1.0">'
         f'<speech id="s"><text>{text}</text></speech></bml>'
@@ -83,7 +83,7 @@ def test_vowels_are_what_is_said(text, vowel):
     ("name", "lexeme"),
     [("happy", "HAPPINESS"), ("angry", "ANGER"), ("sad", "SADNESS"), ("surprised", "SURPRISE")],
 )
-def test_an_emotion_s_face_is_that_emotion(realization, name, lexeme):
+def test_vrma_expressions_are_those_of_emotions(realization, name, lexeme):
     shown = {}
     for (unit, side), amount in face_lexemes()[lexeme].aus.items():
         for suffix in ("",) if str(unit) in axis() else {"BOTH": "LR", "LEFT": "L", "RIGHT": "R"}[side]:
@@ -93,10 +93,10 @@ def test_an_emotion_s_face_is_that_emotion(realization, name, lexeme):
     assert found == {name: pytest.approx(0.6, abs=0.03)}
 
 
-def test_a_wink_is_one_blink_and_a_face_at_rest_is_none(realization):
+def test_vrma_blinks_each_eye_by_itself(realization):
     assert seen(one(realization, AU45L=1.0)) == {"blinkLeft": pytest.approx(1, abs=0.05)}
     assert seen(one(realization)) == {}
 
 
-def test_two_runs_write_the_same_bytes(played):
+def test_vrma_is_deterministic(played):
     assert encode_vrma(played) == encode_vrma(played)

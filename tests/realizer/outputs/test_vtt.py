@@ -29,7 +29,7 @@ def seconds(time):
     return time.hours * 3600 + time.minutes * 60 + time.seconds + time.milliseconds / 1000
 
 
-def test_words_phonemes_and_sync_points_are_cues_in_their_order(realization, tmp_path):
+def test_vtt_has_cues_in_order(realization, tmp_path):
     assert cues(realization, tmp_path) == [
         (0.2, 0.24, "sync", "greeting:nod:start"),
         (0.25, 0.65, "word", "Hello"),
@@ -42,7 +42,7 @@ def test_words_phonemes_and_sync_points_are_cues_in_their_order(realization, tmp
     ]
 
 
-def test_what_was_cut_off_is_not_said(realization, tmp_path):
+def test_vtt_excludes_words_that_were_cut_off(realization, tmp_path):
     (speaking,) = realization.speeches
     short = replace(realization, speeches=(replace(speaking, until=0.6),))
     told = [cue for cue in cues(short, tmp_path) if cue[2] != "sync"]
@@ -50,7 +50,7 @@ def test_what_was_cut_off_is_not_said(realization, tmp_path):
     assert max(cue[1] for cue in told) == 0.6
 
 
-def test_every_word_and_point_of_a_document_is_read(turn, tmp_path):
+def test_vtt_has_every_word_and_point(turn, tmp_path):
     played = realize(turn, voice="silent", idle=False)
     found = cues(played, tmp_path)
     assert [text for _, _, kind, text in found if kind == "word"] == [

@@ -11,7 +11,7 @@ from realizer.outputs.output import RenderSettings
 from realizer.outputs.wav import WAV, encode_wav
 
 
-def test_wav_is_sixteen_bit_mono_and_as_long_as_the_realization(realization):
+def test_wav_is_16_bit_mono_and_as_long_as_the_realization(realization):
     with wave.open(io.BytesIO(WAV.encode(realization, RenderSettings()))) as file:
         assert (file.getnchannels(), file.getsampwidth(), file.getframerate()) == (1, 2, 22050)
         assert file.getnframes() == round(1.5 * 22050)
@@ -20,7 +20,7 @@ def test_wav_is_sixteen_bit_mono_and_as_long_as_the_realization(realization):
     assert np.abs(pcm[int(0.3 * 22050) : int(1.2 * 22050)]).max() > 8000
 
 
-def test_wav_holds_the_samples_as_they_are() -> None:
+def test_wav_has_the_samples_unchanged() -> None:
     pcm = np.array([-32768, -1, 0, 1, 32767], np.int16)
     with wave.open(io.BytesIO(encode_wav(pcm, 8000))) as file:
         assert file.getframerate() == 8000

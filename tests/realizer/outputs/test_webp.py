@@ -32,7 +32,7 @@ def opened(path):
         return found, image.info["loop"]
 
 
-def test_every_picture_is_read_at_its_time(tmp_path):
+def test_webp_has_every_picture_at_its_time(tmp_path):
     path = tmp_path / "x.webp"
     path.write_bytes(encode_webp(pictures(7), [0, 0.04, 0.08, 0.5, 0.6, 0.7, 0.8], 1.0))
     found, loop = opened(path)
@@ -43,7 +43,7 @@ def test_every_picture_is_read_at_its_time(tmp_path):
         assert np.abs(got.astype(int) - wanted).mean() < 6
 
 
-def test_times_that_are_no_whole_milliseconds_do_not_drift(tmp_path):
+def test_webp_times_do_not_drift(tmp_path):
     path = tmp_path / "x.webp"
     path.write_bytes(encode_webp(pictures(9), [k / 24 for k in range(9)], 9 / 24))
     found, _ = opened(path)
@@ -53,7 +53,7 @@ def test_times_that_are_no_whole_milliseconds_do_not_drift(tmp_path):
 
 @pytest.mark.gl
 @pytest.mark.slow
-def test_a_realization_becomes_an_animated_picture_of_its_face(realization, tmp_path):
+def test_webp_of_a_realization_shows_its_face(realization, tmp_path):
     for name in ("x", "y"):
         OUTPUTS[".webp"].write(realization, tmp_path / f"{name}.webp", RenderSettings(size=(97, 96)))
     found, _ = opened(tmp_path / "x.webp")
@@ -68,7 +68,7 @@ def test_a_realization_becomes_an_animated_picture_of_its_face(realization, tmp_
 
 
 @pytest.mark.gl
-def test_more_than_25_pictures_a_second_are_thinned(tmp_path):
+def test_webp_has_at_most_25_pictures_a_second(tmp_path):
     quick = realize('<bml id="b"><head id="n" lexeme="NOD" end="0.5"/></bml>', fps=60, idle=False)
     OUTPUTS[".webp"].write(quick, tmp_path / "x.webp", RenderSettings(size=(32, 32)))
     found, _ = opened(tmp_path / "x.webp")
@@ -76,7 +76,7 @@ def test_more_than_25_pictures_a_second_are_thinned(tmp_path):
     assert {shown for shown, _ in found} == {0.05}
 
 
-def test_one_picture_is_a_file_too(tmp_path):
+def test_webp_of_one_picture(tmp_path):
     path = tmp_path / "x.webp"
     path.write_bytes(encode_webp(pictures(1), [0.0], 0.04))
     ((shown, got),) = opened(path)[0]

@@ -62,7 +62,7 @@ BAD = [
 
 @pytest.mark.espeak
 @pytest.mark.parametrize(("speech", "words"), BAD, ids=range(len(BAD)))
-def test_bad_text_gives_one_warning_and_the_others_play(voice: EspeakVoice, speech: str, words: str) -> None:
+def test_speech_of_a_bad_text_gives_one_warning(voice: EspeakVoice, speech: str, words: str) -> None:
     told = warned(played(speech, voice))
     assert len(told) == 1
     assert words in told[0]
@@ -72,7 +72,9 @@ def test_bad_text_gives_one_warning_and_the_others_play(voice: EspeakVoice, spee
 
 @pytest.mark.hibari
 @pytest.mark.parametrize(("speech", "words"), BAD, ids=range(len(BAD)))
-def test_bad_text_is_no_other_for_the_neural_voice(neural: HibariVoice, speech: str, words: str) -> None:
+def test_speech_of_a_bad_text_gives_one_warning_by_hibari(
+    neural: HibariVoice, speech: str, words: str
+) -> None:
     told = warned(played(speech, neural))
     assert len(told) == 1
     assert words in told[0]
@@ -82,20 +84,20 @@ def test_bad_text_is_no_other_for_the_neural_voice(neural: HibariVoice, speech: 
     "text", ["one &#9; two", "one \x7f\u202e\u200b two", "Привет 你好 مرحبا שלום नमस्ते end"]
 )
 @pytest.mark.espeak
-def test_odd_characters_and_mixed_scripts_are_spoken_without_a_word(voice: EspeakVoice, text: str) -> None:
+def test_speech_of_mixed_scripts_gives_no_warning(voice: EspeakVoice, text: str) -> None:
     schedule = played(f"<text>{text}</text>", voice)
     assert not schedule.warnings
     assert points(schedule, "s")["end"] > 0.5
 
 
-def test_a_speech_without_a_word_lasts_a_moment_so_that_its_points_are_apart() -> None:
+def test_speech_without_words_has_a_length() -> None:
     times = points(played('<text>... <sync id="a"/></text>', "silent"), "s")
     assert times["start"] == 0
     assert times["end"] == pytest.approx(0.1)
 
 
 @pytest.mark.espeak
-def test_ssml_that_is_not_understood_is_one_warning_and_spoken_all_the_same(voice: EspeakVoice) -> None:
+def test_speech_of_odd_ssml_gives_one_warning(voice: EspeakVoice) -> None:
     ssml = (
         '<speak><prosody rate="banana" pitch="+10Hz">one</prosody><nonsense>two</nonsense><break time="x"/>'
         '<break time="3600s"/><mark name="m"/>three <mark name=""/>four <mark name="m"/>five</speak>'
@@ -125,16 +127,14 @@ def test_ssml_that_is_not_understood_is_one_warning_and_spoken_all_the_same(voic
         '<speak xml:lang="xx-YY">hello</speak></description>',
     ],
 )
-def test_a_language_that_no_voice_speaks_is_a_warning_of_the_document(
-    voice: EspeakVoice, speech: str
-) -> None:
+def test_speech_in_an_unknown_language_gives_a_warning(voice: EspeakVoice, speech: str) -> None:
     told = warned(played(speech, voice))
     assert told == [
         "line 1, /bml/speech[1]: speech: espeak-ng does not speak 'xx-YY': spoken as English",
     ]
 
 
-def test_the_language_of_the_text_is_what_the_voice_is_asked_for() -> None:
+def test_speech_request_has_the_language_of_the_text() -> None:
     from bml_schema import parse
 
     for given, wanted in ((' xml:lang="nl-NL"', "nl-NL"), ("", "fr-FR")):
@@ -145,14 +145,14 @@ def test_the_language_of_the_text_is_what_the_voice_is_asked_for() -> None:
         assert asked.language == wanted
 
 
-def test_a_voice_that_is_not_there_is_refused_with_those_that_are() -> None:
+def test_schedule_refuses_an_unknown_voice() -> None:
     with pytest.raises(VoiceError, match="wanted one of espeak, hibari, silent, got 'nobody'"):
         realizer.schedule(document("<text>one</text>"), voice="nobody")
 
 
 @pytest.mark.espeak
 @pytest.mark.parametrize("name", ["espeak", "espeak:nl", "espeak:en-gb+f3"])
-def test_a_service_asks_the_voice_of_that_name_and_of_no_other(name: str) -> None:
+def test_engines_speak_by_the_named_voice(name: str) -> None:
     studio = Engines()
     alone = EspeakVoice(name.partition(":")[2] or None)
     try:
@@ -169,7 +169,7 @@ def test_a_service_asks_the_voice_of_that_name_and_of_no_other(name: str) -> Non
     "name",
     [pytest.param("espeak", marks=pytest.mark.espeak), pytest.param("hibari", marks=pytest.mark.hibari)],
 )
-def test_an_engine_that_is_killed_in_the_middle_costs_one_sound(
+def test_engines_lose_one_sound_when_a_process_is_killed(
     name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     studio = Engines()
@@ -207,7 +207,7 @@ def test_an_engine_that_is_killed_in_the_middle_costs_one_sound(
 
 
 @pytest.mark.espeak
-def test_an_engine_that_is_killed_while_nobody_asks_costs_nothing(voice: EspeakVoice) -> None:
+def test_engine_killed_between_requests_is_replaced(voice: EspeakVoice) -> None:
     voice.say(SpeechRequest("Before it died."))
     engine = voice._process._running
     assert engine is not None
@@ -216,7 +216,7 @@ def test_an_engine_that_is_killed_while_nobody_asks_costs_nothing(voice: EspeakV
     assert voice.say(SpeechRequest("After it died.")).duration > 0.5
 
 
-def test_a_voice_that_fails_is_one_warning_and_the_others_play() -> None:
+def test_speech_of_a_broken_voice_is_silent_with_a_warning() -> None:
     class Broken:
         name = "broken"
 

@@ -15,7 +15,7 @@ SAY = SpeechRequest('one two <mark name="m"/>three four five', ("m",))
 
 
 @pytest.mark.parametrize("ratio", [0.7, 0.95, 1.0, 1.3, 1.6])
-def test_a_speech_lasts_exactly_as_long_as_it_is_asked_to(ratio: float) -> None:
+def test_speak_to_length_has_exactly_that_length(ratio: float) -> None:
     voice = SilentVoice()
     natural = voice.say(SAY)
     made = speak_to_length(voice, SpeechRequest(SAY.ssml, SAY.marks, seconds=natural.duration * ratio))
@@ -25,7 +25,7 @@ def test_a_speech_lasts_exactly_as_long_as_it_is_asked_to(ratio: float) -> None:
     assert made.stretch == WARP, "what is left can be warped"
 
 
-def test_without_a_length_it_is_the_voices_own() -> None:
+def test_speak_to_length_without_a_length_is_the_voices_own() -> None:
     voice = SilentVoice()
     assert speak_to_length(voice, SAY).duration == voice.say(SAY).duration
     assert voice.say(SAY).stretch[0] < 1 < voice.say(SAY).stretch[1]
@@ -33,7 +33,7 @@ def test_without_a_length_it_is_the_voices_own() -> None:
 
 @pytest.mark.espeak
 @pytest.mark.parametrize("ratio", [0.75, 1.4])
-def test_sound_and_times_of_a_real_voice_stretch_together(ratio: float) -> None:
+def test_speak_to_length_stretches_sound_and_times(ratio: float) -> None:
     from realizer.speech.registry import find_voice
 
     voice = find_voice("espeak")
@@ -49,7 +49,7 @@ def test_sound_and_times_of_a_real_voice_stretch_together(ratio: float) -> None:
         voice.close()
 
 
-def test_a_stretched_sound_keeps_its_loudness() -> None:
+def test_stretched_sound_keeps_its_loudness() -> None:
     wave = (8000 * np.sin(np.arange(22050) * 0.1)).astype(np.int16)
     made = stretched(Utterance(1.0, (), (), {"m": 0.5}, 22050, wave), {"end": 1.005})
     assert made.pcm is not None
@@ -57,7 +57,7 @@ def test_a_stretched_sound_keeps_its_loudness() -> None:
     assert made.marks["m"] == pytest.approx(0.5025)
 
 
-def test_a_sound_is_warped_so_that_its_marks_come_where_they_are_wanted() -> None:
+def test_stretched_sound_has_marks_at_given_times() -> None:
     loud = np.zeros(22050, np.int16)
     loud[11025:11035] = 9000  # a click at the mark
     made = stretched(Utterance(1.0, (), (), {"m": 0.5}, 22050, loud), {"m": 0.53, "end": 1.02})
@@ -68,7 +68,7 @@ def test_a_sound_is_warped_so_that_its_marks_come_where_they_are_wanted() -> Non
 
 @pytest.mark.espeak
 @pytest.mark.parametrize("seconds", [1.3, 1.8, 2.3, 3.1])
-def test_a_voice_is_asked_until_hardly_anything_is_left_to_warp(seconds: float) -> None:
+def test_speak_to_length_tries_rates_until_little_is_left(seconds: float) -> None:
     from realizer.speech.registry import find_voice
 
     class Heard:
@@ -98,7 +98,7 @@ def test_a_voice_is_asked_until_hardly_anything_is_left_to_warp(seconds: float) 
     assert min(abs(length / seconds - 1) for length in voice.lengths) < 0.012
 
 
-def test_a_voice_at_its_limit_is_not_asked_for_ever() -> None:
+def test_speak_to_length_stops_at_the_limit_of_a_voice() -> None:
     asked = []
 
     class Rigid:
@@ -115,7 +115,7 @@ def test_a_voice_at_its_limit_is_not_asked_for_ever() -> None:
     assert len(asked) == 2
 
 
-def test_what_was_joined_of_parts_is_one_when_it_is_stretched() -> None:
+def test_stretched_utterance_has_no_sections() -> None:
     made = SilentVoice().say(SAY)
     whole = replace(made, sections=((0.0, made),))
     assert stretched(whole, {"end": 1.1 * made.duration}).sections == ()

@@ -34,7 +34,7 @@ def test_vowel_units_counts_syllables(language: str) -> None:
     assert not wrong
 
 
-def test_digits_have_the_sounds_of_their_names() -> None:
+def test_vowel_units_and_phonemes_of_digits_are_their_names() -> None:
     assert vowel_units("104", "en") == 4
     assert letters_to_phonemes("2", "fr") == letters_to_phonemes("deux", "fr")
 

@@ -21,7 +21,7 @@ def test_voices_are_listed_with_what_they_are() -> None:
     assert all(voice.description for voice in voices())
 
 
-def test_a_voice_that_is_not_installed_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_voices_that_are_missing_say_how_to_install_them(monkeypatch: pytest.MonkeyPatch) -> None:
     real = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "hibari" else real(name))
     listed = {voice.name: voice for voice in voices()}
@@ -38,26 +38,26 @@ def test_a_voice_that_is_not_installed_says_how_to_get_it(monkeypatch: pytest.Mo
         pytest.param("hibari", HibariVoice, marks=pytest.mark.hibari),
     ],
 )
-def test_a_voice_is_found_by_its_name_and_no_engine_starts(name: str, kind: type) -> None:
+def test_find_voice_starts_no_engine(name: str, kind: type) -> None:
     voice = find_voice(name)
     assert isinstance(voice, kind)
     assert (voice.name, getattr(voice, "pid", None)) == (name, None)
 
 
-def test_listing_the_voices_loads_no_engine() -> None:
+def test_voices_are_listed_without_an_engine() -> None:
     code = "import sys; from realizer.speech.registry import voices; voices(); print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert not {"hibari", "onnxruntime", "espeakng_loader"} & set(loaded.split())
 
 
-def test_every_voice_says_what_it_is_or_what_to_install() -> None:
+def test_voices_have_descriptions() -> None:
     listed = {voice.name: voice for voice in voices()}
     assert {"espeak", "silent"} <= set(listed)
     assert listed["silent"].available
     assert all(len(voice.description) > 20 for voice in listed.values())
 
 
-def test_without_an_engine_the_voice_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_find_voice_without_an_engine_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         "realizer.speech.espeak.voice.install_hint", lambda: "pip install 'bml-realizer[speech]'"
     )
@@ -74,12 +74,12 @@ def test_without_an_engine_the_voice_is_silent(monkeypatch: pytest.MonkeyPatch) 
 
 
 @pytest.mark.espeak
-def test_the_best_voice_is_the_one_with_sound() -> None:
+def test_find_voice_prefers_sound() -> None:
     assert find_voice(None).name == "espeak"
     assert find_voice("espeak:en-gb+f3").name == "espeak:en-gb+f3"
 
 
-def test_an_unknown_voice_is_refused_with_the_known_ones() -> None:
+def test_find_voice_refuses_an_unknown_name() -> None:
     with pytest.raises(VoiceError, match="wanted one of espeak, hibari, silent, got 'hal'"):
         find_voice("hal")
 

@@ -16,20 +16,20 @@ def parts(ssml: str) -> tuple[object, ...]:
     return read_script(SpeechRequest(ssml)).parts
 
 
-def test_blanks_are_one_and_marks_keep_their_place() -> None:
+def test_read_script_collapses_blanks_and_keeps_marks() -> None:
     assert parts(' a\n\t <mark name="m"/> b  &amp; c ') == ("a ", Mark("m"), "b & c ")
 
 
-def test_a_speak_element_inside_is_no_matter() -> None:
+def test_read_script_ignores_speak_elements() -> None:
     assert parts("<speak>a <mark name='m'/>b</speak>") == ("a ", Mark("m"), "b")
 
 
-def test_breaks_have_seconds_and_a_limit() -> None:
+def test_read_script_limits_breaks() -> None:
     ssml = '<break time="250ms"/><break time="1.5s"/><break strength="none"/><break/><break time="9999s"/>'
     assert parts(ssml) == (Break(0.25), Break(1.5), Break(0.0), Break(0.4), Break(10.0))
 
 
-def test_only_elements_and_attributes_of_speech_are_kept() -> None:
+def test_read_script_keeps_elements_of_speech_only() -> None:
     script = read_script(
         SpeechRequest('<prosody rate="fast" onclick="x">a</prosody><audio src="/etc/passwd">b</audio>')
     )
@@ -37,18 +37,18 @@ def test_only_elements_and_attributes_of_speech_are_kept() -> None:
     assert "passwd" not in write_document(script).text
 
 
-def test_a_bml_sync_is_a_mark() -> None:
+def test_read_script_reads_bml_syncs_as_marks() -> None:
     assert read_script(SpeechRequest('a <bml:sync id="x"/>b')).marks == ("x",)
 
 
-def test_the_longest_text_is_still_taken() -> None:
+def test_read_script_limits_the_length() -> None:
     assert read_script(SpeechRequest("a" * MAX_TEXT)).text
     with pytest.raises(VoiceError, match="split it"):
         read_script(SpeechRequest("a" * (MAX_TEXT + 1)))
 
 
 @given(st.text(max_size=200))
-def test_any_text_makes_a_script_that_can_be_written(text: str) -> None:
+def test_read_script_reads_any_text(text: str) -> None:
     script = read_script(SpeechRequest(text))
     document = write_document(script)
     document.text.encode()
@@ -60,7 +60,7 @@ def test_any_text_makes_a_script_that_can_be_written(text: str) -> None:
         st.sampled_from(["one", "two.", " ", '<mark name="m"/>', "<p>", "</p>", "&amp;", "<", "'", "😀"])
     )
 )
-def test_any_jumble_of_markup_keeps_its_words(pieces: list[str]) -> None:
+def test_read_script_keeps_words_of_malformed_markup(pieces: list[str]) -> None:
     script = read_script(SpeechRequest("".join(pieces)))
     assert script.text.count("one") == pieces.count("one")
     # A name is that of one place: the first.

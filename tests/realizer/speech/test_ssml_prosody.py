@@ -27,16 +27,14 @@ from realizer.speech.ssml_prosody import PLAIN, Prosody
         ({}, PLAIN),
     ],
 )
-def test_values_are_factors_and_what_is_not_understood_changes_nothing(
-    attributes: dict[str, str], wanted: Prosody
-) -> None:
+def test_prosody_values_are_factors(attributes: dict[str, str], wanted: Prosody) -> None:
     found = PLAIN.within(attributes)
     assert (found.rate, found.pitch, found.volume) == pytest.approx(
         (wanted.rate, wanted.pitch, wanted.volume)
     )
 
 
-def test_what_stands_inside_is_multiplied() -> None:
+def test_prosody_inside_prosody_is_multiplied() -> None:
     inner = PLAIN.within({"rate": "50%", "volume": "soft"}).within({"rate": "50%", "pitch": "+6st"})
     assert (inner.rate, inner.volume) == (0.25, 0.5)
     assert inner.pitch == pytest.approx(2**0.5)

@@ -22,26 +22,26 @@ def volumes(ssml: str, seconds: float | None = None) -> list[set[float]]:
     ]
 
 
-def test_words_inside_are_as_loud_as_it_says_and_the_others_as_ever() -> None:
+def test_with_volumes_changes_words_inside_prosody() -> None:
     assert volumes('one <prosody volume="x-loud">two three</prosody> four') == [{1.0}, {2.0}, {2.0}, {1.0}]
     assert volumes('<prosody volume="+6dB">one</prosody>')[0].pop() == pytest.approx(1.995, abs=0.01)
 
 
-def test_one_inside_another_multiplies() -> None:
+def test_with_volumes_multiplies_nested_prosody() -> None:
     nested = '<prosody volume="soft">a <prosody volume="50%">b</prosody></prosody>'
     assert volumes(nested) == [{0.5}, {0.25}]
 
 
-def test_it_stays_when_speech_is_stretched() -> None:
+def test_with_volumes_survives_stretching() -> None:
     assert volumes('one <prosody volume="loud">two</prosody>', seconds=2.5) == [{1.0}, {1.4}]
 
 
-def test_speech_without_it_is_left_alone() -> None:
+def test_with_volumes_keeps_other_speech() -> None:
     said = SilentVoice().say(SpeechRequest("the volume is <prosody rate='fast'>high</prosody>"))
     assert with_volumes(SpeechRequest("the volume is <prosody rate='fast'>high</prosody>"), said) is said
 
 
-def test_words_of_a_voice_that_merges_them_are_shared_out_evenly() -> None:
+def test_with_volumes_scales_indices_of_merged_words() -> None:
     merged = (Word(0.0, 0.4, "I am"), Word(0.4, 0.8, "very glad"))
     sounds = (Phoneme(0.0, 0.4, "a"), Phoneme(0.4, 0.8, "e"), Phoneme(0.8, 1.0, ""))
     said = with_volumes(
@@ -50,7 +50,7 @@ def test_words_of_a_voice_that_merges_them_are_shared_out_evenly() -> None:
     assert [p.volume for p in said.phonemes] == [1.0, 1.4, 1.0]
 
 
-def test_what_is_shouted_opens_the_mouth_further_than_what_is_whispered() -> None:
+def test_with_volumes_opens_the_mouth_by_volume() -> None:
     jaws = []
     for volume in ("x-soft", "medium", "x-loud"):
         said = speak_to_length(SilentVoice(), SpeechRequest(f'<prosody volume="{volume}">papa car</prosody>'))
@@ -62,7 +62,7 @@ def test_what_is_shouted_opens_the_mouth_further_than_what_is_whispered() -> Non
 
 
 @given(st.text(max_size=60), st.integers(0, 5))
-def test_any_text_leaves_times_and_sounds_as_they_were(text: str, count: int) -> None:
+def test_with_volumes_keeps_times_and_phonemes(text: str, count: int) -> None:
     words = tuple(Word(k * 0.2, k * 0.2 + 0.2, "x") for k in range(count))
     sounds = tuple(Phoneme(k * 0.1, k * 0.1 + 0.1, "a") for k in range(2 * count))
     say = SpeechRequest(f'<prosody volume="loud">{text}</prosody>')

@@ -7,12 +7,12 @@ from realizer.animation.fap.au_fap_mapping import standard
 from realizer.tables import AuToFap
 
 
-def test_the_standard_mapping_is_the_table() -> None:
+def test_standard_mapping_is_the_table() -> None:
     assert standard().rows == tables.au_to_fap()
     assert standard() is standard()
 
 
-def test_what_is_replaced_is_replaced_whole_and_the_other_side_stays() -> None:
+def test_mapping_replaces_units_completely_on_one_side() -> None:
     own = AuToFap(12, "L", 6, 0.0, 1.0, 0.0, 99.0)
     mapping = standard().replaced({(12, "L"): (own,)}, "mine")
     assert [row for row in mapping.rows if (row.au, row.side) == (12, "L")] == [own]
@@ -21,6 +21,6 @@ def test_what_is_replaced_is_replaced_whole_and_the_other_side_stays() -> None:
     assert mapping.sources == ("au_to_fap.csv", "mine")
 
 
-def test_a_unit_can_be_told_to_ask_nothing() -> None:
+def test_mapping_replaces_a_unit_by_nothing() -> None:
     mapping = standard().replaced({(25, ""): ()}, "mine")
     assert 25 not in {row.au for row in mapping.rows}

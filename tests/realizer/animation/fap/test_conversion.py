@@ -41,18 +41,18 @@ def value(number: int, **aus: float) -> float:
 faces = st.dictionaries(st.sampled_from(AU_NAMES()), st.floats(0.0, 1.0, width=32), max_size=8)
 
 
-def test_zero_in_zero_out() -> None:
+def test_to_fap_of_a_face_at_rest_is_zero() -> None:
     assert not to_fap(frames({}, {})).values.any()
 
 
-def test_a_demand_grows_linearly_with_its_action_unit() -> None:
+def test_to_fap_is_linear_in_an_action_unit() -> None:
     most = {row.key: row.fap_to for row in tables.au_to_fap()}[12, "L", 12]
     assert value(12, au12L=0.5) == pytest.approx(most / 2)
     assert value(12, au12L=1.0) == pytest.approx(most)
     assert value(13, au12L=1.0) == 0
 
 
-def test_a_fap_gets_the_strongest_of_each_sign() -> None:
+def test_to_fap_adds_the_strongest_value_of_each_sign() -> None:
     up, down = value(33, au1L=1.0), value(33, au4L=1.0)
     assert up > 0 > down
     assert value(33, au1L=1.0, au4L=1.0) == pytest.approx(up + down)
@@ -60,12 +60,12 @@ def test_a_fap_gets_the_strongest_of_each_sign() -> None:
     assert joined == pytest.approx(min(outer, value(5, au26=1.0)))
 
 
-def test_rotations_add_up() -> None:
+def test_to_fap_adds_rotations() -> None:
     assert value(49, au51=0.5, au52=0.2) == pytest.approx(0.3 * value(49, au51=1.0), rel=1e-5)
     assert value(23, au61=0.5, au65=0.5) == pytest.approx(value(23, au61=0.5) + value(23, au65=0.5), rel=1e-5)
 
 
-def test_a_polyline_bends_at_its_knots_and_stays_level_beyond_its_end() -> None:
+def test_to_fap_bends_at_knots_and_is_constant_after_the_last() -> None:
     rows = (AuToFap(26, "", 3, 0.2, 0.6, 0.0, 100.0), AuToFap(26, "", 3, 0.6, 0.8, 100.0, 300.0))
     au = np.array([0.0, 0.2, 0.4, 0.6, 0.7, 0.8, 1.0])
     got = to_fap(frames(*({"26": v} for v in au)), FapMapping(rows, ())).values[:, 2]
@@ -84,7 +84,7 @@ def mirrored(name: str) -> str:
 
 
 @given(faces)
-def test_swapping_the_sides_of_aus_swaps_the_sides_of_faps(face: dict[str, float]) -> None:
+def test_to_fap_swaps_sides_with_the_aus(face: dict[str, float]) -> None:
     one = to_fap(frames(face)).values
     other = to_fap(frames({mirrored(name): value for name, value in face.items()})).values
     columns, signs = mirrors()
@@ -92,14 +92,14 @@ def test_swapping_the_sides_of_aus_swaps_the_sides_of_faps(face: dict[str, float
 
 
 @given(faces)
-def test_every_fap_stays_within_its_range(face: dict[str, float]) -> None:
+def test_to_fap_limits_every_fap_to_its_range(face: dict[str, float]) -> None:
     values = to_fap(frames(face, {"open_jaw": 1e6, "head_yaw": -1e6})).values
     assert np.all(values >= [row.least for row in tables.faps()])
     assert np.all(values <= [row.most for row in tables.faps()])
 
 
 @given(st.lists(faces, min_size=2, max_size=6))
-def test_a_frame_does_not_depend_on_its_neighbours(clip: list[dict[str, float]]) -> None:
+def test_to_fap_converts_each_frame_by_itself(clip: list[dict[str, float]]) -> None:
     together = to_fap(frames(*clip)).values
     alone = np.concatenate([to_fap(frames(face)).values for face in clip])
     np.testing.assert_allclose(together, alone, rtol=1e-5, atol=1e-3)
@@ -107,7 +107,7 @@ def test_a_frame_does_not_depend_on_its_neighbours(clip: list[dict[str, float]])
 
 @pytest.mark.parametrize("jaw", ["26", "27"])
 @given(face=faces)
-def test_the_lip_gap_never_shrinks_as_the_jaw_drops(jaw: str, face: dict[str, float]) -> None:
+def test_to_fap_widens_the_lip_gap_as_the_jaw_drops(jaw: str, face: dict[str, float]) -> None:
     clip = [{**face, jaw: float(v)} for v in np.linspace(0, 1, 9)]
     values = to_fap(frames(*clip)).values
     for upper, lower in PAIRS:
@@ -116,24 +116,24 @@ def test_the_lip_gap_never_shrinks_as_the_jaw_drops(jaw: str, face: dict[str, fl
 
 
 @given(faces, st.sampled_from(["43", "45"]))
-def test_shut_eyes_are_shut_whatever_else_the_face_does(face: dict[str, float], au: str) -> None:
+def test_to_fap_shuts_eyes_whatever_else_the_face_does(face: dict[str, float], au: str) -> None:
     values = to_fap(frames({**face, f"{au}L": 1.0, f"{au}R": 1.0})).values[0]
     assert values[18] + values[20] == pytest.approx(1024, abs=0.1)
     assert values[19] + values[21] == pytest.approx(1024, abs=0.1)
 
 
 @given(faces)
-def test_lids_never_pass_through_each_other(face: dict[str, float]) -> None:
+def test_to_fap_never_crosses_lids(face: dict[str, float]) -> None:
     values = to_fap(frames(face)).values[0]
     assert values[18] + values[20] <= 1024.1
     assert values[19] + values[21] <= 1024.1
 
 
-def test_lids_follow_the_eyes() -> None:
+def test_to_fap_moves_lids_with_the_eyes() -> None:
     assert value(19, au63=1.0) < 0 < value(19, au64=1.0)
 
 
-def test_speech_takes_the_lips_and_leaves_the_brows() -> None:
+def test_to_fap_masks_lips_in_speech_but_not_brows() -> None:
     smile = {"12L": 1.0, "12R": 1.0, "26": 1.0, "1L": 1.0}
     silent, speaking = to_fap(frames(smile, {**smile, "lips": 1.0})).values
     owned = np.array([row.speech_owns for row in tables.faps()])
@@ -143,12 +143,12 @@ def test_speech_takes_the_lips_and_leaves_the_brows() -> None:
     assert speaking[30] == silent[30] != 0
 
 
-def test_what_speech_itself_asks_is_added_whole() -> None:
+def test_to_fap_adds_faps_of_speech_unchanged() -> None:
     both = to_fap(frames({"26": 1.0, "lips": 1.0, "open_jaw": 200.0}))
     assert both.values[0, 2] == 200
 
 
-def test_the_mask_is_the_same_for_every_clip_and_leaves_out_the_compound_faps() -> None:
+def test_to_fap_mask_is_constant_and_without_compound_faps() -> None:
     masks = [to_fap(frames(face)).mask for face in ({}, {"12L": 1.0}, {"open_jaw": 9.0})]
     assert all((mask == masks[0]).all() for mask in masks)
     assert not masks[0][:2].any()
@@ -156,7 +156,7 @@ def test_the_mask_is_the_same_for_every_clip_and_leaves_out_the_compound_faps() 
     assert masks[0][45]  # the tongue of speech
 
 
-def test_columns_of_speech_and_presences_are_where_the_frames_look_for_them() -> None:
+def test_to_fap_reads_the_columns_of_speech_and_masks() -> None:
     clip = frames({"head_roll": 5.0, "lips": 0.5})
     assert clip.faps[0, 49] == 5
     assert fap(50).name == "head_roll"
@@ -164,13 +164,13 @@ def test_columns_of_speech_and_presences_are_where_the_frames_look_for_them() ->
 
 
 @pytest.mark.parametrize(("inner", "middle", "side"), [(31, 33, "L"), (32, 34, "R")])
-def test_both_brow_raisers_lift_the_brow_in_one_arch(inner: int, middle: int, side: str) -> None:
+def test_to_fap_lifts_the_brow_in_one_arch(inner: int, middle: int, side: str) -> None:
     one, two = {f"au1{side}": 1.0}, {f"au2{side}": 1.0}
     assert value(middle, **one, **two) > max(value(middle, **one), value(middle, **two))
     assert 0 < value(inner, **one, **two) < value(inner, **one)
 
 
-def test_a_combination_is_there_as_far_as_its_weaker_unit_is() -> None:
+def test_to_fap_scales_combinations_by_their_weaker_unit() -> None:
     def more(first: float, second: float) -> float:
         both = value(33, au1L=first, au2L=second)
         return both - max(value(33, au1L=first), value(33, au2L=second))

@@ -19,16 +19,16 @@ def clip(jaw: list[int], fps: float = 25.0) -> FAPClip:
     return FAPClip("x", fps, values, np.arange(68) < 3, visemes, np.zeros((count, 6), np.int32))
 
 
-def test_twice_the_rate_puts_a_frame_between_two() -> None:
+def test_resampled_to_twice_the_rate_interpolates() -> None:
     got = clip([0, 10, 20]).resampled(50)
     assert (got.fps, got.values[:, 2].tolist()) == (50, [0, 5, 10, 15, 20])
 
 
-def test_half_the_rate_leaves_every_other_frame() -> None:
+def test_resampled_to_half_the_rate_drops_every_second_frame() -> None:
     assert clip([0, 10, 20, 30, 40]).resampled(12.5).values[:, 2].tolist() == [0, 20, 40]
 
 
-def test_visemes_are_those_of_the_nearest_frame_and_never_between_two() -> None:
+def test_resampled_takes_visemes_of_the_nearest_frame() -> None:
     assert clip([0, 0, 0]).resampled(100).visemes[:, 0].tolist() == [0, 0, 0, 1, 1, 1, 2, 2, 2]
 
 
@@ -37,18 +37,14 @@ def test_visemes_are_those_of_the_nearest_frame_and_never_between_two() -> None:
     st.sampled_from([2.0, 5.0, 12.5, 25.0, 29.97, 30.0, 60.0]),
     st.integers(1, 8),
 )
-def test_there_and_back_over_a_multiple_of_the_rate_changes_nothing(
-    jaw: list[int], fps: float, times: int
-) -> None:
+def test_resampled_to_a_multiple_and_back_changes_nothing(jaw: list[int], fps: float, times: int) -> None:
     original = clip(jaw, fps)
     again = original.resampled(fps * times).resampled(fps)
     assert again == original
 
 
 @given(st.lists(st.integers(-4000, 4000), min_size=2, max_size=60), st.floats(0.5, 240))
-def test_another_rate_lasts_as_long_up_to_a_frame_and_stays_within_the_values(
-    jaw: list[int], fps: float
-) -> None:
+def test_resampled_keeps_the_length_and_the_range_of_values(jaw: list[int], fps: float) -> None:
     original = clip(jaw)
     got = original.resampled(fps)
     assert 0 <= (len(jaw) - 1) / 25 - (len(got.values) - 1) / fps < 1 / fps + 1e-6
@@ -57,16 +53,16 @@ def test_another_rate_lasts_as_long_up_to_a_frame_and_stays_within_the_values(
 
 
 @pytest.mark.parametrize("jaw", [[], [7]])
-def test_what_has_no_course_keeps_its_frame(jaw: list[int]) -> None:
+def test_resampled_keeps_a_single_frame(jaw: list[int]) -> None:
     assert clip(jaw).resampled(60).values[:, 2].tolist() == jaw
 
 
 @pytest.mark.parametrize("fps", [0, -1, float("nan"), float("inf")])
-def test_what_is_no_rate_is_refused(fps: float) -> None:
+def test_resampled_refuses_invalid_rates(fps: float) -> None:
     with pytest.raises(ValueError, match="fps: wanted a number above 0, got"):
         clip([0, 1]).resampled(fps)
 
 
-def test_what_is_left_of_a_clip_keeps_its_rate_and_its_visemes() -> None:
+def test_from_frame_keeps_rate_and_visemes() -> None:
     got = clip([1, 2, 3], 30).from_frame(1)
     assert (got.fps, got.values[:, 2].tolist(), got.visemes[:, 0].tolist()) == (30, [2, 3], [1, 2])

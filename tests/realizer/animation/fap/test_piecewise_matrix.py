@@ -27,23 +27,23 @@ def asked(rows: tuple[AuToFap, ...], fap: int) -> Float32:
     return found
 
 
-def test_a_gap_between_two_pieces_is_level() -> None:
+def test_matrix_is_constant_between_two_pieces() -> None:
     rows = (AuToFap(26, "", 3, 0.1, 0.3, 0.0, 100.0), AuToFap(26, "", 3, 0.7, 0.9, 100.0, 300.0))
     assert asked(rows, 3) == pytest.approx([0, 0, 50, 100, 100, 100, 300, 300], abs=1e-3)
 
 
-def test_no_rows_ask_nothing() -> None:
+def test_matrix_of_no_rows_is_zero() -> None:
     assert not asked((), 3).any()
 
 
-def test_the_mask_holds_what_rows_and_speech_may_use() -> None:
+def test_matrix_mask_has_the_faps_of_rows_and_speech() -> None:
     mask = PiecewiseMatrix.of((AuToFap(9, "L", 63, 0.0, 1.0, 0.0, 30.0),)).mask
     assert mask[62]
     assert mask[2]  # speech opens the jaw
     assert not mask[[0, 1, 30]].any()
 
 
-def test_what_goes_up_and_then_down_raises_and_lowers() -> None:
+def test_matrix_separates_raising_and_lowering() -> None:
     rows = (AuToFap(26, "", 3, 0.0, 0.5, 0.0, 100.0), AuToFap(26, "", 3, 0.5, 1.0, 100.0, -100.0))
     asking = PiecewiseMatrix.of(rows).among((au(26)[0].column,))
     raised, lowered = asking.evaluate(np.array([AT], np.float32))

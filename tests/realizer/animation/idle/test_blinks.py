@@ -16,7 +16,7 @@ def blinks(seed: int, until: float) -> Float64:
 
 
 @given(st.integers(0, 2**40))
-def test_blinks_come_every_two_and_a_half_to_six_seconds(seed: int) -> None:
+def test_blinks_are_two_and_a_half_to_six_seconds_apart(seed: int) -> None:
     gaps = np.diff(blinks(seed, 600.0))
     assert gaps.min() >= 2.5 - 1e-9
     assert gaps.max() <= 6.0 + 1e-9
@@ -24,14 +24,14 @@ def test_blinks_come_every_two_and_a_half_to_six_seconds(seed: int) -> None:
     assert gaps.std() > 0.4
 
 
-def test_a_blink_closes_faster_than_it_opens_and_takes_three_tenths_of_a_second() -> None:
+def test_blinks_close_faster_than_they_open_and_last_0_3_s() -> None:
     onset = blinks(3, 10.0)[0]
     lids = blinks_between(0.0, 10.0, 3).at(onset + np.array([-0.001, 0.08, 0.13, 0.15, 0.301]))
     assert lids[[0, 1, 2, 4]] == pytest.approx([0, 1, 1, 0])
     assert 0.8 < lids[3] < 1
 
 
-def test_every_blink_shuts_the_eyes_on_a_frame_at_25_fps() -> None:
+def test_blinks_shut_the_eyes_in_a_frame_at_25_fps() -> None:
     times = np.arange(0, 60, 0.04)
     lids = blinks_between(0.0, 60.0, 5).at(times)
     for onset in blinks(5, 59.0):
@@ -45,7 +45,7 @@ def draws(begin: float, end: float, seed: int) -> dict[float, float]:
 
 
 @given(st.integers(0, 2**40))
-def test_each_blink_has_a_draw_of_its_own_in_any_window_evenly_spread(seed: int) -> None:
+def test_blinks_have_uniform_draws_independent_of_the_window(seed: int) -> None:
     whole = draws(0, 600, seed)
     assert draws(290, 310, seed).items() <= whole.items()
     assert min(whole.values()) >= 0
@@ -53,7 +53,7 @@ def test_each_blink_has_a_draw_of_its_own_in_any_window_evenly_spread(seed: int)
     assert 0.35 < np.mean(list(whole.values())) < 0.65
 
 
-def test_blinks_that_speech_brings_together_shut_the_lids_as_the_one_that_is_further() -> None:
+def test_blinks_that_overlap_show_the_stronger_one() -> None:
     times = np.arange(0, 1, 0.01)
     one, other = (Blinks(np.array([onset]), np.zeros(1)).at(times) for onset in (0.2, 0.3))
     both = Blinks(np.array([0.3, 0.2]), np.zeros(2)).at(times)

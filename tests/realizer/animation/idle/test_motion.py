@@ -22,7 +22,7 @@ def idle(times: Float64, seed: int = 0) -> Float32:
 
 
 @given(st.integers(0, 2**40), st.floats(0, 20_000), st.floats(0.1, 8), st.floats(0.1, 8))
-def test_any_two_windows_agree_where_they_overlap(seed: int, begin: float, one: float, two: float) -> None:
+def test_idle_face_agrees_in_overlapping_windows(seed: int, begin: float, one: float, two: float) -> None:
     times = begin + np.arange(0, one + two, 0.05)
     split = max(1, int(len(times) * one / (one + two)))
     whole = idle(times, seed)
@@ -32,12 +32,12 @@ def test_any_two_windows_agree_where_they_overlap(seed: int, begin: float, one: 
     )
 
 
-def test_two_faces_do_not_move_alike() -> None:
+def test_idle_face_depends_on_the_seed() -> None:
     times = np.arange(0, 10, 0.04)
     assert not np.array_equal(idle(times, 0), idle(times, 1))
 
 
-def test_motion_stays_small_and_smooth() -> None:
+def test_idle_motion_is_small_and_smooth() -> None:
     times = np.arange(0, 60, 0.01)
     faps = to_fap(blend([], times, idle=idle_face(0, 60, 1))).values
     degrees = np.degrees(faps[:, 47:50] * 1e-5)
@@ -47,7 +47,7 @@ def test_motion_stays_small_and_smooth() -> None:
     assert 0.3 < np.abs(eyes).max() < 3.5
 
 
-def test_eyes_stay_on_their_point_while_the_head_sways() -> None:
+def test_idle_eyes_compensate_the_sway_of_the_head() -> None:
     times = np.arange(0, 60, 0.01)
     faps = to_fap(blend([], times, idle=idle_face(0, 60, 1))).values
     gaze = np.degrees((faps[:, 22] + faps[:, 48]) * 1e-5)
@@ -55,7 +55,7 @@ def test_eyes_stay_on_their_point_while_the_head_sways() -> None:
     assert still.mean() > 0.9
 
 
-def test_eyes_take_the_time_of_a_saccade_from_point_to_point() -> None:
+def test_idle_eyes_move_in_saccades() -> None:
     motion = idle_face(0, 60, 1).motion
     eyes = replace(motion, poses=np.zeros_like(motion.poses))  # a head that keeps still
     most = np.array([tables.by_number()[int(AU_NAMES()[column])].degrees for column in motion.columns[-4:]])
@@ -72,7 +72,7 @@ def test_eyes_take_the_time_of_a_saccade_from_point_to_point() -> None:
         assert (np.diff(gone) > -1e-9).all()
 
 
-def test_both_lids_blink_and_each_column_moves_once() -> None:
+def test_idle_face_has_each_column_once() -> None:
     frames = blend([], np.arange(0, 20, 0.04), idle=idle_face(0, 20, 7))
     left, right = (frames.values[:, lid.column] for lid in au(45))
     assert left.max() == 1

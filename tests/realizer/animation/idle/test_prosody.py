@@ -64,7 +64,7 @@ def held(number: int, begin: float, end: float, known: float = 0.0, layer: Layer
 
 
 @given(SEEDS, st.floats(0.0, 10_000.0))
-def test_nothing_exceeds_what_the_table_allows(seed: int, start: float) -> None:
+def test_prosody_stays_within_the_limits_of_the_table(seed: int, start: float) -> None:
     facts = prosody_facts()
     times = start + np.arange(0.0, SAID.duration + 1.0, 0.01)
     seen = shown([talk(start)], seed, times)
@@ -78,7 +78,7 @@ def test_nothing_exceeds_what_the_table_allows(seed: int, start: float) -> None:
 
 
 @given(SEEDS)
-def test_head_and_brows_do_not_jump_from_frame_to_frame(seed: int) -> None:
+def test_prosody_moves_head_and_brows_smoothly(seed: int) -> None:
     """At 25 fps, by the largest slope of a course of minimum jerk, 15/8 of its mean."""
     seen = whole(seed, step=0.04)
     brows = prosody_facts()["brows"]
@@ -87,7 +87,7 @@ def test_head_and_brows_do_not_jump_from_frame_to_frame(seed: int) -> None:
 
 
 @given(SEEDS, st.floats(0.5, 10.0))
-def test_any_two_windows_agree_where_they_overlap(seed: int, cut: float) -> None:
+def test_prosody_agrees_in_overlapping_windows(seed: int, cut: float) -> None:
     times = np.arange(0.0, 11.0, 0.04)
     first = int(np.searchsorted(times, cut))
     one = shown([talk()], seed, times)
@@ -97,20 +97,20 @@ def test_any_two_windows_agree_where_they_overlap(seed: int, cut: float) -> None
             np.testing.assert_allclose(values, one[name][part_of], atol=1e-4)
 
 
-def test_the_same_seed_moves_alike_and_another_one_does_not() -> None:
+def test_prosody_depends_on_the_seed() -> None:
     one, same, other = whole(3), whole(3), whole(4)
     assert all(np.array_equal(one[name], same[name]) for name in one)
     assert not np.array_equal(one["head"], other["head"])
 
 
-def test_the_same_words_said_again_do_not_move_alike() -> None:
+def test_prosody_depends_on_the_start_of_a_speech() -> None:
     times = np.arange(0.0, SAID.duration, 0.04)
     one, again = shown([talk()], 0, times), shown([talk(20.0)], 0, times + 20.0)
     assert not np.allclose(one["head"], again["head"], atol=0.05)
 
 
 @given(SEEDS)
-def test_the_head_is_lowest_in_the_middle_of_a_stressed_vowel(seed: int) -> None:
+def test_prosody_nods_in_the_middle_of_a_stressed_vowel(seed: int) -> None:
     seen, times = whole(seed)["head"], np.arange(0.0, SAID.duration + 1.0, 0.01)
     inner = seen[1:-1]
     lows = times[1:-1][(inner > seen[:-2]) & (inner >= seen[2:]) & (inner > 0.3)]
@@ -120,7 +120,7 @@ def test_the_head_is_lowest_in_the_middle_of_a_stressed_vowel(seed: int) -> None
 
 
 @given(SEEDS)
-def test_the_last_accent_of_a_phrase_shows_in_head_or_brows(seed: int) -> None:
+def test_prosody_shows_the_nuclear_accent_in_head_or_brows(seed: int) -> None:
     seen, last = whole(seed), -FOREVER
     for phrase in phrases(SAID):
         time = max(phrase.accents[-1].time, NOD["attack"])
@@ -131,14 +131,14 @@ def test_the_last_accent_of_a_phrase_shows_in_head_or_brows(seed: int) -> None:
 
 
 @given(SEEDS)
-def test_two_nods_keep_their_distance(seed: int) -> None:
+def test_prosody_keeps_nods_apart(seed: int) -> None:
     head = whole(seed)["head"]
     inner = head[1:-1]
     lows = np.flatnonzero((inner > head[:-2]) & (inner >= head[2:]) & (inner > 0.3))
     assert (np.diff(lows) * 0.01 >= NOD["apart"] - 0.02).all()
 
 
-def test_a_nod_leaves_the_eyes_where_they_look() -> None:
+def test_prosody_nods_keep_the_direction_of_the_eyes() -> None:
     times = np.arange(0.0, 2.0, 0.01)
     said = SilentVoice().say(SpeechRequest("Hello everybody"))  # too short to look aside
     for seed in range(5):
@@ -146,7 +146,7 @@ def test_a_nod_leaves_the_eyes_where_they_look() -> None:
         np.testing.assert_allclose(seen["pitch"], -seen["head"], atol=0.01)
 
 
-def test_who_speaks_looks_aside_for_some_of_the_time_and_back_at_the_end_of_each_phrase() -> None:
+def test_prosody_looks_aside_and_back_before_a_phrase_ends() -> None:
     away, times = [], np.arange(0.0, SAID.duration + 1.0, 0.01)
     for seed in range(100):
         aside = np.abs(whole(seed)["yaw"]) > 1.0
@@ -158,18 +158,18 @@ def test_who_speaks_looks_aside_for_some_of_the_time_and_back_at_the_end_of_each
     assert np.max(away) < 0.59
 
 
-def test_a_greeting_is_said_to_the_others_face() -> None:
+def test_prosody_does_not_look_aside_in_a_short_speech() -> None:
     said = SilentVoice().say(SpeechRequest("Good morning, everybody"))
     for seed in range(50):
         assert np.abs(shown([talk(said=said)], seed, np.arange(0, 3, 0.01))["yaw"]).max() == 0.0
 
 
-def test_who_listens_does_not_look_aside() -> None:
+def test_prosody_listener_does_not_look_aside() -> None:
     assert prosody_channels([], 0.0, 100.0, 0) == []
 
 
 @given(SEEDS, st.floats(0.0, 11.0), st.floats(0.2, 3.0))
-def test_a_nod_of_a_document_is_not_nodded_into(seed: int, begin: float, length: float) -> None:
+def test_prosody_does_not_nod_during_a_nod_of_a_document(seed: int, begin: float, length: float) -> None:
     asked = [held(53, begin, begin + length)]
     times = np.arange(0.0, 12.0, 0.01)
     inside = (times >= begin) & (times <= begin + length)
@@ -195,7 +195,7 @@ def whole_at(times: Float64, seed: int, asked: Sequence[KnownMotion]) -> dict[st
     ],
     ids=["frown", *(f"FAP {number}" for number in range(31, 39)), "mood", "gaze", "base gaze", "tilt"],
 )
-def test_what_a_document_moves_is_left_alone_and_only_that(channel: Channel, part: str) -> None:
+def test_prosody_yields_only_parts_that_a_document_moves(channel: Channel, part: str) -> None:
     for seed in range(10):
         alone, beside = whole(seed), whole(seed, asked=[KnownMotion(0.0, channel)])
         assert np.abs(beside[part]).max() == 0.0
@@ -203,7 +203,7 @@ def test_what_a_document_moves_is_left_alone_and_only_that(channel: Channel, par
             np.testing.assert_array_equal(alone[name], beside[name])
 
 
-def test_a_smile_and_a_base_direction_of_the_head_are_in_nobodys_way() -> None:
+def test_prosody_goes_on_with_a_smile_and_a_base_head_direction() -> None:
     keys, values = np.array([0.0, 12.0]), np.array([0.5, 0.5])
     asked = [KnownMotion(0.0, Channel(au(12)[0], keys, values))]
     asked.append(KnownMotion(0.0, Channel(au(53)[0], keys, values, layer=Layer.BASE)))
@@ -212,7 +212,7 @@ def test_a_smile_and_a_base_direction_of_the_head_are_in_nobodys_way() -> None:
 
 
 @given(SEEDS, st.floats(0.0, 10.0))
-def test_what_a_late_document_takes_goes_back_without_a_jump(seed: int, now: float) -> None:
+def test_prosody_yields_to_a_late_document_without_a_jump(seed: int, now: float) -> None:
     before, after = whole(seed), whole(seed, asked=[held(53, now, now + 2.0, known=now)])
     past = np.arange(0.0, SAID.duration + 1.0, 0.01) <= now
     np.testing.assert_array_equal(before["head"][past], after["head"][past])
@@ -223,7 +223,7 @@ def test_what_a_late_document_takes_goes_back_without_a_jump(seed: int, now: flo
 
 
 @given(SEEDS, st.floats(0.0, 10.0))
-def test_who_is_interrupted_keeps_still_soon_and_without_a_jump(seed: int, now: float) -> None:
+def test_prosody_ends_with_an_interrupted_speech_without_a_jump(seed: int, now: float) -> None:
     times = np.arange(0.0, 12.0, 0.01)
     seen = shown([talk(until=now)], seed, times)
     assert np.abs(np.diff(seen["head"])).max() < 0.6
@@ -236,7 +236,7 @@ def blinks(seed: int, until: float, talks: Sequence[SpeechSpan]) -> Float64:
 
 
 @given(SEEDS, st.lists(st.floats(0.2, 4.0), max_size=5))
-def test_blinks_move_to_the_ends_of_phrases_and_none_is_added(seed: int, waits: list[float]) -> None:
+def test_phrase_ends_move_blinks_and_add_none(seed: int, waits: list[float]) -> None:
     talks, now = [], 0.0
     for wait in waits:
         talks.append(talk(now + wait))
@@ -254,7 +254,7 @@ def test_blinks_move_to_the_ends_of_phrases_and_none_is_added(seed: int, waits: 
             assert ((late >= -1e-9) & (late <= facts["delay"] + 1e-9)).any()
 
 
-def test_most_blinks_of_who_speaks_fall_where_a_phrase_ends() -> None:
+def test_phrase_ends_attract_most_blinks() -> None:
     ends = np.array([end.at for end in phrase_ends([talk()])])
     found = np.concatenate([blinks(seed, SAID.duration, [talk()]) for seed in range(200)])
     found = found[found > 0.7]
@@ -262,7 +262,7 @@ def test_most_blinks_of_who_speaks_fall_where_a_phrase_ends() -> None:
     assert near.mean() > 0.5
 
 
-def test_a_blink_that_is_due_before_a_speech_begins_stays_where_it_was() -> None:
+def test_phrase_ends_do_not_move_blinks_before_the_speech() -> None:
     for seed in range(50):
         idle = blinks(seed, 20.0, [])
         late = talk(float(idle[1]) + 0.01)

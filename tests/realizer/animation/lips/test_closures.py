@@ -45,7 +45,7 @@ def longest(times: Float64, mine: Bool) -> float:
     return float(np.ptp(times[mine])) if mine.any() else 0.0
 
 
-def test_the_visemes_that_hold_are_those_of_p_and_f() -> None:
+def test_closure_visemes_are_those_of_p_and_f() -> None:
     assert sounds("p")[0].mix == ((BILABIAL, 1.0),)
     assert sounds("f")[0].mix == ((LABIODENTAL, 1.0),)
     assert coarticulation()["closure"]["visemes"] == [BILABIAL, LABIODENTAL]
@@ -53,7 +53,7 @@ def test_the_visemes_that_hold_are_those_of_p_and_f() -> None:
 
 @pytest.mark.parametrize("length", [0.02, 0.04, 0.08, 0.15])
 @pytest.mark.parametrize(("ipa", "row"), [("p", 0), ("v", 1)])
-def test_a_hold_is_longer_than_a_frame_and_around_its_sound(ipa: str, row: int, length: float) -> None:
+def test_closure_mask_is_longer_than_a_frame_around_its_sound(ipa: str, row: int, length: float) -> None:
     times, *rows = holds(PAUSE, ("a", 0.1), (ipa, length), ("a", 0.1), PAUSE)
     assert longest(times, rows[row]) > FRAME
     middle = 0.6 + length / 2
@@ -61,7 +61,7 @@ def test_a_hold_is_longer_than_a_frame_and_around_its_sound(ipa: str, row: int, 
     assert not rows[1 - row].any()
 
 
-def test_vowels_hold_nothing() -> None:
+def test_closure_mask_of_vowels_is_empty() -> None:
     _, closed, bitten = holds(PAUSE, ("a", 0.1), ("t", 0.1), ("u", 0.1), PAUSE)
     assert not closed.any()
     assert not bitten.any()
@@ -69,7 +69,7 @@ def test_vowels_hold_nothing() -> None:
 
 @pytest.mark.parametrize("pair", [("m", "f"), ("f", "p"), ("v", "m")])
 @given(st.floats(0.02, 0.1), st.floats(0.02, 0.1))
-def test_a_closure_beside_a_bite_leaves_it_time(pair: tuple[str, str], one: float, other: float) -> None:
+def test_closure_mask_separates_closures_from_bites(pair: tuple[str, str], one: float, other: float) -> None:
     """Whatever their lengths, each is there, in its order, and no key is both but where they meet."""
     times, closed, bitten = holds(PAUSE, ("a", 0.1), (pair[0], one), (pair[1], other), ("a", 0.1), PAUSE)
     assert closed.any()
@@ -79,7 +79,7 @@ def test_a_closure_beside_a_bite_leaves_it_time(pair: tuple[str, str], one: floa
     assert times[first].mean() < times[second].mean()
 
 
-def test_speech_has_the_lips_from_the_first_sound_to_the_last() -> None:
+def test_lip_weight_lasts_from_the_first_sound_to_the_last() -> None:
     times, lips = taken(PAUSE, ("a", 0.1), ("t", 0.1), ("a", 0.1), PAUSE)
     assert lips[0] == lips[-1] == 0
     assert (lips[(times > 0.5) & (times < 0.8)] > 0.5).all()
@@ -88,14 +88,14 @@ def test_speech_has_the_lips_from_the_first_sound_to_the_last() -> None:
 
 
 @pytest.mark.parametrize("ipa", ["p", "f", "m"])
-def test_speech_has_them_whole_while_the_first_and_the_last_sound_hold_them(ipa: str) -> None:
+def test_lip_weight_is_1_during_the_first_and_last_closure(ipa: str) -> None:
     times, lips = taken(PAUSE, (ipa, 0.07), ("a", 0.1), (ipa, 0.07), PAUSE)
     inside = (times > 0.5) & (times < 0.74)
     assert lips[inside].min() == pytest.approx(1, abs=1e-6)
 
 
 @pytest.mark.parametrize(("length", "free"), [(0.3, False), (0.9, True)])
-def test_a_long_pause_gives_the_lips_back(length: float, free: bool) -> None:
+def test_lip_weight_is_0_in_a_long_pause(length: float, free: bool) -> None:
     times, lips = taken(PAUSE, ("a", 0.1), ("", length), ("a", 0.1), PAUSE)
     inside = (times > 0.6) & (times < 0.6 + length)
     assert (lips[inside].min() == 0) == free
@@ -104,7 +104,7 @@ def test_a_long_pause_gives_the_lips_back(length: float, free: bool) -> None:
 @given(
     st.lists(st.tuples(st.sampled_from(["", "p", "f", "m", "a", "u", "t"]), st.floats(0.01, 0.6)), min_size=1)
 )
-def test_they_are_never_taken_by_jumps(said: list[tuple[str, float]]) -> None:
+def test_lip_weight_is_continuous(said: list[tuple[str, float]]) -> None:
     found = phonemes(*said)
     track, times = track_of(found), key_times(found)
     if track is None:

@@ -24,19 +24,19 @@ def phonemes(*sounds: tuple[str, float]) -> tuple[Phoneme, ...]:
     )
 
 
-def test_a_track_is_none_where_nothing_is_said() -> None:
+def test_track_of_pauses_is_none() -> None:
     assert track_of(()) is None
     assert track_of(phonemes(("", 0.3), ("", 0.2))) is None
 
 
-def test_pauses_that_touch_are_one_and_sounds_touch() -> None:
+def test_track_joins_pauses_and_sounds() -> None:
     found = track(("", 0.3), ("", 0.2), ("a", 0.1), ("t", 0.1), ("", 0.3))
     assert found.rest.tolist() == [True, False, False, True]
     assert found.end[0] == pytest.approx(0.5)
     assert np.array_equal(found.begin[1:], found.end[:-1])
 
 
-def test_a_short_pause_between_sounds_is_none_and_a_long_one_stays() -> None:
+def test_track_absorbs_short_pauses_between_sounds() -> None:
     short = coarticulation()["pauses"]["absorbed"] - 0.01
     assert not track(("a", 0.1), ("", short), ("a", 0.1)).rest.any()
     assert track(("a", 0.1), ("", short + 0.02), ("a", 0.1)).rest.tolist() == [False, True, False]
@@ -44,13 +44,13 @@ def test_a_short_pause_between_sounds_is_none_and_a_long_one_stays() -> None:
     assert track(("a", 0.1), ("", 0.2), ("a", 0.1)).end[0] == pytest.approx(0.2)
 
 
-def test_a_diphthong_is_two_vowels_in_its_time() -> None:
+def test_track_divides_a_diphthong_into_two_vowels() -> None:
     found = track(("aɪ", 0.2))
     assert found.vowel.tolist() == [True, True]
     assert found.end[0] == pytest.approx(0.2 * coarticulation()["diphthong"]["first"])
 
 
-def test_keys_reach_from_the_first_sound_to_the_last_at_their_rate() -> None:
+def test_key_times_cover_all_sounds_at_their_rate() -> None:
     times = key_times(phonemes(("a", 0.1), ("t", 0.23)))
     assert times[0] == 0
     assert times[-1] == pytest.approx(0.33)
@@ -58,11 +58,11 @@ def test_keys_reach_from_the_first_sound_to_the_last_at_their_rate() -> None:
     assert len(key_times(phonemes(("a", 0.0)))) >= 2
 
 
-def test_every_column_of_a_mouth_belongs_to_one_class() -> None:
+def test_classes_have_every_column_of_a_mouth_once() -> None:
     assert [name for members in CLASSES.values() for name in members] == list(SHAPE)
 
 
-def test_the_parts_of_all_sounds_add_to_a_little_less_than_everything() -> None:
+def test_dominances_add_up_to_a_little_less_than_1() -> None:
     said = phonemes(*[(ipa, 0.09) for ipa in "ˈpatəkifumoʃ"])
     found = track_of(said)
     assert found is not None
@@ -73,7 +73,7 @@ def test_the_parts_of_all_sounds_add_to_a_little_less_than_everything() -> None:
         assert (parts.sum(axis=0) > 0.75).all()
 
 
-def test_in_its_middle_a_sound_has_more_to_say_than_at_its_edges() -> None:
+def test_dominances_are_greatest_in_the_middle_of_a_sound() -> None:
     found = track(("t", 0.1), ("a", 0.1), ("t", 0.1))
     times = np.array([0.1, 0.15, 0.2])
     for near, parts, members in dominances(found, times):
@@ -82,7 +82,7 @@ def test_in_its_middle_a_sound_has_more_to_say_than_at_its_edges() -> None:
         assert own[1] > own[2], members
 
 
-def test_rounding_reaches_further_ahead_than_the_opening() -> None:
+def test_dominances_of_rounding_start_before_those_of_opening() -> None:
     found = track(("t", 0.1), ("s", 0.1), ("u", 0.1))
     ahead = {
         members: np.where(near == 2, parts, 0).sum()
@@ -91,7 +91,7 @@ def test_rounding_reaches_further_ahead_than_the_opening() -> None:
     assert ahead[CLASSES["shape"]] > 2 * ahead[CLASSES["lips"]]
 
 
-def test_a_long_sound_lets_go_more_slowly_than_a_short_one() -> None:
+def test_dominances_of_long_sounds_fall_more_slowly() -> None:
     """At the same distance before its core, with nothing beside it."""
 
     def before(length: float) -> float:

@@ -70,7 +70,7 @@ phonemes_of_speech = st.lists(
 
 @pytest.mark.parametrize("closed", BILABIALS)
 @pytest.mark.parametrize("vowel", ["ɑ", "i", "u"])
-def test_bilabials_close_the_lips_in_a_frame_of_any_phase(closed: str, vowel: str) -> None:
+def test_lip_channels_close_bilabials_in_a_frame_of_any_phase(closed: str, vowel: str) -> None:
     channels = lip_channels(say(f"_ {vowel} {closed} {vowel} _", 0.05), 0.0)
     faps_at = lambda t: to_fap(blend(channels, t)).integers()  # noqa: E731
     for phase in np.arange(0, 0.04, 0.005):
@@ -83,7 +83,7 @@ def test_bilabials_close_the_lips_in_a_frame_of_any_phase(closed: str, vowel: st
 
 
 @pytest.mark.parametrize("bitten", ["f", "v", "ɱ", "ʋ"])
-def test_labiodentals_bring_the_lower_lip_to_the_teeth(bitten: str) -> None:
+def test_lip_channels_bring_the_lower_lip_to_the_teeth_for_f(bitten: str) -> None:
     channels = lip_channels(say(f"_ ɑ {bitten} ɑ _"), 0.0)
     inside = slice(43, 47)
     assert values(channels, 5)[inside].min() > 50  # raised
@@ -92,20 +92,20 @@ def test_labiodentals_bring_the_lower_lip_to_the_teeth(bitten: str) -> None:
     assert gap(channels)[inside].max() < 130
 
 
-def test_open_vowels_open_more_than_close_ones() -> None:
+def test_lip_channels_open_more_for_open_vowels() -> None:
     assert opening("ɑ") > opening("æ") > opening("ɛ") > opening("e") > opening("i") > opening("u")
     assert 11 * 46 < opening("ɑ") < 14 * 46  # 11 to 14 mm
     assert 3.5 * 46 < opening("i") < 5.5 * 46
     assert 2 * 46 < opening("u") < 4 * 46
 
 
-def test_the_jaw_goes_with_the_vowel() -> None:
+def test_lip_channels_move_the_jaw_by_the_vowel() -> None:
     jaws = [middle(v, 3) for v in ("ɑ", "ɛ", "i")]
     assert jaws == sorted(jaws, reverse=True)
     assert middle("s", 3) < middle("k", 3)
 
 
-def test_spread_vowels_are_wide_and_round_ones_narrow_and_forward() -> None:
+def test_lip_channels_spread_and_round_the_lips() -> None:
     assert middle("i", 6) > 30
     assert middle("u", 6) < -60
     assert middle("u", 17) > 100 > abs(middle("i", 17))
@@ -113,32 +113,32 @@ def test_spread_vowels_are_wide_and_round_ones_narrow_and_forward() -> None:
     assert middle("ʃ", 17) > 60
 
 
-def test_the_tongue_shows_for_th_and_rises_for_l() -> None:
+def test_lip_channels_show_the_tongue_for_th_and_raise_it_for_l() -> None:
     assert middle("θ", 45) > 2 * abs(middle("k", 45))
     assert middle("l", 44) > 100
     assert middle("k", 46) > 80
 
 
-def test_rounding_starts_before_its_vowel() -> None:
+def test_lip_channels_round_the_lips_before_the_vowel() -> None:
     plain = lip_channels(say("_ t s t i _"), 0.0)
     round_ = lip_channels(say("_ t s t u _"), 0.0)
     before = slice(40, 50)  # the s, 0.1 to 0.2 s before the vowel
     assert (values(round_, 17)[before] > values(plain, 17)[before] + 10).all()
 
 
-def test_h_takes_the_mouth_of_its_neighbour() -> None:
+def test_lip_channels_give_h_the_mouth_of_its_neighbour() -> None:
     channels = lip_channels(say("_ h ɑ _", 0.12), 0.0)
     assert gap(channels)[36] > 0.5 * gap(channels).max()
 
 
-def test_stressed_vowels_reach_further() -> None:
+def test_lip_channels_open_further_for_stressed_vowels() -> None:
     strong = gap(lip_channels(say("_ t ɑ t _"), 0.0)).max()
     weak = gap(lip_channels(say("_ t ɑ t _", stressed=False), 0.0)).max()
     assert 0.7 * strong < weak < 0.95 * strong
 
 
 @pytest.mark.parametrize("vowel", ["ɑ", "ɛ", "i", "u"])
-def test_the_shorter_a_vowel_is_the_less_of_its_shape_it_reaches(vowel: str) -> None:
+def test_lip_channels_undershoot_short_vowels(vowel: str) -> None:
     """Undershoot: what is missing grows as vowels get shorter, and faster the shorter they are."""
     lengths = (0.03, 0.05, 0.08, 0.12, 0.18, 0.27)
     opened, jaw, width = np.array(
@@ -153,7 +153,7 @@ def test_the_shorter_a_vowel_is_the_less_of_its_shape_it_reaches(vowel: str) -> 
         assert 0.5 < reached[1] / reached[-1] < 0.85
 
 
-def test_quick_speech_closes_its_lips_all_the_same() -> None:
+def test_lip_channels_close_the_lips_in_fast_speech() -> None:
     for length in (0.03, 0.05, 0.1):
         assert gap(lip_channels(say("_ ɑ p ɑ _", length), 0.0))[30:].min() <= 0
 
@@ -162,7 +162,7 @@ def loud(text: str, volume: float) -> tuple[Channel, ...]:
     return lip_channels(tuple(replace(p, volume=volume) for p in say(text)), 0.0)
 
 
-def test_loud_vowels_open_jaw_and_lips_further_and_soft_ones_less() -> None:
+def test_lip_channels_open_further_for_loud_vowels() -> None:
     volumes = (0.0, 0.5, 1.0, 1.4, 2.0, 4.0)
     said = [loud("_ t ɑ t _", volume) for volume in volumes]
     for reached in ([gap(s).max() for s in said], [values(s, 3).max() for s in said]):
@@ -174,7 +174,7 @@ def test_loud_vowels_open_jaw_and_lips_further_and_soft_ones_less() -> None:
 
 
 @pytest.mark.parametrize("volume", [0.0, 0.25, 4.0])
-def test_loudness_leaves_rounding_and_closures_as_they_are(volume: float) -> None:
+def test_lip_channels_keep_rounding_and_closures_at_any_volume(volume: float) -> None:
     usual, other = loud("_ u p ɑ f ɑ _", 1.0), loud("_ u p ɑ f ɑ _", volume)
     for fap in (16, 17, 53):
         assert np.array_equal(values(usual, fap), values(other, fap))
@@ -184,7 +184,7 @@ def test_loudness_leaves_rounding_and_closures_as_they_are(volume: float) -> Non
     assert np.allclose(gap(usual)[f], gap(other)[f], atol=25)
 
 
-def test_long_pauses_let_go_of_the_lips_and_short_ones_do_not() -> None:
+def test_lip_channels_release_the_lips_in_long_pauses_only() -> None:
     first = say("ɑ t ɑ")
     for pause, free in ((0.2, False), (0.35, False), (0.8, True)):
         start = first[-1].end + pause
@@ -197,13 +197,13 @@ def test_long_pauses_let_go_of_the_lips_and_short_ones_do_not() -> None:
         assert (between.min() > 100) == (pause == 0.2)
 
 
-def test_nothing_said_moves_nothing() -> None:
+def test_lip_channels_of_pauses_are_empty() -> None:
     assert lip_channels((), 0.0) == ()
     assert lip_channels(say("_ _"), 0.0) == ()
     assert lip_channels(say("ʔ h"), 0.0) == ()
 
 
-def test_a_later_start_moves_every_key() -> None:
+def test_lip_channels_shift_with_the_start() -> None:
     for here, later in zip(lip_channels(say("ɑ p"), 0.0), lip_channels(say("ɑ p"), 2.5), strict=True):
         assert np.allclose(later.times, here.times + 2.5)
         assert np.array_equal(later.values, here.values)
@@ -212,7 +212,7 @@ def test_a_later_start_moves_every_key() -> None:
 
 @given(phonemes_of_speech)
 @example((Phoneme(0, 0.021484375, "f", 0),))
-def test_any_speech_begins_and_ends_at_rest_and_never_jumps(phonemes: tuple[Phoneme, ...]) -> None:
+def test_lip_channels_begin_and_end_at_rest_without_jumps(phonemes: tuple[Phoneme, ...]) -> None:
     speed = coarticulation()["speed"]
     for channel in lip_channels(phonemes, 0.0):
         assert np.isfinite(channel.values).all()
@@ -229,7 +229,7 @@ def test_any_speech_begins_and_ends_at_rest_and_never_jumps(phonemes: tuple[Phon
 
 
 @given(phonemes_of_speech)
-def test_any_speech_is_symmetrical_and_within_what_a_face_can_do(phonemes: tuple[Phoneme, ...]) -> None:
+def test_lip_channels_are_symmetrical_and_within_ranges(phonemes: tuple[Phoneme, ...]) -> None:
     channels = lip_channels(phonemes, 0.0)
     if not channels:
         return
@@ -244,7 +244,7 @@ def test_any_speech_is_symmetrical_and_within_what_a_face_can_do(phonemes: tuple
 
 
 @given(phonemes_of_speech)
-def test_any_bilabial_closes(phonemes: tuple[Phoneme, ...]) -> None:
+def test_lip_channels_close_every_bilabial(phonemes: tuple[Phoneme, ...]) -> None:
     channels = lip_channels(phonemes, 0.0)
     for phoneme in phonemes:
         if phoneme.ipa in BILABIALS:
@@ -255,7 +255,7 @@ def test_any_bilabial_closes(phonemes: tuple[Phoneme, ...]) -> None:
 
 
 @pytest.mark.parametrize("room", [0.0, 0.05, 0.1, 2.0])
-def test_the_lips_make_ready_for_a_first_closure_where_there_is_room(room: float) -> None:
+def test_lip_channels_prepare_a_first_closure_if_there_is_room(room: float) -> None:
     lips, *_ = lip_channels(say("b ɑ t _", 0.08), 3.0, room=room)
     early = min(room, coarticulation()["pauses"]["attack"])
     assert lips.times[0] == pytest.approx(3.0 - early)

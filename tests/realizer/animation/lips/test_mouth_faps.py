@@ -14,24 +14,24 @@ def shape(**parts: float) -> np.ndarray:
     return np.array([[parts.get(name, 0.0) for name in SHAPE]])
 
 
-def test_an_open_mouth_is_negative_in_both_lips() -> None:
+def test_mouth_faps_of_an_open_mouth_are_negative_in_both_lips() -> None:
     got = mouth_faps(shape(jaw=300, upper=100, lower=200))
     assert (got[3][0], got[4][0], got[5][0]) == (300, -100, -200)
     assert all(got[fap][0] < 0 for fap in (8, 9, 10, 11, 51, 52, 55, 56, 57, 58))
 
 
-def test_the_jaw_does_not_go_above_its_rest() -> None:
+def test_mouth_faps_never_raise_the_jaw() -> None:
     assert mouth_faps(shape(jaw=-50))[3][0] == 0
 
 
-def test_both_sides_and_both_contours_go_along() -> None:
+def test_mouth_faps_move_both_sides_and_contours() -> None:
     got = mouth_faps(shape(width=-40, corner=8))
     assert {got[fap][0] for fap in (6, 7, 53, 54)} == {-40}
     assert {got[fap][0] for fap in (12, 13, 59, 60)} == {8}
 
 
 @pytest.mark.parametrize("viseme", range(15))
-def test_every_viseme_is_within_the_range_of_the_standard(viseme: int) -> None:
+def test_mouth_faps_of_every_viseme_are_within_their_range(viseme: int) -> None:
     for fap, values in mouth_faps(shape_table()[0][[viseme]]).items():
         row = tables.faps()[fap - 1]
         assert row.least <= values[0] <= row.most

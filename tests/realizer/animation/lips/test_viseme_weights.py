@@ -42,7 +42,7 @@ speech = st.lists(st.tuples(st.sampled_from([*IPA, "", "oʊ"]), st.floats(0.02, 
 
 
 @given(speech, arrays(np.float64, 20, elements=st.floats(-1, 11)))
-def test_any_speech_is_shared_out_whole_at_any_time(phonemes: tuple[Phoneme, ...], times: Float64) -> None:
+def test_viseme_weights_add_up_to_1(phonemes: tuple[Phoneme, ...], times: Float64) -> None:
     weights = viseme_weights(phonemes, times)
     assert weights.shape == (20, 15)
     assert (weights >= 0).all()
@@ -51,42 +51,42 @@ def test_any_speech_is_shared_out_whole_at_any_time(phonemes: tuple[Phoneme, ...
     assert (weights[outside, 0] == 1).all()
 
 
-def test_k_is_made_where_nobody_sees_it_and_leaves_half_of_the_mouth_to_its_neighbours() -> None:
+def test_viseme_weights_of_k_leave_half_to_its_neighbours() -> None:
     weights = in_the_middle(say("ɑ", "k", "ɑ"))
     assert 0.3 < weights[2, 5] < weights[2, 10] < 0.6
 
 
 @pytest.mark.parametrize(("ipa", "viseme"), [("p", 1), ("b", 1), ("m", 1), ("f", 2), ("v", 2)])
-def test_what_holds_the_lips_is_alone(ipa: str, viseme: int) -> None:
+def test_viseme_weights_of_closures_are_1(ipa: str, viseme: int) -> None:
     weights = in_the_middle(say("ɑ", ipa, "u", length=0.07))
     assert weights[2, viseme] == pytest.approx(1)
 
 
-def test_the_mouth_rests_in_pauses_and_where_nothing_is_said() -> None:
+def test_viseme_weights_of_pauses_are_neutral() -> None:
     weights = in_the_middle(say("ɑ", "t"))
     assert weights[[0, -1], 0] == pytest.approx(1)
     silent = viseme_weights((), np.array([0.0, 1.0]))
     assert np.array_equal(silent, np.eye(15)[[0, 0]])
 
 
-def test_nothing_jumps_from_frame_to_frame_at_fifty_a_second() -> None:
+def test_viseme_weights_are_smooth_at_50_fps() -> None:
     phonemes = say("p", "ɑ", "m", "f", "u", "s", "t", length=0.09)
     weights = viseme_weights(phonemes, np.arange(0, phonemes[-1].end, 0.02))
     assert np.abs(np.diff(weights, axis=0)).max() < 0.9
 
 
-def test_oculus_has_fifteen_in_its_order_and_each_is_one_of_the_standards() -> None:
+def test_oculus_visemes_are_the_15_of_the_standard_reordered() -> None:
     assert [row.name for row in oculus_visemes()] == list(OCULUS)
     assert sorted(row.viseme for row in oculus_visemes()) == list(range(15))
 
 
 @pytest.mark.parametrize(("name", "ipa"), [item for item in OCULUS.items() if item[1] not in ("", "k")])
-def test_an_example_of_each_shows_under_its_name_most(name: str, ipa: str) -> None:
+def test_oculus_weights_show_an_example_of_each(name: str, ipa: str) -> None:
     weights = oculus_weights(in_the_middle(say("a" if ipa != "ɑ" else "t", ipa, "t")))
     assert oculus_visemes()[int(weights[2].argmax())].name == name
 
 
-def test_fap_1_names_the_two_strongest_and_mixes_them_as_a_decoder_does() -> None:
+def test_fap_1_mixes_the_two_strongest_visemes() -> None:
     weights = np.zeros((3, 15))
     weights[0, [10, 4, 5]] = 0.6, 0.3, 0.1
     weights[1, 2] = 1.0
@@ -98,7 +98,7 @@ def test_fap_1_names_the_two_strongest_and_mixes_them_as_a_decoder_does() -> Non
 
 
 @given(arrays(np.float64, (5, 15), elements=st.floats(0, 1)))
-def test_fap_1_is_always_within_what_the_standard_codes(weights: Float64) -> None:
+def test_fap_1_is_within_the_range_of_the_standard(weights: Float64) -> None:
     out = fap_1(weights)
     assert out.shape == (5, 4)
     assert (out[:, :2] >= 0).all()

@@ -10,7 +10,7 @@ from realizer.animation.lips.visemes import lip_shapes, sounds
 from realizer.tables.phonemes import phoneme_features
 
 
-def test_every_symbol_has_a_mouth_or_none_on_purpose() -> None:
+def test_sounds_of_every_symbol_have_a_viseme_or_an_exception() -> None:
     for ipa, features in phoneme_features().items():
         (sound,) = sounds(ipa)
         parts = sum(part for _, part in sound.mix)
@@ -19,7 +19,7 @@ def test_every_symbol_has_a_mouth_or_none_on_purpose() -> None:
         assert all(0 < viseme <= 14 for viseme, _ in sound.mix)
 
 
-def test_all_visemes_of_the_standard_are_used() -> None:
+def test_sounds_use_all_visemes() -> None:
     used = {viseme for ipa in phoneme_features() for viseme, _ in sounds(ipa)[0].mix}
     assert used == set(range(1, 15))
     assert [row.viseme for row in lip_shapes()] == list(range(15))
@@ -31,7 +31,7 @@ def test_all_visemes_of_the_standard_are_used() -> None:
      ("s z", 7), ("n l", 8), ("ɹ", 9),
      ("ɑː", 10), ("ɛ", 11), ("ɪ", 12), ("ɒ", 13), ("ʊ", 14)],
 )  # fmt: skip
-def test_the_examples_of_the_standard_have_their_viseme(phonemes: str, viseme: int) -> None:
+def test_sounds_of_examples_have_the_viseme_of_the_standard(phonemes: str, viseme: int) -> None:
     for ipa in phonemes.split():
         mix = dict(sounds(ipa)[0].mix)
         assert max(mix, key=lambda v: mix[v]) == viseme
@@ -52,11 +52,11 @@ def test_the_examples_of_the_standard_have_their_viseme(phonemes: str, viseme: i
         ("ɔ˞", "ɔ"),
     ],
 )
-def test_diacritics_do_not_change_the_mouth(written: str, plain: str) -> None:
+def test_sounds_ignore_diacritics(written: str, plain: str) -> None:
     assert sounds(written) == sounds(plain)
 
 
-def test_strings_of_several_sounds_share_their_time() -> None:
+def test_sounds_of_a_string_share_its_time() -> None:
     assert [s.share for s in sounds("oʊ")] == pytest.approx([0.55, 0.45])
     assert [s.vowel for s in sounds("ɔːɹ")] == [True, False]
     assert sum(s.share for s in sounds("aɪəɹ")) == pytest.approx(1)
@@ -65,6 +65,6 @@ def test_strings_of_several_sounds_share_their_time() -> None:
 
 
 @given(st.text(max_size=8))
-def test_any_string_is_taken_for_ipa(text: str) -> None:
+def test_sounds_accept_any_string(text: str) -> None:
     found = sounds(text)
     assert not found or sum(s.share for s in found) == pytest.approx(1)

@@ -32,7 +32,7 @@ def errors(found: Alignment, onsets: np.ndarray) -> np.ndarray:
 
 
 @both
-def test_words_are_found_in_noise(aligner, sentence) -> None:
+def test_align_finds_words_in_noise(aligner, sentence) -> None:
     found = align(sentence.pcm, sentence.rate, TEXT, aligner=aligner)
     assert [word.text for word in found.words] == [word.text for word in sentence.said.words]
     assert np.median(errors(found, sentence.onsets)) < 0.02
@@ -43,7 +43,7 @@ def test_words_are_found_in_noise(aligner, sentence) -> None:
 
 
 @both
-def test_phonemes_tile_the_recording_and_lie_in_their_words(aligner, sentence) -> None:
+def test_align_covers_the_recording_with_phonemes(aligner, sentence) -> None:
     found = align(sentence.pcm, sentence.rate, TEXT, aligner=aligner)
     assert found.phonemes[0].start == 0
     assert found.phonemes[-1].end == found.duration == len(sentence.pcm) / sentence.rate
@@ -59,7 +59,7 @@ def test_phonemes_tile_the_recording_and_lie_in_their_words(aligner, sentence) -
 
 
 @both
-def test_a_wrong_text_is_not_believed(aligner, sentence) -> None:
+def test_align_doubts_a_wrong_text(aligner, sentence) -> None:
     try:
         found = align(sentence.pcm, sentence.rate, WRONG, aligner=aligner)
     except AlignError as error:
@@ -70,13 +70,13 @@ def test_a_wrong_text_is_not_believed(aligner, sentence) -> None:
 
 
 @pytest.mark.espeak
-def test_noise_is_not_believed_whatever_aligns_it(sentence) -> None:
+def test_align_doubts_noise(sentence) -> None:
     noise = np.random.default_rng(1).normal(0, 0.1, 48_000)
     assert align(noise, 16_000, TEXT).confidence < 0.2
 
 
 @pytest.mark.espeak
-def test_a_text_of_another_language_is_not_believed(sentence) -> None:
+def test_align_doubts_a_text_of_another_language(sentence) -> None:
     assert (
         align(sentence.pcm, sentence.rate, "Moja siostra mieszka w małym domu nad rzeką.", "pl").confidence
         < 0.5
@@ -91,7 +91,7 @@ def test_align_uses_espeak_for_other_languages(zin) -> None:
     assert found.confidence > 0.8
 
 
-def test_without_any_aligner_the_words_are_spread_over_what_sounds(monkeypatch) -> None:
+def test_align_spreads_words_without_an_aligner(monkeypatch) -> None:
     from realizer.speech.align import aligner, sphinx
 
     monkeypatch.setattr(aligner, "reference_voice", SilentVoice)
@@ -117,11 +117,11 @@ def test_without_any_aligner_the_words_are_spread_over_what_sounds(monkeypatch) 
         (np.ones(9000), 16_000, "x" * (MAX_TEXT + 1), f"at most {MAX_TEXT} characters"),
     ],
 )
-def test_what_cannot_be_aligned_is_refused_in_words(pcm, rate, text, says) -> None:
+def test_align_refuses(pcm, rate, text, says) -> None:
     with pytest.raises(RealizerError, match=says):
         align(pcm, rate, text)
 
 
-def test_an_unknown_aligner_is_refused(sentence) -> None:
+def test_align_refuses_an_unknown_aligner(sentence) -> None:
     with pytest.raises(AlignError, match="wanted pocketsphinx or espeak, got 'mine'"):
         align(sentence.pcm, sentence.rate, TEXT, aligner="mine")  # type: ignore[arg-type]

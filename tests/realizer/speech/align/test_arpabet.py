@@ -18,10 +18,10 @@ from realizer.speech.align.arpabet import to_arpabet, to_ipa
         ((), ()),
     ],
 )
-def test_phonemes_become_phones_the_longest_symbol_first(ipa, phones) -> None:
+def test_to_arpabet_converts_the_longest_symbol_first(ipa, phones) -> None:
     assert to_arpabet(ipa) == phones
 
 
-def test_a_phone_sounds_like_the_first_of_its_rows_and_silence_like_nothing() -> None:
+def test_to_ipa_uses_the_first_row_of_a_phone() -> None:
     assert [to_ipa(phone) for phone in ("HH", "AA", "ER", "JH", "SIL")] == ["h", "ɑ", "ɝ", "dʒ", ""]
     assert to_arpabet([to_ipa("NG"), to_ipa("OY")]) == ("NG", "OY")

@@ -29,21 +29,21 @@ def way(frames: str, said: str, **band) -> str:
     return "".join(said[k] for k in found)
 
 
-def test_sounds_that_last_longer_or_shorter_are_found() -> None:
+def test_best_path_stretches_states() -> None:
     assert way("__aaabbcddd__", "_abccd_") == "__aaabbcddd__"
 
 
-def test_a_pause_between_words_is_left_out_or_stayed_in() -> None:
+def test_best_path_skips_pauses_or_stays_in_them() -> None:
     assert way("_aabb_", "_ab_") == "_aabb_"
     assert way("_aabb_", "_a_b_") == "_aabb_"
     assert way("_aaaaaa____________bbbbbb_", "_a_b_") == "_aaaaaa____________bbbbbb_"
 
 
-def test_inside_a_word_there_is_no_pause() -> None:
+def test_best_path_has_no_pause_inside_a_word() -> None:
     assert set(way("_aaaaaa____________bbbbbb_", "_ab_")[7:19]) <= {"a", "b"}
 
 
-def test_in_a_band_the_same_way_is_found() -> None:
+def test_best_path_in_a_band_is_the_same() -> None:
     frames, said = "__" + "aabbbcdde" * 20 + "__", "_" + "abcde_" * 20
     whole, cost = best_path(heard(frames), states(said))
     banded, cost_banded = best_path(heard(frames), states(said), whole, 6)
@@ -53,7 +53,7 @@ def test_in_a_band_the_same_way_is_found() -> None:
     assert (best_path(heard(frames), states(said), diagonal, 40)[0] == whole).all()
 
 
-def test_the_way_only_goes_on_and_reaches_the_end() -> None:
+def test_best_path_advances_to_the_end() -> None:
     rng = np.random.default_rng(0)
     noise = Observed(rng.normal(size=(80, 5)), quiet(rng.random(80), 0.1), 1.0)
     found, cost = best_path(noise, states("_" + "abcde_" * 9))
@@ -63,6 +63,6 @@ def test_the_way_only_goes_on_and_reaches_the_end() -> None:
     assert np.isfinite(cost).all()
 
 
-def test_differences_are_root_mean_squares() -> None:
+def test_distance_is_the_root_mean_square() -> None:
     assert distance(np.zeros((1, 4)), np.array([[2.0, 0, 0, 0], [1, 1, 1, 1]])).tolist() == [[1.0, 1.0]]
     assert usual(np.zeros((3, 4)), np.ones((5, 4))) == 1.0

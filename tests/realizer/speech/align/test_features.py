@@ -11,18 +11,18 @@ def tone(hertz: float, seconds: float = 1.0, loud: float = 0.3) -> np.ndarray:
     return (loud * np.sin(2 * np.pi * hertz * np.arange(round(seconds * f.RATE)) / f.RATE)).astype(np.float32)
 
 
-def test_a_tone_is_loudest_in_the_band_of_its_pitch() -> None:
+def test_energies_of_a_tone_are_in_its_band() -> None:
     peaks = [int(f.energies(tone(hertz), 160).mean(axis=0).argmax()) for hertz in (200, 1000, 3000, 6000)]
     assert peaks == sorted(set(peaks))
 
 
-def test_there_is_a_frame_for_each_hop_which_need_not_be_whole() -> None:
+def test_energies_have_a_frame_for_each_hop() -> None:
     energy = f.energies(tone(500), 100.5)
     assert len(energy) == int(f.RATE / 100.5) + 1
     assert f.cepstra(energy).shape == (len(energy), 26)
 
 
-def test_sound_is_told_from_silence_and_steady_noise_has_none() -> None:
+def test_voice_activity_separates_sound_from_silence() -> None:
     sound = np.concatenate([tone(400, 0.5, 1e-4), tone(400, 1.0), tone(400, 0.5, 1e-4)])
     _, talks = f.voice_activity(f.loudness(f.energies(sound, 160)))
     assert 95 <= talks.sum() <= 110
@@ -31,7 +31,7 @@ def test_sound_is_told_from_silence_and_steady_noise_has_none() -> None:
     assert part.max() == 0
 
 
-def test_normalising_takes_the_mean_and_the_spread_away() -> None:
+def test_normalised_features_have_mean_0_and_deviation_1() -> None:
     rng = np.random.default_rng(0)
     some = rng.random(400) < 0.5
     rows = f.normalised(rng.normal(5, 3, (400, 4)), some)
@@ -39,7 +39,7 @@ def test_normalising_takes_the_mean_and_the_spread_away() -> None:
     assert np.allclose(rows[some].std(axis=0), 1, atol=1e-5)
 
 
-def test_resampling_keeps_the_pitch_and_lets_nothing_alias() -> None:
+def test_resampled_sound_keeps_its_pitch_without_aliasing() -> None:
     times = np.arange(44_100) / 44_100
     low, high = (np.sin(2 * np.pi * hertz * times).astype(np.float32) for hertz in (1000, 15_000))
     kept = f.resampled(low, 44_100)

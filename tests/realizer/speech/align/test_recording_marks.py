@@ -17,7 +17,7 @@ MARKED = (
 
 
 @pytest.mark.espeak
-def test_marks_come_with_the_words_they_stand_before(sentence) -> None:
+def test_utterance_of_recording_places_marks_before_their_words(sentence) -> None:
     said = utterance_of_recording(sentence.pcm, sentence.rate, SpeechRequest(MARKED, ("a", "b", "c", "d")))
     starts = {word.text: word.start for word in said.words}
     assert said.marks["a"] == starts["The"]
@@ -30,7 +30,7 @@ def test_marks_come_with_the_words_they_stand_before(sentence) -> None:
 
 
 @pytest.mark.espeak
-def test_a_request_with_a_recording_asks_no_voice_and_stays_as_long_as_it_is(sentence) -> None:
+def test_recording_in_a_request_replaces_the_voice(sentence) -> None:
     request = SpeechRequest(MARKED, ("a",), seconds=1.0, recording=Recording(sentence.rate, sentence.pcm))
     said = speak_to_length(SilentVoice(), request)
     assert said.duration == len(sentence.pcm) / sentence.rate
@@ -38,7 +38,7 @@ def test_a_request_with_a_recording_asks_no_voice_and_stays_as_long_as_it_is(sen
     assert speak_to_length(SilentVoice(), request) is said, "it is aligned once"
 
 
-def test_a_recording_that_cannot_be_aligned_sounds_all_the_same() -> None:
+def test_align_recording_falls_back_to_the_sound() -> None:
     silence = Recording(8000, np.zeros(8000, np.int16))
     said = align_recording(SpeechRequest("Hello", recording=silence), silence)
     assert said.pcm is silence.pcm

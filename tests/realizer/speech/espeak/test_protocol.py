@@ -24,7 +24,7 @@ def read(*structs: bytes, marks: tuple[str, ...] = (), sound: bytes = b"") -> li
     return read_answer({"events": len(told), "marks": list(marks)}, told + sound)[0]
 
 
-def test_an_event_has_its_type_sample_place_and_text() -> None:
+def test_read_answer_returns_type_sample_place_and_text() -> None:
     assert read(struct(WORD, 10, 8), struct(PHONEME, 20, 9, "aɪ".encode()), struct(END, 30)) == [
         (WORD, 10, 8, ""),
         (PHONEME, 20, 9, "aɪ"),
@@ -32,11 +32,11 @@ def test_an_event_has_its_type_sample_place_and_text() -> None:
     ]
 
 
-def test_events_that_are_of_no_use_are_left_out() -> None:
+def test_read_answer_ignores_other_events() -> None:
     assert read(struct(SENTENCE), struct(WORD, 5), struct(8)) == [(WORD, 5, 0, "")]
 
 
-def test_marks_have_the_names_that_stand_in_the_head_in_order() -> None:
+def test_read_answer_names_marks_by_the_head() -> None:
     told = read(struct(MARK, 1), struct(WORD, 2), struct(MARK, 3), marks=("m0", "m1"))
     assert [(sample, text) for _, sample, _, text in told] == [(1, "m0"), (2, ""), (3, "m1")]
 
@@ -50,11 +50,11 @@ def test_marks_have_the_names_that_stand_in_the_head_in_order() -> None:
         (b"", ""),
     ],
 )
-def test_a_phoneme_ends_at_its_end_or_after_eight_bytes(raw: bytes, ipa: str) -> None:
+def test_read_answer_ends_phonemes_at_0_or_after_eight_bytes(raw: bytes, ipa: str) -> None:
     assert read(struct(PHONEME, 0, 0, raw)) == [(PHONEME, 0, 0, ipa)]
 
 
-def test_samples_stand_behind_the_events_and_nobody_can_write_to_them() -> None:
+def test_read_answer_returns_read_only_samples() -> None:
     told = struct(WORD) + struct(END)
     _, pcm = read_answer({"events": len(told), "marks": []}, told + np.array([1, -2, 3], "<i2").tobytes())
     assert pcm.tolist() == [1, -2, 3]

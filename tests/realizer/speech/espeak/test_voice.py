@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-import gc
-import os
-import signal
-import subprocess
 import threading
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from realizer.core.errors import VoiceError
-from realizer.speech import engine_process
-from realizer.speech.cache import MOST
 from realizer.speech.espeak.voice import EspeakVoice, choose_voice
 from realizer.speech.utterance import SpeechRequest, Utterance
 
@@ -37,7 +30,7 @@ def same(a: Utterance, b: Utterance) -> bool:
     return times(a) == times(b) and np.array_equal(a.pcm, b.pcm)
 
 
-def test_sound_is_exactly_as_long_as_it_says(voice: EspeakVoice) -> None:
+def test_espeak_duration_is_that_of_the_sound(voice: EspeakVoice) -> None:
     said = voice.say(HELLO)
     assert said.pcm is not None
     assert said.duration == len(said.pcm) / said.sample_rate
@@ -45,7 +38,7 @@ def test_sound_is_exactly_as_long_as_it_says(voice: EspeakVoice) -> None:
     assert np.abs(said.pcm.astype(int)).max() > 3000
 
 
-def test_marks_are_where_their_word_is_heard(voice: EspeakVoice) -> None:
+def test_espeak_marks_are_where_their_word_is_heard(voice: EspeakVoice) -> None:
     said = voice.say(HELLO)
     assert said.marks == {"s1": starts(said)["very"], "s2": starts(said)["meet"]}
     assert said.pcm is not None
@@ -64,7 +57,9 @@ def test_marks_are_where_their_word_is_heard(voice: EspeakVoice) -> None:
         ("pl-PL", "Raz dwa. {}Trzy cztery. {}Pięć sześć. {}Siedem. {}Osiem."),
     ],
 )
-def test_marks_at_sentence_starts_come_back(voice: EspeakVoice, language: str, text: str) -> None:
+def test_espeak_marks_at_sentence_starts_are_at_their_words(
+    voice: EspeakVoice, language: str, text: str
+) -> None:
     marked = text.format(*(f'<mark name="{name}"/>' for name in "abcd"))
     said = voice.say(SpeechRequest(marked, tuple("abcd"), language))
     assert list(said.marks) == list("abcd")
@@ -77,19 +72,19 @@ def test_marks_at_sentence_starts_come_back(voice: EspeakVoice, language: str, t
 @pytest.mark.parametrize(
     "mark", ["<mark name='x'/>", '<bookmark mark="x"/>', '<s:mark name="x"/>', "<mark name='x'></mark>"]
 )
-def test_every_spelling_of_a_mark_is_a_mark(voice: EspeakVoice, mark: str) -> None:
+def test_espeak_accepts_every_spelling_of_a_mark(voice: EspeakVoice, mark: str) -> None:
     said = voice.say(SpeechRequest(f"one two {mark}three", ("x",)))
     assert said.marks == {"x": starts(said)["three"]}
     assert not said.warnings
 
 
-def test_marks_may_have_any_name(voice: EspeakVoice) -> None:
+def test_espeak_marks_may_have_any_name(voice: EspeakVoice) -> None:
     name = "a&quot;b'ü"
     said = voice.say(SpeechRequest(f'one <mark name="{name}"/>two', (name,)))
     assert list(said.marks) == ["a\"b'ü"]
 
 
-def test_the_same_request_gives_the_same_samples_whatever_came_before() -> None:
+def test_espeak_sound_is_independent_of_earlier_requests() -> None:
     first, second = EspeakVoice(), EspeakVoice()
     try:
         second.say(SpeechRequest("Something quite different comes first.", language="nl"))
@@ -101,7 +96,7 @@ def test_the_same_request_gives_the_same_samples_whatever_came_before() -> None:
         second.close()
 
 
-def test_a_known_request_does_not_reach_the_engine(voice: EspeakVoice) -> None:
+def test_espeak_caches_requests(voice: EspeakVoice) -> None:
     lone = EspeakVoice()
     said = lone.say(HELLO)
     lone.close()
@@ -109,19 +104,7 @@ def test_a_known_request_does_not_reach_the_engine(voice: EspeakVoice) -> None:
     assert lone.pid is None
 
 
-def test_only_so_many_utterances_are_kept() -> None:
-    lone = EspeakVoice()
-    try:
-        first = lone.say(SpeechRequest("0"))
-        for k in range(1, MOST + 1):
-            lone.say(SpeechRequest(str(k)))
-        assert lone.say(SpeechRequest("0")) is not first
-        assert same(lone.say(SpeechRequest("0")), first)
-    finally:
-        lone.close()
-
-
-def test_many_threads_may_speak_at_once(voice: EspeakVoice) -> None:
+def test_espeak_serves_many_threads(voice: EspeakVoice) -> None:
     lone = EspeakVoice()
     said: dict[tuple[int, int], Utterance] = {}
     texts = [SpeechRequest(f"It is line {k}, I am sure.") for k in range(8)]
@@ -138,57 +121,6 @@ def test_many_threads_may_speak_at_once(voice: EspeakVoice) -> None:
     lone.close()
     assert len(said) == 32
     assert all(same(said[n, k], voice.say(texts[(k + n) % 8])) for n, k in said)
-
-
-def test_an_engine_killed_under_a_text_fails_that_one_and_no_more(
-    voice: EspeakVoice, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    lone = EspeakVoice()
-    exchange = engine_process._exchange
-
-    def killed(process: subprocess.Popen[bytes], request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
-        monkeypatch.undo()
-        process.kill()
-        return exchange(process, request)
-
-    try:
-        lone.say(SpeechRequest("first"))
-        monkeypatch.setattr(engine_process, "_exchange", killed)
-        with pytest.raises(VoiceError, match="starts it again"):
-            lone.say(HELLO)
-        assert same(lone.say(HELLO), voice.say(HELLO))
-    finally:
-        lone.close()
-
-
-def test_a_hung_engine_is_replaced(voice: EspeakVoice) -> None:
-    lone = EspeakVoice(limit=5.0)
-    try:
-        lone.say(SpeechRequest("first"))
-        lone._process._limit = 0.2
-        assert lone.pid is not None
-        os.kill(lone.pid, signal.SIGSTOP)
-        with pytest.raises(VoiceError, match="did not answer"):
-            lone.say(HELLO)
-        lone._process._limit = 5.0
-        assert same(lone.say(HELLO), voice.say(HELLO))
-    finally:
-        lone.close()
-
-
-def test_a_closed_or_forgotten_voice_leaves_no_process() -> None:
-    for close in (True, False):
-        lone = EspeakVoice()
-        lone.say(SpeechRequest("first"))
-        pid = lone.pid
-        assert pid is not None
-        if close:
-            lone.close()
-            lone.close()
-        del lone
-        gc.collect()
-        with pytest.raises(ProcessLookupError):
-            os.kill(pid, 0)
 
 
 @pytest.mark.parametrize(
@@ -212,7 +144,7 @@ def test_a_closed_or_forgotten_voice_leaves_no_process() -> None:
         ("es-MX", "roa/es-419"),
     ],
 )
-def test_language_tags_find_their_voice(voice: EspeakVoice, tag: str, engine: str) -> None:
+def test_choose_voice_by_language_tag(voice: EspeakVoice, tag: str, engine: str) -> None:
     assert choose_voice(voice._process.hello(), None, tag) == (engine, ())
     assert voice.say(SpeechRequest("a", language=tag)).duration > 0
 
@@ -227,12 +159,12 @@ def test_language_tags_find_their_voice(voice: EspeakVoice, tag: str, engine: st
         ("Polish", "zlw/pl"),
     ],
 )
-def test_voices_are_chosen_by_name_and_variant(voice: EspeakVoice, wanted: str, engine: str) -> None:
+def test_choose_voice_by_name_and_variant(voice: EspeakVoice, wanted: str, engine: str) -> None:
     assert choose_voice(voice._process.hello(), wanted, "de-DE") == (engine, ())
     assert voice.say(SpeechRequest("a", voice=wanted, language="de-DE")).duration > 0
 
 
-def test_what_it_does_not_speak_is_said_and_spoken_anyway(voice: EspeakVoice) -> None:
+def test_choose_voice_warns_of_unknown_names(voice: EspeakVoice) -> None:
     said = voice.say(SpeechRequest("hello", language="xx-YY", voice="nobody+nothing"))
     assert said.duration > 0.3
     assert [w.split(":")[0] for w in said.warnings] == [
@@ -252,7 +184,7 @@ def test_what_it_does_not_speak_is_said_and_spoken_anyway(voice: EspeakVoice) ->
         ("zh-CN", "你好，我很高兴见到你。"),
     ],
 )
-def test_phonemes_are_ipa_and_nothing_but_ipa(voice: EspeakVoice, language: str, text: str) -> None:
+def test_espeak_phonemes_are_ipa(voice: EspeakVoice, language: str, text: str) -> None:
     said = voice.say(SpeechRequest(text, language=language))
     heard = "".join(phoneme.ipa for phoneme in said.phonemes)
     assert len(heard) > 10
@@ -260,7 +192,7 @@ def test_phonemes_are_ipa_and_nothing_but_ipa(voice: EspeakVoice, language: str,
     assert all(len(phoneme.ipa.encode()) <= 8 for phoneme in said.phonemes)
 
 
-def test_rate_makes_speech_faster_within_what_the_engine_can(voice: EspeakVoice) -> None:
+def test_espeak_rate_is_limited_by_the_engine(voice: EspeakVoice) -> None:
     lengths = [voice.say(replace(HELLO, rate=rate)).duration for rate in (0.1, 0.5, 1.0, 2.0, 100.0)]
     assert lengths == sorted(lengths, reverse=True)
     assert lengths[1] > 1.5 * lengths[2] > 2 * lengths[3]
@@ -278,19 +210,19 @@ def test_rate_makes_speech_faster_within_what_the_engine_can(voice: EspeakVoice)
         ("one 😀 two", "emoji"),
     ],
 )
-def test_bad_text_is_spoken_with_a_warning(voice: EspeakVoice, text: str, warning: str) -> None:
+def test_espeak_speaks_bad_text_with_a_warning(voice: EspeakVoice, text: str, warning: str) -> None:
     said = voice.say(SpeechRequest(text))
     assert {"one", "two"} <= set(starts(said))
     assert any(warning in sentence for sentence in said.warnings)
 
 
-def test_marks_survive_wrong_ssml(voice: EspeakVoice) -> None:
+def test_espeak_keeps_marks_of_malformed_ssml(voice: EspeakVoice) -> None:
     said = voice.say(SpeechRequest("one <mark name='a'/>two <b>three <mark name=\"c\">four", ("a", "c")))
     assert said.marks == {"a": starts(said)["two"], "c": starts(said)["four"]}
 
 
 @pytest.mark.parametrize("text", ["", "   ", "😀", '<mark name="m"/>', "...", "\x00"])
-def test_an_empty_text_takes_no_time_and_is_said(voice: EspeakVoice, text: str) -> None:
+def test_espeak_warns_of_an_empty_text(voice: EspeakVoice, text: str) -> None:
     said = voice.say(SpeechRequest(text, ("m",)))
     assert said.duration == 0
     assert said.words == said.phonemes == ()
@@ -298,19 +230,19 @@ def test_an_empty_text_takes_no_time_and_is_said(voice: EspeakVoice, text: str) 
     assert any("empty" in sentence for sentence in said.warnings)
 
 
-def test_a_text_of_200_kilobytes_is_refused_with_words(voice: EspeakVoice) -> None:
+def test_espeak_refuses_a_text_of_200_kilobytes(voice: EspeakVoice) -> None:
     with pytest.raises(VoiceError, match="at most 20000 characters, got 200000"):
         voice.say(SpeechRequest("word " * 40_000))
     assert voice.say(HELLO).duration > 2
 
 
-def test_files_are_not_opened(voice: EspeakVoice, tmp_path: Path) -> None:
+def test_espeak_opens_no_files(voice: EspeakVoice, tmp_path: Path) -> None:
     said = voice.say(SpeechRequest(f'one <audio src="{tmp_path}/sound.wav">two</audio> three'))
     assert [w.text for w in said.words] == ["one", "two", "three"]
 
 
 @pytest.mark.parametrize("language", ["ar", "hi", "zh", "ja", "ru", "el", "th", "ko", "de", "tr", "vi"])
-def test_other_scripts_are_spoken(voice: EspeakVoice, language: str) -> None:
+def test_espeak_speaks_other_scripts(voice: EspeakVoice, language: str) -> None:
     texts = {
         "ar": "مرحبا بالعالم", "hi": "नमस्ते दुनिया", "zh": "你好世界", "ja": "こんにちは", "ru": "Привет, мир",
         "el": "καλημέρα κόσμε", "th": "สวัสดี", "ko": "안녕하세요", "de": "Grüß Gott",
@@ -327,7 +259,7 @@ def test_other_scripts_are_spoken(voice: EspeakVoice, language: str) -> None:
     ("volume", "part"),
     [("+6dB", 2.0), ("-6dB", 0.5), ("soft", 0.5), ("50", 0.5), ("150%", 1.5), ("silent", 0.0)],
 )
-def test_the_sound_is_as_loud_as_the_lips_are_told(voice: EspeakVoice, volume: str, part: float) -> None:
+def test_espeak_volume_is_the_requested_one(voice: EspeakVoice, volume: str, part: float) -> None:
     text = "Hello there my friend."
     plain = voice.say(SpeechRequest(text)).pcm
     said = voice.say(SpeechRequest(f'<prosody volume="{volume}">{text}</prosody>')).pcm
@@ -337,7 +269,7 @@ def test_the_sound_is_as_loud_as_the_lips_are_told(voice: EspeakVoice, volume: s
 
 
 @pytest.mark.parametrize("semitones", [-4, -2, 2, 4])
-def test_semitones_are_semitones(voice: EspeakVoice, semitones: int) -> None:
+def test_espeak_pitch_is_in_semitones(voice: EspeakVoice, semitones: int) -> None:
     text = "Hello there my friend, how are you doing."
 
     def pitch(ssml: str) -> float:
@@ -356,9 +288,7 @@ def test_semitones_are_semitones(voice: EspeakVoice, semitones: int) -> None:
 
 
 @pytest.mark.parametrize("end", ['there<mark name="m"/>.', 'there<mark name="k"/><mark name="m"/>.'])
-def test_a_mark_before_a_full_stop_is_the_end_of_its_word_and_no_dot_is_said(
-    voice: EspeakVoice, end: str
-) -> None:
+def test_espeak_does_not_say_dot_after_a_mark(voice: EspeakVoice, end: str) -> None:
     plain, said = voice.say(SpeechRequest("Hello there.")), voice.say(SpeechRequest(f"Hello {end}"))
     assert [p.ipa for p in said.phonemes] == [p.ipa for p in plain.phonemes]
     assert said.marks["m"] == pytest.approx(plain.words[-1].end, abs=0.01)

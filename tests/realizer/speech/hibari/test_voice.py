@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
 import threading
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pytest
 
 from realizer.core.errors import VoiceError
-from realizer.speech import engine_process
 from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.hibari.voice import HibariVoice
 from realizer.speech.registry import find_voice
@@ -53,7 +49,7 @@ def tiles(utterance: Utterance) -> bool:
 
 
 @hibari
-def test_sound_and_phonemes_are_exactly_as_long_as_it_says(neural: HibariVoice) -> None:
+def test_hibari_duration_is_that_of_sound_and_phonemes(neural: HibariVoice) -> None:
     said = neural.say(HELLO)
     assert said.pcm is not None
     assert said.duration == len(said.pcm) / said.sample_rate
@@ -63,7 +59,7 @@ def test_sound_and_phonemes_are_exactly_as_long_as_it_says(neural: HibariVoice) 
 
 
 @hibari
-def test_marks_are_where_their_word_is_heard(neural: HibariVoice) -> None:
+def test_hibari_marks_are_where_their_word_is_heard(neural: HibariVoice) -> None:
     said = neural.say(HELLO)
     assert said.marks == {"s1": starts(said)["very"], "s2": starts(said)["meet"]}
     # Against the sound: after a break of silence the marked word is the first thing that is heard.
@@ -77,7 +73,7 @@ def test_marks_are_where_their_word_is_heard(neural: HibariVoice) -> None:
 
 
 @hibari
-def test_vowels_sound_and_the_pauses_between_sentences_are_silent(neural: HibariVoice) -> None:
+def test_hibari_vowels_sound_and_pauses_are_silent(neural: HibariVoice) -> None:
     said = neural.say(SpeechRequest("Yes, I know. Papa is here! Now we go."))
     pauses = [p for p in said.phonemes if not p.ipa and p.end - p.start > 0.3]
     assert len(pauses) == 3, "between the sentences, and at the end"
@@ -88,7 +84,7 @@ def test_vowels_sound_and_the_pauses_between_sentences_are_silent(neural: Hibari
 
 
 @hibari
-def test_every_phoneme_is_one_that_has_a_lip_shape(neural: HibariVoice) -> None:
+def test_hibari_phonemes_have_lip_shapes(neural: HibariVoice) -> None:
     text = "Judge church, boy, how are you? The thing is measured: she sings of butter, oh, air and ice; yes."
     said = neural.say(SpeechRequest(text))
     assert {"dʒ", "tʃ", "ɔɪ", "aʊ", "oʊ", "aɪ", "ð", "θ", "ʒ", "ʃ", "ŋ"} <= {p.ipa for p in said.phonemes}
@@ -110,7 +106,7 @@ def test_every_phoneme_is_one_that_has_a_lip_shape(neural: HibariVoice) -> None:
         ('First. <mark name="m"/>Second. Third.', "Second"),
     ],
 )
-def test_marks_stand_before_their_word_however_it_is_read(neural: HibariVoice, text: str, word: str) -> None:
+def test_hibari_marks_are_before_words_that_are_expanded(neural: HibariVoice, text: str, word: str) -> None:
     said = neural.say(SpeechRequest(text, ("m",)))
     assert said.marks == {"m": starts(said)[word]}
     first = next(w for w in said.words if w.text == word)
@@ -120,7 +116,7 @@ def test_marks_stand_before_their_word_however_it_is_read(neural: HibariVoice, t
 
 
 @hibari
-def test_numbers_take_the_time_of_all_their_words(neural: HibariVoice) -> None:
+def test_hibari_numbers_last_as_long_as_all_their_words(neural: HibariVoice) -> None:
     said = neural.say(SpeechRequest("They paid 1,250,431 euros."))
     number = next(w for w in said.words if w.text.startswith("1"))
     inside = [p.ipa for p in said.phonemes if number.start <= p.start < number.end]
@@ -129,7 +125,7 @@ def test_numbers_take_the_time_of_all_their_words(neural: HibariVoice) -> None:
 
 
 @hibari
-def test_a_break_lasts_as_long_as_it_says_and_marks_stand_on_their_side_of_it(neural: HibariVoice) -> None:
+def test_hibari_breaks_last_as_long_as_requested(neural: HibariVoice) -> None:
     text = '{}one <mark name="a"/>{}<mark name="b"/>two'
     short, long = (
         neural.say(SpeechRequest(text.format("", f'<break time="{time}ms"/>'), ("a", "b")))
@@ -144,7 +140,7 @@ def test_a_break_lasts_as_long_as_it_says_and_marks_stand_on_their_side_of_it(ne
 
 
 @hibari
-def test_prosody_changes_rate_pitch_and_loudness_of_its_words_only(neural: HibariVoice) -> None:
+def test_hibari_prosody_changes_its_words_only(neural: HibariVoice) -> None:
     plain = neural.say(SpeechRequest("one more banana here"))
     slow = neural.say(SpeechRequest('one more <prosody rate="60%">banana</prosody> here'))
     spans = [{w.text: w.end - w.start for w in said.words} for said in (plain, slow)]
@@ -176,7 +172,7 @@ def pitch(said: Utterance) -> float:
 
 
 @hibari
-def test_rate_makes_speech_faster_within_what_the_voice_can(neural: HibariVoice) -> None:
+def test_hibari_rate_is_limited_by_the_voice(neural: HibariVoice) -> None:
     lengths = [neural.say(replace(HELLO, rate=rate)).duration for rate in (0.1, 0.5, 1.0, 2.0, 100.0)]
     assert lengths[0] == lengths[1] > 1.5 * lengths[2]
     assert lengths[2] > 1.5 * lengths[3] == 1.5 * lengths[4]
@@ -184,7 +180,7 @@ def test_rate_makes_speech_faster_within_what_the_voice_can(neural: HibariVoice)
 
 @hibari
 @pytest.mark.parametrize("ratio", [0.75, 0.97, 1.0, 1.3, 1.6])
-def test_it_lasts_as_long_as_the_schedule_asks(neural: HibariVoice, ratio: float) -> None:
+def test_hibari_speaks_to_a_given_length(neural: HibariVoice, ratio: float) -> None:
     natural = neural.say(HELLO)
     made = speak_to_length(neural, replace(HELLO, seconds=natural.duration * ratio))
     assert made.duration == pytest.approx(natural.duration * ratio)
@@ -192,7 +188,7 @@ def test_it_lasts_as_long_as_the_schedule_asks(neural: HibariVoice, ratio: float
 
 
 @hibari
-def test_the_same_request_gives_the_same_samples_whatever_came_before(neural: HibariVoice) -> None:
+def test_hibari_sound_is_independent_of_earlier_requests(neural: HibariVoice) -> None:
     lone = HibariVoice()
     try:
         lone.say(SpeechRequest("Something quite different comes first."))
@@ -202,7 +198,7 @@ def test_the_same_request_gives_the_same_samples_whatever_came_before(neural: Hi
 
 
 @hibari
-def test_many_threads_may_speak_at_once(neural: HibariVoice) -> None:
+def test_hibari_serves_many_threads(neural: HibariVoice) -> None:
     texts = [SpeechRequest(f"It is line {k}. I am sure of {k}.") for k in range(3)]
     said: dict[tuple[int, int], Utterance] = {}
     lone = HibariVoice()
@@ -222,32 +218,7 @@ def test_many_threads_may_speak_at_once(neural: HibariVoice) -> None:
 
 
 @hibari
-def test_an_engine_killed_under_a_text_fails_that_one_and_no_more(
-    neural: HibariVoice, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    lone = HibariVoice()
-    exchange = engine_process._exchange
-
-    def killed(process: subprocess.Popen[bytes], request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
-        monkeypatch.undo()
-        process.kill()
-        return exchange(process, request)
-
-    try:
-        lone.say(SpeechRequest("first"))
-        monkeypatch.setattr(engine_process, "_exchange", killed)
-        with pytest.raises(VoiceError, match=r"hibari ended .* starts it again"):
-            lone.say(HELLO)
-        assert same(lone.say(HELLO), neural.say(HELLO))
-        pid = lone.pid
-    finally:
-        lone.close()
-    with pytest.raises(ProcessLookupError):
-        os.kill(pid, 0)
-
-
-@hibari
-def test_a_model_that_does_not_tell_its_durations_has_times_by_rule_and_says_so(neural: HibariVoice) -> None:
+def test_hibari_estimates_times_without_durations(neural: HibariVoice) -> None:
     lone = HibariVoice(options=("--durations", "/of/another/version"))
     try:
         said, exact = lone.say(HELLO), neural.say(HELLO)
@@ -274,7 +245,7 @@ def test_a_model_that_does_not_tell_its_durations_has_times_by_rule_and_says_so(
         ("one مرحبا two", "hibari cannot pronounce 'مرحبا'"),
     ],
 )
-def test_bad_text_is_spoken_with_a_warning(neural: HibariVoice, text: str, warning: str) -> None:
+def test_hibari_speaks_bad_text_with_a_warning(neural: HibariVoice, text: str, warning: str) -> None:
     said = neural.say(SpeechRequest(text))
     assert {"one", "two"} <= set(starts(said))
     assert [sentence for sentence in said.warnings if warning in sentence]
@@ -284,7 +255,7 @@ def test_bad_text_is_spoken_with_a_warning(neural: HibariVoice, text: str, warni
 
 @hibari
 @pytest.mark.parametrize("text", ["", "   ", "😀", '<mark name="m"/>', "...", "\x00", "你好"])
-def test_a_text_without_a_word_takes_no_time_and_is_said(neural: HibariVoice, text: str) -> None:
+def test_hibari_warns_of_a_text_without_words(neural: HibariVoice, text: str) -> None:
     said = neural.say(SpeechRequest(text, ("m",)))
     assert said.duration == 0
     assert said.phonemes == ()
@@ -292,7 +263,7 @@ def test_a_text_without_a_word_takes_no_time_and_is_said(neural: HibariVoice, te
 
 
 @hibari
-def test_another_language_is_read_as_english_with_a_warning(neural: HibariVoice) -> None:
+def test_hibari_reads_other_languages_as_english(neural: HibariVoice) -> None:
     assert neural.say(SpeechRequest("one two", language="en_GB")).warnings == ()
     said = neural.say(SpeechRequest("een twee", language="nl-NL"))
     assert said.duration > 0.5
@@ -300,14 +271,14 @@ def test_another_language_is_read_as_english_with_a_warning(neural: HibariVoice)
 
 
 @hibari
-def test_brackets_are_no_notation(neural: HibariVoice) -> None:
+def test_hibari_reads_brackets_as_text(neural: HibariVoice) -> None:
     said = neural.say(SpeechRequest("one [two](/hˈi/) three"))
     assert [w.text for w in said.words] == ["one", "two", "hˈi", "three"]
     assert starts(said)["three"] > starts(said)["two"] + 0.2
 
 
 @hibari
-def test_a_long_text_is_spoken_a_sentence_at_a_time(neural: HibariVoice) -> None:
+def test_hibari_speaks_a_long_text(neural: HibariVoice) -> None:
     said = neural.say(
         SpeechRequest("I am here, and it is late. " * 12 + "word " * 150 + '<mark name="end"/>', ("end",))
     )
@@ -320,7 +291,7 @@ def test_a_long_text_is_spoken_a_sentence_at_a_time(neural: HibariVoice) -> None
 
 
 @hibari
-def test_a_voice_that_is_not_there_is_refused_in_words_and_not_fetched(
+def test_hibari_refuses_a_voice_without_fetching_it(
     monkeypatch: pytest.MonkeyPatch, tmp_path: object
 ) -> None:
     monkeypatch.setenv("HIBARI_HOME", str(tmp_path))

@@ -22,7 +22,7 @@ def said(request: SpeechRequest = TEXT, **told):
     return speak_to_length(SilentVoice(), SpeechRequest(request.ssml, request.marks, recording=recording))
 
 
-def test_a_mark_stands_where_its_word_was_told_to_begin() -> None:
+def test_utterance_of_places_marks_by_known_words() -> None:
     utterance = said(words=WORDS)
     assert utterance.words == WORDS
     assert utterance.marks == {"m": pytest.approx(1.0, abs=1e-3)}
@@ -30,7 +30,7 @@ def test_a_mark_stands_where_its_word_was_told_to_begin() -> None:
     assert utterance.pcm is SOUND
 
 
-def test_words_alone_have_phonemes_that_lie_in_them() -> None:
+def test_utterance_of_adds_phonemes_to_known_words() -> None:
     phonemes = said(words=WORDS).phonemes
     assert (phonemes[0].start, phonemes[-1].end) == (0.0, 2.0)
     assert all(a.end == b.start for a, b in pairwise(phonemes))
@@ -39,12 +39,12 @@ def test_words_alone_have_phonemes_that_lie_in_them() -> None:
         assert any(w.start <= middle <= w.end for w in WORDS)
 
 
-def test_words_that_are_divided_otherwise_are_found_by_their_letters() -> None:
+def test_utterance_of_matches_words_by_letters() -> None:
     parts = (Word(0.2, 0.3, "O"), Word(0.3, 0.5, "ne"), Word(0.5, 0.6, ","), *WORDS[1:])
     assert said(words=parts).marks["m"] == pytest.approx(1.0, abs=1e-3)
 
 
-def test_phonemes_are_taken_as_they_are_and_the_rest_is_silence() -> None:
+def test_utterance_of_keeps_known_phonemes() -> None:
     utterance = said(phonemes=(Phoneme(0.5, 0.6, "p"), Phoneme(0.6, 1.8, "a"), Phoneme(1.8, 9.0, "")))
     assert [(p.start, p.end, p.ipa) for p in utterance.phonemes] == [
         (0.0, 0.5, ""),
@@ -56,12 +56,12 @@ def test_phonemes_are_taken_as_they_are_and_the_rest_is_silence() -> None:
     assert 0.5 < utterance.marks["m"] < 1.8
 
 
-def test_without_text_and_times_the_mouth_opens_by_loudness() -> None:
+def test_utterance_of_sound_alone_uses_loudness() -> None:
     utterance = said(SpeechRequest(""))
     assert {p.ipa for p in utterance.phonemes} == {"a"}
     assert utterance.words == ()
 
 
-def test_without_times_the_text_is_looked_for_in_the_sound() -> None:
+def test_utterance_of_text_without_times_is_aligned() -> None:
     utterance = said(SpeechRequest("One two three"))
     assert [w.text for w in utterance.words] == ["One", "two", "three"]

@@ -8,7 +8,7 @@ from realizer.animation.lips.visemes import sounds
 from realizer.speech.recorded.viseme_names import sound_of, viseme_sets
 
 
-def test_every_set_has_silence_and_lips_that_close() -> None:
+def test_viseme_sets_have_silence_and_closed_lips() -> None:
     closed = {"mpeg4": "1", "oculus": "PP", "sapi": "21", "polly": "p"}
     silence = {"mpeg4": "0", "oculus": "sil", "sapi": "0", "polly": "sil"}
     assert set(viseme_sets()) == closed.keys()
@@ -18,12 +18,12 @@ def test_every_set_has_silence_and_lips_that_close() -> None:
 
 
 @pytest.mark.parametrize("viseme", range(1, 15))
-def test_a_viseme_of_mpeg4_comes_back_as_itself(viseme: int) -> None:
+def test_sound_of_an_mpeg4_viseme_has_that_viseme(viseme: int) -> None:
     parts = sounds(sound_of("mpeg4", str(viseme)))[0].mix
     assert max(parts, key=lambda part: part[1])[0] == viseme
 
 
-def test_what_is_not_there_is_said_with_what_there_is() -> None:
+def test_sound_of_an_unknown_name_lists_the_known_ones() -> None:
     with pytest.raises(KeyError, match="polly"):
         sound_of("azure", "1")
     with pytest.raises(KeyError, match="PP"):
