@@ -1,4 +1,4 @@
-"""The axis of what can be animated."""
+"""The columns of animation frames."""
 
 from __future__ import annotations
 

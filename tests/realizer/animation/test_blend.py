@@ -1,4 +1,4 @@
-"""Layers meet as `blend` says, whatever the order of the channels."""
+"""Blending of layers."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def test_blend_masks_idle_motion_but_not_other_motion() -> None:
 
 
 def lid_of(taking: Channel, draw: float, time: float) -> float:
-    """How far a lid is shut, where a blink with this draw would come from 1 to 1.3 s."""
+    """Return how far a lid is shut if a blink with this draw is due from 1 to 1.3 s."""
     still = Motion(
         (NOD.column,), ONE[None], np.zeros((1, 1)), np.zeros(1, int), ONE, np.ones(1), np.zeros((1, 1))
     )
@@ -147,7 +147,7 @@ def test_blend_finishes_a_blink_in_any_window() -> None:
         mask_channel("blinks"), np.array([1.05, 1.1]), np.array([0.0, 1.0]), layer=Layer.BASE, keeps_last=True
     )
     assert lid_of(soon, 0.0, 1.1) == 1
-    # What took it when it began has gone before this window, and counts.
+    # The mask at its onset counts, although it ends before this window.
     gone = BlinkReduction(
         mask_channel("blinks"), ONE, np.array([1.0]), layer=Layer.BASE, keeps_last=True
     ).faded(1.02, 1.1)
@@ -252,7 +252,7 @@ def test_blend_replaces_a_fap_while_it_is_set(face: list[Channel], one: Channel)
 @given(below, st.lists(set_faps(), min_size=1, max_size=4))
 def test_blend_fades_set_faps_without_jumps(face: list[Channel], some: list[Channel]) -> None:
     times = np.arange(0.0, 4.2, 0.001)
-    # Fastest is a whole change in the shortest rise, at 1.875 of its mean speed, both ways at once.
+    # The fastest change: all of it in the shortest rise, at 1.875 of the mean speed, in both directions.
     most = np.abs(corner([*face], times)).max() + sum(np.abs(one.values).max() for one in some)
     assert np.abs(np.diff(corner([*face, *some], times))).max() <= 4 * most * 1.875 * 0.001 / 0.1 + 1e-3
 

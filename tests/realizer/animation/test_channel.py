@@ -1,4 +1,4 @@
-"""A channel is what it was made of, and later it is the same, only later."""
+"""Channels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is left of action units that a face cannot show together."""
+"""Co-occurrence rules."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ INTENSITIES = arrays(
 
 
 def shown(**asked: float) -> dict[str, float]:
-    """ "AU12L" -> what is left of it, for the units that were asked for."""
+    """Return the intensities that the rules leave of requested action units, such as "12L"."""
     values = np.zeros((len(NAMES), 1), np.float32)
     for name, value in asked.items():
         values[NAMES.index(name[2:])] = value

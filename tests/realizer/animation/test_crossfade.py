@@ -1,4 +1,4 @@
-"""A behaviour that gets other times while it is shown goes on from where it is."""
+"""Crossfades to channels with other times."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Channels hit their keys, are 0 outside, and never jump."""
+"""Sampling of channels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Frames know which of their columns may move."""
+"""Frames and their moving columns."""
 
 from __future__ import annotations
 

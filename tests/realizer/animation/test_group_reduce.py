@@ -1,4 +1,4 @@
-"""Groups of rows are reduced as they would be one by one."""
+"""Reduction of rows by group."""
 
 from __future__ import annotations
 

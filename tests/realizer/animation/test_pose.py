@@ -1,4 +1,4 @@
-"""What a face is drawn by: FAPs alone, or the action units it takes and the FAPs of all others."""
+"""Parameters of faces with and without action units."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def test_poses_show_a_set_fap_on_both_kinds_of_faces(
     held[0, number - 1] = part
     clip = replace(frames({**face, FAPS[number - 1]: part * 50.0}), overridden=held)
     (units,) = poses(clip, (*FAPS, *sorted(taken)))
-    # What the units of such a face move it by, and what is asked of it beside them.
+    # The movement by the units of such a face, and by its other FAPs.
     all_, others = (
         to_fap(frames({name: value for name, value in face.items() if name not in without})).values[0]
         for without in (set(), taken)

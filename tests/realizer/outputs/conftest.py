@@ -73,7 +73,7 @@ def turn() -> str:
 
 @pytest.fixture(scope="session")
 def read_by() -> Callable[..., Any]:
-    """A function: what a program of others makes of a file, by a script in `readers/`; its JSON."""
+    """Return a function that reads a file by a foreign program in `readers/` and returns its JSON."""
     node = shutil.which("node")
 
     def read(script: str, *arguments: str | Path) -> Any:

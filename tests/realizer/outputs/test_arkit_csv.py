@@ -20,7 +20,7 @@ SPEECH = (
     '<bml id="a" xmlns="http://www.bml-initiative.org/bml/bml-1.0">'
     f'<speech id="s"><text>{SAYS}</text></speech></bml>'
 )
-# The header of the app's files, as it stands in recordings.
+# The header of the app's files.
 HEADER = (
     "Timecode,BlendShapeCount,EyeBlinkLeft,EyeLookDownLeft,EyeLookInLeft,EyeLookOutLeft,EyeLookUpLeft,"
     "EyeSquintLeft,EyeWideLeft,EyeBlinkRight,EyeLookDownRight,EyeLookInRight,EyeLookOutRight,EyeLookUpRight,"

@@ -1,4 +1,4 @@
-"""What is said, by the line."""
+"""Lines of subtitles."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from realizer.speech.utterance import Word
 
 
 def spoken(realization, *told, until=99.0, also=()):
-    """The realization, with these words said from 1 s on; `also` by somebody else."""
+    """Return the realization with these words spoken from 1 s on; `also` by another character."""
     (speaking,) = realization.speeches
 
     def says(words, character):

@@ -1,4 +1,4 @@
-"""Clips as FAP text, tables and JSON: each says what the others say."""
+"""Clips as FAP text, tables and JSON, with the same contents."""
 
 from __future__ import annotations
 

@@ -161,7 +161,7 @@ def subtitles(path):
                 continue
             text = "\n".join(rect.dialogue.decode() for rect in packet.decode())
             start, length = (float(t * packet.time_base) for t in (packet.pts, packet.duration))
-            # FFmpeg tells of line ends as ASS has them.
+            # FFmpeg reports line ends as in ASS.
             found.append((round(start, 3), round(start + length, 3), text.replace("\\N", "\n").strip()))
         return [line for line in found if line[2]]
 

@@ -24,7 +24,7 @@ LOSS = 4  # of 255, on average: what H.264 loses
 
 
 class Screening(Driver):
-    """A session whose voice and pictures are there the moment it asks for them."""
+    """A session whose voice and pictures are ready at once."""
 
     def __init__(self) -> None:
         self.studio = Engines()

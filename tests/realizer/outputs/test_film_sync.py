@@ -1,4 +1,4 @@
-"""In a film the mouth opens when it is heard to: decoded again, pictures and sound are those of one clock."""
+"""Films, decoded: the mouth opens when it is heard."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_film_mouth_opens_when_it_is_heard(tmp_path: Path, suffix: str) -> None:
     assert 0.5 <= asked < 0.7
     assert onset(line) == pytest.approx(asked, abs=0.02), "the encoder's delay is made up for"
 
-    # How far each picture is from the neutral face goes with how far the mouth is open, picture by picture.
+    # The difference of each picture from the neutral face grows with the opening of the mouth.
     opening = np.abs(played.faps.values[:, OPENING]).sum(1)
     changed = np.abs(pictures - pictures[0]).mean((1, 2))
     assert changed[: round(0.4 * FPS)].max() < 0.05 * changed.max(), "it does not move before"

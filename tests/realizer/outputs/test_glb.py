@@ -1,4 +1,4 @@
-"""The animated head: what others see in the file is the face that we draw."""
+"""The animated head, read by foreign programs."""
 
 from __future__ import annotations
 

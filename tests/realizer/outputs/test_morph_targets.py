@@ -1,4 +1,4 @@
-"""Morph targets: with their weights they are the face that is drawn."""
+"""Morph targets, compared with the drawn face."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def played(request, turn):
 
 
 def still(face, poses):
-    """What they are when neither the head nor the eyes turn."""
+    """Return the vertices with neither head nor eyes turned."""
     rows = poses.copy()
     for number in (23, 24, 25, 26, 48, 49, 50):
         rows[:, face.inputs.index(fap(number).name)] = 0

@@ -15,7 +15,7 @@ from realizer.speech.utterance import Phoneme
 
 SMALL = RenderSettings(size=(32, 32))
 HERE = Path(__file__).parent
-# Those that draw take 10 s each to start.
+# Outputs with pictures take 10 s each to start.
 EACH = [pytest.param(suffix, marks=[pytest.mark.gl, pytest.mark.slow] if output.picture_size else [])
         for suffix, output in OUTPUTS.items()]  # fmt: skip
 

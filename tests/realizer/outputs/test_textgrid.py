@@ -1,4 +1,4 @@
-"""TextGrids, as a reader of others takes them."""
+"""TextGrids, read by a foreign reader."""
 
 from __future__ import annotations
 

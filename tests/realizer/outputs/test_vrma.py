@@ -28,7 +28,7 @@ def played(turn):
 
 
 def one(realization, **shown: float):
-    """The realization, whose only frame shows these action units."""
+    """Return the realization with a single frame of these action units."""
     values = np.zeros((1, len(axis())), np.float32)
     for name, value in shown.items():
         values[0, axis()[name.removeprefix("AU")].column] = value

@@ -1,4 +1,4 @@
-"""WebVTT, as a reader of others takes it."""
+"""WebVTT, read by a foreign reader."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One engine of each kind for all tests; those that need one are skipped where it is absent, with the fix."""
+"""One engine of each kind for all tests, which are skipped with a hint if their engine is not installed."""
 
 from __future__ import annotations
 

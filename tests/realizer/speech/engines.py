@@ -1,4 +1,4 @@
-"""A worker without speech, for the tests of processes: what it does is in its requests."""
+"""A worker without speech, for the tests of processes; its requests say what it does."""
 
 from __future__ import annotations
 

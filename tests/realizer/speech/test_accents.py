@@ -1,4 +1,4 @@
-"""Phrases and accents of what a voice says."""
+"""Phrases and accents of speech."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bad texts and dead engines, from a document's end: one clear warning, and everything else plays."""
+"""Bad texts and dead engines in documents: one clear warning, and everything else plays."""
 
 from __future__ import annotations
 

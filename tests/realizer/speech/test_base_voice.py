@@ -1,4 +1,4 @@
-"""What a voice has without a line of its own."""
+"""The base class of voices."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Speech that has to last so long is spoken faster or slower."""
+"""Speech of a given length."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_speak_to_length_tries_rates_until_little_is_left(seconds: float) -> Non
     from realizer.speech.registry import find_voice
 
     class Heard:
-        """A voice that remembers how long what it said was."""
+        """A voice that records the durations of its utterances."""
 
         name = "heard"
 

@@ -1,4 +1,4 @@
-"""What all voices with an engine do before the engine is asked."""
+"""Voices with an engine: what happens before the engine is used."""
 
 from __future__ import annotations
 

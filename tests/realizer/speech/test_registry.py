@@ -1,4 +1,4 @@
-"""The list of voices, with and without what they need."""
+"""The registry of voices, with and without their engines."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scripts: what is kept of SSML, and that nothing breaks the reader."""
+"""The parser of SSML."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""SSML's ways to say how something is spoken."""
+"""Attributes of SSML's <prosody>."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Loudness: what <prosody volume> asks for reaches the phonemes of its words, and the mouth."""
+"""Volumes of <prosody>, in phonemes and in the mouth."""
 
 from __future__ import annotations
 

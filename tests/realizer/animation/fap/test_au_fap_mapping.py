@@ -1,4 +1,4 @@
-"""A mapping is the table, and what goes before it goes by action unit and side."""
+"""Mappings of AUs to FAPs: the built-in table, and replaced units."""
 
 from __future__ import annotations
 

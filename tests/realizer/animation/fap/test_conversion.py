@@ -1,4 +1,4 @@
-"""AUs become FAPs as the table says; speech keeps the lips, lids meet."""
+"""The conversion of AUs to FAPs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files of FAPs as others write them."""
+"""The reader of FAP files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Polylines become hinges and stay what they were."""
+"""Piecewise linear functions from AUs to FAPs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ AT = (0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 1.0)
 
 
 def asked(rows: tuple[AuToFap, ...], fap: int) -> Float32:
-    """What the rows ask of a FAP as AU26 rises."""
+    """Return the values of a FAP as AU26 rises."""
     aus = np.zeros((len(AU_NAMES()), len(AT)), np.float32)
     aus[au(26)[0].column] = AT
     live = tuple(range(len(aus)))

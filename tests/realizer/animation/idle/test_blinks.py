@@ -1,4 +1,4 @@
-"""Blinks are a function of seed, time and what is said."""
+"""Blinks as a function of seed, time and speech."""
 
 from __future__ import annotations
 

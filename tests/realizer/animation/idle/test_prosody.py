@@ -1,4 +1,4 @@
-"""What a face does by itself while it speaks: small, smooth, seeded, and never in the way of a document."""
+"""Motion that accompanies speech: small, smooth, seeded, and never in conflict with a document."""
 
 from __future__ import annotations
 

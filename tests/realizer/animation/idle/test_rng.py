@@ -1,4 +1,4 @@
-"""What chance says is fixed."""
+"""Random numbers by seed, kind and index."""
 
 from __future__ import annotations
 

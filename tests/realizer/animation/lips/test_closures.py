@@ -1,4 +1,4 @@
-"""Closures: how long sounds hold the lips, whatever stands beside them, and when speech has them at all."""
+"""Lip closures: their durations, and when speech masks the lips."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def taken(*said: tuple[str, float]) -> tuple[Float64, Float64]:
 
 
 def longest(times: Float64, mine: Bool) -> float:
-    """Seconds from the first to the last key that is held."""
+    """Return the seconds from the first to the last key of a closure."""
     return float(np.ptp(times[mine])) if mine.any() else 0.0
 
 
@@ -70,7 +70,7 @@ def test_closure_mask_of_vowels_is_empty() -> None:
 @pytest.mark.parametrize("pair", [("m", "f"), ("f", "p"), ("v", "m")])
 @given(st.floats(0.02, 0.1), st.floats(0.02, 0.1))
 def test_closure_mask_separates_closures_from_bites(pair: tuple[str, str], one: float, other: float) -> None:
-    """Whatever their lengths, each is there, in its order, and no key is both but where they meet."""
+    """All closures are shown in order, whatever their lengths, and overlap in one key at most."""
     times, closed, bitten = holds(PAUSE, ("a", 0.1), (pair[0], one), (pair[1], other), ("a", 0.1), PAUSE)
     assert closed.any()
     assert bitten.any()

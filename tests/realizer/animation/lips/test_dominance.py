@@ -1,4 +1,4 @@
-"""Dominance: each sound has most to say in its middle, and all of them together not more than everything."""
+"""Dominance functions: greatest in the middle of a sound, and never more than 1 in all."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_track_absorbs_short_pauses_between_sounds() -> None:
     short = coarticulation()["pauses"]["absorbed"] - 0.01
     assert not track(("a", 0.1), ("", short), ("a", 0.1)).rest.any()
     assert track(("a", 0.1), ("", short + 0.02), ("a", 0.1)).rest.tolist() == [False, True, False]
-    # What was absorbed is shared by the sounds on either side.
+    # An absorbed pause is divided between the sounds on either side.
     assert track(("a", 0.1), ("", 0.2), ("a", 0.1)).end[0] == pytest.approx(0.2)
 
 

@@ -1,4 +1,4 @@
-"""Lips: what phonemes must look like, and laws for any sequence of them."""
+"""Lips: known phonemes, and laws for any sequence of them."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def values(channels: tuple[Channel, ...], fap: int) -> np.ndarray:
 
 
 def gap(channels: tuple[Channel, ...]) -> np.ndarray:
-    """How far the inner lips are apart, MNS units; FAP 4 counts down, FAP 5 up."""
+    """Return the gap between the inner lips in MNS units; FAP 4 counts down, FAP 5 up."""
     return -values(channels, 4) - values(channels, 5)
 
 
@@ -139,7 +139,7 @@ def test_lip_channels_open_further_for_stressed_vowels() -> None:
 
 @pytest.mark.parametrize("vowel", ["ɑ", "ɛ", "i", "u"])
 def test_lip_channels_undershoot_short_vowels(vowel: str) -> None:
-    """Undershoot: what is missing grows as vowels get shorter, and faster the shorter they are."""
+    """Undershoot grows as vowels get shorter, and faster the shorter they are."""
     lengths = (0.03, 0.05, 0.08, 0.12, 0.18, 0.27)
     opened, jaw, width = np.array(
         [
@@ -169,7 +169,7 @@ def test_lip_channels_open_further_for_loud_vowels() -> None:
         assert reached == sorted(reached)
         assert reached[1] < 0.9 * reached[2]
         assert reached[4] > 1.15 * reached[2]
-    assert gap(said[0]).max() > 0.5 * gap(said[2]).max()  # a whisper is still seen
+    assert gap(said[0]).max() > 0.5 * gap(said[2]).max()  # a whisper is still visible
     assert gap(said[-1]).max() < 20 * 46
 
 
@@ -262,6 +262,6 @@ def test_lip_channels_prepare_a_first_closure_if_there_is_room(room: float) -> N
     assert lips.values[0] == 0
     begins = lips.times < 3.05
     steepest = np.diff(lips.values[begins]) / np.diff(lips.times[begins])
-    # Taken over as long as there is room, they go slower.
+    # With more room they move more slowly.
     assert steepest.max() < 1.6 / max(early, coarticulation()["pauses"]["least"])
     assert lips.values[(lips.times > 3.025) & (lips.times < 3.2)].min() == pytest.approx(1, abs=1e-6)

@@ -1,4 +1,4 @@
-"""Viseme weights: what is said is the viseme that shows most, closures alone, and all of it adds to 1."""
+"""Weights of visemes: the spoken one is the greatest, closures are alone, and they add up to 1."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""IPA to visemes: every sound of the tables has a mouth, and any text is taken."""
+"""Conversion of IPA to visemes."""
 
 from __future__ import annotations
 

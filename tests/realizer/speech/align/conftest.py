@@ -1,4 +1,4 @@
-"""A sentence said by a voice that no aligner speaks with, with its true times."""
+"""A sentence with known times, by a voice that no aligner uses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A recording and its text: where the words are, and how sure that is."""
+"""Alignment of recordings with their texts."""
 
 from __future__ import annotations
 

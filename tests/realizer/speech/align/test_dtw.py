@@ -1,4 +1,4 @@
-"""The cheapest way through states with pauses between."""
+"""The cheapest path through states with pauses between words."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ LETTERS = np.eye(5) * 2
 
 
 def states(word: str) -> States:
-    """One state a letter, "_" where a pause may be."""
+    """Return a state for each letter; "_" is an optional pause."""
     pause = np.array([letter == "_" for letter in word])
     rows = np.array([LETTERS[0] if letter == "_" else LETTERS["abcde".index(letter)] for letter in word])
     return States(rows, pause, np.arange(len(word), dtype=float))
 
 
 def heard(word: str) -> Observed:
-    """One frame a letter, "_" where it is silent."""
+    """Return a frame for each letter; "_" is silent."""
     rows = np.array([np.zeros(5) if letter == "_" else LETTERS["abcde".index(letter)] for letter in word])
     loud = np.array([0.0 if letter == "_" else 1.0 for letter in word])
     return Observed(rows, quiet(loud, 0.1), 1.0)

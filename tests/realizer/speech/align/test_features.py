@@ -1,4 +1,4 @@
-"""Cepstra, loudness, and where somebody speaks."""
+"""Cepstra, loudness and voice activity."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What espeak-ng is given: SSML of its kind, and where our words stand in it."""
+"""The SSML for espeak-ng, and the places of words in it."""
 
 from __future__ import annotations
 

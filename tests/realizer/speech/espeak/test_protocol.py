@@ -1,4 +1,4 @@
-"""What espeak-ng's process answers: events as they lie in its memory, and samples behind them."""
+"""Answers of espeak-ng's process: events as structs, followed by samples."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""espeak-ng: every known trap of the engine is a test here."""
+"""espeak-ng, with a test for each of its known traps."""
 
 from __future__ import annotations
 

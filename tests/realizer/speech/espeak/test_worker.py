@@ -51,7 +51,7 @@ def test_worker_ends_with_its_parent() -> None:
     assert worker.stdin is not None
     assert worker.stdout is not None
     assert worker.stdout.readline().startswith(b'{"rate"')
-    worker.stdin.close()  # what the system does for a parent that dies
+    worker.stdin.close()  # as the system does when the parent dies
     assert worker.wait(10) == 0
     worker.stdout.close()
 

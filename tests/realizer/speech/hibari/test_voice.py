@@ -1,4 +1,4 @@
-"""The neural voice: its times against its sound, and that nothing that is written breaks it."""
+"""The neural voice: times compared with the sound, and odd texts."""
 
 from __future__ import annotations
 
@@ -227,7 +227,7 @@ def test_hibari_estimates_times_without_durations(neural: HibariVoice) -> None:
     assert [w for w in said.warnings if "does not report the durations of its phonemes" in w]
     assert tiles(said)
     assert [w.text for w in said.words] == [w.text for w in exact.words]
-    # Both cut the silence before the sound; what is left differs by how well rules know the durations.
+    # Both cut the silence before the sound; the rest is the error of estimated durations.
     late = [a.start - b.start for a, b in zip(said.words, exact.words, strict=True)]
     assert max(map(abs, late)) < 0.3
     assert said.marks == {"s1": starts(said)["very"], "s2": starts(said)["meet"]}

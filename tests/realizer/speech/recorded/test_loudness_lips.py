@@ -1,4 +1,4 @@
-"""A mouth that goes by loudness: open where it is loud, closed in pauses, still in silence."""
+"""Phonemes from loudness."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A recording with its times: they are taken as they are, words become phonemes, marks find their word."""
+"""Recordings with known times as utterances."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Visemes of others' sets: each has a sound whose mouth it is."""
+"""Viseme names of other systems."""
 
 from __future__ import annotations
 
