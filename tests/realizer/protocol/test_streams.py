@@ -1,4 +1,4 @@
-"""The table of streams, and what is made from it."""
+"""The table of streams, and what is derived from it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_kinds_are_the_streams_that_have_one_in_order() -> None:
     assert {row.name for row in KINDS.values()} == {n for n, row in STREAMS.items() if row.kind is not None}
 
 
-def test_literals_of_messages_are_those_of_the_table() -> None:
+def test_streams_are_the_literals_of_messages() -> None:
     assert get_args(StreamName) == tuple(STREAMS)
     assert get_args(NumericStream) == tuple(SOURCES)
     assert set(get_args(Encoding)) == {name for row in STREAMS.values() for name in row.encodings}

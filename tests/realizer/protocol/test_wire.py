@@ -1,4 +1,4 @@
-"""Binary frames: what is packed is what is unpacked, and the header is where clients look for it."""
+"""Binary frames: round trips, and the bytes of the header."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from realizer.protocol.wire import (
     character=st.integers(0, 255),
     forget=st.booleans(),
 )
-def test_a_frame_comes_back_as_it_was(stream, frame, time, payload, character, forget) -> None:
+def test_unpack_returns_what_was_packed(stream, frame, time, payload, character, forget) -> None:
     got = unpack(pack(stream, frame, time, payload, character=character, flush=forget))
     assert (got.stream, got.frame, got.time, got.payload) == (stream, frame, time, payload)
     assert (got.character, got.flush) == (character, forget)
@@ -45,7 +45,7 @@ def test_a_frame_comes_back_as_it_was(stream, frame, time, payload, character, f
     width=st.integers(1, 70),
     character=st.integers(0, 255),
 )
-def test_frames_packed_together_are_those_packed_alone(stream, first, count, width, character) -> None:
+def test_pack_frames_equals_pack_of_each_frame(stream, first, count, width, character) -> None:
     dtype = STREAMS[stream].dtype
     rows = np.arange(count * width).reshape(count, width).astype(dtype)
     times = (first + np.arange(count)) / 25
@@ -57,7 +57,7 @@ def test_frames_packed_together_are_those_packed_alone(stream, first, count, wid
     assert len(whole) == count * size
 
 
-def test_the_header_is_sixteen_bytes_little_endian() -> None:
+def test_pack_has_a_little_endian_header_of_16_bytes() -> None:
     message = pack("audio", 7, 0.14, b"xy", character=3, flush=True)
     assert struct.unpack("<BBHId", message[:16]) == (4, 1, 0x103, 7, 0.14)
     assert message[16:] == b"xy"
@@ -72,13 +72,13 @@ def test_the_header_is_sixteen_bytes_little_endian() -> None:
         ("mesh", np.arange(12, dtype="<i2").reshape(4, 3)),
     ],
 )
-def test_values_are_numbers_of_their_kind(stream, values) -> None:
+def test_values_have_the_type_of_their_kind(stream, values) -> None:
     got = unpack(pack(stream, 0, 0.0, values.tobytes())).values
     assert got.dtype == values.dtype
     assert np.array_equal(got, values)
 
 
-def test_a_picture_has_no_values() -> None:
+def test_values_refuse_a_picture() -> None:
     with pytest.raises(WireError, match="picture has no values"):
         _ = unpack(pack("video", 0, 0.0, b"jpeg")).values
 
@@ -91,12 +91,12 @@ def test_a_picture_has_no_values() -> None:
         (struct.pack("<BBHId", 77, 1, 0, 0, 0.0), "got 77"),
     ],
 )
-def test_what_is_no_frame_is_told(message, says) -> None:
+def test_unpack_refuses_invalid_messages(message, says) -> None:
     with pytest.raises(WireError, match=says):
         unpack(message)
 
 
-def test_a_json_frame_says_its_stream_number_and_time() -> None:
+def test_json_frame_has_stream_number_and_time() -> None:
     assert json.loads(json_frame("fap", 3, 0.12, [1, 2])) == {
         "type": "fap",
         "frame": 3,
@@ -106,7 +106,7 @@ def test_a_json_frame_says_its_stream_number_and_time() -> None:
     assert json.loads(json_frame("au", 0, 0.0, [], "Ada"))["character"] == "Ada"
 
 
-def test_a_piece_of_a_clip_comes_back_as_it_was() -> None:
+def test_unpack_clip_returns_what_was_packed() -> None:
     piece = ClipPiece("müsli", 7, 22050, b"\x01\x02\x03", final=False)
     message = pack_clip(piece)
     assert message[:8] == bytes([4, 1, 0, 0, 7, 0, 0, 0])
@@ -125,6 +125,6 @@ def test_a_piece_of_a_clip_comes_back_as_it_was() -> None:
         (pack("audio", 0, 0.0, b"\x00\x00\x00\x00\x02\xff\xfe"), "UTF-8"),
     ],
 )
-def test_what_is_no_clip_says_why(message, says) -> None:
+def test_unpack_clip_refuses_invalid_messages(message, says) -> None:
     with pytest.raises(WireError, match=says):
         unpack_clip(message)

@@ -1,4 +1,4 @@
-"""Messages out: what is not said is left out, and what goes over the wire is as it is described."""
+"""Replies leave out empty fields, and their models describe what is sent."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from realizer.protocol.streams import STREAMS
 NOD = '<bml id="b"><head id="n" lexeme="NOD"/></bml>'
 
 
-def test_replies_leave_out_what_they_do_not_say() -> None:
+def test_reply_leaves_out_empty_fields() -> None:
     text = ErrorMessage(code="invalid", message="y").text()
     assert text == '{"type":"error","code":"invalid","message":"y"}'
 
 
-def test_welcome_names_version_capabilities_and_limits(driver) -> None:
+def test_welcome_has_version_capabilities_and_limits(driver) -> None:
     (told,) = driver.send({"type": "hello"}).of("welcome")
     welcome = Welcome.model_validate(told, extra="forbid")
     assert welcome.version == 1
@@ -36,7 +36,7 @@ def test_welcome_names_version_capabilities_and_limits(driver) -> None:
 
 
 @pytest.mark.parametrize("stream", ["fap", "au", "arkit"])
-def test_json_frames_are_as_described(driver, stream) -> None:
+def test_frame_message_describes_json_frames(driver, stream) -> None:
     driver.send({"type": "subscribe", "stream": stream, "encoding": "json"})
     client = driver.run(0.5)
     assert len(client.of(stream)) == 13
@@ -45,7 +45,7 @@ def test_json_frames_are_as_described(driver, stream) -> None:
         assert len(frame["values"]) == len(client.of("subscribed")[0]["names"])
 
 
-def test_schedules_and_states_are_as_described(driver) -> None:
+def test_schedule_message_and_state_message_describe_the_wire(driver) -> None:
     driver.send({"type": "subscribe", "stream": "schedule"})
     driver.send(NOD)
     driver.run(0.2)

@@ -1,4 +1,4 @@
-"""Names of control messages are found, and what is none of them is said."""
+"""Lookup of the names in control messages."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def asked(**fields: object) -> SetMessage:
         (asked(), {}),
     ],
 )
-def test_names_are_those_of_sides_and_of_faps(message: SetMessage, values: dict[str, float | None]) -> None:
+def test_direct_values_resolves_names(message: SetMessage, values: dict[str, float | None]) -> None:
     assert direct_values(message, ["12L", "open_jaw"]) == values
 
 
@@ -39,14 +39,14 @@ def test_names_are_those_of_sides_and_of_faps(message: SetMessage, values: dict[
         (asked(faps={"\u00b3": 1}), "faps", "a FAP"),
     ],
 )
-def test_what_is_no_name_is_said_with_its_field(message: SetMessage, where: str, says: str) -> None:
+def test_direct_values_names_the_field_of_an_unknown_name(message: SetMessage, where: str, says: str) -> None:
     with pytest.raises(FieldError) as wrong:
         direct_values(message, [])
     assert wrong.value.where == where
     assert says in str(wrong.value)
 
 
-def test_a_feeling_is_what_it_moves() -> None:
+def test_emotion_values_are_the_aus_of_an_emotion() -> None:
     assert emotion_values(None) == {}
     assert emotion_values(EmotionFields(name="joy"))["12L"] > 0
     with pytest.raises(FieldError) as wrong:
@@ -54,7 +54,7 @@ def test_a_feeling_is_what_it_moves() -> None:
     assert wrong.value.where == "emotion.name"
 
 
-def test_a_character_that_is_new_has_a_place_while_there_is_room(drive) -> None:
+def test_character_index_adds_characters_up_to_the_limit(drive) -> None:
     session = drive().session
     assert [character_index(session.player, name) for name in (None, "Ada", "Ben", "Ada")] == [0, 0, 1, 0]
     for number in range(2, MAX_CHARACTERS):

@@ -1,4 +1,4 @@
-"""Mixing controls: an emotion below, action units refining it, FAPs on top, in whatever order they come."""
+"""Control messages: emotions, AUs and FAPs set in any order, stops, scenes, voices."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from itertools import permutations
 import numpy as np
 import pytest
 
+from bml_schema.feedback import WarningFeedback
 from realizer.animation.axis import axis
 from realizer.tables.emotions import emotion_faces
+from tests.realizer.server.conftest import Driver, spoken
 
 NOD = '<bml id="{}"><head id="n" lexeme="NOD"/></bml>'
 TALK = '<bml id="{}"><speech id="s"><text>Hello there</text></speech></bml>'
@@ -26,7 +28,7 @@ BLOCKS = (
 
 
 class Face:
-    """A session whose AUs are watched."""
+    """A session with a subscription to AUs."""
 
     def __init__(self, drive) -> None:
         self.driver = drive(idle=False)
@@ -34,7 +36,7 @@ class Face:
         self.names = told.of("subscribed")[0]["names"]
 
     def set(self, seconds: float = 0.5, **asked) -> dict[str, float]:
-        """What shows that long after something was set."""
+        """Set something and return the AUs so many seconds later."""
         self.driver.send({"type": "set", **asked})
         return self.after(seconds)
 
@@ -54,7 +56,7 @@ def face(drive) -> Face:
 
 
 @pytest.mark.parametrize("pause", [0, 1])
-def test_the_order_of_what_is_set_does_not_matter(drive, pause: float) -> None:
+def test_set_gives_the_same_face_in_any_order(drive, pause: float) -> None:
     found = []
     for messages in permutations(SETS):
         face = Face(drive)
@@ -70,7 +72,7 @@ def test_the_order_of_what_is_set_does_not_matter(drive, pause: float) -> None:
         assert other == pytest.approx(found[0], abs=1e-5)
 
 
-def test_the_order_of_what_is_set_and_of_documents_does_not_matter(drive) -> None:
+def test_set_gives_the_same_face_before_and_after_documents(drive) -> None:
     found = []
     for chosen in permutations((*BLOCKS, SETS[0], SETS[1])):
         face = Face(drive)
@@ -85,7 +87,7 @@ def test_the_order_of_what_is_set_and_of_documents_does_not_matter(drive) -> Non
         assert other == pytest.approx(found[0], abs=1e-5)
 
 
-def test_an_action_unit_refines_the_emotion_and_lets_it_show_again(face) -> None:
+def test_set_replaces_aus_of_an_emotion_until_they_are_released(face) -> None:
     joy = face.set(emotion={"name": "happiness"})
     wanted = emotion_faces()["joy"].aus
     assert joy["12L"] == pytest.approx(wanted[12, "BOTH"], abs=0.02)
@@ -96,7 +98,7 @@ def test_an_action_unit_refines_the_emotion_and_lets_it_show_again(face) -> None
     assert again["12R"] == pytest.approx(joy["12R"], abs=0.01)
 
 
-def test_another_emotion_takes_its_place_without_a_jump_and_null_lets_go(face) -> None:
+def test_set_changes_and_releases_an_emotion_smoothly(face) -> None:
     face.set(emotion={"name": "happiness"})
     count = len(face.driver.clients[1].frames)
     fear = face.set(emotion={"name": "fear"})
@@ -108,7 +110,7 @@ def test_another_emotion_takes_its_place_without_a_jump_and_null_lets_go(face) -
     assert max(rest.values()) < 0.01
 
 
-def test_null_lets_go_of_all_action_units_or_of_all_faps_and_of_nothing_else(face) -> None:
+def test_set_releases_all_aus_or_all_faps_by_null(face) -> None:
     names = list(axis())
     face.set(aus={"12": 0.5, "4": 0.5}, faps={"open_jaw": 200})
     jaw, smile = names.index("open_jaw"), names.index("12L")
@@ -120,14 +122,14 @@ def test_null_lets_go_of_all_action_units_or_of_all_faps_and_of_nothing_else(fac
     assert face.whole[smile] == 0.5
 
 
-def test_what_is_said_of_other_things_leaves_the_emotion(face) -> None:
+def test_set_without_an_emotion_leaves_it(face) -> None:
     before = face.set(emotion={"name": "anger", "intensity": 0.5})
     after = face.set(faps={"open_jaw": 50})
     assert after["4L"] == pytest.approx(before["4L"], abs=1e-3)
     assert before["4L"] == pytest.approx(0.5 * emotion_faces()["anger"].aus[4, "BOTH"], abs=0.02)
 
 
-def test_an_emotion_may_be_a_place_of_valence_and_arousal(face) -> None:
+def test_set_accepts_valence_and_arousal(face) -> None:
     good = face.set(emotion={"valence": 0.9, "arousal": 0.3})
     assert good["12L"] > 0.4
     assert good["15L"] == pytest.approx(0, abs=0.01)
@@ -135,7 +137,7 @@ def test_an_emotion_may_be_a_place_of_valence_and_arousal(face) -> None:
     assert max(rest.values()) < 0.01
 
 
-def test_expressions_play_over_what_is_set(face) -> None:
+def test_set_lies_below_expressions(face) -> None:
     face.set(emotion={"name": "sadness", "intensity": 0.3})
     face.driver.send(BLOCKS[1])
     shown = face.after(2)
@@ -143,7 +145,7 @@ def test_expressions_play_over_what_is_set(face) -> None:
     assert shown["15L"] > 0.1
 
 
-def test_turns_of_the_wheel_do_not_count(face) -> None:
+def test_set_ignores_whole_turns_of_the_wheel(face) -> None:
     near = face.set(emotion={"angle": 20})
     assert max(near.values()) > 0.1
     assert face.set(emotion={"angle": -700}) == pytest.approx(near, abs=1e-3)
@@ -161,22 +163,14 @@ def test_turns_of_the_wheel_do_not_count(face) -> None:
         ({"angle": 7, "activation": 40}, "set.emotion.activation"),
     ],
 )
-def test_an_emotion_that_is_none_is_refused_and_nothing_is_set(face, asked, where: str) -> None:
+def test_set_refuses_an_invalid_emotion_as_a_whole(face, asked, where: str) -> None:
     face.driver.send({"type": "set", "emotion": asked, "aus": {"12": 1}})
     (error,) = face.driver.clients[1].of("error")
     assert error["where"] == where
     assert max(face.after(1).values()) == 0
 
 
-@pytest.mark.parametrize("name", ["nobody", "../ada", "", "/etc"])
-def test_an_unknown_face_is_told_by_the_known_ones_and_no_folders(face, name: str) -> None:
-    face.driver.send({"type": "character", "face": name})
-    (error,) = face.driver.clients[1].of("error")
-    assert (error["code"], error["where"]) == ("face", "character.face")
-    assert error["message"] == f"wanted one of ada, ben, ida, got {name!r}"
-
-
-def test_blocks_to_stop_that_nobody_knows_are_named_and_the_others_end(drive) -> None:
+def test_stop_names_unknown_blocks_and_ends_the_others(drive) -> None:
     driver = drive()
     driver.send(NOD.format("a"))
     client = driver.send({"type": "stop", "blocks": ["x", "a", "y"]})
@@ -188,7 +182,7 @@ def test_blocks_to_stop_that_nobody_knows_are_named_and_the_others_end(drive) ->
 
 
 @pytest.mark.parametrize("blocks", [["b", "s"], None])
-def test_what_was_sent_and_is_not_read_does_not_play_once_it_is_stopped(drive, blocks) -> None:
+def test_stop_cancels_unread_documents(drive, blocks) -> None:
     driver = drive()
     for message in (
         NOD.format("a") + NOD.format("b") + NOD.format("c"),
@@ -207,7 +201,7 @@ def test_what_was_sent_and_is_not_read_does_not_play_once_it_is_stopped(drive, b
         assert (f"{name}:start" in ends) == (name not in stopped)
 
 
-def test_a_block_that_waits_for_its_voice_is_known_and_so_is_one_that_has_just_ended(drive) -> None:
+def test_stop_accepts_waiting_and_ended_blocks(drive) -> None:
     driver = drive(mute=True)
     driver.send(TALK.format("talk"))
     driver.send(NOD.format("nod"))
@@ -219,21 +213,95 @@ def test_a_block_that_waits_for_its_voice_is_known_and_so_is_one_that_has_just_e
     assert "talk:end" in client.ids
 
 
-def test_a_speech_that_is_open_is_known_from_its_first_message_on(drive) -> None:
+def test_stop_accepts_an_open_speech(drive) -> None:
     driver = drive()
     driver.send({"type": "speech", "id": "turn", "append": "Hello. "})
     client = driver.send({"type": "stop", "blocks": ["turn"]})
     assert not client.of("error")
 
 
-def test_times_are_told_to_the_microsecond(drive) -> None:
-    driver = drive()
-    driver.run(1 / 3)
-    driver.send('<bml id="b"><wait id="w" duration="0.12345678"/></bml>')
-    client = driver.send({"type": "ping", "id": 1})
-    driver.send({"type": "state"})
-    driver.send({"type": "hello"})
-    (pong,), (state,), (welcome,) = (client.of(kind) for kind in ("pong", "state", "welcome"))
-    assert pong["time"] == state["time"] == welcome["time"] == 0.333333
-    (block,) = state["blocks"]
-    assert (block["start"], block["end"]) == (0.333333, 0.45679)
+def test_stop_ends_playing_and_waiting_blocks() -> None:
+    driver = Driver(mute=True)
+    driver.send(NOD.format("nod"))
+    driver.send(TALK.format("talk"))
+    driver.run(0.1)
+    client = driver.send({"type": "stop"})
+    assert {"nod:end", "talk:end"} <= set(client.ids)
+    driver.say(driver.spoken[0].id, spoken())
+    assert client.ids == driver.run(10).ids
+
+
+def test_stop_by_id_leaves_other_blocks() -> None:
+    driver = Driver()
+    driver.send(NOD.format("a"))
+    driver.send(NOD.format("b"))
+    client = driver.send({"type": "stop", "blocks": ["a"]})
+    assert "a:end" in client.ids
+    assert "b:end" not in client.ids
+
+
+def test_character_message_sets_the_voice() -> None:
+    driver = Driver(mute=True)
+    driver.send({"type": "character", "id": "Ada", "voice": "silent"})
+    driver.send(TALK.format("b").replace("<bml", '<bml characterId="Ada"'))
+    assert driver.spoken[0].request.voice == "silent"
+
+
+def test_scene_message_makes_unknown_targets_a_warning(driver) -> None:
+    gaze = '<bml id="{}"><gaze id="g" target="{}" start="0" end="0.5"/></bml>'
+    driver.send(gaze.format("a", "cup"))
+    driver.run(1)
+    driver.send({"type": "scene", "objects": {"cup": {"x": 0.3, "y": 0, "z": 1}}})
+    driver.send(gaze.format("b", "cup"))
+    driver.run(2)
+    driver.send(gaze.format("c", "moon"))
+    found = [f for f in driver.run(5).feedback if isinstance(f, WarningFeedback)]
+    assert [(w.id, w.type) for w in found] == [("c:g", "NO_SUCH_TARGET")]
+    assert "c:end" in driver.clients[1].ids
+
+
+def test_set_holds_an_au_until_it_is_released(driver) -> None:
+    names = driver.send({"type": "subscribe", "stream": "au", "fps": 25}).of("subscribed")[0]["names"]
+    driver.send({"type": "set", "aus": {"12L": 0.8}})
+    client = driver.run(1)
+    left, right = names.index("12L"), names.index("12R")
+    assert client.frames[-1].values[left] == pytest.approx(0.8, abs=0.05)
+    assert client.frames[-1].values[right] < 0.1
+    driver.send({"type": "set", "aus": {"12L": None}})
+    assert driver.run(2).frames[-1].values[left] < 0.1
+
+
+@pytest.mark.parametrize(
+    ("message", "where"),
+    [
+        ({"type": "set", "aus": {"99": 0.5}}, "set.aus"),
+        ({"type": "set", "faps": {"nose_hair": 5}}, "set.faps"),
+        ({"type": "set", "faps": {"1": 5}}, "set.faps"),
+        ({"type": "subscribe", "stream": "mesh", "encoding": "json"}, "subscribe.encoding"),
+        ({"type": "character", "id": "Ada", "face": "nobody"}, "character.face"),
+    ],
+)
+def test_handle_answers_an_invalid_field_with_its_path(driver, message, where) -> None:
+    (error,) = driver.send(message).of("error")
+    assert error["where"] == where
+
+
+def test_anticipate_moves_behaviours_that_refer_to_the_point(driver) -> None:
+    driver.send({"type": "anticipate", "id": "clock", "syncs": {"beat": 3.0}})
+    driver.send('<bml id="b"><head id="n" lexeme="NOD" stroke="anticipators:clock:beat"/></bml>')
+    driver.run(1)
+    driver.send({"type": "anticipate", "id": "clock", "syncs": {"beat": 2.0}})
+    driver.run(9)
+    strokes = [f for f in driver.clients[1].feedback if getattr(f, "id", "") == "b:n:stroke"]
+    assert [f.global_time for f in strokes] == [pytest.approx(2.0)]
+    predicted = [
+        b.syncs["stroke"].offset for f in driver.clients[1].feedback for b in getattr(f, "behaviours", ())
+    ]
+    assert predicted == [pytest.approx(3.0), pytest.approx(2.0)]
+
+
+def test_character_message_refuses_an_unknown_voice(driver) -> None:
+    told = driver.send({"type": "character", "id": "Z", "voice": "nope"})
+    (error,) = told.of("error")
+    assert (error["code"], error["where"]) == ("voice", "character.voice")
+    assert "nope" in error["message"]

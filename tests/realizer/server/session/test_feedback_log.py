@@ -1,4 +1,4 @@
-"""The feedback a session keeps: numbered from 1, the oldest forgotten first."""
+"""The feedback log: numbered from 1, bounded, resumable."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ def numbers(log: FeedbackLog, seq: int) -> list[int | None]:
     return [parse_feedback(text).seq for text in log.since(seq)]
 
 
-def test_messages_are_numbered_from_1() -> None:
+def test_add_numbers_messages_from_1() -> None:
     log = filled(3)
     assert numbers(log, 1) == [1, 2, 3]
     assert (log.first, log.newest) == (1, 3)
 
 
-def test_since_gives_what_follows() -> None:
+def test_since_returns_later_messages() -> None:
     log = filled(5)
     assert numbers(log, 4) == [4, 5]
     assert log.since(6) == []
 
 
-def test_what_was_told_in_the_last_minute_is_kept_and_of_what_is_older_only_so_much() -> None:
+def test_add_keeps_the_last_minute_and_a_bounded_size() -> None:
     log = filled(6000, step=0.05)
     texts = log.since(1)
     assert len(texts) == log.newest - log.first + 1
@@ -43,21 +43,21 @@ def test_what_was_told_in_the_last_minute_is_kept_and_of_what_is_older_only_so_m
     assert numbers(slow, 1) == list(range(slow.first, 6001))
 
 
-def test_there_is_a_limit_even_to_what_was_told_just_now() -> None:
+def test_add_limits_the_number_of_recent_messages() -> None:
     log = filled(MOST + 5, step=0.0)
     assert log.newest == MOST + 5
     assert MOST - PACK / 100 < len(log.since(1)) == log.newest - log.first + 1 <= MOST
 
 
 @given(seq=st.integers(-5, 700))
-def test_what_is_packed_is_as_it_was_told(seq: int) -> None:
+def test_since_unpacks_compressed_messages(seq: int) -> None:
     log = FeedbackLog()
     told = [log.add(BlockProgress(id=f"b{n}:end", global_time=n * 0.1), n * 0.1) for n in range(600)]
     assert sum(map(len, told)) > 4 * PACK
     assert log.since(seq) == told[max(seq - 1, 0) :]
 
 
-def test_what_was_told_before_can_be_put_back() -> None:
+def test_restore_continues_the_numbers() -> None:
     log = filled(5)
     again = FeedbackLog()
     again.restore(log.newest, log.since(3), now=7.0)
@@ -65,7 +65,7 @@ def test_what_was_told_before_can_be_put_back() -> None:
     assert again.since(4) == log.since(4)
 
 
-def test_with_an_epoch_every_time_comes_in_posix_milliseconds_too() -> None:
+def test_add_writes_posix_times_with_an_epoch() -> None:
     log = FeedbackLog(epoch=1_700_000_000.25)
     log.add(SyncPointProgress(id="b:h:end", time=1.0, global_time=2.5), 2.5)
     (text,) = log.since(1)

@@ -1,4 +1,4 @@
-"""The laws of a session, without sockets: order, once each, nothing after close, faults kept small."""
+"""Sessions without sockets: order of feedback, limits, voices, connections, and laws."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bml_schema.feedback import BlockProgress, WarningFeedback
-from realizer.core.errors import RenderError, VoiceError
+from realizer.core.errors import VoiceError
 from realizer.protocol.wire import unpack
 from realizer.server.journal.entry import Entry, JournalError, TakenOver
 from realizer.server.journal.journal_writer import JournalWriter
@@ -31,7 +31,7 @@ def warnings(client):
 # feedback ---------------------------------------------------------------------------------------
 
 
-def test_every_default_sync_point_is_reported_once_between_start_and_end(driver) -> None:
+def test_session_reports_every_default_sync_point_once(driver) -> None:
     driver.send(NOD.format("b"))
     client = driver.run(10)
     progress = [id for id in client.ids if id != "prediction"]
@@ -39,7 +39,7 @@ def test_every_default_sync_point_is_reported_once_between_start_and_end(driver)
     assert [f.seq for f in client.feedback] == list(range(1, len(client.feedback) + 1))
 
 
-def test_feedback_comes_at_its_time(driver) -> None:
+def test_session_sends_feedback_at_its_time(driver) -> None:
     driver.run(1.25)
     driver.send(NOD.format("b"))
     client = driver.run(10)
@@ -48,7 +48,7 @@ def test_feedback_comes_at_its_time(driver) -> None:
             assert time == pytest.approx(message.global_time, abs=1e-4)
 
 
-def test_the_first_prediction_is_the_acknowledgement_and_comes_before_the_voice() -> None:
+def test_session_acknowledges_a_block_before_its_voice_answers() -> None:
     driver = Driver(mute=True)
     client = driver.send(TALK.format("b"))
     (acknowledged,) = client.feedback
@@ -58,13 +58,13 @@ def test_the_first_prediction_is_the_acknowledgement_and_comes_before_the_voice(
     assert client.feedback[1].blocks[0].global_end == pytest.approx(1.0, abs=0.3)
 
 
-def test_a_client_that_only_sends_bml_gets_feedback_and_nothing_else(driver) -> None:
+def test_session_sends_only_feedback_without_subscriptions(driver) -> None:
     driver.send(TALK.format("b"))
     client = driver.run(10)
     assert all(isinstance(m, str) and m.startswith("<") for m in client.messages)
 
 
-def test_an_id_is_free_again_after_the_end(driver) -> None:
+def test_session_accepts_an_id_again_after_the_end_of_its_block(driver) -> None:
     driver.send(NOD.format("b"))
     driver.run(10)
     driver.send(NOD.format("b"))
@@ -73,7 +73,7 @@ def test_an_id_is_free_again_after_the_end(driver) -> None:
     assert not warnings(client)
 
 
-def test_several_documents_in_one_message_are_all_played(driver) -> None:
+def test_session_plays_all_documents_of_a_message(driver) -> None:
     driver.send("\ufeff<?xml version='1.0'?><!-- two -->" + NOD.format("a") + NOD.format("b"))
     client = driver.run(10)
     assert {"a:end", "b:end"} <= set(client.ids)
@@ -82,7 +82,7 @@ def test_several_documents_in_one_message_are_all_played(driver) -> None:
 @pytest.mark.parametrize(
     "broken", ["<bml id='x'><head", "hello", "<bml><head/></bml>", "<html/>", "<bml id='x'>\x00</bml>"]
 )
-def test_a_broken_document_gives_one_warning_and_the_connection_lives(driver, broken) -> None:
+def test_session_answers_a_broken_document_with_one_warning(driver, broken) -> None:
     client = driver.send(broken)
     assert len(warnings(client)) == 1
     assert warnings(client)[0].type == "PARSING_FAILURE"
@@ -91,14 +91,14 @@ def test_a_broken_document_gives_one_warning_and_the_connection_lives(driver, br
     assert not driver.closed
 
 
-def test_reading_goes_on_after_a_broken_stretch(driver) -> None:
+def test_session_reads_on_after_a_broken_document(driver) -> None:
     driver.send("<bml id='x'><head </bml>" + NOD.format("b"))
     client = driver.run(10)
     assert len(warnings(client)) == 1
     assert "b:end" in client.ids
 
 
-def test_a_bug_while_planning_is_told_with_the_blocks_id(driver, monkeypatch, caplog) -> None:
+def test_session_reports_a_bug_in_planning_with_the_id_of_the_block(driver, monkeypatch, caplog) -> None:
     def bug(*_):
         raise ZeroDivisionError("secret")
 
@@ -112,21 +112,21 @@ def test_a_bug_while_planning_is_told_with_the_blocks_id(driver, monkeypatch, ca
 # limits -----------------------------------------------------------------------------------------
 
 
-def test_a_document_over_the_limit_is_a_warning_with_its_id(driver) -> None:
+def test_session_refuses_a_document_over_the_limit(driver) -> None:
     driver.send(f'<bml id="big"><!--{"x" * 2**20}--></bml>')
     (warning,) = warnings(driver.clients[1])
     assert warning.id == "big"
     assert "1048576" in warning.text
 
 
-def test_a_block_with_too_many_behaviours_is_refused() -> None:
+def test_session_refuses_a_block_with_too_many_behaviours() -> None:
     driver = Driver(max_behaviours=2)
     waits = "".join(f'<wait id="w{i}"/>' for i in range(3))
     (warning,) = warnings(driver.send(f'<bml id="b">{waits}</bml>'))
     assert (warning.id, "at most 2" in warning.text) == ("b", True)
 
 
-def test_a_block_that_would_last_too_long_is_refused_and_ends_nobody() -> None:
+def test_session_refuses_a_block_that_lasts_too_long() -> None:
     driver = Driver(max_duration=60)
     driver.send('<bml id="a"><wait id="w" duration="50"/></bml>')
     client = driver.send('<bml id="b" composition="REPLACE"><wait id="w" duration="60.1"/></bml>')
@@ -147,7 +147,7 @@ def test_a_block_that_would_last_too_long_is_refused_and_ends_nobody() -> None:
         '<realizer:mood xmlns:realizer="urn:bml-realizer:1" id="m" name="joy"/>',
     ],
 )
-def test_a_base_state_holds_for_longer_than_any_block_may_last(holds: str) -> None:
+def test_session_holds_base_states_longer_than_blocks(holds: str) -> None:
     driver = Driver(max_duration=2)
     client = driver.send(f'<bml id="b">{holds}</bml>')
     driver.run(10.0)
@@ -155,7 +155,7 @@ def test_a_base_state_holds_for_longer_than_any_block_may_last(holds: str) -> No
     assert not [w for w in warnings(client) if "MAX_DURATION" in w.text]
 
 
-def test_a_speech_that_is_left_open_is_no_block_that_lasts_too_long() -> None:
+def test_session_does_not_limit_the_duration_of_an_open_speech() -> None:
     driver = Driver(max_duration=2)
     client = driver.send({"type": "speech", "id": "turn", "append": "Hello. "})
     driver.run(10.0)
@@ -165,32 +165,32 @@ def test_a_speech_that_is_left_open_is_no_block_that_lasts_too_long() -> None:
     assert "turn:end" in client.ids
 
 
-def test_too_many_blocks_at_a_time_are_refused() -> None:
+def test_session_refuses_too_many_blocks() -> None:
     driver = Driver(max_blocks=2)
     for name in "abc":
         driver.send(NOD.format(name))
     assert [w.id for w in warnings(driver.clients[1])] == ["c"]
 
 
-def test_too_many_characters_are_refused(driver) -> None:
+def test_session_refuses_too_many_characters(driver) -> None:
     for k in range(20):
         driver.send(f'<bml id="b{k}" characterId="c{k}"><wait id="w"/></bml>')
     assert {w.id for w in warnings(driver.clients[1])} == {f"b{k}" for k in range(16, 20)}
 
 
-def test_binary_in_is_answered_with_an_error(driver) -> None:
+def test_session_answers_an_invalid_binary_message_with_an_error(driver) -> None:
     client = driver.send(b"\x04\x01 sound")
     assert client.of("error")[0]["code"] == "unsupported"
 
 
-def test_no_documents_are_taken_while_the_service_ends(driver) -> None:
+def test_session_refuses_documents_while_the_service_ends(driver) -> None:
     driver.session.ending = True
     (warning,) = warnings(driver.send(NOD.format("b")))
     assert "ending" in warning.text
     assert warning.seq is None, "another service, that goes on with the session, would not count it"
 
 
-def test_what_is_not_kept_has_no_number_and_leaves_what_is_told_as_it_was() -> None:
+def test_session_sends_a_warning_without_seq_if_the_journal_is_full() -> None:
     class Full(SqliteJournal):
         full = False
 
@@ -220,7 +220,7 @@ def test_what_is_not_kept_has_no_number_and_leaves_what_is_told_as_it_was() -> N
 # voices -----------------------------------------------------------------------------------------
 
 
-def test_a_later_block_does_not_wait_for_the_voice_of_an_earlier_one() -> None:
+def test_session_does_not_delay_a_block_by_the_voice_of_another() -> None:
     driver = Driver(mute=True)
     driver.send(TALK.format("talk"))
     driver.send(NOD.format("nod"))
@@ -235,7 +235,7 @@ def test_a_later_block_does_not_wait_for_the_voice_of_an_earlier_one() -> None:
         '<bml id="later"><head id="n" lexeme="NOD" start="talk:s:end"/></bml>',
     ],
 )
-def test_a_block_that_depends_on_one_waits_for_its_voice(later) -> None:
+def test_session_delays_a_block_by_the_voice_of_its_predecessor(later) -> None:
     driver = Driver(mute=True)
     driver.send(TALK.format("talk"))
     driver.send(later)
@@ -247,7 +247,7 @@ def test_a_block_that_depends_on_one_waits_for_its_voice(later) -> None:
     assert nod.global_time == pytest.approx(2.5, abs=0.2)
 
 
-def test_a_replacing_block_ends_those_that_still_wait_for_their_voice() -> None:
+def test_session_replaces_blocks_that_wait_for_their_voice() -> None:
     driver = Driver(mute=True)
     driver.send(TALK.format("talk"))
     client = driver.send('<bml id="now" composition="REPLACE"><head id="n" lexeme="NOD"/></bml>')
@@ -256,27 +256,7 @@ def test_a_replacing_block_ends_those_that_still_wait_for_their_voice() -> None:
     assert "talk:start" not in driver.run(10).ids
 
 
-def test_stop_ends_what_plays_and_what_waits() -> None:
-    driver = Driver(mute=True)
-    driver.send(NOD.format("nod"))
-    driver.send(TALK.format("talk"))
-    driver.run(0.1)
-    client = driver.send({"type": "stop"})
-    assert {"nod:end", "talk:end"} <= set(client.ids)
-    driver.say(driver.spoken[0].id, spoken())
-    assert client.ids == driver.run(10).ids
-
-
-def test_stop_by_name_leaves_the_others() -> None:
-    driver = Driver()
-    driver.send(NOD.format("a"))
-    driver.send(NOD.format("b"))
-    client = driver.send({"type": "stop", "blocks": ["a"]})
-    assert "a:end" in client.ids
-    assert "b:end" not in client.ids
-
-
-def test_a_voice_that_fails_is_replaced_by_silence_and_told_in_one_warning_and_in_state() -> None:
+def test_on_speech_replaces_a_failed_voice_and_reports_it_once() -> None:
     driver = Driver(mute=True)
     driver.send(TALK.format("b"))
     driver.say(driver.spoken[0].id, VoiceError("no engine"))
@@ -287,174 +267,26 @@ def test_a_voice_that_fails_is_replaced_by_silence_and_told_in_one_warning_and_i
     assert client.of("state")[0]["voice"]["fault"] == "no engine"
 
 
-def test_a_voice_that_never_answers_is_replaced_by_silence() -> None:
+def test_tick_replaces_a_voice_that_never_answers() -> None:
     driver = Driver(mute=True)
     driver.send(TALK.format("b"))
     assert "b:end" in driver.run(60).ids
 
 
-def test_a_character_speaks_with_the_voice_it_was_given() -> None:
-    driver = Driver(mute=True)
-    driver.send({"type": "character", "id": "Ada", "voice": "silent"})
-    driver.send(TALK.format("b").replace("<bml", '<bml characterId="Ada"'))
-    assert driver.spoken[0].request.voice == "silent"
-
-
 # streams ----------------------------------------------------------------------------------------
 
 
-def test_frames_are_numbered_by_the_clock_and_sent_at_their_time(driver) -> None:
-    driver.run(0.5)
-    driver.send({**FAP, "fps": 25})
-    client = driver.run(2.0)
-    frames = client.frames
-    assert [f.frame for f in frames] == list(range(13, 51))
-    sent = client.times[-len(frames) :]
-    assert [f.time for f in frames] == pytest.approx(sent, abs=1e-4)
-    assert all(len(f.values) == 68 for f in frames)
-
-
-def test_json_and_binary_say_the_same(driver) -> None:
-    driver.join(2)
-    driver.send({**FAP, "encoding": "json"}, 1)
-    driver.send(FAP, 2)
-    driver.send(NOD.format("b"))
-    driver.run(1.0)
-    texts, frames = driver.clients[1].of("fap"), driver.clients[2].frames
-    assert [t["values"] for t in texts] == [f.values.tolist() for f in frames]
-    assert [t["time"] for t in texts] == pytest.approx([f.time for f in frames])
-
-
-def test_the_stream_shows_what_was_sent(driver) -> None:
-    names = driver.send({**FAP, "encoding": "json"}).of("subscribed")[0]["names"]
-    pitch = names.index("head_pitch")
-    driver.run(0.5)
-    driver.send(NOD.format("b"))
-    client = driver.run(2.0)
-    rows = [t["values"][pitch] for t in client.of("fap")]
-    assert max(map(abs, rows)) > 3 * max(map(abs, rows[:12])) + 100
-
-
-def test_idle_frames_come_without_any_document(driver) -> None:
-    driver.send({"type": "subscribe", "stream": "au", "fps": 10})
-    values = np.stack([f.values for f in driver.run(20).frames])
-    assert values.shape[0] >= 200
-    assert values.max() > 0.5, "an idle face blinks"
-
-
-def test_action_units_come_as_shown_or_as_asked_for(driver) -> None:
-    def jaw_and_lips(asked: bool) -> list[float]:
-        told = driver.send({"type": "subscribe", "stream": "au", "encoding": "json", "asked": asked})
-        names = told.of("subscribed")[-1]["names"]
-        values = driver.run(driver.now + 1.0).of("au")[-1]["values"]
-        return [values[names.index("25")], values[names.index("26")]]
-
-    driver.send({"type": "set", "aus": {"25": 1.0, "26": 1.0}})
-    assert jaw_and_lips(asked=False) == [0.0, 1.0]
-    assert jaw_and_lips(asked=True) == [1.0, 1.0]
-
-
-def test_unsubscribe_ends_a_stream(driver) -> None:
-    driver.send(FAP)
-    driver.run(0.2)
-    count = len(driver.send({"type": "unsubscribe", "stream": "fap"}).frames)
-    assert len(driver.run(1.0).frames) == count
-
-
-def test_a_viewer_can_switch_feedback_off(driver) -> None:
-    viewer = driver.join(2)
-    driver.send({"type": "unsubscribe", "stream": "feedback"}, 2)
-    driver.send(NOD.format("b"))
-    driver.run(10)
-    assert not viewer.feedback
-    assert driver.clients[1].feedback
-
-
-def test_a_slow_client_loses_frames_counted_and_never_feedback(driver) -> None:
-    driver.session.update_backlog(1, 10**6)
-    driver.send(FAP)
-    driver.send(NOD.format("b"))
-    client = driver.run(10)
-    assert not client.frames
-    assert "b:end" in client.ids
-    driver.session.update_backlog(1, 0)
-    driver.run(11)
-    assert [f.frame for f in client.frames] == list(range(251, 276))
-    driver.send({"type": "state"})
-    assert client.of("state")[0]["dropped"] == 251
-
-
-def test_a_client_that_never_reads_is_closed(driver) -> None:
+def test_update_backlog_closes_a_client_that_never_reads(driver) -> None:
     driver.session.update_backlog(1, 10**9)
     driver.collect()
     assert [c.connection for c in driver.closed] == [1]
 
 
-def test_a_stalled_process_does_not_catch_up_with_seconds_of_frames(driver) -> None:
-    driver.send({**FAP, "fps": 25})
-    driver.now = 5.0
-    driver.session.tick(driver.opened + 5.0)
-    driver.collect()
-    numbers = [f.frame for f in driver.clients[1].frames]
-    assert numbers[-1] == 125
-    assert len(numbers) < 20
-
-
-def test_two_characters_have_their_own_index(driver) -> None:
-    driver.send('<bml id="a" characterId="Ada"><wait id="w"/></bml>')
-    driver.send('<bml id="b" characterId="Bob"><faceLexeme id="f" lexeme="SMILE" end="3"/></bml>')
-    client = driver.send({"type": "subscribe", "stream": "au", "character": "Bob"})
-    assert client.of("subscribed")[0]["index"] == 1
-    assert {f.character for f in driver.run(1.0).frames} == {1}
-
-
 # sound ------------------------------------------------------------------------------------------
 
 
-def sound_of(client):
-    return [f for f in client.frames if f.stream == "audio"]
-
-
-def test_sound_comes_in_packets_at_most_a_tenth_ahead_and_not_in_silence(driver) -> None:
-    driver.send({"type": "subscribe", "stream": "audio"})
-    driver.run(0.5)
-    assert not sound_of(driver.clients[1])
-    driver.send(TALK.format("b"))
-    client = driver.run(5)
-    packets = sound_of(client)
-    assert len(packets) in (50, 51)
-    assert all(len(p.values) == RATE // 50 for p in packets)
-    assert [p.time for p in packets] == pytest.approx([p.frame * 0.02 for p in packets])
-    sent = [t for t, m in zip(client.times, client.messages, strict=True) if isinstance(m, bytes)]
-    assert all(p.time - t <= 0.1 + 1e-6 for p, t in zip(packets, sent, strict=True))
-
-
-def test_the_packets_together_are_what_was_spoken(driver) -> None:
-    driver.send({"type": "subscribe", "stream": "audio"})
-    client = driver.send(TALK.format("b"))
-    packets = sound_of(driver.run(5))
-    start = next(f for f in client.feedback if getattr(f, "id", "") == "b:s:start").global_time
-    heard = np.concatenate([p.values for p in packets])
-    first = round((start - packets[0].time) * RATE)
-    pcm = spoken().pcm
-    assert np.array_equal(heard[first : first + len(pcm)], pcm)
-
-
-def test_stop_takes_back_the_sound_that_was_sent_ahead(driver) -> None:
-    driver.send({"type": "subscribe", "stream": "audio"})
-    driver.send(TALK.format("b"))
-    driver.run(0.5)
-    before = len(sound_of(driver.clients[1]))
-    driver.send({"type": "stop"})
-    after = sound_of(driver.run(5))[before:]
-    assert after[0].flush
-    assert after[0].time == pytest.approx(0.5, abs=0.021)
-    assert after[-1].time < 0.6
-    assert abs(int(after[-1].values[-1])) < 2000, "it fades out"
-
-
 def words(*timed: tuple[float, float, str]) -> Utterance:
-    """What `spoken` gives, as long as its last word, with words."""
+    """Return the utterance of `spoken` with words."""
     return replace(spoken(timed[-1][1]), words=tuple(Word(*one) for one in timed))
 
 
@@ -464,7 +296,7 @@ HELLO = ((0.0, 0.3, "Hello"), (0.3, 0.6, "there"), (0.6, 1.0, "friend"))
 @pytest.mark.parametrize(
     ("when", "said", "last"), [(0.1, "", None), (0.45, "Hello", "Hello"), (0.7, "Hello there", "there")]
 )
-def test_the_end_of_an_interrupted_block_says_the_last_word(when, said, last) -> None:
+def test_session_reports_the_spoken_words_of_an_interrupted_block(when, said, last) -> None:
     driver = Driver(mute=True)
     driver.send(TALK.format("b"))
     driver.say(driver.spoken[0].id, words(*HELLO))
@@ -482,7 +314,7 @@ def test_the_end_of_an_interrupted_block_says_the_last_word(when, said, last) ->
         {"type": "stop", "blocks": ["b"]},
     ],
 )
-def test_sound_stops_within_50_ms_of_any_interruption_and_the_face_relaxes(how) -> None:
+def test_session_silences_an_interrupted_block_within_50_ms(how) -> None:
     driver = Driver(mute=True, idle=False)
     driver.send({"type": "subscribe", "stream": "audio", "rate": RATE})
     driver.send(TALK.format("b"))
@@ -502,7 +334,7 @@ def test_sound_stops_within_50_ms_of_any_interruption_and_the_face_relaxes(how) 
 
 
 def heard_of(client, seconds: float = 3.0):
-    """What a client plays: packets by their time; from one with the flag on everything is forgotten."""
+    """Return the sound that a client plays: packets at their times, flushed by the flag."""
     heard = np.zeros(round(seconds * RATE), np.int16)
     for frame in (f for f in client.frames if f.stream == "audio"):
         first = round(frame.time * RATE)
@@ -512,7 +344,7 @@ def heard_of(client, seconds: float = 3.0):
     return heard
 
 
-def test_a_block_that_was_heard_to_its_end_says_nothing_of_it() -> None:
+def test_session_reports_no_words_of_a_complete_block() -> None:
     driver = Driver(mute=True)
     driver.send(TALK.format("b"))
     driver.say(driver.spoken[0].id, words(*HELLO))
@@ -522,71 +354,10 @@ def test_a_block_that_was_heard_to_its_end_says_nothing_of_it() -> None:
 # pictures ---------------------------------------------------------------------------------------
 
 
-def test_the_newest_frame_is_drawn_and_late_ones_are_skipped(driver) -> None:
-    client = driver.send({"type": "subscribe", "stream": "video", "size": [64, 64], "fps": 10})
-    driver.run(1.0)
-    (first,) = driver.draws
-    assert first.options.size == (64, 64)
-    assert first.pose.shape == (68,)
-    driver.session.on_picture(first.id, b"jpeg", driver.opened + 1.0)
-    driver.collect()
-    assert [(f.frame, f.payload) for f in client.frames] == [(0, b"jpeg")]
-    assert len(driver.draws) == 2
-    driver.session.on_picture(driver.draws[1].id, b"next", driver.opened + 1.05)
-    driver.collect()
-    assert client.frames[-1].frame == 10
-    driver.send({"type": "state"})
-    assert client.of("state")[0]["dropped"] == 9
-
-
-def test_a_picture_is_drawn_once_for_all_who_look_at_it(driver) -> None:
-    driver.join(2)
-    for connection in (1, 2):
-        driver.send({"type": "subscribe", "stream": "video", "fps": 10}, connection)
-    driver.run(0.05)
-    assert len(driver.draws) == 1
-    driver.session.on_picture(driver.draws[0].id, b"jpeg", driver.opened + 0.05)
-    driver.collect()
-    assert [len(driver.clients[c].frames) for c in (1, 2)] == [1, 1]
-
-
-def test_pictures_that_cannot_be_drawn_end_with_one_error(driver) -> None:
-    client = driver.send({"type": "subscribe", "stream": "video"})
-    driver.run(0.1)
-    driver.session.on_picture(driver.draws[0].id, RenderError("install EGL"), driver.opened + 0.1)
-    driver.collect()
-    driver.run(2.0)
-    assert [e["message"] for e in client.of("error")] == ["install EGL"]
-    assert len(driver.draws) == 1
-
-
-def test_a_picture_of_absurd_size_is_refused(driver) -> None:
-    client = driver.send({"type": "subscribe", "stream": "video", "size": [100000, 100000]})
-    assert client.of("error")[0]["where"] == "subscribe.size"
-
-
-def test_who_asks_for_another_light_gets_pictures_of_its_own(driver) -> None:
-    driver.join(2)
-    driver.send({"type": "subscribe", "stream": "video"}, 1)
-    look = {"camera": "profile", "light": "evening", "background": "#102030"}
-    driver.send({"type": "subscribe", "stream": "video", **look}, 2)
-    driver.run(0.05)
-    plain, own = (draw.options for draw in driver.draws)
-    assert (plain.camera, plain.light, plain.background) == ("front", None, None)
-    assert (own.camera, own.light, own.background) == ("profile", "evening", "#102030")
-
-
-def test_a_light_that_is_not_there_is_refused_with_those_that_are(driver) -> None:
-    client = driver.send({"type": "subscribe", "stream": "video", "light": "noon"})
-    (error,) = client.of("error")
-    assert error["where"] == "subscribe.light"
-    assert "portrait, daylight, evening" in error["message"]
-
-
 # sessions ---------------------------------------------------------------------------------------
 
 
-def test_a_client_that_comes_back_gets_what_it_missed() -> None:
+def test_connect_sends_missed_feedback() -> None:
     driver = Driver(named=True)
     driver.send(NOD.format("b"))
     driver.run(0.2)
@@ -598,7 +369,7 @@ def test_a_client_that_comes_back_gets_what_it_missed() -> None:
     assert again.ids[-1] == "b:end"
 
 
-def test_hello_with_seen_sends_what_followed(driver) -> None:
+def test_hello_sends_missed_feedback(driver) -> None:
     driver.send(NOD.format("b"))
     driver.run(10)
     viewer = driver.join(2)
@@ -608,7 +379,7 @@ def test_hello_with_seen_sends_what_followed(driver) -> None:
     assert [f.seq for f in viewer.feedback] == list(range(2, 14))
 
 
-def test_what_is_no_longer_there_is_a_gap(driver, monkeypatch) -> None:
+def test_send_missed_feedback_reports_a_gap_of_lost_messages(driver, monkeypatch) -> None:
     monkeypatch.setattr(feedback_log, "MOST", 5)
     monkeypatch.setattr(feedback_log, "PACK", 1)  # whole packs go
     driver.send(NOD.format("b"))
@@ -618,24 +389,24 @@ def test_what_is_no_longer_there_is_a_gap(driver, monkeypatch) -> None:
     assert [f.seq for f in viewer.feedback] == [9, 10, 11, 12, 13]
 
 
-def test_seen_of_another_life_is_a_gap(driver) -> None:
+def test_send_missed_feedback_reports_a_gap_of_unknown_numbers(driver) -> None:
     viewer = driver.join(2, seen=500)
     assert viewer.of("gap") == [{"type": "gap", "seen": 500, "first": 1}]
 
 
-def test_all_connections_of_a_session_get_its_feedback(driver) -> None:
+def test_session_sends_feedback_to_all_connections(driver) -> None:
     viewer = driver.join(2)
     driver.send(NOD.format("b"), 1)
     driver.run(10)
     assert viewer.messages == driver.clients[1].messages
 
 
-def test_a_session_nobody_named_ends_with_its_connection(driver) -> None:
+def test_disconnect_closes_an_unnamed_session(driver) -> None:
     driver.leave(1)
     assert driver.session.closed
 
 
-def test_a_named_session_is_kept_for_a_while() -> None:
+def test_is_expired_keeps_a_named_session_for_a_while() -> None:
     driver = Driver(named=True, keep=60.0)
     driver.leave(1)
     assert not driver.session.closed
@@ -646,56 +417,17 @@ def test_a_named_session_is_kept_for_a_while() -> None:
 # control ----------------------------------------------------------------------------------------
 
 
-def test_another_version_is_refused(driver) -> None:
+def test_hello_refuses_another_version(driver) -> None:
     (error,) = driver.send({"type": "hello", "version": 7}).of("error")
     assert (error["where"], "got 7" in error["message"]) == ("hello.version", True)
 
 
-def test_ping_tells_the_time_of_the_session(driver) -> None:
+def test_ping_returns_the_time_of_the_session(driver) -> None:
     driver.run(2.5)
     assert driver.send({"type": "ping", "id": 9}).of("pong") == [{"type": "pong", "id": 9, "time": 2.5}]
 
 
-def test_a_scene_makes_unknown_targets_a_warning_and_known_ones_not(driver) -> None:
-    gaze = '<bml id="{}"><gaze id="g" target="{}" start="0" end="0.5"/></bml>'
-    driver.send(gaze.format("a", "cup"))
-    driver.run(1)
-    driver.send({"type": "scene", "objects": {"cup": {"x": 0.3, "y": 0, "z": 1}}})
-    driver.send(gaze.format("b", "cup"))
-    driver.run(2)
-    driver.send(gaze.format("c", "moon"))
-    found = warnings(driver.run(5))
-    assert [(w.id, w.type) for w in found] == [("c:g", "NO_SUCH_TARGET")]
-    assert "c:end" in driver.clients[1].ids
-
-
-def test_set_holds_an_au_until_it_is_let_go(driver) -> None:
-    names = driver.send({"type": "subscribe", "stream": "au", "fps": 25}).of("subscribed")[0]["names"]
-    driver.send({"type": "set", "aus": {"12L": 0.8}})
-    client = driver.run(1)
-    left, right = names.index("12L"), names.index("12R")
-    assert client.frames[-1].values[left] == pytest.approx(0.8, abs=0.05)
-    assert client.frames[-1].values[right] < 0.1
-    driver.send({"type": "set", "aus": {"12L": None}})
-    assert driver.run(2).frames[-1].values[left] < 0.1
-
-
-@pytest.mark.parametrize(
-    ("message", "where"),
-    [
-        ({"type": "set", "aus": {"99": 0.5}}, "set.aus"),
-        ({"type": "set", "faps": {"nose_hair": 5}}, "set.faps"),
-        ({"type": "set", "faps": {"1": 5}}, "set.faps"),
-        ({"type": "subscribe", "stream": "mesh", "encoding": "json"}, "subscribe.encoding"),
-        ({"type": "character", "id": "Ada", "face": "nobody"}, "character.face"),
-    ],
-)
-def test_a_control_message_that_cannot_be_followed_says_where(driver, message, where) -> None:
-    (error,) = driver.send(message).of("error")
-    assert error["where"] == where
-
-
-def test_state_says_what_plays_and_what_waits() -> None:
+def test_state_lists_playing_and_waiting_blocks() -> None:
     driver = Driver(mute=True)
     driver.send(NOD.format("nod"))
     driver.send(TALK.format("talk"))
@@ -750,7 +482,7 @@ def act(driver: Driver, kind: str, value) -> None:
 
 @settings(max_examples=40, deadline=None)
 @given(st.lists(ACTIONS, max_size=14))
-def test_in_any_order_of_events_frames_rise_and_feedback_is_whole(actions) -> None:
+def test_session_numbers_frames_and_feedback_in_any_order_of_events(actions) -> None:
     driver, twin = Driver(mute=True), Driver(mute=True)
     closed = None
     for kind, value in actions:
@@ -777,7 +509,7 @@ def test_in_any_order_of_events_frames_rise_and_feedback_is_whole(actions) -> No
             assert running <= 1
 
 
-def test_one_who_joins_a_session_that_another_process_has_is_sent_there_with_all_others() -> None:
+def test_hand_over_closes_all_connections() -> None:
     class Taken(SqliteJournal):
         def add(self, session: str, entry: Entry) -> None:
             raise TakenOver("another process has it")
@@ -788,7 +520,7 @@ def test_one_who_joins_a_session_that_another_process_has_is_sent_there_with_all
     assert driver.closed == [Close(k, 1012, "another process has it") for k in (1, 2)]
 
 
-def test_the_speech_of_one_who_leaves_ends_though_nothing_else_is_due() -> None:
+def test_disconnect_ends_the_open_speech_of_the_client() -> None:
     driver = Driver(named=True)
     viewer = driver.join(2)
     driver.send({"type": "speech", "id": "turn", "append": "All that there is. "})
@@ -800,60 +532,10 @@ def test_the_speech_of_one_who_leaves_ends_though_nothing_else_is_due() -> None:
     assert "turn:end" in viewer.ids
 
 
-def test_a_feedback_stream_that_is_asked_for_again_begins_with_what_follows(driver) -> None:
-    driver.send({"type": "unsubscribe", "stream": "feedback"})
-    driver.send(NOD.format("a"))
-    client = driver.run(10)
-    assert not client.feedback
-    told = driver.session.feedback_log.newest
-    driver.send({"type": "subscribe", "stream": "feedback"})
-    assert not client.feedback
-    driver.send(NOD.format("b"))
-    driver.run(20)
-    assert [f.seq for f in client.feedback] == list(range(told + 1, driver.session.feedback_log.newest + 1))
-
-
-def test_a_feedback_stream_can_be_narrowed_to_some_elements(driver) -> None:
-    viewer = driver.join(2)
-    asked = {"type": "subscribe", "stream": "feedback", "elements": ["blockProgress"]}
-    assert driver.send(asked, 2).of("subscribed")[0]["elements"] == ["blockProgress"]
-    driver.send(NOD.format("b"))
-    driver.run(5)
-    assert viewer.ids == ["b:start", "b:end"]
-    assert len(driver.clients[1].ids) > 2
-    numbers = [f.seq for f in viewer.feedback]
-    assert numbers == sorted(numbers)
-    assert numbers != list(range(1, len(numbers) + 1)), "what was left out keeps its number"
-
-
-def test_a_feedback_stream_can_be_narrowed_to_a_character(driver) -> None:
-    viewer = driver.join(2)
-    driver.send({"type": "subscribe", "stream": "feedback", "character": "Ann"}, 2)
-    driver.send('<bml id="a" characterId="Ann"/>')
-    driver.send('<bml id="b" characterId="Bob"/>')
-    driver.send("<bml/>")
-    driver.run(1)
-    assert {f.character_id for f in viewer.feedback} == {"Ann", None}
-    assert not any("b:" in id for id in viewer.ids)
-
-
-def test_all_feedback_comes_back_when_no_element_is_named(driver) -> None:
-    driver.send({"type": "subscribe", "stream": "feedback", "elements": ["warningFeedback"]})
-    driver.send({"type": "subscribe", "stream": "feedback"})
-    driver.send(NOD.format("b"))
-    driver.run(5)
-    assert "b:end" in driver.clients[1].ids
-
-
-def test_an_unknown_feedback_element_is_an_error(driver) -> None:
-    told = driver.send({"type": "subscribe", "stream": "feedback", "elements": ["blockprogress"]})
-    assert told.of("error")[0]["code"] == "invalid"
-
-
 BMLA = 'xmlns:bmla="http://www.asap-project.org/bmla"'
 
 
-def test_a_block_that_is_to_follow_waits_for_the_one_before_it_in_preparation() -> None:
+def test_session_appends_a_block_after_one_in_preparation() -> None:
     driver = Driver(mute=True)
     driver.send(TALK.format("a"))
     driver.send(f'<bml id="b" {BMLA} bmla:appendAfter="a"/>')
@@ -863,7 +545,7 @@ def test_a_block_that_is_to_follow_waits_for_the_one_before_it_in_preparation() 
     assert times["b:start"] == times["a:end"] == pytest.approx(3.0)
 
 
-def test_a_block_in_preparation_waits_for_one_that_is_to_come_before_it() -> None:
+def test_session_prepends_a_block_before_one_in_preparation() -> None:
     driver = Driver(mute=True)
     driver.send(TALK.format("a"))
     driver.send(f'<bml id="b" {BMLA} bmla:prependBefore="a"><wait id="w" duration="1"/></bml>')
@@ -872,7 +554,7 @@ def test_a_block_in_preparation_waits_for_one_that_is_to_come_before_it() -> Non
     assert times["a:start"] == times["b:end"] == pytest.approx(1.0)
 
 
-def test_a_block_in_preparation_can_be_interrupted() -> None:
+def test_session_interrupts_a_block_in_preparation() -> None:
     driver = Driver(mute=True)
     driver.send(TALK.format("a"))
     driver.send(f'<bml id="b" {BMLA}><bmla:interrupt id="i" target="a"/></bml>')
@@ -881,21 +563,7 @@ def test_a_block_in_preparation_can_be_interrupted() -> None:
     assert [(f.id, f.status) for f in told] == [("a:end", "REVOKED")]
 
 
-def test_an_anticipated_point_moves_what_is_tied_to_it(driver) -> None:
-    driver.send({"type": "anticipate", "id": "clock", "syncs": {"beat": 3.0}})
-    driver.send('<bml id="b"><head id="n" lexeme="NOD" stroke="anticipators:clock:beat"/></bml>')
-    driver.run(1)
-    driver.send({"type": "anticipate", "id": "clock", "syncs": {"beat": 2.0}})
-    driver.run(9)
-    strokes = [f for f in driver.clients[1].feedback if getattr(f, "id", "") == "b:n:stroke"]
-    assert [f.global_time for f in strokes] == [pytest.approx(2.0)]
-    predicted = [
-        b.syncs["stroke"].offset for f in driver.clients[1].feedback for b in getattr(f, "behaviours", ())
-    ]
-    assert predicted == [pytest.approx(3.0), pytest.approx(2.0)]
-
-
-def test_a_speech_that_has_to_last_longer_is_spoken_again_and_later_blocks_wait_for_it() -> None:
+def test_session_requests_a_stretched_speech_again() -> None:
     driver = Driver(mute=True)
     driver.send('<bml id="a"><speech id="s" start="0" end="3"><text>Hello there</text></speech></bml>')
     driver.send('<bml id="b" composition="APPEND"/>')
@@ -907,7 +575,7 @@ def test_a_speech_that_has_to_last_longer_is_spoken_again_and_later_blocks_wait_
     assert times == {"a:start": 1.0, "a:end": 4.0, "b:start": 4.0, "b:end": 4.0}
 
 
-def test_a_voice_that_comes_back_with_another_length_is_not_asked_a_third_time() -> None:
+def test_session_does_not_request_a_speech_a_third_time() -> None:
     driver = Driver(mute=True)
     driver.send('<bml id="a"><speech id="s" start="0" end="3"><text>Hello there</text></speech></bml>')
     driver.say(driver.spoken[0].id, replace(spoken(2.0), stretch=(0.6, 1.8)))
@@ -918,14 +586,7 @@ def test_a_voice_that_comes_back_with_another_length_is_not_asked_a_third_time()
     assert "a:end" in told.ids
 
 
-def test_a_voice_that_is_not_there_is_an_error_at_once(driver) -> None:
-    told = driver.send({"type": "character", "id": "Z", "voice": "nope"})
-    (error,) = told.of("error")
-    assert (error["code"], error["where"]) == ("voice", "character.voice")
-    assert "nope" in error["message"]
-
-
-def test_time_that_passes_while_a_voice_speaks_again_is_made_up_for() -> None:
+def test_session_stretches_a_late_speech_to_its_end() -> None:
     driver = Driver(mute=True)
     driver.send('<bml id="a"><faceLexeme id="f" lexeme="SMILE" start="0" end="4"/></bml>')
     driver.run(0.5)
@@ -944,7 +605,7 @@ CALM = """<bml id="{id}" composition="REPLACE"><head id="n" lexeme="NOD" start="
 <faceLexeme id="f" lexeme="SMILE" start="n:stroke" end="1.1"/><gaze id="g" target="cup" end="0.9"/></bml>"""
 
 
-def test_a_session_that_is_woken_at_its_deadlines_tells_what_one_does_that_always_looks(drive) -> None:
+def test_next_due_wakes_a_session_at_every_event(drive) -> None:
     def play(step: float | None) -> list[str | bytes]:
         driver = drive()
         for message in (
@@ -966,7 +627,7 @@ def test_a_session_that_is_woken_at_its_deadlines_tells_what_one_does_that_alway
     assert play(None) == play(0.007)
 
 
-def test_frames_go_on_while_documents_wait_to_be_read(driver) -> None:
+def test_tick_sends_frames_while_documents_wait(driver) -> None:
     driver.send({"type": "subscribe", "stream": "fap", "fps": 25})
     now = driver.opened
     for k in range(3):
@@ -986,7 +647,7 @@ def test_frames_go_on_while_documents_wait_to_be_read(driver) -> None:
 
 
 @pytest.mark.parametrize("message", ["ping", "state", "stop", "unsubscribe"])
-def test_what_is_due_goes_out_before_a_late_message_is_followed(driver, message) -> None:
+def test_receive_sends_what_is_due_before_it_handles_a_late_message(driver, message) -> None:
     driver.send(FAP | {"fps": 25})
     driver.send('<bml id="b"><wait id="w" duration="0.5"/></bml>')
     client = driver.run(0.49)
@@ -996,3 +657,38 @@ def test_what_is_due_goes_out_before_a_late_message_is_followed(driver, message)
     assert 'id="b:w:end"' in point
     assert 'status="DONE"' in end
     assert unpack(frame).frame == 13
+
+
+def test_replies_round_times_to_microseconds(drive) -> None:
+    driver = drive()
+    driver.run(1 / 3)
+    driver.send('<bml id="b"><wait id="w" duration="0.12345678"/></bml>')
+    client = driver.send({"type": "ping", "id": 1})
+    driver.send({"type": "state"})
+    driver.send({"type": "hello"})
+    (pong,), (state,), (welcome,) = (client.of(kind) for kind in ("pong", "state", "welcome"))
+    assert pong["time"] == state["time"] == welcome["time"] == 0.333333
+    (block,) = state["blocks"]
+    assert (block["start"], block["end"]) == (0.333333, 0.45679)
+
+
+def test_state_lists_the_layers_of_the_face(drive) -> None:
+    driver = drive(idle=False)
+    mood = '<mood xmlns="urn:bml-realizer:1" id="s" name="joy" end="1"/>'
+    driver.send(f'<bml id="m">{mood}</bml>')
+    driver.send('<bml id="b"><faceFacs id="f" au="4" amount="0.5" attackPeak="0.2" relax="8" end="9"/></bml>')
+    gaze = '<gaze id="g" target="cup" offsetAngle="20" offsetDirection="LEFT" start="0" ready="0.5" end="9"/>'
+    driver.send(f'<bml id="g">{gaze}</bml>')
+    driver.send({"type": "set", "aus": {"2L": 0.25}, "faps": {"open_jaw": 120}})
+    driver.run(3.0)
+    state = driver.send({"type": "state"}).of("state")[-1]
+    (face,) = state["characters"]
+    layers = face["layers"]
+    assert layers["expression"] == {"aus": {"4L": 0.5, "4R": 0.5}, "faps": {}}
+    assert layers["direct"] == {"aus": {"2L": 0.25}, "faps": {"open_jaw": 120}}
+    assert layers["base"]["aus"]["12L"] == layers["base"]["aus"]["12R"] > 0.1
+    assert layers["gaze"]["aus"]
+    assert "idle" not in layers
+    assert face["aus"]["4L"] > 0
+    assert face["face"] == driver.session.faces.name(0)
+    assert {(b["id"], *b["behaviours"]) for b in state["blocks"]} >= {("b", "f"), ("g", "g")}

@@ -1,4 +1,4 @@
-"""Streams are given, replaced and ended one by one; who gets them is told what their values mean."""
+"""Subscriptions: encodings, options, replies, and the filter of feedback."""
 
 from __future__ import annotations
 
@@ -8,10 +8,17 @@ from realizer.face.load import load_face
 from realizer.protocol.streams import STREAMS
 from realizer.protocol.wire import unpack
 from realizer.server.streams.frame_windows import SOURCES
+from tests.realizer.server.conftest import NOD
+
+FAP = {"type": "subscribe", "stream": "fap"}
+
+
+def subscribe(stream: str, **fields):
+    return {"type": "subscribe", "stream": stream, **fields}
 
 
 @pytest.mark.parametrize("stream", sorted(STREAMS))
-def test_each_stream_is_given_in_each_of_its_encodings_and_in_no_other(driver, stream: str) -> None:
+def test_subscribe_accepts_exactly_the_encodings_of_a_stream(driver, stream: str) -> None:
     for encoding in STREAMS[stream].encodings:
         told = driver.send({"type": "subscribe", "stream": stream, "encoding": encoding}).of("subscribed")[-1]
         assert (told["stream"], told["encoding"]) == (stream, encoding)
@@ -22,14 +29,14 @@ def test_each_stream_is_given_in_each_of_its_encodings_and_in_no_other(driver, s
 
 
 @pytest.mark.parametrize("stream", sorted(SOURCES))
-def test_what_numbers_are_is_told_one_by_one(driver, stream: str) -> None:
+def test_subscribe_names_every_value(driver, stream: str) -> None:
     driver.send({"type": "subscribe", "stream": stream})
     client = driver.run(0.1)
     (told,) = client.of("subscribed")
     assert {len(frame.values) for frame in client.frames} == {len(set(told["names"]))}
 
 
-def test_who_gets_meshes_is_told_of_another_face_before_the_first_one_of_it(drive) -> None:
+def test_announce_face_change_precedes_the_first_new_mesh(drive) -> None:
     driver = drive(idle=False)
     for number in (2, 3, 4):
         driver.join(number)
@@ -54,7 +61,7 @@ def test_who_gets_meshes_is_told_of_another_face_before_the_first_one_of_it(driv
         assert told["frame"] == fps + 1
 
 
-def test_the_pictures_of_a_session_are_bounded_together_and_a_shared_one_counts_once(drive) -> None:
+def test_subscribe_bounds_the_pixels_of_all_views_together(drive) -> None:
     driver = drive(max_pixels=64 * 64 * 50)
     driver.join(2)
     driver.join(3)
@@ -76,7 +83,7 @@ def test_the_pictures_of_a_session_are_bounded_together_and_a_shared_one_counts_
     assert look(2, camera="three-quarter") == "subscribed"
 
 
-def test_videos_of_one_character_with_views_of_their_own_run_side_by_side(drive) -> None:
+def test_subscribe_runs_views_of_a_character_side_by_side(drive) -> None:
     driver = drive()
 
     def look(**asked) -> int:
@@ -108,7 +115,7 @@ def test_videos_of_one_character_with_views_of_their_own_run_side_by_side(drive)
     assert (error["where"], error["message"]) == ("subscribe.view", "wanted at most 240 views")
 
 
-def test_a_stream_of_the_first_character_is_replaced_whether_it_is_named_or_not(driver) -> None:
+def test_subscribe_replaces_the_stream_of_the_first_character(driver) -> None:
     driver.send({"type": "character", "id": "Ada"})
     driver.send({"type": "subscribe", "stream": "fap", "fps": 10})
     driver.send({"type": "subscribe", "stream": "fap", "fps": 20, "character": "Ada"})
@@ -118,3 +125,103 @@ def test_a_stream_of_the_first_character_is_replaced_whether_it_is_named_or_not(
     count = len(client.frames)
     driver.run(2.0)
     assert len(client.frames) == count
+
+
+def test_unsubscribe_ends_a_stream(driver) -> None:
+    driver.send(FAP)
+    driver.run(0.2)
+    count = len(driver.send({"type": "unsubscribe", "stream": "fap"}).frames)
+    assert len(driver.run(1.0).frames) == count
+
+
+def test_unsubscribe_ends_feedback(driver) -> None:
+    viewer = driver.join(2)
+    driver.send({"type": "unsubscribe", "stream": "feedback"}, 2)
+    driver.send(NOD.format("b"))
+    driver.run(10)
+    assert not viewer.feedback
+    assert driver.clients[1].feedback
+
+
+def test_subscribe_returns_the_index_of_the_character(driver) -> None:
+    driver.send('<bml id="a" characterId="Ada"><wait id="w"/></bml>')
+    driver.send('<bml id="b" characterId="Bob"><faceLexeme id="f" lexeme="SMILE" end="3"/></bml>')
+    client = driver.send({"type": "subscribe", "stream": "au", "character": "Bob"})
+    assert client.of("subscribed")[0]["index"] == 1
+    assert {f.character for f in driver.run(1.0).frames} == {1}
+
+
+def test_subscribe_refuses_a_picture_that_is_too_large(driver) -> None:
+    client = driver.send({"type": "subscribe", "stream": "video", "size": [100000, 100000]})
+    assert client.of("error")[0]["where"] == "subscribe.size"
+
+
+def test_subscribe_names_the_known_lights(driver) -> None:
+    client = driver.send({"type": "subscribe", "stream": "video", "light": "noon"})
+    (error,) = client.of("error")
+    assert error["where"] == "subscribe.light"
+    assert "portrait, daylight, evening" in error["message"]
+
+
+def test_subscribe_to_feedback_again_begins_with_new_messages(driver) -> None:
+    driver.send({"type": "unsubscribe", "stream": "feedback"})
+    driver.send(NOD.format("a"))
+    client = driver.run(10)
+    assert not client.feedback
+    told = driver.session.feedback_log.newest
+    driver.send({"type": "subscribe", "stream": "feedback"})
+    assert not client.feedback
+    driver.send(NOD.format("b"))
+    driver.run(20)
+    assert [f.seq for f in client.feedback] == list(range(told + 1, driver.session.feedback_log.newest + 1))
+
+
+def test_subscribe_to_feedback_filters_by_element(driver) -> None:
+    viewer = driver.join(2)
+    asked = {"type": "subscribe", "stream": "feedback", "elements": ["blockProgress"]}
+    assert driver.send(asked, 2).of("subscribed")[0]["elements"] == ["blockProgress"]
+    driver.send(NOD.format("b"))
+    driver.run(5)
+    assert viewer.ids == ["b:start", "b:end"]
+    assert len(driver.clients[1].ids) > 2
+    numbers = [f.seq for f in viewer.feedback]
+    assert numbers == sorted(numbers)
+    assert numbers != list(range(1, len(numbers) + 1)), "what was left out keeps its number"
+
+
+def test_subscribe_to_feedback_filters_by_character(driver) -> None:
+    viewer = driver.join(2)
+    driver.send({"type": "subscribe", "stream": "feedback", "character": "Ann"}, 2)
+    driver.send('<bml id="a" characterId="Ann"/>')
+    driver.send('<bml id="b" characterId="Bob"/>')
+    driver.send("<bml/>")
+    driver.run(1)
+    assert {f.character_id for f in viewer.feedback} == {"Ann", None}
+    assert not any("b:" in id for id in viewer.ids)
+
+
+def test_subscribe_to_feedback_without_elements_removes_the_filter(driver) -> None:
+    driver.send({"type": "subscribe", "stream": "feedback", "elements": ["warningFeedback"]})
+    driver.send({"type": "subscribe", "stream": "feedback"})
+    driver.send(NOD.format("b"))
+    driver.run(5)
+    assert "b:end" in driver.clients[1].ids
+
+
+def test_subscribe_to_feedback_refuses_an_unknown_element(driver) -> None:
+    told = driver.send({"type": "subscribe", "stream": "feedback", "elements": ["blockprogress"]})
+    assert told.of("error")[0]["code"] == "invalid"
+
+
+def test_subscribe_refuses_a_transparent_jpeg(driver) -> None:
+    client = driver.send(subscribe("video", background="transparent"))
+    assert client.of("error")[0]["where"] == "subscribe.background"
+    driver.send(subscribe("video", background="transparent", format="png"))
+    driver.run(0.05)
+    assert [draw.options.background for draw in driver.draws] == ["transparent"]
+
+
+def test_subscribe_names_the_known_cameras(driver) -> None:
+    (error,) = driver.send(subscribe("video", camera="moon")).of("error")
+    assert error["where"] == "subscribe.camera"
+    assert "front, three-quarter" in error["message"]

@@ -1,4 +1,4 @@
-"""Sound clips over the wire: pieces in order, limits in words, times that move the lips."""
+"""Sound clips: pieces in order, limits, annotations that move the lips."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def wav(pcm: np.ndarray) -> bytes:
     return buffer.getvalue()
 
 
-def test_pieces_of_pcm_are_one_recording_when_the_last_has_come() -> None:
+def test_add_chunk_joins_pieces_of_pcm() -> None:
     known = AudioClips()
     known.add_chunk(ClipPiece("c", 0, RATE, SOUND[:1000].tobytes(), final=False))
     assert not known.recordings
@@ -51,7 +51,7 @@ def test_pieces_of_pcm_are_one_recording_when_the_last_has_come() -> None:
     assert known.recordings["c"].rate == RATE
 
 
-def test_a_file_may_come_in_pieces_too_and_says_its_rate_itself() -> None:
+def test_add_chunk_joins_pieces_of_a_file() -> None:
     known, content = AudioClips(), wav(SOUND)
     known.add_chunk(ClipPiece("c", 0, 0, content[:777], final=False))
     known.add_chunk(ClipPiece("c", 1, 0, content[777:]))
@@ -59,7 +59,7 @@ def test_a_file_may_come_in_pieces_too_and_says_its_rate_itself() -> None:
     assert np.array_equal(known.recordings["c"].pcm, SOUND)
 
 
-def test_times_may_come_before_and_after_the_sound_and_in_parts() -> None:
+def test_annotate_accepts_times_before_and_after_the_sound() -> None:
     known = AudioClips()
     known.annotate(told(clip="c", words=[{"start": 0, "text": "Hi"}], final=False))
     known.add_chunk(ClipPiece("c", 0, RATE, SOUND.tobytes()))
@@ -73,7 +73,7 @@ def test_times_may_come_before_and_after_the_sound_and_in_parts() -> None:
     assert known.recordings["c"].words == (), "what is told anew replaces what was told"
 
 
-def test_a_clip_that_begins_anew_is_another() -> None:
+def test_add_chunk_replaces_a_clip_that_begins_anew() -> None:
     known = AudioClips()
     known.add_chunk(ClipPiece("c", 0, RATE, SOUND.tobytes()))
     known.annotate(told(clip="c", text="Hello"))
@@ -92,7 +92,7 @@ def test_a_clip_that_begins_anew_is_another() -> None:
         (ClipPiece("c", 0, 0, b"no sound at all"), "wanted"),
     ],
 )
-def test_a_piece_that_cannot_be_used_says_why(piece, says) -> None:
+def test_add_chunk_refuses_invalid_pieces(piece, says) -> None:
     known = AudioClips()
     with pytest.raises(ClipError, match=says) as error:
         known.add_chunk(piece)
@@ -100,7 +100,7 @@ def test_a_piece_that_cannot_be_used_says_why(piece, says) -> None:
     assert not known.recordings
 
 
-def test_too_much_sound_is_refused_and_the_oldest_clips_make_room(monkeypatch) -> None:
+def test_add_chunk_removes_the_oldest_clips(monkeypatch) -> None:
     monkeypatch.setattr(audio_clips, "MAX_BYTES", 100)
     known = AudioClips()
     known.add_chunk(ClipPiece("a", 0, RATE, bytes(60)))
@@ -119,7 +119,7 @@ def test_too_much_sound_is_refused_and_the_oldest_clips_make_room(monkeypatch) -
         ({"visemes": [{"start": 0, "viseme": 1}], "viseme_set": "mine"}, "speech.visemes"),
     ],
 )
-def test_times_that_cannot_be_used_say_where(fields, where) -> None:
+def test_annotate_names_the_field_of_invalid_times(fields, where) -> None:
     with pytest.raises(ClipError) as error:
         AudioClips().annotate(told(clip="c", **fields))
     assert error.value.where == where
@@ -129,7 +129,7 @@ def test_times_that_cannot_be_used_say_where(fields, where) -> None:
 
 
 def play(*messages, until: str = "b:end", **settings) -> list:
-    """What a service of its own sends up to a block progress."""
+    """Return the messages of a service up to a block progress."""
     got: list = []
 
     async def run() -> None:
@@ -153,7 +153,7 @@ def feedback(messages: list) -> list:
     return [parse_feedback(m) for m in messages if isinstance(m, str) and m.startswith("<")]
 
 
-def test_a_document_speaks_a_clip_with_the_times_that_were_told() -> None:
+def test_clips_are_spoken_with_their_annotated_times() -> None:
     got = play(
         {"type": "subscribe", "stream": "audio", "rate": RATE},
         pack_clip(ClipPiece("c1", 0, RATE, SOUND[:5000].tobytes(), final=False)),
@@ -178,7 +178,7 @@ def test_a_document_speaks_a_clip_with_the_times_that_were_told() -> None:
     assert np.array_equal(late.values, SOUND[first : first + len(late.values)])
 
 
-def test_visemes_of_another_voice_close_the_lips_when_they_say_so() -> None:
+def test_clips_move_lips_by_their_visemes() -> None:
     visemes = [{"start": 0, "viseme": 2}, {"start": 0.5, "viseme": 21}, {"start": 0.6, "viseme": 2}]
     got = play(
         {"type": "subscribe", "stream": "fap", "encoding": "json", "fps": 50},
@@ -195,7 +195,7 @@ def test_visemes_of_another_voice_close_the_lips_when_they_say_so() -> None:
     assert all(0.42 < t < 0.68 for t in closed)
 
 
-def test_a_clip_of_which_nobody_tells_opens_the_jaw_as_it_is_loud() -> None:
+def test_clips_without_annotation_move_the_jaw_by_loudness() -> None:
     sound = SOUND * (np.arange(RATE) < RATE // 2)
     got = play(
         {"type": "subscribe", "stream": "fap", "encoding": "json", "fps": 25},
@@ -210,7 +210,7 @@ def test_a_clip_of_which_nobody_tells_opens_the_jaw_as_it_is_loud() -> None:
     assert max(value for t, value in jaw.items() if 0.75 < t < 1.0) < 20
 
 
-def test_what_cannot_be_used_is_an_error_and_a_warning_and_the_connection_lives() -> None:
+def test_clips_that_are_invalid_cause_an_error_and_a_warning() -> None:
     got = play(
         pack_clip(ClipPiece("c", 3, RATE, SOUND.tobytes())),
         b"\x01\x01 no clip, but a header as long as one",

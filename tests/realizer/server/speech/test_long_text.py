@@ -1,4 +1,4 @@
-"""A long text grows part by part: exact where it is made, without seams, guessed where it is not."""
+"""Long texts synthesized in parts: exact times, seams without clicks, estimates of the rest."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def voice():
 
 
 def grown(voice, say: SpeechRequest) -> tuple[list[SpeechRequest], list[Utterance]]:
-    """The parts, and the utterance after each of them."""
+    """Return the parts, and the utterance after each of them."""
     growing, parts, made = LongText(say), [], []
     while (part := growing.next()) is not None:
         parts.append(part)
@@ -41,7 +41,7 @@ def grown(voice, say: SpeechRequest) -> tuple[list[SpeechRequest], list[Utteranc
     return parts, made
 
 
-def test_the_first_part_is_a_clause_and_all_of_them_are_the_text() -> None:
+def test_next_returns_a_clause_first_and_the_whole_text_in_parts() -> None:
     parts, _ = grown(SilentVoice(), SpeechRequest(TEXT, MARKS))
     assert parts[0].ssml == "When all of them had come to the house by the sea,"
     assert "".join(p.ssml for p in parts) == TEXT
@@ -49,7 +49,7 @@ def test_the_first_part_is_a_clause_and_all_of_them_are_the_text() -> None:
     assert all(PART <= len(p.ssml) < 2 * PART for p in parts[1:-1])
 
 
-def test_what_is_said_in_another_manner_is_so_in_each_part(voice) -> None:
+def test_next_repeats_prosody_around_each_part(voice) -> None:
     slow = SpeechRequest(f'<prosody rate="slow">{TEXT}</prosody>', MARKS)
     parts, made = grown(voice, slow)
     assert parts[0].ssml.count(" ") < 15
@@ -64,7 +64,7 @@ def test_what_is_said_in_another_manner_is_so_in_each_part(voice) -> None:
     assert all(p.ssml.count("<prosody") == p.ssml.count("</prosody") for p in grown(SilentVoice(), twice)[0])
 
 
-def test_what_is_made_does_not_change_when_more_comes(voice) -> None:
+def test_add_part_does_not_change_earlier_parts(voice) -> None:
     _, made = grown(voice, SpeechRequest(TEXT, MARKS))
     for before, after in pairwise(made):
         length = len(before.pcm)
@@ -76,8 +76,8 @@ def test_what_is_made_does_not_change_when_more_comes(voice) -> None:
     assert [w.text for w in made[-1].words] == [w.text for w in voice.say(SpeechRequest(TEXT, MARKS)).words]
 
 
-def test_marks_are_exact_against_the_sound(voice) -> None:
-    """Where a part stands in the sound of the whole, its own sound does, and its marks with it."""
+def test_add_part_places_marks_exactly(voice) -> None:
+    """Check that parts have their own sound and marks at their places in the whole."""
     parts, made = grown(voice, SpeechRequest(TEXT, MARKS))
     whole = made[-1]
     assert set(whole.marks) == set(MARKS)
@@ -90,7 +90,7 @@ def test_marks_are_exact_against_the_sound(voice) -> None:
             assert whole.marks[mark] - start == pytest.approx(alone.marks[mark], abs=1e-9)
 
 
-def test_the_seams_are_pauses_as_in_the_whole_and_do_not_click(voice) -> None:
+def test_add_part_joins_parts_at_pauses(voice) -> None:
     said, (parts, made) = voice.say(SpeechRequest(TEXT, MARKS)), grown(voice, SpeechRequest(TEXT, MARKS))
     joined = made[-1]
     assert joined.duration == pytest.approx(said.duration, abs=0.02 * len(parts))
@@ -104,7 +104,7 @@ def test_the_seams_are_pauses_as_in_the_whole_and_do_not_click(voice) -> None:
         assert steps[at - 1] < 0.01 * steps.max(), "and begins softly"
 
 
-def test_the_end_and_the_marks_that_are_to_come_are_guessed(voice) -> None:
+def test_add_part_estimates_the_end_and_missing_marks(voice) -> None:
     _, made = grown(voice, SpeechRequest(TEXT, MARKS))
     end = made[-1].duration
     assert [abs(u.duration / end - 1) < 0.25 for u in made] == [True] * len(made)
@@ -114,7 +114,7 @@ def test_the_end_and_the_marks_that_are_to_come_are_guessed(voice) -> None:
         assert sorted(u.marks, key=lambda m: u.marks[m]) == list(MARKS)
 
 
-def test_a_part_that_comes_late_leaves_silence_before_it(voice) -> None:
+def test_add_part_leaves_silence_before_a_late_part(voice) -> None:
     growing = LongText(SpeechRequest(TEXT, MARKS))
     first = growing.add_part(voice.say(growing.next()))
     made = growing.ready_until
@@ -127,7 +127,7 @@ def test_a_part_that_comes_late_leaves_silence_before_it(voice) -> None:
     assert second.words[len(first.words)].start >= start
 
 
-def test_a_voice_that_fails_in_between_leaves_silence(voice) -> None:
+def test_add_part_accepts_a_part_without_sound(voice) -> None:
     growing = LongText(SpeechRequest(TEXT))
     growing.add_part(SilentVoice().say(growing.next()))
     made = growing.ready_until
@@ -137,7 +137,7 @@ def test_a_voice_that_fails_in_between_leaves_silence(voice) -> None:
     assert loud.pcm[round(made * loud.sample_rate) :].any()
 
 
-def test_parts_at_another_rate_sound_at_the_first_ones() -> None:
+def test_add_part_resamples_to_the_rate_of_the_first_part() -> None:
     growing = LongText(SpeechRequest(TEXT))
     growing.next()
     tone = np.full(800, 1000, np.int16)
@@ -153,7 +153,7 @@ def test_parts_at_another_rate_sound_at_the_first_ones() -> None:
         st.sampled_from(['<mark name="m"/>', "One. ", "two, ", "<p>", "</p>", "&amp;", " "]), max_size=80
     )
 )
-def test_any_text_is_made_to_its_end(pieces) -> None:
+def test_long_text_completes_any_text(pieces) -> None:
     say = SpeechRequest("".join(pieces), ("m",))
     parts, made = grown(SilentVoice(), say)
     assert "".join("".join(p.ssml for p in parts).split()) == "".join(say.ssml.split())
@@ -162,7 +162,7 @@ def test_any_text_is_made_to_its_end(pieces) -> None:
         assert replace(made[-1], sections=()).sections == ()
 
 
-def test_what_is_said_louder_stays_louder_when_more_comes() -> None:
+def test_add_part_keeps_volumes() -> None:
     class Loud(SilentVoice):
         def say(self, request: SpeechRequest) -> Utterance:
             made = super().say(request)

@@ -1,4 +1,4 @@
-"""A text that comes piece by piece is spoken sentence by sentence."""
+"""Splitting of text that arrives in chunks into sentences."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from realizer.server.speech.sentence_splitter import SentenceSplitter
 
 
 def cut(text: str, *, close: bool = True) -> list[str]:
-    """What is given out where the text comes letter by letter."""
+    """Return the pieces of a text that is fed letter by letter."""
     clauses = SentenceSplitter()
     pieces = [piece for letter in text for piece in clauses.feed(letter)]
     return [p.strip() for p in (pieces + (clauses.feed("", close=True) if close else []))]
@@ -29,11 +29,11 @@ def cut(text: str, *, close: bool = True) -> list[str]:
         ("   ", []),
     ],
 )
-def test_sentences_end_where_people_end_them(text, pieces) -> None:
+def test_feed_splits_sentences(text, pieces) -> None:
     assert cut(text) == pieces
 
 
-def test_a_sentence_is_spoken_when_a_blank_follows_it_and_not_before() -> None:
+def test_feed_waits_for_white_space_after_a_sentence() -> None:
     clauses = SentenceSplitter()
     assert clauses.feed("Hello the") == []
     assert clauses.feed("re.") == []
@@ -41,7 +41,7 @@ def test_a_sentence_is_spoken_when_a_blank_follows_it_and_not_before() -> None:
     assert clauses.feed("", close=True) == [" How"]
 
 
-def test_tags_behind_a_sentence_are_part_of_it_and_those_behind_a_blank_are_not() -> None:
+def test_feed_keeps_tags_directly_behind_a_sentence() -> None:
     assert cut('One.<sync id="a"/> Two. <head id="n"/>Three.') == [
         'One.<sync id="a"/>',
         "Two.",
@@ -49,7 +49,7 @@ def test_tags_behind_a_sentence_are_part_of_it_and_those_behind_a_blank_are_not(
     ]
 
 
-def test_an_element_is_never_divided() -> None:
+def test_feed_never_splits_an_element() -> None:
     text = (
         'So <emphasis level="strong">this. And that. </emphasis>it is. '
         '<face id="f"><lexeme a=". "/></face> End'
@@ -60,7 +60,7 @@ def test_an_element_is_never_divided() -> None:
     ]
 
 
-def test_the_first_piece_may_be_a_clause_and_long_sentences_are_divided() -> None:
+def test_feed_splits_first_and_long_sentences_into_clauses() -> None:
     clause = "when all of them had come to the old house by the sea, "
     pieces = cut(clause * 12)
     assert pieces[0] == clause.strip()
@@ -70,7 +70,7 @@ def test_the_first_piece_may_be_a_clause_and_long_sentences_are_divided() -> Non
 
 
 @given(st.lists(st.text(alphabet='ab.,!? <>/"=\n', max_size=12), max_size=12))
-def test_the_pieces_together_are_the_text(parts) -> None:
+def test_feed_returns_the_whole_text_in_pieces(parts) -> None:
     clauses = SentenceSplitter()
     pieces = [piece for part in parts for piece in clauses.feed(part)] + clauses.feed("", close=True)
     assert "".join("".join(pieces).split()) == "".join("".join(parts).split())

@@ -1,4 +1,4 @@
-"""A piece of a speech as a block: syncs, SSML, behaviours where they stand."""
+"""Blocks of chunks: syncs, SSML, behaviours at their places."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def said(block: Block) -> str:
     return str(block["turn"].text)
 
 
-def test_a_text_is_a_speech_with_its_syncs() -> None:
+def test_text_block_is_a_speech_with_its_syncs() -> None:
     block = text_block('R&D, 1 < 2: <sync id="m"/>"so &amp; so".', PIECE)
     assert block.id == "turn.2"
     assert said(block) == 'R&D, 1 < 2: "so & so".'
@@ -25,7 +25,7 @@ def test_a_text_is_a_speech_with_its_syncs() -> None:
     assert block.problems == ()
 
 
-def test_a_behaviour_without_references_starts_where_it_stands() -> None:
+def test_text_block_starts_a_behaviour_at_its_place() -> None:
     block = text_block('<head lexeme="NOD"/>Yes <faceLexeme lexeme="SMILE"/>indeed.', PIECE)
     nod, smile = block["b1"], block["b2"]
     assert nod.syncs["start"].offset == 0
@@ -34,20 +34,20 @@ def test_a_behaviour_without_references_starts_where_it_stands() -> None:
     assert said(block) == "Yes indeed."
 
 
-def test_a_behaviour_with_references_is_taken_as_it_is() -> None:
+def test_text_block_keeps_references_of_behaviours() -> None:
     block = text_block('Yes <sync id="m"/>indeed. <head id="n" lexeme="NOD" stroke="turn:m"/>', PIECE)
     assert list(block["n"].syncs) == ["stroke"]
     assert block["turn"].marked == ("m",)
 
 
-def test_a_reference_to_an_earlier_piece_finds_its_block() -> None:
+def test_text_block_resolves_references_to_earlier_chunks() -> None:
     piece = Chunk("turn", 3, marks={"m": "turn.1"})
     block = text_block('And <head id="n" lexeme="NOD" start="turn:m + 1" end="turn:end"/>so.', piece)
     assert (block["n"].syncs["start"].block, block["n"].syncs["start"].offset) == ("turn.1", 1)
     assert block["n"].syncs["end"].block is None
 
 
-def test_ssml_goes_to_the_voice_and_unknown_tags_nowhere() -> None:
+def test_text_block_keeps_ssml_and_removes_unknown_tags() -> None:
     block = text_block('A <b>bold</b> <emphasis level="strong">word</emphasis> <sync id="m"/>here', PIECE)
     (description,) = block["turn"].descriptions
     assert '<emphasis level="strong">word</emphasis>' in description.content
@@ -56,7 +56,7 @@ def test_ssml_goes_to_the_voice_and_unknown_tags_nowhere() -> None:
     assert said(block) == "A bold word here"
 
 
-def test_elements_with_an_inside_and_with_prefixes_are_read() -> None:
+def test_text_block_reads_content_and_prefixes() -> None:
     block = text_block(
         'Oh <face><faceLexeme lexeme="SMILE"/></face>no <realizer:emotion name="joy"/>yes', PIECE
     )
@@ -64,7 +64,7 @@ def test_elements_with_an_inside_and_with_prefixes_are_read() -> None:
     assert block.problems == ()
 
 
-def test_behaviours_alone_are_a_block_without_speech() -> None:
+def test_text_block_of_behaviours_alone_has_no_speech() -> None:
     block = text_block(' <head id="n" lexeme="NOD"/> ', PIECE)
     assert [node.id for node in block.behaviours] == ["n"]
 
@@ -72,27 +72,27 @@ def test_behaviours_alone_are_a_block_without_speech() -> None:
 @pytest.mark.parametrize(
     "text", ["<head lexeme='NOD'>Well", "<emphasis>Well", "Well</p>", "<x:head y='1'/>Well"]
 )
-def test_what_is_no_xml_is_spoken_without_its_tags(text) -> None:
+def test_text_block_speaks_invalid_xml_without_tags(text) -> None:
     assert said(text_block(text, PIECE)).strip() == "Well"
 
 
-def test_character_and_language_are_told() -> None:
+def test_text_block_has_character_and_language() -> None:
     block = text_block("Ja", Chunk("turn", 1, character="Eva", language="de"))
     assert block.character_id == "Eva"
     assert block["turn"].text.language == "de"
 
 
-def test_a_clip_is_a_speech_too() -> None:
+def test_clip_block_is_a_speech() -> None:
     assert 'fileName="clip:c1"' in write(clip_block("c1", PIECE))
 
 
 @given(st.text(alphabet='ab<>/="&;sync \x00\ud800', max_size=60))
-def test_any_text_gives_a_block(text) -> None:
+def test_text_block_accepts_any_text(text) -> None:
     assert text_block(text, PIECE).id == "turn.2"
 
 
 @pytest.mark.parametrize("syncs", ['<sync id=""/>', '<sync id="m"/>some <sync id="m"/>', '<sync id="a b"/>'])
-def test_a_sync_that_cannot_be_is_told_and_costs_no_word(syncs: str) -> None:
+def test_text_block_speaks_all_words_despite_invalid_syncs(syncs: str) -> None:
     block = text_block(f'Have {syncs}tea <head id="n" lexeme="NOD" start="1"/>here.', PIECE)
     assert said(block).split()[-2:] == ["tea", "here."]
     assert ["/sync[" in p.path or "sync" in p.text for p in block.problems] == [True]
@@ -100,6 +100,6 @@ def test_a_sync_that_cannot_be_is_told_and_costs_no_word(syncs: str) -> None:
 
 
 @pytest.mark.parametrize("tag", ['<sync id="m', "<sync", "</prosody", '<realizer:emotion name="joy'])
-def test_a_tag_that_breaks_off_is_not_spoken(tag: str) -> None:
+def test_text_block_removes_an_incomplete_tag(tag: str) -> None:
     assert said(text_block(f"Good morning. {tag}", PIECE)).strip() == "Good morning."
     assert said(text_block("Is a <b?", PIECE)) == "Is a <b?"

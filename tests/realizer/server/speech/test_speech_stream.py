@@ -1,4 +1,4 @@
-"""One speech piece by piece: what it is made of, what waits, and what is left of it."""
+"""One streaming speech: its chunks and their states."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def turn(text: str = "", *, close: bool = False) -> SpeechStream:
     return made
 
 
-def test_its_own_block_waits_for_its_anticipator_and_is_composed_as_was_asked() -> None:
+def test_own_block_waits_for_its_anticipator() -> None:
     speech = turn("One. Two.")
     block = speech.own_block()
     assert (block.id, block.composition, block.character_id) == ("turn", "MERGE", "bob")
@@ -26,7 +26,7 @@ def test_its_own_block_waits_for_its_anticipator_and_is_composed_as_was_asked() 
     assert speech.open_chunks == []  # it is no piece
 
 
-def test_pieces_are_numbered_and_owed_until_they_are_planned() -> None:
+def test_next_chunk_numbers_blocks() -> None:
     speech = turn("One. Two. ")
     assert [speech.next_chunk().id, speech.next_chunk().id] == ["turn.1", "turn.2"]
     assert (speech.unplanned, speech.scheduled) == (["turn.1", "turn.2"], [])
@@ -43,7 +43,7 @@ def test_pieces_are_numbered_and_owed_until_they_are_planned() -> None:
     assert speech.open_chunks == []
 
 
-def test_what_is_not_whole_waits_until_it_is_closed() -> None:
+def test_add_holds_back_an_incomplete_sentence() -> None:
     speech = turn("One. And tw")
     assert speech.unspoken_length == len("One.")
     speech.add("o", None)
@@ -52,7 +52,7 @@ def test_what_is_not_whole_waits_until_it_is_closed() -> None:
     assert speech.unspoken_length == len("One. And two")
 
 
-def test_a_clip_ends_the_text_before_it_and_is_no_character_that_waits() -> None:
+def test_add_ends_the_text_before_a_clip() -> None:
     speech = turn()
     speech.add("Listen", "c1")
     assert speech.unspoken_length == len("Listen")
@@ -67,14 +67,12 @@ def test_a_clip_ends_the_text_before_it_and_is_no_character_that_waits() -> None
     ("text", "close", "part"),
     [("One, ", False, True), ("One. ", False, False), ("One", True, False)],
 )
-def test_a_piece_is_part_of_a_sentence_while_more_of_that_may_come(
-    text: str, close: bool, part: bool
-) -> None:
+def test_next_chunk_marks_parts_of_a_sentence(text: str, close: bool, part: bool) -> None:
     speech = turn(f"{text}{'two and three, ' * 20 if part else ''}", close=close)
     assert (speech.next_chunk().id in speech.partial_chunks) is part
 
 
-def test_a_sync_is_lacking_until_its_piece_is_planned_or_nothing_follows() -> None:
+def test_awaits_sync_until_its_chunk_is_planned() -> None:
     speech = turn('See <sync id="m"/>this. ')
     assert speech.awaits_sync("m")
     speech.next_chunk()
@@ -87,7 +85,7 @@ def test_a_sync_is_lacking_until_its_piece_is_planned_or_nothing_follows() -> No
     assert not speech.awaits_sync("never")
 
 
-def test_a_piece_knows_the_syncs_of_those_before_it() -> None:
+def test_next_chunk_knows_the_syncs_of_earlier_chunks() -> None:
     speech = turn('See <sync id="m"/>this. Nod <head lexeme="NOD" start="turn:m"/>now. ')
     speech.next_chunk()
     assert 'start="turn.1:turn:m"' in write(speech.next_chunk())

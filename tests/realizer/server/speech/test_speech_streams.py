@@ -1,4 +1,4 @@
-"""A speech that comes piece by piece: heard as it comes, syncs and behaviours in time, cut off at once."""
+"""Streaming speeches: spoken as text arrives, with syncs and behaviours, and interrupted immediately."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ EACH = 0.5  # s a piece
 
 
 class Talker(Driver):
-    """A voice that says each piece in half a second, with words and marks evenly spread."""
+    """A voice that speaks each chunk in half a second, with evenly spaced words and marks."""
 
     def do(self, effect: Effect) -> None:
         if not isinstance(effect, Speak) or self.mute:
@@ -60,7 +60,7 @@ def said(order: Speak) -> Utterance:
 
 
 def times(client: Client) -> dict[str, float]:
-    """When everything that was told of happened."""
+    """Return the times of all feedback."""
     told = (f for f in client.feedback if isinstance(f, BlockProgress | SyncPointProgress))
     return {f.id: f.global_time for f in told}
 
@@ -69,7 +69,7 @@ def texts(driver: Driver) -> list[str]:
     return [order.request.ssml.strip() for order in driver.spoken]
 
 
-def test_a_sentence_is_heard_when_it_is_whole_and_the_next_follows_it() -> None:
+def test_speech_streams_speak_each_complete_sentence() -> None:
     driver = Talker()
     for token in ("Hel", "lo the", "re.", " How are", " you", "?"):
         driver.append(token)
@@ -85,7 +85,7 @@ def test_a_sentence_is_heard_when_it_is_whole_and_the_next_follows_it() -> None:
     assert list(at)[-1] == "turn:end"
 
 
-def test_a_text_that_comes_late_is_said_when_it_comes() -> None:
+def test_speech_streams_speak_late_text_when_it_arrives() -> None:
     driver = Talker()
     driver.append("One. ")
     driver.run(3.0)
@@ -95,7 +95,7 @@ def test_a_text_that_comes_late_is_said_when_it_comes() -> None:
     assert at["turn:end"] == pytest.approx(3.5, abs=2e-3)
 
 
-def test_behaviours_and_syncs_in_the_text_come_at_their_place() -> None:
+def test_speech_streams_place_behaviours_and_syncs_of_the_text() -> None:
     driver = Talker()
     driver.append('One. Yes <sync id="m"/>two <head lexeme="NOD"/>three. ')
     driver.append('Four <head id="n" lexeme="NOD" stroke="turn:m + 1"/>five.', close=True)
@@ -104,7 +104,7 @@ def test_behaviours_and_syncs_in_the_text_come_at_their_place() -> None:
     assert at["turn.3:n:stroke"] == pytest.approx(at["turn.2:turn:m"] + 1)
 
 
-def test_a_document_names_a_sync_of_the_speech_before_and_after_it_has_come() -> None:
+def test_with_links_resolves_syncs_before_and_after_they_arrive() -> None:
     driver = Talker()
     driver.append("One. ")
     for n in (1, 2):
@@ -118,7 +118,7 @@ def test_a_document_names_a_sync_of_the_speech_before_and_after_it_has_come() ->
     assert at["b1:n:stroke"] == at["b2:n:stroke"] == pytest.approx(at["turn.2:turn:m"])
 
 
-def test_a_sync_that_never_comes_costs_what_names_it_and_nothing_else() -> None:
+def test_awaits_sync_ends_when_the_speech_is_closed() -> None:
     driver = Talker()
     driver.append("One. ")
     driver.send(
@@ -132,14 +132,14 @@ def test_a_sync_that_never_comes_costs_what_names_it_and_nothing_else() -> None:
     assert "turn:end" in at
 
 
-def test_a_speech_that_ends_without_a_word_is_no_fault() -> None:
+def test_speech_streams_accept_a_speech_without_words() -> None:
     driver = Talker()
     told = [*driver.send({"type": "speech", "id": "turn", "close": True}).feedback, *driver.run(1).feedback]
     assert [f.status for f in told if isinstance(f, BlockProgress) and f.id == "turn:end"] == ["DONE"]
     assert not [f for f in told if isinstance(f, WarningFeedback)]
 
 
-def test_others_follow_the_speech_as_one_block() -> None:
+def test_speech_streams_are_followed_as_one_block() -> None:
     driver = Talker()
     driver.append("One. ")
     driver.send('<bml id="after" composition="APPEND"><wait id="w" duration="1"/></bml>')
@@ -150,7 +150,7 @@ def test_others_follow_the_speech_as_one_block() -> None:
     assert at["with:w:start"] == pytest.approx(at["turn:end"])
 
 
-def test_a_speech_follows_what_plays_and_its_pieces_too() -> None:
+def test_speech_streams_follow_playing_blocks() -> None:
     driver = Talker()
     driver.send('<bml id="first"><wait id="w" duration="2"/></bml>')
     driver.append("One. Two.", close=True)
@@ -160,7 +160,7 @@ def test_a_speech_follows_what_plays_and_its_pieces_too() -> None:
     assert driver.run(12).feedback[-1].id == "turn:end"
 
 
-def test_a_long_text_is_made_a_few_pieces_ahead_and_all_of_it_is_said() -> None:
+def test_next_prepares_a_few_chunks_ahead() -> None:
     driver = Talker(max_blocks=12)
     driver.append("".join(f"This is {n}. " for n in range(40)), close=True)
     assert len(driver.spoken) == speech_streams.AHEAD
@@ -171,7 +171,7 @@ def test_a_long_text_is_made_a_few_pieces_ahead_and_all_of_it_is_said() -> None:
     assert at["turn:end"] == pytest.approx(20.0, abs=2e-3)
 
 
-def test_between_the_pieces_of_a_sentence_is_the_pause_of_a_comma() -> None:
+def test_is_streaming_shortens_pauses_inside_a_sentence() -> None:
     class Slow(Talker):
         """A voice that ends whatever it says as it ends a sentence."""
 
@@ -194,7 +194,7 @@ def test_between_the_pieces_of_a_sentence_is_the_pause_of_a_comma() -> None:
     assert at["turn.3:end"] - at["turn.3:start"] == pytest.approx(EACH), "nothing follows the last one"
 
 
-def test_the_end_is_told_as_soon_as_it_is_known() -> None:
+def test_advance_predicts_the_end_once_it_is_known() -> None:
     driver = Talker()
     driver.append("One. Two.")
     driver.append(close=True)
@@ -217,7 +217,7 @@ CUTS = [
 
 
 @pytest.mark.parametrize("how", CUTS)
-def test_an_interruption_stops_the_sound_in_50_ms_says_what_was_said_and_lets_nothing_follow(how) -> None:
+def test_process_feedback_reports_the_words_of_an_interrupted_speech(how) -> None:
     driver = Talker()
     driver.send({"type": "subscribe", "stream": "audio", "rate": RATE})
     driver.append("One two three. Four five six. Seven eight. ")
@@ -242,7 +242,7 @@ def test_an_interruption_stops_the_sound_in_50_ms_says_what_was_said_and_lets_no
     assert "turn:end" in [getattr(f, "id", "") for f in driver.run(9.0).feedback[-1:]]
 
 
-def test_the_face_of_an_interrupted_speech_relaxes() -> None:
+def test_speech_streams_relax_the_face_after_an_interruption() -> None:
     driver = Talker(idle=False)
     driver.append('<faceLexeme lexeme="SMILE" end="turn:end"/>One two three. Four five six. ')
     driver.run(0.3)
@@ -254,7 +254,7 @@ def test_the_face_of_an_interrupted_speech_relaxes() -> None:
     assert not shown.faps.any()
 
 
-def test_a_piece_that_was_cut_off_alone_lets_the_others_follow() -> None:
+def test_speech_streams_continue_after_an_interrupted_chunk() -> None:
     driver = Talker()
     driver.append("One two. Three four. ", close=True)
     driver.run(0.2)
@@ -264,7 +264,7 @@ def test_a_piece_that_was_cut_off_alone_lets_the_others_follow() -> None:
     assert at["turn:end"] == pytest.approx(0.7, abs=2e-3)
 
 
-def test_clips_are_said_between_texts() -> None:
+def test_speech_streams_play_clips_between_texts() -> None:
     driver = Talker()
     sound = (np.arange(8000) % 9000).astype("<i2").tobytes()
     driver.session.receive(1, pack_clip(ClipPiece("c", 0, 8000, sound)), driver.opened)
@@ -276,7 +276,7 @@ def test_clips_are_said_between_texts() -> None:
     assert starts == pytest.approx([0, EACH, EACH + 1.0])
 
 
-def test_whoever_leaves_is_heard_to_the_end_of_what_came() -> None:
+def test_on_disconnect_speaks_the_rest_of_the_text() -> None:
     driver = Talker(named=True)
     driver.join(2)
     driver.send({"type": "speech", "id": "turn", "append": "One. Two and"})
@@ -294,7 +294,7 @@ def test_whoever_leaves_is_heard_to_the_end_of_what_came() -> None:
         ([{"append": "x" * 30}], "speech.append"),
     ],
 )
-def test_what_cannot_be_followed_is_an_error_that_says_where(monkeypatch, messages, where) -> None:
+def test_handle_names_the_field_of_an_invalid_message(monkeypatch, messages, where) -> None:
     monkeypatch.setattr(speech_streams, "MOST", 20)
     driver = Talker()
     for message in messages:
@@ -302,7 +302,7 @@ def test_what_cannot_be_followed_is_an_error_that_says_where(monkeypatch, messag
     assert [e["where"] for e in client.of("error")] == [where]
 
 
-def test_a_speech_whose_id_is_a_block_that_plays_is_refused_and_says_nothing() -> None:
+def test_on_refused_ends_a_speech_with_the_id_of_a_block() -> None:
     driver = Talker()
     driver.send('<bml id="turn"><wait id="w" duration="3"/></bml>')
     driver.append("One. ")
@@ -328,7 +328,7 @@ ACTS = st.lists(
 
 @settings(max_examples=60, deadline=None)
 @given(ACTS)
-def test_in_any_order_every_block_that_starts_ends_and_nothing_is_left(acts) -> None:
+def test_speech_streams_end_every_block_in_any_order(acts) -> None:
     driver = Talker()
     for act, what in acts:
         match act:
@@ -355,7 +355,7 @@ def test_in_any_order_every_block_that_starts_ends_and_nothing_is_left(acts) -> 
 
 
 async def spoken_over(socket, last: str) -> list[str | bytes]:
-    """Messages up to the block progress `last`."""
+    """Return the messages up to the block progress `last`."""
     got: list[str | bytes] = []
     async for message in socket:
         got.append(message)
@@ -365,7 +365,7 @@ async def spoken_over(socket, last: str) -> list[str | bytes]:
 
 
 def streamed(test) -> list[str | bytes]:
-    """What a client got of a service that speaks."""
+    """Return the messages that a client received from a service."""
 
     async def run() -> list[str | bytes]:
         async with (
@@ -389,7 +389,7 @@ def packets(messages: list[str | bytes]):
 
 
 @pytest.mark.espeak
-def test_a_speech_streams_over_a_websocket() -> None:
+def test_speech_streams_run_over_a_websocket() -> None:
     async def talk(socket) -> list[str | bytes]:
         for token in ("One ", 'and <sync id="m"/>', "two. ", "And ", "three."):
             await socket.send(json.dumps({"type": "speech", "id": "turn", "append": token}))
@@ -407,7 +407,7 @@ def test_a_speech_streams_over_a_websocket() -> None:
 
 
 @pytest.mark.espeak
-def test_a_barge_in_over_a_websocket_leaves_no_sound_50_ms_later() -> None:
+def test_speech_streams_stop_within_50_ms_over_a_websocket() -> None:
     async def barge_in(socket) -> list[str | bytes]:
         text = 'Well, <sync id="m"/>this is a rather long sentence, which nobody wants to hear to its end. '
         await socket.send(json.dumps({"type": "speech", "id": "turn", "append": text * 3}))

@@ -1,4 +1,4 @@
-"""Sound is made in blocks, of which nothing is to be heard."""
+"""Sound mixed in blocks equals sound mixed as a whole."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tests.realizer.server.conftest import RATE, Driver
 
 @pytest.mark.parametrize("rate", [8000, 16000, 22050, 48000])
 @pytest.mark.parametrize("stopped", [None, 3.99, 4.5, 9.02])
-def test_sound_made_block_by_block_is_that_of_a_film(rate: int, stopped: float | None) -> None:
+def test_packet_equals_a_slice_of_the_whole_sound(rate: int, stopped: float | None) -> None:
     driver = Driver(mute=True)
     driver.send('<bml id="b"><speech id="s"><text>Hello</text></speech></bml>')
     driver.run(0.013)

@@ -1,19 +1,29 @@
-"""Frames that follow each other: each once, at its time, and none where there is more to do."""
+"""Frames for subscribers: each once, at its time, and by the fast path."""
 
 from __future__ import annotations
+
+import gc
 
 import numpy as np
 import pytest
 
 from realizer.core.options import PlayOptions
 from realizer.playback.player import Player
+from realizer.protocol.streams import STREAMS
 from realizer.protocol.wire import unpack
+from realizer.server.streams.audio_stream import AudioStream
 from realizer.server.streams.broadcast import FrameRun
 from realizer.server.streams.frame_windows import FrameSubscription, FrameTimeline, PackedFrames
+from tests.realizer.server.conftest import NOD
 
+FAP = {"type": "subscribe", "stream": "fap"}
 FPS = 25.0
 ZERO = 100.0
 FRAMES = 10
+
+
+def subscribe(stream: str, **fields):
+    return {"type": "subscribe", "stream": stream, **fields}
 
 
 def run(until: float = float("inf"), following: int = 0) -> tuple[FrameRun, FrameSubscription]:
@@ -29,7 +39,7 @@ def at(frame: float) -> float:
     return ZERO + frame / FPS
 
 
-def test_each_frame_is_given_once_at_its_time() -> None:
+def test_next_message_returns_each_frame_once_at_its_time() -> None:
     frames, subscription = run()
     for number in range(FRAMES):
         assert frames.wake_at == pytest.approx(at(number))
@@ -42,23 +52,83 @@ def test_each_frame_is_given_once_at_its_time() -> None:
         assert subscription.next == number + 1
 
 
-def test_behind_the_last_there_is_none() -> None:
+def test_next_message_returns_none_after_the_last_frame() -> None:
     frames, _ = run(following=FRAMES - 1)
     assert frames.next_message(at(FRAMES - 1)) is not None
     assert frames.next_message(at(FRAMES)) is None
 
 
-def test_where_more_than_one_is_due_the_session_is_wanted() -> None:
+def test_next_message_returns_none_if_two_frames_are_due() -> None:
     frames, subscription = run()
     assert frames.next_message(at(1)) is None
     assert frames.next_message(at(0.99)) is not None
     assert subscription.next == 1
 
 
-def test_where_something_else_is_due_the_session_is_wanted() -> None:
+def test_next_message_returns_none_if_another_event_is_due() -> None:
     frames, _ = run(until=at(1.5))
     assert frames.next_message(at(0)) is not None
     assert frames.next_message(at(1)) is not None
     assert frames.wake_at == at(1.5)
     assert frames.next_message(at(1.5)) is None
     assert frames.next_message(at(2)) is None
+
+
+def test_broadcast_numbers_frames_by_the_clock_and_sends_them_in_time(driver) -> None:
+    driver.run(0.5)
+    driver.send({**FAP, "fps": 25})
+    client = driver.run(2.0)
+    frames = client.frames
+    assert [f.frame for f in frames] == list(range(13, 51))
+    sent = client.times[-len(frames) :]
+    assert [f.time for f in frames] == pytest.approx(sent, abs=1e-4)
+    assert all(len(f.values) == 68 for f in frames)
+
+
+def test_broadcast_drops_and_counts_frames_of_a_slow_client(driver) -> None:
+    driver.session.update_backlog(1, 10**6)
+    driver.send(FAP)
+    driver.send(NOD.format("b"))
+    client = driver.run(10)
+    assert not client.frames
+    assert "b:end" in client.ids
+    driver.session.update_backlog(1, 0)
+    driver.run(11)
+    assert [f.frame for f in client.frames] == list(range(251, 276))
+    driver.send({"type": "state"})
+    assert client.of("state")[0]["dropped"] == 251
+
+
+def test_broadcast_skips_late_frames_after_a_stall(driver) -> None:
+    driver.send({**FAP, "fps": 25})
+    driver.now = 5.0
+    driver.session.tick(driver.opened + 5.0)
+    driver.collect()
+    numbers = [f.frame for f in driver.clients[1].frames]
+    assert numbers[-1] == 125
+    assert len(numbers) < 20
+
+
+def test_broadcast_sends_all_streams_side_by_side(driver) -> None:
+    for stream, rate in (("fap", 25), ("au", 50), ("arkit", 10), ("mesh", 5)):
+        driver.send(subscribe(stream, fps=rate))
+    counts = dict.fromkeys(STREAMS, 0)
+    for frame in driver.run(1.0).frames:
+        counts[frame.stream] += 1
+    rates = {"fap": 25, "au": 50, "arkit": 10, "mesh": 5}
+    assert {stream: count for stream, count in counts.items() if count} == {
+        k: n + 1 for k, n in rates.items()
+    }
+
+
+def test_broadcast_forgets_timelines_without_subscribers(driver) -> None:
+    def alive() -> int:
+        gc.collect()
+        return sum(isinstance(o, FrameTimeline | AudioStream) for o in gc.get_objects())
+
+    before = alive()
+    for k in range(20):
+        driver.send(subscribe("fap", fps=10 + k / 7))
+        driver.send(subscribe("audio", rate=8000 + 50 * k))
+        driver.run(driver.now + 0.05)
+    assert alive() == before + 2

@@ -1,4 +1,4 @@
-"""The stream `schedule`: the whole state first, then every change, once and in order."""
+"""The stream `schedule`: all blocks first, then every change, once and in order."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ DOCUMENTS = (
 
 
 def states(client) -> list[tuple[str, str]]:
-    """(block, state) of all that was told, in order."""
+    """Return (block, state) of all messages, in order."""
     return [(b["block"], b["state"]) for m in client.of("schedule") for b in m["blocks"]]
 
 
 def known(client) -> dict[str, dict[str, Any]]:
-    """What a client knows that keeps what it was told last."""
+    """Return the state of a client that applies all messages."""
     blocks: dict[str, dict[str, Any]] = {}
     for message in client.of("schedule"):
         if message["whole"]:
@@ -46,7 +46,7 @@ def ends(block: dict[str, Any]) -> dict[str, float]:
     return {b["id"]: b["syncs"][-1]["at"] for b in block["behaviours"]}
 
 
-def test_a_subscription_begins_with_what_plays_and_what_waits(driver) -> None:
+def test_schedule_stream_begins_with_all_blocks(driver) -> None:
     driver.send(WAIT.format("a", "", 3))
     driver.send(WAIT.format("b", ' composition="APPEND"', 2))
     driver.run(1.0)
@@ -65,12 +65,12 @@ def test_a_subscription_begins_with_what_plays_and_what_waits(driver) -> None:
     ]
 
 
-def test_while_nothing_plays_the_whole_state_is_empty(driver) -> None:
+def test_schedule_stream_begins_empty_without_blocks(driver) -> None:
     client = driver.send(SCHEDULE)
     assert [m["blocks"] for m in client.of("schedule")] == [[]]
 
 
-def test_a_block_is_told_when_it_is_planned_starts_and_ends(driver) -> None:
+def test_schedule_stream_sends_a_block_when_planned_started_and_ended(driver) -> None:
     client = driver.send(SCHEDULE)
     driver.send(WAIT.format("a", "", 1))
     driver.send(WAIT.format("b", ' composition="APPEND"', 1))
@@ -90,7 +90,7 @@ def test_a_block_is_told_when_it_is_planned_starts_and_ends(driver) -> None:
     assert (begins["time"], ends["time"]) == pytest.approx((1.0, 2.0), abs=1e-5)
 
 
-def test_what_is_told_comes_when_it_happens_and_nothing_between(driver) -> None:
+def test_schedule_stream_sends_changes_when_they_happen(driver) -> None:
     client = driver.send(SCHEDULE)
     driver.send(WAIT.format("a", "", 1))
     count = len(client.messages)
@@ -98,7 +98,7 @@ def test_what_is_told_comes_when_it_happens_and_nothing_between(driver) -> None:
     assert len(client.messages) == count
 
 
-def test_a_block_that_moves_because_another_ends_is_told_with_its_new_times(driver) -> None:
+def test_schedule_stream_sends_a_block_that_another_one_moves(driver) -> None:
     client = driver.send(SCHEDULE)
     driver.send(WAIT.format("a", "", 3))
     driver.send(WAIT.format("b", ' composition="APPEND"', 2))
@@ -108,7 +108,7 @@ def test_a_block_that_moves_because_another_ends_is_told_with_its_new_times(driv
     assert ends(known(client)["b"]) == {"w": 3.0}
 
 
-def test_an_anticipated_point_that_moves_moves_what_is_told(driver) -> None:
+def test_schedule_stream_sends_blocks_that_an_anticipated_point_moves(driver) -> None:
     client = driver.send(SCHEDULE)
     driver.send({"type": "anticipate", "id": "music", "syncs": {"beat": 2.0}})
     driver.send('<bml id="a"><head id="n" lexeme="NOD" stroke="anticipators:music:beat"/></bml>')
@@ -120,7 +120,7 @@ def test_an_anticipated_point_that_moves_moves_what_is_told(driver) -> None:
     assert syncs["stroke"] == pytest.approx(2.5)
 
 
-def test_the_room_of_an_order_is_told_again_when_the_block_it_looks_at_moves(driver) -> None:
+def test_schedule_stream_sends_constraints_that_another_block_moves(driver) -> None:
     client = driver.send(SCHEDULE)
     driver.send({"type": "anticipate", "id": "music", "syncs": {"beat": 2.0}})
     driver.send('<bml id="a"><wait id="w" start="anticipators:music:beat" duration="1"/></bml>')
@@ -138,7 +138,7 @@ def test_the_room_of_an_order_is_told_again_when_the_block_it_looks_at_moves(dri
     assert slack() == pytest.approx(1.5)
 
 
-def test_a_behaviour_that_is_cut_off_is_told(driver) -> None:
+def test_schedule_stream_sends_a_behaviour_that_is_cut_off(driver) -> None:
     client = driver.send(SCHEDULE)
     driver.send('<bml id="a"><gaze id="g" target="x" start="0" end="5"/><wait id="w" duration="6"/></bml>')
     driver.send(f'<bml id="b"{BMLA}><bmla:interrupt id="i" start="2" target="a" include="g"/></bml>')
@@ -148,7 +148,7 @@ def test_a_behaviour_that_is_cut_off_is_told(driver) -> None:
     assert times["w"] == 6.0
 
 
-def test_a_preplanned_block_has_times_when_it_is_activated(driver) -> None:
+def test_schedule_stream_sends_times_when_a_block_is_activated(driver) -> None:
     client = driver.send(SCHEDULE)
     driver.send(WAIT.format("a", f'{BMLA} bmla:preplan="true"', 1))
     waits = known(client)["a"]
@@ -162,7 +162,7 @@ def test_a_preplanned_block_has_times_when_it_is_activated(driver) -> None:
     assert known(client)["a"]["start"] == pytest.approx(1.0)
 
 
-def test_what_was_dropped_is_told_with_its_warning(driver) -> None:
+def test_schedule_stream_sends_dropped_behaviours_with_warnings(driver) -> None:
     client = driver.send(SCHEDULE)
     driver.send('<bml id="a"><wait id="w" duration="1"/><head id="n" lexeme="NOD" end="0.01"/></bml>')
     (gone,) = known(client)["a"]["dropped"]
@@ -170,7 +170,7 @@ def test_what_was_dropped_is_told_with_its_warning(driver) -> None:
     assert [w["id"] for w in known(client)["a"]["warnings"]] == ["a:n"]
 
 
-def test_blocks_of_one_character_can_be_had_alone(driver) -> None:
+def test_schedule_stream_filters_by_character(driver) -> None:
     alice = driver.join(2)
     driver.send(WAIT.format("a", ' characterId="Alice"', 1))
     driver.send({**SCHEDULE, "character": "Alice"}, 2)
@@ -182,7 +182,7 @@ def test_blocks_of_one_character_can_be_had_alone(driver) -> None:
     assert {block for block, _ in states(client)} == {"a", "b"}
 
 
-def test_a_slow_client_gets_one_whole_state_for_all_it_missed(driver) -> None:
+def test_schedule_stream_sends_a_slow_client_all_blocks_later(driver) -> None:
     fast = driver.join(2)
     driver.send(SCHEDULE, 2)
     client = driver.send(SCHEDULE)
@@ -202,14 +202,14 @@ def test_a_slow_client_gets_one_whole_state_for_all_it_missed(driver) -> None:
     }
 
 
-def test_a_slow_client_for_whom_there_is_nothing_new_is_not_waited_for(driver) -> None:
+def test_schedule_stream_does_not_retry_without_changes(driver) -> None:
     driver.send(SCHEDULE)
     driver.session.update_backlog(1, 10**6)
     driver.run(5)
     assert wakes(driver.session) == math.inf
 
 
-def test_nothing_is_told_after_the_stream_was_ended(driver) -> None:
+def test_schedule_stream_ends_with_unsubscribe(driver) -> None:
     client = driver.send(SCHEDULE)
     driver.send({"type": "unsubscribe", "stream": "schedule"})
     driver.send(WAIT.format("a", "", 1))
@@ -217,7 +217,7 @@ def test_nothing_is_told_after_the_stream_was_ended(driver) -> None:
     assert states(client) == []
 
 
-def test_who_comes_back_begins_with_the_whole_state_again(drive) -> None:
+def test_schedule_stream_begins_with_all_blocks_after_a_reconnect(drive) -> None:
     driver = drive(named=True)
     driver.send(SCHEDULE)
     driver.send(WAIT.format("a", "", 3))
@@ -230,7 +230,7 @@ def test_who_comes_back_begins_with_the_whole_state_again(drive) -> None:
     assert states(again) == [("a", "IN_EXEC")]
 
 
-def test_the_stream_has_no_other_encoding(driver) -> None:
+def test_schedule_stream_has_no_other_encoding(driver) -> None:
     client = driver.send({**SCHEDULE, "encoding": "binary"})
     assert client.of("error")[0]["where"] == "subscribe.encoding"
 
@@ -246,7 +246,7 @@ MOVES = st.one_of(
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(moves=st.lists(MOVES, max_size=14))
-def test_who_was_told_every_change_knows_what_who_comes_last_is_told(drive, moves) -> None:
+def test_schedule_stream_changes_add_up_to_the_whole_state(drive, moves) -> None:
     driver = drive(idle=False)
     client = driver.send(SCHEDULE)
     driver.send({"type": "anticipate", "id": "m", "syncs": {"beat": 1.0}})
