@@ -1,4 +1,4 @@
-"""`python -m realizer` and the console script."""
+"""The entry point of `python -m realizer` and of the console script."""
 
 from realizer.cli import main
 

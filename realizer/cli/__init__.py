@@ -1,4 +1,4 @@
-"""The command line. Exit status: 0 done, 1 refused, 2 wrong usage, 3 something is missing."""
+"""The command line interface."""
 
 from __future__ import annotations
 
@@ -35,19 +35,27 @@ __all__ = ["main"]
 @click.option("-q", "--quiet", is_flag=True, help=options.QUIET)
 @click.pass_context
 def cli(context: click.Context, verbose: bool, quiet: bool) -> None:
-    """Send it BML, get a living face.
+    """Turn BML, the Behavior Markup Language, into an animated, speaking face.
 
     \b
-    realizer demo                          play the examples, leave a film, open a page
-    realizer serve                         take BML over a WebSocket, stream faces back
-    realizer realize hello.bml -o hello.mp4
-    realizer batch talks/ -o films/ --format mp4
-    realizer schedule hello.bml            when every sync point falls
-    realizer check hello.bml               every fault, with line and path
-    realizer emotion guilty                what an emotion looks like, in FAPs or as a picture
-    realizer enrich "Are you sure?"        a text becomes BML with expressions
+    Start here:
+      realizer demo                             play the examples, make a film, open a page
+      realizer realize hello.bml -o hello.mp4   a film, picture, sound or animation data
+      realizer check hello.bml                  explain every mistake in a document
+      realizer schedule hello.bml               print the time of every sync point
+      realizer serve                            play BML from a WebSocket, stream the face back
 
-    DOC may be - for standard input. Settings may also come from REALIZER_* variables.
+    \b
+    `realizer COMMAND --help` explains a command with examples. DOC is a file, or - for
+    standard input. Options can also be set by variables: REALIZER_FPS=30 means --fps 30.
+    `realizer doctor` checks the installation.
+
+    \b
+    Exit status:
+      0  success; warnings are on standard error
+      1  a document was refused, or `check` found a fault
+      2  wrong usage
+      3  something is missing on this machine; the message says what
     """
     options.configure_logging(context, quiet=quiet, verbose=verbose)
 
@@ -77,7 +85,7 @@ for command in (
 
 
 def main() -> None:
-    """Run the command line; never shows a traceback for a fault that has words."""
+    """Run the command line and exit; known errors become a line on standard error."""
     try:
         status = cli(standalone_mode=False)
         sys.exit(status if isinstance(status, int) else 0)
@@ -88,14 +96,14 @@ def main() -> None:
     except click.ClickException as error:
         error.show()
         sys.exit(error.exit_code)
-    except TableError as error:  # a file of the user's own: rules, a mapping, words
+    except TableError as error:  # in a file of the user: rules, a mapping, words
         click.echo(f"realizer: {error}", err=True)
         sys.exit(2)
     except RealizerError as error:
         click.echo(f"realizer: {error}", err=True)
         sys.exit(3)
     except BrokenPipeError:
-        # The reader of our output went away (`realizer ... | head`): that is not our fault.
+        # The reader has closed the pipe, as in `realizer ... | head`.
         sys.stderr.close()
         sys.exit(0)
     except OSError as error:

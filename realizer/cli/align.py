@@ -8,68 +8,72 @@ from typing import TYPE_CHECKING
 
 import click
 
+from realizer.cli import options
+
 if TYPE_CHECKING:
     from realizer.speech.align.alignment import Alignment
 
 
 @click.command()
-@click.argument("audio", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("audio", type=options.FILE)
 @click.argument("text")
-@click.option("--language", default="en-US", metavar="TAG", help="BCP-47.  [default: en-US]")
-@click.option("--aligner", type=click.Choice(["pocketsphinx", "espeak"]), help="Only this one.")
-@click.option("-o", "output", metavar="FILE", type=click.Path(path_type=Path), help=".json or .vtt")
+@click.option(
+    "--language", default="en-US", metavar="TAG", help="Language, as a BCP-47 tag.  [default: en-US]"
+)
+@click.option("--aligner", type=click.Choice(["pocketsphinx", "espeak"]), help="Use only this aligner.")
+@click.option("-o", "output", metavar="FILE", type=options.OUTPUT, help="Write a .json or .vtt file.")
 def align(audio: Path, text: str, language: str, aligner: str | None, output: Path | None) -> None:
-    """Find when AUDIO says each word of TEXT (or of a file, as @FILE)."""
-    from realizer.behaviours.sound_file import read_sound
-    from realizer.speech.align.aligner import align as aligned
+    """Find when each word of a recording is spoken.
 
-    if output is not None and output.suffix not in (".json", ".vtt"):
-        raise click.UsageError(f"-o: wanted a .json or a .vtt file, got {output}")
+    AUDIO is a sound file, TEXT the words spoken in it, or @FILE for a file that holds them. Prints start,
+    end, confidence and word; with -o writes the phonemes too (.json), or subtitles (.vtt).
+
+    \b
+    realizer align hello.wav "Hello there"
+    realizer align talk.flac @talk.txt --language de -o talk.json
+    """
+    from realizer.behaviours.sound_file import read_sound
+    from realizer.speech.align.aligner import align as find_words
+
+    options.check_suffix(output, ".json", ".vtt")
     if text.startswith("@"):
-        try:
-            text = Path(text[1:]).read_text("utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            raise click.UsageError(f"{text}: {error}") from None
+        (content,) = options.read_documents([text[1:]])
+        text = options.decode(content, text[1:], "a text")
     recording = read_sound(audio.read_bytes())
-    found = aligned(recording.pcm, recording.rate, text, language, aligner=aligner)  # type: ignore[arg-type]
-    for warning in found.warnings:
+    alignment = find_words(recording.pcm, recording.rate, text, language, aligner=aligner)  # type: ignore[arg-type]
+    for warning in alignment.warnings:
         click.echo(f"realizer: {warning}", err=True)
     if output is None:
-        click.echo(f"{found.aligner}, confidence {found.confidence:.2f}")
-        for word, sure in zip(found.words, found.confidences, strict=True):
-            click.echo(f"{word.start:8.3f} {word.end:8.3f}  {sure:.2f}  {word.text}")
+        click.echo(f"{alignment.aligner}, confidence {alignment.confidence:.2f}")
+        for word, confidence in zip(alignment.words, alignment.confidences, strict=True):
+            click.echo(f"{word.start:8.3f} {word.end:8.3f}  {confidence:.2f}  {word.text}")
     else:
-        write = _json if output.suffix == ".json" else _vtt
-        output.write_text(write(found), "utf-8")
+        output.write_text((_json if output.suffix.lower() == ".json" else _vtt)(alignment), "utf-8")
 
 
-def _json(found: Alignment) -> str:
-    words = zip(found.words, found.confidences, strict=True)
-    phonemes = zip(found.phonemes, found.phoneme_confidences, strict=True)
+def _json(alignment: Alignment) -> str:
+    words = zip(alignment.words, alignment.confidences, strict=True)
+    phonemes = zip(alignment.phonemes, alignment.phoneme_confidences, strict=True)
     return json.dumps(
         {
-            "duration": round(found.duration, 6),
-            "aligner": found.aligner,
-            "confidence": round(found.confidence, 3),
-            "words": [_times(w.start, w.end, sure) | {"text": w.text} for w, sure in words],
-            "phonemes": [
-                _times(p.start, p.end, sure) | {"ipa": p.ipa, "stress": p.stress} for p, sure in phonemes
-            ],
+            "duration": round(alignment.duration, 6),
+            "aligner": alignment.aligner,
+            "confidence": round(alignment.confidence, 3),
+            "words": [_times(w.start, w.end, c) | {"text": w.text} for w, c in words],
+            "phonemes": [_times(p.start, p.end, c) | {"ipa": p.ipa, "stress": p.stress} for p, c in phonemes],
         },
         ensure_ascii=False,
         indent=1,
     )
 
 
-def _times(start: float, end: float, sure: float) -> dict[str, object]:
-    return {"start": round(start, 4), "end": round(end, 4), "confidence": round(sure, 3)}
+def _times(start: float, end: float, confidence: float) -> dict[str, object]:
+    return {"start": round(start, 4), "end": round(end, 4), "confidence": round(confidence, 3)}
 
 
-def _vtt(found: Alignment) -> str:
-    cues = [f"{_clock(w.start)} --> {_clock(w.end)}\n{w.text}\n" for w in found.words if w.end > w.start]
+def _vtt(alignment: Alignment) -> str:
+    from realizer.outputs.vtt import timestamp
+
+    words = (word for word in alignment.words if word.end > word.start)
+    cues = [f"{timestamp(w.start)} --> {timestamp(w.end)}\n{w.text}\n" for w in words]
     return "\n".join(["WEBVTT\n", *cues])
-
-
-def _clock(seconds: float) -> str:
-    ms = round(seconds * 1000)
-    return f"{ms // 3_600_000:02}:{ms // 60_000 % 60:02}:{ms // 1000 % 60:02}.{ms % 1000:03}"

@@ -1,4 +1,4 @@
-"""`batch`: realizes many documents, each once."""
+"""`batch`: realizes many documents in parallel."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def _formats(context: click.Context, parameter: click.Parameter, value: tuple[st
     required=True,
     metavar="DIR",
     type=click.Path(file_okay=False, path_type=Path),
-    help="The folder of outputs and of manifest.jsonl.",
+    help="Folder for the outputs and manifest.jsonl.",
 )
 @click.option(
     "--format",
@@ -50,53 +50,54 @@ def _formats(context: click.Context, parameter: click.Parameter, value: tuple[st
     required=True,
     metavar="NAME",
     callback=_formats,
-    help="A suffix of `realizer outputs`; may be given several times.",
+    help="Format to write, a suffix of `realizer outputs`; repeat it for several.",
 )
-@click.option("--workers", type=click.IntRange(1, 1024), help="Processes here.  [default: one a core]")
-@click.option("--dask", metavar="ADDRESS", help="Work on the machines of this Dask scheduler instead.")
+@click.option("--workers", type=click.IntRange(1, 1024), help="Number of processes.  [default: one per core]")
+@click.option("--dask", metavar="ADDRESS", help="Run on the workers of this Dask scheduler instead.")
 @performance_options
-@click.pass_context
 def batch(
-    context: click.Context,
-    /,
     places: tuple[str, ...],
     folder: Path,
     formats: tuple[str, ...],
     workers: int | None,
     dask: str | None,
-    **asked: Any,
+    **flags: Any,
 ) -> int:
-    """Play many documents, each as `realize` would alone, to one file a format.
+    """Realize many documents, each on its own, in parallel.
 
-    IN is a document, a folder (all .bml and .xml in it), a pattern in quotes ('talks/**/*.bml'), or - for a
-    list of these on standard input, one a line.
+    IN is a document, a folder (all .bml and .xml files in it), a quoted pattern, or - for a list of these on
+    standard input, one a line.
 
-    What was played before with the same options, tables and program is not played again, so a batch that
-    was interrupted goes on where it was. DIR/manifest.jsonl has a line for each document: what was written,
-    warnings, or the error. A worker that dies is replaced and its document played again.
+    \b
+    realizer batch talks/ -o films/ --format mp4
+    realizer batch 'talks/**/*.bml' -o out/ --format fap --format wav --workers 4
+
+    Run the same command again to continue an interrupted batch: documents already realized with the same
+    options, tables and version are skipped. DIR/manifest.jsonl has one line per document with the files
+    written, the warnings or the error. A worker that crashes is replaced and its document tried again.
     """
     if dask is not None and workers is not None:
         raise click.UsageError("--workers, --dask: wanted one of them, got both")
-    strict: bool = asked.pop("strict")
-    how = _options(formats, asked)
+    strict: bool = flags.pop("strict")
+    how = _options(formats, flags)
     from realizer.batch.documents import DocumentsError, find
     from realizer.batch.run import batch as run
 
     try:
-        documents = find(_listed(places))
+        documents = find(_read_places(places))
     except DocumentsError as error:
         raise click.UsageError(str(error)) from None
     counts: Counter[str] = Counter()
     dropped = 0
-    crew = _workers(how, min(workers or _cores(), len(documents)), dask)
+    pool = _workers(how, min(workers or _core_count(), len(documents)), dask)
     try:
         with click.progressbar(
-            run(documents, folder, how, crew),
+            run(documents, folder, how, pool),
             length=len(documents),
             show_pos=True,
             file=sys.stderr,
             item_show_func=lambda item: None if item is None else item[0]["document"],
-            hidden=context.obj["quiet"],
+            hidden=options.is_quiet(),
         ) as rows:
             for row, known in rows:
                 counts[row["status"]] += 1
@@ -105,44 +106,42 @@ def batch(
                 if row["status"] == "failed":
                     click.echo(f"{row['document']}: {row['error']}", err=True)
     finally:
-        crew.close()
-    if not context.obj["quiet"]:
-        parts = ", ".join(f"{counts[status]} {status}" for status in STATUS if counts[status])
-        before = f" ({counts['known']} of them before)" if counts["known"] else ""
-        click.echo(f"{folder}: {parts}{before}; manifest.jsonl says more", err=True)
+        pool.close()
+    parts = ", ".join(f"{counts[status]} {status}" for status in STATUS if counts[status])
+    before = f" ({counts['known']} of them before)" if counts["known"] else ""
+    options.note(f"{folder}: {parts}{before}; see manifest.jsonl for details")
     return 1 if counts["refused"] or counts["failed"] or (strict and dropped) else 0
 
 
-def _options(formats: tuple[str, ...], asked: dict[str, Any]) -> Options:
-    """How documents are played: flags, variables and defaults, and the voice that speaks by name."""
+def _options(formats: tuple[str, ...], flags: dict[str, Any]) -> Options:
+    """Return the options of the batch; fails if the voice is not installed."""
     from realizer.batch.task import Options
     from realizer.speech.registry import find_voice
 
-    drawn = {name: asked[name] for name in ("light", "background")}
-    chosen = options.play_settings(asked, **drawn)
+    chosen = options.play_settings(flags, light=flags["light"], background=flags["background"])
     if any(suffix in PICTURES for suffix in formats):
-        options.check_camera(chosen.face, asked["camera"])
-    played = chosen.play_options(options.read_scene(chosen.scene))
+        options.check_camera(chosen.face, flags["camera"])
+    play = chosen.play_options(options.read_scene(chosen.scene))
     voice = find_voice(chosen.voice)
     voice.close()
     options.warn_no_voice(chosen.voice)
     return Options(
-        **vars(played),
+        **vars(play),
         formats=formats,
         voice=chosen.voice or voice.name,
-        size=asked["size"],
-        camera=asked["camera"],
+        size=flags["size"],
+        camera=flags["camera"],
         light=chosen.light,
         background=chosen.background,
     )
 
 
-def _listed(places: tuple[str, ...]) -> list[str]:
-    """The places, with those of standard input where `-` stands."""
-    named: list[str] = []
+def _read_places(places: tuple[str, ...]) -> list[str]:
+    """Return the places; `-` is replaced by the lines of standard input."""
+    found: list[str] = []
     for place in places:
-        named += [line for line in sys.stdin.read().splitlines() if line.strip()] if place == "-" else [place]
-    return named
+        found += [line for line in sys.stdin.read().splitlines() if line.strip()] if place == "-" else [place]
+    return found
 
 
 def _workers(how: Options, workers: int, dask: str | None) -> Workers:
@@ -155,6 +154,6 @@ def _workers(how: Options, workers: int, dask: str | None) -> Workers:
     return ProcessPool(how, workers)
 
 
-def _cores() -> int:
-    """How many of the machine's cores are ours."""
+def _core_count() -> int:
+    """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

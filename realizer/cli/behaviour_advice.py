@@ -1,4 +1,4 @@
-"""Advice of the knowledge base on the expressions of a block, as findings."""
+"""Advice from the knowledge base about the expressions of a block, as findings."""
 
 from __future__ import annotations
 
@@ -30,12 +30,11 @@ def advise_on_behaviours(
     mood: Mood | None,
     lists: Words,
 ) -> Iterator[Finding]:
-    """Expressions that last, follow each other or accompany words otherwise than people's do.
+    """Yield advice on expressions whose duration, order or words are unusual for people.
 
     Args:
-        schedule: of the block.
-        utterances: what a voice made of its speeches.
-        lists: the words that count.
+        utterances: speech id -> utterance.
+        lists: the emotional words.
     """
     seen = [
         VisibleExpression(node.id, template, (start + peak) / 2, (relax + end) / 2)
@@ -43,19 +42,19 @@ def advise_on_behaviours(
         if (template := template_of(node)) and node.id in schedule.times
         for start, peak, relax, end in [schedule.times[node.id].tolist()]
     ]
-    words = {}
+    words = {}  # speech id -> (place in the text, seconds) of each word
     for node in block.behaviours:
         if isinstance(node, Speech) and node.id in schedule.times and node.id in utterances:
             places = [place for _, place in words_in(str(node.text or ""))]
             spoken = utterances[node.id].words
-            # A description may say something else than the text; when which word of that comes nobody knows.
+            # A description may be spoken instead of the text; then the words have no known times.
             if len(places) == len(spoken):
                 begin = float(schedule.times[node.id][0])
                 words[node.id] = [(p, begin + w.start) for p, w in zip(places, spoken, strict=True)]
-    for one in advise(block, seen, words, role, mood, lists):
-        where = block.places.get(one.id)
-        path, line = (where.path, where.line) if where is not None else ("/bml", None)
-        spot = source.locate(path, line=line, block=block.id)
-        id = f"{block.id}:{one.id}" if one.id else block.id
-        whole = f"{one.text}; {one.hint}"
-        yield Finding(file, ADVICE, id, path, whole, one.text, (Label(spot, ""),), (f"help: {one.hint}",))
+    for advice in advise(block, seen, words, role, mood, lists):
+        place = block.places.get(advice.id)
+        path, line = (place.path, place.line) if place is not None else ("/bml", None)
+        label = Label(source.locate(path, line=line, block=block.id))
+        id = f"{block.id}:{advice.id}" if advice.id else block.id
+        text, notes = f"{advice.text}; {advice.hint}", (f"help: {advice.hint}",)
+        yield Finding(file, ADVICE, id, path, text, advice.text, (label,), notes)

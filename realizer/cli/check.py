@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
     from realizer.tables.knowledge import Mood, Role
 
-MAX_ADVICE = 20  # on one block: one slip is often made all over a document
+MAX_ADVICE = 20  # per block: one mistake is often repeated all over a document
 
 
 @click.command()
 @options.documents
-@click.option("--scene", type=click.Path(exists=True, dir_okay=False), help="File of targets: name x y z.")
+@options.scene
 @options.media
 @options.expressions
 @role
@@ -34,15 +34,14 @@ MAX_ADVICE = 20  # on one block: one slip is often made all over a document
 @words
 @click.option(
     "--long/--short",
-    "long",
     default=None,
-    help="Show source, marks and help, or a line for each fault.  [default: --long on a terminal]",
+    help="Show the source with marks and help, or one line per fault.  [default: --long on a terminal]",
 )
 @click.pass_context
 def check(
     context: click.Context,
     documents: tuple[str, ...],
-    scene: str | None,
+    scene: Path | None,
     media: Path | None,
     expressions: Path | None,
     role: Role,
@@ -53,10 +52,14 @@ def check(
 ) -> int:
     """Explain every fault of documents, with line, column and path.
 
-    Standard output holds the faults and nothing else; a line each, unless it is a terminal. Advice on what is
-    no fault but looks like a slip goes to standard error, and does not count; so does advice on expressions
-    that last, follow each other or go with words otherwise than people's do, as who talks or listens.
-    A .toml or .json file is a timeline (`realizer timeline`).
+    \b
+    realizer check hello.bml
+    realizer check --scene room.txt --mood happy hello.bml
+
+    Faults go to standard output, one line each unless it is a terminal, and nothing else does. Advice goes
+    to standard error and does not change the exit status: about likely mistakes, and about expressions whose
+    duration, order or words are unusual for a person in this role and mood. A .toml or .json file is checked
+    as a timeline (see `realizer timeline`).
     """
     from bml_schema.source import Source
     from realizer.checking.advice import advice
@@ -71,21 +74,21 @@ def check(
 
     def show(finding: Finding, source: Source, *, err: bool = False) -> None:
         stream = sys.stderr if err else sys.stdout
-        said = render(finding, source, width=width) + "\n" if long else one_line(finding)
-        click.echo(said, err=err, color=_coloured(stream))
+        text = render(finding, source, width=width) + "\n" if long else one_line(finding)
+        click.echo(text, err=err, color=_is_coloured(stream))
 
     for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure"):  # a document may hold what the terminal's encoding does not
+        if hasattr(stream, "reconfigure"):  # the terminal's encoding may lack characters of a document
             stream.reconfigure(errors="backslashreplace")
     chosen = options.settings(media=media, expressions=expressions)
     lists = words_for(language, words)
     faults = 0
-    told_languages: set[str] = set()
+    warned: set[str] = set()
     for name, text in zip(documents, options.read_documents(documents), strict=True):
         if is_timeline(name):
-            faults += _check_timeline(name, text, chosen.expressions, role, mood, context.obj["quiet"])
+            faults += _check_timeline(name, text, chosen.expressions, role, mood)
             continue
-        # A player a file: what one document says must not colour the next one's report.
+        # Each file has a player of its own, so that reports are independent.
         player = Player(
             PlayOptions(
                 scene=options.read_scene(scene),
@@ -102,38 +105,36 @@ def check(
             found += len(part.findings)
             for finding in part.findings:
                 show(finding, source)
-            if part.block is not None and part.schedule is not None and not context.obj["quiet"]:
+            if part.block is not None and part.schedule is not None and not options.is_quiet():
                 slips = advice(name, source, part.block, part.schedule, player)
                 unusual = advise_on_behaviours(
                     name, source, part.block, part.schedule, part.utterances, role, mood, lists
                 )
                 if context.obj["verbose"]:
-                    warn_unknown_languages(lists, languages_in(part.block, lists), told_languages)
+                    warn_unknown_languages(lists, languages_in(part.block, lists), warned)
                 for finding in islice(chain(slips, unusual), MAX_ADVICE):
                     show(finding, source, err=True)
-        if not found and not context.obj["quiet"]:
-            click.echo(f"{name}: no fault in {blocks} block{'s' * (blocks != 1)}", err=True)
+        if not found:
+            options.note(f"{name}: no fault in {blocks} block{'s' * (blocks != 1)}")
         faults += found
     return 1 if faults else 0
 
 
-def _check_timeline(
-    name: str, text: bytes, folder: Path | None, role: Role, mood: Mood | None, quiet: bool
-) -> int:
-    """How many faults a timeline has; each is told, and advice on a sound one."""
+def _check_timeline(name: str, text: bytes, folder: Path | None, role: Role, mood: Mood | None) -> int:
+    """Print the faults of a timeline, or advice if it has none, and return the number of faults."""
     from realizer.expressions.library import library_of
 
     library = library_of(folder)
     faults = faults_in(text, library)
     for fault in faults:
         click.echo(f"{name}: {fault}")
-    if not faults and not quiet:
-        for words in advice_on(text, library, role, mood):
-            click.echo(f"{name}: ADVICE {words}", err=True)
-        click.echo(f"{name}: no fault in this timeline", err=True)
+    if not faults and not options.is_quiet():
+        for advice in advice_on(text, library, role, mood):
+            options.note(f"{name}: ADVICE {advice}")
+        options.note(f"{name}: no fault in this timeline")
     return len(faults)
 
 
-def _coloured(stream: Any) -> bool:
-    """Whether a stream is a terminal whose user has not said no to colours (https://no-color.org)."""
+def _is_coloured(stream: Any) -> bool:
+    """Return whether a stream is a terminal that shows colours (https://no-color.org)."""
     return bool(stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb")

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from realizer.cli import options
+
 if TYPE_CHECKING:
     from bml_schema import Feedback
 
@@ -15,16 +17,17 @@ FILM, FRAMES = Path("demo.mp4"), Path("demo.fap")
 
 
 @click.command()
-@click.option("--once", is_flag=True, help="End when the examples have been played.")
+@click.option("--once", is_flag=True, help="Exit after playing the examples.")
 @click.option(
-    "--port", default=8765, show_default=True, help="Of the page; a free one is taken if it is in use."
+    "--port", default=8765, show_default=True, help="Port of the page; if it is in use, a free one is chosen."
 )
-@click.option("--voice", metavar="NAME", help="A voice of `realizer voices`.")
-@click.option("--face", default="default", show_default=True, help="A face of `realizer faces list`.")
+@options.voice
+@click.option("--face", default="default", show_default=True, help="Face to show; see `realizer faces list`.")
 def demo(once: bool, port: int, voice: str | None, face: str) -> None:
-    """Play the examples: serve them, film them, and give the page's address.
+    """Play the examples: write a film of them, then serve a page that shows them.
 
-    Leaves demo.mp4 and demo.fap in the current folder.
+    Writes demo.mp4 and demo.fap to the current folder, prints the page's address, and plays the examples
+    there as a client of the service would.
     """
     import asyncio
 
@@ -36,8 +39,7 @@ def demo(once: bool, port: int, voice: str | None, face: str) -> None:
 
 
 def _film(documents: list[str], voice: str | None, face: str) -> None:
-    """All examples one after the other into demo.fap and demo.mp4."""
-    from realizer.cli.options import warn_no_voice
+    """Write all examples, one after the other, to demo.fap and demo.mp4."""
     from realizer.core.errors import RealizerError
     from realizer.offline import realize
     from realizer.outputs.output import RenderSettings
@@ -45,7 +47,7 @@ def _film(documents: list[str], voice: str | None, face: str) -> None:
 
     appended = [text.replace("<bml ", '<bml composition="APPEND" ', 1) for text in documents]
     realization = realize(appended, face=face, voice=voice)
-    warn_no_voice(voice)
+    options.warn_no_voice(voice)
     for path in (FRAMES, FILM):
         click.echo(f"writing {path} ({realization.duration:.1f} s) ...")
         try:
@@ -55,7 +57,7 @@ def _film(documents: list[str], voice: str | None, face: str) -> None:
 
 
 def _line(feedback: Feedback) -> str:
-    """Feedback as a line for people; predictions are left to programs."""
+    """Return a line that describes feedback, or "" for predictions."""
     from bml_schema import BlockProgress, SyncPointProgress, WarningFeedback
 
     match feedback:
@@ -67,7 +69,7 @@ def _line(feedback: Feedback) -> str:
 
 
 async def _serve(documents: dict[str, str], once: bool, port: int, voice: str | None, face: str) -> None:
-    """Serve, send every example as a client would, print what is told of it and when."""
+    """Serve the page, play every example as a client would, and print its feedback."""
     from realizer.client import connect
     from realizer.core.settings import Settings
     from realizer.server.serve import Server
@@ -87,7 +89,7 @@ async def _serve(documents: dict[str, str], once: bool, port: int, voice: str | 
                     if line := _line(feedback):
                         click.echo(line)
         if not once:
-            click.echo("\nthe page is open for you; Ctrl-C ends")
+            click.echo("\nthe page stays available until Ctrl-C")
             await server.wait_closed()
     finally:
         await server.close()

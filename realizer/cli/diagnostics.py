@@ -1,4 +1,4 @@
-"""Findings as text for people: place, source line, marks and help."""
+"""Text of findings for people: place, source line, marks and help."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ import click
 from bml_schema.source import Source
 from realizer.checking.finding import Finding, Label
 
-_TAB = 4  # columns, wherever the tab stands: what counts is that the mark is below the right character
+_TAB = 4  # columns of every tab, so that marks are below the right character
 _CUT = "..."
-_LEAST = 20  # columns of source that are shown however narrow the terminal is
+_LEAST = 20  # columns of source that are always shown
 
 
 def one_line(finding: Finding, text: str | None = None) -> str:
-    """`file:line:column: TYPE id: line N, path: text`, whatever blanks the text holds."""
+    """Return `file:line:column: TYPE id: line N, path: text` on one line."""
     spot = finding.spot
     at = f":{spot.line}:{spot.column}" if spot else ""
     where = ", ".join(filter(None, (f"line {spot.line}" if spot else "", finding.path)))
@@ -28,11 +28,10 @@ def one_line(finding: Finding, text: str | None = None) -> str:
 
 
 def render(finding: Finding, source: Source, *, width: int = 100) -> str:
-    """The finding as a good compiler shows it, with ANSI colours; `click.echo` takes them out where they
-    do not belong.
+    """Return the finding as compilers show errors, with ANSI colours.
 
     Args:
-        source: of the text that it is in.
+        source: the text that the finding is about.
         width: columns of the terminal.
     """
     head = one_line(finding, finding.head)
@@ -67,7 +66,7 @@ def render(finding: Finding, source: Source, *, width: int = 100) -> str:
 
 
 def _beside(mark: str, text: str, room: int) -> list[str]:
-    """A mark and its words in one line, or in two where they are too long for that."""
+    """Return a mark and its words on one line, or on two if they are too long."""
     if len(mark) + 1 + len(text) <= room:
         return [f"{mark} {text}".rstrip()]
     start = min(len(mark) - len(mark.lstrip()), max(0, room - len(text)))
@@ -77,16 +76,15 @@ def _beside(mark: str, text: str, room: int) -> list[str]:
 def _excerpts(
     line: str, labels: Sequence[Label], width: int
 ) -> Iterator[tuple[str, list[tuple[str, Label]]]]:
-    """The line with the marks below it; a line that is too long once for each label, cut around it."""
+    """Yield the line with the marks below it; a long line is cut around each label instead."""
     first, last = min(label.spot.column for label in labels) - 1, max(map(_end, labels))
-    together = last - first <= width
-    if together:
-        excerpt = _cut(line, first, last, width)
-        together = excerpt.first <= first and last <= excerpt.last
-    for some in [labels] if together else [[label] for label in labels]:
-        excerpt = _cut(line, some[0].spot.column - 1, _end(some[0]), width) if not together else excerpt
+    excerpt = _cut(line, first, last, width)
+    fits = last - first <= width and excerpt.first <= first and last <= excerpt.last
+    for group in [labels] if fits else [[label] for label in labels]:
+        if not fits:
+            excerpt = _cut(line, group[0].spot.column - 1, _end(group[0]), width)
         marks = []
-        for label in some:
+        for label in group:
             start, end = (excerpt.column(at) for at in (label.spot.column - 1, _end(label)))
             sign = "^" if label.primary else "-"
             marks.append((" " * start + sign * max(1, end - start), label))
@@ -99,7 +97,7 @@ def _end(label: Label) -> int:
 
 @dataclass(frozen=True, slots=True)
 class _Excerpt:
-    """Characters first..last of a line as a terminal shows them, and where each begins."""
+    """Characters first..last of a line as a terminal shows them, and the column of each."""
 
     text: str
     first: int
@@ -107,13 +105,13 @@ class _Excerpt:
     columns: Sequence[int]
 
     def column(self, at: int) -> int:
-        """Where a character of the line is shown; what is cut off is at the nearer end."""
+        """Return the column of a character; a character that was cut off is at the nearer end."""
         return self.columns[min(max(at, self.first), self.last) - self.first]
 
 
 def _cut(line: str, first: int, last: int, width: int) -> _Excerpt:
-    """As much around line[first:last] as fits into `width` columns."""
-    # What is further away cannot fit, whatever its width; a line may be a whole document.
+    """Return as much around line[first:last] as fits into `width` columns."""
+    # A line may be a whole document; characters further away cannot fit.
     begin, end = max(0, first - 2 * width), min(len(line), last + 2 * width)
     cells = [_cell(character) for character in line[begin:end]]
     whole = begin == 0 and end == len(line) and sum(columns for _, columns in cells) <= width
@@ -125,7 +123,7 @@ def _cut(line: str, first: int, last: int, width: int) -> _Excerpt:
 
 
 def _window(cells: Sequence[tuple[str, int]], first: int, last: int, width: int) -> tuple[int, int]:
-    """First and last + 1 of the characters that fit, with what is meant in their middle."""
+    """Return the range of characters that fit, with first..last in the middle."""
     room = width - 2 * len(_CUT)
     low = high = min(first, len(cells))
     columns = 0
@@ -144,13 +142,13 @@ def _window(cells: Sequence[tuple[str, int]], first: int, last: int, width: int)
 
 
 def _cell(character: str) -> tuple[str, int]:
-    """A character as a terminal can show it, and how many columns it takes."""
+    """Return a character as a terminal can show it, and its width in columns."""
     if character == "\t":
         return " " * _TAB, _TAB
     category = unicodedata.category(character)
     if category in ("Mn", "Me"):
         return character, 0
     if category in ("Cf", "Cc", "Cs", "Cn", "Zl", "Zp"):
-        # A byte order mark or a change of direction would move what follows.
+        # A byte order mark or a change of direction would move the rest of the line.
         return ("", 0) if character == "\ufeff" else ("\N{REPLACEMENT CHARACTER}", 1)
     return character, 2 if unicodedata.east_asian_width(character) in "WF" else 1

@@ -1,4 +1,4 @@
-"""`doctor`: reports what this machine has, and what to install for the rest."""
+"""`doctor`: reports which parts work on this machine and what to install for the others."""
 
 from __future__ import annotations
 
@@ -8,27 +8,27 @@ from importlib.util import find_spec
 
 import click
 
-Finding = tuple[bool, str, str]  # there, what, the fix or a detail
+Finding = tuple[bool, str, str]  # whether it works, its name, a description or the fix
 
 
 @click.command()
-def doctor() -> int:
-    """Say what is there and what is missing, a line each with the fix."""
-    missing = 0
-    for look in (_pictures, _voices, _film, _node, _faces, _page):
-        for there, what, words in look():
-            missing += not there
-            mark = click.style("ok     ", fg="green") if there else click.style("missing", fg="yellow")
-            click.echo(f"{mark}  {what:<10} {words}")
-    return 0
+def doctor() -> None:
+    """Check the installation: pictures, voices, films, faces and the page.
+
+    Prints one line per part: ok, or missing and how to fix it.
+    """
+    for part in (_pictures, _voices, _film, _node, _faces, _page):
+        for works, name, text in part():
+            mark = click.style("ok     ", fg="green") if works else click.style("missing", fg="yellow")
+            click.echo(f"{mark}  {name:<10} {text}")
 
 
 def _pictures() -> Iterator[Finding]:
     from realizer.render.drawing_process import available_backend
 
-    says = {"gl": "drawn by OpenGL", "onboard": "drawn by the processor, without OpenGL"}
-    way, fix = available_backend()
-    yield fix is None, "pictures", fix or says[way]
+    descriptions = {"gl": "drawn by OpenGL", "onboard": "drawn by the processor, without OpenGL"}
+    backend, fix = available_backend()
+    yield fix is None, "pictures", fix or descriptions[backend]
 
 
 def _voices() -> Iterator[Finding]:
@@ -39,24 +39,24 @@ def _voices() -> Iterator[Finding]:
 
 
 def _film() -> Iterator[Finding]:
-    there = find_spec("av") is not None
-    yield there, "FFmpeg", "PyAV writes films" if there else "pip install 'bml-realizer[film]'"
+    works = find_spec("av") is not None
+    yield works, "FFmpeg", "PyAV writes films" if works else "pip install 'bml-realizer[film]'"
 
 
 def _node() -> Iterator[Finding]:
-    there = shutil.which("npm") is not None
-    says = "npm is used to build the page from source"
-    yield there, "node", says if there else "not needed to run; the build takes node from a wheel"
+    works = shutil.which("npm") is not None
+    text = "npm is used to build the page from source"
+    yield works, "node", text if works else "not needed to run; the build takes node from a wheel"
 
 
 def _faces() -> Iterator[Finding]:
     from realizer.face.load import list_faces
     from realizer.facebuild.check import check_face
 
-    found = list_faces()
-    if not found:
+    faces = list_faces()
+    if not faces:
         yield False, "faces", "no face folder was found; reinstall bml-realizer"
-    for face in found:
+    for face in faces:
         faults = check_face(face.name)
         yield not faults, "face", f"{face.name}: {faults[0] if faults else face.description}"
 
@@ -64,6 +64,6 @@ def _faces() -> Iterator[Finding]:
 def _page() -> Iterator[Finding]:
     from importlib.resources import files
 
-    there = files("realizer.server").joinpath("static", "index.html").is_file()
+    works = files("realizer.server").joinpath("static", "index.html").is_file()
     fix = "the page is not built; install from a wheel, or have npm and run pip install -e ."
-    yield there, "page", "served at http://HOST:PORT/" if there else fix
+    yield works, "page", "served at http://HOST:PORT/" if works else fix

@@ -1,4 +1,4 @@
-"""`emotion`: shows a word or a place on the emotion wheel, as FAPs and as a picture."""
+"""`emotion`: prints or draws the FAPs of an emotion word or of a place on the emotion wheel."""
 
 from __future__ import annotations
 
@@ -15,40 +15,39 @@ from realizer.cli import options
 if TYPE_CHECKING:
     from realizer.emotions.profile import Profile
 
-RINGS = (1.0, 3.0, 5.0, 7.0)  # activations of the picture of the wheel, as in Paul 2010, 6.4
-WRITES = (".png", ".txt")
+RINGS = (1.0, 3.0, 5.0, 7.0)  # activations in the picture of the wheel, as in Paul 2010, 6.4
 
 
 @click.command()
 @click.argument("word", metavar="[WORD|FILE.txt]", required=False)
-@click.option("--json", "as_json", is_flag=True, help="Print JSON: ranges, and the 68 values.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON: the ranges and all 68 values.")
 @click.option(
     "--profiles",
     type=click.Choice(["own", "published", "raw"]),
     default="own",
     show_default=True,
-    help="Ours; those of Raouzaiou et al. 2002, corrected; the same as printed.",
+    help="Profiles: our own, or those of Raouzaiou et al. 2002, corrected (published) or as printed (raw).",
 )
-@click.option("--angle", type=float, metavar="DEGREES", help="Place on Paul's wheel; any turn.")
-@click.option("--activation", type=float, help="0 the middle to 7 the rim.  [default: as full]")
-@click.option("--valence", type=float, help="With --arousal, instead of an angle: -1 to 1.")
-@click.option("--arousal", type=float, help="-1 to 1.")
-@click.option("--seed", type=click.IntRange(0), help="Draw within the ranges instead of their middle.")
+@click.option("--angle", type=float, metavar="DEGREES", help="Angle on the wheel of Paul 2010.")
+@click.option("--activation", type=float, help="With --angle: 0 (neutral) to 7 (full).  [default: full]")
+@click.option("--valence", type=float, help="Unpleasant (-1) to pleasant (1); needs --arousal.")
+@click.option("--arousal", type=float, help="Calm (-1) to excited (1); needs --valence.")
+@click.option("--seed", type=click.IntRange(0), help="Choose random values instead of the middle values.")
 @click.option(
     "-o",
     "--output",
-    type=click.Path(path_type=Path),
+    type=options.OUTPUT,
     metavar="FILE",
-    help="Picture (.png), or the profile as a line of Paul's file (.txt).",
+    help="Write a picture (.png) or a profile file of Paul 2010, 6.3 (.txt).",
 )
 @click.option(
     "--wheel",
     "chart",
-    type=click.Path(path_type=Path),
+    type=options.OUTPUT,
     metavar="FILE.png",
-    help="Draw the wheel: 16 angles, 4 activations.",
+    help="Draw the whole wheel: 16 angles at 4 activations.",
 )
-@click.option("--face", default="default", show_default=True, help="Whose face.")
+@click.option("--face", default="default", show_default=True, help="Face to draw; see `realizer faces list`.")
 @click.option("--camera", default="close", show_default=True, help=options.CAMERAS)
 def emotion(
     word: str | None,
@@ -64,9 +63,10 @@ def emotion(
     face: str,
     camera: str,
 ) -> None:
-    """Say which FAPs an emotion moves, and how far: of WORD, or of a place on the wheel.
+    """Print which FAPs an emotion moves, and how far.
 
-    FILE.txt is a file of Paul's (2010, 6.3) with one profile, as -o writes it.
+    The emotion is a WORD, a place on the emotion wheel (--angle), a degree of valence and arousal, or the
+    profile in FILE.txt, as written by -o.
 
     \b
     realizer emotion guilty
@@ -74,18 +74,17 @@ def emotion(
     realizer emotion --valence -0.6 --arousal 0.4 --json
     realizer emotion --wheel wheel.png
     """
-    for path, suffixes in ((output, WRITES), (chart, (".png",))):
-        if path is not None and path.suffix.lower() not in suffixes:
-            raise click.UsageError(f"{path}: wanted a name that ends in {' or '.join(suffixes)}")
+    options.check_suffix(output, ".png", ".txt")
+    options.check_suffix(chart, ".png")
     if output or chart:
         options.check_camera(face, camera)
     profile = _requested_profile(word, profiles, angle, activation, valence, arousal, bool(chart))
     if profile is not None:
-        if output is not None:  # before it is told: who reads only the first lines gets the file too
+        if output is not None:  # before anything is printed: the reader may close the pipe
             _write(profile, seed, output, face, camera)
         _print_profile(profile, _archetype_shares(profiles, angle, valence, arousal), seed, as_json)
     elif output is not None or as_json or seed is not None:
-        raise click.UsageError("wanted a WORD, or a place, for what was asked; got only --wheel")
+        raise click.UsageError("wanted a WORD or a place for --json, --seed and -o; got only --wheel")
     if chart is not None:
         _draw_wheel(profiles, chart, face, camera)
 
@@ -97,8 +96,9 @@ def _requested_profile(
     activation: float | None,
     valence: float | None,
     arousal: float | None,
-    other: bool,
+    wheel_only: bool,
 ) -> Profile | None:
+    """Return the profile of the options, or None if only the wheel was requested."""
     from realizer.emotions.wheel import affect, wheel
     from realizer.emotions.words import emotion as profile_of
 
@@ -106,7 +106,8 @@ def _requested_profile(
         raise click.UsageError("wanted --valence and --arousal together, got one of them")
     if activation is not None and angle is None:
         raise click.UsageError("wanted --angle with --activation, got it alone")
-    if (ways := sum(way is not None for way in (word, angle, valence))) > 1 or not (ways or other):
+    given = sum(option is not None for option in (word, angle, valence))
+    if given > 1 or not (given or wheel_only):
         raise click.UsageError("wanted one of WORD, --angle, or --valence with --arousal")
     try:
         if angle is not None:
@@ -114,18 +115,14 @@ def _requested_profile(
         if valence is not None and arousal is not None:
             return affect(valence, arousal, profiles)
         if word is not None and word.lower().endswith(".txt"):
-            return _read(Path(word))
+            return _read_profile(Path(word))
         return None if word is None else profile_of(word, profiles)
     except ValueError as error:
         raise click.UsageError(str(error)) from None
 
 
-def _read(path: Path) -> Profile:
-    """The profile of a file.
-
-    Raises:
-        ValueError: no such file, what is none of Paul's, or more than one profile.
-    """
+def _read_profile(path: Path) -> Profile:
+    """Return the only profile of a file; raises ValueError otherwise."""
     from realizer.emotions.profile_file import read_profiles
 
     try:
@@ -143,7 +140,7 @@ def _read(path: Path) -> Profile:
 def _archetype_shares(
     profiles: str, angle: float | None, valence: float | None, arousal: float | None
 ) -> Mapping[str, float]:
-    """How much of which archetype is at a place; nothing of a word, whose name says what it is."""
+    """Return archetype -> share at a place on the wheel; empty for a word."""
     from realizer.emotions.wheel import blend_weights
 
     if angle is not None:
@@ -153,25 +150,25 @@ def _archetype_shares(
     return {}
 
 
-def _print_profile(profile: Profile, mixed: Mapping[str, float], seed: int | None, as_json: bool) -> None:
+def _print_profile(profile: Profile, shares: Mapping[str, float], seed: int | None, as_json: bool) -> None:
     from realizer.emotions.profile import Profile
     from realizer.tables import faps
 
     values = profile.frame() if seed is None else profile.draw(seed)
     names = {row.fap: row.name for row in faps()}
-    if profile.ranges and not any(map(any, profile.ranges.values())):  # the middle of the wheel is no emotion
-        profile, mixed = Profile("neutral", profile.source, {}), {}
+    if profile.ranges and not any(map(any, profile.ranges.values())):  # the middle of the wheel
+        profile, shares = Profile("neutral", profile.source, {}), {}
     if as_json:
         ranges = {names[fap]: list(ends) for fap, ends in profile.ranges.items()}
-        said = {"emotion": " and ".join(mixed) or profile.name, "profiles": profile.source, "ranges": ranges}
-        if mixed:
-            said["shares"] = {name: round(share, 4) for name, share in mixed.items()}
-        click.echo(json.dumps(said | {"values": [round(float(value), 3) for value in values]}))
+        data = {"emotion": " and ".join(shares) or profile.name, "profiles": profile.source, "ranges": ranges}
+        if shares:
+            data["shares"] = {name: round(share, 4) for name, share in shares.items()}
+        click.echo(json.dumps(data | {"values": [round(float(value), 3) for value in values]}))
         return
-    parts = " and ".join(f"{name} {share:.0%}" for name, share in mixed.items())
+    parts = " and ".join(f"{name} {share:.0%}" for name, share in shares.items())
     click.echo(f"{parts or profile.name or 'neutral'} ({profile.source})")
     for fap, ends in profile.ranges.items():
-        # + 0.0: no minus before a zero
+        # + 0.0 turns -0.0 into 0.0.
         low, high, value = (round(float(number), 1) + 0.0 for number in (*ends, values[fap - 1]))
         click.echo(f"F{fap:<3} {names[fap]:<22} {low:8.1f} .. {high:7.1f}   {value:8.1f}")
 
@@ -192,7 +189,7 @@ def _write(profile: Profile, seed: int | None, path: Path, face: str, camera: st
 
 
 def _draw_wheel(profiles: str, path: Path, face: str, camera: str) -> None:
-    """The faces of 16 angles (columns) and 4 activations (rows), labelled."""
+    """Draw the labelled faces of 16 angles (columns) and 4 activations (rows)."""
     import numpy as np
     from PIL import Image
 
@@ -209,4 +206,4 @@ def _draw_wheel(profiles: str, path: Path, face: str, camera: str) -> None:
     notes = [(f"activation {activation:g}",) for _, activation in places]
     columns = len(places) // len(RINGS)
     Image.fromarray(sheet(list(pictures), titles, notes, columns)).save(path)
-    click.echo(f"{path}: {len(places)} faces", err=True)
+    options.note(f"{path}: {len(places)} faces")

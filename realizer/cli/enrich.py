@@ -1,4 +1,4 @@
-"""`enrich`: adds expressions of the knowledge base to a text or to documents."""
+"""`enrich`: adds expressions from the knowledge base to a text or to documents."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     from realizer.knowledge.enrich import Enricher, SpokenText
     from realizer.knowledge.word_languages import Words
 
-FILES = (".bml", ".xml", ".txt")  # a single word that ends so is meant to be a file
-MARKUP = re.compile(r"\s*<(?!\d)[\w:?!/]")  # "<3" is none
-# What XML 1.0 has no way to write (production 2, Char).
+FILES = (".bml", ".xml", ".txt")  # suffixes of a single word that is meant to be a file name
+MARKUP = re.compile(r"\s*<(?!\d)[\w:?!/]")  # but not "<3"
+# Characters that XML 1.0 cannot contain (production 2, Char).
 UNWRITABLE = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 class MoodWord(click.ParamType):  # type: ignore[type-arg]
-    """A word of the table of moods."""
+    """A mood of the knowledge base."""
 
     name = "mood"
 
@@ -44,33 +44,31 @@ role = click.option(
     type=click.Choice(["speaker", "listener"]),
     default="speaker",
     show_default=True,
-    help="Whether the face talks, or listens to what is said.",
+    help="Whether the face speaks the text or listens to it.",
 )
 mood = click.option(
     "--mood",
     type=MoodWord(),
     metavar="WORD",
-    help="How often, and for how long, expressions come: sad, happy.",
+    help="Mood, such as happy or sad: how often expressions come and how long they last.",
 )
-
-
 language = click.option(
-    "--language", metavar="BCP-47", help="Of what is said, where no xml:lang says it.  [default: en-US]"
+    "--language", metavar="TAG", help="Language of text without xml:lang, as a BCP-47 tag.  [default: en-US]"
 )
 words = click.option(
     "--words",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    type=options.FILE,
     metavar="FILE.csv",
-    help="Emotional words of your own, for texts in --language or for all: lines # source:, # units:,"
-    " # licence: and word,category,origin, as in realizer/tables/emotional_words_en.csv.",
+    help="Your own emotional words, for texts in --language, or for all texts without it; the format is that "
+    "of realizer/tables/emotional_words_en.csv.",
 )
 
 
 def words_for(language: str | None, file: Path | None) -> Words:
-    """The words that count.
+    """Return the emotional words to use.
 
     Raises:
-        click.UsageError: a file that is no list of words.
+        click.UsageError: the file is not a list of words.
     """
     from realizer.core.errors import TableError
     from realizer.knowledge.word_languages import Words
@@ -84,23 +82,23 @@ def words_for(language: str | None, file: Path | None) -> Words:
 
 
 def warn_unknown_languages(words: Words, languages: Iterable[str], warned: set[str]) -> None:
-    """A word on standard error for each language without a list of words that is not told yet."""
+    """Print a warning for each language without emotional words, once, and add it to `warned`."""
     for language in languages:
         if language not in warned and words.of(language) is None:
             warned.add(language)
             click.echo(
-                f"no emotional words for language {language!r}: none of its words counts; see --words",
+                f"no emotional words for language {language!r}: only punctuation counts; see --words",
                 err=True,
             )
 
 
 def languages_in(block: Block, words: Words) -> list[str]:
-    """The languages of what is said in a block, each once."""
+    """Return the languages of the speeches of a block, each once."""
     from bml_schema import Speech
     from realizer.knowledge.word_languages import language_of
 
-    said = [node for node in block.behaviours if isinstance(node, Speech)]
-    return list(dict.fromkeys(language_of(node, block, words.language) for node in said))
+    speeches = [node for node in block.behaviours if isinstance(node, Speech)]
+    return list(dict.fromkeys(language_of(node, block, words.language) for node in speeches))
 
 
 @click.command()
@@ -110,11 +108,9 @@ def languages_in(block: Block, words: Words) -> list[str]:
 @language
 @words
 @click.option(
-    "-o", "--output", metavar="OUT.bml", type=click.Path(path_type=Path), help="Default: standard output."
+    "-o", "--output", metavar="OUT.bml", type=options.OUTPUT, help="File to write.  [default: print it]"
 )
-@click.pass_context
 def enrich(
-    context: click.Context,
     text: str,
     role: Any,
     mood: Any,
@@ -122,10 +118,11 @@ def enrich(
     words: Path | None,
     output: Path | None,
 ) -> int:
-    """Give a text the face of who says it: BML with expressions at its words (Wojdel 2005, 6.5).
+    """Add facial expressions to a text or a BML document (Wojdel 2005, 6.5).
 
-    TEXT is what is said, a file of it, or a BML document, whose speeches and expressions get what goes with
-    them. Each expression says in `because` which rule placed it. The expressions are her templates.
+    A text becomes a BML document that speaks it, with expressions at words and sentence ends; in a document,
+    speeches and expressions get the expressions that usually accompany them. The attribute `because` of each
+    added expression names the rule that placed it.
 
     \b
     realizer enrich "Are you sure? That is nonsense!" -o sure.bml
@@ -135,57 +132,55 @@ def enrich(
     from realizer.knowledge.enrich import Enricher
     from realizer.speech.utterance import MAX_TEXT
 
-    said = _read(text)
-    if not said.strip():
-        raise click.UsageError("wanted a text or a BML document, got nothing but blanks")
+    source = _read(text)
+    if not source.strip():
+        raise click.UsageError("wanted a text or a BML document, got only blanks")
     lists = words_for(language, words)
     enricher = Enricher(role, mood, lists)
-    faults = 0
-    before = 0
-    if isinstance(said, bytes) or MARKUP.match(said):
-        blocks, before, faults, languages = _documents(said, enricher)
+    faults = before = 0
+    if isinstance(source, bytes) or MARKUP.match(source):
+        blocks, before, faults, languages = _enrich_documents(source, enricher)
     else:
-        clean = _writable(said)
+        clean = _replace_unwritable(source)
         if not clean.strip():
-            raise click.UsageError("wanted a text or a BML document, got nothing that can be said")
+            raise click.UsageError("wanted a text or a BML document, got characters XML cannot hold")
         blocks = list(enricher.texts(clean, MAX_TEXT))
         languages = [lists.language]
-    if not context.obj["quiet"]:
+    if not options.is_quiet():
         warn_unknown_languages(lists, languages, set())
-        if language is None and words is None and _is_foreign(said, lists.language):
-            click.echo(
-                f"none of this is in the letters of {lists.language!r}, so that none of its words counts; see"
-                " --language and --words",
-                err=True,
-            )
+    if language is None and words is None and _is_foreign(source, lists.language):
+        options.note(
+            f"this text has no letters of {lists.language!r}, so only punctuation counts; see --language and "
+            "--words"
+        )
     result = "".join(write(block) for block in blocks)
     if output is None:
         sys.stdout.write(result)
     else:
         output.write_text(result, "utf-8")
         placed = sum(map(_count_placed, blocks)) - before
-        click.echo(f"{output}: {placed} expression{'s' * (placed != 1)} placed", err=True)
+        options.note(f"{output}: {placed} expression{'s' * (placed != 1)} placed")
     return 1 if faults else 0
 
 
-def _is_foreign(said: str | bytes, language: str) -> bool:
-    """Whether a text that is taken for English has letters, and none of them are English ones."""
-    if isinstance(said, bytes) or language.partition("-")[0].lower() != "en":
+def _is_foreign(text: str | bytes, language: str) -> bool:
+    """Return whether a text that is taken for English has letters, but no English ones."""
+    if isinstance(text, bytes) or language.partition("-")[0].lower() != "en":
         return False
-    letters = [letter for letter in said if letter.isalpha()]
+    letters = [letter for letter in text if letter.isalpha()]
     return bool(letters) and not any(letter.isascii() for letter in letters)
 
 
 def _count_placed(block: Block) -> int:
-    """How many expressions of a block say which rule placed them."""
+    """Return the number of expressions that a rule has placed."""
     return sum(bool(getattr(node, "because", "")) for node in block.behaviours)
 
 
 def _read(text: str) -> str | bytes:
-    """The text itself, or what a file or standard input holds; XML, which names its encoding, as bytes.
+    """Return the text, or the content of the file or standard input; XML, which names its encoding, as bytes.
 
     Raises:
-        click.UsageError: what looks like the name of a file, and is none; a text that is not UTF-8.
+        click.UsageError: a missing file, or a text that is not UTF-8.
     """
     try:
         is_file = text == "-" or Path(text).is_file()
@@ -194,32 +189,27 @@ def _read(text: str) -> str | bytes:
         is_file = is_folder = False
     if not is_file:
         if is_folder or (not text.split()[1:] and text.lower().rstrip().endswith(FILES)):
-            raise click.UsageError(f"{text}: wanted a text, or a file that is there; a text may come by -")
+            raise click.UsageError(f"{text}: wanted a text or an existing file; - reads standard input")
         return text
-    data = options.read_documents([text])[0]
+    (data,) = options.read_documents([text])
     if re.match(rb"(?:\xef\xbb\xbf)?\s*<(?![\d\s])", data) or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return data
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        name = "standard input" if text == "-" else text
-        raise click.UsageError(
-            f"{name}: wanted a text in UTF-8, got byte 0x{data[error.start]:02X} at {error.start}"
-        ) from None
+    return options.decode(data, text, "a text")
 
 
-def _writable(text: str) -> str:
-    """The text with blanks for characters that XML has no way to write; how many is told."""
+def _replace_unwritable(text: str) -> str:
+    """Replace characters that XML cannot contain by blanks and print how many."""
     clean, count = UNWRITABLE.subn(" ", text)
     if count:
         click.echo(f"{count} character{'s' * (count > 1)} that XML cannot hold became blanks", err=True)
     return clean
 
 
-def _documents(text: str | bytes, enricher: Enricher) -> tuple[list[Block], int, int, list[str]]:
-    """Blocks of documents, enriched; how many expressions they had before; faults told; languages.
+def _enrich_documents(text: str | bytes, enricher: Enricher) -> tuple[list[Block], int, int, list[str]]:
+    """Enrich documents and print their faults; broken documents are left out.
 
-    A broken document is left out.
+    Returns:
+        The blocks, the number of expressions placed before, the number of faults, and the languages.
     """
     from bml_schema import Block, Speech, read
     from realizer.behaviours.registry import VOCABULARY
@@ -239,20 +229,19 @@ def _documents(text: str | bytes, enricher: Enricher) -> tuple[list[Block], int,
             for node in item.behaviours:
                 if isinstance(node, Speech) and node.text is not None and node.descriptions:
                     click.echo(
-                        f"{item.id}:{node.id}: a description may be spoken instead of its text, where no mark"
-                        " of ours is: nothing is placed in it",
+                        f"{item.id}:{node.id}: a description may be spoken instead of its text; skipped",
                         err=True,
                     )
             before += _count_placed(item)
             blocks.append(enricher.block(item))
         else:
-            heard = _spoken_texts(item, enricher.words.language)
-            blocks.append(enricher.listener(heard, f"{item.id}-listener"))
+            texts = _spoken_texts(item, enricher.words.language)
+            blocks.append(enricher.listener(texts, f"{item.id}-listener"))
     return blocks, before, faults, languages
 
 
 def _spoken_texts(block: Block, language: str) -> list[SpokenText]:
-    """The texts of a block, each when it begins as the block is scheduled."""
+    """Return the texts of a block in the order in which they are scheduled."""
     from bml_schema import Speech
     from realizer.knowledge.enrich import SpokenText
     from realizer.knowledge.word_languages import language_of
@@ -261,9 +250,9 @@ def _spoken_texts(block: Block, language: str) -> list[SpokenText]:
     from realizer.speech.silent import SilentVoice
 
     times = submit_with_speech(Player(PlayOptions(language=language)), block, SilentVoice()).times
-    said = [
+    texts = [
         SpokenText(str(node.text), float(times[node.id][0]), language_of(node, block, language))
         for node in block.behaviours
         if isinstance(node, Speech) and node.text is not None and node.id in times
     ]
-    return sorted(said, key=lambda one: one.begin)
+    return sorted(texts, key=lambda text: text.begin)

@@ -16,17 +16,14 @@ if TYPE_CHECKING:
     from realizer.analysis.picture_search import Likeness
     from realizer.expressions.expression import Expression
 
-MIN_LIKE = 0.4  # the best cosine of a picture that shows anything: a head that idles makes 0.3
-as_json = click.option("--json", "as_json", is_flag=True, help="As JSON instead of lines.")
+MIN_LIKE = 0.4  # least cosine of the best match; the motion of an idle head reaches 0.3
 picture = click.option(
-    "-o", "--output", metavar="SHEET.png", type=click.Path(path_type=Path), help="Draw what is told."
+    "-o", "--output", metavar="SHEET.png", type=options.OUTPUT, help="Draw the expressions as well."
 )
-face = click.option("--face", default="default", show_default=True, help="Whose face.")
-whose = click.option("--face", metavar="NAME", help="Whose face; --like takes any, else the default one.")
 
 
 class Units(click.ParamType):  # type: ignore[type-arg]
-    """1,2,12L=0.5 -> (AU, side) -> intensity."""
+    """Action units such as 1,2,12L=0.5, as (AU, side) -> intensity."""
 
     name = "units"
 
@@ -34,52 +31,56 @@ class Units(click.ParamType):  # type: ignore[type-arg]
         from realizer.core.errors import TableError
         from realizer.tables.lexemes import read_aus
 
-        found: dict[tuple[int, str], float] = {}
+        units: dict[tuple[int, str], float] = {}
         for part in str(value).replace("+", ",").split(","):
             match = re.fullmatch(r"\s*(?:AU)?\s*([^=\s]*)\s*(?:=\s*(\d*\.?\d+))?\s*", part, re.IGNORECASE)
             if match is None:
                 self.fail(f"wanted action units such as 1,2,12L=0.5, got {part!r}", parameter, context)
             try:
-                found |= read_aus({match[1].upper(): float(match[2] or 1)}, "--au")
+                units |= read_aus({match[1].upper(): float(match[2] or 1)}, "--au")
             except TableError as error:
                 self.fail(re.sub(r"^--au[:,] ", "", str(error)), parameter, context)
-        return found
+        return units
 
 
 @click.group()
 def expressions() -> None:
-    """List the expressions that documents and timelines may name, and look them up."""
+    """List and search the expressions that documents and timelines can use by name."""
 
 
 @expressions.command("list")
-@as_json
+@options.as_json
 @picture
-@face
+@click.option("--face", default="default", show_default=True, help="Face to draw.")
 @options.expressions
 def list_(as_json: bool, output: Path | None, face: str, expressions: Path | None) -> None:
-    """A line for each: name, action units, seconds of onset, apex and offset, and what is seen."""
+    """List the expressions: name, action units, seconds of onset, apex and offset, description."""
     from realizer.expressions.library import library_of
 
     _check_picture(output, face)
-    known = list(library_of(options.settings(expressions=expressions).expressions).values())
-    _print_matches(known, [""] * len(known), as_json)
+    library = list(library_of(options.settings(expressions=expressions).expressions).values())
+    _print_matches(library, [""] * len(library), as_json)
     if output is not None:
-        _draw(known, [one.units for one in known], output, face)
+        _draw(library, [expression.units for expression in library], output, face)
 
 
 @expressions.command()
 @click.argument("text", required=False)
-@click.option("--au", "units", type=Units(), metavar="1,2,12L=0.5", help="By action units, instead of words.")
+@click.option("--au", "units", type=Units(), metavar="1,2,12L=0.5", help="Search by action units.")
 @click.option(
     "--like",
     metavar="IMAGE",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="By a picture of one of our faces from the front, in any of our lights.",
+    type=options.FILE,
+    help="Search by a picture of a built-in face, from the front, in one of the lights of --light.",
 )
-@click.option("--most", type=click.IntRange(1), default=8, show_default=True, help="How many to tell.")
-@as_json
+@click.option(
+    "--most", type=click.IntRange(1), default=8, show_default=True, help="Largest number of results."
+)
+@options.as_json
 @picture
-@whose
+@click.option(
+    "--face", metavar="NAME", help="Face to draw, and face in the picture.  [default: default, any]"
+)
 @options.expressions
 def find(
     text: str | None,
@@ -91,7 +92,9 @@ def find(
     face: str | None,
     expressions: Path | None,
 ) -> int:
-    """Look expressions up: by what TEXT says they mean, by action units, by a picture; the best first.
+    """Search expressions by the words of TEXT, by action units or by a picture, best match first.
+
+    Exits with 1 if nothing matches.
 
     \b
     realizer expressions find "sorry about that"
@@ -104,64 +107,62 @@ def find(
     if sum(way is not None for way in (text, units, like)) != 1:
         raise click.UsageError("wanted one of TEXT, --au and --like")
     _check_picture(output, face or "default")
-    known = list(library_of(options.settings(expressions=expressions).expressions).values())
+    library = list(library_of(options.settings(expressions=expressions).expressions).values())
     if text is not None:
-        found = by_meaning(text, known)
+        matches = by_meaning(text, library)
     elif units is not None:
-        found = by_action_units(units, known)
+        matches = by_action_units(units, library)
     else:
         assert like is not None
-        seen = _find_similar(like, known, face)
-        face, found = seen.face, [pair for pair in seen.matches if pair[1] > 0]
-        if found and found[0][1] < MIN_LIKE:
-            found = []
-        click.echo(f"{like}: {seen.face}, {seen.light}{', neutral' if seen.neutral else ''}", err=True)
-    found = found[:most]
-    scores = [f"{score:.2f}" for _, score in found]
-    _print_matches([one for one, _ in found], scores, as_json)
-    if not found:
-        asked = repr(text) if text is not None else "that"
-        click.echo(f"nothing in the library goes with {asked}; `realizer expressions list` has all", err=True)
+        likeness = _find_similar(like, library, face)
+        face, matches = likeness.face, [pair for pair in likeness.matches if pair[1] > 0]
+        if matches and matches[0][1] < MIN_LIKE:
+            matches = []
+        options.note(f"{like}: {face}, {likeness.light}{', neutral' if likeness.neutral else ''}")
+    matches = matches[:most]
+    expressions_found, scores = [match[0] for match in matches], [f"{match[1]:.2f}" for match in matches]
+    _print_matches(expressions_found, scores, as_json)
+    if not matches:
+        query = repr(text) if text is not None else "this query"
+        click.echo(f"no expression matches {query}; see `realizer expressions list`", err=True)
     elif output is not None:
-        _draw([one for one, _ in found], scores, output, face or "default")
-    return 0 if found else 1
+        _draw(expressions_found, scores, output, face or "default")
+    return 0 if matches else 1
 
 
-def _find_similar(like: Path, known: Sequence[Expression], face: str | None) -> Likeness:
+def _find_similar(like: Path, library: Sequence[Expression], face: str | None) -> Likeness:
     from realizer.analysis.picture_search import UnknownPictureError, by_picture, read_picture
 
     try:
-        return by_picture(read_picture(like), known, None if face is None else [face])
+        return by_picture(read_picture(like), library, None if face is None else [face])
     except UnknownPictureError as error:
         raise click.UsageError(str(error)) from None
 
 
 def _check_picture(output: Path | None, face: str) -> None:
-    if output is not None and output.suffix.lower() != ".png":
-        raise click.UsageError(f"{output}: wanted a name that ends in .png")
+    options.check_suffix(output, ".png")
     if output is not None:
         options.check_camera(face, "close")
 
 
-def _print_matches(found: Sequence[Expression], scores: Sequence[str], as_json: bool) -> None:
+def _print_matches(expressions: Sequence[Expression], scores: Sequence[str], as_json: bool) -> None:
+    """Print expressions with their scores, which are "" if there are none."""
+    scored = list(zip(expressions, scores, strict=True))
     if as_json:
-        told = [
-            one.to_json() | ({"score": float(score)} if score else {})
-            for one, score in zip(found, scores, strict=True)
-        ]
-        click.echo(json.dumps(told, indent=1))
+        rows = [e.to_json() | ({"score": float(score)} if score else {}) for e, score in scored]
+        click.echo(json.dumps(rows, indent=1))
         return
-    width = max((len(one.name) for one in found), default=0)
-    units = max((len(one.units) for one in found), default=0)
-    for one, score in zip(found, scores, strict=True):
-        seconds = f"{one.onset:4.2f} {one.apex:4.2f} {one.offset:4.2f}"
-        own = f"  [{one.file}]" if one.file is not None else ""
-        line = f"{score + '  ' if score else ''}{one.name:<{width}}  {one.units:<{units}}  {seconds}"
-        click.echo(f"{line}  {one.features or ', '.join(one.means)}{own}".rstrip())
+    name_width = max((len(e.name) for e in expressions), default=0)
+    units_width = max((len(e.units) for e in expressions), default=0)
+    for e, score in scored:
+        head = f"{score + '  ' if score else ''}{e.name:<{name_width}}  {e.units:<{units_width}}"
+        file = f"  [{e.file}]" if e.file is not None else ""
+        seconds = f"{e.onset:4.2f} {e.apex:4.2f} {e.offset:4.2f}"
+        click.echo(f"{head}  {seconds}  {e.features or ', '.join(e.means)}{file}".rstrip())
 
 
-def _draw(found: Sequence[Expression], notes: Sequence[str], path: Path, face: str) -> None:
-    """A picture of each on a sheet."""
+def _draw(expressions: Sequence[Expression], notes: Sequence[str], path: Path, face: str) -> None:
+    """Write a contact sheet of the expressions."""
     from PIL import Image
 
     from realizer.animation.pose import poses
@@ -171,10 +172,9 @@ def _draw(found: Sequence[Expression], notes: Sequence[str], path: Path, face: s
     from realizer.render import Renderer
     from realizer.render.contact_sheet import sheet
 
-    rows = poses(frames([Series("", of_expressions(found))]), input_names(face), mapping_of(face))
+    rows = poses(frames([Series("", of_expressions(expressions))]), input_names(face), mapping_of(face))
     with Renderer(face, (220, 220), "close") as renderer:
         pictures = renderer.draw(rows)
-    Image.fromarray(sheet(list(pictures), [one.name for one in found], [(note,) for note in notes])).save(
-        path
-    )
-    click.echo(f"{path}: {len(found)} expressions", err=True)
+    titles = [expression.name for expression in expressions]
+    Image.fromarray(sheet(list(pictures), titles, [(note,) for note in notes])).save(path)
+    options.note(f"{path}: {len(expressions)} expressions")

@@ -15,32 +15,32 @@ from realizer.cli.realize import output_options, play_documents
 if TYPE_CHECKING:
     from realizer.animation.fap.fap_clip import FAPClip
 
-HELD = 1.0  # s; how long a file of one frame is played
-FASTEST = 240.0  # frames a second that can be asked of a performance
+HOLD = 1.0  # s, the duration of a file with one frame
+MAX_FPS = 240.0  # the highest --fps
 
 file = click.argument("file", metavar="FILE", type=click.Path(exists=True, dir_okay=False, allow_dash=True))
 
 
 @click.group()
 def fap() -> None:
-    """Look into FAP files, convert and play them.
+    """Inspect, convert and play FAP files (MPEG-4 facial animation parameters).
 
-    FILE is MPEG-4 FAP text as any program writes it, or a .csv or .json of frames as `convert` and `realize`
-    write them; - is standard input. What is odd in it is said on standard error, and survived.
+    FILE is a FAP text file of any program, or a .csv or .json file as written by `convert` and `realize`; -
+    reads standard input. Irregularities of the file are reported on standard error and tolerated.
     """
 
 
 @fap.command()
 @file
-@click.option("--json", "as_json", is_flag=True, help="As JSON instead of lines.")
+@options.as_json
 def info(file: str, as_json: bool) -> None:
-    """Say how long a file is, at what rate, what it moves and how far."""
+    """Print the duration and frame rate of a file, and which FAPs it moves and how far."""
     from realizer.behaviours.fap_visemes import expand_compound
     from realizer.tables import faps
 
     clip = _read(file)
-    given = [row for row in faps()[2:] if clip.mask[row.fap - 1] and len(clip.values)]
-    columns = {row.fap: clip.values[:, row.fap - 1] for row in given}
+    moved = [row for row in faps()[2:] if clip.mask[row.fap - 1] and len(clip.values)]
+    columns = {row.fap: clip.values[:, row.fap - 1] for row in moved}
     extremes = {number: (int(values.min()), int(values.max())) for number, values in columns.items()}
     seconds = round(max(len(clip.values) - 1, 0) / clip.fps, 6)
     compound = {
@@ -49,36 +49,44 @@ def info(file: str, as_json: bool) -> None:
     }
     notes = expand_compound(clip).notes
     if as_json:
-        moved = {
-            row.name: dict(zip(("least", "most"), extremes[row.fap], strict=True)) | {"unit": row.unit}
-            for row in given
+        data: dict[str, Any] = {
+            "name": clip.name,
+            "fps": clip.fps,
+            "frames": len(clip.values),
+            "duration": seconds,
+            "faps": {
+                row.name: dict(zip(("least", "most"), extremes[row.fap], strict=True)) | {"unit": row.unit}
+                for row in moved
+            },
+            **compound,
+            "notes": notes,
         }
-        told = {"name": clip.name, "fps": clip.fps, "frames": len(clip.values), "duration": seconds}
-        click.echo(json.dumps(told | {"faps": moved} | compound | {"notes": notes}, ensure_ascii=False))
+        click.echo(json.dumps(data, ensure_ascii=False))
         return
     click.echo(f"{clip.name or '-'}: {len(clip.values)} frames at {clip.fps:g} fps, {seconds:g} s")
-    for row in given:
+    for row in moved:
         least, most = extremes[row.fap]
         click.echo(f"{row.fap:>4} {row.name:<22} {least:>7} .. {most:<7} {row.unit}")
-    for number, (what, found) in enumerate(compound.items(), 1):
+    for number, (name, values) in enumerate(compound.items(), 1):
         if clip.mask[number - 1]:
-            click.echo(f"{number:>4} {what:<22} {', '.join(map(str, found)) or 'none'}")
+            click.echo(f"{number:>4} {name:<22} {', '.join(map(str, values)) or 'none'}")
     for note in notes:
         click.echo(f"{file}: {note}", err=True)
 
 
 @fap.command()
 @file
-@click.option("-o", "--output", metavar="OUT", required=True, help="Where to: a .fap, .csv or .json file.")
-@click.option("--fps", type=options.Number(0.1, 1000), help="Frames a second.  [default: as they are]")
 @click.option(
-    "--expand", is_flag=True, help="Write what visemes and expressions (FAP 1, 2) show as other FAPs."
+    "-o", "--output", metavar="OUT", type=options.OUTPUT, required=True, help="A .fap, .csv or .json file."
 )
-@click.pass_context
-def convert(context: click.Context, file: str, output: str, fps: float | None, expand: bool) -> None:
-    """Write the frames of a file as another one, at another rate too.
+@click.option("--fps", type=options.Number(0.1, 1000), help="New frame rate.  [default: unchanged]")
+@click.option(
+    "--expand", is_flag=True, help="Replace visemes and expressions (FAPs 1 and 2) by low-level FAPs."
+)
+def convert(file: str, output: Path, fps: float | None, expand: bool) -> None:
+    """Convert a file to another format or frame rate.
 
-    A .fap is as the standard has it: whole numbers within their ranges, one mask, frames from 0.
+    A .fap file is written as the standard says: integers within their ranges, one mask, frames from 0.
 
     \b
     realizer fap convert greta.fap -o clean.fap --fps 30
@@ -87,36 +95,28 @@ def convert(context: click.Context, file: str, output: str, fps: float | None, e
     from realizer.core.atomic_files import write_text
     from realizer.outputs.fap_clip_files import ENCODINGS, clip_to_range
 
-    suffix = Path(output).suffix.lower()
-    if suffix not in ENCODINGS:
-        raise click.BadParameter(
-            f"{output}: wanted a suffix of {' '.join(ENCODINGS)}, got {suffix or 'none'}", param_hint="-o"
-        )
+    options.check_suffix(output, *ENCODINGS)
+    suffix = output.suffix.lower()
     clip = _read(file)
     if expand:
         clip = expand_compound(clip)
     clip = clip if fps is None else clip.resampled(fps)
     if suffix == ".fap":
         clip = clip_to_range(clip)
-    _print_info(context, file, clip)
-    name = clip.name or Path(output).stem
-    try:
-        write_text(Path(output), ENCODINGS[suffix](replace(clip, name=name)))
-    except OSError as error:
-        raise click.UsageError(f"{output}: {error.strerror or error}") from None
-    if not context.obj["quiet"]:
-        click.echo(f"{output}: {len(clip.values)} frames at {clip.fps:g} fps", err=True)
+    _print_notes(file, clip)
+    with options.writing(output):
+        write_text(output, ENCODINGS[suffix](replace(clip, name=clip.name or output.stem)))
+    options.note(f"{output}: {len(clip.values)} frames at {clip.fps:g} fps")
 
 
 @fap.command()
 @file
 @output_options
-@click.pass_context
-def play(context: click.Context, /, file: str, **asked: Any) -> int:
-    """Play a file into any output of `realizer outputs`, visemes and expressions (FAP 1, 2) too.
+def play(file: str, **flags: Any) -> int:
+    """Play a file on a face, to any format of `realizer outputs`.
 
-    Its FAPs stand in place of what else moves them; the rest of the face idles, unless there is --no-idle.
-    The rate is the file's own. A file of one frame is held for a second.
+    The file controls the FAPs it names, also those of visemes and expressions (FAPs 1 and 2); the rest of the
+    face idles, unless --no-idle is given. The default frame rate is the file's. A single frame lasts 1 s.
 
     \b
     realizer fap play actor.fap -o actor.mp4 --face ben
@@ -129,9 +129,9 @@ def play(context: click.Context, /, file: str, **asked: Any) -> int:
     from realizer.core.errors import RealizerError
 
     clip = expand_compound(_read(file))
-    _print_info(context, file, clip)
+    _print_notes(file, clip)
     if len(clip.values) == 1:
-        count = 1 + max(1, round(HELD * clip.fps))
+        count = 1 + max(1, round(HOLD * clip.fps))
         values, visemes, expressions = (
             np.repeat(part, count, axis=0) for part in (clip.values, clip.visemes, clip.expressions)
         )
@@ -139,15 +139,15 @@ def play(context: click.Context, /, file: str, **asked: Any) -> int:
     try:
         document = document_of(clip, "fap")
     except RealizerError as error:
-        raise _refused(file, error) from None
+        raise click.ClickException(f"{file}: {error}") from None
     room = MAX_BYTES * len(clip.values) // len(document)
     if room < len(clip.values):
         raise click.ClickException(
             f"{file}: wanted at most about {room} frames of these FAPs to play, got {len(clip.values)}; "
-            "`realizer fap convert --fps` makes fewer of them"
+            "`realizer fap convert --fps` reduces them"
         )
-    fps = asked["fps"] if asked["fps"] is not None else min(clip.fps, FASTEST)
-    return play_documents(context, lambda: [document.encode()], asked | {"fps": fps})
+    fps = flags["fps"] if flags["fps"] is not None else min(clip.fps, MAX_FPS)
+    return play_documents(lambda: [document.encode()], flags | {"fps": fps})
 
 
 def _read(file: str) -> FAPClip:
@@ -158,15 +158,9 @@ def _read(file: str) -> FAPClip:
     try:
         return read_clip(content)
     except RealizerError as error:
-        raise _refused(file, error) from None
+        raise click.ClickException(f"{file}: {error}") from None
 
 
-def _print_info(context: click.Context, file: str, clip: FAPClip) -> None:
-    if not context.obj["quiet"]:
-        for note in clip.notes:
-            click.echo(f"{file}: {note}", err=True)
-
-
-def _refused(file: str, error: Exception) -> click.ClickException:
-    """Exit status 1, as for a document."""
-    return click.ClickException(f"{file}: {error}")
+def _print_notes(file: str, clip: FAPClip) -> None:
+    for note in clip.notes:
+        options.note(f"{file}: {note}")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from realizer.cli import options
 from realizer.core.errors import FaceError
 
 SHAPES = "au_shapes.npz"
@@ -17,38 +18,42 @@ FORMS = ("published", "extended")
 @click.option(
     "--from",
     "measurements",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="Measured landmarks: a CSV file au,x,y,z,dx,dy,dz in metres, below lines # source:, # units: and "
-    "# licence:; one side is enough. Default: the face's own shapes.",
+    type=options.FILE,
+    help="Fit to measured landmarks: a CSV file with lines # source:, # units:, # licence: and the columns "
+    "au,x,y,z,dx,dy,dz in metres; one side is enough.  [default: the face's own shapes]",
 )
 @click.option(
     "--data",
-    type=click.Path(exists=True, file_okay=False, path_type=Path),
-    help="Folder of the unpacked CC0 head data: take the shapes from there, keep them in the face's folder.",
+    type=options.FOLDER,
+    help="Measure the shapes in this folder of the unpacked CC0 head data, and save them with the face.",
 )
 @click.option(
     "--form",
     type=click.Choice([*FORMS, "both"]),
-    help="published: one or two Gaussians; extended: up to four.  [default: both; extended for a FILE]",
+    help="One or two Gaussians (published), or up to four (extended).  [default: both; extended for a FILE]",
 )
-@click.option("-o", "--output", metavar="FOLDER|FILE.toml", type=click.Path(path_type=Path),
-              help="Where au_FORM.toml goes, or one form's file.  [default: the face's folder]")  # fmt: skip
-@click.pass_context
+@click.option(
+    "-o",
+    "--output",
+    metavar="FOLDER|FILE.toml",
+    type=options.OUTPUT,
+    help="Folder for au_FORM.toml, or the file of one form.  [default: the face's folder]",
+)
 def fit(
-    context: click.Context,
     name: str,
     measurements: Path | None,
     data: Path | None,
     form: str | None,
     output: Path | None,
 ) -> None:
-    """Fit how action units move a face, and print how near it comes (Wojdel 2005, table 4.3).
+    """Fit the action unit model of a face, and print its errors (Wojdel 2005, table 4.3).
 
-    The deformer au draws a face by the extended form. A face that was built anew is measured anew by --data.
+    --deformer au draws a face with the extended form. After `realizer faces build`, use --data to measure the
+    new shapes.
     """
     import os
 
-    # Small products, thousands of them: a second thread only costs.
+    # Thousands of small matrix products: further threads only slow them down.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from realizer.face.au.file import write_model
     from realizer.face.load import folder_of, load_face
@@ -76,15 +81,14 @@ def fit(
         )
     done = 0
 
-    def say(words: str) -> None:
+    def report(text: str) -> None:
         nonlocal done
         done += 1
-        if not (context.obj or {}).get("quiet"):
-            click.echo(f"{done}/{len(measured)} {words}", err=True)
+        options.note(f"{done}/{len(measured)} {text}")
 
-    models = fit_models(face, measured, tuple(files), say, source)
+    models = fit_models(face, measured, tuple(files), report, source)
     faults = [
-        f"{kind}: {words}" for kind, model in models.items() for words in runaways(face, model, measured)
+        f"{kind}: {fault}" for kind, model in models.items() for fault in runaways(face, model, measured)
     ]
     if faults:
         raise FaceError("; ".join((f"{folder}: nothing written, a fit tears the face", *faults)))
@@ -93,17 +97,15 @@ def fit(
     for kind, model in models.items():
         write_model(files[kind], model)
         click.echo(f"{kind} form\n{table_text(table(model, measured))}")
-        click.echo(f"{files[kind]}: written", err=True)
+        options.note(f"{files[kind]}: written")
 
 
 def _files(output: Path, form: str | None) -> dict[str, Path]:
-    """Form -> the file that it goes to."""
+    """Return the file of each form."""
     if output.suffix == ".toml":
         if form == "both":
             raise click.BadParameter(f"wanted a folder for two forms, got {output}", param_hint="-o")
         return {form or "extended": output}
     if not output.is_dir():
-        raise click.BadParameter(
-            f"wanted a folder that is there, or FILE.toml, got {output}", param_hint="-o"
-        )
+        raise click.BadParameter(f"wanted an existing folder or FILE.toml, got {output}", param_hint="-o")
     return {kind: output / f"au_{kind}.toml" for kind in FORMS if form in (None, "both", kind)}

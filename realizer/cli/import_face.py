@@ -1,4 +1,4 @@
-"""`faces import` and `faces check`: imports a head; reports what is wrong with a face."""
+"""`faces import` and `faces check`: import a head, and report faults of faces."""
 
 from __future__ import annotations
 
@@ -6,57 +6,62 @@ from pathlib import Path
 
 import click
 
+from realizer.cli import options
+
 HEADS = (".glb", ".gltf")
 
 
 @click.command("import")
-@click.argument("head", type=click.Path(exists=True, dir_okay=False, path_type=Path))
-@click.option("--name", help="The face's name; default the output folder's, or the file's.")
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="The folder to write; default faces/NAME."
-)
+@click.argument("head", type=options.FILE)
+@click.option("--name", help="Name of the face.  [default: that of the output folder, or of the file]")
+@click.option("-o", "--output", type=options.OUTPUT, help="Folder to write.  [default: faces/NAME]")
 def import_(head: Path, name: str | None, output: Path | None) -> None:
-    """Make a face of a GLB or glTF head with ARKit-named morph targets (jawOpen, mouthSmileLeft, ...).
+    """Make a face folder from a GLB or glTF head with ARKit blend shapes (jawOpen, mouthSmileLeft, ...).
 
-    Prints what was found, what is missing, and what to look at.
+    Prints what the file has, what is missing, and what to check by eye.
+
+    \b
+    realizer faces import anna.glb
+    realizer faces sheet anna -o anna.png
     """
     from realizer.facebuild.arkit.importer import import_head
 
     folder = output or Path("faces") / (name or head.stem)
     for line in import_head(head, folder, name or folder.name).lines:
         click.echo(line)
-    click.echo(
-        f"{folder}: written; look at it: realizer faces sheet {folder.name} -o {folder.name}.png", err=True
-    )
+    options.note(f"{folder}: written; look at it: realizer faces sheet {folder.name} -o {folder.name}.png")
 
 
 @click.command()
 @click.argument("names", nargs=-1, metavar="[NAME | FOLDER | HEAD.glb]...")
 def check(names: tuple[str, ...]) -> int:
-    """Say every fault of face folders, of all without a name; of a GLB head, what an import would find."""
+    """Print every fault of face folders; without a name, of all of them.
+
+    For a GLB or glTF head, prints what `realizer faces import` would find.
+    """
     from realizer.face.load import face_folders
     from realizer.facebuild.check import check_face
 
     status = 0
     for name in names or face_folders():
-        head = Path(name)
-        if head.suffix.lower() in HEADS:
-            faults = _head_faults(head)
-        elif head.name != name and head.is_dir():
-            folder = head.resolve()
+        path = Path(name)
+        if path.suffix.lower() in HEADS:
+            faults = _inspect_head(path)
+        elif path.name != name and path.is_dir():
+            folder = path.resolve()
             faults = check_face(folder.name, folder.parent)
         else:
             faults = check_face(name)
         for fault in faults:
             click.echo(fault)
+            status = 1
         if not faults:
-            click.echo(f"{name}: sound", err=True)
-        status = 1 if faults else status
+            options.note(f"{name}: sound")
     return status
 
 
-def _head_faults(head: Path) -> tuple[str, ...]:
-    """Why a head cannot be imported; else says what an import finds."""
+def _inspect_head(head: Path) -> tuple[str, ...]:
+    """Print what an import would find, or return why the head cannot be imported."""
     from realizer.core.errors import FaceError
     from realizer.facebuild.arkit.importer import inspect_head
 

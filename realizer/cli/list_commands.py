@@ -1,4 +1,4 @@
-"""`voices` and `outputs`: list what there is, and how to get what is missing."""
+"""`voices` and `outputs`: list the registered ones and how to install missing parts."""
 
 from __future__ import annotations
 
@@ -7,34 +7,38 @@ from importlib.util import find_spec
 
 import click
 
-MODULES = {"film": "av"}  # an extra, and what it installs
+MODULES = {"film": "av"}  # extra -> a module that it installs
 
 
 @click.command()
 def voices() -> None:
-    """List the voices, and say how to get the missing ones."""
-    from realizer.speech.registry import voices as known
+    """List the voices that --voice takes, and how to install missing ones."""
+    from realizer.speech.registry import voices as all_voices
 
-    for voice in known():
+    for voice in all_voices():
         click.echo(f"{voice.name:<16} {voice.description}")
 
 
 @click.command()
 def outputs() -> None:
-    """List what `realize -o` can write, by suffix, and how to get what is missing for it."""
+    """List the file formats that `realize -o` writes.
+
+    Prints suffix, media type and contents, and what to install where something is missing.
+    """
     from realizer.outputs.registry import OUTPUTS
 
-    found = dict(OUTPUTS.working())
-    width, kinds = (max(map(len, column)) for column in (found, (o.media_type for o in found.values())))
-    for suffix, output in sorted(found.items()):
-        fixes = [fix for fix in map(_missing, output.needs) if fix is not None]
-        mark = f"  (missing: {'; '.join(fixes)})" if fixes else ""
-        click.echo(f"{suffix:<{width}}  {output.media_type:<{kinds}}  {output.description}{mark}")
+    working = sorted(OUTPUTS.working())
+    width = max(len(suffix) for suffix, _ in working)
+    type_width = max(len(output.media_type) for _, output in working)
+    for suffix, output in working:
+        fixes = "; ".join(filter(None, map(_fix, output.needs)))
+        missing = f"  (missing: {fixes})" if fixes else ""
+        click.echo(f"{suffix:<{width}}  {output.media_type:<{type_width}}  {output.description}{missing}")
 
 
 @cache
-def _missing(extra: str) -> str | None:
-    """What to do about an extra that is not there, or does not work here."""
+def _fix(extra: str) -> str | None:
+    """Return how to install an extra, or None if it works."""
     if extra == "render":
         from realizer.render import available
 

@@ -1,4 +1,4 @@
-"""`faces mapping`: prints a face's mapping of action units to FAPs as a file to edit."""
+"""`faces mapping`: writes a face's mapping of action units to FAPs as a file to edit."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from realizer.cli import options
     "--output",
     metavar="FILE",
     type=click.Path(dir_okay=False, path_type=Path),
-    help="Where to, instead of here: .txt in Paul's form (2010, 5.2), .csv as the table that ships.",
+    help="Write a .txt file in the format of Paul (2010, 5.2) or a .csv file.  [default: print the former]",
 )
 @options.mapping
 def mapping(name: str, output: Path | None, mapping: Path | None) -> None:
-    """Write the mapping of action units to FAPs that is in force for a face.
+    """Write how action units move the FAPs of a face, as a file to edit.
 
-    What is changed in such a file can be played without more: an action unit that it names is as it says, the
-    others stay. A face keeps its own as au_to_fap.txt or au_to_fap.csv in its folder.
+    The edited file works with --mapping of other commands: action units in it move as it says, all others
+    as before. To change a face for good, save it as au_to_fap.txt or au_to_fap.csv in the face's folder.
 
     \b
     realizer faces mapping ada -o mine.txt
@@ -32,19 +32,13 @@ def mapping(name: str, output: Path | None, mapping: Path | None) -> None:
     from realizer.face.fap_mapping import mapping_of
     from realizer.tables.mappings import FORMS, as_text, write_mapping
 
-    if output is not None and output.suffix not in FORMS:
-        raise click.BadParameter(
-            f"wanted a name that ends in {' or '.join(FORMS)}, got {output}", param_hint="-o"
-        )
-    chosen = options.settings(mapping=mapping)
-    found = mapping_of(name, chosen.mapping)
-    source = f"{name}: {', then '.join(found.sources)}"
+    options.check_suffix(output, *FORMS)
+    chosen = mapping_of(name, options.settings(mapping=mapping).mapping)
+    source = f"{name}: {', then '.join(chosen.sources)}"
     if output is None:
-        click.echo(as_text(found.rows, source), nl=False)
+        click.echo(as_text(chosen.rows, source), nl=False)
         return
-    try:
-        write_mapping(output, found.rows, source)
-    except OSError as error:
-        raise click.UsageError(f"{output}: {error.strerror or error}") from None
-    units = len({(row.au, row.side) for row in found.rows})
-    click.echo(f"{output}: {units} action units by side, {len(found.rows)} rows", err=True)
+    with options.writing(output):
+        write_mapping(output, chosen.rows, source)
+    units = len({(row.au, row.side) for row in chosen.rows})
+    options.note(f"{output}: {units} action units by side, {len(chosen.rows)} rows")

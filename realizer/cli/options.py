@@ -1,76 +1,77 @@
-"""Options that several commands share."""
+"""Options and helpers that several commands share."""
 
 from __future__ import annotations
 
+import errno
 import math
 import re
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-if TYPE_CHECKING:  # loading them takes longer than `--help` should
+if TYPE_CHECKING:  # importing them takes longer than `--help` should
     from realizer.behaviours.kind import Position
     from realizer.core.settings import Settings
     from realizer.scheduling.timing import Warning
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
+FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+FOLDER = click.Path(exists=True, file_okay=False, path_type=Path)
+OUTPUT = click.Path(path_type=Path)
+CAMERAS = "front, three-quarter, profile, close, or a camera of the face's own."
+QUIET, VERBOSE = "Print only errors on standard error.", "Print more on standard error."
+DISK_FULL = (errno.ENOSPC, errno.EFBIG)
+
 documents = click.argument(
     "documents", nargs=-1, required=True, metavar="DOC...", type=click.Path(allow_dash=True)
 )
-
-
+as_json = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 media = click.option(
-    "--media",
-    metavar="DIR",
-    type=click.Path(exists=True, file_okay=False, path_type=Path),
-    help="Folder of the files that documents may name.",
+    "--media", metavar="DIR", type=FOLDER, help="Folder of the files that documents may refer to."
 )
-
-
 expressions = click.option(
     "--expressions",
     metavar="DIR",
-    type=click.Path(exists=True, file_okay=False, path_type=Path),
-    help="Folder of expressions of your own, a .toml file each; before those that ship.",
+    type=FOLDER,
+    help="Folder of your own expressions, one .toml file each; they override built-in ones.",
 )
-
-
+scene = click.option(
+    "--scene", type=FILE, help="File of gaze and pointing targets, one a line: NAME X Y Z, in metres."
+)
+voice = click.option("--voice", metavar="NAME", help="Voice to speak with; see `realizer voices`.")
 cooccurrence = click.option(
     "--cooccurrence",
     metavar="on|off|FILE",
-    help="Rules of action units that no face shows together: ours, none, a file of them.  [default: on]",
+    help="Rules for action units that no face shows together: the built-in ones, none, or a file.  "
+    "[default: on]",
 )
-
-
 prosody = click.option(
     "--prosody",
     type=click.Choice(["on", "off"]),
-    help="Small nods, brows, blinks and looks that go with speech; none without idle motion.  [default: on]",
+    help="Small nods, raised brows, blinks and glances that accompany speech; off with --no-idle.  "
+    "[default: on]",
 )
-
-
 deformer = click.option(
     "--deformer",
     type=click.Choice(["mpeg4", "au"]),
-    help="What moves the face: FAPs, or its model of action units.  [default: as the face says]",
+    help="Move the face by FAPs (mpeg4) or by its action unit model (au).  [default: the face's own choice]",
 )
-
-
 mapping = click.option(
     "--mapping",
     metavar="FILE",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="What action units ask of FAPs, as `realizer faces mapping` writes it; before what the face says.",
+    type=FILE,
+    help="Mapping of action units to FAPs, as `realizer faces mapping` writes it; overrides the face's.",
 )
 
 
 class Number(click.FloatRange):
-    """A finite number in a range; click lets NaN through."""
+    """A finite number in a range; click accepts NaN."""
 
     def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> float:
         number: float = super().convert(value, parameter, context)
@@ -79,11 +80,35 @@ class Number(click.FloatRange):
         return number
 
 
+def parse_size(context: click.Context, parameter: click.Parameter, value: str) -> tuple[int, int]:
+    """512x512 -> (512, 512)."""
+    match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", value)
+    width, height = (int(n) for n in match.groups()) if match else (0, 0)
+    if not (16 <= width <= 4096 and 16 <= height <= 4096):
+        raise click.BadParameter(f"wanted WIDTHxHEIGHT between 16x16 and 4096x4096, got {value!r}")
+    return width, height
+
+
+fps = click.option("--fps", type=Number(0, 240, min_open=True), help="Frames per second.  [default: 25]")
+size = click.option(
+    "--size",
+    metavar="WxH",
+    default="512x512",
+    show_default=True,
+    callback=parse_size,
+    help="Size of pictures in pixels.",
+)
+camera = click.option("--camera", default="front", show_default=True, help=CAMERAS)
+at = click.option(
+    "--at", type=Number(0), metavar="SECONDS", help="With .png: draw this instant instead of a contact sheet."
+)
+
+
 def settings(**flags: Any) -> Settings:
-    """What flags, REALIZER_* variables and defaults say together.
+    """Return the settings from flags, REALIZER_* variables and defaults.
 
     Raises:
-        click.UsageError: a wrong value, and where it came from.
+        click.UsageError: a wrong value; the text says where it came from.
     """
     from realizer.core.settings import Settings, SettingsError
 
@@ -93,35 +118,28 @@ def settings(**flags: Any) -> Settings:
         raise click.UsageError(str(error)) from None
 
 
-def play_settings(asked: Mapping[str, Any], **flags: Any) -> Settings:
-    """Return the settings of playing, and other flags, from the options of a command by their names."""
+def play_settings(options: Mapping[str, Any], **flags: Any) -> Settings:
+    """Return the settings for playing from the options of a command and further flags."""
     from realizer.core.options import PlayOptions
 
     names = {"voice", *(f.name for f in fields(PlayOptions) if f.name != "idle")}
-    flags |= {name: asked[name] for name in names if name in asked}
-    return settings(**flags, idle=False if asked["no_idle"] else None)
+    flags |= {name: options[name] for name in names if name in options}
+    return settings(**flags, idle=False if options["no_idle"] else None)
 
 
 def playback_options(command: Command) -> Command:
-    """--voice, --scene, --media, --expressions and --strict."""
-    for option in (
-        click.option("--strict", is_flag=True, help="Exit 1 if any behaviour was dropped."),
-        expressions,
-        media,
-        click.option(
-            "--scene", type=click.Path(exists=True, dir_okay=False), help="File of targets: name x y z."
-        ),
-        click.option("--voice", metavar="NAME", help="A voice of `realizer voices`."),
-    ):
+    """Add --voice, --scene, --media, --expressions and --strict."""
+    strict = click.option("--strict", is_flag=True, help="Exit with 1 if any behaviour was dropped.")
+    for option in (strict, expressions, media, scene, voice):
         command = option(command)
     return command
 
 
 def read_documents(names: Iterable[str]) -> list[bytes]:
-    """The bytes of every document; `-` is standard input.
+    """Return the bytes of every document; `-` is standard input.
 
     Raises:
-        click.UsageError: a file that cannot be read.
+        click.UsageError: a file cannot be read.
     """
     texts = []
     for name in names:
@@ -132,7 +150,26 @@ def read_documents(names: Iterable[str]) -> list[bytes]:
     return texts
 
 
+def decode(content: bytes, name: str, wanted: str) -> str:
+    """Return the text of a UTF-8 file.
+
+    Args:
+        content: its bytes.
+        name: the file, or `-` for standard input; wanted: what it should be; both for messages.
+
+    Raises:
+        click.UsageError: it is not UTF-8.
+    """
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        byte = f"0x{content[error.start]:02X} at {error.start}"
+        source = "standard input" if name == "-" else name
+        raise click.UsageError(f"{source}: wanted {wanted} in UTF-8, got byte {byte}") from None
+
+
 def read_scene(path: str | Path | None) -> dict[str, Position] | None:
+    """Return the targets of a scene file, or None without one."""
     from realizer.playback.scene_file import parse_scene
 
     if path is None:
@@ -143,8 +180,36 @@ def read_scene(path: str | Path | None) -> dict[str, Position] | None:
         raise click.UsageError(f"{path}: {error}") from None
 
 
+def check_suffix(path: Path | None, *suffixes: str) -> None:
+    """Refuse a path that ends in none of the suffixes, in either case."""
+    if path is not None and path.suffix.lower() not in suffixes:
+        raise click.UsageError(f"{path}: wanted a name that ends in {' or '.join(suffixes)}")
+
+
+@contextmanager
+def writing(path: str | Path) -> Iterator[None]:
+    """Report that `path` cannot be written as wrong usage; a full disk is not the user's mistake."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno in DISK_FULL:
+            raise
+        raise click.UsageError(f"{path}: {error.strerror or error}") from None
+
+
+def is_quiet() -> bool:
+    """Return whether --quiet is in effect."""
+    return bool((click.get_current_context().obj or {}).get("quiet"))
+
+
+def note(text: str) -> None:
+    """Print a line on standard error, unless --quiet is in effect."""
+    if not is_quiet():
+        click.echo(text, err=True)
+
+
 def warn_no_voice(voice: str | None) -> None:
-    """A word on standard error where nobody asked for silence and there is no voice."""
+    """Print a warning if no voice was requested and only the silent one is installed."""
     from realizer.speech.registry import find_voice, voices
 
     if voice is None and find_voice(None).name == "silent":
@@ -153,101 +218,89 @@ def warn_no_voice(voice: str | None) -> None:
 
 
 def print_warnings(warnings: Iterable[Warning]) -> None:
-    """Warnings of documents, one line each, on standard error."""
+    """Print warnings about documents on standard error, one line each."""
     for warning in warnings:
         click.echo(f"{warning.id}: {warning.type}: {warning.text}", err=True)
 
 
-CAMERAS = "front, three-quarter, profile, close, or a camera of the face's own."
-LIGHTS = "portrait (soft and warm), daylight (even: shows every feature) or evening (one cheek in shade)"
+def check_light(name: str | None) -> str | None:
+    """Return the name of a light.
 
-
-def light(command: Command) -> Command:
-    """--light; another name is refused with the known ones."""
-    words = f"{LIGHTS}.  [default: portrait]"
-    return click.option("--light", metavar="NAME", callback=_light, help=words)(command)
-
-
-def _light(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
-    check_light(value)
-    return value
-
-
-def check_light(name: str | None) -> None:
-    """Nothing, where there is such a light; click.BadParameter, which lists them, where there is none."""
+    Raises:
+        click.BadParameter: there is no such light; the text lists them.
+    """
     from realizer.render.light import preset
 
-    if name is not None:
-        _checked_value(preset, name)
-
-
-def background(command: Command) -> Command:
-    """--background, of pictures that may have no background at all."""
-    words = "Behind the head: a colour such as '#d8dde2', or transparent.  [default: the light's own]"
-    return click.option("--background", metavar="COLOUR", callback=_background, help=words)(command)
-
-
-def colour(command: Command) -> Command:
-    """--background, of pictures that are opaque."""
-    words = "Behind the head: a colour such as '#d8dde2'.  [default: the light's own]"
-    return click.option("--background", metavar="COLOUR", callback=_colour, help=words)(command)
-
-
-def _background(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
-    from realizer.render.backdrop import colour_of
-
-    return None if value is None else _checked_value(colour_of, value)
-
-
-def _colour(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
-    if value == "transparent":
-        raise click.BadParameter("wanted a colour such as #d8dde2: these pictures are opaque")
-    return _background(context, parameter, value)
-
-
-def _checked_value(check: Callable[[str], object], value: str) -> str:
-    """The value, where `check` takes it; what it says otherwise is about how it was called."""
-    from realizer.core.errors import RenderError
-
-    try:
-        check(value)
-    except RenderError as error:
-        raise click.BadParameter(str(error)) from None
-    return value
+    return _checked(preset, name)
 
 
 def check_camera(face: str, name: str) -> None:
-    """Nothing, where this face has a camera of that name.
+    """Check that a face has a camera of this name.
 
     Raises:
-        click.BadParameter: it has none; lists those it has.
+        click.BadParameter: it has none; the text lists those it has.
     """
     from realizer.face.load import load_face
     from realizer.render.cameras import PRESETS, camera_for
 
     if name not in PRESETS:  # a face may bring its own
-        try:
-            _checked_value(lambda name: camera_for(load_face(face), name), name)
-        except click.BadParameter as error:
-            raise click.BadParameter(error.message, param_hint="--camera") from None
+        _checked(lambda name: camera_for(load_face(face), name), name, "--camera")
+
+
+def _background(value: str | None) -> str | None:
+    from realizer.render.backdrop import colour_of
+
+    return _checked(colour_of, value)
+
+
+def _opaque(value: str | None) -> str | None:
+    if value == "transparent":
+        raise click.BadParameter("wanted a colour such as #d8dde2: these pictures are opaque")
+    return _background(value)
+
+
+def _checked(check: Callable[[str], object], value: str | None, option: str | None = None) -> str | None:
+    """Return the value; raises BadParameter with the text of a RenderError of `check`."""
+    from realizer.core.errors import RenderError
+
+    try:
+        if value is not None:
+            check(value)
+    except RenderError as error:
+        raise click.BadParameter(str(error), param_hint=option) from None
+    return value
+
+
+light = click.option(
+    "--light",
+    metavar="NAME",
+    callback=lambda context, parameter, value: check_light(value),
+    help="portrait (soft and warm), daylight (even, shows every feature) or evening (one cheek in shade).  "
+    "[default: portrait]",
+)
+background = click.option(
+    "--background",
+    metavar="COLOUR",
+    callback=lambda context, parameter, value: _background(value),
+    help="Colour behind the head such as '#d8dde2', or transparent.  [default: the light's own]",
+)
+opaque_background = click.option(
+    "--background",
+    metavar="COLOUR",
+    callback=lambda context, parameter, value: _opaque(value),
+    help="Colour behind the head such as '#d8dde2'.  [default: the light's own]",
+)
 
 
 def verbosity(command: click.Command) -> None:
-    """Let a command, or each command of a group, take -q and -v as `realizer` itself does."""
+    """Add -q and -v to a command, or to each command of a group, as `realizer` itself has them."""
     if isinstance(command, click.Group):
         for member in command.commands.values():
             verbosity(member)
         return
-    taken = {flag for parameter in command.params for flag in parameter.opts}
     for flags, words in ((("-q", "--quiet"), QUIET), (("-v", "--verbose"), VERBOSE)):
-        if not taken & set(flags):
-            option = click.Option(
-                flags, is_flag=True, expose_value=False, callback=_set_verbosity, help=words
-            )
-            command.params.append(option)
-
-
-VERBOSE, QUIET = "Say more on standard error.", "Say nothing but errors on standard error."
+        option = click.Option(flags, is_flag=True, expose_value=False, callback=_set_verbosity, help=words)
+        command.params.append(option)
 
 
 def _set_verbosity(context: click.Context, parameter: click.Parameter, value: bool) -> None:
@@ -256,22 +309,12 @@ def _set_verbosity(context: click.Context, parameter: click.Parameter, value: bo
 
 
 def configure_logging(context: click.Context, *, quiet: bool = False, verbose: bool = False) -> None:
-    """Say as much on standard error as was asked for, before or after the command's name."""
+    """Set how much is logged to standard error; -q and -v come before or after the command's name."""
     import logging
 
     from realizer.core.logs import write_words
 
     context.obj = {"quiet": quiet, "verbose": verbose}
-    level = logging.ERROR if quiet else logging.DEBUG if verbose else logging.WARNING
-    write_words(level)
-    # Long films say how far they are.
+    write_words(logging.ERROR if quiet else logging.DEBUG if verbose else logging.WARNING)
+    # Writing a long film reports its progress.
     logging.getLogger("realizer.outputs").setLevel(logging.ERROR if quiet else logging.INFO)
-
-
-def size(context: click.Context, parameter: click.Parameter, value: str) -> tuple[int, int]:
-    """512x512 -> (512, 512)."""
-    match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", value)
-    width, height = (int(n) for n in match.groups()) if match else (0, 0)
-    if not (16 <= width <= 4096 and 16 <= height <= 4096):
-        raise click.BadParameter(f"wanted WIDTHxHEIGHT between 16x16 and 4096x4096, got {value!r}")
-    return width, height

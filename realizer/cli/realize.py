@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import json
 import sys
 from pathlib import Path
@@ -17,59 +16,49 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from realizer.charts.timeline import BlockChart
+    from realizer.outputs.output import Output, RenderSettings
     from realizer.playback.player import Player
+    from realizer.realization import Realization
     from realizer.scheduling.timing import Schedule
 
 PICTURES = (".png", ".webp", ".mp4", ".webm")
-TRANSPARENT = "transparent"
-DRAWN = ("size", "camera", "at", "light", "background", "visemes")  # fields of Drawing
-# What the machine lacks, whatever was asked for: room.
-FULL = (errno.ENOSPC, errno.EFBIG)
+DRAWN = ("size", "camera", "at", "light", "background", "visemes")  # fields of RenderSettings
 
 
 def performance_options(command: options.Command) -> options.Command:
-    """What can be asked of any performance: how documents are played, and how they are drawn."""
+    """Add the options for playing and drawing documents."""
     for option in (
         options.playback_options,
         options.mapping,
         options.cooccurrence,
         options.prosody,
-        click.option("--no-idle", is_flag=True, help="No blinks, no small head motion."),
-        click.option("--seed", type=int, help="Of idle motion: the same seed, the same bytes.  [default: 0]"),
+        click.option("--no-idle", is_flag=True, help="No blinks or small head motion of an idle face."),
+        click.option(
+            "--seed", type=int, help="Seed of idle motion: equal seeds give equal files.  [default: 0]"
+        ),
         options.background,
         options.light,
-        click.option("--camera", default="front", show_default=True, help=options.CAMERAS),
-        click.option(
-            "--size", default="512x512", show_default=True, callback=options.size, help="Of pictures."
-        ),
+        options.camera,
+        options.size,
         options.deformer,
-        click.option("--face", metavar="NAME", help="A face of `realizer faces list`."),
-        click.option(
-            "--fps", type=options.Number(0, 240, min_open=True), help="Frames a second.  [default: 25]"
-        ),
+        click.option("--face", metavar="NAME", help="Face to animate; see `realizer faces list`."),
+        options.fps,
     ):
         command = option(command)
     return command
 
 
 def output_options(command: options.Command) -> options.Command:
-    """What can be asked of a performance that is written to a file."""
+    """Add the options for playing, drawing and writing documents."""
     for option in (
         performance_options,
-        click.option(
-            "--visemes", is_flag=True, help="With .fap: FAP 1 too, the two visemes that are said most."
-        ),
-        click.option(
-            "--at",
-            type=options.Number(0),
-            metavar="SECONDS",
-            help="With .png: the picture of that instant.",
-        ),
+        click.option("--visemes", is_flag=True, help="With .fap: also write the visemes (FAP 1)."),
+        options.at,
         click.option(
             "-o",
             "--output",
             metavar="OUT",
-            help="Where to; its suffix picks the encoding. Default: JSON here.",
+            help="File to write, in the format of its suffix; see `realizer outputs`.  [default: print JSON]",
         ),
     ):
         command = option(command)
@@ -79,39 +68,35 @@ def output_options(command: options.Command) -> options.Command:
 @click.command()
 @options.documents
 @output_options
-@click.pass_context
-def realize(context: click.Context, /, documents: tuple[str, ...], **asked: Any) -> int:
-    """Play documents offline and write frames, pictures, sound or film.
+def realize(documents: tuple[str, ...], **flags: Any) -> int:
+    """Play documents without a clock, to a film, picture, sound or animation data.
 
-    Several documents are submitted at 0 s in order; their composition attributes apply.
+    \b
+    realizer realize hello.bml -o hello.mp4
+    realizer realize hello.bml -o hello.png --at 1.5 --camera profile
+    realizer realize one.bml two.bml -o talk.fap --seed 7
+
+    Several documents are submitted at 0 s, in order; their composition attributes apply.
     """
-    return play_documents(context, lambda: options.read_documents(documents), asked)
+    return play_documents(lambda: options.read_documents(documents), flags)
 
 
-def play_documents(context: click.Context, read: Callable[[], list[bytes]], asked: dict[str, Any]) -> int:
-    """Play the documents that `read` gives, as the options of `output_options` ask; returns the exit status.
-
-    They are read when all that was asked has been found possible.
+def play_documents(read: Callable[[], list[bytes]], flags: dict[str, Any]) -> int:
+    """Play documents with the options of `output_options` and return the exit status.
 
     Args:
-        asked: the options by their names.
+        read: returns the documents; it is called after the options have been checked.
+        flags: the options by name.
     """
     from realizer.outputs.output import RenderSettings
-    from realizer.outputs.registry import output_for
 
-    output, strict = asked["output"], asked["strict"]
-    writer = None
-    if output not in (None, "-"):
-        try:
-            writer = output_for(Path(output))
-        except ValueError as error:
-            raise click.BadParameter(str(error), param_hint="-o") from None
-    chosen = options.play_settings(asked)
-    drawing = RenderSettings(**{name: asked[name] for name in DRAWN})
+    writer = writer_for(flags["output"])
+    chosen = options.play_settings(flags)
+    drawing = RenderSettings(**{name: flags[name] for name in DRAWN})
     if writer is not None and writer.suffix in PICTURES:
         options.check_camera(chosen.face, drawing.camera)
-    one = writer is not None and writer.suffix == ".png" and drawing.at is not None
-    if drawing.background == TRANSPARENT and not one:
+    single = writer is not None and writer.suffix == ".png" and drawing.at is not None
+    if drawing.background == "transparent" and not single:
         raise click.BadParameter(
             "wanted a colour such as #d8dde2: only the picture of one instant, a .png with --at, "
             "can be transparent",
@@ -122,7 +107,7 @@ def play_documents(context: click.Context, read: Callable[[], list[bytes]], aske
     texts = read()
     if writer is not None:
         drawing = writer.begin(drawing, chosen.face, chosen.deformer)
-    # What planning needs is imported while the drawing process gets ready.
+    # The planner is imported while the drawing process starts.
     from realizer.pipeline import play
 
     realization = play(texts, chosen.play_options(options.read_scene(chosen.scene)), chosen.voice)
@@ -133,36 +118,51 @@ def play_documents(context: click.Context, read: Callable[[], list[bytes]], aske
         json.dump(realization.to_json(), sys.stdout)
         sys.stdout.write("\n")
         sys.stdout.flush()
-    elif output is not None:
+    else:
+        path = Path(flags["output"])
         if not realization.has_content:
-            click.echo(f"{output}: not written, as there is nothing to play", err=True)
+            click.echo(f"{path}: not written, as there is nothing to play", err=True)
             return 1
-        try:
-            writer.write(realization, Path(output), drawing)
-        except OSError as error:
-            if error.errno in FULL:
-                raise
-            raise click.UsageError(f"{output}: {error.strerror or error}") from None
+        save(realization, writer, path, drawing)
         first, *others = (name or "the unnamed character" for name in realization.characters)
         if others and not writer.all_characters:
-            left = ", ".join(others)
-            words = f"{output}: shows {first}, not {left}: it has room for the face of one character"
-            click.echo(words, err=True)
-        if not context.obj["quiet"]:
-            words = (
-                f"{output}: {realization.duration:.2f} s, {realization.frames} frames at {chosen.fps:g} fps"
-            )
-            click.echo(words, err=True)
-    return 1 if realization.refusals or (strict and any(s.dropped for s in realization.schedules)) else 0
+            text = f"{path}: shows {first}, not {', '.join(others)}: the format holds one character"
+            click.echo(text, err=True)
+    dropped = any(schedule.dropped for schedule in realization.schedules)
+    return 1 if realization.refusals or (flags["strict"] and dropped) else 0
+
+
+def writer_for(output: str | None) -> Output | None:
+    """Return the output for the suffix of a path; None without a path or for "-".
+
+    Raises:
+        click.BadParameter: an unknown suffix; the text lists the known ones.
+    """
+    from realizer.outputs.registry import output_for
+
+    if output in (None, "-"):
+        return None
+    try:
+        return output_for(Path(output))
+    except ValueError as error:
+        raise click.BadParameter(str(error), param_hint="-o") from None
+
+
+def save(realization: Realization, writer: Output, path: Path, drawing: RenderSettings) -> None:
+    """Write a realization to a file and print its length."""
+    with options.writing(path):
+        writer.write(realization, path, drawing)
+    frames = f"{realization.frames} frames at {realization.fps:g} fps"
+    options.note(f"{path}: {realization.duration:.2f} s, {frames}")
 
 
 @click.command()
 @options.documents
-@click.option("--json", "as_json", is_flag=True, help="As JSON instead of a table.")
-@click.option("--bml", "as_bml", is_flag=True, help="As the documents themselves, with all times as numbers.")
-@click.option("--detail", is_flag=True, help="With --json: gaps, what ties them, and what was dropped, too.")
-@click.option("-o", "--output", metavar="FILE", help="Where to, instead of here.")
-@click.option("--plot", metavar="FILE", help="Draw the timeline, as .svg or .png, instead of a table.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
+@click.option("--bml", "as_bml", is_flag=True, help="Print the documents with all times as numbers.")
+@click.option("--detail", is_flag=True, help="With --json: also gaps, links and dropped behaviours.")
+@click.option("-o", "--output", metavar="FILE", help="File to write.  [default: print it]")
+@click.option("--plot", metavar="FILE", help="Draw a timeline as .svg or .png instead of the table.")
 @options.playback_options
 def schedule(
     documents: tuple[str, ...],
@@ -172,18 +172,21 @@ def schedule(
     output: str | None,
     plot: str | None,
     voice: str | None,
-    scene: str | None,
+    scene: Path | None,
     media: Path | None,
     expressions: Path | None,
     strict: bool,
 ) -> int:
-    """Print when every sync point falls, in seconds from block start.
+    """Print the time of every sync point, in seconds from the start of its block.
 
-    With --bml every document comes back with these times, what was dropped left out; scheduling it again
-    gives the same times.
+    \b
+    realizer schedule hello.bml
+    realizer schedule hello.bml --json --detail
+    realizer schedule hello.bml --plot hello.svg
 
-    A plot has a row for each behaviour: its sync points, its gaps coloured by how far they are from the
-    length they would like, what ties them, how much room before and after leave, and what was dropped.
+    The documents of --bml have no dropped behaviours and give the same schedule again. A plot has one row per
+    behaviour: sync points, gaps coloured by their distance from the preferred length, links, the room before
+    and after, and dropped behaviours.
     """
     from realizer.pipeline import plan
     from realizer.playback.player import Player
@@ -212,35 +215,36 @@ def schedule(
     options.print_warnings(w for w in refused if not any(w in s.warnings for s in schedules))
     for planned in schedules:
         options.print_warnings(planned.warnings)
+    charts = _charts(player, accepted) if detail or plot is not None else []
     if as_bml:
-        words = _as_documents(texts, schedules)
+        text = _as_documents(texts, schedules)
     elif as_json:
-        out: Any = [s.to_json() for s in schedules]
+        rows: Any = [s.to_json() for s in schedules]
         if detail:
-            out = [told | line.detail() for told, line in zip(out, _charts(player, accepted), strict=True)]
-        words = json.dumps(out[0] if len(out) == 1 and len(documents) == 1 else out, indent=1) + "\n"
+            rows = [row | chart.detail() for row, chart in zip(rows, charts, strict=True)]
+        text = json.dumps(rows[0] if len(rows) == len(documents) == 1 else rows, indent=1) + "\n"
     else:
-        words = "" if plot is not None else "".join(_table(planned) for planned in schedules)
+        text = "" if plot is not None else "".join(_table(planned) for planned in schedules)
     if plot is not None:
-        _plot(player, accepted, plot)
+        from realizer.charts.write_chart import write_timeline
+
+        with options.writing(plot):
+            write_timeline(charts, plot)
     if output in (None, "-"):
-        click.echo(words, nl=False)
+        click.echo(text, nl=False)
     elif output is not None:
-        try:
-            Path(output).write_text(words, "utf-8")
-        except OSError as error:
-            raise click.UsageError(f"{output}: {error.strerror or error}") from None
+        with options.writing(output):
+            Path(output).write_text(text, "utf-8")
     return 1 if refused or (strict and any(s.dropped for s in schedules)) else 0
 
 
 def _final_schedule(player: Player, planned: Schedule) -> Schedule:
-    """The schedule as later documents moved it; as it was planned where they ended it before its time."""
+    """Return a schedule as later documents moved it, but complete if they cut it short."""
     latest = player.latest(planned)
     return latest if latest.times.keys() == planned.times.keys() else planned
 
 
 def _check_plot(plot: str) -> None:
-    """Before anything is planned."""
     from realizer.charts.write_chart import writer_for
 
     try:
@@ -249,24 +253,14 @@ def _check_plot(plot: str) -> None:
         raise click.BadParameter(str(error), param_hint="--plot") from None
 
 
-def _plot(player: Player, accepted: list[Schedule], plot: str) -> None:
-    from realizer.charts.write_chart import write_timeline
-
-    try:
-        write_timeline(_charts(player, accepted), plot)
-    except OSError as error:
-        raise click.UsageError(f"{plot}: {error.strerror or error}") from None
-
-
 def _charts(player: Player, accepted: list[Schedule]) -> list[BlockChart]:
-    """The blocks of these schedules as charts and their data show them."""
     from realizer.charts.chart_data import charts_of
 
     return charts_of(player.blocks, accepted)
 
 
 def _table(planned: Schedule) -> str:
-    """A line for the block, and one for each behaviour."""
+    """Return a line for the block and one for each behaviour."""
     if planned.failed:
         return f"{planned.block}  refused\n"
     lines = [f"{planned.block}  {planned.start:.3f} .. {planned.end:.3f} s"]
@@ -278,7 +272,7 @@ def _table(planned: Schedule) -> str:
 
 
 def _as_documents(texts: Iterable[bytes], schedules: Iterable[Schedule]) -> str:
-    """The documents of texts with the times of their schedules, one of each, in order."""
+    """Return the documents with the times of their schedules, without refused blocks."""
     from bml_schema import Block, read, with_absolute_times, write
     from realizer.behaviours.registry import VOCABULARY
 

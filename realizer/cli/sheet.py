@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,41 +24,42 @@ SCALE = (260, 16)  # pixels of the colour scale
 
 @click.command()
 @click.argument("name")
-@click.option("-o", "--output", required=True, metavar="SHEET.png", type=click.Path(path_type=Path))
-@click.option("--faps", "faps", is_flag=True, help="Every low-level FAP, in each of its directions.")
-@click.option("--aus", is_flag=True, help="Every action unit.  [default: FAPs and action units]")
 @click.option(
-    "--emotions", is_flag=True, help="The archetypes, and 17 angles of the wheel at 4 activations each."
+    "-o", "--output", required=True, metavar="SHEET.png", type=options.OUTPUT, help="Picture to write."
+)
+@click.option("--faps", is_flag=True, help="Draw every low-level FAP, in both directions.")
+@click.option("--aus", is_flag=True, help="Draw every action unit.  [default: FAPs and action units]")
+@click.option(
+    "--emotions", is_flag=True, help="Draw the archetypes, and 17 angles of the wheel at 4 activations each."
 )
 @click.option(
     "--value",
     type=options.Number(1, 4320),
     default=512,
     show_default=True,
-    help="Of FAPs: 512 is half the distance they are measured in, and 20 degrees of those that turn. "
-    "Less where a FAP does not go so far.",
+    help="Value of FAPs: 512 is half their unit distance, or 20 degrees of rotation; limited to their range.",
 )
 @click.option(
     "--intensity",
     type=options.Number(0, 1, min_open=True),
     default=1,
     show_default=True,
-    help="Of action units.",
+    help="Intensity of action units.",
 )
 @click.option(
     "--camera",
     "cameras",
     multiple=True,
-    help=f"{options.CAMERAS} Repeat it to see each pose from several sides.  [default: front]",
+    help=f"{options.CAMERAS} May be repeated to show several views.  [default: front]",
 )
 @options.deformer
 @options.mapping
 @options.light
-@options.colour
-@click.option("--size", default="220x280", show_default=True, callback=options.size, help="Of each picture.")
-@click.pass_context
+@options.opaque_background
+@click.option(
+    "--size", default="220x280", show_default=True, callback=options.parse_size, help="Size of each picture."
+)
 def sheet(
-    context: click.Context,
     name: str,
     output: Path,
     faps: bool,
@@ -74,10 +74,10 @@ def sheet(
     background: str | None,
     size: tuple[int, int],
 ) -> None:
-    """Draw what every FAP and every action unit does to a face.
+    """Draw what every FAP and action unit does to a face, to check the face by eye.
 
-    Beside each picture stands what changed: over the neutral face, blurred and faint, the difference in
-    colours, pale where it is strong (Paul 2010, 4.4.2). For judging a face by eye, also from the side:
+    Beside each picture is the difference to the neutral face, in colours over a faint neutral face; the
+    larger the difference, the paler the colour (Paul 2010, 4.4.2).
 
     \b
     realizer faces sheet ada -o ada.png --camera front --camera profile
@@ -90,14 +90,13 @@ def sheet(
     from realizer.outputs.output import RenderSettings
     from realizer.render.contact_sheet import Group, album
 
-    if output.suffix != ".png":
-        raise click.BadParameter(f"wanted a name that ends in .png, got {output}", param_hint="-o")
+    options.check_suffix(output, ".png")
     cameras = cameras or ("front",)
     for camera in cameras:
         options.check_camera(name, camera)
     if not (faps or aus or emotions):
         faps = aus = True
-    in_force = mapping_of(name, options.settings(mapping=mapping).mapping)
+    face_mapping = mapping_of(name, options.settings(mapping=mapping).mapping)
     series = [sheet_poses.neutral()]
     if faps:
         series += sheet_poses.of_faps(value)
@@ -107,16 +106,17 @@ def sheet(
         series += sheet_poses.of_emotions()
     drawing = RenderSettings(size, light=light, background=background)
     count = sum(len(part.poses) for part in series)
-    with _progress(count * len(cameras), context.obj["quiet"]) as step:
+    with click.progressbar(
+        length=count * len(cameras), label="drawing", file=sys.stderr, hidden=options.is_quiet()
+    ) as bar:
         groups = [
             Group(part.heading, cells, part.columns)
-            for part, cells in _cells(name, deformer, in_force, series, cameras, drawing, step)
+            for part, cells in _cells(name, deformer, face_mapping, series, cameras, drawing, bar.update)
         ]
-    words = f"{name}: {', '.join(cameras)}. Left as drawn, right the difference to the neutral face"
-    pixels = album(groups, _scale(), words)
+    title = f"{name}: {', '.join(cameras)}. Left: as drawn; right: difference to the neutral face"
+    pixels = album(groups, _scale(), title)
     Image.fromarray(pixels).save(output, compress_level=4)
-    if not context.obj["quiet"]:
-        click.echo(f"{output}: {count} poses, {pixels.shape[1]}x{pixels.shape[0]}", err=True)
+    options.note(f"{output}: {count} poses, {pixels.shape[1]}x{pixels.shape[0]}")
 
 
 def _cells(
@@ -128,7 +128,7 @@ def _cells(
     drawing: RenderSettings,
     step: Callable[[int], None],
 ) -> Iterator[tuple[Series, list[Cell]]]:
-    """Each series with its cells; the first pose of all is the neutral one."""
+    """Yield each series with its cells; the first pose of all is the neutral one."""
     import numpy as np
 
     from realizer.animation.pose import poses as poses_of
@@ -139,13 +139,13 @@ def _cells(
     from realizer.render.difference_image import difference, faint, flatten
     from realizer.render.light import preset
 
-    # Plain, so that what differs is the face.
+    # A plain background, so that only the face differs.
     behind = np.rint(np.array(preset(drawing.light).backdrop_middle) * 255)
     if drawing.background:
         behind = np.frombuffer(bytes.fromhex(drawing.background[1:]), np.uint8)
-    every = [pose for part in series for pose in part.poses]
+    all_poses = [pose for part in series for pose in part.poses]
     rows = poses_of(sheet_poses.frames(series), input_names(name, deformer=deformer), mapping)
-    shown: list[list[Any]] = [[] for _ in every]
+    pictures: list[list[Any]] = [[] for _ in all_poses]
     for camera in cameras:
         neutral = below = None
         with Renderer(
@@ -155,22 +155,15 @@ def _cells(
                 picture = flatten(drawn, behind)
                 if neutral is None or below is None:
                     neutral, below = picture, faint(drawn)
-                shown[k] += [picture, difference(picture, neutral, below)]
+                pictures[k] += [picture, difference(picture, neutral, below)]
                 step(1)
-    pictures = iter(shown)
+    remaining = iter(pictures)
     for part in series:
-        yield part, [Cell(next(pictures), pose.title, pose.notes) for pose in part.poses]
-
-
-@contextmanager
-def _progress(steps: int, quiet: bool) -> Iterator[Callable[[int], None]]:
-    """A bar on standard error, where somebody looks."""
-    with click.progressbar(length=steps, label="drawing", file=sys.stderr, hidden=quiet) as bar:
-        yield bar.update
+        yield part, [Cell(next(remaining), pose.title, pose.notes) for pose in part.poses]
 
 
 def _scale() -> Any:
-    """(h, w, 3): the colours of differences, and what they mean."""
+    """Return the scale of difference colours, (h, w, 3) uint8, with a label."""
     import numpy as np
     from PIL import Image, ImageDraw, ImageFont
 
@@ -181,6 +174,6 @@ def _scale() -> Any:
     image = Image.new("RGB", (width, height * 2 + 8), PAPER)
     bar = np.broadcast_to(ramp(np.linspace(0, 1, width, dtype=np.float32)), (height, width, 3))
     image.paste(Image.fromarray(np.rint(bar).astype(np.uint8)), (0, 0))
-    words = f"differs by 0 .. {FULL:.0%} of white or more"
-    ImageDraw.Draw(image).text((0, height + 4), words, INK, ImageFont.load_default(14))
+    text = f"differs by 0 .. {FULL:.0%} of white or more"
+    ImageDraw.Draw(image).text((0, height + 4), text, INK, ImageFont.load_default(14))
     return np.asarray(image)

@@ -11,6 +11,7 @@ import numpy as np
 from realizer.animation.axis import au, axis, fap
 from realizer.animation.frames import AUFrames
 from realizer.core.array_types import Float32
+from realizer.core.units import ANGLE_UNIT
 from realizer.emotions.wheel import wheel
 from realizer.expressions.expression import Expression
 from realizer.tables import by_number, faps
@@ -22,14 +23,14 @@ from realizer.tables.wheel_words import ring
 if TYPE_CHECKING:
     from realizer.tables import Fap
 
-HALF, TURN = 512, 34907  # half a face distance (Paul 2010, 4.4.2), and the 20 degrees that go with it
+HALF, TURN = 512, 34907  # half of the unit distance (Paul 2010, 4.4.2), and 20 degrees for rotations
 # Paul 2010, 6.4: the grid of his table of emotions.
 ANGLES, ACTIVATIONS = np.arange(0, 360.1, 22.5), (1, 3, 5, 7)
 
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """One picture: (n_targets,) float32 of the axis of all that is animated, and what to write below it."""
+    """One picture: a row of the animation axis, (n_targets,) float32, with its title and notes."""
 
     row: Float32
     title: str
@@ -38,7 +39,7 @@ class Pose:
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """Poses that belong together; `columns` where they make a table."""
+    """Poses under one heading; `columns` if they form a table."""
 
     heading: str
     poses: Sequence[Pose]
@@ -46,18 +47,18 @@ class Series:
 
 
 def frames(series: Sequence[Series]) -> AUFrames:
-    """All poses of these series, one a second."""
+    """Return all poses of these series as frames, one per second."""
     rows = np.stack([pose.row for part in series for pose in part.poses])
     return AUFrames(np.arange(len(rows), dtype=np.float64), rows)
 
 
 def neutral() -> Series:
-    """The face at rest, which all others are compared with."""
+    """Return the face at rest, with which all others are compared."""
     return Series("", [Pose(_nothing(), "neutral")])
 
 
 def of_faps(value: float) -> list[Series]:
-    """Each low-level FAP at +value and -value, by the standard's groups; less where it does not go so far."""
+    """Return each low-level FAP at +value and -value, within its range, by the groups of the standard."""
     rows = {row.fap: row for row in faps()}
     return [
         Series(
@@ -74,19 +75,18 @@ def _both_ways(row: Fap, value: float) -> list[Pose]:
     for sign in (1, -1):
         amount = round(min(max(sign * size, row.least), row.most))
         if amount:
-            far = (
-                f"{np.degrees(amount * 1e-5):+.0f} degrees"
-                if row.unit == "angle_unit"
-                else f"{amount / 1024:+.2f} {row.unit}0"
-            )
-            # Some FAPs are named "lower" or "depress" and go up: say which way plus is.
-            title, note = f"{row.fap} {row.name} {amount:+d}", f"{far}; + is {row.direction}"
+            if row.unit == "angle_unit":
+                distance = f"{np.degrees(amount * ANGLE_UNIT):+.0f} degrees"
+            else:
+                distance = f"{amount / 1024:+.2f} {row.unit}0"
+            # The names do not give the direction: some FAPs named "lower" or "depress" go up.
+            title, note = f"{row.fap} {row.name} {amount:+d}", f"{distance}; + is {row.direction}"
             found.append(Pose(_faps({row.fap: amount}), title, (note,)))
     return found
 
 
 def of_aus(intensity: float) -> list[Series]:
-    """Each action unit on both sides, by place and direction."""
+    """Return each action unit on both sides, by place and direction."""
     names = by_number()
     return [
         Series(
@@ -102,12 +102,12 @@ def of_aus(intensity: float) -> list[Series]:
 
 
 def of_emotions() -> list[Series]:
-    """The archetypes, and Paul's table of the wheel: 17 angles at 4 activations (2010, 6.4)."""
-    known = archetypes()
-    shown = _poses(
-        [face_lexemes()[emotion.name].aus for emotion in known],
-        [emotion.name.lower() for emotion in known],
-        [f"{emotion.angle:g} degrees, activation {emotion.activation:g}" for emotion in known],
+    """Return the archetypes, and the wheel at 17 angles and 4 activations (Paul 2010, 6.4)."""
+    emotions = archetypes()
+    poses = _poses(
+        [face_lexemes()[emotion.name].aus for emotion in emotions],
+        [emotion.name.lower() for emotion in emotions],
+        [f"{emotion.angle:g} degrees, activation {emotion.activation:g}" for emotion in emotions],
     )
     names = {place.angle: name for name, place in ring("paul").items()}
     grid = [
@@ -120,26 +120,26 @@ def of_emotions() -> list[Series]:
         for activation in ACTIVATIONS
     ]
     return [
-        Series("Emotions: archetypes", shown),
+        Series("Emotions: archetypes", poses),
         Series("Emotions: the wheel, weak to strong", grid, len(ACTIVATIONS)),
     ]
 
 
 def of_expressions(expressions: Sequence[Expression]) -> list[Pose]:
-    """Each expression of the library, at full intensity."""
+    """Return each expression at full intensity."""
     return _poses(
-        [one.aus for one in expressions],
-        [one.name for one in expressions],
-        [one.units for one in expressions],
+        [expression.aus for expression in expressions],
+        [expression.name for expression in expressions],
+        [expression.units for expression in expressions],
     )
 
 
 def _poses(
-    shown: Sequence[Mapping[tuple[int, str], float]], titles: Sequence[str], notes: Sequence[str]
+    intensities: Sequence[Mapping[tuple[int, str], float]], titles: Sequence[str], notes: Sequence[str]
 ) -> list[Pose]:
-    """Poses of action units: (AU, side) -> intensity each."""
+    """Return poses of action units, each from (AU, side) -> intensity."""
     found = []
-    for aus, title, note in zip(shown, titles, notes, strict=True):
+    for aus, title, note in zip(intensities, titles, notes, strict=True):
         row = _nothing()
         for (number, side), amount in aus.items():
             row[[target.column for target in au(number, side)]] = amount

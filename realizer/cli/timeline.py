@@ -1,4 +1,4 @@
-"""`timeline`: plays a timeline file, or reports what is wrong with it."""
+"""`timeline`: plays a timeline file or prints its faults."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from realizer.cli.realize import output_options, play_documents
 if TYPE_CHECKING:
     from realizer.expressions.library import Library
     from realizer.expressions.timeline import Timeline
+    from realizer.knowledge.advice import Advice
     from realizer.tables.knowledge import Mood, Role
 
 SUFFIXES = (".toml", ".json")
@@ -25,22 +26,22 @@ CORE = "http://www.bml-initiative.org/bml/bml-1.0"
 
 
 @click.command()
-@click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("file", type=options.FILE)
 @output_options
-@click.pass_context
-def timeline(context: click.Context, /, file: Path, **asked: Any) -> int:
-    """Play a timeline: channels of expressions that grow out of each other (Wojdel 2005, 5.4).
+def timeline(file: Path, **flags: Any) -> int:
+    """Play a timeline: channels of expressions that blend into each other (Wojdel 2005, 5.4).
 
-    FILE is TOML or JSON. In a document, <realizer:timeline fileName="..."/> plays a file of the media folder.
+    FILE is TOML or JSON. In a BML document, <realizer:timeline fileName="..."/> plays a file of the media
+    folder.
 
     \b
-    mixer = "successive"      # or "additive", which is usual: with --deformer au
-    order = [4, 1, 2]         # the action units that come first
+    mixer = "successive"      # with --deformer au; the default is "additive"
+    order = [4, 1, 2]         # action units that come first
 
     \b
     [[channel]]
     name = "brows"
-    joins = "both"            # or "onset", "offset": what leads from one entry to the next
+    joins = "both"            # transition between entries; or "onset", "offset"
     curve = "linear"          # or "smooth"
     start = 0.0               # seconds
     entries = [
@@ -55,27 +56,26 @@ def timeline(context: click.Context, /, file: Path, **asked: Any) -> int:
     """
     from realizer.expressions.library import library_of
 
-    if asked["media"] is not None:
-        raise click.BadParameter("a timeline names no files", param_hint="--media")
-    if file.suffix.lower() not in SUFFIXES:
-        raise click.UsageError(f"{file}: wanted a name that ends in {' or '.join(SUFFIXES)}")
-    chosen = options.settings(expressions=asked["expressions"])
+    if flags["media"] is not None:
+        raise click.BadParameter("a timeline refers to no files", param_hint="--media")
+    options.check_suffix(file, *SUFFIXES)
+    chosen = options.settings(expressions=flags["expressions"])
     if faults := list(faults_in(file.read_bytes(), library_of(chosen.expressions))):
         for fault in faults:
             click.echo(f"{file}: {fault}", err=True)
         return 1
     node = f'<own:timeline id="timeline" fileName={quoteattr(file.name)}/>'
     document = f'<bml xmlns="{CORE}" xmlns:own="{OWN}" id="timeline">{node}</bml>'
-    return play_documents(context, lambda: [document.encode()], asked | {"media": file.parent})
+    return play_documents(lambda: [document.encode()], flags | {"media": file.parent})
 
 
 def is_timeline(name: str) -> bool:
-    """Whether a file that is to be checked is a timeline, by its name."""
+    """Return whether a file is a timeline, by its suffix."""
     return Path(name).suffix.lower() in SUFFIXES
 
 
 def faults_in(content: bytes, library: Library) -> list[str]:
-    """All that is wrong with a timeline: channel, entry, what was wanted, what came."""
+    """Return the faults of a timeline, each with its channel and entry."""
     from realizer.core.errors import TableError
     from realizer.expressions.timeline import faults_of
     from realizer.expressions.timeline_reader import read_timeline
@@ -87,16 +87,19 @@ def faults_in(content: bytes, library: Library) -> list[str]:
 
 
 def advice_on(content: bytes, library: Library, role: Role, mood: Mood | None) -> list[str]:
-    """What people's faces do otherwise than those of a sound timeline, and what would be usual."""
+    """Return advice on a timeline without faults: what is unusual for people, and what would be usual."""
     from realizer.expressions.timeline import remarks
     from realizer.expressions.timeline_reader import read_timeline
 
     timeline = read_timeline(content)
-    found = chain(remarks(timeline), _advice(timeline, library, role, mood))
-    return list(islice(found, MAX_ADVICE))
+    advice = (
+        f"{item.id + ': ' if item.id else ''}{item.text}; {item.hint}"
+        for item in _advice(timeline, library, role, mood)
+    )
+    return list(islice(chain(remarks(timeline), advice), MAX_ADVICE))
 
 
-def _advice(timeline: Timeline, library: Library, role: Role, mood: Mood | None) -> Iterator[str]:
+def _advice(timeline: Timeline, library: Library, role: Role, mood: Mood | None) -> Iterator[Advice]:
     from bml_schema import Block
     from realizer.expressions.spans import visible_spans
     from realizer.knowledge.advice import VisibleExpression, advise, duration_advice
@@ -108,9 +111,7 @@ def _advice(timeline: Timeline, library: Library, role: Role, mood: Mood | None)
             seen.append(VisibleExpression(place, template, begin, end))
             continue
         source = str(expression.file or expression.source)
-        for one in duration_advice(
+        yield from duration_advice(
             place, expression.name, end - begin, expression.possible, expression.probable, source
-        ):
-            yield f"{one.id}: {one.text}; {one.hint}"
-    for one in advise(Block(id="timeline"), seen, {}, role, mood):
-        yield f"{one.id + ': ' if one.id else ''}{one.text}; {one.hint}"
+        )
+    yield from advise(Block(id="timeline"), seen, {}, role, mood)

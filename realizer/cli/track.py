@@ -22,24 +22,24 @@ if TYPE_CHECKING:
     "--output",
     required=True,
     metavar="OUT.fap",
-    type=click.Path(path_type=Path),
-    help="Where the FAPs go.",
+    type=options.OUTPUT,
+    help="FAP file to write.",
 )
 @click.option(
-    "--fps", type=options.Number(0.1, 1000), default=25.0, show_default=True, help="Of the tracker."
+    "--fps", type=options.Number(0.1, 1000), default=25.0, show_default=True, help="Frame rate of the points."
 )
 @click.option(
     "--profiles",
     type=click.Choice(["own", "published", "raw"]),
-    help="Say which emotions of this set show, and when.",
+    help="Also print which emotions are recognised, by these profiles, and when.",
 )
 def track(points: str, output: Path, fps: float, profiles: str | None) -> None:
-    """Turn tracked feature points into FAPs, for any face to play.
+    """Convert tracked feature points of a face to FAPs, which any face can play.
 
-    POINTS is a table frame,point,x,y,z: points as MPEG-4 names them, metres, x to the character's left, y up,
-    z forward. Frame 0 is the face at rest, from which its proportions are measured: it needs 2.2, 3.1 to 3.6,
-    8.3, 8.4 and 9.15. Where the head is and how it turns does not matter, given corners of the eyes or points
-    of the forehead (11.1 to 11.6). A point that a frame does not list goes straight to where it is seen next.
+    POINTS is a CSV table with the columns frame,point,x,y,z: points by their MPEG-4 names, in metres, x to
+    the character's left, y up, z forward. Frame 0 shows the face at rest; its proportions are measured from
+    points 2.2, 3.1 to 3.6, 8.3, 8.4 and 9.15. Head motion is measured at points 11.1 to 11.6 or the
+    corners of the eyes. Points missing from a frame are interpolated.
 
     \b
     realizer track actor.csv --fps 30 -o actor.fap
@@ -53,14 +53,9 @@ def track(points: str, output: Path, fps: float, profiles: str | None) -> None:
     from realizer.animation.frames import FAPFrames
     from realizer.outputs.fap_text import encode
 
-    if output.suffix.lower() != ".fap":
-        raise click.UsageError(f"{output}: wanted a name that ends in .fap")
+    options.check_suffix(output, ".fap")
     (content,) = options.read_documents([points])
-    try:
-        text = content.decode("utf-8-sig")  # spreadsheets write the mark
-    except UnicodeDecodeError as error:
-        byte = f"0x{content[error.start]:02X} at {error.start}"
-        raise click.UsageError(f"{points}: wanted a table in UTF-8, got byte {byte}") from None
+    text = options.decode(content, points, "a table")
     try:
         moving, rest = read_points(text, points)
         values, seen = faps_from_points(bridge(moving), rest, _fapu(rest, points))
@@ -68,14 +63,13 @@ def track(points: str, output: Path, fps: float, profiles: str | None) -> None:
         raise click.UsageError(str(error)) from None
     times = np.arange(len(values)) / fps
     output.write_text(encode(FAPClip.of(FAPFrames(times, values, seen), fps, output.stem)), "utf-8")
-    click.echo(f"{output}: {len(values)} frames, {int(seen.sum())} FAPs", err=True)
+    options.note(f"{output}: {len(values)} frames, {int(seen.sum())} FAPs")
     if profiles is not None:
-        names = recogniser(profiles).names(values, seen)
         first = 0
-        for name, frames in groupby(names):
-            count = len(list(frames))
-            click.echo(f"{first / fps:8.2f} {(first + count) / fps:8.2f} {name or '-'}")
-            first += count
+        for name, frames in groupby(recogniser(profiles).names(values, seen)):
+            end = first + len(list(frames))
+            click.echo(f"{first / fps:8.2f} {end / fps:8.2f} {name or '-'}")
+            first = end
 
 
 def _fapu(rest: dict[str, Float64], where: str) -> Fapu:
@@ -88,7 +82,7 @@ def _fapu(rest: dict[str, Float64], where: str) -> Fapu:
         return fapu_of({name: place.astype(np.float32) for name, place in rest.items()}, where)
     except KeyError as missing:
         raise click.UsageError(
-            f"{where}: wanted point {missing.args[0]} in frame 0: the face's proportions hang on it"
+            f"{where}: wanted point {missing.args[0]} in frame 0, to measure the face's proportions"
         ) from None
     except FaceError as error:
         raise click.UsageError(str(error)) from None

@@ -34,7 +34,7 @@ def encode_vtt(realization: Realization) -> str:
     cues = sorted(_cues(realization), key=lambda cue: (cue.start, KINDS.index(cue.kind), cue.id))
     blocks = ["WEBVTT"]
     for cue in cues:
-        head = f"{_clock(cue.start)} --> {_clock(max(cue.end, cue.start + LEAST))}"
+        head = f"{timestamp(cue.start)} --> {timestamp(max(cue.end, cue.start + LEAST))}"
         identifier = [cue.id.replace("-->", "--")] if cue.id else []
         blocks.append(
             "\n".join([*identifier, head, f"<c.{cue.kind}>{html.escape(cue.text, quote=False)}</c>"])
@@ -58,7 +58,8 @@ def _cues(realization: Realization) -> Iterator[_Cue]:
         yield _Cue(time, time + 1 / realization.fps, "sync", name, name)
 
 
-def _clock(seconds: float) -> str:
+def timestamp(seconds: float) -> str:
+    """Return HH:MM:SS.mmm."""
     milliseconds = round(max(0.0, seconds) * 1000)
     minutes, milliseconds = divmod(milliseconds, 60_000)
     return f"{minutes // 60:02}:{minutes % 60:02}:{milliseconds // 1000:02}.{milliseconds % 1000:03}"

@@ -39,4 +39,4 @@ def test_an_output_of_another_kind_is_wrong_usage(tmp_path: Path) -> None:
     (tmp_path / "a.wav").write_bytes(b"")
     run = CliRunner().invoke(cli, ["align", str(tmp_path / "a.wav"), "x", "-o", "x.txt"])
     assert run.exit_code == 2
-    assert "wanted a .json or a .vtt file, got x.txt" in run.output
+    assert "x.txt: wanted a name that ends in .json or .vtt" in run.output

@@ -36,7 +36,7 @@ def test_a_folder_becomes_a_file_a_document_and_format(talks: Path, tmp_path: Pa
     command = [str(talks), "-o", str(out), "--format", "fap", "--format", ".JSON", "--workers", "1"]
     done = batch(*command)
     assert done.return_value == 0
-    assert "2 done; manifest.jsonl says more" in done.stderr
+    assert "2 done; see manifest.jsonl" in done.stderr
     assert {p.name for p in out.glob("*.*")} >= {"a.fap", "a.json", "b.fap", "b.json"}
     assert rows(out) == {"a": "done", "b": "done"}
     assert "2 done (2 of them before)" in batch(*command).stderr

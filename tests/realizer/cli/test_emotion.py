@@ -161,7 +161,7 @@ def test_the_wheel_is_a_picture_of_64_faces_and_the_word_one_of_its_own(tmp_path
         (["--valence", "7", "--arousal", "0"], "valence: wanted -1..1, got 7"),
         (["joy", "-o", "joy.gif"], "joy.gif: wanted a name that ends in .png or .txt"),
         (["--wheel", "wheel.svg"], "wheel.svg: wanted a name that ends in .png"),
-        (["--wheel", "w.png", "--json"], "wanted a WORD, or a place, for what was asked"),
+        (["--wheel", "w.png", "--json"], "wanted a WORD or a place for --json"),
         (["joy", "-o", "x.png", "--camera", "above"], "--camera"),
     ],
 )

@@ -72,7 +72,7 @@ def test_words_of_another_language_come_from_a_file(tmp_path: Path) -> None:
 
 
 def test_a_text_in_other_letters_than_english_ones_is_asked_for_its_language() -> None:
-    told = "none of this is in the letters of 'en-US'"
+    told = "this text has no letters of 'en-US'"
     done = enrich("Ты уверен?")
     assert told in done.stderr
     assert starts(done.stdout) == {"bml1:surprise1": "speech1:w1"}
@@ -98,7 +98,7 @@ def test_an_unknown_mood_names_those_that_are_near() -> None:
 
 def test_a_name_of_a_file_that_is_not_there_is_not_spoken(tmp_path: Path) -> None:
     for name in ("nofile.bml", "talk.TXT", str(tmp_path)):
-        assert "wanted a text, or a file that is there" in str(enrich(name).exception)
+        assert "wanted a text or an existing file" in str(enrich(name).exception)
     assert starts(enrich("Did you read talk.txt?").stdout)
 
 
@@ -172,4 +172,4 @@ def test_a_text_may_begin_with_a_heart() -> None:
 
 
 def test_a_text_of_nothing_that_can_be_written_is_refused() -> None:
-    assert "got nothing that can be said" in str(enrich("-", stdin="\0\x01 ").exception)
+    assert "got characters XML cannot hold" in str(enrich("-", stdin="\0\x01 ").exception)

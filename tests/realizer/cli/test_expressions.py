@@ -70,7 +70,7 @@ def test_what_cannot_be_asked_is_refused(words: list[str], told: str) -> None:
 def test_nothing_found_is_said_and_counts() -> None:
     done = CliRunner().invoke(cli, ["expressions", "find", "qqqq"], standalone_mode=False)
     assert done.return_value == 1
-    assert "nothing in the library goes with 'qqqq'" in done.stderr
+    assert "no expression matches 'qqqq'" in done.stderr
 
 
 @pytest.mark.slow
@@ -90,4 +90,4 @@ def test_a_neutral_face_with_its_head_turned_a_little_is_like_no_expression(tmp_
         standalone_mode=False,
     )
     assert done.stdout == ""
-    assert (done.return_value, "nothing in the library" in done.stderr) == (1, True)
+    assert (done.return_value, "no expression matches" in done.stderr) == (1, True)

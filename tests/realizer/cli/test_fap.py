@@ -153,8 +153,8 @@ def test_what_has_nothing_to_play_is_refused(content: bytes) -> None:
 @pytest.mark.parametrize(
     ("args", "says"),
     [
-        (["-o", "x.png"], "wanted a suffix of .fap .csv .json, got .png"),
-        (["-o", "x"], "wanted a suffix of .fap .csv .json, got none"),
+        (["-o", "x.png"], "x.png: wanted a name that ends in .fap or .csv or .json"),
+        (["-o", "x"], "x: wanted a name that ends in .fap or .csv or .json"),
         ([], "Missing option '-o'"),
         (["-o", "x.fap", "--fps", "0"], "--fps"),
         (["-o", "no/such/folder/x.fap"], "No such file or directory"),

@@ -80,7 +80,7 @@ def test_a_sound_timeline_gets_advice_that_does_not_count(file: Path) -> None:
     ("words", "told"),
     [
         (["x.bml"], "x.bml: wanted a name that ends in .toml or .json"),
-        (["x.toml", "--media", "."], "names no"),
+        (["x.toml", "--media", "."], "refers to no"),
     ],
 )
 def test_what_cannot_be_played_is_refused(tmp_path: Path, words: list[str], told: str) -> None:

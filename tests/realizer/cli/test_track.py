@@ -54,7 +54,7 @@ def test_points_become_a_fap_file_and_the_emotion_is_named(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("leave_out", "output", "said"),
     [
-        (("9.15",), "a.fap", "wanted point 9.15 in frame 0: the face's proportions hang on it"),
+        (("9.15",), "a.fap", "wanted point 9.15 in frame 0, to measure the face's proportions"),
         ((), "a.csv", "a.csv: wanted a name that ends in .fap"),
     ],
 )
