@@ -1,1 +1,1 @@
-"""Analysis of recordings and pictures of faces."""
+"""Analysis of faces: FAPs from points and meshes, recognised emotions, search by picture."""

@@ -13,17 +13,17 @@ from realizer.core.array_types import Bool, Float32, Float64
 from realizer.face.deform import deform
 from realizer.face.model import Face
 
-PROBE = 60.0  # FAPU; far enough to be measured, near enough to be proportional
-ROUNDS = 4  # rotations and slides are not linear; each round removes most of the remaining error
+PROBE = 60.0  # FAPU; large enough to be measured, small enough to be linear
+ROUNDS = 4  # rotations are not linear; each round removes most of the remaining error
 
 
 def points_of(face: Face, vertices: Any) -> dict[str, Float32]:
-    """Name -> (n, 3) metres: where the feature points of a face are, of vertices (n, n_vertices, 3)."""
+    """Return name -> (n, 3) of the feature points in vertices (n, n_vertices, 3), in metres."""
     return {name: vertices[:, index] for name, index in face.feature_points.items()}
 
 
 def faps_from_mesh(face: Face, vertices: Any) -> tuple[Float32, Bool]:
-    """The FAPs (n, 68) of vertices (n, n_vertices, 3) of that face, and which were observed.
+    """Return the FAPs (n, 68) of vertices (n, n_vertices, 3) of a face, and which of them were observed.
 
     Raises:
         ValueError: vertices of another shape.
@@ -35,22 +35,24 @@ def faps_from_mesh(face: Face, vertices: Any) -> tuple[Float32, Bool]:
 
 
 def faps_from_face(face: Face, points: Mapping[str, Any]) -> tuple[Float32, Bool]:
-    """Measure all feature points of the mesh, name -> (n, 3) metres.
+    """Return the FAPs (n, 68) of the feature points of a face, and which of them were observed.
 
-    Points hang together in a face: what moves one moves its neighbours too. How much, is measured on the face
-    itself, each FAP alone, and taken apart again; then the face is moved by what was found, and measured
-    beside what was given.
+    A FAP also moves neighbouring points. This crosstalk is measured for each FAP alone and removed; the
+    result is refined by deforming the face and comparing its points with the given ones.
+
+    Args:
+        points: name -> (n, 3) in metres.
 
     Raises:
-        ValueError: not its points.
+        ValueError: points that the face does not have.
     """
     wanted, seen = faps_from_points(points, _at_rest(face), face.fapu)
-    apart = _apart(face)
-    found = wanted @ apart
+    inverse = _inverse_crosstalk(face)
+    faps = wanted @ inverse
     for _ in range(ROUNDS):
-        read, _ = faps_from_points(points_of(face, deform(face, found)), _at_rest(face), face.fapu)
-        found = found + (wanted - read) @ apart
-    return found.astype(np.float32), seen
+        read, _ = faps_from_points(points_of(face, deform(face, faps)), _at_rest(face), face.fapu)
+        faps = faps + (wanted - read) @ inverse
+    return faps.astype(np.float32), seen
 
 
 def _at_rest(face: Face) -> dict[str, Float32]:
@@ -58,15 +60,15 @@ def _at_rest(face: Face) -> dict[str, Float32]:
 
 
 @lru_cache(maxsize=8)
-def _apart(face: Face) -> Float64:
-    """(68, 68): measured values, times this, are the face's FAPs."""
+def _inverse_crosstalk(face: Face) -> Float64:
+    """Return the (68, 68) matrix that turns measured values into FAPs."""
     _, seen = faps_from_points(points_of(face, face.vertices[None]), _at_rest(face), face.fapu)
     local = np.flatnonzero(seen)
-    local = local[(local < 47) | (local > 49)]  # turns of the head are not proportional, and hang on nothing
+    local = local[(local < 47) | (local > 49)]  # without the rotations of the head
     probes = np.zeros((len(local), 68), np.float32)
     probes[np.arange(len(local)), local] = PROBE
     read, _ = faps_from_points(points_of(face, deform(face, probes)), _at_rest(face), face.fapu)
-    apart = np.eye(68)
-    # A FAP that this face does not show (its own reading stays 0) must not make the others unreadable.
-    apart[np.ix_(local, local)] = np.linalg.pinv(read[:, local].astype(np.float64) / PROBE, rcond=1e-3)
-    return apart
+    inverse = np.eye(68)
+    # The pseudo-inverse ignores FAPs that this face does not show.
+    inverse[np.ix_(local, local)] = np.linalg.pinv(read[:, local].astype(np.float64) / PROBE, rcond=1e-3)
+    return inverse

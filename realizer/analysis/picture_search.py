@@ -1,4 +1,4 @@
-"""Search for the expressions that look like a picture of a face (Wojdel 2005, 3.2.2)."""
+"""Search for expressions that look like a picture of a face (Wojdel 2005, 3.2.2)."""
 
 from __future__ import annotations
 
@@ -20,19 +20,18 @@ from realizer.face.load import input_names, list_faces
 from realizer.render import Renderer
 from realizer.render.light import presets
 
-HEIGHT = 96  # pixels that pictures are compared at, so that a brow counts wherever in its way it is
-FINE = 4  # times as high they are drawn, so that they are as smooth as one made smaller
-STEPS = (0.5, 1.0)  # intensities that are compared: weak and strong ones move other places
+HEIGHT = 96  # pixels of compared pictures; small, so that brows of different heights overlap
+FINE = 4  # pictures are drawn larger by this factor and reduced, to be smooth
+STEPS = (0.5, 1.0)  # compared intensities, as they move different places
 LIGHT = "portrait"  # the light of the reference pictures
-# Correlation with the neutral face: below it, a picture is not that face in front view.
-ALIKE = 0.8
-# A picture that differs from the neutral one by less (root mean square over the face, of white; what drawing
-# at another size leaves is 0.004) in a way that is like no expression (cosine) is neutral.
-REST, UNLIKE = 0.006, 0.45
+MIN_CORRELATION = 0.8  # of a front view with the neutral face
+# A picture is neutral if its difference to the neutral face is small (root mean square, of white; drawing at
+# another size makes 0.004) and similar to no expression (cosine).
+MAX_NEUTRAL, MAX_COSINE = 0.006, 0.45
 
 
 class UnknownPictureError(RealizerError):
-    """A picture in which none of our faces is seen from the front."""
+    """A picture that does not show a known face from the front."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +39,9 @@ class Likeness:
     """A recognised picture: face, light and expression.
 
     Attributes:
-        matches: (expression, cosine 0..1 between what both change in the neutral face), the best first.
-        neutral: it looks like no expression, but like the neutral face.
+        matches: (expression, cosine between its and the picture's difference to the neutral face), best
+            first.
+        neutral: whether the picture shows the neutral face.
     """
 
     face: str
@@ -51,18 +51,18 @@ class Likeness:
 
 
 def read_picture(path: Path) -> UInt8:
-    """Return a picture file as (h, w, 3), with transparency on black.
+    """Read a picture file as (h, w, 3), with transparent parts in black.
 
     Raises:
-        UnknownPictureError: no picture.
+        UnknownPictureError: the file is not a picture.
     """
     from PIL import Image, UnidentifiedImageError
 
     try:
         with Image.open(path) as image:
-            seen = image.convert("RGBA")
-            plain = Image.new("RGBA", seen.size, (0, 0, 0, 255))
-            return np.asarray(Image.alpha_composite(plain, seen).convert("RGB"))
+            picture = image.convert("RGBA")
+            black = Image.new("RGBA", picture.size, (0, 0, 0, 255))
+            return np.asarray(Image.alpha_composite(black, picture).convert("RGB"))
     except (UnidentifiedImageError, OSError, Image.DecompressionBombError) as error:
         raise UnknownPictureError(f"{path}: wanted a picture, got: {error}") from None
 
@@ -70,49 +70,49 @@ def read_picture(path: Path) -> UInt8:
 def by_picture(
     picture: UInt8, expressions: Sequence[Expression], faces: Sequence[str] | None = None
 ) -> Likeness:
-    """The expressions that change a face as the picture does.
+    """Return the face, light and expressions that are most similar to a picture.
 
-    The face and its light are those whose neutral picture is nearest; the difference to it is
-    compared with what each expression changes in it at full intensity, so that weak and strong ones count as
-    alike.
+    The face and light are those whose neutral picture has the best correlation. The difference to that
+    picture is then compared with the difference that each expression makes, regardless of its strength.
 
     Args:
-        picture: (h, w, 3), the front view as `realizer realize -o x.png --at T` draws it, of any size.
-        faces: names to look for; None: every face there is.
+        picture: (h, w, 3), a front view as `realizer realize -o x.png --at T` draws it, of any size.
+        faces: names of faces to consider; None: all.
 
     Raises:
-        UnknownPictureError: none of them is in it.
-        RenderError: pictures cannot be drawn here.
+        UnknownPictureError: none of the faces is in the picture.
+        RenderError: pictures cannot be drawn.
     """
     height, width = picture.shape[:2]
     size = max(round(width * HEIGHT / height), 1), HEIGHT
     if not HEIGHT // 4 <= size[0] <= 4 * HEIGHT:
         raise UnknownPictureError(f"{_WANTED}, got one of {width}x{height} pixels")
-    seen = _brightness(_resized(picture, size))
+    brightness = _brightness(_resized(picture, size))
     names = [info.name for info in list_faces()] if faces is None else faces
-    # The face shows through expression and light; the light is found on that face alone.
-    name = max(names, key=lambda one: _alike(seen, *_neutral(one, LIGHT, size)))
-    light = max(presets(), key=lambda one: _alike(seen, *_neutral(name, one, size)))
-    if _alike(seen, *_neutral(name, light, size)) < ALIKE:
+    # Faces differ more than lights and expressions, so the light is searched for one face only.
+    name = max(names, key=lambda name: _correlation(brightness, *_neutral(name, LIGHT, size)))
+    light = max(presets(), key=lambda light: _correlation(brightness, *_neutral(name, light, size)))
+    if _correlation(brightness, *_neutral(name, light, size)) < MIN_CORRELATION:
         raise UnknownPictureError(f"{_WANTED} ({', '.join(names)}), got one that is like none of them")
     rows = np.zeros((len(expressions) * len(STEPS) + 1, len(axis())), np.float32)
-    asked = [(one, step) for one in expressions for step in STEPS]
-    for row, (one, step) in zip(rows[1:], asked, strict=True):
-        for (number, side), value in one.aus.items():
+    candidates = [(expression, step) for expression in expressions for step in STEPS]
+    for row, (expression, step) in zip(rows[1:], candidates, strict=True):
+        for (number, side), value in expression.aus.items():
             row[[target.column for target in au(number, side)]] = value * step
-    (rest, face), *shown = _drawn(name, light, size, rows)
-    changed = (seen - rest)[face]
+    (rest, face), *drawn = _draw(name, light, size, rows)
+    difference = (brightness - rest)[face]
     scores: dict[str, float] = {}
-    for (one, _), (look, _) in zip(asked, shown, strict=True):
+    for (expression, _), (look, _) in zip(candidates, drawn, strict=True):
         change = (look - rest)[face]
-        length = float(np.linalg.norm(change) * np.linalg.norm(changed))
-        score = float(change @ changed) / length if length else 0.0
-        scores[one.name] = max(score, scores.get(one.name, 0.0))
-    found = [(one, scores[one.name]) for one in expressions]
-    found.sort(key=lambda pair: -pair[1])
-    little = float(np.sqrt(np.mean(changed**2))) < REST
-    neutral = little and max(scores.values(), default=0.0) < UNLIKE
-    return Likeness(name, light, () if neutral else found, neutral)
+        norms = float(np.linalg.norm(change) * np.linalg.norm(difference))
+        score = float(change @ difference) / norms if norms else 0.0
+        scores[expression.name] = max(score, scores.get(expression.name, 0.0))
+    matches = sorted(
+        ((expression, scores[expression.name]) for expression in expressions), key=lambda match: -match[1]
+    )
+    is_small = float(np.sqrt(np.mean(difference**2))) < MAX_NEUTRAL
+    neutral = is_small and max(scores.values(), default=0.0) < MAX_COSINE
+    return Likeness(name, light, () if neutral else matches, neutral)
 
 
 _WANTED = "wanted a picture of one of our faces from the front, as `realizer realize --at` draws it"
@@ -120,24 +120,24 @@ _WANTED = "wanted a picture of one of our faces from the front, as `realizer rea
 
 @lru_cache(maxsize=32)
 def _neutral(name: str, light: str, size: tuple[int, int]) -> tuple[Float32, Bool]:
-    return _drawn(name, light, size, np.zeros((1, len(axis())), np.float32))[0]
+    return _draw(name, light, size, np.zeros((1, len(axis())), np.float32))[0]
 
 
-def _drawn(name: str, light: str, size: tuple[int, int], rows: Float32) -> list[tuple[Float32, Bool]]:
-    """Each pose: brightness (h, w) 0..1, and where the head is."""
+def _draw(name: str, light: str, size: tuple[int, int], rows: Float32) -> list[tuple[Float32, Bool]]:
+    """Draw poses and return for each the brightness (h, w) 0..1 and a mask of the head."""
     frames = AUFrames(np.arange(len(rows), dtype=np.float64), rows)
-    takings = poses(frames, input_names(name), mapping_of(name))
+    rows_of_poses = poses(frames, input_names(name), mapping_of(name))
     fine = size[0] * FINE, size[1] * FINE
     with Renderer(name, fine, "front", light=light, background="transparent") as renderer:
-        pictures = [_resized(picture, size) for picture in renderer.frames(takings)]
+        pictures = [_resized(picture, size) for picture in renderer.frames(rows_of_poses)]
     return [(_brightness(picture[..., :3]), picture[..., 3] > 250) for picture in pictures]
 
 
-def _alike(seen: Float32, look: Float32, face: Bool) -> float:
-    """The correlation of two pictures where the face is; how bright they are does not count."""
-    one, other = (part[face] - part[face].mean() for part in (seen, look))
-    size = float(np.linalg.norm(one) * np.linalg.norm(other))
-    return float(one @ other) / size if size else 0.0
+def _correlation(one: Float32, other: Float32, face: Bool) -> float:
+    """Return the correlation of two pictures in the area of the face."""
+    a, b = (picture[face] - picture[face].mean() for picture in (one, other))
+    norms = float(np.linalg.norm(a) * np.linalg.norm(b))
+    return float(a @ b) / norms if norms else 0.0
 
 
 def _brightness(picture: UInt8) -> Float32:

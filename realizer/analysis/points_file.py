@@ -1,4 +1,4 @@
-"""A reader of files of tracked feature points."""
+"""A reader for files of tracked feature points."""
 
 from __future__ import annotations
 
@@ -16,14 +16,16 @@ MAX_FRAMES = 100_000  # an hour at 25 frames a second, and a little
 
 
 def read_points(text: str, where: str = "points") -> tuple[dict[str, Float64], dict[str, Float64]]:
-    """Each point's way (n, 3) and its place at rest (3,), which is that of frame 0; metres as in the file.
+    """Parse a CSV text and return the trajectory (n, 3) and the position at rest (3,) of each point.
 
-    The columns are frame,point,x,y,z, frames whole numbers from 0, points named as in MPEG-4 ("4.1"). Lines
-    that begin with # do not count. A point that a frame does not list was lost there, and is NaN.
+    The columns are frame,point,x,y,z; frames count from 0, and points have their MPEG-4 names ("4.1"). Lines
+    that begin with # are ignored. Frame 0 is the position at rest; points missing from a frame are NaN.
+
+    Args:
+        where: name of the file in messages.
 
     Raises:
-        ValueError: other columns, a bad cell, a point that there is none of, a point twice in a frame, or no
-            place at rest; with the line.
+        ValueError: invalid columns, cells or points; the text names the line.
     """
     found: dict[str, dict[int, tuple[float, float, float]]] = {}
     last = 0
@@ -59,7 +61,7 @@ def read_points(text: str, where: str = "points") -> tuple[dict[str, Float64], d
 
 
 def bridge(points: Mapping[str, Float64]) -> dict[str, Float64]:
-    """Return the trajectories (n, 3) without NaN: linear over gaps, constant after the last value."""
+    """Return the trajectories (n, 3) without NaN: linear across gaps, constant after the last value."""
     whole = {}
     for name, way in points.items():
         there = np.flatnonzero(~np.isnan(way).any(axis=1))

@@ -21,9 +21,9 @@ class Recognition:
     """The result of a recognition.
 
     Attributes:
-        emotion: the one with the greatest belief (eq. 11); None if nothing fits.
-        emotions: emotion -> belief 0..1 (eq. 9), all of them.
-        profiles: name of a profile -> belief (eq. 8).
+        emotion: emotion with the greatest belief (eq. 11); None if all are 0.
+        emotions: emotion -> belief 0..1 (eq. 9).
+        profiles: profile -> belief (eq. 8).
     """
 
     emotion: str | None
@@ -32,11 +32,11 @@ class Recognition:
 
 
 class Recogniser:
-    """Fuzzy classes of profiles, ready for whole arrays.
+    """Recognises profiles and emotions in FAP frames by fuzzy classes.
 
-    A value belongs to a FAP's class as far as it lies in the range (`tables/emotion_model.toml`: the drawing
-    of figure 6 is not in the text). A profile is the product of its FAPs, an emotion the best of its
-    profiles. Where two are believed in alike, the one that asks for more FAPs is meant.
+    The membership of a value depends on its distance from the range of the FAP (`tables/emotion_model.toml`;
+    the shape of figure 6 is not in the text). The belief in a profile is the product over its FAPs, the
+    belief in an emotion that of its best profile. Of equal beliefs, the profile with more FAPs has priority.
     """
 
     def __init__(
@@ -44,10 +44,10 @@ class Recogniser:
     ) -> None:
         """
         Args:
-            profiles: at least one; an emotion is the name without the number at its end.
-            absent: what another profile moves and this one does not is in a class of its own, around 0;
-                without it (as published) a profile of few FAPs is believed in wherever one of more is.
-            strengths: a profile is believed in as far as it is at the likeliest of these parts of itself.
+            profiles: at least one; the emotion is the name without the number.
+            absent: whether FAPs that only other profiles move must be near 0; without it (as published), a
+                profile with few FAPs is recognised wherever a larger one is.
+            strengths: factors of the profiles to try; the best one counts.
         """
         self.profiles = tuple(profiles)
         if not self.profiles:
@@ -70,10 +70,13 @@ class Recogniser:
         self._emotions = [_emotion(profile.name) for profile in self.profiles]
 
     def beliefs(self, frames: Any, seen: Bool | None = None) -> Float64:
-        """(n, profiles) of FAP frames (n, 68); `seen` (68,) says which FAPs were observed, None is all.
+        """Return the beliefs (n, profiles) in FAP frames (n, 68).
+
+        Args:
+            seen: (68,) which FAPs were observed; None: all.
 
         Raises:
-            ValueError: another shape, or values that are not finite.
+            ValueError: frames of another shape, or values that are not finite.
         """
         values = np.asarray(frames, np.float64)
         if values.ndim != 2 or values.shape[1] != 68:
@@ -86,11 +89,11 @@ class Recogniser:
             away = np.abs(values[:, None] - middle) / half
             membership = np.clip((self._base - away) / (self._base - self._core), 0.0, 1.0)
             np.maximum(best, np.where(judged, membership, 1.0).prod(axis=2), out=best)
-        # A profile none of whose FAPs was observed cannot be believed.
+        # Profiles need at least one observed FAP.
         return best * judged.any(axis=1)
 
     def names(self, frames: Any, seen: Bool | None = None) -> list[str | None]:
-        """The emotion of each frame (eq. 11), None where nothing fits."""
+        """Return the emotion of each frame (eq. 11), or None."""
         return [self._best(row) for row in self.beliefs(frames, seen)]
 
     def recognise(self, frame: Any, seen: Bool | None = None) -> Recognition:
@@ -103,7 +106,7 @@ class Recogniser:
         return Recognition(self._best(beliefs), emotions, dict(zip(names, map(float, beliefs), strict=True)))
 
     def _class(self, strength: float, least: float) -> tuple[Float64, Float64]:
-        """(profiles, 68) twice: the middles of the classes, and half their lengths; absence has one size."""
+        """Return the middles of the classes and half of their lengths, (profiles, 68) each."""
         length = np.where(self._moving, np.maximum(self._length * strength, least), self._length)
         return self._middle * strength, length / 2
 
@@ -115,9 +118,8 @@ class Recogniser:
 def recogniser(profiles: str = "own", absent: bool = True) -> Recogniser:
     """Return the recogniser of all profiles of a set: "own", "published" or "raw".
 
-    Where what is absent counts, the neutral face, at which all is, is one more that may be recognised. In
-    the published sets an emotion has many profiles, weak and strong; in ours one, which counts at any
-    strength, and the advanced emotions of the wheel, which lie in the middle of two, are known too.
+    With `absent`, the neutral face can be recognised too. Our own set has one profile per emotion, tried at
+    several strengths, and includes the advanced emotions of the wheel.
     """
     strengths = emotion_model().strengths if profiles == "own" else (1.0,)
     every = [profile for numbered in archetypes(profiles).values() for profile in numbered.values()]

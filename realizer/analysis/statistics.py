@@ -11,22 +11,21 @@ from realizer import tables
 from realizer.emotions.profile import Profile
 from realizer.tables.profiles import statistics
 
-LEAST = 1.0  # FAPU; what moves less on average is not part of an expression
+LEAST = 1.0  # FAPU; FAPs with a smaller mean are not part of an expression
 
 
 def from_statistics(
     name: str, measured: Mapping[int, tuple[float, float]], source: str = "statistics"
 ) -> Profile:
-    """The ranges from a deviation below the mean to one above it (eq. 1).
+    """Return the profile with ranges of one standard deviation around the means (eq. 1).
 
-    A FAP that moves in one direction alone keeps to it (eq. 2 and 3): such as has 0 for its least or most
-    value in MPEG-4.
+    Ranges of FAPs that move in one direction only are limited to it (eq. 2 and 3).
 
     Args:
-        measured: {FAP: (mean, standard deviation)} in the FAP's FAPU.
+        measured: FAP -> (mean, standard deviation) in FAPU.
 
     Raises:
-        ValueError: a deviation below 0, or no number.
+        ValueError: a deviation below 0, or not a number.
     """
     ranges = {}
     for fap, (mean, deviation) in measured.items():
@@ -43,7 +42,7 @@ def from_statistics(
 
 
 def published_statistics(emotion: str, raw: bool = False) -> dict[int, tuple[float, float]]:
-    """{FAP: (mean, deviation)} of an emotion's verified FAPs (table 4), as printed or as MPEG-4 has it."""
+    """Return FAP -> (mean, deviation) of an emotion (table 4), as printed or with the signs of MPEG-4."""
     found = {}
     for row in statistics():
         mean = row.raw_mean if raw else row.mean
@@ -53,14 +52,14 @@ def published_statistics(emotion: str, raw: bool = False) -> dict[int, tuple[flo
 
 
 def from_faces(name: str, frames: Any, faps: Iterable[int] | None = None) -> Profile:
-    """The profile of observed faces that show the same expression.
+    """Return the profile of observed faces that show the same expression.
 
     Args:
-        frames: (n, 68) FAP values, n of 2 or more; column = FAP - 1.
-        faps: the vocabulary; None is every FAP that moves on average.
+        frames: (n, 68) FAP values of at least 2 faces; column = FAP - 1.
+        faps: FAPs of the expression; None: those whose mean is at least `LEAST`.
 
     Raises:
-        ValueError: another shape, or values that are not finite.
+        ValueError: frames of another shape, or values that are not finite.
     """
     values = np.asarray(frames, np.float64)
     if values.ndim != 2 or values.shape[1] != 68 or len(values) < 2:

@@ -1,1 +1,1 @@
-"""Checking of documents: faults with explanations, and advice."""
+"""Checks of documents: explanations of faults, and advice."""

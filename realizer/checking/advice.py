@@ -1,4 +1,4 @@
-"""Advice on valid blocks that look like mistakes of their author."""
+"""Advice on valid blocks that look like mistakes."""
 
 from __future__ import annotations
 
@@ -19,20 +19,17 @@ if TYPE_CHECKING:
     from realizer.scheduling.timing import Schedule
 
 ADVICE = "ADVICE"
-# s; a single face is hardly planned so far ahead, but 250 and more are often milliseconds.
-LONG = 250.0
-# s; one frame at 25 fps: shorter motion may fall between frames.
-SHORT = 0.04
-# In standard deviations from the mean: faster than this is not a matter of style.
-FASTER = 2.0
+LONG = 250.0  # s; longer times are probably milliseconds
+SHORT = 0.04  # s; shorter motion may be between two frames at 25 fps
+FASTER = 2.0  # standard deviations below the mean; a faster motion is unnatural
 KNOWN_SPACES = frozenset({CORE, EXTENSIONS, BMLA, BMLT, OWN})
 
 
 def advice(file: str, source: Source, block: Block, schedule: Schedule, player: Player) -> Iterator[Finding]:
-    """Attributes and elements that look misspelt, times in the wrong unit, and what muscles cannot do.
+    """Yield advice on misspelt attributes and elements, times in milliseconds, and unnatural motion.
 
     Args:
-        schedule: of the block, as `player` made it.
+        schedule: schedule of the block by `player`.
     """
     advisor = _Advisor(file, source, block)
     yield from advisor.attributes(block, "/bml", None)
@@ -47,15 +44,15 @@ def advice(file: str, source: Source, block: Block, schedule: Schedule, player: 
 
 
 class _Advisor:
-    """Makes findings of one block."""
+    """Makes the findings of a block."""
 
     def __init__(self, file: str, source: Source, block: Block) -> None:
         self.file, self.source, self.block = file, source, block
 
     def attributes(self, node: Any, path: str, line: int | None) -> Iterator[Finding]:
-        """Yield advice on unknown attributes of BMLA and BMLT that are nearly a known one.
+        """Yield advice on unknown attributes of BMLA and BMLT that are similar to a known one.
 
-        Those languages have more than we know; unknown attributes of BML itself are faults.
+        Not all attributes of these languages are known here; unknown attributes of BML are faults.
         """
         known = schema_of(type(node)).attributes
         for name in node.unknown_attributes:
@@ -67,12 +64,12 @@ class _Advisor:
             element = self.source.find(path, line=line, block=self.block.id) if meant else None
             if element is None or meant is None or self.source.value_span(element, meant):
                 continue
-            said = f"{local(name)}: no attribute of <{local(node.tag)}>, so it does nothing"
+            text = f"{local(name)}: no attribute of <{local(node.tag)}>, so it does nothing"
             label = Label(self.source.attribute_spot(element, name), "does nothing")
-            yield self.finding(node, path, said, label, f'help: did you mean "{meant}"?')
+            yield self.finding(node, path, text, label, f'help: did you mean "{meant}"?')
 
     def children(self, node: Any, path: str, line: int) -> Iterator[Finding]:
-        """Yield advice on unknown child elements of a behaviour that are nearly a known one."""
+        """Yield advice on unknown child elements of a behaviour that are similar to a known one."""
         element = self.source.find(path, line=line, block=self.block.id)
         known = {local(tag): tag for tag in schema_of(type(node)).by_tag}
         if element is None or not known:
@@ -83,31 +80,31 @@ class _Advisor:
                 continue
             meant = near(name, known, 0.75)
             if meant is not None and self.namespace(inner.name) in KNOWN_SPACES:
-                said = f"<{inner.name}>: no element of <{local(node.tag)}>, so it does nothing"
+                text = f"<{inner.name}>: no element of <{local(node.tag)}>, so it does nothing"
                 label = Label(self.source.name_spot(inner), "does nothing")
-                yield self.finding(node, path, said, label, f'help: did you mean "{prefix}:{meant}"?')
+                yield self.finding(node, path, text, label, f'help: did you mean "{prefix}:{meant}"?')
 
     def namespace(self, name: str) -> str:
-        """Return the namespace of an element name, as first declared for its prefix."""
+        """Return the namespace of an element name, as declared first for its prefix."""
         declared = f"xmlns:{name.rpartition(':')[0]}"
         found = (self.source.value(e, declared) for e in self.source.elements if declared in e.attributes)
         return next(found, "")
 
     def units(self, node: Any, path: str, line: int) -> Iterator[Finding]:
-        """Times so long that they are probably milliseconds."""
+        """Yield advice on times that are probably milliseconds."""
         times = [(name, ref.offset) for name, ref in node.syncs.items() if isinstance(ref, SyncRef)]
         times += [("duration", node.duration)] if hasattr(node, "duration") else []
         for name, seconds in times:
             if abs(seconds) >= LONG:
-                said = f"{name}: {seconds:g} s are {_minutes(abs(seconds))}; BML counts in seconds"
+                text = f"{name}: {seconds:g} s are {_minutes(abs(seconds))}; BML counts in seconds"
                 spot = self.source.locate(path, name, line=line, block=self.block.id)
                 hint = f"help: if these are milliseconds, write {seconds / 1000:g}"
-                yield self.finding(node, path, said, Label(spot, _minutes(abs(seconds))), hint)
+                yield self.finding(node, path, text, Label(spot, _minutes(abs(seconds))), hint)
 
     def muscles(
         self, node: Any, path: str, line: int, schedule: Schedule, player: Player
     ) -> Iterator[Finding]:
-        """Movements that are over in a frame, or faster than a face or a head is."""
+        """Yield advice on motion that takes less than a frame or is faster than muscles are."""
         from dataclasses import replace
 
         kind, times = player.kinds[node.tag], schedule.times[node.id]
@@ -115,13 +112,13 @@ class _Advisor:
         if not node.syncs or kind.command is not None or kind.speech_request is not None:
             return
         if 0 < seconds < SHORT:
-            said = f"lasts {seconds:.3g} s from start to end, less than a frame"
+            text = f"lasts {seconds:.3g} s from start to end, less than a frame"
             spot = self.source.locate(path, line=line, block=self.block.id)
             hint = "help: it may not be seen at all; BML counts in seconds"
-            yield self.finding(node, path, said, Label(spot, "less than a frame"), hint)
+            yield self.finding(node, path, text, Label(spot, "less than a frame"), hint)
             return
         if kind.region is None and not node.sync_points[1:-1]:
-            return  # nothing that rises or falls: a wait, a sound
+            return  # no motion: a wait, a sound
         timing = kind.timing(node, replace(player.context, utterances={}))
         spread = 1 / np.sqrt(timing.stiffness)
         for n, gap in enumerate(np.diff(times).tolist()):
@@ -129,16 +126,16 @@ class _Advisor:
             if timing.rigid or not gap < usual - FASTER * float(spread[n]):
                 continue
             begin, end = timing.points[n : n + 2]
-            said = f"{begin} to {end} in {gap:.2g} s; this usually takes {usual:.2g} s"
+            text = f"{begin} to {end} in {gap:.2g} s; this usually takes {usual:.2g} s"
             name = next((p for p in (end, begin, *node.syncs) if p in node.syncs), "")
             spot = self.source.locate(path, name, line=line, block=self.block.id)
             hint = f"help: leave {end} or {begin} out, and they are placed where they look natural"
-            yield self.finding(node, path, said, Label(spot, "faster than muscles are"), hint)
+            yield self.finding(node, path, text, Label(spot, "faster than muscles are"), hint)
             return
 
-    def finding(self, node: Any, path: str, said: str, label: Label, note: str) -> Finding:
+    def finding(self, node: Any, path: str, text: str, label: Label, note: str) -> Finding:
         id = self.block.id if isinstance(node, Block) else f"{self.block.id}:{node.id}"
-        return Finding(self.file, ADVICE, id, path, said, said, (label,), (note,))
+        return Finding(self.file, ADVICE, id, path, text, text, (label,), (note,))
 
 
 def _minutes(seconds: float) -> str:

@@ -1,4 +1,4 @@
-"""The check of a document: every fault of every block."""
+"""Checks of documents that find every fault of every block."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from realizer.speech.utterance import Utterance
 
 @dataclass(frozen=True)
 class CheckedBlock:
-    """A block, or a stretch of text that is none, and its faults.
+    """The faults of a block, or of a part of a document that is not a block.
 
     Attributes:
-        findings: in order of their places.
-        block, schedule: None where nothing could be read.
-        utterances: the silent voice's utterances of its speeches.
+        findings: faults by their place.
+        block, schedule: None if it is not a block.
+        utterances: speech id -> utterance of the silent voice.
     """
 
     findings: tuple[Finding, ...]
@@ -37,22 +37,23 @@ class CheckedBlock:
 
 
 def check_document(file: str, source: Source, text: bytes | str, player: Player) -> Iterator[CheckedBlock]:
-    """All blocks of a document, in order.
+    """Check the blocks of a document in order.
 
     Args:
-        file: as the user named it.
-        source: of the text.
-        player: gets every block, so that later ones may refer to earlier ones.
+        file: name of the file, for the findings.
+        source: the text with its positions.
+        player: plays all blocks, so that blocks may refer to earlier ones.
     """
     voice = SilentVoice()
     items = list(read(text, VOCABULARY))
     for item, whole in zip(items, without_faults(source, items), strict=True):
         if isinstance(item, Block):
-            said = synthesize(player.speech_requests(item), voice)
-            schedule, warnings = check_block(item, player, said)
+            utterances = synthesize(player.speech_requests(item), voice)
+            schedule, warnings = check_block(item, player, utterances)
             if whole is not None:
-                warnings += masked_faults(item, whole, player, replace(player.context, utterances=dict(said)))
-            yield CheckedBlock(_explained(file, source, warnings), item, schedule, said)
+                context = replace(player.context, utterances=dict(utterances))
+                warnings += masked_faults(item, whole, player, context)
+            yield CheckedBlock(_explained(file, source, warnings), item, schedule, utterances)
         else:
             yield CheckedBlock(_explained(file, source, [parse_warning(item)]))
 
@@ -65,29 +66,29 @@ def _explained(file: str, source: Source, warnings: list[Warning]) -> tuple[Find
 def check_block(
     block: Block, player: Player, utterances: Mapping[str, Utterance]
 ) -> tuple[Schedule, list[Warning]]:
-    """The schedule of a block, and everything that is wrong with it, also where one fault ends it all.
+    """Schedule a block and return all warnings, even if a single fault would make the block fail.
 
     Args:
-        utterances: the silent voice's utterances of its speeches.
+        utterances: speech id -> utterance of the silent voice.
     """
     warnings = [Warning(p.id, p.type, str(p)) for p in block.problems]
-    world = replace(player.context, utterances=dict(utterances))
+    context = replace(player.context, utterances=dict(utterances))
     bad: set[str] = set()
     for node in block.behaviours:
         kind = player.kinds.get(node.tag)
-        faults = kind.check(node, world) if kind is not None else ()
+        faults = kind.check(node, context) if kind is not None else ()
         warnings += [located_warning(block, node.id, fault.type, fault.text) for fault in faults]
         if any(fault.fatal for fault in faults):
             bad.add(node.id)
-    # Reported faults must not end the block before its constraints are checked.
+    # The block must not fail for known faults before its constraints are checked.
     whole = replace(block, problems=(), children=tuple(_without_required(block, bad)))
     schedule = submit_with_speech(player, whole, SilentVoice())
-    told = {(warning.id, warning.text) for warning in warnings}
-    return schedule, warnings + [w for w in schedule.warnings if (w.id, w.text) not in told]
+    known = {(warning.id, warning.text) for warning in warnings}
+    return schedule, warnings + [w for w in schedule.warnings if (w.id, w.text) not in known]
 
 
 def _without_required(block: Block, bad: set[str]) -> Iterator[Any]:
-    """The children of a block, with the bad behaviours of <required> outside of it."""
+    """Yield the children of a block, with the bad behaviours of <required> moved out of it."""
     for child in block.children:
         if not isinstance(child, Required):
             yield child

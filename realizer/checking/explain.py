@@ -1,4 +1,4 @@
-"""Findings that explain warnings: places to mark, and suggestions."""
+"""Findings that explain warnings with marked places and suggestions."""
 
 from __future__ import annotations
 
@@ -33,21 +33,21 @@ _MAX_LISTED = 12
 
 
 def finding_of(file: str, source: Source, warning: Warning, vocabulary: Mapping[str, type[Any]]) -> Finding:
-    """Return the finding of a warning, with its places.
+    """Return the finding for a warning.
 
     Args:
-        file: as the user named it.
-        source: the text.
-        warning: its text begins with "line N, path: " where the place is known.
-        vocabulary: Clark tag -> node class, for what might have been meant.
+        file: name of the file.
+        source: the text with its positions.
+        warning: its text begins with "line N, path: " if the place is known.
+        vocabulary: Clark tag -> node class, for suggestions.
     """
     placed = _PLACED.fullmatch(warning.text)
     line, path, text = (int(placed[1]), placed[2] or "", placed[3]) if placed else (None, "", warning.text)
     builder = FindingBuilder(source, warning.id, line, path)
     lost = _LOST.fullmatch(text)
-    said = lost[1] if lost else text
-    if not explain_conflict(builder, warning, said):
-        _Sentences(builder, vocabulary).explain(said)
+    sentence = lost[1] if lost else text
+    if not explain_conflict(builder, warning, sentence):
+        _Sentences(builder, vocabulary).explain(sentence)
     if lost:
         builder.notes.append(f"note: with it went {lost[2]}")
     return Finding(
@@ -63,7 +63,7 @@ def finding_of(file: str, source: Source, warning: Warning, vocabulary: Mapping[
 
 
 def near(word: str, choices: Iterable[str], cutoff: float = 0.6) -> str | None:
-    """Return the choice that a word was probably meant to be, in any case, or None."""
+    """Return the choice that is most similar to a word, ignoring case, or None."""
     by_case = {choice.lower(): choice for choice in choices}
     found = difflib.get_close_matches(word.lower(), by_case, n=1, cutoff=cutoff)
     return by_case[found[0]] if found else None
@@ -80,7 +80,7 @@ def attributes_of(text: str) -> list[str]:
 
 
 class _Sentences:
-    """Explains the warnings of the parser and the behaviour kinds: sentences about one element each."""
+    """Explains warnings of the parser and of behaviour kinds, each about one element."""
 
     def __init__(self, builder: FindingBuilder, vocabulary: Mapping[str, type[Any]]) -> None:
         self.builder, self.vocabulary = builder, vocabulary
@@ -89,7 +89,7 @@ class _Sentences:
     def explain(self, text: str) -> None:
         builder = self.builder
         if builder.element is None and builder.line is None:
-            # A fault of the whole block; of several with one id, the last.
+            # A fault of the whole block; of several blocks with this id, the last.
             builder.element = self.source.document(builder.block)
             builder.path = "/bml" if builder.element is not None else ""
         if builder.element is None:
@@ -98,9 +98,8 @@ class _Sentences:
             pieces = [self.piece(piece, builder.element) for piece in _PIECE.split(text)]
             builder.head = "; ".join(pieces)
 
-    # a document that gave no block
-
     def broken(self, text: str) -> None:
+        """Explain why a part of a document is not a block."""
         source, line = self.source, self.builder.line
         if line is None:
             return
@@ -129,17 +128,15 @@ class _Sentences:
             return Label(source.spot(offset, offset + 1), "first given here", primary=False)
         return Label(source.name_spot(element), f"<{element.name}> is opened here", primary=False)
 
-    # a fault inside one element
-
     def piece(self, text: str, element: Element) -> str:
-        """Label one sentence; returns what of it is left for the first line."""
+        """Label one sentence and return the part of it for the first line."""
         meant = _MEANT.search(text)
         if meant:
             self.notes.append(f"help: did you mean {meant[1]}?")
             text = text[: meant.start()]
         listed = _LONG_LIST.search(text)
         if listed:
-            text = f"{text[: listed.start()]}wanted one of those known, got {text[listed.end() :]}"
+            text = f"{text[: listed.start()]}wanted a known one, got {text[listed.end() :]}"
             self.notes.append(f"help: known are {listed[1]}")
         found = _ATTRIBUTE.fullmatch(text)
         if several := _ATTRIBUTES.fullmatch(text):
@@ -152,46 +149,46 @@ class _Sentences:
                 self.holder(held[1], element)
             self.unknown_element(text, element, bool(meant))
             return text
-        name, said = found[1], found[2]
+        name, message = found[1], found[2]
         spec = schema_of(cls).attributes.get(name) if cls else None
         span = self.source.value_span(element, name)
         if span is None:
-            self.missing(name, said, element, cls)
+            self.missing(name, message, element, cls)
             return text
-        self.labels.append(Label(self.spot_in(span, said), said))
-        if taken := _TAKEN.search(said):
+        self.labels.append(Label(self.spot_in(span, message), message))
+        if taken := _TAKEN.search(message):
             id = self.source.id(element)
             first = self.source.named(id, line=int(taken[1]), block=self.builder.block)
             if first is not None and first is not element:
                 spot = self.source.locate_in(first, "id")
                 self.labels.append(Label(spot, "the first one is here", primary=False))
-        self.hints(said, spec, self.source.value(element, name), element, bool(meant))
+        self.hints(message, spec, self.source.value(element, name), element, bool(meant))
         return text
 
     def holder(self, name: str, element: Element) -> None:
-        """Return the holder of a resource: "behaviour", or "block:behaviour" of an earlier block."""
+        """Label the holder of a resource, "behaviour" or "block:behaviour"."""
         block, _, id = name.rpartition(":")
         other = self.source.named(id, block=block or self.builder.block)
         if other is not None and other is not element:
             self.labels.append(Label(self.source.name_spot(other), f"{name} is here", primary=False))
 
-    def spot_in(self, span: tuple[int, int], said: str) -> Spot:
-        """The part of a value that is meant: the name in a reference, else all of it."""
+    def spot_in(self, span: tuple[int, int], message: str) -> Spot:
+        """Return the name in a reference that a message is about, or else the whole value."""
         start, end = span
         value = self.source.text[start:end]
-        point, behaviour = _NO_POINT.search(said), _NO_BEHAVIOUR.search(said)
+        point, behaviour = _NO_POINT.search(message), _NO_BEHAVIOUR.search(message)
         at = value.rfind(point[1]) if point else value.find(behaviour[1]) if behaviour else -1
         if at >= 0:
             length = len((point or behaviour or "")[1])
             return self.source.spot(start + at, start + at + length)
         return self.source.spot(start, end)
 
-    def hints(self, said: str, spec: Attribute | None, value: str, element: Element, meant: bool) -> None:
-        if point := _NO_POINT.search(said):
+    def hints(self, message: str, spec: Attribute | None, value: str, element: Element, meant: bool) -> None:
+        if point := _NO_POINT.search(message):
             points = self.points_of(point[2])
             if points:
                 self.notes.append(f"help: {point[2]} has {_listed(points)}")
-        elif _NO_BEHAVIOUR.search(said) and not meant:
+        elif _NO_BEHAVIOUR.search(message) and not meant:
             ids = list(dict.fromkeys(filter(None, map(self.source.id, self.behaviours(element)))))
             self.notes.append(f"help: there is {_listed(ids)}" if ids else "help: there is no other one")
         if spec is None:
@@ -201,16 +198,16 @@ class _Sentences:
         if not spec.required and spec.default not in (None, ()):
             self.notes.append(f"help: without it, {spec.name} is {spec.value.write(spec.default)}")
 
-    def missing(self, name: str, said: str, element: Element, cls: type[Any] | None) -> None:
-        """An attribute that is not there: perhaps another is it, misspelt."""
+    def missing(self, name: str, message: str, element: Element, cls: type[Any] | None) -> None:
+        """Explain a missing attribute, of which another may be a misspelling."""
         known = (
             {*schema_of(cls).attributes, *cls.sync_points} if cls and hasattr(cls, "sync_points") else set()
         )
         word = near(name, [a for a in element.attributes if a not in known and ":" not in a])
         if word is None:
-            self.labels.append(Label(self.source.name_spot(element), f"{name}: {said}"))
+            self.labels.append(Label(self.source.name_spot(element), f"{name}: {message}"))
         else:
-            self.labels.append(Label(self.source.attribute_spot(element, word), f"{name}: {said}"))
+            self.labels.append(Label(self.source.attribute_spot(element, word), f"{name}: {message}"))
             self.notes.append(f'help: did you mean {name} where it says "{word}"?')
 
     def unknown_element(self, text: str, element: Element, meant: bool) -> None:

@@ -1,7 +1,4 @@
-"""Labels for the lines that take part in a scheduling conflict.
-
-The words are those of realizer/scheduling/explain.py.
-"""
+"""Labels for the lines of a scheduling conflict; parses texts of `realizer.scheduling.explain`."""
 
 from __future__ import annotations
 
@@ -24,28 +21,28 @@ _BECAUSE = re.compile(r"; (\S+ was dropped because .+)$|; (a constraint that .+)
 
 
 def explain_conflict(builder: FindingBuilder, warning: Warning, text: str) -> bool:
-    """Add the explanation of a scheduling conflict; returns whether the warning is one.
+    """Add the explanation of a scheduling conflict and return whether the warning is about one.
 
     Args:
-        text: of the warning, without its place.
+        text: text of the warning without its place.
     """
     if warning.clash:
         _conflict(builder, warning.clash, text)
         return True
     if (astray := _ASTRAY.fullmatch(text)) is None:
         return False
-    name, constraint, id, line, said = astray.groups()
-    _dangling_reference(builder, name, bool(constraint), id, int(line) if line else builder.line, said)
+    name, constraint, id, line, message = astray.groups()
+    _dangling_reference(builder, name, bool(constraint), id, int(line) if line else builder.line, message)
     return True
 
 
 def _conflict(builder: FindingBuilder, clash: Iterable[Clause], text: str) -> None:
-    """Add a label for every line that takes part, and the behaviours' own needs."""
+    """Add a label for every line that takes part, and notes for other requirements."""
     builder.path = builder.path or "/bml"
     for clause in clash:
         of_behaviour = ":" in clause.id
         stated = _STATED.fullmatch(clause.text)
-        # Of a behaviour's own points only equalities are in the document; their order is implied.
+        # The order of the points of a behaviour is implied; only equalities are in the document.
         if stated is None or clause.line is None or (of_behaviour and stated[2] != "="):
             builder.notes.append(f"note: {clause.text}")
             continue
@@ -69,28 +66,28 @@ def _dangling_reference(
     is_constraint: bool,
     constraint: str | None,
     line: int | None,
-    said: str,
+    message: str,
 ) -> None:
-    """A reference that leads nowhere the scheduler knows."""
+    """Add a label for a reference to an unknown point."""
     element = builder.element
     if element is None and is_constraint:
         element = _constraint(builder, constraint, line)
     elif element is None:
         element = builder.source.named(name, line=line, block=builder.block)
     builder.path = builder.source.path(element) if element is not None else builder.path or "/bml"
-    builder.head = said
+    builder.head = message
     if element is None:
         if line is not None:
-            builder.labels.append(Label(builder.source.whole_line(line), said))
+            builder.labels.append(Label(builder.source.whole_line(line), message))
         return
-    found = _REFERENCE.match(said)
+    found = _REFERENCE.match(message)
     wanted = "".join(found[1].split()) if found else ""
     for one in (element, *builder.source.below(element)):
         for attribute in one.attributes:
             if wanted and "".join(builder.source.value(one, attribute).split()) == wanted:
-                builder.labels.append(Label(builder.source.locate_in(one, attribute), said))
+                builder.labels.append(Label(builder.source.locate_in(one, attribute), message))
                 return
-    builder.labels.append(Label(builder.source.name_spot(element), said))
+    builder.labels.append(Label(builder.source.name_spot(element), message))
 
 
 def _in_behaviour(builder: FindingBuilder, point: str, line: int) -> Spot:
@@ -106,7 +103,7 @@ def _in_behaviour(builder: FindingBuilder, point: str, line: int) -> Spot:
 
 
 def _constraint(builder: FindingBuilder, id: str | None, line: int | None) -> Element | None:
-    """A constraint by its id, or the first one on a line."""
+    """Return a constraint by its id, or the first one on a line."""
     found = builder.source.named(id, line=line) if id else None
     if found is None and line is not None:
         on = (e for e in builder.source.on_line(line) if e.name.rpartition(":")[2] == "constraint")

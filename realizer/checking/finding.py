@@ -1,4 +1,4 @@
-"""The finding value: text, labelled places and help."""
+"""Findings: faults or advice with labelled places and help."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from bml_schema.source import Spot
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """A labelled place; `primary` for the fault itself, else for what it conflicts with."""
+    """A labelled place; `primary` marks the fault itself, other labels mark conflicting places."""
 
     spot: Spot
     text: str = ""
@@ -21,13 +21,13 @@ class Finding:
     """A fault of a document, or advice.
 
     Attributes:
-        file: as the user named it.
+        file: name of the file.
         type: BML warning type, or "ADVICE".
-        id: of the block, "block:behaviour", or a constraint's.
-        path: of the element, or "".
-        text: all of it in one line.
-        head: the text, if labels and notes say the rest.
-        labels: the first primary one says the line and column of the whole.
+        id: block, "block:behaviour", or constraint.
+        path: path of the element, or "".
+        text: full text, on one line.
+        head: shorter text for use with labels and notes.
+        labels: marked places; the first primary one gives line and column of the finding.
         notes: sentences below the source, such as "help: did you mean ...?".
     """
 

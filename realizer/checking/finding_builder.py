@@ -1,4 +1,4 @@
-"""A builder of findings: collects places, labels and notes of one warning."""
+"""A builder that collects the parts of a finding."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from realizer.checking.finding import Label
 
 @dataclass
 class FindingBuilder:
-    """A finding in the making.
+    """The parts of the finding for a warning.
 
     Attributes:
-        source: the text.
-        id: of the warning: a block, "block:behaviour", or a constraint.
-        line, path: from the warning; None and "" if it has none.
-        head: the first line, "" while the whole text will do.
-        labels, notes: as a finding has them.
-        element: its source, or None while unknown.
+        source: the text with its positions.
+        id: block, "block:behaviour", or constraint.
+        line, path: place in the warning, or None and "".
+        head: first line; "" for the text of the warning.
+        labels, notes: those of the finding.
+        element: element that the warning is about; None if unknown.
     """
 
     source: Source

@@ -1,4 +1,4 @@
-"""Faults that other faults mask, found by parsing again without these."""
+"""Faults that are hidden by other faults, found by parsing again without those."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from realizer.scheduling.timing import Warning
 
 
 def located_warning(block: Block, id: str, type: str, text: str) -> Warning:
-    """A warning of a behaviour, with its place."""
+    """Return a warning about a behaviour, with its place."""
     place = block.places.get(id)
     return Warning(f"{block.id}:{id}", type, text if place is None else place.with_place(text))
 
 
 def without_faults(source: Source, items: Sequence[Block | BMLError]) -> list[Block | None]:
-    """Return the blocks of a text without the attributes for which behaviours were dropped.
+    """Parse a text again without the attributes for which behaviours were dropped.
 
     Args:
-        items: the results of reading it.
+        items: the results of parsing the text.
 
     Returns:
-        One for each of them; None if there is nothing more to find.
+        A block for each item, or None if there is nothing more to find.
     """
     problems = [p for item in items if isinstance(item, Block) for p in item.problems if p.dropped]
     spans = sorted(set(_spans(source, problems)))
     if not spans:
         return [None] * len(items)
-    # Replace them by blanks, so that positions stay.
+    # Blanks keep the positions of the rest.
     parts, last = [], 0
     for start, end in spans:
         parts += [source.text[last:start], re.sub(r"[^\n]", " ", source.text[start:end])]
@@ -45,10 +45,10 @@ def without_faults(source: Source, items: Sequence[Block | BMLError]) -> list[Bl
 
 
 def masked_faults(block: Block, whole: Block, player: Player, context: PlanningContext) -> Iterator[Warning]:
-    """Return the faults of the behaviours that a block has only without its faults.
+    """Yield the faults of behaviours that had been dropped from a block.
 
     Args:
-        whole: the block as `without_faults` gave it.
+        whole: the block from `without_faults`.
     """
     known = {node.id for node in block.behaviours}
     for node in whole.behaviours:
@@ -59,7 +59,7 @@ def masked_faults(block: Block, whole: Block, player: Player, context: PlanningC
 
 
 def _spans(source: Source, problems: Iterable[Problem]) -> Iterator[tuple[int, int]]:
-    """Return the spans of attributes that problems mention, each from its name to its last quote."""
+    """Yield the spans of attributes that problems mention, from the name to the closing quote."""
     for problem in problems:
         element = source.find(problem.path, line=problem.line, block=problem.id.partition(":")[0])
         if element is None:
@@ -67,7 +67,7 @@ def _spans(source: Source, problems: Iterable[Problem]) -> Iterator[tuple[int, i
         for name in attributes_of(problem.text):
             span = source.value_span(element, name)
             if span is None or name == "id":
-                continue  # without an id there is nothing to speak of
+                continue  # behaviours need an id
             tag = source.text[element.offset : span[0]]
             begun = re.search(r"[^\s\"'<>/=]+\s*=\s*[\"']$", tag)
             if begun is not None:

@@ -1,1 +1,1 @@
-"""Values, errors and settings that every layer shares."""
+"""Types, errors and settings that all layers share."""

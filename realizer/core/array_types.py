@@ -1,4 +1,4 @@
-"""Array types that flow between the steps; shapes are documented where they are used."""
+"""Names of array types; shapes are documented where they are used."""
 
 from typing import TypeAlias
 

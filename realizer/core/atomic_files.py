@@ -1,4 +1,4 @@
-"""Atomic writing: a file appears complete or not at all."""
+"""Atomic writing of files: complete or not at all."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from pathlib import Path
 
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
-    """A new file beside `path` that takes its place when the block ends well, and vanishes when it fails.
+    """Yield a new file that replaces `path` at the end of the block, or is deleted if the block fails.
 
-    A path that exists but is no plain file (a pipe, /dev/null) is written to directly.
+    A path that exists but is not a regular file (a pipe, /dev/null) is yielded itself.
     """
     path = Path(path)
     if path.exists() and not path.is_file():
         yield path
         return
-    path = path.resolve()  # a link stays a link, its target is replaced
+    path = path.resolve()  # replaces the target of a link, not the link
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=path.suffix, dir=path.parent)
     os.close(handle)
     draft = Path(name)
     try:
         yield draft
-        # mkstemp gives 0600; an existing file keeps its mode, a new one gets the usual one.
+        # mkstemp creates files with mode 0600.
         mode = path.stat().st_mode & 0o7777 if path.exists() else 0o666 & ~_umask()
         draft.chmod(mode)
         draft.replace(path)
@@ -37,13 +37,13 @@ def replacing(path: str | Path) -> Iterator[Path]:
 
 
 def write_bytes(path: str | Path, content: bytes) -> None:
-    """The whole content, or nothing."""
+    """Write a whole file, or nothing."""
     with replacing(path) as draft:
         draft.write_bytes(content)
 
 
 def write_text(path: str | Path, content: str) -> None:
-    """Write the whole content as UTF-8 with unchanged line ends, or nothing."""
+    """Write a whole file as UTF-8 with unchanged line ends, or nothing."""
     write_bytes(path, content.encode("utf-8"))
 
 

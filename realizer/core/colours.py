@@ -8,12 +8,12 @@ from realizer.core.array_types import Float32, UInt8
 
 
 def linear(colours: UInt8) -> Float32:
-    """Linear light 0..1, float32, of 8-bit sRGB."""
+    """Return the linear light 0..1 of 8-bit sRGB colours."""
     c = np.asarray(colours, np.float32) / np.float32(255)
     return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
 def srgb(light: Float32) -> Float32:
-    """sRGB 0..1, float32, of linear light; below 0 and above 1 are cut."""
+    """Return the sRGB colours 0..1 of linear light, which is clipped to 0..1."""
     c = np.clip(np.asarray(light, np.float32), 0, 1)
     return np.where(c <= 0.0031308, c * 12.92, 1.055 * c ** (1 / 2.4) - 0.055).astype(np.float32)

@@ -1,40 +1,40 @@
-"""The errors of the library, other than those of documents.
+"""The exceptions of the library, except those about documents.
 
 RealizerError
-├── ScheduleError    constraints that cannot hold together
-├── TableError       a table under realizer/tables or in a face folder: file, line, column
-├── FaceError        a face folder: which file, what to change
-├── VoiceError       a voice that is not installed or failed
-├── PluginError      an entry point of another package that cannot be used
-└── RenderError      no GL, or a lost context
+├── ScheduleError    conflicting constraints of required behaviours
+├── TableError       an invalid table: built in, of a face, or of the user
+├── FaceError        an invalid or missing face
+├── VoiceError       a missing or failed voice
+├── PluginError      an unusable plug-in
+└── RenderError      pictures cannot be drawn
 
 Faults of documents are `bml_schema.BMLError`.
 """
 
 
 class RealizerError(Exception):
-    """Any fault of the realizer that a caller may want to catch."""
+    """The base class of the library's exceptions."""
 
 
 class ScheduleError(RealizerError):
-    """Required behaviours whose constraints cannot hold together."""
+    """Required behaviours have constraints that conflict."""
 
 
 class TableError(RealizerError):
-    """A table with a bad row; the text says file, line and column."""
+    """A table has a bad row; the message names file, line and column."""
 
 
 class FaceError(RealizerError):
-    """A face folder that cannot be used; the text says which file and what to change."""
+    """A face folder cannot be used; the message names the file and what to change."""
 
 
 class VoiceError(RealizerError):
-    """A voice that is not installed or failed; the text says what to install."""
+    """A voice is not installed or has failed; the message says what to install."""
 
 
 class PluginError(RealizerError):
-    """An entry point of another package that cannot be used; the text says which and why."""
+    """An entry point of another package cannot be used; the message says why."""
 
 
 class RenderError(RealizerError):
-    """Pictures cannot be drawn; the text says what to install."""
+    """Pictures cannot be drawn; the message says what to install."""

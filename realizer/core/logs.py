@@ -1,4 +1,4 @@
-"""Log formatters: text for people, or JSON for collectors."""
+"""Logging as text for people or as JSON for programs."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import sys
 from datetime import UTC, datetime
 from typing import TextIO
 
-# Attributes that every record has; the rest comes from `extra`.
-USUAL = set(vars(logging.makeLogRecord({}))) | {"message", "asctime", "taskName"}
+# Attributes of every record; further ones come from `extra`.
+STANDARD = set(vars(logging.makeLogRecord({}))) | {"message", "asctime", "taskName"}
 
 
 class JsonFormatter(logging.Formatter):
-    """A formatter of one JSON object a line: time (UTC), level, logger, message, `extra`, and a traceback."""
+    """Formats a record as one line of JSON: time (UTC), level, logger, message, `extra` and traceback."""
 
     def format(self, record: logging.LogRecord) -> str:
         time = datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds")
@@ -23,20 +23,20 @@ class JsonFormatter(logging.Formatter):
             "logger": record.name,
             "message": record.getMessage(),
         }
-        line |= {name: value for name, value in vars(record).items() if name not in USUAL}
+        line |= {name: value for name, value in vars(record).items() if name not in STANDARD}
         if record.exc_info:
             line["exception"] = self.formatException(record.exc_info)
         return json.dumps(line, ensure_ascii=False, default=str)
 
 
-def write_words(level: int, who: str = "") -> None:
-    """Log from `level` on as lines for people, on standard error; `who` precedes each."""
-    logging.basicConfig(format=f"realizer: {who}%(message)s", stream=sys.stderr)
+def write_words(level: int, prefix: str = "") -> None:
+    """Log to standard error as text, from `level` on, each line with a prefix."""
+    logging.basicConfig(format=f"realizer: {prefix}%(message)s", stream=sys.stderr)
     logging.getLogger().setLevel(level)
 
 
 def write_json(stream: TextIO | None = None) -> None:
-    """Log as JSON lines, on standard error; the service's own from INFO on."""
+    """Log as lines of JSON, to standard error by default; messages of the service from INFO on."""
     handler = logging.StreamHandler(stream or sys.stderr)
     handler.setFormatter(JsonFormatter())
     root = logging.getLogger()

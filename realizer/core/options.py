@@ -1,4 +1,4 @@
-"""Options of playing documents, the same for `realize`, the commands, the service and batches."""
+"""Options for playing documents, shared by `realize`, the commands, the service and batches."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from pathlib import Path
 
 @dataclass(frozen=True, kw_only=True)
 class PlayOptions:
-    """How documents are played, and what face they move.
+    """Options for playing documents.
 
     Attributes:
-        face: name of a face folder.
-        deformer: what moves it: "mpeg4" (FAPs) or "au" (its model of action units); None is what it says.
-        fps: frames a second.
-        scene: target name -> (x, y, z) metres, origin between the eyes; None while no scene was declared.
-        seed: for idle motion and anything else random; the same seed gives the same frames.
-        idle: blinks and small head motion between and under the behaviours.
-        language: BCP-47 of speech that does not name its own.
-        media: the folder of the files that documents may name; None: they may name none.
-        expressions: a folder of the user's own expressions, before those that ship; None: there are none.
-        cooccurrence: which AUs a face can show together: "on" (the rules that ship), "off", or a file.
-        prosody: nods, brows, blinks and looks that go with what is said; none without `idle`.
-        mapping: a file of what AUs ask of FAPs; it goes before what the face says.
+        face: name of the face.
+        deformer: "mpeg4" moves the face by FAPs, "au" by its action unit model; None: the face's own choice.
+        fps: frames per second.
+        scene: target name -> (x, y, z) in metres, origin between the eyes; None: no scene declared.
+        seed: of all random motion; the same seed gives the same frames.
+        idle: whether the face blinks and its head moves slightly.
+        language: BCP-47 tag of speech without xml:lang.
+        media: folder of the files that documents may refer to; None: they may not.
+        expressions: folder of a user's expressions, which override built-in ones.
+        cooccurrence: rules for AUs that no face shows together: "on" (built in), "off", or a file.
+        prosody: whether nods, brows, blinks and glances accompany speech; needs `idle`.
+        mapping: file that maps AUs to FAPs and overrides the face's mapping.
 
     Raises:
         ValueError: `fps` is not a number above 0.

@@ -1,7 +1,7 @@
-"""Registries: names of objects that are imported when they are first used, ours and those of plug-ins.
+"""Registries of built-in objects and plug-ins, imported on first use.
 
-A plug-in is an installed package with entry points (https://packaging.python.org/specifications/entry-points)
-in the group of a registry.
+A plug-in is an installed package with entry points in the group of a registry
+(https://packaging.python.org/specifications/entry-points).
 """
 
 from __future__ import annotations
@@ -23,16 +23,15 @@ _installed = cache(entry_points)  # reading those of all packages takes 10 ms
 
 
 class Registry(Mapping[str, T], Generic[T]):
-    """The objects of one kind by name. A plug-in cannot replace an object of ours.
+    """The objects of one kind by name; a plug-in cannot replace a built-in object.
 
-    `registry[name]` imports the object, and raises PluginError if it is a plug-in's and cannot be used.
-    `working()` leaves such plug-ins out.
+    `registry[name]` imports the object, and raises PluginError if a plug-in cannot be used.
 
     Args:
-        group: the group of entry points that plug-ins use, such as "realizer.outputs".
-        ours: name -> "module:attribute".
-        wanted: what the objects are, for messages.
-        accepts: returns whether an object of a plug-in is one.
+        group: group of entry points for plug-ins, such as "realizer.outputs".
+        ours: name -> "module:attribute" of the built-in objects.
+        wanted: description of the objects, for messages.
+        accepts: returns whether an object of a plug-in is of this kind.
     """
 
     def __init__(
@@ -60,11 +59,7 @@ class Registry(Mapping[str, T], Generic[T]):
         return name in self._ours or name in self._plugins
 
     def working(self, names: Iterable[str] | None = None) -> Iterator[tuple[str, T]]:
-        """Yield names and objects, without the plug-ins that cannot be used: each is one warning.
-
-        Args:
-            names: only these; None stands for all.
-        """
+        """Yield names (by default all) and objects; log a warning for each plug-in that cannot be used."""
         for name in self if names is None else names:
             try:
                 yield name, self[name]
@@ -76,7 +71,7 @@ class Registry(Mapping[str, T], Generic[T]):
         found: dict[str, EntryPoint] = {}
         for point in _installed().select(group=self.group):
             if point.name in self._ours or point.name in found:
-                self._warn(f"{_described(point)} is not used: there is another of this name")
+                self._warn(f"{_described(point)} is not used: its name is taken")
             else:
                 found[point.name] = point
         return dict(sorted(found.items()))

@@ -1,4 +1,4 @@
-"""Settings in one typed object: flags, then REALIZER_* variables, then a TOML file."""
+"""The settings of the service, from flags, REALIZER_* variables and a TOML file, in this order."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from realizer.core.options import PlayOptions
 
 T = TypeVar("T")
 PREFIX = "REALIZER_"
-# Read elsewhere: where faces lie and are made, what draws.
+# Variables that are read elsewhere.
 OTHERS = frozenset({"REALIZER_DRAW", "REALIZER_FACES", "REALIZER_HEAD_DATA", "REALIZER_NO_PAGE"})
-SECRET = 32  # characters; HS256 is as strong as that (RFC 7518, 3.2)
+MIN_SECRET = 32  # characters, the key length of HS256 (RFC 7518, 3.2)
 
 
 class SettingsError(RealizerError):
-    """A setting with a wrong value; the text says which, what was wanted and what came.
+    """A setting has a wrong value; the message names it, the wanted values and the actual one.
 
     Attributes:
         setting: its name, or "".
@@ -50,18 +50,15 @@ def _number(kind: type[int] | type[float], low: float, high: float) -> Callable[
 
 
 def raises(name: str) -> str:
-    """Return the part of a message that says where a limit is set."""
+    """Return the part of a message that says which variable sets a limit."""
     return f"({PREFIX}{name.upper()} sets it)"
 
 
 def _flag(value: Any) -> bool:
-    words = dict.fromkeys(("1", "true", "yes", "on"), True) | dict.fromkeys(
-        ("0", "false", "no", "off"), False
-    )
-    known = words.get(str(value).strip().lower())
-    if known is None:
+    word = str(value).strip().lower()
+    if word not in ("1", "true", "yes", "on", "0", "false", "no", "off"):
         raise ValueError("true or false")
-    return known
+    return word in ("1", "true", "yes", "on")
 
 
 def _text(value: Any) -> str:
@@ -70,14 +67,7 @@ def _text(value: Any) -> str:
     return value
 
 
-def _deformer(value: Any) -> str:
-    if value not in ("mpeg4", "au"):
-        raise ValueError("mpeg4 or au")
-    return str(value)
-
-
 def _ports(value: Any) -> tuple[int, int]:
-    """Two port numbers: BML in, feedback out."""
     port = _number(int, 0, 65535)
     ports = value.replace(",", " ").split() if isinstance(value, str) else value
     if not isinstance(ports, list | tuple) or len(ports) != 2 or port(ports[1]) == 0:
@@ -92,16 +82,13 @@ def _address(value: Any) -> str:
     return f"{host}:{int(port)}"
 
 
-def _session(value: Any) -> str:
-    if not isinstance(value, str) or not re.fullmatch(r"[A-Za-z0-9._~-]{1,64}", value):
-        raise ValueError("1..64 letters, digits or . _ ~ -")
-    return value
+def _matching(pattern: str, wanted: str) -> Callable[[Any], str]:
+    def read(value: Any) -> str:
+        if not isinstance(value, str) or not re.fullmatch(pattern, value):
+            raise ValueError(wanted)
+        return value
 
-
-def _colour(value: Any) -> str:
-    if not isinstance(value, str) or not re.fullmatch(r"#[0-9a-fA-F]{6}|transparent", value):
-        raise ValueError("transparent or a colour such as #d8dde2")
-    return value
+    return read
 
 
 def _path(value: Any) -> Path:
@@ -111,31 +98,28 @@ def _path(value: Any) -> Path:
 
 
 def _folder(value: Any) -> Path:
-    path = _path(value)
-    if not path.is_dir():
-        raise ValueError("a folder that is there")
+    if not (path := _path(value)).is_dir():
+        raise ValueError("an existing folder")
     return path
 
 
 def _file(value: Any) -> Path:
-    path = _path(value)
-    if not path.is_file():
-        raise ValueError("a file that is there")
+    if not (path := _path(value)).is_file():
+        raise ValueError("an existing file")
     return path
 
 
 def _switch_or_file(value: Any) -> str:
-    """ "on", "off", or the name of a file."""
     try:
         return "on" if _flag(value) else "off"
     except ValueError:
         if not isinstance(value, str | Path) or not Path(value).is_file():
-            raise ValueError("on, off, or a file that is there") from None
+            raise ValueError("on, off, or an existing file") from None
         return str(value)
 
 
 def _origins(value: Any) -> tuple[str, ...]:
-    """Addresses of pages, with scheme and without path: in one text, or a list of them."""
+    """Parse origins, which have scheme and host but no path, from a list or a text."""
     origins = value.replace(",", " ").split() if isinstance(value, str) else value
     if not isinstance(origins, list | tuple) or not all(
         origin == "*" or re.fullmatch(r"[a-z][a-z0-9+.-]*://[^/\s]+/?|null", str(origin))
@@ -145,16 +129,9 @@ def _origins(value: Any) -> tuple[str, ...]:
     return tuple(str(origin) for origin in origins)
 
 
-def _token(value: Any) -> str | None:
-    """An empty one is no word: a variable that was left empty by mistake must open no door."""
-    return None if value is None else _text(value)
-
-
-def _key(value: Any) -> str | None:
-    """Return a key itself, or the content of its file: a public key in PEM, or a secret."""
-    if value is None:
-        return None
-    wanted = f"a PEM file that is there, or a secret of at least {SECRET} characters"
+def _key(value: Any) -> str:
+    """Return a public key in PEM or a secret; `value` is the key or its file."""
+    wanted = f"an existing PEM file, or a secret of at least {MIN_SECRET} characters"
     if not isinstance(value, str | Path) or not str(value).strip():
         raise ValueError(wanted)
     text = str(value)
@@ -162,12 +139,12 @@ def _key(value: Any) -> str | None:
         if "-----BEGIN" not in text and Path(text).is_file():
             text = Path(text).read_text("utf-8")
     except OSError:
-        pass  # a secret may be longer than any name
+        pass  # a secret may be longer than a file name can be
     except UnicodeDecodeError:
         raise ValueError(wanted) from None
     text = text.strip()
-    # A misspelt file name must not become a guessable secret.
-    if "-----BEGIN" not in text and (len(text) < SECRET or text.endswith((".pem", ".key", ".pub"))):
+    # A misspelt file name must not become a secret.
+    if "-----BEGIN" not in text and (len(text) < MIN_SECRET or text.endswith((".pem", ".key", ".pub"))):
         raise ValueError(wanted)
     return text
 
@@ -181,23 +158,35 @@ def _word_of(*words: str) -> Callable[[Any], str]:
     return read
 
 
-def _meant(name: str, known: Iterable[str]) -> str | None:
-    """Return the setting that was probably meant, or None."""
+def _closest(name: str, known: Iterable[str]) -> str | None:
+    """Return the setting with the most similar name, or None."""
     from difflib import get_close_matches
 
     return next(iter(get_close_matches(name, known, n=1, cutoff=0.8)), None)
 
 
-def _optional(read: Callable[[Any], T]) -> Callable[[Any], T | None]:
-    return lambda value: None if value is None or value == "" else read(value)
+def _optional(read: Callable[[Any], T], empty: bool = True) -> Callable[[Any], T | None]:
+    return lambda value: None if value is None or (empty and value == "") else read(value)
 
 
-def _setting(default: Any, read: Callable[[Any], Any], says: str, *, secret: bool = False) -> Any:
-    """A field; a secret one is in no message and no `repr`."""
+def _setting(
+    default: Any, read: Callable[[Any], Any], says: str, *, secret: bool = False, empty: bool = True
+) -> Any:
+    """Return a field of the settings.
+
+    Args:
+        default: None also makes None a valid value.
+        read: converts and checks a value; raises ValueError with what was wanted.
+        says: description.
+        secret: keeps the value out of messages and `repr`.
+        empty: whether "" means None for a setting that may be None.
+    """
+    if default is None:
+        read = _optional(read, empty)
     return field(default=default, repr=not secret, metadata={"read": read, "says": says, "secret": secret})
 
 
-# Not pydantic, which the messages of the service use: loading it takes longer than planning a document.
+# Not a pydantic model: importing pydantic takes longer than planning a document.
 @dataclass(frozen=True, kw_only=True)
 class Settings:
     """The settings of a service. `REALIZER_FPS=30` and `fps = 30` in a TOML file mean `--fps 30`.
@@ -207,120 +196,120 @@ class Settings:
     """
 
     host: str = _setting("127.0.0.1", _text, "address to listen on")
-    port: int = _setting(8765, _number(int, 0, 65535), "0 takes a free port")
-    workers: int = _setting(1, _number(int, 1, 64), "processes that serve the port, each its sessions")
+    port: int = _setting(8765, _number(int, 0, 65535), "port; 0: any free one")
+    workers: int = _setting(1, _number(int, 1, 64), "number of processes that share the port")
+    # An empty token must not open the service by mistake.
     token: str | None = _setting(
-        None, _token, "what clients of the WebSocket must bring; none: all may come", secret=True
+        None, _text, "password for WebSocket clients; none: no password", secret=True, empty=False
     )
     jwt_key: str | None = _setting(
         None,
         _key,
-        "a PEM file of a public key, or a secret: clients may bring a JWT that is signed with it; none: no",
+        "key of the JWTs that clients may present: PEM file of a public key, or a secret; none: no JWTs",
         secret=True,
+        empty=False,
     )
-    jwt_audience: str | None = _setting(
-        None, _optional(_text), "what a JWT must be for, its claim aud; none: it must have none"
-    )
-    origins: tuple[str, ...] = _setting(
-        (), _origins, "addresses of pages elsewhere that may open a WebSocket; * is any"
-    )
-    tls_cert: Path | None = _setting(
-        None, _optional(_file), "certificates in PEM, the service's first; none: no TLS"
-    )
-    tls_key: Path | None = _setting(None, _optional(_file), "its key in PEM; none: it is in the same file")
-    log: str = _setting("text", _word_of("text", "json"), "how logs are written to standard error")
+    jwt_audience: str | None = _setting(None, _text, "required claim aud of a JWT; none: it must have none")
+    origins: tuple[str, ...] = _setting((), _origins, "origins of pages that may connect; *: all")
+    tls_cert: Path | None = _setting(None, _file, "certificate chain in PEM; none: no TLS")
+    tls_key: Path | None = _setting(None, _file, "private key in PEM; none: it is in the file tls_cert")
+    log: str = _setting("text", _word_of("text", "json"), "format of log messages")
+    # The URL may contain a password.
     journal: str | None = _setting(
-        None,
-        _optional(_text),
-        "a file, or redis://HOST:PORT/N: sessions with a name outlive the service; none: they do not",
-        secret=True,  # a password may be in it
+        None, _text, "file or redis://HOST:PORT/N that saves named sessions; none: not saved", secret=True
     )
-    record: Path | None = _setting(
-        None,
-        _optional(_path),
-        "a folder to record all sessions in, for `realizer replay`; none: not recorded",
-    )
+    record: Path | None = _setting(None, _path, "folder for recordings of all sessions; none: not recorded")
     asap_ports: tuple[int, int] | None = _setting(
-        None, _optional(_ports), "of Asap's TCP: BML in, feedback to this port of the client; none: no door"
+        None, _ports, "ports of ASAP's TCP: BML in, feedback to this port of the client; none: off"
     )
-    xface_port: int | None = _setting(
-        None, _optional(_number(int, 0, 65535)), "of Xface's TCP: tasks for a player; none: no door"
-    )
+    xface_port: int | None = _setting(None, _number(int, 0, 65535), "port of Xface's TCP; none: off")
     xface_player: str | None = _setting(
-        None, _optional(_address), "HOST:PORT of an Xface player that shows a session; none: no door"
+        None, _address, "HOST:PORT of an Xface player that shows a session; none: off"
     )
-    xface_player_session: str = _setting("xface-player", _session, "which session it shows")
+    xface_player_session: str = _setting(
+        "xface-player",
+        _matching(r"[A-Za-z0-9._~-]{1,64}", "1..64 letters, digits or . _ ~ -"),
+        "session that xface_player shows",
+    )
     xface_player_interval: float = _setting(
-        0.25, _number(float, 0, 60), "seconds from one frame to the next; the player stops at shorter ones"
+        0.25, _number(float, 0, 60), "seconds between frames for xface_player; it stops at shorter ones"
     )
-    stomp: str | None = _setting(None, _optional(_address), "HOST:PORT of a message broker; none: no door")
-    stomp_login: str | None = _setting(None, _optional(_text), "for the broker")
-    stomp_password: str | None = _setting(None, _optional(_text), "for the broker", secret=True)
-    stomp_host: str | None = _setting(None, _optional(_text), 'virtual host; RabbitMQ wants "/"')
+    stomp: str | None = _setting(None, _address, "HOST:PORT of a STOMP broker; none: off")
+    stomp_login: str | None = _setting(None, _text, "login for the broker")
+    stomp_password: str | None = _setting(None, _text, "password for the broker", secret=True)
+    stomp_host: str | None = _setting(None, _text, 'virtual host; "/" for RabbitMQ')
     stomp_json_in: str | None = _setting(
-        "/topic/bmlRequests", _optional(_text), "BML in JSON; none: not read"
+        "/topic/bmlRequests", _optional(_text), "destination of BML in JSON; none: not read"
     )
-    stomp_json_out: str = _setting("/topic/bmlFeedback", _text, "feedback in JSON")
-    stomp_xml_in: str | None = _setting("/topic/asap.bml.request", _optional(_text), "BML; none: not read")
-    stomp_xml_out: str = _setting("/topic/asap.bml.feedback", _text, "feedback")
-    stomp_vhmsg: str | None = _setting("/topic/DEFAULT_SCOPE", _optional(_text), "VHMSG; none: not read")
-    face: str = _setting("default", _text, "of characters that name none")
+    stomp_json_out: str = _setting("/topic/bmlFeedback", _text, "destination of feedback in JSON")
+    stomp_xml_in: str | None = _setting(
+        "/topic/asap.bml.request", _optional(_text), "destination of BML; none: not read"
+    )
+    stomp_xml_out: str = _setting("/topic/asap.bml.feedback", _text, "destination of feedback")
+    stomp_vhmsg: str | None = _setting(
+        "/topic/DEFAULT_SCOPE", _optional(_text), "destination of VHMSG; none: not read"
+    )
+    face: str = _setting("default", _text, "default face of characters")
     deformer: str | None = _setting(
-        None, _optional(_deformer), "what moves faces: mpeg4 or au; none: as each face says"
+        None, _word_of("mpeg4", "au"), "what moves faces: mpeg4 or au; none: each face's own choice"
     )
-    voice: str | None = _setting(None, _optional(_text), "none: espeak-ng where installed, else silent")
-    language: str = _setting("en-US", _text, "BCP-47, of speech that names none")
-    camera: str = _setting("front", _text, "of pictures that name none")
-    light: str | None = _setting(None, _optional(_text), "of pictures that name none; none: portrait")
+    voice: str | None = _setting(None, _text, "default voice; none: espeak-ng if installed, else silent")
+    language: str = _setting("en-US", _text, "BCP-47 tag of speech without xml:lang")
+    camera: str = _setting("front", _text, "default camera of pictures")
+    light: str | None = _setting(None, _text, "default light of pictures; none: portrait")
     background: str | None = _setting(
-        None, _optional(_colour), "of pictures that name none; none: the light's own"
+        None,
+        _matching(r"#[0-9a-fA-F]{6}|transparent", "transparent or a colour such as #d8dde2"),
+        "default background of pictures; none: the light's own",
     )
-    fps: float = _setting(25.0, _number(float, 0.01, 240), "frames a second of streams that name no rate")
-    scene: Path | None = _setting(None, _optional(_path), "a file of targets every session starts with")
-    media: Path | None = _setting(None, _optional(_folder), "the folder of the files that documents may name")
+    fps: float = _setting(25.0, _number(float, 0.01, 240), "default frames per second of streams")
+    scene: Path | None = _setting(None, _path, "file of targets for all sessions")
+    media: Path | None = _setting(None, _folder, "folder of the files that documents may refer to")
     expressions: Path | None = _setting(
-        None, _optional(_folder), "a folder of expressions of one's own; none: those that ship"
+        None, _folder, "folder of a user's expressions; none: only built-in ones"
     )
-    seed: int = _setting(0, _number(int, -(2**63), 2**63 - 1), "of idle motion")
+    seed: int = _setting(0, _number(int, -(2**63), 2**63 - 1), "seed of idle motion")
     idle: bool = _setting(True, _flag, "blinks and small head motion")
-    cooccurrence: str = _setting("on", _switch_or_file, "rules of AUs together: on, off, or a file of them")
-    prosody: bool = _setting(True, _flag, "nods, brows, blinks and looks that go with speech: on or off")
-    mapping: Path | None = _setting(
-        None, _optional(_file), "a file of what AUs ask of FAPs; none: as each face"
+    cooccurrence: str = _setting(
+        "on", _switch_or_file, "rules for AUs that no face shows together: on, off, or a file"
     )
-    keep: float = _setting(60.0, _number(float, 0, 1e9), "seconds a named session outlives its connections")
-    drain: float = _setting(5.0, _number(float, 0, 3600), "seconds given to what plays when the service ends")
+    prosody: bool = _setting(True, _flag, "nods, brows, blinks and glances that accompany speech: on or off")
+    mapping: Path | None = _setting(None, _file, "file that maps AUs to FAPs; none: each face's own mapping")
+    keep: float = _setting(
+        60.0, _number(float, 0, 1e9), "seconds that a named session lives after its last connection"
+    )
+    drain: float = _setting(
+        5.0, _number(float, 0, 3600), "seconds that blocks may go on playing when the service stops"
+    )
     max_message: int = _setting(16 * 2**20, _number(int, 1, 2**31), "bytes of one WebSocket message")
     max_document: int = _setting(2**20, _number(int, 1, 2**31), "bytes of BML in one message")
     max_elements: int = _setting(100_000, _number(int, 1, 10**7), "XML elements in one message")
     max_behaviours: int = _setting(10_000, _number(int, 1, 10**6), "behaviours in one block")
-    max_duration: float = _setting(
-        1_800.0, _number(float, 1, 1e9), "seconds that one block is planned to last, from its start"
-    )
+    max_duration: float = _setting(1_800.0, _number(float, 1, 1e9), "planned duration of a block in seconds")
     max_blocks: int = _setting(
         1_000,
         _number(int, 1, 10**6),
-        "blocks playing or waiting in one session, and messages that wait with more",
+        "blocks that play or wait in one session, and messages that wait with further blocks",
     )
     max_connections: int = _setting(
-        2_000, _number(int, 1, 10**6), "connections open from one address, at each door"
+        2_000, _number(int, 1, 10**6), "open connections per address, at each transport"
     )
-    max_sessions: int = _setting(5_000, _number(int, 1, 10**6), "sessions of the service, in each worker")
+    max_sessions: int = _setting(5_000, _number(int, 1, 10**6), "sessions of each worker")
     max_address_sessions: int = _setting(
-        2_000, _number(int, 1, 10**6), "sessions that one address has opened and that still live"
+        2_000, _number(int, 1, 10**6), "live sessions that one address has opened"
     )
     max_size: int = _setting(2048, _number(int, 16, 16384), "pixels of a picture's longer side")
     max_pixels: float = _setting(
-        125e6, _number(float, 256, 1e12), "pixels a second of the pictures of one session: 1920x1080 at 60"
+        125e6, _number(float, 256, 1e12), "pixels per second of all pictures of a session: 1920x1080 at 60"
     )
     max_speech: int = _setting(20_000, _number(int, 1, 10**7), "characters of one speech in a document")
     max_rate: float = _setting(
-        500.0, _number(float, 0.1, 1e6), "messages a second that are read from one connection"
+        500.0, _number(float, 0.1, 1e6), "messages per second that are read from one connection"
     )
     max_memory: int | None = _setting(
         None,
-        _optional(_number(int, 64, 10**7)),
-        "MB of the process above which no session is opened any more; none: no limit",
+        _number(int, 64, 10**7),
+        "MB of the process above which no session is opened; none: no limit",
     )
 
     def __post_init__(self) -> None:
@@ -335,23 +324,23 @@ class Settings:
             raise SettingsError("setting tls_key: wanted tls_cert too, got none")
         if self.tls_cert is not None and self.workers > 1:
             raise SettingsError(
-                f"setting tls_cert: wanted workers = 1, got {self.workers}: what hands connections to "
-                "several workers reads their first line; let a proxy in front speak TLS"
+                f"setting tls_cert: wanted workers = 1, got {self.workers}: connections are distributed to "
+                "workers by their first line; use TLS in a proxy in front of the service"
             )
-        open_doors = [name for name in ("asap_ports", "xface_port") if getattr(self, name) is not None]
+        unprotected = [name for name in ("asap_ports", "xface_port") if getattr(self, name) is not None]
         if self.jwt_audience is not None and self.jwt_key is None:
             raise SettingsError("setting jwt_audience: wanted jwt_key too, got none")
-        if (self.token or self.jwt_key) and open_doors and self.host not in ("127.0.0.1", "localhost", "::1"):
+        if (
+            (self.token or self.jwt_key)
+            and unprotected
+            and self.host not in ("127.0.0.1", "localhost", "::1")
+        ):
             raise SettingsError(
-                f"setting {open_doors[0]}: wanted none, or host 127.0.0.1: its clients cannot bring the token"
+                f"setting {unprotected[0]}: wanted none, or host 127.0.0.1: its clients cannot send the token"
             )
 
     def play_options(self, scene: Mapping[str, tuple[float, float, float]] | None = None) -> PlayOptions:
-        """Return how documents are played.
-
-        Args:
-            scene: what is in the file `scene`.
-        """
+        """Return the options for playing; `scene` is the content of the file `self.scene`."""
         names = (f.name for f in fields(PlayOptions) if f.name != "scene")
         return PlayOptions(**{name: getattr(self, name) for name in names}, scene=scene)
 
@@ -363,12 +352,12 @@ class Settings:
         file: Path | None = None,
         environment: Mapping[str, str] | None = None,
     ) -> Settings:
-        """Settings from all three sources.
+        """Return the settings from all three sources.
 
         Args:
-            flags: values of the command line; None values are ignored.
-            file: a TOML file; None for none.
-            environment: variables; None for the process's own.
+            flags: options of the command line, None if not set.
+            file: TOML file.
+            environment: variables; None: those of the process.
 
         Raises:
             SettingsError: an unknown name or a wrong value.
@@ -387,16 +376,16 @@ class Settings:
                 setting = name.removeprefix(PREFIX).lower()
                 if setting in known:
                     values[setting], sources[setting] = value, name
-                elif meant := _meant(setting, known):
-                    # A misspelt protection would leave the service open.
-                    raise SettingsError(f"variable {name}: wanted {PREFIX}{meant.upper()}?")
+                elif closest := _closest(setting, known):
+                    # A misspelt REALIZER_TOKEN would leave the service open.
+                    raise SettingsError(f"variable {name}: wanted {PREFIX}{closest.upper()}?")
         if unknown := sorted(values.keys() - known):
-            wanted = _meant(unknown[0], known) or f"one of {', '.join(sorted(known))}"
+            wanted = _closest(unknown[0], known) or f"one of {', '.join(sorted(known))}"
             raise SettingsError(f"setting {unknown[0]}: wanted {wanted} ({file})")
-        told = {name: value for name, value in (flags or {}).items() if value is not None}
+        given = {name: value for name, value in (flags or {}).items() if value is not None}
         try:
-            return cls(**values | told)
+            return cls(**values | given)
         except SettingsError as error:
-            if error.setting in told or error.setting not in sources:
+            if error.setting in given or error.setting not in sources:
                 raise
             raise SettingsError(f"{error} ({sources[error.setting]})", error.setting) from None

@@ -1,1 +1,1 @@
-"""Emotions: words and places on the wheel, and the FAP profiles that show them."""
+"""Emotions: words and places on the emotion wheel, and the FAP profiles that show them."""

@@ -15,14 +15,14 @@ SETS: tuple[ProfileSet, ...] = ("own", "published", "raw")
 
 @cache
 def archetypes(profiles: str = "own") -> Mapping[str, Mapping[int, Profile]]:
-    """Emotion -> number -> profile.
+    """Return emotion -> number -> profile.
 
     Args:
-        profiles: "own"; "published", which are those of Raouzaiou et al. 2002, table 5, corrected; "raw", as
-            they are printed.
+        profiles: "own"; "published", those of Raouzaiou et al. 2002, table 5, corrected; or "raw", as
+            printed.
 
     Raises:
-        ValueError: another set.
+        ValueError: an unknown set.
     """
     if profiles not in SETS:
         raise ValueError(f"profiles: wanted {', '.join(SETS)}, got {profiles!r}")
@@ -33,7 +33,7 @@ def archetypes(profiles: str = "own") -> Mapping[str, Mapping[int, Profile]]:
     else:
         for row in published_ranges():
             low, high = (row.raw_low, row.raw_high) if profiles == "raw" else (row.low, row.high)
-            # A range that is printed backwards is reversed.
+            # Some ranges are printed backwards.
             ranges.setdefault((row.emotion, row.profile), {})[row.fap] = min(low, high), max(low, high)
     found: dict[str, dict[int, Profile]] = {}
     for (emotion, number), faps in ranges.items():

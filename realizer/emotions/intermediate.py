@@ -17,37 +17,37 @@ class Anchor(NamedTuple):
 
 
 def same_category(archetype: Profile, own: float, activation: float, name: str = "") -> Profile:
-    """The archetype's FAPs, as far as the activations are to each other (4.1, rules 1 to 3).
+    """Return the archetype's profile, scaled by the ratio of the activations (4.1, rules 1 to 3).
 
     Args:
-        own: the activation of the archetype's word, above 0.
-        activation: that of the intermediate emotion's.
+        own: activation of the archetype's word, above 0.
+        activation: activation of the intermediate emotion.
 
     Raises:
-        ValueError: an activation that is not a number, or below 0.
+        ValueError: an activation below 0, or not a number.
     """
     _check(own, activation)
     return archetype.scaled(activation / own, name)
 
 
 def between(one: Anchor, two: Anchor, angle: float, activation: float, name: str = "") -> Profile:
-    """The profile of an emotion between two archetypes, by the published rules (4.2, rules 1 to 6).
+    """Return the profile of an emotion between two archetypes, by the published rules (4.2, rules 1 to 6).
 
-    The nearer archetype weighs more, as in the paper's own example (eq. 13); its eq. 5 and 6 have the weights
-    exchanged. The rules are not continuous; `wheel` is.
+    The nearer archetype has the larger weight, as in the example of the paper (eq. 13); eq. 5 and 6 have the
+    weights exchanged. The result is not continuous in the angle; that of `wheel` is.
 
     Args:
-        one, two: counted in the sense of rising angles, over 0 if need be.
+        one, two: archetypes in the direction of rising angles, across 0 if necessary.
         angle: degrees, from one to two.
-        activation: that of the intermediate emotion's word.
+        activation: activation of the intermediate emotion.
 
     Raises:
-        ValueError: an angle that does not lie between, or an activation that is no number.
+        ValueError: an angle that is not between them, or an invalid activation.
     """
     _check(one.activation, activation)
     _check(two.activation, activation)
     width = (two.angle - one.angle) % 360.0
-    share = ((angle - one.angle) % 360.0) / width if width else math.inf  # how much of `two`
+    share = ((angle - one.angle) % 360.0) / width if width else math.inf  # weight of `two`
     if not share <= 1.0:
         raise ValueError(f"angle: wanted one from {one.angle:g} to {two.angle:g} degrees, got {angle:g}")
     first = one.profile.scaled(activation / one.activation).ranges
@@ -57,11 +57,11 @@ def between(one: Anchor, two: Anchor, angle: float, activation: float, name: str
         if fap not in first or fap not in second:  # rule 4: averaged with the neutral face
             low, high = first[fap] if fap in first else second[fap]
             ranges[fap] = low / 2, high / 2
-        elif sum(first[fap]) * sum(second[fap]) >= 0:  # rule 2: the middles have the same direction
-            # Weighing middles and lengths is weighing both ends.
+        elif sum(first[fap]) * sum(second[fap]) >= 0:  # rule 2: the same direction
+            # Interpolating middles and lengths is the same as interpolating both ends.
             low, high = ((1 - share) * a + share * b for a, b in zip(first[fap], second[fap], strict=True))
             ranges[fap] = low, high
-        else:  # rule 3: what both agree on, mostly nothing
+        else:  # rule 3: the intersection, which is mostly empty
             low, high = max(first[fap][0], second[fap][0]), min(first[fap][1], second[fap][1])
             if low <= high:
                 ranges[fap] = low, high

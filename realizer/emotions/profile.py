@@ -1,4 +1,4 @@
-"""The profile value: an expression as ranges of FAPs."""
+"""Profiles: expressions as ranges of FAPs."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from realizer import tables
 from realizer.core.array_types import Float32
 
 RANGE = re.compile(r"\s*F(\d+)\s*\[\s*([^,\[\]]+),([^,\[\]]+)\]\s*")
-OUTER = 47  # the FAP of a point of the outer lips is that of the inner one + 47 (ISO/IEC 14496-2 annex C)
+OUTER = 47  # difference between FAPs of the outer and the inner lips (ISO/IEC 14496-2 annex C)
 
 
 @dataclass(frozen=True)
 class Profile:
-    """The FAPs that an expression moves, and how far (Raouzaiou et al. 2002, section 2).
+    """The ranges of the FAPs that an expression moves (Raouzaiou et al. 2002, section 2).
 
     Attributes:
-        name: such as "fear 8".
-        source: "own", "published", "raw", or how it was made.
-        ranges: {FAP 3..68: (low, high)} in the FAP's FAPU, rising FAPs.
+        name: name such as "fear 8".
+        source: "own", "published", "raw", or another source.
+        ranges: FAP 3..68 -> (low, high) in FAPU, sorted by FAP.
 
     Raises:
-        ValueError: no FAP, not a number, or low above high.
+        ValueError: an invalid FAP or range.
     """
 
     name: str
@@ -47,17 +47,17 @@ class Profile:
         return hash((self.name, self.source, tuple(self.ranges.items())))
 
     def __str__(self) -> str:
-        """As Paul 2010, figure 6.5 writes it: F3 [400, 560], F5 [-240, -160]."""
+        """Return the notation of Paul 2010, figure 6.5: F3 [400, 560], F5 [-240, -160]."""
         return ", ".join(
             f"F{fap} [{_plain(low)}, {_plain(high)}]" for fap, (low, high) in self.ranges.items()
         )
 
     @classmethod
     def parse(cls, text: str, name: str = "profile", source: str = "text") -> Profile:
-        """The profile of such a text; ranges that are written backwards are turned round.
+        """Parse such a text; the ends of a range may be in any order.
 
         Raises:
-            ValueError: an invalid range, or a FAP twice; with the place in the text.
+            ValueError: an invalid range or a repeated FAP, with its place in the text.
         """
         ranges: dict[int, tuple[float, float]] = {}
         place = 0
@@ -82,39 +82,39 @@ class Profile:
         return cls(name, source, ranges)
 
     def midpoint(self) -> dict[int, float]:
-        """FAP -> the middle of its range."""
+        """Return FAP -> middle of its range."""
         return {fap: (low + high) / 2 for fap, (low, high) in self.ranges.items()}
 
     def frame(self) -> Float32:
-        """(68,) the middle of each range, column = FAP - 1; 0 elsewhere."""
+        """Return the middle of each range, (68,) with column = FAP - 1, and 0 for other FAPs."""
         return _frame(self.midpoint())
 
     def draw(self, seed: int | np.random.Generator) -> Float32:
-        """(68,) a place in each range, so that one expression does not look twice alike.
+        """Return a random value in each range, (68,), so that expressions vary.
 
-        Both sides of the face, and the inner and the outer point of a lip, go equally far into their ranges:
-        otherwise the face would tear.
+        Both sides of the face, and the inner and outer points of a lip, have values at the same place of
+        their ranges, to keep the face whole.
         """
-        chance = np.random.default_rng(seed)
+        rng = np.random.default_rng(seed)
         parts: dict[int, float] = {}
         values = {}
         for fap, (low, high) in self.ranges.items():
-            one = _one_of(fap)
-            if one not in parts:
-                parts[one] = float(chance.uniform())
-            values[fap] = low + (high - low) * parts[one]
+            group = _group(fap)
+            if group not in parts:
+                parts[group] = float(rng.uniform())
+            values[fap] = low + (high - low) * parts[group]
         return _frame(values)
 
     def scaled(self, factor: float, name: str | None = None) -> Profile:
-        """Every range times `factor`, 0 or more."""
+        """Return the profile with every range multiplied by `factor`, 0 or more."""
         if not (math.isfinite(factor) and factor >= 0):
             raise ValueError(f"{self.name}: wanted a factor of 0 or more, got {factor}")
         ranges = {fap: (low * factor, high * factor) for fap, (low, high) in self.ranges.items()}
         return Profile(name or self.name, self.source, ranges)
 
 
-def _one_of(fap: int) -> int:
-    """Return the FAPs that belong together: this one, its mirror image, and their inner lip points."""
+def _group(fap: int) -> int:
+    """Return the number of a group of FAPs: mirror images, and inner and outer points of a lip."""
     inner = fap - OUTER if 4 <= fap - OUTER <= 13 else fap
     return min(inner, tables.faps()[inner - 1].mirror)
 
@@ -127,4 +127,4 @@ def _frame(values: Mapping[int, float]) -> Float32:
 
 
 def _plain(value: float) -> str:
-    return f"{round(value, 3) + 0.0:.7g}"  # + 0.0: no minus before a zero
+    return f"{round(value, 3) + 0.0:.7g}"  # + 0.0 turns -0.0 into 0.0

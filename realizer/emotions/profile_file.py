@@ -1,4 +1,4 @@
-"""Paul's file format for profiles (2010, 6.3): reader and writer."""
+"""Reader and writer for profile files in the format of Paul (2010, 6.3)."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from realizer.emotions.profile import Profile
 
 
 def read_profiles(text: str, where: str = "profiles") -> tuple[Profile, ...]:
-    """The profiles of a file: a line with an emotion and a number, then a line of ranges, and so on.
+    """Parse the profiles of a file: each is a line with an emotion and a number, and a line of ranges.
 
-    Empty lines, and those that begin with #, do not count.
+    Empty lines and lines that begin with # are ignored.
 
     Args:
-        where: the name of the file in messages.
+        where: name of the file in messages.
 
     Raises:
-        ValueError: a label without a number, a label twice, or an invalid range; with the line.
+        ValueError: an invalid line; the text names it.
     """
     found: dict[str, Profile] = {}
     label = ""

@@ -18,22 +18,21 @@ NEUTRAL = "neutral"
 def wheel(
     angle: float, activation: float | None = None, profiles: str = "own", ring: str = "paul"
 ) -> Profile:
-    """Return the profile at a place on the wheel: a mix of the archetypes on both sides, by nearness.
+    """Return the profile at a place on the wheel: a blend of the two nearest archetypes.
 
-    Each range is that of an archetype times the activation over the archetype's own, and times its share;
-    a FAP that only one of them moves counts by its share too, and those in which the two contradict each
-    other are added up. The published rules (`intermediate.between`) have a constant half for the first and
-    an intersection for the second, which make the face jump at the archetypes and beside them.
+    The ranges of each archetype are multiplied by its weight and by the ratio of the activations, and added.
+    Unlike the published rules (`intermediate.between`), this is continuous: they take half of a FAP that only
+    one archetype moves, and intersect contradicting ranges.
 
     Args:
-        angle: degrees, any turn: -700 is 20.
-        activation: 0, the middle, which is neutral, to 7, the rim; None as for the archetypes.
-        profiles: "own", whose archetypes are at the rim, "published" or "raw", at their activations.
-        ring: "paul", with trust at 0, fear at 45 and so on, "plutchik", with the angles of Plutchik's words,
-            or "affect", by the angle of (valence, arousal).
+        angle: degrees, modulo 360.
+        activation: from 0 (neutral) to 7 (the rim); None: that of the archetypes.
+        profiles: "own", with archetypes at the rim, or "published" or "raw", with those of the paper.
+        ring: "paul", with trust at 0 and fear at 45; "plutchik", with the angles of Plutchik's words; or
+            "affect", with the angles of (valence, arousal).
 
     Raises:
-        ValueError: an angle that is no number, an activation off the wheel, another ring or set.
+        ValueError: an invalid angle or activation, or an unknown ring or set.
 
     Source: Paul 2010, chapter 6; Raouzaiou et al. 2002, 4.
     """
@@ -52,10 +51,10 @@ def wheel(
 
 
 def strength_at(activation: float | None) -> float:
-    """Return the strength of our own archetypes at an activation: 0 in the middle, 1 at the rim (None).
+    """Return the strength of our own archetypes at an activation: 0 in the middle, 1 at the rim (or None).
 
     Raises:
-        ValueError: an activation off the wheel.
+        ValueError: an activation outside the wheel.
     """
     most = emotion_model().most
     if activation is None:
@@ -66,7 +65,7 @@ def strength_at(activation: float | None) -> float:
 
 
 def blend_weights(angle: float, profiles: str = "own", ring: str = "paul") -> dict[str, float]:
-    """Archetype -> how much of it shows at that angle; the one or two shares add up to 1."""
+    """Return archetype -> weight of the one or two archetypes at an angle; weights add up to 1."""
     pairs = neighbours(angle, profiles, ring)
     return {_plain(anchor.profile.name): share for anchor, share in pairs if share}
 
@@ -74,25 +73,24 @@ def blend_weights(angle: float, profiles: str = "own", ring: str = "paul") -> di
 def affect(valence: float, arousal: float, profiles: str = "own") -> Profile:
     """Return the profile at a place in the plane of valence and arousal (the extension of Paul 2010, 8.2).
 
-    There is no one-to-one relation between valence and the angle of Plutchik's wheel, so this has a ring of
-    its own: each archetype stands where Whissell's evaluation and activation of its word put it, and shows
-    the more the farther a place is from the middle; beyond the circle it is as at its rim.
+    Plutchik's angles do not correspond to valence, so archetypes are placed by Whissell's evaluation and
+    activation of their words. The strength is proportional to the distance from the middle, up to 1.
 
     Args:
-        valence, arousal: -1..1; 0 and 0 is the neutral face.
+        valence, arousal: -1..1; (0, 0) is the neutral face.
 
     Raises:
-        ValueError: not numbers in that range.
+        ValueError: numbers outside that range.
     """
     angle, away = place_of_affect(valence, arousal)
     return wheel(angle, None, profiles, "affect").scaled(away)
 
 
 def place_of_affect(valence: float, arousal: float) -> tuple[float, float]:
-    """Degrees on the ring "affect", and how far from the middle: 0..1.
+    """Return the angle on the ring "affect", in degrees, and the distance from the middle, 0..1.
 
     Raises:
-        ValueError: not numbers in -1..1.
+        ValueError: numbers outside -1..1.
     """
     for name, value in (("valence", valence), ("arousal", arousal)):
         if not -1 <= value <= 1:
@@ -101,11 +99,11 @@ def place_of_affect(valence: float, arousal: float) -> tuple[float, float]:
 
 
 def neighbours(angle: float, profiles: str, ring: str) -> tuple[tuple[Anchor, float], tuple[Anchor, float]]:
-    """The archetype at or before an angle and the one after it, each with its share."""
+    """Return the archetype at or before an angle and the one after it, with their weights."""
     if not math.isfinite(angle):
         raise ValueError(f"angle: wanted a number of degrees, got {angle}")
     anchors, angles = _anchors(profiles, ring)
-    angle %= 360.0  # before anything is taken from it: of a huge angle, a few degrees would be lost
+    angle %= 360.0  # first, since a difference of huge angles would be inexact
     after = bisect_right(angles, angle) % len(anchors)
     low, high = anchors[after - 1], anchors[after]
     share = ((angle - low.angle) % 360.0) / ((high.angle - low.angle) % 360.0)
@@ -113,13 +111,13 @@ def neighbours(angle: float, profiles: str, ring: str) -> tuple[tuple[Anchor, fl
 
 
 def _plain(name: str) -> str:
-    """The name of a profile without its number."""
+    """Return the name of a profile without its number."""
     return name.rpartition(" ")[0] or name
 
 
 @cache
 def _anchors(profiles: str, ring: str) -> tuple[tuple[Anchor, ...], tuple[float, ...]]:
-    """Return the emotions of a ring that have a profile in the set, by rising angle, and the angles."""
+    """Return the emotions of a ring that have a profile in the set, by angle, and their angles."""
     model, known = emotion_model(), archetypes(profiles)
     if not places(ring):
         raise ValueError(f"ring: wanted paul, plutchik or affect, got {ring!r}")

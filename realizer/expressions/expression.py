@@ -15,17 +15,17 @@ LETTERS = {"LEFT": "L", "RIGHT": "R", "BOTH": ""}
 
 @dataclass(frozen=True, slots=True)
 class Expression:
-    """A shape that a face takes, with a name of its own (Wojdel 2005, 5.4.1).
+    """A named facial expression (Wojdel 2005, 5.4.1).
 
     Attributes:
-        name: as written: "template:surprise", "SMILE".
-        features: the visible features, in words.
+        name: name as written, such as "template:surprise" or "SMILE".
+        features: description of the visible features.
         means: words and phrases for searching.
         aus: (AU, side LEFT | RIGHT | BOTH) -> intensity 0..1 at intensity 1.
-        gaps: onset, apex and offset, each with its source; seconds.
-        possible, probable: seconds for which people showed it, (least, most); None if unknown.
+        gaps: onset, apex and offset, in seconds.
+        possible, probable: least and most seconds for which people show it; None if unknown.
         source: where the expression comes from.
-        file: of a user's expression; None for a built-in one.
+        file: file of a user's expression; None for a built-in one.
     """
 
     name: str
@@ -40,39 +40,39 @@ class Expression:
 
     @property
     def onset(self) -> float:
-        """Seconds that it takes to rise."""
+        """Seconds of the onset."""
         return self.gaps[0].preferred
 
     @property
     def apex(self) -> float:
-        """Seconds that it stays."""
+        """Seconds of the apex."""
         return self.gaps[1].preferred
 
     @property
     def offset(self) -> float:
-        """Seconds that it takes to go."""
+        """Seconds of the offset."""
         return self.gaps[2].preferred
 
     @property
     def duration(self) -> float:
-        """Seconds from the first to the last of it."""
+        """Seconds from the start of the onset to the end of the offset."""
         return self.onset + self.apex + self.offset
 
     @property
     def visible_duration(self) -> float:
-        """Seconds for which it can be seen: the apex, and half of rising and going."""
+        """Seconds for which it is visible: the apex, and half of onset and offset."""
         return self.onset / 2 + self.apex + self.offset / 2
 
     @property
     def units(self) -> str:
-        """Its action units as FACS writes sums of them: "1+2+12L"."""
+        """The action units in the notation of FACS: "1+2+12L"."""
         return "+".join(f"{au}{LETTERS[side]}" for au, side in self.aus)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data; a range without an end has null there."""
+        """Return the expression as JSON; a range without an end has null there."""
 
-        def ends(of: tuple[float, float] | None) -> list[float | None] | None:
-            return None if of is None else [end if end < float("inf") else None for end in of]
+        def bounds(ends: tuple[float, float] | None) -> list[float | None] | None:
+            return None if ends is None else [end if end < float("inf") else None for end in ends]
 
         return {
             "name": self.name,
@@ -83,13 +83,13 @@ class Expression:
                 name: {"seconds": round(gap.preferred, 4), "source": gap.source}
                 for name, gap in zip(("onset", "apex", "offset"), self.gaps, strict=True)
             },
-            "possible": ends(self.possible),
-            "probable": ends(self.probable),
+            "possible": bounds(self.possible),
+            "probable": bounds(self.probable),
             "source": self.source,
             "file": None if self.file is None else str(self.file),
         }
 
 
 def key(name: str) -> str:
-    """Return the key of a name: case and separators do not count."""
+    """Return the key of a name, which ignores case and separators."""
     return re.sub(r"[\s_-]+", "_", re.sub(r"\s*:\s*", ":", name.strip())).upper()

@@ -21,44 +21,44 @@ log = logging.getLogger(__name__)
 
 
 class Library(Mapping[str, Expression]):
-    """Expressions by name, however it is spelt; of two with one name the later counts.
+    """Expressions by name, in any spelling; a later expression replaces one of the same name.
 
     Attributes:
-        notes: which took the place of which.
+        notes: messages about replaced expressions.
     """
 
     def __init__(self, expressions: Iterable[Expression]) -> None:
         self._known: dict[str, Expression] = {}
         notes = []
-        for one in expressions:
-            before = self._known.get(key(one.name))
-            if before is not None:
-                notes.append(f"{one.file}: {one.name} takes the place of the shipped {before.name}")
-            self._known[key(one.name)] = one
+        for expression in expressions:
+            replaced = self._known.get(key(expression.name))
+            if replaced is not None:
+                notes.append(f"{expression.file}: {expression.name} replaces the built-in {replaced.name}")
+            self._known[key(expression.name)] = expression
         self.notes = tuple(notes)
-        self._as_written = {one.name: one for one in self._known.values()}
+        self._as_written = {expression.name: expression for expression in self._known.values()}
 
     def __getitem__(self, name: str) -> Expression:
-        # Nearly always the exact spelling.
+        # Spellings are nearly always exact.
         return self._as_written.get(name) or self._known[key(name)]
 
     def __iter__(self) -> Iterator[str]:
-        return (one.name for one in self._known.values())
+        return iter(self._as_written)
 
     def __len__(self) -> int:
         return len(self._known)
 
     def near(self, name: str) -> list[str]:
-        """Names that are nearly this one, the nearest first; at most three."""
+        """Return up to three similar names, the most similar first."""
         parts: dict[str, list[str]] = {}
-        for spelt, one in self._known.items():
-            for part in {spelt, spelt.rpartition(":")[2]}:
-                parts.setdefault(part, []).append(one.name)
+        for spelling, expression in self._known.items():
+            for part in {spelling, spelling.rpartition(":")[2]}:
+                parts.setdefault(part, []).append(expression.name)
         found = difflib.get_close_matches(key(name)[:100], parts, n=3)
         return list(dict.fromkeys(name for part in found for name in parts[part]))[:3]
 
     def unknown(self, name: str) -> str:
-        """Return the message for an unknown name."""
+        """Return the error message for an unknown name."""
         near = self.near(name)
         hint = f", did you mean {' or '.join(near)}?" if near else ""
         return f"wanted a name of `realizer expressions list`, got {name[:60]!r}{hint}"
@@ -66,19 +66,15 @@ class Library(Mapping[str, Expression]):
 
 @cache
 def builtin() -> Library:
-    """The twelve templates of Wojdel, as "template:...", and every face lexeme.
-
-    Raises:
-        TableError: one of their tables is damaged.
-    """
+    """Return the face lexemes, and the templates of Wojdel as "template:..."."""
     return Library([*map(_of_lexeme, face_lexemes()), *map(_of_template, templates().values())])
 
 
 def library_of(folder: Path | None = None) -> Library:
-    """Return the library: a user's expressions before the built-in ones. A folder is read once.
+    """Return the built-in expressions, replaced and extended by those of a user's folder, which is read once.
 
     Raises:
-        TableError: files that are no expressions; every fault, with file and key.
+        TableError: invalid files; the text has a line for each fault, with file and key.
     """
     return builtin() if folder is None else _with_own(folder.resolve())
 
@@ -92,7 +88,7 @@ def _with_own(folder: Path) -> Library:
     for note in library.notes:
         log.warning(note)
     if not own:
-        log.warning("%s: wanted expressions, a .toml file each, found none", folder)
+        log.warning("%s: wanted expressions, one .toml file each, found none", folder)
     return library
 
 
@@ -110,7 +106,7 @@ def _of_lexeme(name: str) -> Expression:
 
 
 def _of_template(template: Template) -> Expression:
-    """Return the apex: the average within its probable range, less half of onset and offset."""
+    """Return the expression of a template; its visible time is the average, within the probable range."""
     onset, hold, offset = gaps("face").gaps
     evident = template.evident
     if template.probable is not None:

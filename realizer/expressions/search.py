@@ -11,133 +11,78 @@ import numpy as np
 from realizer.expressions.expression import Expression
 from realizer.tables import by_number
 
-# Weight of a matching word, by where it is found.
-NAMED, MEANT, SEEN, NEARLY = 3.0, 2.0, 1.0, 0.5
-LITTLE = frozenset(
-    [
-        "a",
-        "about",
-        "am",
-        "an",
-        "and",
-        "are",
-        "at",
-        "be",
-        "do",
-        "don",
-        "i",
-        "in",
-        "is",
-        "it",
-        "me",
-        "my",
-        "not",
-        "of",
-        "on",
-        "or",
-        "s",
-        "so",
-        "t",
-        "that",
-        "the",
-        "this",
-        "to",
-        "very",
-        "was",
-        "with",
-        "you",
-    ]
-)
-# Endings, the longest first, that a word may lose without meaning another thing.
+# Weights of a word in the name, meanings or features of an expression, and of a similar word.
+NAME, MEANING, FEATURE, SIMILAR = 3.0, 2.0, 1.0, 0.5
+STOP_WORDS = {
+    "a", "about", "am", "an", "and", "are", "at", "be", "do", "don", "i", "in", "is", "it", "me", "my",
+    "not", "of", "on", "or", "s", "so", "t", "that", "the", "this", "to", "very", "was", "with", "you",
+}  # fmt: skip
+# Endings that do not change the meaning of a word, the longest first.
 ENDINGS = (
-    "liness",
-    "fully",
-    "ingly",
-    "iness",
-    "ness",
-    "ment",
-    "ings",
-    "tion",
-    "sion",
-    "ance",
-    "able",
-    "ful",
-    "ing",
-    "ied",
-    "ies",
-    "ily",
-    "est",
-    "ial",
-    "ed",
-    "er",
-    "es",
-    "al",
-    "ly",
-    "y",
-    "e",
-    "s",
-)
-LEAST = 3  # letters of a stem
+    "liness", "fully", "ingly", "iness", "ness", "ment", "ings", "tion", "sion", "ance", "able", "ful",
+    "ing", "ied", "ies", "ily", "est", "ial", "ed", "er", "es", "al", "ly", "y", "e", "s",
+)  # fmt: skip
+MIN_STEM = 3  # letters
 
 
 def by_meaning(text: str, expressions: Iterable[Expression]) -> list[tuple[Expression, float]]:
-    """Return expressions that share words with a text, in name, meaning or features, by number of words.
+    """Return expressions that share words with a text in their name, meanings or features.
 
     Returns:
-        (expression, score): 1 where every word of the text is in its name; sorted, none with 0.
+        (expression, score above 0), best first; the score is 1 if the name contains all words of the text.
     """
-    asked = [word for word in _words(text) if word not in LITTLE] or _words(text)
-    found = []
-    for one in expressions:
+    query = [word for word in _words(text) if word not in STOP_WORDS] or _words(text)
+    matches = []
+    for expression in expressions:
         name, means, features = (
-            {stem(word) for word in _words(part)} - LITTLE
-            for part in (one.name, " ".join(one.means), one.features)
+            {stem(word) for word in _words(part)} - STOP_WORDS
+            for part in (expression.name, " ".join(expression.means), expression.features)
         )
         score = 0.0
-        for word in asked:
+        for word in query:
             root = stem(word)
-            places = [
-                weight for weight, where in ((NAMED, name), (MEANT, means), (SEEN, features)) if root in where
+            weights = [
+                w for w, stems in ((NAME, name), (MEANING, means), (FEATURE, features)) if root in stems
             ]
-            if places:
-                # A word in several places says a little more than in the best of them alone.
-                score += max(places) + 0.1 * (len(places) - 1)
+            if weights:
+                # A word in several places counts slightly more.
+                score += max(weights) + 0.1 * (len(weights) - 1)
             elif difflib.get_close_matches(root, name | means, n=1, cutoff=0.85):
-                score += NEARLY
+                score += SIMILAR
         if score:
-            found.append((one, min(score / (NAMED * len(asked)), 1.0)))
-    return sorted(found, key=lambda pair: -pair[1])
+            matches.append((expression, min(score / (NAME * len(query)), 1.0)))
+    return sorted(matches, key=lambda match: -match[1])
 
 
 def by_action_units(
-    asked: Mapping[tuple[int, str], float], expressions: Iterable[Expression]
+    aus: Mapping[tuple[int, str], float], expressions: Iterable[Expression]
 ) -> list[tuple[Expression, float]]:
-    """Return expressions that share action units with the request, by cosine, with sides apart.
+    """Return expressions that share action units with a query.
 
     Args:
-        asked: (AU, side LEFT | RIGHT | BOTH) -> intensity.
+        aus: (AU, side LEFT | RIGHT | BOTH) -> intensity.
 
     Returns:
-        (expression, cosine 0..1), the best first, without those of cosine 0.
+        (expression, cosine above 0), best first; the two sides of an AU are separate dimensions.
     """
-    wanted = _vector(asked)
-    found = []
-    for one in expressions:
-        shown = _vector(one.aus)
-        common = sum(value * shown.get(unit, 0.0) for unit, value in wanted.items())
-        if common:
-            sizes = np.linalg.norm(list(wanted.values())) * np.linalg.norm(list(shown.values()))
-            found.append((one, float(common / sizes)))
-    return sorted(found, key=lambda pair: -pair[1])
+    query = _vector(aus)
+    matches = []
+    for expression in expressions:
+        vector = _vector(expression.aus)
+        product = sum(value * vector.get(unit, 0.0) for unit, value in query.items())
+        if product:
+            norms = np.linalg.norm(list(query.values())) * np.linalg.norm(list(vector.values()))
+            matches.append((expression, float(product / norms)))
+    return sorted(matches, key=lambda match: -match[1])
 
 
 def stem(word: str) -> str:
-    """A word without its ending: "surprised", "surprising" and "surprise" have one stem."""
+    """Return the stem of a word: "surprised", "surprising" and "surprise" have the same."""
     for ending in ENDINGS:
-        if word.endswith(ending) and len(word) - len(ending) >= LEAST:
+        if word.endswith(ending) and len(word) - len(ending) >= MIN_STEM:
             word = word.removesuffix(ending)
             break
-    return word[:-1] if len(word) > LEAST and word[-1] == word[-2] else word.replace("i", "y")
+    return word[:-1] if len(word) > MIN_STEM and word[-1] == word[-2] else word.replace("i", "y")
 
 
 def _words(text: str) -> list[str]:
@@ -145,7 +90,7 @@ def _words(text: str) -> list[str]:
 
 
 def _vector(aus: Mapping[tuple[int, str], float]) -> dict[tuple[int, str], float]:
-    """(AU, L | R | "") -> intensity; a unit without sides has one place."""
+    """Return (AU, L | R | "") -> intensity."""
     sided = by_number()
     vector: dict[tuple[int, str], float] = {}
     for (au, side), value in aus.items():

@@ -1,4 +1,4 @@
-"""The time spans of the entries of a timeline's track."""
+"""The times of the entries of a timeline."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ from itertools import pairwise
 from realizer.expressions.expression import Expression
 from realizer.expressions.timeline import Entry, Timeline, Track
 
-BREAK = 0.5  # s; a break that says no duration
+BREAK = 0.5  # s, the default duration of a break
 
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """When an entry shows, in seconds from the timeline's start: whole from `reached` to `left`.
+    """The times of an entry, in seconds from the start of the timeline.
 
-    `start` and `end` are its place in the track; what leads to it and from it may reach beyond them.
+    The expression is at full intensity from `reached` to `left`. `start` and `end` are the borders of the
+    entry; transitions may begin before and end after them.
     """
 
     entry: Entry
@@ -27,13 +28,13 @@ class Span:
 
 
 def spans(track: Track, library: Mapping[str, Expression]) -> list[Span]:
-    """When each entry of a track shows.
+    """Return the times of each entry of a track.
 
-    An entry spans from the end of the one before it to the start of the next. Its onset is at its beginning
-    and its offset at its end; joined by one of them alone, the other expression is whole up to there. The
-    first rises by its onset and the last goes by its offset, whatever the joins. A break has neither: the
-    expression before it goes by its own offset, the one after it comes by its own onset. Where an entry is
-    shorter than its onset and offset, both shrink alike, and it is whole for an instant.
+    An entry begins with its onset and ends with its offset. If `joins` is "onset" or "offset", only this one
+    is used between two entries, and the other expression stays whole up to the border. The first entry
+    always has its onset and the last its offset. A break has neither: the entry before it ends with its
+    offset, and the entry after it begins with its onset. If an entry is too short, onset and offset are
+    scaled to fit.
 
     Raises:
         KeyError: an expression that is not in the library.
@@ -44,7 +45,7 @@ def spans(track: Track, library: Mapping[str, Expression]) -> list[Span]:
         lengths.append(own if entry.duration is None else entry.duration)
         begins.append(begins[-1] + lengths[-1])
     times = [_onset_and_offset(entry, library) for entry in track.entries]
-    # (before, after): how long it takes from one to the next, before and after the border between them.
+    # (before, after): seconds of the transition before and after the border between two entries.
     borders = [(0.0, times[0][0])]
     for (one, (_, offset)), (other, (onset, _)) in pairwise(zip(track.entries, times, strict=True)):
         before, after = offset, onset
@@ -54,26 +55,26 @@ def spans(track: Track, library: Mapping[str, Expression]) -> list[Span]:
             before, after = onset if one.neutral else offset, 0.0
         borders.append((before, after))
     borders.append((times[-1][1], 0.0))
-    found = []
+    entries = []
     for k, (entry, length) in enumerate(zip(track.entries, lengths, strict=True)):
         rise, fall = borders[k][1], borders[k + 1][0]
         part = min(1.0, length / (rise + fall)) if rise + fall > 0 else 1.0
         begin, end = begins[k], begins[k + 1]
-        found.append(Span(entry, begin, begin + rise * part, end - fall * part, end))
-    return found
+        entries.append(Span(entry, begin, begin + rise * part, end - fall * part, end))
+    return entries
 
 
 def duration_of(timeline: Timeline, library: Mapping[str, Expression]) -> float:
-    """Seconds to the end of the longest track."""
+    """Return the seconds to the end of the longest track."""
     return max(spans(track, library)[-1].end for track in timeline.tracks)
 
 
 def visible_spans(
     timeline: Timeline, library: Mapping[str, Expression]
 ) -> Iterator[tuple[str, Expression, float, float]]:
-    """(place, expression, begin, end) of each entry but breaks: the seconds from when to when it can be seen.
+    """Yield (place, expression, begin, end) of each entry except breaks: the seconds for which it is visible.
 
-    It can from half of what leads to it to half of what leads from it.
+    An expression is visible from the middle of the transition to it to the middle of the next one.
     """
     for track in timeline.tracks:
         shown = spans(track, library)

@@ -1,4 +1,4 @@
-"""The timeline value: tracks of expressions and a mixer; and checks against a library and a face."""
+"""Timelines: tracks of expressions and a mixer, with checks against a library and a face."""
 
 from __future__ import annotations
 
@@ -20,10 +20,9 @@ class Entry:
     """An entry of a track.
 
     Attributes:
-        expression: its name in the library; "neutral" is a break.
+        expression: name in the library; "neutral" is a break.
         intensity: 0..1.
-        duration: seconds with onset and offset; None is the expression's
-            own, of a break half a second.
+        duration: seconds including onset and offset; None: the expression's own, or 0.5 s of a break.
     """
 
     expression: str
@@ -37,14 +36,14 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """A channel of Wojdel 2005, 5.4.2: expressions one after the other, the next grown out of the last.
+    """A sequence of expressions that blend into each other (a channel of Wojdel 2005, 5.4.2).
 
     Attributes:
-        name: for messages.
+        name: name in messages.
         entries: at least one.
-        joins: the transition between two entries: "offset" of the first, "onset" of the second, or both.
-        curve: "linear" as hers, or "smooth".
-        start: seconds from the timeline's start.
+        joins: transition between entries: "offset" of the first, "onset" of the second, or both.
+        curve: shape of transitions; Wojdel's are "linear".
+        start: seconds from the start of the timeline.
     """
 
     name: str
@@ -60,10 +59,9 @@ class Timeline:
 
     Attributes:
         tracks: at least one.
-        mixer: how the action units of the face are combined while it plays: added up, or one after the other
-            (Wojdel 2005, 5.1). It holds for the whole face, as in hers (5.4.1).
-        order: the action units that the successive mixer takes first, in this order; all others follow as
-            they are numbered.
+        mixer: how action units of the whole face are combined: added up ("additive"), or applied one after
+            the other ("successive"; Wojdel 2005, 5.1 and 5.4.1).
+        order: action units that the successive mixer applies first; the others follow by number.
     """
 
     tracks: tuple[Track, ...]
@@ -72,7 +70,7 @@ class Timeline:
 
 
 def faults_of(timeline: Timeline, library: Library) -> list[str]:
-    """Yield entries whose expression is not in the library: channel, entry, what was wanted, what came."""
+    """Return a message for each entry whose expression is not in the library."""
     return [
         f"channel {track.name}, entry {number}, expression: {library.unknown(entry.expression)}"
         for track in timeline.tracks
@@ -82,18 +80,20 @@ def faults_of(timeline: Timeline, library: Library) -> list[str]:
 
 
 def remarks(timeline: Timeline, inputs: Collection[str] | None = None) -> list[str]:
-    """Yield mixer requests of a timeline that have no effect, a sentence each.
+    """Return a message for each mixer setting that has no effect.
 
     Args:
-        inputs: what moves the face (`Face.takes`); None: it is not known.
+        inputs: inputs of the face (`Face.inputs`); None: unknown.
     """
     if timeline.mixer == "additive":
-        told = 'order: no effect, a sum has no order; wanted mixer = "successive"'
-        return [told] if timeline.order else []
+        message = 'order: no effect, a sum has no order; wanted mixer = "successive"'
+        return [message] if timeline.order else []
     if inputs is None:
         return []
     if "successive" not in inputs:
         return ["mixer: no effect, FAPs move this face; wanted a face that action units move (deformer au)"]
-    aside = [str(au) for au in timeline.order if f"rank {au}" not in inputs]
-    told = f"order: no effect on {', '.join(aside)}, which this face does not mix with other action units"
-    return [told] if aside else []
+    unmixed = [str(au) for au in timeline.order if f"rank {au}" not in inputs]
+    message = (
+        f"order: no effect on {', '.join(unmixed)}, which this face does not mix with other action units"
+    )
+    return [message] if unmixed else []

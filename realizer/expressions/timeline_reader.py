@@ -1,4 +1,4 @@
-"""A reader of timeline files (TOML or JSON) that reports all faults at once."""
+"""A reader for timeline files (TOML or JSON) that reports all faults at once."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ ENTRY = ("expression", "intensity", "duration")
 
 
 def read_timeline(content: bytes) -> Timeline:
-    """Read a timeline: TOML, or JSON if it begins as an object or a list.
+    """Parse a timeline: JSON if it begins with an object or a list, else TOML.
 
-        mixer = "successive"    # or "additive", which is usual
-        order = [4, 1, 2]       # with "successive": these action units first
+        mixer = "successive"    # or "additive", the default
+        order = [4, 1, 2]       # with "successive": action units that come first
 
         [[channel]]
         name = "brows"
@@ -37,29 +37,29 @@ def read_timeline(content: bytes) -> Timeline:
         ]
 
     Raises:
-        TableError: all faults, a line each: channel, entry, what was wanted, what came.
+        TableError: the text has a line for each fault, with channel and entry.
     """
     try:
         text = content.decode("utf-8-sig")
-        told = json.loads(text) if _is_json(text) else tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # a number of thousands of digits is no error of syntax
+        table = json.loads(text) if _is_json(text) else tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # also for integers of thousands of digits
         raise TableError(f"wanted a timeline in TOML or JSON, got: {error}") from None
-    if not isinstance(told, dict):
-        raise TableError(f'timeline: wanted {{"channel": [...]}}, got a {type(told).__name__}')
-    reading = _TimelineReader()
-    timeline = reading.timeline(told)
-    if reading.faults:
-        raise TableError("\n".join(reading.faults))
+    if not isinstance(table, dict):
+        raise TableError(f'timeline: wanted {{"channel": [...]}}, got a {type(table).__name__}')
+    reader = _TimelineReader()
+    timeline = reader.timeline(table)
+    if reader.faults:
+        raise TableError("\n".join(reader.faults))
     return timeline
 
 
 def _is_json(text: str) -> bool:
-    """Tables of TOML begin with a bracket too, but none of them with what follows one in a list of JSON."""
+    """Return whether a text is JSON; a table of TOML may begin with a bracket, but not with these two."""
     return re.match(r"\s*(\{|\[\s*[{\]])", text) is not None
 
 
 class _TimelineReader:
-    """The faults of a file while it is read."""
+    """Reads a timeline and collects its faults."""
 
     def __init__(self) -> None:
         self.faults: list[str] = []
@@ -79,30 +79,30 @@ class _TimelineReader:
                 near = difflib.get_close_matches(name, known, n=1)
                 hint = f"; did you mean {near[0]}?" if near else ""
                 if place != "timeline" and name in TIMELINE:
-                    hint = "; that stands before all channels"
+                    hint = "; it belongs before all channels"
                 self.faults.append(f"{place}: wanted {', '.join(known)}, got {name!r}{hint}")
 
-    def timeline(self, told: Mapping[str, Any]) -> Timeline:
-        self._keys(told, TIMELINE, "timeline")
-        mixer = cast(Mixer, self._choice(told, "mixer", get_args(Mixer), "timeline"))
-        order = self._order(told.get("order", []))
-        rows = told.get("channel")
+    def timeline(self, table: Mapping[str, Any]) -> Timeline:
+        self._keys(table, TIMELINE, "timeline")
+        mixer = cast(Mixer, self._choice(table, "mixer", get_args(Mixer), "timeline"))
+        order = self._order(table.get("order", []))
+        rows = table.get("channel")
         if not isinstance(rows, list) or not rows:
             self._fault("timeline", "channels, [[channel]] each", rows)
             rows = []
         tracks = tuple(self._track(row, number) for number, row in enumerate(rows, 1))
         return Timeline(tracks, mixer, order)
 
-    def _order(self, told: Any) -> tuple[int, ...]:
-        if not isinstance(told, list):
-            self._fault("timeline, order", "a list of action units, such as [4, 1, 2]", told)
+    def _order(self, aus: Any) -> tuple[int, ...]:
+        if not isinstance(aus, list):
+            self._fault("timeline, order", "a list of action units, such as [4, 1, 2]", aus)
             return ()
-        # Rotations follow all other units, whatever their order (5.1).
-        still = {row.au for row in action_units() if not row.degrees}
+        # Rotations always follow all other units (5.1).
+        mixed = {row.au for row in action_units() if not row.degrees}
         order: list[int] = []
-        for number, au in enumerate(told, 1):
+        for number, au in enumerate(aus, 1):
             place = f"timeline, order, place {number}"
-            if type(au) is not int or au not in still:
+            if type(au) is not int or au not in mixed:
                 self._fault(place, "the number of an action unit that turns neither head nor eyes", au)
             elif au in order:
                 self._fault(place, "each action unit once", au)
@@ -154,10 +154,10 @@ class _TimelineReader:
         return str(value)
 
     def _number(
-        self, row: Mapping[str, Any], name: str, usual: float, low: float, high: float, place: str
+        self, row: Mapping[str, Any], name: str, default: float, low: float, high: float, place: str
     ) -> float:
-        value = row.get(name, usual)
+        value = row.get(name, default)
         if isinstance(value, int | float) and not isinstance(value, bool) and low <= value <= high:
             return float(value)
         self._fault(f"{place}, {name}", f"a number {low:g}..{high:g}", value)
-        return usual
+        return default

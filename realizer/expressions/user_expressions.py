@@ -1,4 +1,4 @@
-"""A reader of a folder of user expressions (TOML) that reports all faults at once."""
+"""A reader for a folder of user expressions (TOML) that reports all faults at once."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from realizer.tables.lexemes import read_aus
 from realizer.tables.timing import Gap, gaps
 
 KEYS = ("name", "means", "features", "aus", "onset", "apex", "offset", "possible", "probable", "source")
-NEUTRAL = "NEUTRAL"  # the word for no expression, in timelines
 NAME = re.compile(r"[^\W\d_][\w .:'-]{0,99}")
+NEUTRAL = "NEUTRAL"  # a break in timelines
 LONGEST = 3600.0  # s
 
 
 def read_folder(folder: Path) -> tuple[Expression, ...]:
-    """The expressions of a folder, by the names of their files.
+    """Return the expressions of a folder, in the order of their files.
 
-        name = "polite smile"                # else the name of the file
+        name = "polite smile"                # default: the name of the file
         means = ["greeting", "thank you"]    # search words
         features = "raised corners of the mouth, one brow up"
         aus = { 12 = 0.5, 6 = 0.2, 2L = 0.4 }
-        onset = 0.3                          # seconds; those that are missing are as for any face
+        onset = 0.3                          # seconds; default: those of the element face
         apex = 0.8
         offset = 0.5
-        possible = [0.3, 4.0]                # seconds for which it can be seen
+        possible = [0.3, 4.0]                # seconds for which it is visible
         probable = [0.5, 2.0]
         source = "seen at the front desk"
 
     Raises:
-        TableError: all faults, a line each: file, key, what was wanted, what came.
+        TableError: the text has a line for each fault, with file and key.
     """
     found: dict[str, Expression] = {}
     faults: list[str] = []
@@ -48,22 +48,23 @@ def read_folder(folder: Path) -> tuple[Expression, ...]:
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             faults.append(f"{path}: wanted TOML, got: {error}")
             continue
-        reading = _FileReader(path, row)
-        one = reading.expression()
-        faults += reading.faults
-        if one is None:
+        reader = _FileReader(path, row)
+        expression = reader.expression()
+        faults += reader.faults
+        if expression is None:
             continue
-        other = found.get(key(one.name))
-        if other is not None:
-            faults.append(f"{path}: name: wanted one of its own, got {one.name!r}, which {other.file} has")
-        found[key(one.name)] = one
+        if (other := found.get(key(expression.name))) is not None:
+            faults.append(
+                f"{path}: name: wanted one of its own, got {expression.name!r}, which {other.file} has"
+            )
+        found[key(expression.name)] = expression
     if faults:
         raise TableError("\n".join(faults))
     return tuple(found.values())
 
 
 class _FileReader:
-    """One file and its faults."""
+    """Reads a file and collects its faults."""
 
     def __init__(self, path: Path, row: dict[str, Any]) -> None:
         self.path, self.row = path, row
@@ -89,7 +90,7 @@ class _FileReader:
             name, features, means, aus, (onset, apex, offset), possible, probable, source, self.path
         )
         if possible and not possible[0] - 1e-6 <= found.visible_duration <= possible[1] + 1e-6:
-            wanted = f"a time with which it is seen for the possible {_range_text(possible)}"
+            wanted = f"a visible duration within the possible {_range_text(possible)}"
             self._fault(
                 "apex", wanted, f"{found.visible_duration:.3g} s (half of onset and offset, and the apex)"
             )

@@ -1,1 +1,1 @@
-"""Wojdel's knowledge of expressions in conversation (2005, chapter 6): advice and enrichment."""
+"""Rules for expressions in conversation (Wojdel 2005, chapter 6): advice and enrichment."""

@@ -14,15 +14,15 @@ from realizer.tables.emotional_words import WordList
 from realizer.tables.knowledge import CompanionRule, Mood, PlacementRule, Role, knowledge
 from realizer.tables.templates import templates
 
-NEAR = 1.0  # s; nearer expressions are "in the neighbourhood" (6.3.3)
-FRAME = 0.04  # s; she counted frames
-FEW = 3  # expressions; fewer show no pace
-RATIO = 2.0  # a pace that differs from the mood's by more than that is another mood's
+NEAR = 1.0  # s; distance of expressions that are "in the neighbourhood" (6.3.3)
+FRAME = 0.04  # s; the durations were counted in frames
+MIN_PACE = 3  # expressions from which a pace can be measured
+RATIO = 2.0  # largest ratio between a pace and that of the mood
 
 
 @dataclass(frozen=True, slots=True)
 class VisibleExpression:
-    """A template that a block shows: the behaviour's id, and from when to when it is evident, in seconds."""
+    """A template that a behaviour shows, and the seconds from which to which it is visible."""
 
     id: str
     template: str
@@ -32,12 +32,12 @@ class VisibleExpression:
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """An unusual expression.
+    """Advice on an unusual expression.
 
     Attributes:
-        id: of the behaviour that it is about; "" for the whole block.
-        text: what is unusual, and the rule.
-        hint: what would be usual.
+        id: behaviour that it is about; "" for the whole block.
+        text: description of what is unusual.
+        hint: what would be usual, with the source.
     """
 
     id: str
@@ -53,13 +53,13 @@ def advise(
     mood: Mood | None = None,
     lists: Words = ENGLISH,
 ) -> Iterator[Advice]:
-    """Yield advice on a block; behaviours that are no templates are ignored.
+    """Yield advice on the templates of a block.
 
     Args:
-        seen: the scheduled templates of the block.
+        seen: the scheduled templates.
         words: speech id -> (characters before it in the text, seconds) of each word.
-        role, mood: of the animated character.
-        lists: the language of a text that names none, and which words count in which.
+        role, mood: role and mood of the character.
+        lists: emotional words, and the default language.
     """
     seen = sorted(seen, key=lambda one: one.start)
     for one in seen:
@@ -82,14 +82,12 @@ def advise(
 
 
 def _length(one: VisibleExpression, mood: Mood | None) -> Iterator[Advice]:
-    """Yield durations that nobody was seen to show, and those that are unusual, also for the mood.
-
-    Of some templates the mean is beyond what table 6.15 calls probable; the mean is not unusual.
-    """
+    """Yield advice on a duration that was never or rarely observed, considering the mood."""
     template = templates()[one.template.upper()]
     source = "Wojdel 2005, table 6.15"
     lasts, probable = one.end - one.start, template.probable
     if probable is not None:
+        # The mean of some templates is longer than their probable durations; it is not unusual either.
         usual = mood.length if mood is not None else 1.0
         most = max(probable[1], template.evident + FRAME) * max(usual, 1.0)
         if probable[0] * min(usual, 1.0) <= lasts <= most:
@@ -105,25 +103,23 @@ def duration_advice(
     probable: tuple[float, float] | None,
     source: str,
 ) -> Iterator[Advice]:
-    """Advice where an expression can be seen for a time that it is not, or rarely, seen for on people.
+    """Yield advice on an expression that is visible for a time that was never or rarely observed.
 
     Args:
-        id: of what shows it; name: of the expression.
+        id: behaviour or entry that shows it.
+        name: name of the expression.
         lasts: seconds.
-        possible, probable: seconds, (least, most); None if unknown.
-        source: where it was observed.
+        possible, probable: least and most seconds; None if unknown.
+        source: source of these times.
     """
     if possible is not None and not possible[0] - 1e-3 <= lasts <= possible[1] + 1e-3:
-        how = _how(lasts, possible[0])
-        said = f"{name} can be seen for {lasts:.2g} s; nobody was seen to show it so {how}"
-        yield Advice(id, said, f"it lasts {_range(possible)} ({source})")
+        how = "short" if lasts < possible[0] else "long"
+        text = f"{name} is visible for {lasts:.2g} s; it was never observed so {how}"
+        yield Advice(id, text, f"it lasts {_range(possible)} ({source})")
     elif probable is not None and not probable[0] - 1e-3 <= lasts <= probable[1] + 1e-3:
-        said = f"{name} can be seen for {lasts:.2g} s, which is unusually {_how(lasts, probable[0])}"
-        yield Advice(id, said, f"it mostly lasts {_range(probable)} ({source})")
-
-
-def _how(lasts: float, low: float) -> str:
-    return "short" if lasts < low else "long"
+        how = "short" if lasts < probable[0] else "long"
+        text = f"{name} is visible for {lasts:.2g} s, which is unusually {how}"
+        yield Advice(id, text, f"it mostly lasts {_range(probable)} ({source})")
 
 
 def _range(seconds: tuple[float, float]) -> str:
@@ -138,9 +134,9 @@ def _apart(one: VisibleExpression, seen: Sequence[VisibleExpression]) -> Iterato
     for other in seen:
         if other is not one and other.start <= one.start and one.start - other.end < room:
             after = max(one.start - other.end, 0.0)
-            said = f"{one.template} begins {after:.2g} s after {other.template} ({other.id})"
+            text = f"{one.template} begins {after:.2g} s after {other.template} ({other.id})"
             hint = f"{one.template} does not follow another expression within {room:g} s (Wojdel 2005, 6.5)"
-            yield Advice(one.id, said, hint)
+            yield Advice(one.id, text, hint)
             return
 
 
@@ -161,7 +157,7 @@ def _missing_expressions(
     times: dict[int, float],
     words: WordList | None,
 ) -> Iterator[Advice]:
-    """Yield words that usually have an expression which is missing."""
+    """Yield advice on words that usually come with an expression."""
     for placement in place_expressions(text, knowledge(), "speaker", None, words):
         at = times.get(placement.word.place)
         if not placement.rule.keep or at is None:
@@ -187,27 +183,27 @@ def _listening(seen: Sequence[VisibleExpression]) -> Iterator[Advice]:
 
 
 def _pace(seen: Sequence[VisibleExpression], role: Role, mood: Mood | None) -> Iterator[Advice]:
-    """Expressions that come too often for a listener, or at another pace than the mood's."""
+    """Yield advice on expressions that are too frequent for a listener, or not at the pace of the mood."""
     groups = _groups(seen)
-    if len(groups) < FEW:
+    if len(groups) < MIN_PACE:
         return
     gaps = [max(b[0] - a[1], 0.0) for a, b in pairwise(groups)]
     distance = sum(gaps) / len(gaps)
-    says = f"{len(groups)} expressions, {distance:.2g} s between two of them on average"
+    text = f"{len(groups)} expressions, {distance:.2g} s between two of them on average"
     least = knowledge().listener_distance
     if role == "listener":
         if distance < least / RATIO:
             hint = f"a listener's face is calmer: about {least:g} s between two (Wojdel 2005, 6.5)"
-            yield Advice("", f"a listener with {says}", hint)
+            yield Advice("", f"a listener with {text}", hint)
     elif mood is not None:
         often = distance < mood.distance / RATIO
         if often or distance > mood.distance * RATIO:
-            hint = f"who is in that mood shows one every {mood.distance:g} s or so (Wojdel 2005, table 6.5)"
-            yield Advice("", f"{says}: {'often' if often else 'rarely'} for the mood {mood.name!r}", hint)
+            hint = f"in that mood people show one about every {mood.distance:g} s (Wojdel 2005, table 6.5)"
+            yield Advice("", f"{text}: {'often' if often else 'rarely'} for the mood {mood.name!r}", hint)
 
 
 def _groups(seen: Sequence[VisibleExpression]) -> list[tuple[float, float]]:
-    """Spans of expressions that overlap count as one."""
+    """Return the spans of expressions; overlapping ones are joined."""
     groups: list[tuple[float, float]] = []
     for one in seen:
         if groups and one.start < groups[-1][1]:

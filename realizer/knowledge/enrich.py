@@ -1,4 +1,4 @@
-"""Enrichment of a text or a block with expressions from the knowledge base."""
+"""Addition of expressions to a text or a block, by the rules of the knowledge base."""
 
 from __future__ import annotations
 
@@ -12,22 +12,20 @@ from bml_schema.behaviours import SpeechText
 from realizer.knowledge.placement_rules import Placement, place_expressions
 from realizer.knowledge.sentences import sentences
 from realizer.knowledge.word_languages import ENGLISH, Words, language_of
-from realizer.tables.knowledge import CompanionRule, Knowledge, Mood, Role, knowledge
+from realizer.tables.knowledge import CompanionRule, Mood, Role, knowledge
 from realizer.tables.templates import Template, apex, templates
 
 PREFIX = "template:"
-LEAST = 500  # characters of a long text that are not cut any further
-MARK, ESCAPE = (
-    len('<mark name="w1234"/>'),
-    len("&amp;") - 1,
-)  # what they add to the text that a voice is given
+MIN_PIECE = 500  # characters; shorter texts are not split
+# Characters that a mark and an escape add to the text for a voice.
+MARK, ESCAPE = len('<mark name="w1234"/>'), len("&amp;") - 1
 OPENING = "\"'“‘„«‹([¿¡"
-INTENSITY = 0.7  # intensity of placed expressions: people talk with less than a full face
-NEVER = 0.2  # s; what would be shorter than that is not placed
+INTENSITY = 0.7  # of placed expressions, as people do not talk with a full face
+MIN_LEAD = 0.2  # s; expressions that would be shorter are not placed
 
 
 def template_of(node: object) -> str:
-    """The template that a behaviour shows, lower case; "" for any other behaviour."""
+    """Return the template that a behaviour shows, in lower case, or ""."""
     name = node.name.lower() if isinstance(node, Expression) else ""
     if not name.startswith(PREFIX):
         return ""
@@ -44,12 +42,12 @@ class SpokenText(NamedTuple):
 
 @dataclass(frozen=True)
 class Enricher:
-    """The context of the animated character.
+    """Adds expressions to texts and blocks for a character.
 
     Attributes:
         role: whether the character speaks or listens.
-        mood: how often, and for how long, expressions come; None: as on average.
-        words: the language of a text that names none, and which words count in which.
+        mood: mood of the character; None: average.
+        words: emotional words, and the default language.
     """
 
     role: Role = "speaker"
@@ -57,7 +55,7 @@ class Enricher:
     words: Words = ENGLISH
 
     def text(self, text: str, block: str = "bml1") -> Block:
-        """Return a block that says `text` with a speaker's face, or that shows a listener."""
+        """Return a block that speaks a text with expressions, or shows a listener to it."""
         if self.role == "listener":
             return self.listener((SpokenText(text, 0.0, self.words.language),), block)
         named = "" if self.words.everywhere else self.words.language
@@ -65,27 +63,27 @@ class Enricher:
         return self.block(Block(id=block, children=(speech,)))
 
     def texts(self, text: str, longest: int) -> Iterator[Block]:
-        """Return the same as playable blocks, each after the one before, cut between sentences.
+        """Yield the blocks for a long text, split between sentences, each appended to the one before.
 
         Args:
-            longest: characters that a voice can take at once, marks included.
+            longest: largest number of characters for a voice, marks included.
         """
         for number, block in enumerate(self._short(text, longest, longest // 2), 1):
             yield replace(block, id=f"bml{number}", composition="APPEND" if number > 1 else "MERGE")
 
     def _short(self, text: str, longest: int, most: int) -> Iterator[Block]:
-        """Blocks of at most `most` characters; of fewer where so many marks come in that it gets too long."""
+        """Yield blocks of at most `most` characters; of fewer if their marks make them too long."""
         for piece in _pieces(text, self.words.language, most):
             block = self.text(piece)
-            if most > LEAST and any(_length(node) > longest for node in block.behaviours):
+            if most > MIN_PIECE and any(_length(node) > longest for node in block.behaviours):
                 yield from self._short(piece, longest, most // 2)
             else:
                 yield block
 
     def block(self, block: Block) -> Block:
-        """A speaker's block with expressions at its words, and with company for the expressions it has.
+        """Return a speaker's block with expressions at words, and companions of all its expressions.
 
-        Expressions of the block stay; enriching twice adds nothing.
+        Enriching a block twice adds nothing.
         """
         names = _IdFactory(block)
         speeches: dict[str, Speech] = {}
@@ -100,11 +98,11 @@ class Enricher:
         children = _replaced(block.children, speeches)
         return replace(block, children=(*children, *placed), places={})
 
-    def listener(self, said: Iterable[SpokenText], block: str) -> Block:
+    def listener(self, texts: Iterable[SpokenText], block: str) -> Block:
         """Return a block of expressions for a listener to these texts."""
         names = _IdFactory(Block(id=block))
         placed: list[Expression] = []
-        for text, begin, language in said:
+        for text, begin, language in texts:
             for placement in self._placements(text, language):
                 for name in placement.rule.show:
                     start = SyncRef(offset=round(begin + placement.word.start, 3))
@@ -115,14 +113,10 @@ class Enricher:
 
     def _placements(self, text: str, language: str) -> tuple[Placement, ...]:
         words = self.words.of(language)
-        return place_expressions(sentences(text, language), self.knowledge, self.role, self.mood, words)
-
-    @property
-    def knowledge(self) -> Knowledge:
-        return knowledge()
+        return place_expressions(sentences(text, language), knowledge(), self.role, self.mood, words)
 
     def _speech(self, node: Speech, block: Block, names: _IdFactory) -> tuple[Speech, list[Expression]]:
-        """The speech with a mark before each word that something begins at, and what begins there."""
+        """Return the speech with marks, and the expressions that begin at them."""
         assert node.text is not None
         marks = _marks(node.text.parts)
         begun = {(str(e.syncs.get("start")), template_of(e)) for e in block.behaviours}
@@ -154,8 +148,8 @@ class Enricher:
     def _company(
         self, node: Expression, beside: Sequence[Expression], names: _IdFactory
     ) -> Iterator[Expression]:
-        """Return the accompanying expressions that are missing."""
-        for company in self.knowledge.companies:
+        """Yield the accompanying expressions that are missing."""
+        for company in knowledge().companies:
             if company.offered or company.of != template_of(node):
                 continue
             if any(template_of(e) == company.other and _refers(e, node.id) for e in beside):
@@ -167,7 +161,7 @@ class Enricher:
 
 
 def _length(node: object) -> int:
-    """Return the approximate number of characters for a voice; 0 for behaviours that do not speak."""
+    """Return the approximate number of characters of a speech for a voice, or 0."""
     if not isinstance(node, Speech) or node.text is None:
         return 0
     text = str(node.text)
@@ -176,7 +170,7 @@ def _length(node: object) -> int:
 
 
 def _pieces(text: str, language: str, longest: int) -> Iterator[str]:
-    """The text in pieces of at most so many characters, cut before a sentence, or a word, if there is one."""
+    """Split a text into pieces of at most `longest` characters, between sentences or else words."""
     begin = 0
     if len(text) > longest:
         said = sentences(text, language)
@@ -193,13 +187,13 @@ def _pieces(text: str, language: str, longest: int) -> Iterator[str]:
 
 
 def _last(rising: Sequence[int], most: int) -> int:
-    """The last that is at most `most`; 0 if none is."""
+    """Return the last number up to `most`, or 0."""
     found = bisect_right(rising, most)
     return rising[found - 1] if found else 0
 
 
 class _IdFactory:
-    """Ids that nothing in a block has yet."""
+    """Makes new ids for a block."""
 
     def __init__(self, block: Block) -> None:
         self.used = {node.id for node in block.behaviours}
@@ -222,7 +216,7 @@ class _IdFactory:
 
 
 def _around(node: Expression, company: CompanionRule) -> tuple[SyncRef | None, SyncRef | None]:
-    """Return start and end of the other expression; no start if there is no room."""
+    """Return start and end of the other expression; start is None if there is no room."""
 
     def point(sync: str, offset: float = 0.0) -> SyncRef:
         return SyncRef(behaviour=node.id, sync=sync, offset=offset)
@@ -233,7 +227,7 @@ def _around(node: Expression, company: CompanionRule) -> tuple[SyncRef | None, S
     if company.by == "around":
         return point("start", -lead), point("end", company.lead)
     if company.by == "before":
-        return (point("start", -lead) if lead >= NEVER else None), point("attackPeak")
+        return (point("start", -lead) if lead >= MIN_LEAD else None), point("attackPeak")
     if company.by == "after":
         return point("relax"), None
     return point("start"), point("end")
@@ -244,7 +238,7 @@ def _refers(node: Expression, id: str) -> bool:
 
 
 def _hold_seconds(template: Template, length: float) -> float:
-    """Return the seconds from attackPeak to relax that show it `length` times as long as usual."""
+    """Return the seconds from attackPeak to relax for `length` times the usual duration."""
     seen = template.evident * length
     if template.possible is not None:
         seen = min(max(seen, template.possible[0]), template.possible[1])
@@ -252,7 +246,7 @@ def _hold_seconds(template: Template, length: float) -> float:
 
 
 def _marks(parts: Sequence[str | Sync]) -> dict[int, str]:
-    """Characters of text before each mark, with the blanks after it -> the mark's id."""
+    """Return place in the text -> id of each mark; the place is after the blanks that follow the mark."""
     found: dict[int, str] = {}
     at = 0
     for part, following in zip(parts, (*parts[1:], ""), strict=False):
@@ -265,7 +259,7 @@ def _marks(parts: Sequence[str | Sync]) -> dict[int, str]:
 
 
 def _marked(parts: Sequence[str | Sync], new: Mapping[int, str]) -> tuple[str | Sync, ...]:
-    """The parts with marks at places in the text, counted in characters."""
+    """Insert marks (place in the text -> id) into the parts of a text."""
     found: list[str | Sync] = []
     at = 0
     for part in parts:

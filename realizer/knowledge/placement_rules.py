@@ -9,20 +9,14 @@ from realizer.knowledge.sentences import Sentence, SpokenWord
 from realizer.tables.emotional_words import WordList
 from realizer.tables.knowledge import Knowledge, Mood, PlacementRule, Role
 
-# A negation applies to a word at most so many words after it: "not so very bad".
-REACH = 3
+REACH = 3  # words after a negation to which it applies: "not so very bad"
 # Categories that a negation inverts: "do not be afraid" shows no fear.
 TURNED = ("sorrow", "fright", "irritation", "disapproval", "approval", "assent")
 
 
 @dataclass(frozen=True, slots=True)
 class Placement:
-    """A placement by one rule.
-
-    Attributes:
-        rule: the rule.
-        word: the index of its first word.
-    """
+    """A rule, and the first word of the place where it applies."""
 
     rule: PlacementRule
     word: SpokenWord
@@ -37,28 +31,30 @@ def place_expressions(
 ) -> tuple[Placement, ...]:
     """Return the placements of expressions, in the order of the text.
 
-    At one place the most important rule wins. A mood or a listener keeps expressions apart: of two
-    that are too near, the less important one is dropped, except if its rule says that it stays.
+    Only the most important rule applies at a place. Expressions of a listener or in a mood have a least
+    distance; less important ones are dropped unless their rule has `keep`.
 
     Args:
-        words: the categories of words; None: only punctuation counts.
+        words: the emotional words; None: only punctuation counts.
     """
     rules = knowledge.placings[role]
-    asked = [placement for sentence in text for placement in _asked(sentence, rules, words)]
+    placements = [placement for sentence in text for placement in _applied(sentence, rules, words)]
     apart = mood.distance if mood is not None else 0.0
     if role == "listener":
         usual = knowledge.listener_distance
         apart = usual if mood is None else usual * mood.distance / knowledge.usual_distance
     kept: list[Placement] = []
-    for placement in sorted(asked, key=lambda one: (rules.index(one.rule), one.word.start)):
+    for placement in sorted(placements, key=lambda one: (rules.index(one.rule), one.word.start)):
         near = apart > 0 and any(abs(placement.word.start - other.word.start) < apart for other in kept)
         if placement.rule.keep or not near:
             kept.append(placement)
     return tuple(sorted(kept, key=lambda one: one.word.place))
 
 
-def _asked(sentence: Sentence, rules: Sequence[PlacementRule], words: WordList | None) -> Iterator[Placement]:
-    """Yield the placements of one sentence; the first rule for a place wins."""
+def _applied(
+    sentence: Sentence, rules: Sequence[PlacementRule], words: WordList | None
+) -> Iterator[Placement]:
+    """Yield the placements in one sentence, by the first rule for each place."""
     categories = _categories(sentence, words)
     taken: set[int] = set()
     for rule in rules:
@@ -71,7 +67,7 @@ def _asked(sentence: Sentence, rules: Sequence[PlacementRule], words: WordList |
 
 
 def _places(rule: PlacementRule, sentence: Sentence, categories: Sequence[str]) -> list[int]:
-    """Indices of the words at which a rule asks for something."""
+    """Return the indices of the words where a rule applies."""
     if rule.when in ("question", "exclamation"):
         return [len(sentence.words) - 1] if getattr(sentence, rule.when) else []
     before = ["", *categories]
@@ -79,7 +75,7 @@ def _places(rule: PlacementRule, sentence: Sentence, categories: Sequence[str]) 
 
 
 def _categories(sentence: Sentence, words: WordList | None) -> list[str]:
-    """The category of each word; "" where a negation before it turns it around."""
+    """Return the category of each word; "" after a negation that inverts it."""
     if words is None:
         return [""] * len(sentence.words)
     found = words.categories([word.text for word in sentence.words])

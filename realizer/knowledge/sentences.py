@@ -10,20 +10,20 @@ from realizer.speech.letter_to_sound import syllable_facts, vowel_units
 from realizer.speech.words import words_in
 
 QUESTION, EXCLAMATION = "?？؟՞\u037e", "!！՜"  # U+037E is the Greek one, which looks like a semicolon
-PICTURE = "\U0001f000-\U0001faff\u2600-\u27bf"  # emoji, which no voice says
+EMOJI = "\U0001f000-\U0001faff\u2600-\u27bf"  # not spoken
 ENDS = re.compile(
-    rf"[.?!…。？！؟।՞՜\u037e]+[\"'”’»)\]\u200e\u200f\u202c\u2069]*(?=\s|$|[{PICTURE}])|[。？！؟।]+|\n\s*\n"
+    rf"[.?!…。？！؟।՞՜\u037e]+[\"'”’»)\]\u200e\u200f\u202c\u2069]*(?=\s|$|[{EMOJI}])|[。？！؟।]+|\n\s*\n"
 )
-SAID = re.compile(f"[^{PICTURE}]")
+SPOKEN = re.compile(f"[^{EMOJI}]")
 
 
 @dataclass(frozen=True, slots=True)
 class SpokenWord:
-    """A word, its place in the text, and its time.
+    """A word of a text.
 
     Attributes:
-        place: characters before it.
-        start, end: seconds from the start of the text, by vowel units (eq. 6.6 to 6.10).
+        place: number of characters before it.
+        start, end: seconds from the start of the text, estimated from vowel units (eq. 6.6 to 6.10).
     """
 
     text: str
@@ -42,21 +42,21 @@ class Sentence:
 
 
 def sentences(text: str, language: str = "en", rate: float = 1.0) -> tuple[Sentence, ...]:
-    """The sentences of a text that have words.
+    """Return the sentences of a text that have words.
 
     Args:
-        language: BCP-47; which letters are vowels.
-        rate: beside the ordinary rate of 0.2 s a vowel unit.
+        language: BCP-47 tag; it defines the vowels.
+        rate: 1 is the ordinary rate of 0.2 s per vowel unit.
     """
     if language.replace("_", "-").partition("-")[0].lower() == "el":
-        text = text.replace(";", "\u037e")  # keyboards and normal forms make no difference
+        text = text.replace(";", "\u037e")  # the Greek question mark; keyboards write a semicolon
     found: list[Sentence] = []
     now = 0.0
     for piece, place, signs in _pieces(text):
         words = []
         at = place
         for word, start in words_in(piece):
-            if not SAID.search(word):
+            if not SPOKEN.search(word):
                 continue
             now += _pauses(text[at : place + start]) * _unit(rate)
             length = vowel_units(word, language) * _unit(rate)
@@ -71,7 +71,7 @@ def sentences(text: str, language: str = "en", rate: float = 1.0) -> tuple[Sente
 
 
 def _pieces(text: str) -> Iterator[tuple[str, int, str]]:
-    """(text of a sentence, its place, the signs that end it)."""
+    """Yield (text of a sentence, its place, the signs that end it)."""
     at = 0
     for end in ENDS.finditer(text):
         yield text[at : end.start()], at, end[0]
@@ -80,7 +80,7 @@ def _pieces(text: str) -> Iterator[tuple[str, int, str]]:
 
 
 def _pauses(between: str) -> int:
-    """Return the units between two words: one for each run of punctuation (eq. 6.6)."""
+    """Return the vowel units of a pause: one for each run of punctuation (eq. 6.6)."""
     phrase = syllable_facts()["phrase"]
     inside = [sign in phrase for sign in between]
     return sum(now and not before for before, now in zip([False, *inside], inside, strict=False))

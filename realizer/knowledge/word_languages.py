@@ -1,4 +1,4 @@
-"""The language of each text, and the emotional words that apply to it."""
+"""The languages of texts and their emotional words."""
 
 from __future__ import annotations
 
@@ -15,13 +15,12 @@ LANG = "{http://www.w3.org/XML/1998/namespace}lang"
 
 @dataclass(frozen=True)
 class Words:
-    """Which words count in which language.
+    """The emotional words of each language.
 
     Attributes:
-        language: BCP-47 of a text that names none.
-        own: a user's list, before the built-in ones; None if there is none.
-        everywhere: whether that list is for all texts, because no language was requested; if not, for
-            those in `language`.
+        language: BCP-47 tag of text without xml:lang.
+        own: a user's list, which overrides the built-in one.
+        everywhere: whether `own` is for texts in all languages, not only in `language`.
     """
 
     language: str = "en"
@@ -29,7 +28,7 @@ class Words:
     everywhere: bool = True
 
     def of(self, language: str) -> WordList | None:
-        """Return the words of a language ("en-GB" is "en"), or None, so that no word counts."""
+        """Return the words of a language ("en-GB" is "en"), or None if there is no list."""
         if self.own is not None and (self.everywhere or _same(language, self.language)):
             return self.own
         return word_list(language)
@@ -38,23 +37,23 @@ class Words:
 ENGLISH = Words()
 
 
-def language_of(speech: Speech, block: Block, usual: str) -> str:
-    """BCP-47, as xml:lang says: the first of its SSML, its text, the speech and the block; or `usual`."""
-    return next(filter(None, _named(speech, block)), usual)
+def language_of(speech: Speech, block: Block, default: str) -> str:
+    """Return the first xml:lang of the SSML, the text, the speech and the block, or else `default`."""
+    return next(filter(None, _languages(speech, block)), default)
 
 
-def _named(speech: Speech, block: Block) -> Iterator[str | None]:
+def _languages(speech: Speech, block: Block) -> Iterator[str | None]:
     for description in sorted(speech.descriptions, key=lambda one: -one.priority):
         if description.type == SSML and description.priority >= 0:
-            yield _of_ssml(description.content)
+            yield _ssml_language(description.content)
     if speech.text is not None:
         yield speech.text.language
     yield speech.unknown_attributes.get(LANG)
     yield block.unknown_attributes.get(LANG)
 
 
-def _of_ssml(content: str) -> str | None:
-    # The content comes from the parser, which rejects DTDs and entities.
+def _ssml_language(content: str) -> str | None:
+    # Safe for untrusted content, as our parser has rejected DTDs and entities.
     try:
         return ElementTree.fromstring(content).get(LANG)
     except ElementTree.ParseError:
@@ -62,6 +61,6 @@ def _of_ssml(content: str) -> str | None:
 
 
 def _same(one: str, other: str) -> bool:
-    """Return whether two tags are of one language, whatever their country."""
+    """Return whether two tags have the same language, ignoring the country."""
     first, second = (tag.replace("_", "-").partition("-")[0].lower() for tag in (one, other))
     return first == second

@@ -1,7 +1,7 @@
-"""Tables of the standards as CSV and TOML files: one frozen row class a table, validated when read.
+"""Tables of the standards as CSV and TOML files, validated when they are read.
 
-Every file names its `source:`, `units:` and `licence:` in its leading `#` lines; a file without them, or a
-row with a bad cell, is refused with its place.
+Every file begins with comments that name its `source:`, `units:` and `licence:`; each CSV table has a frozen
+class for its rows.
 """
 
 from __future__ import annotations
@@ -26,10 +26,12 @@ __all__ = [
     "au_combinations",
     "au_to_fap",
     "by_number",
+    "csv_rows",
     "faps",
     "nearest",
     "read_csv",
     "read_toml",
+    "toml_table",
 ]
 
 Row = TypeVar("Row")
@@ -37,15 +39,15 @@ HEAD = ("source", "units", "licence")
 
 
 def read_csv(text: str, row_class: type[Row], name: str) -> tuple[Row, ...]:
-    """The rows of a CSV table as `row_class` (a dataclass), in file order.
+    """Return the rows of a CSV table in file order.
 
     Args:
-        text: the file's text; leading `#` lines carry source, units and licence.
-        row_class: a frozen dataclass; a column a field, converted to the field's type.
-        name: what to call the file in messages.
+        text: content of the file.
+        row_class: a dataclass with a field for each column; cells are converted to the types of the fields.
+        name: name of the file in messages.
 
     Raises:
-        TableError: a missing head line or column, or a cell of the wrong kind; with file, line and column.
+        TableError: a missing head line or column, or an invalid cell; with file, line and column.
     """
     _check_head(text, name)
     lines = text.splitlines()
@@ -74,7 +76,11 @@ def read_csv(text: str, row_class: type[Row], name: str) -> tuple[Row, ...]:
 
 
 def read_toml(text: str, name: str) -> dict[str, Any]:
-    """A TOML table as a dictionary.
+    """Parse a TOML table.
+
+    Args:
+        text: content of the file.
+        name: name of the file in messages.
 
     Raises:
         TableError: a missing head line, or text that is not TOML.
@@ -86,8 +92,18 @@ def read_toml(text: str, name: str) -> dict[str, Any]:
         raise TableError(f"{name}: {error}") from None
 
 
+def csv_rows(name: str, row_class: type[Row]) -> tuple[Row, ...]:
+    """Return the rows of a built-in CSV table; arguments and errors as for `read_csv`."""
+    return read_csv(text_of(name), row_class, name)
+
+
+def toml_table(name: str) -> dict[str, Any]:
+    """Return a built-in TOML table; errors as for `read_toml`."""
+    return read_toml(text_of(name), name)
+
+
 def text_of(name: str) -> str:
-    """The text of a file in this folder."""
+    """Return the content of a built-in table."""
     return files(__name__).joinpath(name).read_text("utf-8")
 
 
@@ -120,7 +136,7 @@ def _cell(cell: str, kind: Any, place: str) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Fap:
-    """One MPEG-4 facial animation parameter (ISO/IEC 14496-2 annex C)."""
+    """An MPEG-4 facial animation parameter (ISO/IEC 14496-2 annex C)."""
 
     fap: int
     name: str
@@ -137,9 +153,14 @@ class Fap:
 
 @dataclass(frozen=True, slots=True)
 class ActionUnit:
-    """One FACS action unit; `no_fap` says why no FAP shows it, "" where FAPs do.
+    """A FACS action unit.
 
-    `strength` is how far full intensity goes beside the shape that the unit was measured in.
+    Attributes:
+        sides: whether it can show on one side alone.
+        combine: how channels of one layer combine: the stronger ("max"), or added ("sum").
+        degrees: rotation at intensity 1; 0 if it is not a rotation.
+        strength: size of full intensity, relative to the shape in which it was measured.
+        no_fap: why no FAP shows it; "" if FAPs do.
     """
 
     au: int
@@ -153,9 +174,9 @@ class ActionUnit:
 
 @dataclass(frozen=True, slots=True)
 class AuToFap:
-    """One straight piece of what an action unit asks of a FAP (Paul 2010, 5.2).
+    """A linear segment of the mapping from an action unit to a FAP (Paul 2010, 5.2).
 
-    The pieces of one (au, side, fap) join into a polyline through (0, 0); beyond its end it stays level.
+    The segments of one `key` form a polyline through (0, 0), which is constant beyond its end.
     """
 
     au: int
@@ -173,7 +194,7 @@ class AuToFap:
 
 @dataclass(frozen=True, slots=True)
 class AuCombination:
-    """What two action units show together beside what each shows: a value of a FAP, in its own unit."""
+    """What two action units add to a FAP, in its unit, when they are shown together."""
 
     au: int
     other: int
@@ -184,36 +205,36 @@ class AuCombination:
 
 @cache
 def au_combinations() -> tuple[AuCombination, ...]:
-    """The combinations that FACS calls different, in file order."""
-    return read_csv(text_of("au_combinations.csv"), AuCombination, "au_combinations.csv")
+    """Return the combinations of action units that FACS lists as different."""
+    return csv_rows("au_combinations.csv", AuCombination)
 
 
 @cache
 def faps() -> tuple[Fap, ...]:
-    """The 68 FAPs, in order: row i is FAP i + 1."""
-    return read_csv(text_of("faps.csv"), Fap, "faps.csv")
+    """Return the 68 FAPs; row i is FAP i + 1."""
+    return csv_rows("faps.csv", Fap)
 
 
 @cache
 def action_units() -> tuple[ActionUnit, ...]:
-    """The action units, ascending."""
-    return read_csv(text_of("action_units.csv"), ActionUnit, "action_units.csv")
+    """Return the action units in ascending order."""
+    return csv_rows("action_units.csv", ActionUnit)
 
 
 @cache
 def au_to_fap() -> tuple[AuToFap, ...]:
-    """What each action unit asks of each FAP, in file order."""
-    return read_csv(text_of("au_to_fap.csv"), AuToFap, "au_to_fap.csv")
+    """Return the mapping of action units to FAPs."""
+    return csv_rows("au_to_fap.csv", AuToFap)
 
 
 @cache
 def by_number() -> Mapping[int, ActionUnit]:
-    """AU number -> its row of `action_units`."""
+    """Return AU number -> action unit."""
     return {row.au: row for row in action_units()}
 
 
 def nearest(number: int) -> str:
-    """The three action units nearest to a number, for messages: "2 (Outer brow raiser), 4 (...), ..."."""
+    """Return the three action units nearest to a number, for messages: "2 (Outer brow raiser), ..."."""
     known = by_number()
     near = sorted(sorted(known, key=lambda au: (abs(au - number), au))[:3])
     return ", ".join(f"{au} ({known[au].name})" for au in near)

@@ -13,7 +13,7 @@ FILE = "regions.toml"
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """A heading, and the numbers of the FAPs or AUs under it."""
+    """A heading and the numbers of its FAPs or AUs."""
 
     name: str
     members: tuple[int, ...]
@@ -21,29 +21,21 @@ class Region:
 
 @cache
 def fap_regions() -> tuple[Region, ...]:
-    """The groups of the low-level FAPs, 3..68, in order.
-
-    Raises:
-        TableError: a FAP that is missing, unknown, or there twice.
-    """
+    """Return the groups of the low-level FAPs, 3..68."""
     return _regions("fap", [row.fap for row in tables.faps() if row.fap > 2])
 
 
 @cache
 def au_regions() -> tuple[Region, ...]:
-    """The classes of the AUs, from the brows down.
-
-    Raises:
-        TableError: an AU that is missing, unknown, or there twice.
-    """
+    """Return the classes of the AUs, from the brows down."""
     return _regions("au", [row.au for row in tables.action_units()])
 
 
 def _regions(kind: str, wanted: list[int]) -> tuple[Region, ...]:
-    rows = tables.read_toml(tables.text_of(FILE), FILE)[kind]
-    found = tuple(Region(row["name"], tuple(row["members"])) for row in rows)
-    members = [number for region in found for number in region.members]
+    rows = tables.toml_table(FILE)[kind]
+    regions = tuple(Region(row["name"], tuple(row["members"])) for row in rows)
+    members = [number for region in regions for number in region.members]
     if sorted(members) != wanted:
         odd = sorted({n for n in [*members, *wanted] if members.count(n) != 1 or n not in wanted})
         raise TableError(f"{FILE}, {kind}: wanted every number of its table once, but not so: {odd}")
-    return found
+    return regions

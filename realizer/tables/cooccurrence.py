@@ -17,14 +17,14 @@ from realizer.core.errors import TableError
 FILE = "cooccurrence.toml"
 Kind = Literal["domination", "exclusion", "inclusion", "opposition"]
 SIGNS: Mapping[str, str] = {"domination": "<", "exclusion": "@", "inclusion": "@", "opposition": "@"}
-SMALL = "X"  # the set that exclusion and inclusion go by
-MOST = 2  # units that dominate another together
+SMALL = "X"  # the fuzzy set that exclusion and inclusion use
+MAX_DOMINANT = 2  # units that dominate another one together
 UNIT = re.compile(r"([0-9]+)([A-Za-z]?)")
 
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """An action unit in a rule: all of it, or one of the fuzzy sets of its intensity ("X", "Y", "Z")."""
+    """An action unit in a rule, at any intensity or in a fuzzy set of intensities ("X", "Y", "Z")."""
 
     au: int
     set: str = ""
@@ -32,12 +32,12 @@ class Unit:
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """The units that weaken an action unit.
+    """A rule by which action units weaken another one.
 
     Attributes:
-        kind: the class of the rule.
-        weaker: the AU that gives way; of an opposition the first.
-        stronger: the AUs before which it gives way, all together; of the classes but domination just one.
+        kind: class of the rule.
+        weaker: the weakened AU; the first AU of an opposition.
+        stronger: the AUs that weaken it together; only a domination has several.
         text: as written.
     """
 
@@ -49,31 +49,20 @@ class Rule:
 
 @dataclass(frozen=True)
 class Rules:
-    """A file of rules.
-
-    Attributes:
-        sets: name -> membership of an intensity of 0, 0.5 and 1.
-        rules: in file order.
-    """
+    """A file of rules; `sets` maps a fuzzy set to the memberships of intensities 0, 0.5 and 1."""
 
     sets: Mapping[str, tuple[float, float, float]]
     rules: tuple[Rule, ...]
 
 
 def load_rules(setting: str) -> Rules | None:
-    """The rules of "on" (those that ship), "off" (none), or a file.
-
-    Raises:
-        TableError: as `rules`.
-    """
-    if setting == "off":
-        return None
-    return rules(None if setting == "on" else Path(setting))
+    """Return the rules of "on" (the built-in ones), "off" (None) or a file; errors as for `rules`."""
+    return None if setting == "off" else rules(None if setting == "on" else Path(setting))
 
 
 @cache
 def rules(path: Path | None = None) -> Rules:
-    """The rules of a file, of the table that ships if None.
+    """Return the rules of a file, or the built-in ones.
 
     Raises:
         TableError: an unreadable file, or as `read_rules`.
@@ -90,12 +79,12 @@ def read_rules(text: str, name: str) -> Rules:
     """Read a file of rules; `name` is what messages call it.
 
     Raises:
-        TableError: every fault at once, a line each: not TOML, an unknown section, a rule that cannot be
-            read, an AU that does not exist, a rule that says the opposite of another, or
-            closes a circle with others.
+        TableError: invalid TOML, sections, rules or AUs, or rules that contradict each other; one line for
+            each fault.
     """
     table = tables.read_toml(text, name)
-    faults = [f"{name}: wanted sections sets, {', '.join(SIGNS)}; got [{key}]" for key in _strange(table)]
+    unknown = [key for key in table if key != "sets" and key not in SIGNS]
+    faults = [f"{name}: wanted sections sets, {', '.join(SIGNS)}; got [{key}]" for key in unknown]
     sets = {
         key: _set(values, f"{name}, [sets] {key}", faults)
         for key, values in _section(table, "sets", name, faults).items()
@@ -122,7 +111,7 @@ def parse_rule(text: str, kind: Kind, sets: Mapping[str, Any]) -> Rule:
     """Parse one rule in the notation of the table: "5<63", "18<20+23", "12<15Z", "27@25".
 
     Raises:
-        TableError: the text says what was wanted, and what came.
+        TableError: an invalid rule.
     """
     sign = SIGNS[kind]
     left, found, right = str(text).replace(" ", "").partition(sign)
@@ -130,13 +119,13 @@ def parse_rule(text: str, kind: Kind, sets: Mapping[str, Any]) -> Rule:
         example = "16<12+18" if sign == "<" else "27@25"
         raise TableError(f"wanted two sides with {sign!r} between them, as {example}")
     names = right.split("+") if kind == "domination" else [right]
-    if len(names) > MOST:
-        raise TableError(f"wanted one unit or {MOST} together on the right, got {len(names)}")
+    if len(names) > MAX_DOMINANT:
+        raise TableError(f"wanted one unit or {MAX_DOMINANT} together on the right, got {len(names)}")
     first = _unit(left, {})
     others = tuple(_unit(other, sets if kind == "domination" else {}) for other in names)
     if first.au in [other.au for other in others]:
         raise TableError(f"AU{first.au} stands on both sides")
-    if kind in ("exclusion", "inclusion"):  # there the privileged one comes first
+    if kind in ("exclusion", "inclusion"):  # the stronger unit comes first
         return Rule(kind, others[0].au, (first,), text)
     return Rule(kind, first.au, others, text)
 
@@ -154,10 +143,6 @@ def _unit(text: str, sets: Mapping[str, Any]) -> Unit:
     return Unit(number, name)
 
 
-def _strange(table: Mapping[str, Any]) -> list[str]:
-    return [key for key in table if key != "sets" and key not in SIGNS]
-
-
 def _section(table: Mapping[str, Any], key: str, name: str, faults: list[str]) -> Mapping[str, Any]:
     section = table.get(key, {})
     if isinstance(section, Mapping):
@@ -167,7 +152,7 @@ def _section(table: Mapping[str, Any], key: str, name: str, faults: list[str]) -
 
 
 def _lines(section: Mapping[str, Any], where: str, faults: list[str]) -> list[Any]:
-    """The rules of a section, which has nothing else."""
+    """Return the rules of a section and report other keys."""
     faults += [f"{where}: wanted rules = [...] alone, got {key}" for key in section if key != "rules"]
     lines = section.get("rules", [])
     if isinstance(lines, list):
@@ -186,31 +171,31 @@ def _set(values: object, where: str, faults: list[str]) -> tuple[float, float, f
 
 
 def _at(text: str, rule: object) -> str:
-    """Return ":7", the last line of a rule, or "" if it is written in another way."""
+    """Return ":7", the last line with the rule, or "" if it is not found."""
     lines = [row.partition("#")[0] for row in text.splitlines()]
     at = [n for n, row in enumerate(lines, 1) if f'"{rule}"' in row or f"'{rule}'" in row]
     return f":{at[-1]}" if at else ""
 
 
 def _contradictions(found: list[Rule]) -> list[tuple[Rule, str]]:
-    """Pairs of rules of which one says that the other's stronger unit is the weaker, or says it twice."""
+    """Return rules that repeat or contradict other rules, with a description."""
     faults = []
     seen: dict[tuple[int, tuple[Unit, ...]], Rule] = {}
     for rule in found:
         key = (rule.weaker, rule.stronger)
         turned = (rule.stronger[0].au, (Unit(rule.weaker),)) if len(rule.stronger) == 1 else None
         if key in seen:
-            faults.append((rule, f"says what {seen[key].text!r} says already"))
+            faults.append((rule, f"says the same as {seen[key].text!r}"))
         elif turned in seen:
             faults.append((rule, f"says the opposite of {seen[turned].text!r}"))
         seen[key] = rule
     if not faults:
-        faults += _circles(found)
+        faults += _cycles(found)
     return faults
 
 
-def _circles(found: list[Rule]) -> list[tuple[Rule, str]]:
-    """A rule by which units would silence each other in a round, as 1<2, 2<4 and 4<1."""
+def _cycles(found: list[Rule]) -> list[tuple[Rule, str]]:
+    """Return a rule that closes a cycle of dominations such as 1<2, 2<4 and 4<1."""
     whole = {
         (rule.weaker, rule.stronger[0].au): rule
         for rule in found
@@ -222,7 +207,7 @@ def _circles(found: list[Rule]) -> list[tuple[Rule, str]]:
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
-        circle = list(reversed(error.args[1]))  # each before the unit it gives way to
-        texts = [whole[pair].text for pair in pairwise(circle)]
-        return [(whole[circle[-2], circle[-1]], f"closes a circle with {', '.join(texts[:-1])}")]
+        cycle = list(reversed(error.args[1]))  # each unit is dominated by the next one
+        texts = [whole[pair].text for pair in pairwise(cycle)]
+        return [(whole[cycle[-2], cycle[-1]], f"closes a cycle with {', '.join(texts[:-1])}")]
     return []

@@ -14,17 +14,17 @@ FILE = "emotion_model.toml"
 
 @dataclass(frozen=True, slots=True)
 class EmotionModel:
-    """The parameters that are not in the other tables of emotions.
+    """The parameters of the emotion wheel and the recogniser.
 
     Attributes:
-        most: the highest activation, for which our own profiles are drawn.
-        spread: the part of an action unit by which a drawn face may differ.
-        middle: of evaluation and activation.
-        chosen: emotion -> the number of its published profile.
-        core, base: parts of a range's length within which a value belongs to it for sure, and perhaps.
-        least_length: FAPU, of a range.
-        absent: FAPU, as far as a FAP that is not moved may be off.
-        strengths: parts of one of our own profiles at which it is recognised.
+        most: highest activation, at which our own profiles are defined.
+        spread: share of an action unit by which a random face may differ.
+        middle: middle of the scales of evaluation and activation.
+        chosen: emotion -> number of its preferred published profile.
+        core, base: shares of a range's length where membership is 1, and where it ends.
+        least_length: least length of a range, FAPU.
+        absent: tolerance for a FAP that is not moved, FAPU.
+        strengths: strengths at which our own profiles are recognised.
     """
 
     most: float
@@ -40,12 +40,12 @@ class EmotionModel:
 
 @cache
 def emotion_model() -> EmotionModel:
-    """The table.
+    """Return the model.
 
     Raises:
-        TableError: a membership that does not fall, no strength, or one of nothing.
+        TableError: an invalid value.
     """
-    table = tables.read_toml(tables.text_of(FILE), FILE)
+    table = tables.toml_table(FILE)
     recognition = table["recognition"] | {"strengths": tuple(table["recognition"]["strengths"])}
     model = EmotionModel(**table["wheel"], chosen=table["chosen"], **recognition)
     if not (0 <= model.core < model.base and model.least_length > 0 and model.absent > 0):

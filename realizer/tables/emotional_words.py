@@ -10,7 +10,7 @@ from pathlib import Path
 from realizer import tables
 from realizer.core.errors import TableError
 
-# The eight of Wojdel's appendix D.2, the approval of her 6.5, and what turns the word after it around.
+# The eight categories of Wojdel 2005, appendix D.2, approval (6.5), and negations of the words after them.
 CATEGORIES = (
     "praise", "pleasure", "curiosity", "assent", "sorrow", "fright", "irritation", "disapproval", "approval",
     "negation",
@@ -26,10 +26,10 @@ class _Row:
 
 @dataclass(frozen=True)
 class WordList:
-    """Words, beginnings of words and phrases, each with its category.
+    """Words, phrases and beginnings of words, with their categories.
 
     Attributes:
-        phrases: first word -> (the words of a phrase, category), the longest first.
+        phrases: first word -> (words, category) of each phrase, the longest first.
         beginnings: beginning of a word -> category.
     """
 
@@ -37,9 +37,9 @@ class WordList:
     beginnings: Mapping[str, str]
 
     def categories(self, words: Sequence[str]) -> list[str]:
-        """The category of each word, "" for most; of a phrase it is that of all its words.
+        """Return the category of each word, or ""; all words of a phrase have the category of the phrase.
 
-        A phrase wins over a word, a whole word over a beginning, a longer beginning over a shorter one.
+        Phrases have priority over words, words over beginnings, and long beginnings over short ones.
         """
         plain = [word.lower().replace("’", "'") for word in words]
         found = [""] * len(plain)
@@ -60,7 +60,7 @@ class WordList:
 
 @cache
 def word_list(language: str) -> WordList | None:
-    """Return the words of a language ("en-GB" is "en"), or None if there is no built-in list."""
+    """Return the built-in list of a language ("en-GB" is "en"), or None."""
     subtag = language.replace("_", "-").partition("-")[0].lower()
     if not (subtag.isascii() and subtag.isalpha()):
         return None
@@ -74,7 +74,7 @@ def word_list(language: str) -> WordList | None:
 
 @cache
 def words_of(path: Path) -> WordList:
-    """The words of a user's file.
+    """Return the list of a user's file.
 
     Raises:
         TableError: an unreadable file, or as `read_words`.
@@ -86,10 +86,10 @@ def words_of(path: Path) -> WordList:
 
 
 def read_words(text: str, name: str) -> WordList:
-    """Read a list: columns word, category, origin.
+    """Parse a list with the columns word, category and origin.
 
     Raises:
-        TableError: a bad row, an unknown category, a word twice; with file and word.
+        TableError: an invalid row, with file and word.
     """
     phrases: dict[str, list[tuple[tuple[str, ...], str]]] = {}
     beginnings: dict[str, str] = {}
@@ -99,7 +99,7 @@ def read_words(text: str, name: str) -> WordList:
         if row.category not in CATEGORIES:
             raise TableError(f"{name}, {word}: wanted one of {', '.join(CATEGORIES)}, got {row.category!r}")
         if not word.strip("*") or word in seen or not row.origin:
-            raise TableError(f"{name}, {word!r}: wanted a word that stands once, with its origin")
+            raise TableError(f"{name}, {word!r}: wanted each word once, with its origin")
         seen.add(word)
         if word.endswith("*"):
             if len(word) < 4 or " " in word:
@@ -108,5 +108,8 @@ def read_words(text: str, name: str) -> WordList:
         else:
             parts = tuple(word.split())
             phrases.setdefault(parts[0], []).append((parts, row.category))
-    ordered = {first: tuple(sorted(some, key=lambda one: -len(one[0]))) for first, some in phrases.items()}
+    ordered = {
+        first: tuple(sorted(known, key=lambda phrase: len(phrase[0]), reverse=True))
+        for first, known in phrases.items()
+    }
     return WordList(ordered, beginnings)

@@ -16,7 +16,7 @@ FILE = "emotions.toml"
 
 @dataclass(frozen=True, slots=True)
 class EmotionFace:
-    """An emotion's (AU, side LEFT | RIGHT | BOTH) -> intensity 0..1, and its face lexeme or "" (none)."""
+    """The face of an emotion: (AU, side LEFT | RIGHT | BOTH) -> intensity 0..1; `lexeme` may be ""."""
 
     emotion: str
     lexeme: str
@@ -25,7 +25,7 @@ class EmotionFace:
 
 @dataclass(frozen=True, slots=True)
 class Archetype:
-    """An emotion with a face lexeme of its own: that, degrees on Plutchik's ring, activation 1..7."""
+    """An emotion with a face lexeme of this name, its angle on Plutchik's ring, and activation 1..7."""
 
     name: str
     angle: float
@@ -34,13 +34,9 @@ class Archetype:
 
 @cache
 def emotion_faces() -> Mapping[str, EmotionFace]:
-    """Lower-case emotion -> its face.
-
-    Raises:
-        TableError: a row without a known lexeme or AUs.
-    """
+    """Return lower-case emotion -> face."""
     found = {}
-    for emotion, row in tables.read_toml(tables.text_of(FILE), FILE)["face"].items():
+    for emotion, row in tables.toml_table(FILE)["face"].items():
         lexeme = row.get("lexeme", "")
         if lexeme and lexeme not in face_lexemes():
             raise TableError(f"{FILE}, face.{emotion}, lexeme: wanted a face lexeme, got {lexeme!r}")
@@ -54,7 +50,7 @@ def emotion_faces() -> Mapping[str, EmotionFace]:
 
 @cache
 def archetypes() -> tuple[Archetype, ...]:
-    """Return the emotions that have a lexeme, by rising angle."""
+    """Return the emotions with a lexeme, by angle."""
     found = []
     for place in ring("plutchik").values():
         if place.activation is None or not emotion_faces()[place.name].lexeme:

@@ -13,7 +13,7 @@ FILE = "expression_words.csv"
 
 @dataclass(frozen=True, slots=True)
 class ExpressionWords:
-    """A row: `means` separated by "; "; `features` empty where the table of templates has them."""
+    """Words of an expression; templates have their `features` in their own table."""
 
     name: str
     features: str
@@ -21,16 +21,11 @@ class ExpressionWords:
 
     @property
     def words(self) -> tuple[str, ...]:
-        """The words and phrases of `means`."""
+        """Return the words and phrases of `means`."""
         return tuple(word.strip() for word in self.means.split(";") if word.strip())
 
 
 @cache
 def expression_words() -> Mapping[str, ExpressionWords]:
-    """Name, as the expression library has it -> row.
-
-    Raises:
-        TableError: a bad row; with file, line and column.
-    """
-    rows = tables.read_csv(tables.text_of(FILE), ExpressionWords, FILE)
-    return {row.name: row for row in rows}
+    """Return name in the expression library -> words."""
+    return {row.name: row for row in tables.csv_rows(FILE, ExpressionWords)}

@@ -13,14 +13,14 @@ FILE = "facial_features.csv"
 
 @dataclass(frozen=True, slots=True)
 class FacialFeature:
-    """A change of the distance between two feature points (Raouzaiou et al. 2002, table 3).
+    """The change of a distance between two feature points (Raouzaiou et al. 2002, table 3).
 
     Attributes:
-        first, second: names of MPEG-4 feature points.
-        growth: 1 counts moving apart, -1 coming together.
-        unit: FAPU in which it is counted.
-        signs: {FAP: 1 or -1}; the feature is their sum.
-        also: FAPs of the inner lips that are read like `signs`, the same way round.
+        first, second: names of the MPEG-4 feature points.
+        growth: 1 if moving apart is positive, -1 if approaching is.
+        unit: FAPU.
+        signs: {FAP: 1 or -1}; the feature is the sum of these FAPs.
+        also: FAPs of the inner lips that follow from the feature with sign 1.
     """
 
     number: int
@@ -45,18 +45,14 @@ class Row:
 
 @cache
 def facial_features() -> tuple[FacialFeature, ...]:
-    """The 15 features, f1 first.
-
-    Raises:
-        TableError: not FAP numbers.
-    """
-    found = []
-    for row in tables.read_csv(tables.text_of(FILE), Row, FILE):
+    """Return the 15 features, f1 first."""
+    features = []
+    for row in tables.csv_rows(FILE, Row):
         try:
             signed = [int(fap) for fap in row.faps.split()]
             also = tuple(int(fap) for fap in row.also.split())
         except ValueError:
             raise TableError(f"{FILE}, f{row.feature}: wanted FAP numbers, got {row.faps!r}") from None
         signs = {abs(fap): 1 if fap > 0 else -1 for fap in signed}
-        found.append(FacialFeature(row.feature, row.first, row.second, row.growth, row.unit, signs, also))
-    return tuple(found)
+        features.append(FacialFeature(row.feature, row.first, row.second, row.growth, row.unit, signs, also))
+    return tuple(features)

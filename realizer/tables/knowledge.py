@@ -1,4 +1,4 @@
-"""The rules of Wojdel's knowledge base (`knowledge.toml`)."""
+"""The rules of the knowledge base of expressions (Wojdel 2005; `knowledge.toml`)."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ SENTENCES = ("question", "exclamation")
 
 @dataclass(frozen=True, slots=True)
 class PlacementRule:
-    """The expressions shown for a kind of sentence, or for a word of a category.
+    """Expressions for a kind of sentence, or for words of a category.
 
     Attributes:
         when: "question", "exclamation", or a category of words.
-        show: names of templates, lower case; shown together.
-        says: the rule in words, with its source.
-        unless: categories of words that keep a sentence from it.
-        keep: whether to warn if it is missing.
+        show: templates, in lower case, that are shown together.
+        says: the rule as a sentence, with its source.
+        unless: categories of words that exclude a sentence.
+        keep: whether to warn if an expression is missing.
     """
 
     when: str
@@ -40,15 +40,15 @@ class PlacementRule:
 
 @dataclass(frozen=True, slots=True)
 class CompanionRule:
-    """An expression that comes with another one.
+    """An expression that accompanies another one.
 
     Attributes:
-        of, other: names of templates, lower case.
-        by: the place of `other`.
-        says: the rule in words, with its source.
-        lead: seconds; how far `other` reaches over `of` at either end, or begins before it.
-        keep: whether to warn if it is missing.
-        offered: whether it is only suggested, not placed.
+        of, other: templates, in lower case.
+        by: when `other` is shown.
+        says: the rule as a sentence, with its source.
+        lead: seconds by which `other` begins before `of` and, if around it, ends after it.
+        keep: whether to warn if `other` is missing.
+        offered: whether `other` is only suggested, not placed.
     """
 
     of: str
@@ -62,12 +62,11 @@ class CompanionRule:
 
 @dataclass(frozen=True, slots=True)
 class Mood:
-    """A state of mind.
+    """A mood.
 
     Attributes:
-        name: as requested.
-        distance: seconds from the end of one expression to the start of the next, on average.
-        length: of expressions, beside their usual one.
+        distance: average seconds from the end of one expression to the start of the next.
+        length: average duration of expressions, relative to the usual one.
     """
 
     name: str
@@ -77,15 +76,13 @@ class Mood:
 
 @dataclass(frozen=True)
 class Knowledge:
-    """The whole table.
+    """The rules.
 
     Attributes:
-        placings: role -> rules, the more important first.
-        companies: in file order.
-        apart: name of a template -> seconds for which nothing may have ended before it.
-        usual_distance: seconds between two expressions of a speaker, on average.
-        listener_distance: seconds between two expressions of a listener, at least.
-        moods: word -> mood.
+        placings: role -> rules, most important first.
+        apart: template -> seconds that must pass after the end of another expression.
+        usual_distance: average seconds between two expressions of a speaker.
+        listener_distance: least seconds between two expressions of a listener.
     """
 
     placings: Mapping[Role, tuple[PlacementRule, ...]]
@@ -96,10 +93,10 @@ class Knowledge:
     moods: Mapping[str, Mood]
 
     def mood(self, word: str) -> Mood:
-        """The mood of a word, either case.
+        """Return the mood for a word in any case.
 
         Raises:
-            KeyError: an unknown word; its text names those that are near.
+            KeyError: an unknown word; the text lists similar ones.
         """
         name = word.strip().lower()
         if name not in self.moods:
@@ -110,12 +107,8 @@ class Knowledge:
 
 @cache
 def knowledge() -> Knowledge:
-    """The rules that ship.
-
-    Raises:
-        TableError: an unknown template, category, or key.
-    """
-    table = tables.read_toml(tables.text_of(FILE), FILE)
+    """Return the built-in rules."""
+    table = tables.toml_table(FILE)
     return Knowledge(
         {
             "speaker": tuple(_placing(row, "speaker") for row in table["speaker"]),
@@ -154,8 +147,8 @@ def _company(row: Mapping[str, Any]) -> CompanionRule:
 
 def _check_keys(row: Mapping[str, Any], kind: type, place: str) -> None:
     known = {f.name for f in fields(kind)}
-    if strange := row.keys() - known:
-        raise TableError(f"{place}: wanted keys {', '.join(sorted(known))}; got {', '.join(strange)}")
+    if unknown := row.keys() - known:
+        raise TableError(f"{place}: wanted keys {', '.join(sorted(known))}; got {', '.join(unknown)}")
 
 
 def _template(name: str, place: str) -> str:
@@ -166,10 +159,8 @@ def _template(name: str, place: str) -> str:
 
 def _moods(rows: Mapping[str, Any]) -> dict[str, Mood]:
     mean = float(rows["mean"])
-    moods = {}
-    for name, row in rows.items():
-        if name == "mean":
-            continue
-        own = rows[row["like"]] if "like" in row else row
-        moods[name] = Mood(name, float(own["distance"]), float(own["frames"]) / mean)
-    return moods
+    known = {name: row for name, row in rows.items() if name != "mean"}
+    values = {name: rows[row["like"]] if "like" in row else row for name, row in known.items()}
+    return {
+        name: Mood(name, float(row["distance"]), float(row["frames"]) / mean) for name, row in values.items()
+    }

@@ -17,7 +17,7 @@ SIDES = {"": "BOTH", "L": "LEFT", "R": "RIGHT"}
 
 @dataclass(frozen=True, slots=True)
 class FaceLexeme:
-    """A word for a face: (AU, side LEFT | RIGHT | BOTH) -> intensity 0..1 at amount 1."""
+    """A facial expression: (AU, side LEFT | RIGHT | BOTH) -> intensity 0..1 at amount 1."""
 
     name: str
     aus: Mapping[tuple[int, str], float]
@@ -25,14 +25,14 @@ class FaceLexeme:
 
 @dataclass(frozen=True, slots=True)
 class HeadLexeme:
-    """A word for a head movement: AU -> degrees at amount 1, at three poses.
+    """A head movement as three poses, AU -> degrees at amount 1.
 
     Attributes:
-        ready: before the first stroke.
-        stroke: at each stroke.
-        back: between strokes, and from strokeEnd to relax.
-        decay: each further stroke beside the one before it, 0..1.
-        eyes: part of a turn that the eyes take back, 0..1.
+        ready: pose before the first stroke.
+        stroke: pose at each stroke.
+        back: pose between strokes, and from strokeEnd to relax.
+        decay: size of each stroke relative to the one before, 0..1.
+        eyes: share of a turn that the eyes compensate, 0..1.
     """
 
     name: str
@@ -45,11 +45,7 @@ class HeadLexeme:
 
 @cache
 def face_lexemes() -> Mapping[str, FaceLexeme]:
-    """Upper-case name -> lexeme, in file order.
-
-    Raises:
-        TableError: a name that is no action unit, or an intensity outside 0..1.
-    """
+    """Return upper-case name -> lexeme."""
     return {
         name: FaceLexeme(name, read_aus(row["aus"], f"{FILE}, face.{name}"))
         for name, row in _rows("face").items()
@@ -58,11 +54,7 @@ def face_lexemes() -> Mapping[str, FaceLexeme]:
 
 @cache
 def head_lexemes() -> Mapping[str, HeadLexeme]:
-    """Upper-case name -> lexeme, in file order.
-
-    Raises:
-        TableError: a pose of an action unit that is no rotation, or further than it goes.
-    """
+    """Return upper-case name -> lexeme."""
     return {
         name: HeadLexeme(
             name,
@@ -76,24 +68,27 @@ def head_lexemes() -> Mapping[str, HeadLexeme]:
     }
 
 
-@cache
-def _table() -> Mapping[str, Any]:
-    return tables.read_toml(tables.text_of(FILE), FILE)
-
-
 def _rows(part: str) -> dict[str, Mapping[str, Any]]:
-    rows: Mapping[str, Mapping[str, Any]] = _table()[part]
-    found = {}
+    """Return the rows of a part; `same_as` is replaced by the row it refers to."""
+    rows: Mapping[str, Mapping[str, Any]] = tables.toml_table(FILE)[part]
+    resolved = {}
     for name, row in rows.items():
         same = row.get("same_as", name)
         if same not in rows:
             raise TableError(f"{FILE}, {part}.{name}, same_as: wanted another {part} lexeme, got {same!r}")
-        found[name] = rows[same]
-    return found
+        resolved[name] = rows[same]
+    return resolved
 
 
 def read_aus(cells: Mapping[str, float], place: str) -> dict[tuple[int, str], float]:
-    """Parse a row such as { 1 = 0.5, 12L = 1.0 } to (AU, side) -> intensity; `place` is for messages."""
+    """Parse action units such as { 1 = 0.5, 12L = 1.0 } to (AU, side LEFT | RIGHT | BOTH) -> intensity.
+
+    Args:
+        place: name of the row in messages.
+
+    Raises:
+        TableError: an unknown action unit or side, or an intensity outside 0..1.
+    """
     known = tables.by_number()
     aus = {}
     for cell, amount in cells.items():

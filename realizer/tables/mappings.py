@@ -1,13 +1,15 @@
-"""Files that map AUs to FAPs: Paul's text format (2010, 5.2), or CSV like `au_to_fap.csv`.
+"""Files that map AUs to FAPs: text in the format of Paul (2010, 5.2), or CSV like `au_to_fap.csv`.
 
-His text has two kinds of lines. `AU`, `AU<tab>L` or `AU<tab>R` names an action unit; each line of five
-numbers after it, `FAP AU-start AU-end FAP-start FAP-end`, gives its effect on a FAP. Empty lines and
-comments do not count. He shows no comment and leaves some cases open; we read them so: a comment begins
-with #; blanks do as well as tabs; below its AU range a line asks nothing and above it what it asks at its
-end; several lines of one FAP are pieces of one polyline; an action unit without lines asks nothing. Where he
-gives no side to an action unit that has sides here, each FAP goes with the side of the face it is on, and
-those in the middle with both; where he gives sides to one that has none here (23), the lines of both sides
-are together its lines.
+The text has two kinds of lines. `AU`, `AU<tab>L` or `AU<tab>R` names an action unit; each line of five
+numbers after it, `FAP AU-start AU-end FAP-start FAP-end`, gives its effect on a FAP. Paul leaves some cases
+open:
+
+- Blanks are accepted instead of tabs, empty lines are ignored, and comments begin with #.
+- A line has no effect below its AU range, and the effect of its end above it. Several lines of one FAP form a
+  polyline. An action unit without lines has no effect.
+- If an action unit that has sides is given without one, each FAP follows the side of the face where it is,
+  and FAPs of the middle follow both. If an action unit without sides is given with sides (23), it has the
+  lines of both.
 """
 
 from __future__ import annotations
@@ -26,26 +28,25 @@ Side: TypeAlias = Literal["L", "R", ""]
 Units: TypeAlias = Mapping[tuple[int, Side], tuple[AuToFap, ...]]
 Line: TypeAlias = tuple[int, AuToFap]
 FORMS = (".txt", ".csv")
-OWN = "au_to_fap"  # .txt or .csv: the rows of a face folder
+OWN = "au_to_fap"  # the file of a face folder, .txt or .csv
 COLUMNS = ("au", "side", "fap", "au_from", "au_to", "fap_from", "fap_to")
 NUMBERS = ("AU-start", "AU-end", "FAP-start", "FAP-end")
 
 
 def read_mapping(path: Path) -> Units:
-    """The rows of a mapping file: (au, side of the axis) -> rows; missing ones are not in it.
+    """Read a mapping file: (AU, side) -> rows of each action unit that it names.
 
     Args:
-        path: .csv as `au_to_fap.csv`; anything else is Paul's text.
+        path: a .csv file like `au_to_fap.csv`, or any other file with Paul's text.
 
     Raises:
-        TableError: a file that cannot be read, or a line that cannot be used; with the line, what was wanted,
-            and what came.
+        TableError: an unreadable file or an invalid line.
     """
     try:
         text = path.read_text("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise TableError(f"{path}: wanted a mapping of action units to FAPs, got {error}") from None
-    named, lines = _read_csv(text, path) if path.suffix == ".csv" else _read_text(text, path)
+    named, lines = _read_csv(text, path) if path.suffix.lower() == ".csv" else _read_text(text, path)
     units: dict[tuple[int, Side], list[Line]] = {(au, side): [] for key in named for au, side in _sides(*key)}
     for number, row in lines:
         _check(row, f"{path}, line {number}")
@@ -58,7 +59,7 @@ def own_file(folder: Path) -> Path | None:
     """Return the mapping file of a face folder, or None.
 
     Raises:
-        TableError: it has two.
+        TableError: there are two.
     """
     own = [path for path in (folder / f"{OWN}{form}" for form in FORMS) if path.is_file()]
     if len(own) > 1:
@@ -67,19 +68,19 @@ def own_file(folder: Path) -> Path | None:
 
 
 def write_mapping(path: Path, rows: Iterable[AuToFap], source: str) -> None:
-    """Write rows of the axis as .csv, or else as Paul's text; reading them back gives the same rows.
+    """Write rows as .csv or, for other suffixes, as Paul's text; `read_mapping` returns the same rows.
 
     Args:
-        source: where they come from, for the file's head.
+        source: source of the rows, for the head of the file.
 
     Raises:
         OSError: the file cannot be written.
     """
-    path.write_text((_as_csv if path.suffix == ".csv" else as_text)(rows, source), "utf-8")
+    path.write_text((_as_csv if path.suffix.lower() == ".csv" else as_text)(rows, source), "utf-8")
 
 
 def as_text(rows: Iterable[AuToFap], source: str) -> str:
-    """Rows of the axis as Paul's text."""
+    """Return rows as Paul's text."""
     lines = [
         f"# AU to FAP: {source}",
         "# AU and side, then FAP, AU-start, AU-end, FAP-start, FAP-end of each FAP it moves",
@@ -104,10 +105,10 @@ def _as_csv(rows: Iterable[AuToFap], source: str) -> str:
         "# licence: that of its source",
         ",".join(COLUMNS),
     ]
-    # An action unit that asks nothing any more has to be named, or the table would speak for it.
-    silent = {(r.au, r.side): replace(r, fap_from=0.0, fap_to=0.0) for r in au_to_fap()}
-    for key in sorted(silent.keys() | units.keys()):
-        for r in units.get(key) or (silent[key],):
+    # An action unit without effect must be named, or the built-in mapping would apply.
+    unused = {(r.au, r.side): replace(r, fap_from=0.0, fap_to=0.0) for r in au_to_fap()}
+    for key in sorted(unused.keys() | units.keys()):
+        for r in units.get(key) or (unused[key],):
             lines.append(
                 f"{r.au},{r.side},{r.fap},{r.au_from:.10g},{r.au_to:.10g},{r.fap_from:.10g},{r.fap_to:.10g}"
             )
@@ -154,7 +155,7 @@ def _read_text(text: str, path: Path) -> tuple[set[tuple[int, str]], list[Line]]
             spans = [_number(field, name, where) for field, name in zip(fields[1:], NUMBERS, strict=True)]
             lines.append((number, AuToFap(au, cast(Side, side), fap, *spans)))
     if not named:
-        raise TableError(f"{path}: wanted action units and what they ask of FAPs, got none")
+        raise TableError(f"{path}: wanted action units and their FAPs, got none")
     return named, lines
 
 
@@ -192,14 +193,14 @@ def _check(row: AuToFap, where: str) -> None:
 
 
 def _sides(au: int, side: str) -> list[tuple[int, Side]]:
-    """Return the targets on our axis of a file's action unit."""
+    """Return the (AU, side) pairs for an action unit of a file."""
     if not by_number()[au].sides:
         return [(au, "")]
     return [(au, cast(Side, side))] if side else [(au, "L"), (au, "R")]
 
 
 def _sides_of(row: AuToFap) -> list[Side]:
-    """The sides of the axis that a file's row is for."""
+    """Return the sides for a row of a file."""
     sides = [side for _, side in _sides(row.au, row.side)]
     parts = faps()[row.fap - 1].name.split("_")  # stretch_l_cornerlip, lower_t_lip_rm_o
     own: list[Side] = ["L"] if {"l", "lm"} & {*parts} else ["R"] if {"r", "rm"} & {*parts} else []
@@ -207,7 +208,7 @@ def _sides_of(row: AuToFap) -> list[Side]:
 
 
 def _joined(lines: list[Line], path: Path) -> tuple[AuToFap, ...]:
-    """Return the rows in order, without duplicates."""
+    """Return the rows as polylines in order, without duplicates."""
     out: list[AuToFap] = []
     ordered = sorted(lines, key=lambda line: (*line[1].key, line[1].au_from, line[0]))
     for number, row in ordered:

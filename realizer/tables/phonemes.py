@@ -1,4 +1,4 @@
-"""The table of phonemes: their articulatory features."""
+"""The articulatory features of phonemes (`phonemes.csv`)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from realizer import tables
 
 @dataclass(frozen=True, slots=True)
 class PhonemeFeatures:
-    """How one IPA symbol is made; `height` of vowels only, 0 close .. 1 open."""
+    """The articulation of an IPA symbol; vowels have a `height` from 0 (close) to 1 (open)."""
 
     ipa: str
     kind: Literal["vowel", "consonant"]
@@ -24,12 +24,11 @@ class PhonemeFeatures:
 
 @cache
 def phoneme_features() -> Mapping[str, PhonemeFeatures]:
-    """IPA symbol -> features."""
-    rows = tables.read_csv(tables.text_of("phonemes.csv"), PhonemeFeatures, "phonemes.csv")
-    return {row.ipa: row for row in rows}
+    """Return IPA symbol -> features."""
+    return {row.ipa: row for row in tables.csv_rows("phonemes.csv", PhonemeFeatures)}
 
 
 @cache
 def vowels() -> frozenset[str]:
-    """The IPA letters of vowels."""
+    """Return the IPA symbols of vowels."""
     return frozenset(ipa for ipa, row in phoneme_features().items() if row.kind == "vowel")

@@ -14,7 +14,7 @@ VOCABULARIES = "vocabularies.toml"
 
 @dataclass(frozen=True, slots=True)
 class PublishedRange:
-    """One FAP of one published profile, as printed and as corrected (Raouzaiou et al. 2002, table 5)."""
+    """The range of a FAP in a published profile, printed and corrected (Raouzaiou et al. 2002, table 5)."""
 
     emotion: str
     profile: int
@@ -28,7 +28,7 @@ class PublishedRange:
 
 @dataclass(frozen=True, slots=True)
 class OwnRange:
-    """One FAP of one of our own profiles."""
+    """The range of a FAP in one of our own profiles."""
 
     emotion: str
     profile: int
@@ -39,7 +39,7 @@ class OwnRange:
 
 @dataclass(frozen=True, slots=True)
 class Statistic:
-    """Mean and deviation of a FAP over faces that show an emotion; None if not verified."""
+    """Mean and deviation of a FAP in faces that show an emotion; None if not verified."""
 
     emotion: str
     fap: int
@@ -50,33 +50,30 @@ class Statistic:
 
 @cache
 def published_ranges() -> tuple[PublishedRange, ...]:
-    """Return all rows, in the order of print."""
-    return tables.read_csv(tables.text_of("profiles_published.csv"), PublishedRange, "profiles_published.csv")
+    """Return the ranges of table 5 in printed order."""
+    return tables.csv_rows("profiles_published.csv", PublishedRange)
 
 
 @cache
 def own_ranges() -> tuple[OwnRange, ...]:
-    """Return all rows, in file order."""
-    return tables.read_csv(tables.text_of("profiles_own.csv"), OwnRange, "profiles_own.csv")
+    """Return the ranges of our own profiles."""
+    return tables.csv_rows("profiles_own.csv", OwnRange)
 
 
 @cache
 def statistics() -> tuple[Statistic, ...]:
-    """Emotion by emotion, rising FAPs."""
-    return tables.read_csv(tables.text_of("fap_statistics.csv"), Statistic, "fap_statistics.csv")
+    """Return the statistics, by emotion and FAP."""
+    return tables.csv_rows("fap_statistics.csv", Statistic)
 
 
 @cache
 def vocabularies(raw: bool = False) -> Mapping[str, frozenset[int]]:
-    """Emotion -> the FAPs that its expressions may move (Raouzaiou et al. 2002, table 2).
+    """Return emotion -> FAPs that its expressions may move (Raouzaiou et al. 2002, table 2).
 
     Args:
-        raw: as printed; else with the misprint put right.
-
-    Raises:
-        TableError: not FAP numbers.
+        raw: whether to return the table as printed, not corrected.
     """
-    table = tables.read_toml(tables.text_of(VOCABULARIES), VOCABULARIES)
+    table = tables.toml_table(VOCABULARIES)
     found = {}
     for emotion, faps in (table["raw"] if raw else table["raw"] | table["corrected"]).items():
         if not all(isinstance(fap, int) and 3 <= fap <= 68 for fap in faps):

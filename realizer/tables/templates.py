@@ -1,4 +1,4 @@
-"""The twelve expression templates of Wojdel (`templates.toml`)."""
+"""The twelve expression templates of Wojdel 2005 (`templates.toml`)."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from realizer.tables.lexemes import read_aus
 from realizer.tables.timing import gaps
 
 FILE = "templates.toml"
-FRAME = 1 / 25  # s; she labelled films of 25 frames a second
+FRAME = 1 / 25  # s; the measured films have 25 frames per second
 
 
 @dataclass(frozen=True, slots=True)
 class Template:
-    """A shape that a face takes.
+    """An expression that was observed on people.
 
     Attributes:
-        features: in her words.
+        features: visible features, in Wojdel's words.
         aus: (AU, side LEFT | RIGHT | BOTH) -> intensity 0..1 at intensity 1.
-        evident: seconds for which it can be seen on a still picture, on average.
-        deviation: seconds, None where she saw too few.
-        possible, probable: seconds, (least, most), None where she gives none.
+        evident: average seconds for which it is visible on still pictures.
+        deviation: standard deviation of these seconds; None if there were too few observations.
+        possible, probable: least and most seconds; None if not published.
     """
 
     name: str
@@ -37,20 +37,18 @@ class Template:
 
 
 def apex(visible: float) -> float:
-    """Seconds from attackPeak to relax of what can be seen for `visible`: half of rising and going counts."""
+    """Return the seconds from attackPeak to relax of an expression that is visible for `visible` seconds.
+
+    It is visible from the middle of its onset to the middle of its offset.
+    """
     onset, _, offset = gaps("face").gaps
     return max(visible - onset.preferred / 2 - offset.preferred / 2, 0.0)
 
 
 @cache
 def templates() -> Mapping[str, Template]:
-    """Upper-case name -> template, in her order.
-
-    Raises:
-        TableError: an unknown action unit, or lengths that are none.
-    """
-    table = tables.read_toml(tables.text_of(FILE), FILE)
-    return {name: _template(name, row) for name, row in table.items()}
+    """Return upper-case name -> template."""
+    return {name: _template(name, row) for name, row in tables.toml_table(FILE).items()}
 
 
 def _template(name: str, row: Mapping[str, object]) -> Template:

@@ -16,7 +16,7 @@ GAP_KEYS = {"name", "preferred", "least", "stiffness", "source"}
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """The time from one sync point to the next: seconds, seconds, 1/s^2."""
+    """The time between two sync points: preferred and least in seconds, stiffness in 1/s^2."""
 
     name: str
     preferred: float
@@ -27,7 +27,7 @@ class Gap:
 
 @dataclass(frozen=True, slots=True)
 class Gaps:
-    """The preferred timing of one element: k sync points, k-1 gaps; `strokes`: gap of repeated strokes."""
+    """The preferred timing of an element: k sync points, k-1 gaps, and the gap between repeated strokes."""
 
     points: tuple[str, ...]
     gaps: tuple[Gap, ...]
@@ -35,9 +35,10 @@ class Gaps:
 
 
 def gaps(element: str, variant: str = "") -> Gaps:
-    """Return the timing of `element` ("faceLexeme"); `variant` is a lexeme or influence, either case.
+    """Return the timing of an element such as "faceLexeme".
 
-    A variant without an entry of its own wants what its element wants.
+    Args:
+        variant: lexeme or influence, in any case; without an entry, it has the timing of the element.
 
     Raises:
         KeyError: no such element.
@@ -48,12 +49,8 @@ def gaps(element: str, variant: str = "") -> Gaps:
 
 @cache
 def all_gaps() -> Mapping[str, Gaps]:
-    """ "element" or "element.VARIANT" -> Gaps.
-
-    Raises:
-        TableError: a gap without source, or not sensible; a `same_as` that leads nowhere.
-    """
-    table = tables.read_toml(tables.text_of(FILE), FILE)
+    """Return "element" or "element.VARIANT" -> gaps."""
+    table = tables.toml_table(FILE)
     rows: dict[str, Mapping[str, Any]] = {}
     for element, row in table.items():
         rows[element] = row

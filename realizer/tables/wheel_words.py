@@ -15,9 +15,10 @@ class WhissellWord:
     """A word of Raouzaiou et al. 2002, table 6.
 
     Attributes:
-        raw_activation: as printed; `activation`: as the paper computes.
+        raw_activation: as printed.
+        activation: as the paper uses it.
         angle: degrees on the ring "plutchik".
-        category: the archetype it belongs to; "" for a word between two archetypes.
+        category: archetype of the word; "" for a word between two archetypes.
     """
 
     word: str
@@ -30,7 +31,7 @@ class WhissellWord:
 
 @dataclass(frozen=True, slots=True)
 class OwnWord:
-    """A word that no source of ours lists: it is another name for one that is known."""
+    """Another name, chosen for this project, for a word of the wheel or of Whissell."""
 
     word: str
     like: str
@@ -43,8 +44,8 @@ class Place:
 
     Attributes:
         angle: degrees.
-        activation: 1..7 of the published archetype, or None.
-        opposite, between: Paul 2010, table 6.1; "" in the other ring, `between` = "trust+fear".
+        activation: 1..7 of a published archetype, or None.
+        opposite, between: of Paul 2010, table 6.1, such as "trust+fear"; "" on the other rings.
     """
 
     ring: Literal["plutchik", "paul", "affect"]
@@ -58,20 +59,18 @@ class Place:
 
 @cache
 def whissell_words() -> Mapping[str, WhissellWord]:
-    """Lower-case word -> row."""
-    rows = tables.read_csv(tables.text_of("words_whissell.csv"), WhissellWord, "words_whissell.csv")
-    return {row.word: row for row in rows}
+    """Return lower-case word -> row."""
+    return {row.word: row for row in tables.csv_rows("words_whissell.csv", WhissellWord)}
 
 
 @cache
 def own_words() -> Mapping[str, OwnWord]:
-    """Lower-case word -> row."""
-    rows = tables.read_csv(tables.text_of("words_own.csv"), OwnWord, "words_own.csv")
-    return {row.word: row for row in rows}
+    """Return lower-case word -> row."""
+    return {row.word: row for row in tables.csv_rows("words_own.csv", OwnWord)}
 
 
 @cache
 def ring(name: str) -> Mapping[str, Place]:
-    """Emotion -> its place on that ring, by rising angle."""
-    rows = tables.read_csv(tables.text_of("emotion_wheel.csv"), Place, "emotion_wheel.csv")
+    """Return emotion -> place on a ring, by angle."""
+    rows = tables.csv_rows("emotion_wheel.csv", Place)
     return {row.name: row for row in sorted(rows, key=lambda row: row.angle) if row.ring == name}

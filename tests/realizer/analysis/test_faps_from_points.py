@@ -133,7 +133,7 @@ def test_bad_points_are_refused_in_words(face: Face) -> None:
     here = {name: at[None] for name, at in rest(face).items()}
     for points, neutral, said in (
         ({}, rest(face), "wanted at least one feature point, got none"),
-        ({"99.1": np.zeros(3)}, rest(face), "wanted such as have a neutral place, got 99.1"),
+        ({"99.1": np.zeros(3)}, rest(face), "wanted those with a neutral position, got 99.1"),
         (here | {"2.1": np.zeros((4, 3))}, rest(face), r"all of one n, got \(1, 3\), \(4, 3\)"),
         (here, rest(face) | {"2.1": np.zeros(2)}, r"neutral: wanted \(3,\) each, got \(2,\)"),
         (here, rest(face) | {"2.1": np.full(3, np.nan)}, "neutral: wanted finite places"),

@@ -164,7 +164,7 @@ def test_emotion_of_an_archetype_and_a_number_is_a_published_profile(play) -> No
         ('name="fear 33" profile="published"', "got 'fear 33', did you mean fear 9?"),
         ('name="feer 8" profile="raw"', "got 'feer 8', did you mean fear 8"),
         ('name="fear 8"', "got 'fear 8'; the published profiles have it"),
-        ('name="accepting"', "accepting: nobody rated how activated it is"),
+        ('name="accepting"', "accepting: its activation was never rated"),
     ],
 )
 def test_emotion_with_an_unknown_number_is_dropped_with_a_suggestion(

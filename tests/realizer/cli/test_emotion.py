@@ -148,7 +148,7 @@ def test_the_wheel_is_a_picture_of_64_faces_and_the_word_one_of_its_own(tmp_path
         (["fear 33", "--profiles", "published"], "got 'fear 33', did you mean fear 9?"),
         (["feer 8", "--profiles", "published"], "got 'feer 8', did you mean fear 8"),
         (["fear 8"], "wanted fear 0 of the own profiles, got 'fear 8'; the published profiles have it"),
-        (["accepting"], "accepting: nobody rated how activated it is"),
+        (["accepting"], "accepting: its activation was never rated"),
         (["joy", "--angle", "3"], "wanted one of WORD, --angle, or --valence with --arousal"),
         ([], "wanted one of WORD"),
         (["joy", "--seed", "-1"], "-1 is not in the range x>=0"),

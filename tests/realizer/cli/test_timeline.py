@@ -67,12 +67,12 @@ def test_a_sound_timeline_gets_advice_that_does_not_count(file: Path) -> None:
     done = run("check", str(file), "--expressions", str(file.parent / "mine"))
     assert done.return_value == 0
     assert done.stdout == ""
-    assert "ADVICE channel brows, entry 3: wry can be seen for 2.6 s, which is unusually long" in done.stderr
+    assert "ADVICE channel brows, entry 3: wry is visible for 2.6 s, which is unusually long" in done.stderr
     assert "wry.toml" in done.stderr
     text = '{"channel": [{"entries": [{"expression": "template:disgust", "duration": 4}]}]}'
     file.with_suffix(".json").write_text(text, "utf-8")
     done = run("check", str(file.with_suffix(".json")))
-    assert "nobody was seen to show it so long" in done.stderr
+    assert "it was never observed so long" in done.stderr
     assert "disgust stands alone" in done.stderr
 
 

@@ -91,5 +91,5 @@ def test_registry_keeps_ours_against_a_plugin(installed, caplog):
     assert found["pi"] != 7
     assert list(found) == ["pi", "tau"]
     assert [record.getMessage() for record in caplog.records] == [
-        f"plug-in 'pi' of test-plugin ({GROUP}, {MODULE}:NUMBER) is not used: there is another of this name"
+        f"plug-in 'pi' of test-plugin ({GROUP}, {MODULE}:NUMBER) is not used: its name is taken"
     ]

@@ -178,7 +178,7 @@ def test_a_key_that_is_short_or_not_there_is_refused_and_not_shown(key: str, tmp
     short = tmp_path / "short"
     short.write_text(key)
     for value in (key, str(short)):
-        with pytest.raises(SettingsError, match=r"jwt_key: wanted a PEM file that is there, or") as refused:
+        with pytest.raises(SettingsError, match=r"jwt_key: wanted an existing PEM file, or") as refused:
             Settings.read(environment={"REALIZER_JWT_KEY": value})
         assert "got something else" in str(refused.value)
 
@@ -188,8 +188,8 @@ def test_a_key_that_is_short_or_not_there_is_refused_and_not_shown(key: str, tmp
     [
         ({"tls_key": Path(__file__)}, "setting tls_key: wanted tls_cert too"),
         ({"tls_cert": Path(__file__), "workers": 2}, "setting tls_cert: wanted workers = 1, got 2"),
-        ({"token": "x", "host": "0.0.0.0", "xface_port": 0}, "its clients cannot bring the token"),
-        ({"jwt_key": "x" * 32, "host": "0.0.0.0", "xface_port": 0}, "its clients cannot bring the token"),
+        ({"token": "x", "host": "0.0.0.0", "xface_port": 0}, "its clients cannot send the token"),
+        ({"jwt_key": "x" * 32, "host": "0.0.0.0", "xface_port": 0}, "its clients cannot send the token"),
         ({"jwt_audience": "faces"}, "setting jwt_audience: wanted jwt_key too"),
         ({"token": "x", "host": "::", "asap_ports": (0, 1)}, "setting asap_ports: wanted none, or host 127"),
     ],

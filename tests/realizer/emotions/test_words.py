@@ -83,5 +83,5 @@ def test_an_unknown_word_gets_those_near_it() -> None:
 
 
 def test_a_word_that_nobody_rated_says_so() -> None:
-    with pytest.raises(ValueError, match="accepting: nobody rated how activated it is"):
+    with pytest.raises(ValueError, match="accepting: its activation was never rated"):
         emotion("accepting")

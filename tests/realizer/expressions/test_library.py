@@ -59,7 +59,7 @@ def test_ones_own_go_before_what_ships_and_that_is_said(folder, caplog) -> None:
     assert library["SMILE"].units == "12L+2R"
     assert len(library) == len(builtin()) + 1
     (note,) = library.notes
-    assert "other.toml: Smile takes the place of the shipped SMILE" in note
+    assert "other.toml: Smile replaces the built-in SMILE" in note
     assert note in caplog.text
     assert builtin()["SMILE"].units == "6+12"
 

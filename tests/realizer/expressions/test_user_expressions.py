@@ -63,7 +63,7 @@ BAD = {
     ),
     "long": (
         "aus = { 12 = 1 }\napex = 9\npossible = [1, 2]",
-        "a.toml: apex: wanted a time with which it is seen for the possible 1 to 2 s, got 9.4 s",
+        "a.toml: apex: wanted a visible duration within the possible 1 to 2 s, got 9.4 s",
     ),
     "name": ('name = "7"\naus = { 12 = 1 }', "a.toml: name: wanted a name that begins with a letter"),
     "neutral": ('name = "Neutral"\naus = { 12 = 1 }', "a.toml: name: wanted another name"),

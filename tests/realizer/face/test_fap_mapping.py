@@ -96,5 +96,5 @@ def test_a_session_shows_characters_by_their_faces_and_the_users_mapping(own: Pa
 
 
 def test_a_setting_names_a_file_that_is_there() -> None:
-    with pytest.raises(SettingsError, match="mapping: wanted a file that is there"):
+    with pytest.raises(SettingsError, match="mapping: wanted an existing file"):
         Settings.read({}, environment={"REALIZER_MAPPING": "nowhere.txt"})

@@ -26,11 +26,11 @@ def series(count: int, every: float, template: str = "surprise") -> list[Visible
 @pytest.mark.parametrize(
     ("lasts", "says"),
     [
-        (0.2, ["anger can be seen for 0.2 s; nobody was seen to show it so short"]),
-        (0.4, ["anger can be seen for 0.4 s, which is unusually short"]),
+        (0.2, ["anger is visible for 0.2 s; it was never observed so short"]),
+        (0.4, ["anger is visible for 0.4 s, which is unusually short"]),
         (1.0, []),
-        (3.0, ["anger can be seen for 3 s, which is unusually long"]),
-        (5.0, ["anger can be seen for 5 s; nobody was seen to show it so long"]),
+        (3.0, ["anger is visible for 3 s, which is unusually long"]),
+        (5.0, ["anger is visible for 5 s; it was never observed so long"]),
     ],
 )
 def test_how_long_an_expression_lasts(lasts: float, says: list[str]) -> None:
@@ -55,7 +55,7 @@ def test_what_enrich_places_for_a_mood_is_usual_for_it(mood: str) -> None:
         for start, peak, relax, end in [times[node.id].tolist()]
     ]
     assert seen
-    assert not [one for one in said(*seen, mood=mood) if "can be seen for" in one]
+    assert not [one for one in said(*seen, mood=mood) if "is visible for" in one]
 
 
 def test_sadness_keeps_away_from_what_ends_before_it() -> None:

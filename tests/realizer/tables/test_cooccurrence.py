@@ -53,7 +53,7 @@ def test_a_rule_that_stands_twice_is_found_where_it_stands_the_second_time() -> 
             f'{HEAD}[domination]\nrules = [\n  "5<63",\n  "7<6",  # "5<63"\n  "5<63",\n]\n', "mine.toml"
         )
     assert str(caught.value).startswith(
-        f"mine.toml:{HEAD.count(chr(10)) + 5}, [domination] '5<63': says what"
+        f"mine.toml:{HEAD.count(chr(10)) + 5}, [domination] '5<63': says the same"
     )
 
 
@@ -61,7 +61,7 @@ def test_rules_that_would_silence_units_in_a_round_are_refused() -> None:
     with pytest.raises(TableError) as caught:
         read_rules(f'{HEAD}[domination]\nrules = ["5<63", "1<2", "2<4", "4<1"]\n', "mine.toml")
     line = HEAD.count("\n") + 2
-    assert str(caught.value) == f"mine.toml:{line}, [domination] '4<1': closes a circle with 1<2, 2<4"
+    assert str(caught.value) == f"mine.toml:{line}, [domination] '4<1': closes a cycle with 1<2, 2<4"
 
 
 def test_all_faults_of_a_file_are_said_at_once() -> None:
@@ -74,7 +74,7 @@ def test_all_faults_of_a_file_are_said_at_once() -> None:
     assert "[dominance]" in lines[0]
     assert "[sets] Y: wanted three memberships" in lines[1]
     assert "'63<5': says the opposite of '5<63'" in lines[2]
-    assert "'5<63': says what '5<63' says already" in lines[3]
+    assert "'5<63': says the same as '5<63'" in lines[3]
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:

@@ -46,7 +46,7 @@ def test_a_language_without_a_list_has_none() -> None:
     [
         ("gut,lob,own", "wanted one of praise, pleasure"),
         ("g*,praise,own", "wanted three letters or more"),
-        ("gut,praise,own\ngut,sorrow,own", "wanted a word that stands once"),
+        ("gut,praise,own\ngut,sorrow,own", "wanted each word once"),
     ],
 )
 def test_a_bad_row_says_what_was_wanted(tmp_path: Path, row: str, says: str) -> None:

@@ -102,7 +102,7 @@ def test_pieces_of_one_fap_join(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("", "wanted action units and what they ask of FAPs, got none"),
+        ("", "wanted action units and their FAPs, got none"),
         ("3 0 1 0 9\n", "line 1: wanted an action unit before its FAPs"),
         ("12 B\n", "line 1: wanted L or R beside AU12, got 'B'"),
         ("\ntwelve\n", "line 2: wanted an action unit's number, got 'twelve'"),
