@@ -15,7 +15,7 @@ import numpy as np
 
 from realizer.core.array_types import Float64, Int32
 from realizer.facebuild.arkit.mouth_coordinates import Mouth, averages
-from realizer.facebuild.mpeg4.measure import WAYS
+from realizer.facebuild.mpeg4.fields import WAYS
 from realizer.facebuild.mpeg4.zones import Triple
 from realizer.facebuild.parts import smooth
 from realizer.tables import faps

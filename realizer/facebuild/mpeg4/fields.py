@@ -17,10 +17,13 @@ import numpy as np
 
 from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
-from realizer.facebuild.mpeg4.measure import WAYS
 from realizer.facebuild.mpeg4.zones import Setup, Zone
 from realizer.tables import faps, read_csv
 
+# The unit vectors of FAP directions.
+WAYS: dict[str, tuple[float, float, float]] = {
+    "up": (0, 1, 0), "down": (0, -1, 0), "left": (1, 0, 0), "right": (-1, 0, 0), "forward": (0, 0, 1),
+}  # fmt: skip
 NEAREST = 1e-9  # in radii: at a feature point the share is its own
 POWER = 1.2  # of the distance: 1 bends sharply at a point, 2 makes a step half-way to the next
 

@@ -14,8 +14,8 @@ from realizer.face.load import folder_of, load_face
 from realizer.face.model import Face
 from realizer.facebuild.check import check_face
 from realizer.facebuild.mpeg4.build import apply_zones, setup_of
-from realizer.facebuild.mpeg4.fap_scores import mean_score, score_faps
 from realizer.facebuild.mpeg4.parameters import write_setup
+from tests.fap_scores import mean_score, score_faps
 
 pytestmark = pytest.mark.xdist_group("faces")
 

@@ -12,11 +12,9 @@ from realizer.core.array_types import Bool, Float64
 from realizer.core.units import ANGLE_UNIT
 from realizer.face.deform import deform
 from realizer.face.model import Face
+from realizer.facebuild.mpeg4.fields import WAYS
 from realizer.tables import Fap
 
-WAYS: dict[str, tuple[float, float, float]] = {
-    "up": (0, 1, 0), "down": (0, -1, 0), "left": (1, 0, 0), "right": (-1, 0, 0), "forward": (0, 0, 1),
-}  # fmt: skip
 UPPER = ("2.2", "2.6", "2.7", "8.1", "8.5", "8.6")
 LOWER = ("2.3", "2.8", "2.9", "8.2", "8.7", "8.8")
 CORNERS = ("2.4", "2.5", "8.3", "8.4")

@@ -8,7 +8,7 @@ import pytest
 
 from realizer.face.load import list_faces, load_face
 from realizer.face.model import Face
-from realizer.facebuild.mpeg4.fap_scores import PEERS, FapScore, mean_score, score_faps
+from tests.fap_scores import PEERS, FapScore, mean_score, score_faps
 
 FACES = [info.name for info in list_faces()]
 FINE = {"error": 0.0, "mirror": 0.0, "others": 0.0, "flips": 0.0, "rough": 0.1}

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
+from pathlib import Path
 
 from realizer.face.model import Face
 from realizer.facebuild.mpeg4.fap_limits import ROLLED, accompanying_faps, usual_range
-from realizer.facebuild.mpeg4.measure import Measure, error_of, flips_of, mirror_of, others_of, rough_of
 from realizer.tables import Fap, faps, read_csv
+from tests.fap_measures import Measure, error_of, flips_of, mirror_of, others_of, rough_of
 
 # The scores of other faces (Paul 2010, tables 4.5), with FAPs that they lack counted as 0.
 PEERS = {"FaceEditor": 2.60, "Greta": 2.32, "Miraface": 1.96, "Xface": 1.32}
@@ -90,8 +90,8 @@ class _Weight:
 
 @cache
 def _weights() -> dict[int, int]:
-    text = files(__package__).joinpath("weights.csv").read_text("utf-8")
-    return {row.fap: row.weight for row in read_csv(text, _Weight, "weights.csv")}
+    path = Path(__file__).with_name("fap_weights.csv")
+    return {row.fap: row.weight for row in read_csv(path.read_text("utf-8"), _Weight, path.name)}
 
 
 def _score_fap(measure: Measure, row: Fap, sign: int) -> FapScore:
