@@ -11,6 +11,13 @@ import numpy as np
 from realizer.core.array_types import Bool, Float64
 from realizer.core.units import ANGLE_UNIT
 from realizer.face.deform import deform
+from realizer.face.mesh_geometry import (
+    half_edges,
+    mirror_twins,
+    neighbour_mean,
+    part_triangles,
+    triangle_normals,
+)
 from realizer.face.model import Face
 from realizer.facebuild.mpeg4.fields import WAYS
 from realizer.tables import Fap
@@ -35,25 +42,13 @@ class Measure:
     @classmethod
     @cache
     def of(cls, face: Face) -> Measure:
-        import scipy.sparse as sp
-        from scipy.spatial import cKDTree
-
         first, last = face.parts["skin"]
-        mine = face.triangles[(face.triangles >= first).all(axis=1) & (face.triangles < last).all(axis=1)]
-        mine = mine - first
+        mine = part_triangles(face.triangles, face.parts["skin"])
         at = face.vertices[first:last].astype(float)
-        off, twin = cKDTree(at).query(at * [-1, 1, 1])
-        n = len(at)
-        i, j = np.concatenate([mine[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))]).T
-        near = sp.csr_matrix((np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), (n, n))
-        near.data[:] = 1
-        count = np.maximum(np.asarray(near.sum(axis=1)).ravel(), 1)
+        twin = mirror_twins(at, 3e-4)
         seen: Bool = np.asarray(face.occlusion[first:last] >= INNER)
-        paired: Bool = np.asarray(off < 3e-4)
-        return cls(
-            face, slice(first, last), mine, seen,
-            sp.diags_array(1 / count) @ near, twin, paired,
-        )  # fmt: skip
+        mean = neighbour_mean(len(at), half_edges(mine), own=False)
+        return cls(face, slice(first, last), mine, seen, mean, twin, np.asarray(twin >= 0))
 
     def at(self, values: dict[int, float]) -> Float64:
         """(n_vertices, 3) metres under the FAPs."""
@@ -172,17 +167,13 @@ def flips_of(measure: Measure, row: Fap, values: dict[int, float], cosine: float
         return 0.0
     corners = measure.triangles
     rest, now = (
-        _ups(at[measure.skin][corners]) for at in (measure.face.vertices.astype(float), measure.at(values))
+        triangle_normals(at[measure.skin], corners)
+        for at in (measure.face.vertices.astype(float), measure.at(values))
     )
     area = np.linalg.norm(rest, axis=1)
     moved = np.abs(rest - now).max(axis=1) > 1e-3 * area
     turned = (rest * now).sum(axis=1) < cosine * area * np.linalg.norm(now, axis=1)
     return float(area[turned].sum() / max(area[moved].sum(), 1e-12))
-
-
-def _ups(corners: Float64) -> Float64:
-    a, b, c = corners.transpose(1, 0, 2)
-    return np.cross(b - a, c - a)
 
 
 def rough_of(measure: Measure, row: Fap, moves: Float64) -> float:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float64, Int32
+from realizer.face.mesh_geometry import edges_of, half_edges, part_triangles
 
 NEEDED = ("skin", "left_eye", "right_eye")  # parts that every face has
 COLLAR = 1  # the clean cut at the bust's end is the hole that every head may have
@@ -62,18 +63,18 @@ def surface_faults(vertices: Float64, triangles: Int32, parts: Parts, mouth: Any
         mouth: (3,) the middle between the lips, or None where that is not known.
     """
     faults = []
-    for name, (first, last) in parts.items():
-        mine = triangles[((triangles >= first) & (triangles < last)).all(axis=1)]
+    for name, ends in parts.items():
+        mine = part_triangles(triangles, ends) + ends[0]
         if len(mine):
             faults += [f"{name}: {fault}" for fault in _turned(mine)]
-    mine = triangles[((triangles >= parts["skin"][0]) & (triangles < parts["skin"][1])).all(axis=1)]
+    mine = part_triangles(triangles, parts["skin"]) + parts["skin"][0]
     eyes = [vertices[slice(*parts[name])].mean(axis=0) for name in ("left_eye", "right_eye") if name in parts]
     return faults + [f"skin: {fault}" for fault in _holes(vertices, mine, eyes, mouth)]
 
 
 def _turned(triangles: Int32) -> list[str]:
     """Return the triangles whose neighbours are all wound the other way."""
-    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    edges = half_edges(triangles)
     owner = np.tile(np.arange(len(triangles)), 3)
     _, inverse, counts = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
     twice = counts[inverse.ravel()] > 1
@@ -94,10 +95,7 @@ def _holes(vertices: Float64, triangles: Int32, eyes: list[Any], mouth: Any) -> 
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
-    edges = np.sort(
-        np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1
-    )
-    pairs, counts = np.unique(edges, axis=0, return_counts=True)
+    pairs, counts = edges_of(triangles)
     rim = pairs[counts == 1]
     if not len(rim):
         return []

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float64, Int32
+from realizer.face.mesh_geometry import edges_of, mirror_twins, triangle_normals
 
 PAIRED = 3e-4  # m that a vertex and its mirror image may be apart
 TURN = 0.25  # least cosine between a triangle before and after
@@ -30,8 +31,6 @@ def decimate(vertices: Float64, triangles: Int32, tolerance: Float64) -> tuple[A
 
 class _Surface:
     def __init__(self, vertices: Float64, triangles: Int32, tolerance: Float64) -> None:
-        from scipy.spatial import cKDTree
-
         self.at = [tuple(row) for row in vertices.tolist()]
         self.faces: list[tuple[int, int, int] | None] = [tuple(row) for row in triangles.tolist()]
         n = len(self.at)
@@ -39,20 +38,16 @@ class _Surface:
         for k, face in enumerate(triangles.tolist()):
             for corner in face:
                 self.around[corner].add(k)
-        a, b, c = (vertices[triangles[:, k]] for k in range(3))
-        ups = np.cross(b - a, c - a)
+        ups = triangle_normals(vertices, triangles)
         area = np.linalg.norm(ups, axis=1)
-        planes = np.c_[ups, -(ups * a).sum(axis=1)] / np.maximum(area, 1e-20)[:, None]
+        planes = np.c_[ups, -(ups * vertices[triangles[:, 0]]).sum(axis=1)] / np.maximum(area, 1e-20)[:, None]
         each = planes[:, :, None] * planes[:, None, :] * area[:, None, None]
         self.quadric = np.zeros((n, 4, 4))
         self.weight = np.zeros(n)
         for k in range(3):
             np.add.at(self.quadric, triangles[:, k], each)
             np.add.at(self.weight, triangles[:, k], area)
-        edges = np.sort(
-            np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1
-        )
-        pairs, count = np.unique(edges, axis=0, return_counts=True)
+        pairs, count = edges_of(triangles)
         self.free = np.asarray(tolerance) > 0
         self.rim: dict[int, set[int]] = {}
         for p, q in pairs[count != 2].tolist():
@@ -60,8 +55,7 @@ class _Surface:
             self.rim.setdefault(q, set()).add(p)
         self.free[[v for v, ends in self.rim.items() if len(ends) != 2]] = False
         self.tolerance = tolerance
-        off, twin = cKDTree(vertices).query(vertices * [-1, 1, 1])
-        self.twin = np.where(np.asarray(off) < PAIRED, twin, -1).tolist()
+        self.twin = mirror_twins(vertices, PAIRED).tolist()
 
     def thin(self) -> tuple[Any, Int32]:
         queue = [entry for v in np.flatnonzero(self.free).tolist() if (entry := self._best(v))]

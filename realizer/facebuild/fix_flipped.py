@@ -11,6 +11,7 @@ from realizer.core.array_types import Bool, Float32, Float64, Int32
 from realizer.face.basis import FAPS, JAW_COS, JAW_DROP, JAW_SIN, ROWS
 from realizer.face.contours import CONTOURS, Contours, contours_of, couple_lips
 from realizer.face.deform import jaw_pose
+from realizer.face.mesh_geometry import triangle_normals
 from realizer.face.model import Fapu
 from realizer.facebuild.mpeg4.fap_limits import OPEN_JAW, ROLLED, accompanying_faps, required_range
 from realizer.tables import faps
@@ -28,7 +29,7 @@ JAW = (JAW_COS + 1, JAW_SIN + 1, JAW_DROP + 1)
 
 def flipped_triangles(rest: Float64, now: Float64, triangles: Int32, cosine: float = 0.0) -> Bool:
     """(m,) which triangles face away from where they faced at rest: turned past the angle of this cosine."""
-    before, after = _ups(rest[triangles]), _ups(now[triangles])
+    before, after = triangle_normals(rest, triangles), triangle_normals(now, triangles)
     sizes = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
     away: Bool = np.asarray((before * after).sum(axis=1) < cosine * sizes)
     return away
@@ -168,8 +169,3 @@ def symmetrize(fields: Mapping[int, Float64], twin: Int32) -> dict[int, Float64]
         mirror, sign = (table[number - 1].mirror, table[number - 1].sign) if number <= FAPS else (number, 1)
         out[number] = (field + sign * fields[mirror][twin] * flip) / 2
     return out
-
-
-def _ups(corners: Float64) -> Float64:
-    a, b, c = corners.transpose(1, 0, 2)
-    return np.asarray(np.cross(b - a, c - a))

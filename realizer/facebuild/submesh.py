@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -82,18 +83,8 @@ class Submesh:
                 a, b, c = triangle[odd:] + triangle[:odd]
                 ab, ca = cut(a, b), cut(a, c)
                 triangles += [(a, ab, ca)] if count == 1 else [(ab, b, c), (ab, c, ca)]
-        mix = sp.csr_matrix(
-            (
-                [w for row in rows for w in row.values()],
-                (
-                    [i for i, row in enumerate(rows) for _ in row],
-                    [j for row in rows for j in row],
-                ),
-            ),
-            (len(rows), len(self)),
-        )
         used, inverse = np.unique(np.array(triangles).reshape(-1, 3), return_inverse=True)
-        mix = mix[used]
+        mix = mix_of(rows, len(self))[used]
         return self.mixed(mix, inverse.reshape(-1, 3)), mix
 
     def threaded(self, loops: list[list[int]]) -> Submesh:
@@ -120,71 +111,11 @@ class Submesh:
             tip = ({a, b, c} - {p, q}).pop()
             new = middle[(p, q) if p < q else (q, p)]
             triangles += [(p, new, tip), (new, q, tip)]
-        mix = sp.csr_matrix(
-            (
-                [w for row in rows for w in row.values()],
-                ([i for i, row in enumerate(rows) for _ in row], [j for row in rows for j in row]),
-            ),
-            (len(rows), len(self)),
-        )
-        return self.mixed(mix, np.array(triangles))
-
-    def subdivided(self, flat: bool = False) -> tuple[Submesh, sp.csr_matrix]:
-        """Every triangle in four by Loop's rules (Warren's weights), and how it was mixed.
-
-        Args:
-            flat: new vertices stay on the old triangles, for surfaces that lie on another one.
-        """
-        ends: dict[tuple[int, int], list[int]] = {}
-        for a, b, c in self.triangles.tolist():
-            for p, q, r in ((a, b, c), (b, c, a), (c, a, b)):
-                ends.setdefault((p, q) if p < q else (q, p), []).append(r)
-        n = len(self)
-        number = {edge: n + k for k, edge in enumerate(ends)}
-        rows: list[int] = []
-        columns: list[int] = []
-        values: list[float] = []
-
-        def put(row: int, weights: dict[int, float]) -> None:
-            rows.extend([row] * len(weights))
-            columns.extend(weights)
-            values.extend(weights.values())
-
-        near: dict[int, list[int]] = {i: [] for i in range(n)}
-        rim: dict[int, list[int]] = {}
-        for (p, q), others in ends.items():
-            near[p].append(q)
-            near[q].append(p)
-            if len(others) == 2 and not flat:
-                put(number[p, q], {p: 3 / 8, q: 3 / 8, others[0]: 1 / 8, others[1]: 1 / 8})
-            else:
-                put(number[p, q], {p: 1 / 2, q: 1 / 2})
-                rim.setdefault(p, []).append(q)
-                rim.setdefault(q, []).append(p)
-        for i in range(n):
-            around, share = (rim[i], 1 / 8) if i in rim else (near[i], 3 / (8 * max(len(near[i]), 3)))
-            if i in rim and len(around) != 2:
-                around = []
-            if flat:
-                around = []
-            put(i, {i: 1 - share * len(around)} | dict.fromkeys(around, share))
-
-        def mid(p: int, q: int) -> int:
-            return number[(p, q) if p < q else (q, p)]
-
-        triangles = []
-        for a, b, c in self.triangles.tolist():
-            ab, bc, ca = mid(a, b), mid(b, c), mid(c, a)
-            triangles += [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
-        mix = sp.csr_matrix((values, (rows, columns)), (n + len(ends), n))
-        return self.mixed(mix, np.array(triangles)), mix
+        return self.mixed(mix_of(rows, len(self)), np.array(triangles))
 
 
-def vertex_normals(vertices: Float64, triangles: Int32) -> Float64:
-    """Unit normals (n, 3), area weighted; zero where no triangle meets."""
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    faces = np.cross(b - a, c - a)
-    out = np.zeros_like(vertices)
-    for k in range(3):
-        np.add.at(out, triangles[:, k], faces)
-    return np.asarray(out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-20))
+def mix_of(rows: Sequence[Mapping[int, float]], n: int) -> sp.csr_matrix:
+    """Return the sparse matrix (len(rows), n) of rows that map columns to shares."""
+    shares = [share for row in rows for share in row.values()]
+    places = [i for i, row in enumerate(rows) for _ in row], [j for row in rows for j in row]
+    return sp.csr_matrix((shares, places), (len(rows), n))

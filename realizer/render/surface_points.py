@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from realizer.core.array_types import Float64, Int32
+from realizer.face.mesh_geometry import part_triangles
 from realizer.face.model import Face
 
 
@@ -23,7 +24,7 @@ def locate_on_skin(
     """
     skin = face.parts.get("skin", (0, len(face.vertices)))
     low, high = places.min(axis=0), places.max(axis=0)
-    mine = face.triangles[((face.triangles >= skin[0]) & (face.triangles < skin[1])).all(axis=1)]
+    mine = part_triangles(face.triangles, skin) + skin[0]
     flat = np.stack([face.vertices @ right, face.vertices[:, 1]], axis=1)
     depth = face.vertices @ towards
     a, b, c = (flat[mine[:, k]] for k in range(3))

@@ -72,6 +72,14 @@ def canonical(name: str) -> str | None:
     return None
 
 
+def other_side(name: str) -> str:
+    """Return `eyeBlinkLeft` for `eyeBlinkRight` and the reverse; names without a side stay."""
+    for one, other in (("Left", "Right"), ("Right", "Left")):
+        if name.endswith(one):
+            return name.removesuffix(one) + other
+    return name
+
+
 def nearest(name: str) -> tuple[str, ...]:
     """Return the ARKit names most similar to a name, for messages."""
     from difflib import get_close_matches

@@ -7,6 +7,7 @@ import numpy as np
 from realizer.core.array_types import Bool, Float64, Int32
 from realizer.core.errors import FaceError
 from realizer.face.au.model import Mouth
+from realizer.face.mesh_geometry import edge_graph, half_edges, part_triangles
 from realizer.face.model import Face
 
 UPPER = ("2.2", "2.6", "2.7", "8.1", "8.5", "8.6")
@@ -25,17 +26,11 @@ def halves(face: Face) -> tuple[Int32, Bool]:
     Returns:
         (k,) indices and (k,) booleans.
     """
-    from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import dijkstra
 
     first, last = face.parts["skin"]
     at = face.vertices[first:last].astype(np.float64)
-    triangles = face.triangles[((face.triangles >= first) & (face.triangles < last)).all(axis=1)] - first
-    a, b = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]).T
-    long = np.linalg.norm(at[a] - at[b], axis=1) + 1e-9
-    # An edge of two triangles must count once: keep its first occurrence.
-    _, once = np.unique(np.minimum(a, b).astype(np.int64) * len(at) + np.maximum(a, b), return_index=True)
-    graph = coo_matrix((long[once], (a[once], b[once])), (len(at),) * 2).tocsr()
+    graph = edge_graph(at, half_edges(part_triangles(face.triangles, face.parts["skin"])))
     seeds = [[face.feature_points[name] - first for name in names] for names in (UPPER, LOWER)]
     away = [dijkstra(graph, directed=False, indices=mine, min_only=True, limit=0.05) for mine in seeds]
     near = np.flatnonzero(np.minimum(*away) < 2 * REACH).astype(np.int32)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Bool, Float64, Int32
+from realizer.face.mesh_geometry import edge_graph, half_edges, part_triangles
 from realizer.face.model import Face
 
 # All other parts of a face move with the head alone, or grow on the skin.
@@ -34,13 +35,11 @@ def skin_roots(face: Face, part: str) -> tuple[Int32, Float64]:
 
     What stands off, such as a lash's tip, follows the nearest vertex of the part that is on the skin.
     """
-    from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import dijkstra
     from scipy.spatial import cKDTree
     from trimesh import triangles
 
-    low, high = face.parts["skin"]
-    skin = face.triangles[((face.triangles >= low) & (face.triangles < high)).all(axis=1)]
+    skin = part_triangles(face.triangles, face.parts["skin"]) + face.parts["skin"][0]
     corners = face.vertices[skin].astype(np.float64)
     first, last = face.parts[part]
     at = face.vertices[first:last].astype(np.float64)
@@ -55,15 +54,11 @@ def skin_roots(face: Face, part: str) -> tuple[Int32, Float64]:
     hit, place, off = near[each, best], places[each, best], off[each, best]
     share = np.clip(shares(corners[hit], place), 0, 1)
     # Parts far from the skin are bound to their nearest place on it as well.
-    mine = face.triangles[((face.triangles >= first) & (face.triangles < last)).all(axis=1)] - first
-    a, b = np.concatenate([mine[:, [0, 1]], mine[:, [1, 2]], mine[:, [2, 0]]]).T
+    edges = half_edges(part_triangles(face.triangles, face.parts[part]))
     grown = np.flatnonzero(off < NEAR)
     root = each.copy()
-    if len(grown) and len(a):
-        long = np.linalg.norm(at[a] - at[b], axis=1) + 1e-9
-        # Edges of two triangles count once.
-        _, once = np.unique(np.minimum(a, b).astype(np.int64) * len(at) + np.maximum(a, b), return_index=True)
-        graph = coo_matrix((long[once], (a[once], b[once])), (len(at),) * 2).tocsr()
+    if len(grown) and len(edges):
+        graph = edge_graph(at, edges)
         away, _, source = dijkstra(
             graph, directed=False, indices=grown, min_only=True, return_predecessors=True
         )

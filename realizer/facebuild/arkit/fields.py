@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float64, Int32
-from realizer.facebuild.arkit.mouth_coordinates import Mouth, averages
+from realizer.face.mesh_geometry import half_edges, neighbour_mean
+from realizer.facebuild.arkit.mouth_coordinates import Mouth
 from realizer.facebuild.mpeg4.fields import WAYS
 from realizer.facebuild.mpeg4.zones import Triple
 from realizer.facebuild.parts import smooth
@@ -56,7 +57,7 @@ class ShapedSkin:
         self.skin, self.moves, self.mouth, self.upper_lid = skin, moves, mouth, upper_lid
         self.place = {name: np.array(value, float) for name, value in points.items()}
         self.vertex, self.zones = vertex, zones
-        self.mean = averages(len(skin), triangles)
+        self.mean = neighbour_mean(len(skin), half_edges(triangles))
         self.eyes = float(self.place["3.5"][0] - self.place["3.6"][0])
         # 1 on the lips, which FAP 3 leaves to their own FAPs, falling to 0 at the chin.
         reach = 0.95 * float(np.linalg.norm(self.place["8.2"] - self.place["2.1"]))

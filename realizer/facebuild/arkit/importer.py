@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -11,9 +10,10 @@ import numpy as np
 
 from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
-from realizer.face.basis import JAW_COS, JAW_DROP, JAW_SIN, pack, unpack
+from realizer.face.basis import unpack
 from realizer.face.features import Point, write_features
 from realizer.face.load import load_face
+from realizer.face.mesh_geometry import fit_ball, vertex_normals
 from realizer.facebuild.arkit.au_measurements import measure_units
 from realizer.facebuild.arkit.fields import ShapedSkin, shape_fields
 from realizer.facebuild.arkit.gltf import Gltf
@@ -21,16 +21,16 @@ from realizer.facebuild.arkit.jaw import drag_of, joint_of
 from realizer.facebuild.arkit.mesh_merge import Surface, cut, merge_pieces
 from realizer.facebuild.arkit.mouth_coordinates import mouth_of
 from realizer.facebuild.arkit.orientation import oriented, pose_of
-from realizer.facebuild.arkit.part_classifier import ASIDE, FLOOR, ball_behind, ball_of, sort_parts
+from realizer.facebuild.arkit.part_classifier import ASIDE, FLOOR, ball_behind, sort_parts
 from realizer.facebuild.arkit.points import points_of
 from realizer.facebuild.arkit.scene import read_pieces
 from realizer.facebuild.au.measure import write_shapes
-from realizer.facebuild.mpeg4.build import apply_zones
+from realizer.facebuild.face_files import write_fields, write_head, write_mesh
+from realizer.facebuild.mpeg4.build import apply_zones, with_brows
 from realizer.facebuild.mpeg4.defaults import default_setup, split_sides
-from realizer.facebuild.mpeg4.rigid import sliding
+from realizer.facebuild.mpeg4.rigid import opening_rows, sliding
 from realizer.facebuild.parts import smooth
 from realizer.facebuild.person.skin_colours import occlusion
-from realizer.facebuild.submesh import vertex_normals
 from realizer.tables.arkit_names import canonical, nearest, shapes
 
 # Gloss of surfaces: skin, hair, wet parts. A file's roughness is meant for other lights.
@@ -39,7 +39,6 @@ GLOSS = {
     "lower_teeth": 0.75, "tongue": 0.35, "hair": 0.10, "beard": 0.08, "shirt": 0.0, "other": 0.1,
 }  # fmt: skip
 DIRECTIONS, CELL = 48, 0.003  # of the baked occlusion: enough for vertices millimetres apart
-DRESSED = ("brows", "lashes", "beard")  # parts that go with the skin under them
 INSIDE = ("upper_teeth", "lower_teeth", "tongue")
 LINED = ("brows", "lashes", *INSIDE)  # cast no shadow: thin, or behind closed lips
 
@@ -148,7 +147,7 @@ def _read(path: Path) -> _Head:
     surface = surface.subset(np.concatenate(list(parts.parts.values())))
     ends = np.cumsum([0] + [len(index) for index in parts.parts.values()])
     ranges = {name: (int(ends[k]), int(ends[k + 1])) for k, name in enumerate(parts.parts)}
-    fit = ball_behind if parts.painted else ball_of
+    fit = ball_behind if parts.painted else fit_ball
     balls = [fit(surface.vertices[slice(*ranges[part])])[0] for part in ("left_eye", "right_eye")]
     surface = replace(surface, vertices=surface.vertices - (balls[0] + balls[1]) / 2)
     found = [f"{len(surface.moves)} of ARKit's {len(shapes())} shapes", *pose.words, *parts.words]
@@ -180,20 +179,10 @@ def _write_head(path: Path, name: str, head: _Head) -> None:
     extras = asset.get("extras") if isinstance(asset.get("extras"), dict) else {}
     author = str(extras.get("author") or asset.get("generator") or "its maker")
     licence = str(extras.get("license") or asset.get("copyright") or "not stated: ask who made it")
-    lines = {"name": name, "source": f"{head.gltf.path.name}, by {author}", "licence": licence,
-             "says": f"Imported from {head.gltf.path.name}"}  # fmt: skip
-    path.write_text(
-        "\n".join(
-            [
-                *(f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in lines.items()),
-                "",
-                "[parts]  # first vertex, last + 1",
-                *(f"{part} = [{first}, {last}]" for part, (first, last) in head.ranges.items()),
-                "",
-            ]
-        ),
-        "utf-8",
-    )
+    source = f"{head.gltf.path.name}, by {author}"
+    says = f"Imported from {head.gltf.path.name}"
+    values = {"name": name, "source": source, "licence": licence, "says": says}
+    write_head(path, values, head.ranges)
 
 
 def _write_mesh(
@@ -213,14 +202,7 @@ def _write_mesh(
             # Light reaches the front of an open mouth and not its back.
             z = at[slice(*ends), 2]
             light[slice(*ends)] = 0.10 + 0.85 * smooth(z.max() - z, 0.030, 0.002)
-    np.savez_compressed(
-        path,
-        vertices=at.astype(np.float32),
-        triangles=surface.triangles.astype(np.int32),
-        colours=_bytes(surface.colours),
-        occlusion=_bytes(light * 255),
-        gloss=_bytes(gloss * 255),
-    )
+    write_mesh(path, at, surface.triangles, surface.colours, light, gloss)
 
 
 def _write_fields(
@@ -238,27 +220,17 @@ def _write_fields(
     made = shape_fields(grown)
     words = _jaw(grown, surface, ranges, rows, stored, points, made)
     for fap, field in made.items():
-        rows[fap] = _with_brows(at, ranges, field, rows[fap])
+        rows[fap] = with_brows(at, ranges, field, rows[fap])
     if head.painted:
         rows |= _gaze_rows(surface, ranges)
-    fit = ball_behind if head.painted else ball_of
+    fit = ball_behind if head.painted else fit_ball
     eyes = [fit(at[slice(*ranges[part])]) for part in ("left_eye", "right_eye")]
-    lid, lid_eye, lid_radius = sliding(rows, at, ranges, eyes)
+    lids = sliding(rows, at, ranges, eyes)
     if head.painted:
-        lid, lid_eye, lid_radius = lid[:0], lid_eye[:0], lid_radius[:0]
-    np.savez_compressed(
-        folder / "fields.npz",
-        **(
-            stored
-            | pack(rows)
-            | {
-                "eye_centre": np.stack([centre for centre, _ in eyes]),
-                "lid": lid.astype(np.int32),
-                "lid_eye": lid_eye.astype(np.int32),
-                "lid_radius": lid_radius.astype(np.float32),
-            }
-        ),
-    )
+        lids = (lids[0][:0], lids[1][:0], lids[2][:0])
+    centres = [centre for centre, _ in eyes]
+    pivots = stored["jaw_pivot"], stored["head_pivot"]
+    write_fields(folder / "fields.npz", rows, stored["head"], *pivots, centres, lids)
     return tuple(sorted(made)), words
 
 
@@ -305,14 +277,8 @@ def _jaw(
         for part in ("lower_teeth", "tongue"):
             if part in ranges:
                 opens[slice(*ranges[part])] = 1
-        opens = _with_brows(surface.vertices, ranges, opens[first:last, None], opens[:, None])[:, 0]
-        arm = surface.vertices - pivot
-        for row, way in (
-            (JAW_COS, np.stack([0 * arm[:, 0], -arm[:, 1], -arm[:, 2]], 1)),
-            (JAW_SIN, np.stack([0 * arm[:, 0], -arm[:, 2], arm[:, 1]], 1)),
-            (JAW_DROP, np.broadcast_to([0, -1.0, 0], arm.shape)),
-        ):
-            rows[row + 1] = way * opens[:, None]
+        opens = with_brows(surface.vertices, ranges, opens[first:last, None], opens[:, None])[:, 0]
+        rows |= opening_rows(surface.vertices, pivot, opens)
     thrust = grown.move("jawForward")
     aside = grown.move("jawRight", "jawLeft")
     for fap, shape in (
@@ -323,23 +289,6 @@ def _jaw(
         if field is not None:
             made[fap] = field
     return words
-
-
-def _with_brows(at: Float64, ranges: dict[str, tuple[int, int]], field: Float64, row: Float64) -> Float64:
-    """Return a row with a field on the skin; brows and lashes follow it, other parts keep their own."""
-    from scipy.spatial import cKDTree
-
-    first, last = ranges["skin"]
-    out = np.array(row)
-    out[first:last] = field
-    tree = cKDTree(at[first:last])
-    for name in DRESSED:
-        if name in ranges:
-            mine = slice(*ranges[name])
-            off, near = tree.query(at[mine], 3)
-            share = 1 / np.maximum(off, 1e-5)
-            out[mine] = (field[near] * (share / share.sum(axis=1, keepdims=True))[..., None]).sum(axis=1)
-    return out
 
 
 def _gaze_rows(surface: Surface, ranges: dict[str, tuple[int, int]]) -> dict[int, Float64]:
@@ -356,7 +305,3 @@ def _gaze_rows(surface: Surface, ranges: dict[str, tuple[int, int]]) -> dict[int
             angle = float(np.arcsin(np.clip(size / max(radius, 1e-6), 0.1, 0.9)))
             rows[fap] = move / angle
     return rows
-
-
-def _bytes(values: Any) -> Any:
-    return np.clip(np.rint(values), 0, 255).astype(np.uint8)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float64, Int32
+from realizer.face.mesh_geometry import edge_graph, half_edges, neighbour_mean
 from realizer.facebuild.mpeg4.zones import Triple
 from realizer.facebuild.person.lips import spline_basis
 
@@ -47,7 +48,7 @@ def mouth_of(skin: Float64, triangles: Int32, points: Mapping[str, Triple], uppe
         skin: (n, 3) metres; triangles: (m, 3) of the skin; upper: vertices above the slit.
     """
     place = {name: np.array(value, float) for name, value in points.items()}
-    graph = edge_graph(skin, triangles)
+    graph = edge_graph(skin, half_edges(triangles))
     inner, from_inner = _ways(graph, skin, place, INNER)
     outer, from_outer = _ways(graph, skin, place, OUTER)
     # Between the contours it rises from 0 to 1, whatever the lip's width; beyond them it stays.
@@ -58,31 +59,10 @@ def mouth_of(skin: Float64, triangles: Int32, points: Mapping[str, Triple], uppe
     above[upper] = 1
     away = np.minimum(inner, outer)
     soft = above
-    mean = averages(len(skin), triangles)
+    mean = neighbour_mean(len(skin), half_edges(triangles))
     for _ in range(BLUR):
         soft = np.asarray(mean @ soft)
     return Mouth(spline_basis(along), across, np.where(away < LIPS, above, soft), away, along)
-
-
-def edge_graph(at: Float64, triangles: Int32) -> Any:
-    """(n, n) sparse: the lengths of the mesh's edges, each once."""
-    import scipy.sparse as sp
-
-    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    edges = np.unique(np.sort(edges, axis=1), axis=0)
-    length = np.maximum(np.linalg.norm(at[edges[:, 0]] - at[edges[:, 1]], axis=1), 1e-7)
-    return sp.csr_matrix((length, (edges[:, 0], edges[:, 1])), (len(at),) * 2)
-
-
-def averages(n: int, triangles: Int32) -> Any:
-    """(n, n) sparse: a vertex and its neighbours in equal parts."""
-    import scipy.sparse as sp
-
-    i, j = np.concatenate([triangles[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))]).T
-    near = sp.csr_matrix((np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), (n, n))
-    near.data[:] = 1
-    near = near + sp.eye_array(n, format="csr")
-    return sp.csr_matrix(sp.diags_array(1 / np.asarray(near.sum(axis=1)).ravel()) @ near)
 
 
 def _ways(graph: Any, at: Float64, place: Mapping[str, Float64], contours: Any) -> tuple[Float64, Int32]:

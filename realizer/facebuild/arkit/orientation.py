@@ -11,6 +11,7 @@ import numpy as np
 from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
 from realizer.facebuild.arkit.mesh_merge import Surface
+from realizer.tables.arkit_names import other_side
 
 UNITS = {"metres": 1.0, "decimetres": 0.1, "centimetres": 0.01, "millimetres": 0.001, "inches": 0.0254}
 EYES = (0.048, 0.078)  # m between the eyes of people from six years on
@@ -96,16 +97,9 @@ def oriented(surface: Surface, pose: Pose) -> Surface:
     """The surface in metres, origin between the eyes, +x the character's left, +y up, +z forward."""
     moves = {name: move @ pose.turn.T * pose.scale for name, move in surface.moves.items()}
     if pose.swapped:
-        moves = {_other(name): move for name, move in moves.items()}
+        moves = {other_side(name): move for name, move in moves.items()}
     at = (surface.vertices - pose.middle) @ pose.turn.T * pose.scale
     return replace(surface, vertices=at, moves=moves)
-
-
-def _other(name: str) -> str:
-    for one, other in (("Left", "Right"), ("Right", "Left")):
-        if name.endswith(one):
-            return name.removesuffix(one) + other
-    return name
 
 
 def _centre(surface: Surface, move: Float64) -> Float64:

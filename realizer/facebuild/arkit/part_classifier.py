@@ -12,6 +12,7 @@ import numpy as np
 
 from realizer.core.array_types import Bool, Float64
 from realizer.core.errors import FaceError
+from realizer.face.mesh_geometry import fit_ball
 from realizer.facebuild.arkit.mesh_merge import Surface, components
 from realizer.tables import read_csv
 
@@ -139,7 +140,7 @@ def is_ball(at: Float64) -> bool:
     """Return whether vertices (n, 3) in metres lie on most of a ball of an eye's size."""
     if len(at) < 12:
         return False
-    centre, radius = ball_of(at)
+    centre, radius = fit_ball(at)
     off = np.abs(np.linalg.norm(at - centre, axis=1) - radius)
     return bool(BALL[0] < radius < BALL[1] and np.percentile(off, 80) < ROUND * radius)
 
@@ -148,13 +149,6 @@ def ball_behind(at: Float64) -> tuple[Float64, float]:
     """Centre and radius of the ball that would lie behind an eye (n, 3) that is part of the skin."""
     middle = np.asarray((at.min(axis=0) + at.max(axis=0)) / 2)
     return np.array([middle[0], middle[1], at[:, 2].max() - EYEBALL]), EYEBALL
-
-
-def ball_of(at: Float64) -> tuple[Float64, float]:
-    """Centre and radius of the ball that fits vertices best."""
-    rows = np.c_[2 * at, np.ones(len(at))]
-    fit = np.linalg.lstsq(rows, (at**2).sum(axis=1), rcond=None)[0]
-    return fit[:3], float(np.sqrt(max(fit[3] + fit[:3] @ fit[:3], 1e-12)))
 
 
 def _place(surface: Surface, word: str) -> Float64 | None:

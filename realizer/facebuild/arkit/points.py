@@ -9,10 +9,10 @@ import numpy as np
 
 from realizer.core.array_types import Float64
 from realizer.face.features import Point
+from realizer.face.mesh_geometry import vertex_normals
 from realizer.facebuild.arkit.mesh_merge import Surface
 from realizer.facebuild.arkit.part_classifier import ball_behind
 from realizer.facebuild.mpeg4.landmarks import find_points
-from realizer.facebuild.submesh import vertex_normals
 
 PUPILS = {"left_eye": "3.5", "right_eye": "3.6"}
 SPHERE = np.concatenate([np.eye(3), -np.eye(3), np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1)

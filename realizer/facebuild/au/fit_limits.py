@@ -15,6 +15,7 @@ from realizer.core.array_types import Float64
 from realizer.face.au.functions import density
 from realizer.face.au.model import Model, Mouth, UnitModel
 from realizer.face.au.mouth import shares
+from realizer.face.mesh_geometry import part_triangles
 from realizer.face.model import Face
 from realizer.facebuild.au.measure import UnitMeasurement
 
@@ -55,8 +56,7 @@ def watched_places(face: Face, mouth: Mouth, between: bool = False) -> WatchedPl
     every, half = face.vertices.astype(np.float64), shares(face, mouth)
     at, upper = every[mine], half[mine]
     if between:
-        first, last = face.parts["skin"]
-        skin = face.triangles[((face.triangles >= first) & (face.triangles < last)).all(axis=1)]
+        skin = part_triangles(face.triangles, face.parts["skin"]) + face.parts["skin"][0]
         for some in (skin, skin[:, :2], skin[:, 1:], skin[:, ::2]):
             at = np.concatenate([at, every[some].mean(axis=1)])
             upper = np.concatenate([upper, half[some].mean(axis=1)])

@@ -12,6 +12,7 @@ from realizer.core.array_types import Float64, Int32
 from realizer.core.errors import FaceError
 from realizer.face.au.mouth import fit_mouth, shares
 from realizer.face.au.units import Unit, units
+from realizer.face.mesh_geometry import part_triangles, triangle_normals, vertex_normals
 from realizer.face.model import Face
 from realizer.facebuild.au.measure import UnitMeasurement
 from realizer.facebuild.person import makehuman
@@ -19,7 +20,7 @@ from realizer.facebuild.person.base_mesh import Ground
 from realizer.facebuild.person.lips import Lips
 from realizer.facebuild.person.person import person_of
 from realizer.facebuild.person.recipe import read_recipe
-from realizer.facebuild.submesh import Submesh, vertex_normals
+from realizer.facebuild.submesh import Submesh
 
 OPEN = 0.3  # baked light below this: inside the head, or the inner side of a lip
 COLLAR = -0.16  # m; below it no face moves
@@ -89,12 +90,12 @@ def _on_base(ground: Ground, face: Face, index: Any) -> tuple[Int32, Float64, Fl
 
     first, last = face.parts["skin"]
     skin = face.vertices[first:last].astype(np.float64)
-    mine = face.triangles[((face.triangles >= first) & (face.triangles < last)).all(axis=1)] - first
+    mine = part_triangles(face.triangles, face.parts["skin"])
     ups, skin = vertex_normals(skin, mine)[index], skin[index]
     body = Submesh.of_quads(ground.mesh.quads["body"], len(ground.at))
     base = body.mix.indices[body.triangles]
     corners = ground.at[base]
-    faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    faces = triangle_normals(ground.at, base)
     near = np.asarray(cKDTree(corners.mean(axis=1)).query(skin, AROUND)[1])
     many = np.repeat(skin, AROUND, axis=0)
     nearest: Any = triangles.closest_point

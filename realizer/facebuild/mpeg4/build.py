@@ -12,10 +12,12 @@ import numpy as np
 
 from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
-from realizer.face.basis import ARRAYS, pack
+from realizer.face.basis import ARRAYS, unpack
 from realizer.face.features import read_features, write_features
 from realizer.face.load import MESH, read_head
+from realizer.face.mesh_geometry import half_edges, neighbour_mean, part_triangles
 from realizer.face.npz_file import read_arrays
+from realizer.facebuild.face_files import write_fields
 from realizer.facebuild.mpeg4 import rigid
 from realizer.facebuild.mpeg4.defaults import default_setup, split_sides
 from realizer.facebuild.mpeg4.faceeditor import fitted, read_faceeditor
@@ -27,9 +29,8 @@ from realizer.tables import faps
 
 FILES = ("face.toml", "mesh.npz", "features.csv", "fields.npz", "recipe.toml", "LICENSE.md", FILE)
 
-DRESSED = ("brows", "lashes")  # parts that lie on the skin and go along with it
+GROWN = ("brows", "lashes", "beard")  # parts that lie on the skin and follow it
 NEAR = 3  # vertices of the skin that one of theirs follows
-PRECISION = 1e-9
 PUPILS = {"3.5", "3.6"}  # points that lie on no skin
 SOFTENED = 1  # times
 
@@ -113,10 +114,10 @@ def apply_zones(folder: Path, setup: Setup, only: Collection[int] = ()) -> None:
         )
     whole = _with_masks_of_skin(setup, parts["skin"])
     made = _softened(zone_fields(whole, at[skin]), whole, at[skin], mesh["triangles"], parts["skin"])
-    rows = {fap: _with_brows(at, parts, made[fap]) for fap in chosen}
+    rows = {fap: with_brows(at, parts, made[fap], np.zeros_like(at)) for fap in chosen}
     if only:
         stored = read_arrays(path, ARRAYS)
-        rows = _unpacked(stored, len(at)) | rows
+        rows = unpack(stored, len(at)) | rows
         eyes = [
             (centre, radius)
             for (_, radius), centre in zip(rigid.balls(at, parts), stored["eye_centre"], strict=True)
@@ -132,18 +133,8 @@ def apply_zones(folder: Path, setup: Setup, only: Collection[int] = ()) -> None:
         rows |= rigid.pupil_rows(at, mesh["colours"], parts, eyes)
         pivot = np.array(points["7.1"])
         head = np.rint(rigid.head_weight(at, points, parts) * 255).astype(np.uint8)
-    lid, lid_eye, lid_radius = rigid.sliding(rows, at, parts, eyes)
-    np.savez_compressed(
-        path,
-        **pack(rows),
-        head=head,
-        jaw_pivot=jaw,
-        head_pivot=pivot,
-        eye_centre=np.stack([centre for centre, _ in eyes]),
-        lid=lid.astype(np.int32),
-        lid_eye=lid_eye.astype(np.int32),
-        lid_radius=lid_radius.astype(np.float32),
-    )
+    centres = [centre for centre, _ in eyes]
+    write_fields(path, rows, head, jaw, pivot, centres, rigid.sliding(rows, at, parts, eyes))
 
 
 def _read(folder: Path) -> tuple[Float64, Any, dict[str, tuple[int, int]], dict[str, Any]]:
@@ -172,14 +163,7 @@ def _softened(
 
     Feature points keep their full movement, so that they still follow their FAPs.
     """
-    import scipy.sparse as sp
-
-    first, last = skin
-    mine = triangles[(triangles >= first).all(axis=1) & (triangles < last).all(axis=1)] - first
-    i, j = np.concatenate([mine[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))]).T
-    near = sp.csr_matrix((np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), (last - first,) * 2)
-    near.data[:] = 1
-    mean = sp.diags_array(1 / np.maximum(np.asarray(near.sum(axis=1)).ravel(), 1)) @ near
+    mean = neighbour_mean(len(at), half_edges(part_triangles(triangles, skin)), own=False)
     ends = {faps()[fap - 1].feature_point for fap in fields} - PUPILS
     fixed = [int(np.argmin(np.linalg.norm(at - np.array(setup.points[name]), axis=1))) for name in ends]
     out = {}
@@ -206,31 +190,17 @@ def _with_masks_of_skin(setup: Setup, skin: tuple[int, int]) -> Setup:
     return replace(setup, masks=masks)
 
 
-def _with_brows(at: Float64, parts: Mapping[str, tuple[int, int]], field: Float64) -> Float64:
-    """A field of the skin on the whole face: brows and lashes go along, the rest stays."""
+def with_brows(at: Float64, parts: Mapping[str, tuple[int, int]], field: Float64, row: Float64) -> Float64:
+    """Return a row (n, k) with a field of the skin; what grows on the skin follows it, other parts stay."""
     from scipy.spatial import cKDTree
 
-    out = np.zeros_like(at)
-    skin = slice(*parts["skin"])
+    out, skin = np.array(row), slice(*parts["skin"])
     out[skin] = field
-    moving = np.flatnonzero(np.abs(field).max(axis=1) > PRECISION)
-    if not len(moving):
-        return out
     tree = cKDTree(at[skin])
-    for name in DRESSED:
+    for name in GROWN:
         if name in parts:
             mine = slice(*parts[name])
             off, near = tree.query(at[mine], NEAR)
             share = 1 / np.maximum(off, 1e-5)
             out[mine] = (field[near] * (share / share.sum(axis=1, keepdims=True))[..., None]).sum(axis=1)
     return out
-
-
-def _unpacked(stored: Mapping[str, Any], n: int) -> dict[int, Float64]:
-    """The fields that a fields.npz holds: what `pack` stored."""
-    rows = {}
-    for k, number in enumerate(stored["row"].tolist()):
-        part = slice(int(stored["start"][k]), int(stored["start"][k + 1]))
-        rows[number] = np.zeros((n, 3))
-        rows[number][stored["vertex"][part]] = stored["move"][part]
-    return rows

@@ -12,6 +12,7 @@ import numpy as np
 
 from realizer.core.array_types import Bool, Float64, Int32
 from realizer.core.errors import FaceError
+from realizer.face.mesh_geometry import edge_graph, half_edges, part_triangles
 from realizer.facebuild.mpeg4.zones import Falloff, Setup, Triple, Zone
 from realizer.tables import faps, read_csv
 
@@ -119,21 +120,13 @@ def split_sides(
 
 def _graph(vertices: Float64, triangles: Int32, skin: tuple[int, int]) -> Any:
     """(skin, skin) sparse: the lengths of the mesh's edges; vertices on one place are one."""
-    import scipy.sparse as sp
-
-    first, last = skin
-    mine = triangles[(triangles >= first).all(axis=1) & (triangles < last).all(axis=1)] - first
-    edges = np.concatenate([mine[:, [0, 1]], mine[:, [1, 2]], mine[:, [2, 0]]])
-    at = vertices[first:last]
+    at = vertices[slice(*skin)]
     # Seams double vertices (one for each side's texture): a hair's length joins them.
     _, place = np.unique(np.round(at, 6), axis=0, return_inverse=True)
     order = np.argsort(place.ravel(), kind="stable")
     same = np.flatnonzero(np.diff(place.ravel()[order]) == 0)
-    edges = np.concatenate([edges, np.stack([order[same], order[same + 1]], 1)])
-    edges = np.unique(np.sort(edges, axis=1), axis=0)
-    length = np.maximum(np.linalg.norm(at[edges[:, 0]] - at[edges[:, 1]], axis=1), 1e-7)
-    n = last - first
-    return sp.csr_matrix((length, (edges[:, 0], edges[:, 1])), (n, n))
+    seams = np.stack([order[same], order[same + 1]], 1)
+    return edge_graph(at, np.concatenate([half_edges(part_triangles(triangles, skin)), seams]))
 
 
 def _ways(graph: Any, at: Float64, places: list[Float64]) -> Float64:

@@ -16,9 +16,9 @@ import numpy as np
 from realizer.core.array_types import Float64, Int32
 from realizer.core.errors import FaceError
 from realizer.face.features import INSIDE, NAMES, Point
+from realizer.face.mesh_geometry import part_triangles, vertex_normals
 from realizer.facebuild.mpeg4.head_geometry import HeadGeometry, find_anchors
 from realizer.facebuild.mpeg4.rigid import balls
-from realizer.facebuild.submesh import vertex_normals
 from realizer.tables import read_csv
 
 NEAR = 0.22  # eye distances; a point farther than this from all evidence is a guess
@@ -62,9 +62,8 @@ def head_of(
             "left one at the larger x and both at one height; turn the head: +x its left, +y up, +z forward"
         )
     origin = (left + right) / 2
-    first, last = parts["skin"]
-    mine = triangles[(triangles >= first).all(axis=1) & (triangles < last).all(axis=1)] - first
-    skin = (at[first:last] - origin) / unit
+    mine = part_triangles(triangles, parts["skin"])
+    skin = (at[slice(*parts["skin"])] - origin) / unit
     head = HeadGeometry(
         skin, mine, vertex_normals(skin, mine), (left - origin) / unit, (right - origin) / unit,
         (radius + other) / 2 / unit,

@@ -10,6 +10,7 @@ import numpy as np
 
 from realizer.core.array_types import Float64, Int32
 from realizer.face.basis import JAW_COS, JAW_DROP, JAW_SIN, TONGUE_COS, TONGUE_SIN
+from realizer.face.mesh_geometry import fit_ball
 from realizer.facebuild.mpeg4.zones import Triple
 from realizer.facebuild.parts import smooth
 
@@ -72,22 +73,23 @@ def jaw_rows(
     opens = drag * (1 - hold) * inner + mover
     vertex = int(np.argmin(np.linalg.norm(at - chin, axis=1)))
     opens = np.minimum(opens / max(opens[vertex], 1e-6), 1)
-    arm = at - pivot
-    turn_cos, turn_sin = np.zeros_like(arm), np.zeros_like(arm)
-    turn_cos[:, 1:] = -arm[:, 1:]
-    turn_sin[:, 1], turn_sin[:, 2] = -arm[:, 2], arm[:, 1]
     # Thrust and shift take the lower lip along, its corners by half.
     near = smooth(lips, 0.012, 0.002) * nearest
     slides = drag * inner * (1 - 0.5 * near) + mover
     slides /= max(slides[vertex], 1e-6)
-    ahead = np.array([0, 0, 1.0])
-    return {
-        JAW_COS + 1: turn_cos * opens[:, None],
-        JAW_SIN + 1: turn_sin * opens[:, None],
-        JAW_DROP + 1: opens[:, None] * np.array([0, -1.0, 0]),
-        14: slides[:, None] * ahead,
+    return opening_rows(at, pivot, opens) | {
+        14: slides[:, None] * np.array([0, 0, 1.0]),
         15: slides[:, None] * np.array([-1.0, 0, 0]),
     }
+
+
+def opening_rows(at: Float64, pivot: Float64, share: Any) -> dict[int, Float64]:
+    """Return the three rows of an opening jaw, (n, 3) each, for vertices (n, 3) that follow it by a share."""
+    # Turned by a about +x: y' = y cos a - z sin a, z' = y sin a + z cos a.
+    y, z = (at - pivot)[:, 1:].T
+    none = np.zeros_like(y)
+    ways = {JAW_COS: (none, -y, -z), JAW_SIN: (none, -z, y), JAW_DROP: (none, none - 1, none)}
+    return {row + 1: (share * np.array(way)).T for row, way in ways.items()}
 
 
 def skin_only(n: int, parts: Parts) -> Float64:
@@ -124,13 +126,7 @@ def tongue_rows(at: Float64, points: Mapping[str, Triple], parts: Parts) -> dict
     along[mine] = np.clip((at[mine, 2] - back) / max(front - back, 1e-9), 0, 1)
     inside = np.zeros(len(at))
     inside[mine] = 1
-    bend = smooth(along, 0.35, 1.0) * along
-    arch = np.sin(np.pi * np.clip((along - 0.15) / 0.85, 0, 1)) ** 2 * inside
-    edge = smooth(along, 0.30, 0.65) * inside
-    turn_cos, turn_sin = np.zeros_like(at), np.zeros_like(at)
-    turn_cos[:, 0] = -at[:, 0] * edge
-    turn_sin[:, 1] = np.abs(at[:, 0]) * edge
-    out = {TONGUE_COS + 1: turn_cos, TONGUE_SIN + 1: turn_sin}
+    bend, arch, out = tongue_bends(at, along, inside)
     for fap, name, weight, way in (
         (43, "6.1", bend, (-1.0, 0, 0)), (44, "6.1", bend, (0, 1.0, 0)),
         (45, "6.1", along**1.5, (0, 0, 1.0)), (46, "6.2", arch, (0, 1.0, 0)),
@@ -140,15 +136,24 @@ def tongue_rows(at: Float64, points: Mapping[str, Triple], parts: Parts) -> dict
     return out
 
 
+def tongue_bends(at: Float64, along: Float64, inside: Any) -> tuple[Float64, Float64, dict[int, Float64]]:
+    """Return how far a tongue's vertices bend and arch, (n,) each, and the rows of its roll.
+
+    Args:
+        at: (n, 3) metres; along: (n,) 0 at the back of the tongue, 1 at its tip; inside: (n,) 1 on it.
+    """
+    bend = smooth(along, 0.35, 1.0) * along
+    arch = np.sin(np.pi * np.clip((along - 0.15) / 0.85, 0, 1)) ** 2 * inside
+    # Rolled about its middle line: the borders rise, whichever side they are on.
+    edge = smooth(along, 0.30, 0.65) * inside
+    turn_cos, turn_sin = np.zeros_like(at), np.zeros_like(at)
+    turn_cos[:, 0], turn_sin[:, 1] = -at[:, 0] * edge, np.abs(at[:, 0]) * edge
+    return bend, arch, {TONGUE_COS + 1: turn_cos, TONGUE_SIN + 1: turn_sin}
+
+
 def balls(at: Float64, parts: Parts) -> list[tuple[Float64, float]]:
     """Centre and radius of the balls that fit the eyeballs best, left and right."""
-    out = []
-    for name in ("left_eye", "right_eye"):
-        shell = at[slice(*parts[name])]
-        rows = np.c_[2 * shell, np.ones(len(shell))]
-        fit = np.linalg.lstsq(rows, (shell**2).sum(axis=1), rcond=None)[0]
-        out.append((fit[:3], float(np.sqrt(max(fit[3] + fit[:3] @ fit[:3], 1e-12)))))
-    return out
+    return [fit_ball(at[slice(*parts[name])]) for name in ("left_eye", "right_eye")]
 
 
 def pupil_rows(

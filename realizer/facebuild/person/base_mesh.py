@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 
 from realizer.core.array_types import Float64
 from realizer.face.features import fapu_of
+from realizer.face.mesh_geometry import neighbour_mean
 from realizer.face.model import Fapu
 from realizer.facebuild.person.makehuman import BaseMesh
 
@@ -31,12 +31,8 @@ class Ground:
         self.mesh, self.at, self.points, self.shape = mesh, at, points, shape
         n = len(at)
         quads = mesh.quads["body"]
-        a = np.concatenate([quads[:, k] for k in range(4)])
-        b = np.concatenate([quads[:, (k + 1) % 4] for k in range(4)])
-        near = sp.csr_matrix((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, a])), (n, n))
-        near.data[:] = 1
-        near = near + sp.eye_array(n, format="csr")
-        self.average = sp.csr_matrix(sp.diags_array(1 / np.asarray(near.sum(axis=1)).ravel()) @ near)
+        sides = np.concatenate([quads[:, [k, (k + 1) % 4]] for k in range(4)])
+        self.average = neighbour_mean(n, sides)
         self.body = np.zeros(n, bool)
         self.body[np.unique(quads)] = True
 

@@ -9,10 +9,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from realizer.core.array_types import Float64
+from realizer.face.mesh_geometry import vertex_normals
 from realizer.facebuild.parts import Part, grid, smooth
 from realizer.facebuild.person.appearance import Appearance
 from realizer.facebuild.person.lids import Lid
-from realizer.facebuild.submesh import Submesh, vertex_normals
+from realizer.facebuild.submesh import Submesh, mix_of
 
 ALONG, ACROSS = 26, 7  # vertices of a brow
 HALF = 0.0047  # m, half its width where it is widest, soft edges included
@@ -171,14 +172,8 @@ def lashes(base: Float64, lid: Lid, centre: Float64, skin: Any, colour: Any, loo
                 if width:
                     put(bent, place + wide * width, fade if upper else fade + 0.3)
             triangles += [(n, n + 1, n + 3), (n, n + 3, n + 2), (n + 2, n + 3, n + 4)]
-    mix = sp.csr_matrix(
-        (
-            [share for row, _ in rows for share in row.values()],
-            ([k for k, (row, _) in enumerate(rows) for _ in row], [i for row, _ in rows for i in row]),
-        ),
-        (len(rows), len(base)),
-    )
     order = np.array(triangles, np.int32)
+    mix = mix_of([row for row, _ in rows], len(base))
     patch = Submesh(mix, np.array([place for _, place in rows]), order)
     count = len(rows)
     return Part(

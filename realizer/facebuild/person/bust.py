@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from realizer.core.array_types import Bool, Float64
+from realizer.face.mesh_geometry import vertex_normals
 from realizer.facebuild import parts
 from realizer.facebuild.parts import Part, smooth
 from realizer.facebuild.person import clothing, skin_colours
@@ -16,7 +17,7 @@ from realizer.facebuild.person.lips import Lips
 from realizer.facebuild.person.person import Person
 from realizer.facebuild.person.recipe import Recipe
 from realizer.facebuild.person.scalp import Scalp
-from realizer.facebuild.submesh import Submesh, vertex_normals
+from realizer.facebuild.submesh import Submesh
 
 ORDER = (
     "skin", "brows", "lashes", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue", "hair",

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float64
+from realizer.face.mesh_geometry import edges_of, vertex_normals
 from realizer.facebuild.decimate import decimate
 from realizer.facebuild.parts import Part, smooth
-from realizer.facebuild.submesh import Submesh, vertex_normals
+from realizer.facebuild.submesh import Submesh
 
 COLLAR = 0.486  # of the face's height, hairline to chin: how far below the chin the collar is in front
 TILT = 0.42  # of the plane of the collar, which rises backwards
@@ -64,10 +65,7 @@ def decimate_hidden(part: Part, keep: Any, ear: Any, chin: float, floor: float) 
         tolerance = np.where(light < HIDDEN, UNSEEN, 0)
         tolerance = np.maximum(tolerance, np.where(ear, EAR, 0))
         tolerance = np.maximum(tolerance, np.where(at[:, 1] < chin - 0.012, BUST, 0))
-        edges = np.concatenate(
-            [part.triangles[:, [0, 1]], part.triangles[:, [1, 2]], part.triangles[:, [2, 0]]]
-        )
-        pairs, count = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
+        pairs, count = edges_of(part.triangles)
         tolerance[pairs[count == 1].ravel()] = 0
     elif part.name == "shirt":
         tolerance = np.where(at[:, 1] < floor + 0.05, DEEP_CLOTH, CLOTH)

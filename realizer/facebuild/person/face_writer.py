@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float64
-from realizer.face.basis import JAW_COS, JAW_DROP, JAW_SIN, pack
 from realizer.face.features import Point, write_features
+from realizer.face.mesh_geometry import mirror_twins
+from realizer.facebuild.face_files import to_bytes, write_fields, write_head, write_mesh
 from realizer.facebuild.fix_flipped import without_flips
+from realizer.facebuild.mpeg4.rigid import opening_rows, sliding
 from realizer.facebuild.parts import Part
 from realizer.facebuild.person.person import Person
 
@@ -20,7 +22,6 @@ SOURCE = (
 )
 LICENCE = "CC0-1.0"
 PAIRED = 3e-4  # m that a vertex and its mirror image may be apart
-MADE = ("name", "source", "licence", "says")  # keys of face.toml that the builder writes, beside the parts
 
 
 def write_face(
@@ -55,54 +56,36 @@ def write_face(
     vertices = np.concatenate([part.vertices for part in made])
     points = _points(person, vertices, base, ranges)
     _mend(rows, made, ranges["skin"], points, person)
-    lid, lid_eye, lid_radius = _sliding(rows, vertices, ranges, person.balls)
-    np.savez_compressed(
+    lids = sliding(rows, vertices, {name: (a, b) for name, (a, b) in ranges.items()}, list(person.balls))
+    write_mesh(
         folder / "mesh.npz",
-        vertices=vertices.astype(np.float32),
-        triangles=np.concatenate([p.triangles + f for p, f in zip(made, count, strict=False)]).astype(
-            np.int32
-        ),
-        colours=_bytes(np.concatenate([part.colours for part in made])),
-        occlusion=_bytes(np.concatenate([np.asarray(part.occlusion) for part in made]) * 255),
-        gloss=_bytes(np.concatenate([part.gloss for part in made]) * 255),
+        vertices,
+        np.concatenate([part.triangles + first for part, first in zip(made, count, strict=False)]),
+        np.concatenate([part.colours for part in made]),
+        np.concatenate([np.asarray(part.occlusion) for part in made]),
+        np.concatenate([part.gloss for part in made]),
     )
-    np.savez_compressed(
-        folder / "fields.npz",
-        **pack(rows),
-        head=_bytes(weight * 255),
-        jaw_pivot=person.jaw_pivot,
-        head_pivot=person.head_pivot,
-        eye_centre=np.stack([centre for centre, _ in person.balls]),
-        lid=lid.astype(np.int32),
-        lid_eye=lid_eye.astype(np.int32),
-        lid_radius=lid_radius.astype(np.float32),
-    )
+    centres = [centre for centre, _ in person.balls]
+    turn = to_bytes(weight * 255)
+    write_fields(folder / "fields.npz", rows, turn, person.jaw_pivot, person.head_pivot, centres, lids)
     write_features(folder / "features.csv", points)
-    lines = [
-        *(f'{key} = "{value}"' for key, value in zip(MADE, (name, SOURCE, LICENCE, says), strict=True)),
-        "",
-        "[parts]  # first vertex, last + 1",
-        *(f"{key} = [{a}, {b}]" for key, (a, b) in ranges.items()),
-    ]
-    (folder / "face.toml").write_text("\n".join(lines) + "\n", "utf-8")
+    head = {"name": name, "source": SOURCE, "licence": LICENCE, "says": says}
+    write_head(folder / "face.toml", head, ranges)
 
 
 def _mend(
     rows: dict[int, Float64], made: list[Part], skin: list[int], points: dict[str, Point], person: Person
 ) -> None:
     """No triangle of the skin turns over: not those of the base mesh, nor those that it was cut into."""
-    from scipy.spatial import cKDTree
-
     mine = next(part for part in made if part.name == "skin")
     first, last = skin
-    found = cKDTree(mine.vertices).query(mine.vertices * [-1, 1, 1])
-    twin = np.where(np.asarray(found[0]) < PAIRED, np.asarray(found[1]), -1)
+    twin = mirror_twins(mine.vertices, PAIRED)
     alone = twin < 0
     twin[alone] = np.flatnonzero(alone)
     places = {name: point.vertex - first for name, point in points.items() if first <= point.vertex < last}
     mended = without_flips(
         {number: row[first:last] for number, row in rows.items()},
-        mine.vertices, mine.triangles, places, person.ground.fapu(), person.jaw_pivot, twin.astype(np.int32),
+        mine.vertices, mine.triangles, places, person.ground.fapu(), person.jaw_pivot, twin,
     )  # fmt: skip
     for number, row in mended.items():
         rows[number][first:last][~alone] = row[~alone]
@@ -110,33 +93,10 @@ def _mend(
 
 def _hang_on_jaw(rows: dict[int, Float64], mine: slice, vertices: Float64, pivot: Float64) -> None:
     """The lower teeth turn, thrust and shift with the jaw bone."""
-    arm = vertices - pivot
-    rows[JAW_COS + 1][mine, 1:] = -arm[:, 1:]
-    rows[JAW_SIN + 1][mine, 1], rows[JAW_SIN + 1][mine, 2] = -arm[:, 2], arm[:, 1]
-    rows[JAW_DROP + 1][mine] = [0, -1, 0]
+    for number, row in opening_rows(vertices, pivot, 1.0).items():
+        rows[number][mine] = row
     rows[14][mine] = [0, 0, 1]
     rows[15][mine] = [-1, 0, 0]
-
-
-def _sliding(
-    rows: dict[int, Float64],
-    vertices: Float64,
-    ranges: dict[str, list[int]],
-    balls: tuple[tuple[Float64, float], ...],
-) -> tuple[Any, Any, Any]:
-    """Vertices of skin and lashes that blinks move over a ball, which ball, and their least distance."""
-    index, side, radius = [], [], []
-    first, last = ranges["skin"][0], ranges["lashes"][1]
-    for k, (centre, size) in enumerate(balls):
-        moves = np.abs(rows[19 + k][:, 1]) + np.abs(rows[21 + k][:, 1]) > 0.02
-        away = np.linalg.norm(vertices - centre, axis=1)
-        # Deeper vertices belong to the socket's lining behind the lid: they may stay.
-        found = np.flatnonzero(moves & (away > size + 0.0001) & (vertices[:, 2] > centre[2] + 0.002))
-        found = found[(found >= first) & (found < last)]
-        index.append(found)
-        side.append(np.full(len(found), k))
-        radius.append(np.minimum(away[found], size + 0.0022))
-    return np.concatenate(index), np.concatenate(side), np.concatenate(radius)
 
 
 def _points(person: Person, vertices: Float64, base: Any, ranges: dict[str, list[int]]) -> dict[str, Point]:
@@ -172,7 +132,3 @@ def _points(person: Person, vertices: Float64, base: Any, ranges: dict[str, list
     vertex = nearest([top.x, top.y + 0.02, top.z], "hair")
     out["11.5"] = Point("11.5", vertex, *vertices[vertex])
     return out
-
-
-def _bytes(values: Any) -> Any:
-    return np.clip(np.rint(values), 0, 255).astype(np.uint8)

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from realizer.core.array_types import Float64
-from realizer.face.basis import JAW_COS, JAW_DROP, JAW_SIN, TONGUE_COS, TONGUE_SIN
 from realizer.facebuild.fix_flipped import symmetrize, without_flips
+from realizer.facebuild.mpeg4.rigid import opening_rows, tongue_bends
 from realizer.facebuild.parts import smooth
 from realizer.facebuild.person.base_mesh import FORWARD, LEFT, UP, Ground, scaled
 from realizer.facebuild.person.lids import lid_fields
@@ -68,11 +68,6 @@ def _jaw(ground: Ground, lips: Lips, pivot: Float64) -> dict[int, Float64]:
     along = _along_tongue(ground)
     tongue = (along >= 0) * 1.0
     opens = drag * (1 - lips.around) + tongue * np.interp(along, (0, 1), SINKS)
-    arm = ground.at - pivot
-    turn_cos, turn_sin = np.zeros_like(arm), np.zeros_like(arm)
-    # Turned by a about +x: y' = y cos a - z sin a, z' = y sin a + z cos a.
-    turn_cos[:, 1:] = -arm[:, 1:]
-    turn_sin[:, 1], turn_sin[:, 2] = -arm[:, 2], arm[:, 1]
     # Thrust and shift take the lower lip along; the upper one stays.
     # The corners, shared by both, go 0.4 of the way.
     # The lips are stretched between: a shelf at the corner would show.
@@ -81,10 +76,7 @@ def _jaw(ground: Ground, lips: Lips, pivot: Float64) -> dict[int, Float64]:
     )
     slides = drag * (1 - lips.lips + lips.lips * lip) + tongue
     slides /= slides[chin]
-    return {
-        JAW_COS + 1: turn_cos * opens[:, None],
-        JAW_SIN + 1: turn_sin * opens[:, None],
-        JAW_DROP + 1: -opens[:, None] * UP,
+    return opening_rows(ground.at, pivot, opens) | {
         14: slides[:, None] * FORWARD,
         15: -slides[:, None] * LEFT,
     }
@@ -239,23 +231,15 @@ def _along_tongue(ground: Ground) -> Float64:
 
 
 def _tongue(ground: Ground) -> dict[int, Float64]:
-    at, along = ground.at, _along_tongue(ground)
+    along = _along_tongue(ground)
     mine = along >= 0
     along = np.maximum(along, 0)
     tip, body = ground.points["6.1"], ground.points["6.2"]
-    bend = smooth(along, 0.35, 1.0) * along
-    arch = np.sin(np.pi * np.clip((along - 0.15) / 0.85, 0, 1)) ** 2 * mine
-    edge = smooth(along, 0.30, 0.65) * mine
-    # Rolled by a about its middle line: the borders rise, whichever side they are on.
-    turn_cos, turn_sin = np.zeros_like(at), np.zeros_like(at)
-    turn_cos[:, 0] = -at[:, 0] * edge
-    turn_sin[:, 1] = np.abs(at[:, 0]) * edge
-    return {
+    bend, arch, roll = tongue_bends(ground.at, along, mine)
+    return roll | {
         43: scaled(bend[:, None] * -LEFT, tip, -LEFT),
         44: scaled(bend[:, None] * UP, tip, UP),
         # On its way out it climbs over the lower teeth.
         45: scaled((along**1.5)[:, None] * (FORWARD + CLIMB * UP), tip, FORWARD),
         46: scaled(arch[:, None] * UP, body, UP),
-        TONGUE_COS + 1: turn_cos,
-        TONGUE_SIN + 1: turn_sin,
     }

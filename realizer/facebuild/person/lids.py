@@ -9,6 +9,7 @@ import numpy as np
 from realizer.core.array_types import Float64
 from realizer.facebuild.parts import smooth
 from realizer.facebuild.person.base_mesh import FORWARD, UP, Ground, scaled
+from realizer.facebuild.person.makehuman import walk
 
 # Two vertices each of the rings around the left eye, from the edge of the lid outwards.
 RINGS = ((13352, 13369), (6785, 6844), (11465, 11485), (6787, 6845), (6789, 6846), (11515, 11493))
@@ -26,11 +27,9 @@ class Lid:
     """
 
     def __init__(self, ground: Ground, side: int) -> None:
-        from realizer.facebuild.person.makehuman import walk
-
         self.side = side
         at = ground.at
-        edges = ground.mesh.edges()
+        edges = ground.mesh.edges
         rings = []
         for first, _ in RINGS:
             tips = [next(iter(e - {first})) for e in edges if first in e]

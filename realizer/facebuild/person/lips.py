@@ -13,6 +13,7 @@ import numpy as np
 from realizer.core.array_types import Bool, Float64
 from realizer.facebuild.parts import smooth
 from realizer.facebuild.person.base_mesh import FORWARD, LEFT, UP, Ground, scaled
+from realizer.facebuild.person.makehuman import walk
 
 # Two vertices each of the rings around the mouth, from inside out: ring 1 is where the lips meet, ring 7 the
 # border of the red. First the vertex in the middle of the upper lip, then its neighbour.
@@ -78,9 +79,7 @@ class Lips:
 
     def __init__(self, ground: Ground) -> None:
         at, n = ground.at, len(ground.at)
-        edges = ground.mesh.edges()
-        from realizer.facebuild.person.makehuman import walk
-
+        edges = ground.mesh.edges
         rings = []
         for first, second in RINGS:
             ring = walk(edges, first, second)

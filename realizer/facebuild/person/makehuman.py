@@ -13,6 +13,7 @@ import numpy as np
 
 from realizer.core.array_types import Float64, Int32
 from realizer.core.errors import FaceError
+from realizer.face.mesh_geometry import mirror_twins
 
 OBJ = Path("mpfb2/3dobjs/base.obj")
 DECIMETRE = 0.1  # m; the data's unit
@@ -34,18 +35,12 @@ class BaseMesh:
 
     def mirror(self) -> Int32:
         """Return each vertex's mirror image (n,), or the vertex itself."""
-        from scipy.spatial import cKDTree
-
-        found = cKDTree(self.vertices).query(self.vertices * [-1, 1, 1])
-        off, twin = np.asarray(found[0]), np.asarray(found[1])
-        return np.where(off < 2e-3, twin, np.arange(len(twin))).astype(np.int32)
-
-    def edges(self) -> Edges:
-        """Every edge of the body with the quads that share it, as sets of vertices."""
-        return self._edges
+        twin = mirror_twins(self.vertices, 2e-3)
+        return np.where(twin < 0, np.arange(len(twin)), twin).astype(np.int32)
 
     @cached_property
-    def _edges(self) -> Edges:
+    def edges(self) -> Edges:
+        """The edges of the body, with the quads at each."""
         edges = Edges()
         for quad in self.quads["body"].tolist():
             for a, b in zip(quad, quad[1:] + quad[:1], strict=True):

@@ -10,11 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from realizer.core.array_types import Float64
+from realizer.face.mesh_geometry import fit_ball
 from realizer.facebuild.parts import smooth
 from realizer.facebuild.person import makehuman
 from realizer.facebuild.person.base_mesh import Ground
 from realizer.facebuild.person.lips import close_lips
 from realizer.tables import read_csv
+from realizer.tables.arkit_names import other_side
 
 MIRROR = np.array([-1.0, 1.0, 1.0])
 EYE_INSET = 0.00015  # m; how much deeper the ball lies than the socket's fit
@@ -67,7 +69,7 @@ def person_of(data: Path, targets: Mapping[str, float]) -> Person:
     @cache
     def shape(unit: str) -> Float64:
         # The data are rounded to a tenth of a millimetre, each side on its own: take the mean of both.
-        sides = [makehuman.read_target(data, name, len(at)) for name in (unit, _other_side(unit))]
+        sides = [makehuman.read_target(data, name, len(at)) for name in (unit, other_side(unit))]
         return np.asarray((sides[0] + sides[1][twin] * MIRROR) / 2 * makehuman.DECIMETRE)
 
     at = _relaxed(Ground(mesh, at, points, shape))
@@ -105,19 +107,9 @@ def _relaxed(ground: Ground) -> Float64:
     return at
 
 
-def _other_side(unit: str) -> str:
-    """`eyeBlinkLeft` for `eyeBlinkRight` and the other way; names without a side stay."""
-    for one, other in (("Left", "Right"), ("Right", "Left")):
-        if unit.endswith(one):
-            return unit.removesuffix(one) + other
-    return unit
-
-
 def _ball(shell: Float64) -> tuple[Float64, float]:
-    """Centre and radius of the ball that fits an eye best."""
-    rows = np.c_[2 * shell, np.ones(len(shell))]
-    fit = np.linalg.lstsq(rows, (shell**2).sum(axis=1), rcond=None)[0]
-    return fit[:3], float(np.sqrt(fit[3] + fit[:3] @ fit[:3])) - EYE_INSET
+    centre, radius = fit_ball(shell)
+    return centre, radius - EYE_INSET
 
 
 def _joint(mesh: makehuman.BaseMesh, at: Float64, name: str) -> Float64:

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float64
-from realizer.facebuild.submesh import Submesh, vertex_normals
+from realizer.face.mesh_geometry import vertex_normals
+from realizer.facebuild.submesh import Submesh
 
 CROWN, CHIN, BACK = (
     0.1087,

@@ -1,9 +1,10 @@
-"""Cutting and refining surfaces, and the lips' splines."""
+"""Tests of pieces of the base mesh."""
 
 import numpy as np
 import pytest
 
-from realizer.facebuild.submesh import Submesh, vertex_normals
+from realizer.face.mesh_geometry import vertex_normals
+from realizer.facebuild.submesh import Submesh, mix_of
 
 GRID = np.array([[x, y, 0.0] for y in range(4) for x in range(4)])
 QUADS = np.array(
@@ -22,28 +23,24 @@ def area(patch: Submesh) -> float:
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 
 
-def test_a_cut_leaves_a_straight_edge_and_nothing_beyond(sheet: Submesh) -> None:
+def test_submesh_clipped_ends_in_a_straight_edge(sheet: Submesh) -> None:
     cut, _ = sheet.clipped(sheet.positions(GRID)[:, 0] - 1.25)
     assert cut.positions(GRID)[:, 0].min() == pytest.approx(1.25)
     assert area(cut) == pytest.approx(3 * 1.75)
 
 
-@pytest.mark.parametrize("flat", [True, False])
-def test_refining_makes_four_of_each_triangle(sheet: Submesh, flat: bool) -> None:
-    fine, _ = sheet.subdivided(flat)
-    assert len(fine.triangles) == 4 * len(sheet.triangles)
-    # Loop's rule rounds the four corners of a sheet; flat keeps every place.
-    assert area(fine) == pytest.approx(9, abs=0 if flat else 0.3)
-    assert np.allclose(vertex_normals(fine.positions(GRID), fine.triangles), [0, 0, 1])
+def test_submesh_vertices_are_mixes_of_base_vertices(sheet: Submesh) -> None:
+    cut = sheet.clipped(sheet.positions(GRID)[:, 1] - 0.4)[0]
+    assert np.allclose(np.asarray(cut.mix.sum(axis=1)).ravel(), 1)
+    assert np.allclose(cut.positions(GRID + np.array([0, 0, 2.0]))[:, 2], 2)
 
 
-def test_cut_and_refined_vertices_are_mixes_of_base_vertices(sheet: Submesh) -> None:
-    fine = sheet.clipped(sheet.positions(GRID)[:, 1] - 0.4)[0].subdivided()[0]
-    assert np.allclose(np.asarray(fine.mix.sum(axis=1)).ravel(), 1)
-    assert np.allclose(fine.positions(GRID + np.array([0, 0, 2.0]))[:, 2], 2)
+def test_mix_of_puts_shares_into_their_columns() -> None:
+    mixed = mix_of([{0: 0.25, 2: 0.75}, {1: 1.0}], 3)
+    assert mixed.toarray().tolist() == [[0.25, 0, 0.75], [0, 1, 0]]
 
 
-def test_a_threaded_loop_has_twice_its_vertices_and_stays_round() -> None:
+def test_submesh_threaded_doubles_the_vertices_of_round_loops() -> None:
     turn = np.arange(8) * np.pi / 4
     rings = [np.stack([r * np.cos(turn), r * np.sin(turn), 0 * turn], 1) for r in (1.0, 2.0)]
     base = np.concatenate(rings)

@@ -13,7 +13,7 @@ from realizer.face.deform import deform
 from realizer.face.load import folder_of, load_face
 from realizer.face.model import Face
 from realizer.facebuild.check import check_face
-from realizer.facebuild.mpeg4.build import apply_zones, setup_of
+from realizer.facebuild.mpeg4.build import apply_zones, setup_of, with_brows
 from realizer.facebuild.mpeg4.parameters import write_setup
 from tests.fap_scores import mean_score, score_faps
 
@@ -118,3 +118,14 @@ def test_the_command_makes_another_face_of_a_head(tmp_path: Path) -> None:
     assert face_of(folder).name == "zoe"
     assert (folder / "mpeg4.toml").is_file()
     assert check_face("zoe", tmp_path) == ()
+
+
+def test_with_brows_moves_what_grows_on_the_skin() -> None:
+    at = np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.001], [0.1, 0, 0.001], [0, 0.2, 0]])
+    parts = {"skin": (0, 3), "beard": (3, 4), "lashes": (4, 5), "hair": (5, 6)}
+    field = np.array([[0, 1.0, 0], [0, 2.0, 0], [0, 0, 0]])
+    row = with_brows(at, parts, field, np.full((6, 3), 9.0))
+    assert row[:3] == pytest.approx(field)
+    assert row[3] == pytest.approx([0, 1, 0], abs=0.05)
+    assert row[4] == pytest.approx([0, 2, 0], abs=0.05)
+    assert (row[5] == 9).all()

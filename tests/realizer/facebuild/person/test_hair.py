@@ -8,9 +8,10 @@ import scipy.sparse as sp
 
 from realizer.core.errors import FaceError
 from realizer.face.load import load_face
+from realizer.face.mesh_geometry import vertex_normals
 from realizer.facebuild.person.hair import Style, hair, scalp_of, shadow, style_of
 from realizer.facebuild.person.scalp import Scalp
-from realizer.facebuild.submesh import Submesh, vertex_normals
+from realizer.facebuild.submesh import Submesh
 from realizer.tables import read_toml, text_of
 
 pytestmark = pytest.mark.xdist_group("faces")

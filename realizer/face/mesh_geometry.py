@@ -1,0 +1,81 @@
+"""Edges, neighbours, normals, mirror images and balls of triangle meshes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from realizer.core.array_types import Float64, Int32
+
+
+def part_triangles(triangles: Int32, part: tuple[int, int]) -> Int32:
+    """Return the triangles (k, 3) of a part (first, last + 1), with vertices counted from its first."""
+    first, last = part
+    return np.asarray(triangles[((triangles >= first) & (triangles < last)).all(axis=1)] - first)
+
+
+def half_edges(triangles: Int32) -> Int32:
+    """Return the sides of triangles (m, 3) in their direction, (3 m, 2)."""
+    return np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+
+
+def edges_of(triangles: Int32) -> tuple[Int32, Any]:
+    """Return the edges (k, 2) of triangles (m, 3), each once, and the number of triangles at each, (k,)."""
+    pairs, counts = np.unique(np.sort(half_edges(triangles), axis=1), axis=0, return_counts=True)
+    return pairs, counts
+
+
+def edge_graph(at: Float64, edges: Int32) -> Any:
+    """Return the lengths of edges (k, 2), which may repeat, as a sparse matrix (n, n), each once."""
+    from scipy.sparse import csr_matrix
+
+    edges = np.unique(np.sort(edges, axis=1), axis=0)
+    length = np.maximum(np.linalg.norm(at[edges[:, 0]] - at[edges[:, 1]], axis=1), 1e-7)
+    return csr_matrix((length, (edges[:, 0], edges[:, 1])), (len(at),) * 2)
+
+
+def neighbour_mean(n: int, edges: Int32, own: bool = True) -> Any:
+    """Return the sparse matrix (n, n) that takes the mean over a vertex's neighbours.
+
+    Args:
+        edges: (k, 2), which may repeat.
+        own: count the vertex itself, too.
+    """
+    import scipy.sparse as sp
+
+    i, j = edges.T
+    near = sp.csr_matrix((np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), (n, n))
+    near.data[:] = 1
+    if own:
+        near = near + sp.eye_array(n, format="csr")
+    return sp.csr_matrix(sp.diags_array(1 / np.maximum(np.asarray(near.sum(axis=1)).ravel(), 1)) @ near)
+
+
+def triangle_normals(at: Float64, triangles: Int32) -> Float64:
+    """Return the normals (m, 3) of triangles, each as long as twice its area."""
+    a, b, c = (at[triangles[:, k]] for k in range(3))
+    return np.asarray(np.cross(b - a, c - a))
+
+
+def vertex_normals(at: Float64, triangles: Int32) -> Float64:
+    """Return unit normals (n, 3), area weighted; zero for a vertex without triangles."""
+    faces, out = triangle_normals(at, triangles), np.zeros_like(at)
+    for k in range(3):
+        np.add.at(out, triangles[:, k], faces)
+    return np.asarray(out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-20))
+
+
+def mirror_twins(at: Float64, within: float) -> Int32:
+    """Return the vertex (n,) within that distance of each vertex's mirror image, or -1."""
+    from scipy.spatial import cKDTree
+
+    off, twin = cKDTree(at).query(at * [-1, 1, 1])
+    return np.where(np.asarray(off) < within, twin, -1).astype(np.int32)
+
+
+def fit_ball(at: Float64) -> tuple[Float64, float]:
+    """Return centre (3,) and radius of the ball that fits vertices (n, 3) best."""
+    rows = np.c_[2 * at, np.ones(len(at))]
+    fit = np.linalg.lstsq(rows, (at**2).sum(axis=1), rcond=None)[0]
+    return fit[:3], float(np.sqrt(max(fit[3] + fit[:3] @ fit[:3], 1e-12)))
