@@ -1,0 +1,61 @@
+"""Tests of the eyelids."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from realizer.facebuild.person.base_mesh import Ground
+from realizer.facebuild.person.lids import Lid, lid_fields
+
+pytestmark = pytest.mark.xdist_group("mask")
+
+
+def test_lid_rings_are_mirror_images(ground: Ground, mask_lids: list[Lid]) -> None:
+    left, right = mask_lids
+    for one, other in zip(left.rings, right.rings, strict=True):
+        assert ground.at[one] == pytest.approx(ground.at[other] * [-1, 1, 1])
+
+
+def test_lid_edges_run_from_the_inner_to_the_outer_corner(ground: Ground, mask_lids: list[Lid]) -> None:
+    for lid in mask_lids:
+        for edge in (lid.upper, lid.lower):
+            assert (edge[0], edge[-1]) == (lid.inner, lid.outer)
+            assert (np.diff(np.abs(ground.at[edge, 0])) > 0).all()
+        assert set(lid.upper) | set(lid.lower) == set(lid.rings[0])
+        assert ground.at[lid.upper, 1].mean() > ground.at[lid.lower, 1].mean()
+
+
+def test_lid_gap_is_widest_between_the_corners_and_nothing_beyond(
+    ground: Ground, mask_lids: list[Lid]
+) -> None:
+    for lid in mask_lids:
+        inner, outer = ground.at[[lid.inner, lid.outer], 0]
+        x = np.linspace(inner, outer, 21)
+        gap = lid.gap(x)
+        assert gap[[0, -1]] == pytest.approx(0, abs=1e-9)
+        assert gap.max() == pytest.approx(lid.aperture, rel=0.05)
+        assert not lid.gap(np.array([inner - lid.side * 0.001, outer + lid.side * 0.001])).any()
+        assert lid.gap_of(ground.at, upper=True).max() == pytest.approx(lid.aperture, rel=0.05)
+        assert lid.middle(np.array([(inner + outer) / 2])) == pytest.approx(0, abs=0.001)
+
+
+def test_lid_fields_move_the_edge_s_middle_by_one(ground: Ground) -> None:
+    made = lid_fields(ground)
+    assert set(made) == {19, 20, 21, 22, 27, 28}
+    for fap, point, way in ((19, "3.1", -1), (20, "3.2", -1), (21, "3.3", 1), (22, "3.4", 1)):
+        assert made[fap][ground.points[point]] == pytest.approx([0, way, 0])
+
+
+def test_lid_fields_of_both_lids_close_the_whole_opening(ground: Ground, mask_lids: list[Lid]) -> None:
+    made, lid = lid_fields(ground), mask_lids[0]
+    shut = ground.at + 0.5 * lid.aperture * (made[19] + made[21])
+    upper, lower = (shut[edge] for edge in (lid.upper, lid.lower))
+    below = np.interp(upper[:, 0], lower[:, 0], lower[:, 1])
+    assert upper[:, 1] - below == pytest.approx(np.zeros(len(upper)), abs=0.15 * lid.aperture)
+
+
+def test_lid_fields_leave_the_other_side_and_the_mouth(ground: Ground) -> None:
+    made = lid_fields(ground)
+    assert not made[19][ground.at[:, 0] < -0.001].any()
+    assert not made[21][ground.at[:, 1] < -0.05].any()

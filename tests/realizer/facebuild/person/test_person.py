@@ -1,0 +1,59 @@
+"""Tests of a person made of the base mesh."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from realizer.facebuild.person.makehuman import BaseMesh
+from realizer.facebuild.person.person import Person, identity
+
+pytestmark = pytest.mark.xdist_group("mask")
+AT = np.array([[3, 1, 0], [-3, 1, 0], [4, 1, 0], [-4, 1, 0], [0, -2, 1], [2, -2, 0], [-2, -2, 0.0]])
+QUADS = {"helper-l-eye": np.array([[0, 2, 0, 2]]), "helper-r-eye": np.array([[1, 3, 1, 3]])}
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    """One target for both sides, one for each."""
+    folder = tmp_path / "mpfb2/targets"
+    (folder / "cheek").mkdir(parents=True)
+    (folder / "low.target").write_text("4 0 -1 0\n")
+    (folder / "cheek/l-wide.target").write_text("5 1 0 0\n")
+    (folder / "cheek/r-wide.target").write_text("6 -1 0 0\n")
+    (folder / "cheek/odd.target").write_text("5 0 2 0\n")
+    return tmp_path
+
+
+@pytest.fixture
+def mesh() -> BaseMesh:
+    return BaseMesh(AT, np.zeros((len(AT), 2)), QUADS)
+
+
+def test_identity_is_in_metres_from_between_the_eyes(mesh: BaseMesh, data: Path) -> None:
+    at = identity(mesh, data, {})
+    assert at[:4].mean(axis=0) == pytest.approx([0, 0, 0])
+    assert np.ptp(at, axis=0) == pytest.approx(np.ptp(AT, axis=0) / 10)
+
+
+def test_identity_weighs_targets_of_both_sides(mesh: BaseMesh, data: Path) -> None:
+    plain = identity(mesh, data, {})
+    moved = identity(mesh, data, {"low": 0.5, "cheek/*wide": 1.0}) - plain
+    assert moved[4] == pytest.approx([0, -0.05, 0])
+    assert moved[5:] == pytest.approx(np.array([[0.1, 0, 0], [-0.1, 0, 0]]))
+
+
+def test_identity_is_even_whatever_the_targets(mesh: BaseMesh, data: Path) -> None:
+    at = identity(mesh, data, {"cheek/odd": 1.0})
+    assert at[mesh.mirror()] == pytest.approx(at * [-1, 1, 1])
+
+
+def test_person_turns_whole_above_the_jaw_and_not_below_the_neck(person: Person) -> None:
+    turns, at = person.turns(), person.ground.at
+    assert (turns[person.ground.body & (at[:, 1] > -0.05)] == 1).all()
+    assert (turns[at[:, 1] < -0.24] < 0.1).all()
+    middle = np.flatnonzero(person.ground.body & (at[:, 0] == 0) & (at[:, 1] < -0.05))
+    order = np.argsort((at[:, 1] + 0.3 * at[:, 2])[middle])
+    assert (np.diff(turns[middle[order]]) >= 0).all()
