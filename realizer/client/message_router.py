@@ -84,7 +84,7 @@ class Router:
         if isinstance(message, bytes):
             frame = unpack(message)
             told = self._told.get((frame.stream, frame.character))
-            self.queue_of(frame.stream).append(replace(frame, told=told))
+            self.queue_of(frame.stream).append(replace(frame, stream_info=told))
         elif message.startswith("{"):
             reply = json.loads(message)
             if reply["type"] == "schedule" or "values" in reply:

@@ -36,7 +36,7 @@ class WireFrame:
 
     Attributes:
         character: index of the character, as in `subscribed`.
-        told: the fields of the last `subscribed` or `changed` of its stream, if a client has added them.
+        stream_info: the fields of the last `subscribed` or `changed` of its stream, added by the client.
     """
 
     kind: int
@@ -45,7 +45,7 @@ class WireFrame:
     payload: bytes
     character: int = 0
     flush: bool = False
-    told: Mapping[str, Any] | None = field(default=None, compare=False, repr=False)
+    stream_info: Mapping[str, Any] | None = field(default=None, compare=False, repr=False)
 
     @property
     def stream(self) -> str:
@@ -72,9 +72,9 @@ class WireFrame:
         Raises:
             WireError: it is no mesh, or its scale is unknown.
         """
-        if self.stream != "mesh" or self.told is None:
-            raise WireError(f"wanted a mesh whose stream was told of, got {self.stream}")
-        scale, offset = self.told["scale"], self.told["offset"]
+        if self.stream != "mesh" or self.stream_info is None:
+            raise WireError(f"wanted a mesh whose scale is known, got {self.stream}")
+        scale, offset = self.stream_info["scale"], self.stream_info["offset"]
         return (self.values * np.float32(scale) + np.array(offset, np.float32)).astype(np.float32)
 
 

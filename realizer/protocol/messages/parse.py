@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, get_args
 
 from pydantic import Field, TypeAdapter, ValidationError
 
@@ -41,18 +41,8 @@ Control = (
     | StateQuery
     | Ping
 )
-SUPPORTED: tuple[str, ...] = (
-    "hello",
-    "subscribe",
-    "unsubscribe",
-    "scene",
-    "character",
-    "set",
-    "anticipate",
-    "speech",
-    "stop",
-    "state",
-    "ping",
+SUPPORTED: tuple[str, ...] = tuple(
+    get_args(model.model_fields["type"].annotation)[0] for model in get_args(Control)
 )
 # Kind of a pydantic error -> what was wanted, in the style of our other messages.
 _WANTED = {
@@ -122,7 +112,7 @@ def parse_control(text: str) -> Control | ErrorMessage:
         errors = error.errors(include_url=False)
         where = _where(errors[0], message)
         same = [other for other in errors if _where(other, message) == where]
-        return ErrorMessage(code="invalid", message=_said(same), where=where)
+        return ErrorMessage(code="invalid", message=_explain(same), where=where)
 
 
 def _where(error: ErrorDetails, message: object) -> str:
@@ -149,7 +139,7 @@ def _is_text(message: object) -> bool:
     return True
 
 
-def _said(errors: list[ErrorDetails]) -> str:
+def _explain(errors: list[ErrorDetails]) -> str:
     """Return what was wanted and what came."""
     first = errors[0]
     got = "nothing" if first["type"] == "missing" else _short(first["input"])

@@ -34,11 +34,11 @@ class Hello(Message):
     )
 
     type: Literal["hello"]
-    version: Whole = Field(PROTOCOL, description="of the protocol that the client speaks")
+    version: Whole = Field(PROTOCOL, description="of the client's protocol")
     session: str | None = Field(None, pattern=r"^[A-Za-z0-9._~-]{1,64}$")
-    seen: Numbered | None = Field(None, description="seq of the last feedback that arrived")
+    seen: Numbered | None = Field(None, description="seq of the last feedback received")
     token: str | None = Field(
-        None, max_length=4096, description="of the service, where it asks for one and none came before"
+        None, max_length=4096, description="access token, if the service needs one and none was sent before"
     )
 
 
@@ -72,24 +72,24 @@ class Subscribe(Message):
 
     type: Literal["subscribe"]
     stream: StreamName
-    encoding: Encoding | None = Field(None, description="None: the stream's first")
-    fps: float | None = Field(None, gt=0, le=MAX_FPS, description="None: the service's own rate")
-    character: str | None = Field(None, max_length=256, description="None: the first")
+    encoding: Encoding | None = Field(None, description="default: the stream's first")
+    fps: float | None = Field(None, gt=0, le=MAX_FPS, description="default: the service's rate")
+    character: str | None = Field(None, max_length=256, description="default: the first")
     size: tuple[Side, Side] = Field((512, 512), strict=False, description="video: width, height in pixels")
-    camera: str | None = Field(None, max_length=64, description="video: None: the service's own")
-    light: str | None = Field(None, max_length=64, description="video: None: the service's own")
+    camera: str | None = Field(None, max_length=64, description="video: a camera; default: the service's")
+    light: str | None = Field(None, max_length=64, description="video: a light; default: the service's")
     background: str | None = Field(
         None,
         pattern="^(#[0-9a-fA-F]{6}|transparent)$",
-        description="video: a colour, or of PNG and WebP transparent; None: the service's, or the light's",
+        description="video: a colour, or transparent (PNG, WebP); default: the service's, or the light's",
     )
-    format: Picture = Field("jpeg", description="video: what the pictures are")
+    format: Picture = Field("jpeg", description="video: format of the pictures")
     view: str | None = Field(
-        None, max_length=64, description="video: a name; those of different names run side by side"
+        None, max_length=64, description="video: a name; views of different names run side by side"
     )
     quality: Whole = Field(85, ge=1, le=100, description="video: of JPEG and WebP")
-    asked: bool = Field(False, description="au: as asked for, before the rules of co-occurrence")
-    elements: list[FeedbackElement] | None = Field(None, description="feedback: which; none named is all")
+    asked: bool = Field(False, description="au: the values before the rules of co-occurrence")
+    elements: list[FeedbackElement] | None = Field(None, description="feedback: default: all elements")
     rate: Whole = Field(22050, ge=8000, le=48000, multiple_of=50, description="audio: samples a second")
 
 
@@ -101,7 +101,7 @@ class Unsubscribe(Message):
     type: Literal["unsubscribe"]
     stream: StreamName
     character: str | None = Field(None, max_length=256)
-    view: str | None = Field(None, max_length=64, description="of a video that was given one")
+    view: str | None = Field(None, max_length=64, description="video: the name in `subscribe`")
 
 
 class Point(Message):
@@ -153,7 +153,7 @@ class CharacterMessage(Message):
     )
 
     type: Literal["character"]
-    id: str | None = Field(None, min_length=1, max_length=256, description="none: the first")
+    id: str | None = Field(None, min_length=1, max_length=256, description="default: the first")
     face: str | None = Field(None, max_length=64)
     voice: str | None = Field(None, max_length=64)
 
@@ -162,8 +162,8 @@ class EmotionFields(Message):
     """An emotion: its word, its place on the wheel, or its place in the plane of valence and arousal."""
 
     name: str | None = Field(None, min_length=1, max_length=64, description="a word, such as guilty")
-    angle: float | None = Field(None, description="degrees on the wheel; turns do not count")
-    activation: float | None = Field(None, description="0..7, with an angle; none: the rim's")
+    angle: float | None = Field(None, description="degrees on the wheel, modulo 360")
+    activation: float | None = Field(None, description="0..7, with an angle; default: that of the rim")
     valence: float | None = Field(None, description="-1..1, with arousal")
     arousal: float | None = Field(None, description="-1..1")
     intensity: float = Field(1.0, ge=0, le=1)
@@ -172,8 +172,8 @@ class EmotionFields(Message):
 class SetMessage(Message):
     """Set an emotion, AUs (0..1) and FAPs (FAPU) until they are changed; null releases one of them, or all.
 
-    AUs replace those of the emotion, and FAPs replace those of AUs and speech, in whatever order they are
-    sent (Paul 2010, 7.4).
+    AUs replace those of the emotion, and FAPs replace those of AUs and speech, in any order of messages
+    (Paul 2010, 7.4).
     """
 
     model_config = ConfigDict(
@@ -225,7 +225,7 @@ class Stop(Message):
 
 
 class StateQuery(Message):
-    """Ask for `state`."""
+    """Request `state`."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"type": "state"}]})
 
@@ -233,7 +233,7 @@ class StateQuery(Message):
 
 
 class Ping(Message):
-    """Ask for `pong`, which contains the time of the session."""
+    """Request `pong`, which contains the time of the session."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"type": "ping", "id": 1}]})
 

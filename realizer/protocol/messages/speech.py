@@ -13,10 +13,10 @@ MAX_APPEND = 20_000  # characters
 
 
 class TimedText(Message):
-    """A word, a phoneme or a viseme of a clip, and when it is said."""
+    """A word, a phoneme or a viseme of a clip, and its time."""
 
     start: float = Field(ge=0, le=1e5, description="seconds from the start of the clip")
-    end: float | None = Field(None, ge=0, le=1e5, description="none: up to the next one")
+    end: float | None = Field(None, ge=0, le=1e5, description="default: the start of the next one")
     text: str = Field(
         max_length=256,
         validation_alias=AliasChoices("text", "word", "ipa", "phoneme", "viseme"),
@@ -54,20 +54,20 @@ class SpeechMessage(Message):
 
     type: Literal["speech"]
     id: str | None = Field(None, pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,63}$")
-    append: str | None = Field(None, max_length=MAX_APPEND, description="text, with what may be in it")
-    close: bool = Field(False, description="nothing follows: what is left is said, then the block ends")
+    append: str | None = Field(None, max_length=MAX_APPEND, description="text with markup, as above")
+    close: bool = Field(False, description="the end of the text: the rest is spoken, then the block ends")
     composition: Literal["MERGE", "APPEND", "REPLACE"] = Field(
         "APPEND", description="of the block, with its first message"
     )
     character: str | None = Field(None, max_length=256, description="with its first message")
-    language: str | None = Field(None, max_length=64, description="BCP-47 of the text; none: the service's")
-    clip: str | None = Field(None, min_length=1, max_length=64, description="of which the rest tells")
-    text: str | None = Field(None, max_length=MAX_APPEND, description="plain: what is said in the clip")
+    language: str | None = Field(None, max_length=64, description="BCP-47; default: the service's")
+    clip: str | None = Field(None, min_length=1, max_length=64, description="id of the clip described here")
+    text: str | None = Field(None, max_length=MAX_APPEND, description="the words of the clip as plain text")
     words: list[TimedText] = Field([], max_length=MAX_APPEND)
     phonemes: list[TimedText] = Field([], max_length=MAX_APPEND, description="in IPA")
     visemes: list[TimedText] = Field([], max_length=MAX_APPEND, description="instead of phonemes")
     viseme_set: str = Field("oculus", max_length=64, description="of visemes: mpeg4, oculus, sapi or polly")
-    final: bool = Field(True, description="all of the clip's times are told")
+    final: bool = Field(True, description="whether the description of the clip is complete")
 
     @model_validator(mode="after")
     def _whole(self) -> SpeechMessage:
@@ -76,7 +76,7 @@ class SpeechMessage(Message):
         if self.id is None and (self.append is not None or self.close):
             raise ValueError("wanted the id of the speech that is appended to or closed")
         if self.clip is None and (self.text is not None or self.words or self.phonemes or self.visemes):
-            raise ValueError("wanted the clip that this is said in")
+            raise ValueError("wanted the clip that this describes")
         if self.phonemes and self.visemes:
             raise ValueError("wanted phonemes or visemes, got both")
         return self

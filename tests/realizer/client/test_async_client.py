@@ -239,17 +239,17 @@ def test_a_mesh_is_read_by_the_face_it_has_though_that_changes_while_it_runs() -
             numbers, shown = [], []
             async for frame in client.frames("mesh"):
                 assert isinstance(frame, WireFrame)
-                assert frame.told is not None
+                assert frame.stream_info is not None
                 numbers.append(frame.frame)
-                shown.append(frame.told["face"])
+                shown.append(frame.stream_info["face"])
                 # A face moves by centimetres; by another one's scale it would be another face.
                 assert np.abs(frame.vertices - rests[shown[-1]].vertices).max() < 0.03
                 if shown == ["ada"] * 3:
                     await client.control("character", face="ben")
                 if shown[-3:] == ["ben"] * 3:
                     break
-            assert frame.told["type"] == "changed"
-            assert frame.told["frame"] == frame.frame - 2
+            assert frame.stream_info["type"] == "changed"
+            assert frame.stream_info["frame"] == frame.frame - 2
             assert numbers == list(range(told["frame"], told["frame"] + len(numbers)))
             assert not client.errors
 

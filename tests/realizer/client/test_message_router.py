@@ -64,9 +64,9 @@ def test_a_frame_brings_what_was_told_of_its_stream_when_it_came(mail) -> None:
     first, second, other = mail.queue_of("mesh")
     assert first.vertices.tolist() == [[2.0, 4.0, 7.0]]
     assert second.vertices.tolist() == [[1.0, 2.0, 4.0]]
-    assert second.told["fps"] == 25.0
+    assert second.stream_info["fps"] == 25.0
     assert first == second
-    with pytest.raises(WireError, match="wanted a mesh whose stream was told of, got mesh"):
+    with pytest.raises(WireError, match="wanted a mesh whose scale is known, got mesh"):
         _ = other.vertices
     assert mail.answer()["scale"] == 2.0
     assert not mail.errors

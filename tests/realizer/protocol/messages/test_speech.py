@@ -14,7 +14,7 @@ from realizer.protocol.messages.replies import ErrorMessage
         ("", "the id of a speech, or a clip"),
         (',"clip":"c","append":"Hello"', "the id of the speech"),
         (',"id":"t","words":[]', ""),
-        (',"id":"t","text":"Hello"', "the clip that this is said in"),
+        (',"id":"t","text":"Hello"', "the clip that this describes"),
         (',"clip":"c","phonemes":[{"start":0,"ipa":"p"}],"visemes":[{"start":0,"viseme":1}]', "got both"),
         (',"clip":"c","words":[{"start":-1,"text":"a"}]', "wanted at least 0; got -1"),
         (',"id":"t 1","append":"x"', "a string that matches"),
