@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
+from typing import NoReturn
 
 import click
 
@@ -84,10 +86,14 @@ for command in (
     cli.add_command(command)
 
 
-def main() -> None:
-    """Run the command line and exit; known errors become a line on standard error."""
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Run the command line and exit; known errors become a line on standard error.
+
+    Args:
+        arguments: words after `realizer`; None: those of the process.
+    """
     try:
-        status = cli(standalone_mode=False)
+        status = cli(arguments, standalone_mode=False)
         sys.exit(status if isinstance(status, int) else 0)
     except click.exceptions.Exit as end:
         sys.exit(end.exit_code)
@@ -102,10 +108,6 @@ def main() -> None:
     except RealizerError as error:
         click.echo(f"realizer: {error}", err=True)
         sys.exit(3)
-    except BrokenPipeError:
-        # The reader has closed the pipe, as in `realizer ... | head`.
-        sys.stderr.close()
-        sys.exit(0)
     except OSError as error:
         click.echo(
             f"realizer: {error.filename or ''}: {error.strerror or error}".replace(" : ", " "), err=True

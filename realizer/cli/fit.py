@@ -107,5 +107,5 @@ def _files(output: Path, form: str | None) -> dict[str, Path]:
             raise click.BadParameter(f"wanted a folder for two forms, got {output}", param_hint="-o")
         return {form or "extended": output}
     if not output.is_dir():
-        raise click.BadParameter(f"wanted an existing folder or FILE.toml, got {output}", param_hint="-o")
+        raise click.BadParameter(f"wanted a folder that exists, or FILE.toml, got {output}", param_hint="-o")
     return {kind: output / f"au_{kind}.toml" for kind in FORMS if form in (None, "both", kind)}

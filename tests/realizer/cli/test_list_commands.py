@@ -1,23 +1,24 @@
-"""`realizer outputs`: what can be written here."""
+"""`realizer outputs` and `realizer voices`: what can be written and spoken here."""
 
 from __future__ import annotations
 
-import subprocess
 import sys
 
 import pytest
 
+from realizer.cli import list_commands
 from realizer.outputs.registry import OUTPUTS
+from realizer.speech.registry import voices
+from tests.commands import run
 
 
-def lines(before: str = "") -> dict[str, str]:
+def lines() -> dict[str, str]:
     """Suffix -> the rest of its line."""
-    code = f"import sys; {before}\nfrom realizer.cli import main; sys.argv = ['realizer', 'outputs']; main()"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    return dict(line.split(maxsplit=1) for line in done.stdout.splitlines())
+    list_commands._fix.cache_clear()
+    return dict(line.split(maxsplit=1) for line in run("outputs").stdout.splitlines())
 
 
-def test_every_output_has_a_line_that_says_what_it_is():
+def test_outputs_has_a_line_for_each_output() -> None:
     found = lines()
     assert list(found) == sorted(OUTPUTS)
     for suffix, output in OUTPUTS.items():
@@ -25,13 +26,20 @@ def test_every_output_has_a_line_that_says_what_it_is():
         assert output.description in found[suffix]
 
 
-def test_what_is_missing_is_said_with_what_to_install():
-    found = lines("sys.modules['av'] = None")
+def test_outputs_says_what_to_install_for_films(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "av", None)
+    found = lines()
+    list_commands._fix.cache_clear()
     for suffix in (".mp4", ".webm"):
         assert "pip install 'bml-realizer[film]'" in found[suffix]
     assert not [suffix for suffix in (".fap", ".glb", ".wav") if "missing" in found[suffix]]
 
 
 @pytest.mark.parametrize("suffix", OUTPUTS)
-def test_an_output_that_draws_says_that_it_needs_what_draws(suffix):
+def test_outputs_that_draw_need_the_extra_render(suffix: str) -> None:
     assert ("render" in OUTPUTS[suffix].needs) == (OUTPUTS[suffix].picture_size is not None)
+
+
+def test_voices_has_a_line_for_each_voice() -> None:
+    rows = [line.split(maxsplit=1) for line in run("voices").stdout.splitlines()]
+    assert rows == [[voice.name, voice.description] for voice in voices()]
