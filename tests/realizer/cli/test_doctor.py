@@ -1,0 +1,39 @@
+"""`realizer doctor`: a line for each part, and the fix for what is missing."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+
+import pytest
+
+from tests.commands import run
+
+
+def test_doctor_names_every_part_and_exits_with_0() -> None:
+    done = run("doctor")
+    assert done.returncode == 0
+    for part in ("pictures", "FFmpeg", "silent", "node", "face", "page"):
+        assert part in done.stdout
+    assert {line.split()[0] for line in done.stdout.splitlines()} <= {"ok", "missing"}
+
+
+def test_doctor_says_how_to_fix_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "av", None)
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    monkeypatch.setattr("realizer.render.drawing_process.available_backend", lambda: ("gl", "install GL"))
+    monkeypatch.setattr("realizer.face.load.list_faces", lambda: ())
+    found = [line.split(maxsplit=2) for line in run("doctor").stdout.splitlines()]
+    missing = {part: text for mark, part, text in found if mark == "missing"}
+    assert missing["FFmpeg"] == "pip install 'bml-realizer[film]'"
+    assert missing["pictures"] == "install GL"
+    assert missing["faces"].startswith("no face folder was found")
+    assert missing["node"].startswith("not needed to run")
+
+
+def test_doctor_shows_the_first_fault_of_a_face(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("realizer.facebuild.check.check_face", lambda name: ("mesh.npz: torn", "more"))
+    monkeypatch.setattr("realizer.render.drawing_process.available_backend", lambda: ("gl", None))
+    lines = [line for line in run("doctor").stdout.splitlines() if "torn" in line]
+    assert lines
+    assert all(line.startswith("missing") and "more" not in line for line in lines)
