@@ -71,27 +71,27 @@ def variables() -> dict[str, str]:
 # The files -------------------------------------------------------------------------------------------
 
 
-def test_the_script_is_one_for_any_shell() -> None:
+def test_install_script_runs_in_any_shell() -> None:
     checked(tool("sh"), "-n", DOCKER / "install.sh")
     checked(tool("shellcheck"), DOCKER / "install.sh")
 
 
-def test_the_dockerfile_is_as_its_linter_wants_it() -> None:
+def test_dockerfile_passes_its_linter() -> None:
     checked(tool("hadolint"), "--failure-threshold", "style", DOCKER / "Dockerfile")
 
 
-def test_the_proxy_takes_its_configuration() -> None:
+def test_proxy_accepts_its_configuration() -> None:
     program, places = tool("haproxy"), {"NODE_1": "127.0.0.1:8766", "NODE_2": "127.0.0.1:8767"}
     assert "valid" in checked(program, "-c", "-f", DOCKER / "haproxy.cfg", **places)
 
 
-def test_the_image_is_run_by_a_user_who_is_a_number_and_not_root() -> None:
+def test_image_runs_as_a_numeric_user_that_is_not_root() -> None:
     users = re.findall(r"^USER (\d+):(\d+)$", DOCKERFILE, re.M)
     assert users
     assert "0" not in users[-1]
 
 
-def test_the_image_is_made_by_the_script_of_extras_that_there_are() -> None:
+def test_image_installs_extras_that_exist() -> None:
     assert re.search(r"^RUN docker/install.sh ", DOCKERFILE, re.M)
     script = (DOCKER / "install.sh").read_text("utf-8")
     extras = re.search(r"^extras=\$\{2:-(.+)\}$", script, re.M)
@@ -104,7 +104,7 @@ def test_the_image_is_made_by_the_script_of_extras_that_there_are() -> None:
 
 
 @pytest.mark.parametrize("name", COMPOSE["services"])
-def test_a_service_can_write_nothing_and_has_no_rights(name: str) -> None:
+def test_compose_gives_services_no_rights_and_no_writable_disk(name: str) -> None:
     service = COMPOSE["services"][name]
     assert service["read_only"] is True
     assert service["cap_drop"] == ["ALL"]
@@ -114,7 +114,7 @@ def test_a_service_can_write_nothing_and_has_no_rights(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", COMPOSE["services"])
-def test_a_service_says_whether_it_is_well_and_fills_neither_the_disk_nor_the_process_table(
+def test_compose_limits_logs_and_processes_and_checks_health(
     name: str,
 ) -> None:
     service = COMPOSE["services"][name]
@@ -126,11 +126,11 @@ def test_a_service_says_whether_it_is_well_and_fills_neither_the_disk_nor_the_pr
     assert 0 < service["pids_limit"] <= 1000
 
 
-def test_the_image_has_a_health_check() -> None:
+def test_image_has_a_health_check() -> None:
     assert re.search(r"^HEALTHCHECK .*\\\n +CMD \[", DOCKERFILE, re.M)
 
 
-def test_the_journal_is_on_a_volume_and_keeps_what_it_was_given() -> None:
+def test_compose_keeps_the_journal_on_a_volume() -> None:
     journal = COMPOSE["services"]["journal"]
     words = iter(journal["command"][1:])
     options = {name.removeprefix("--"): value for name, value in zip(words, words, strict=True)}
@@ -141,7 +141,7 @@ def test_the_journal_is_on_a_volume_and_keeps_what_it_was_given() -> None:
 
 
 @pytest.mark.parametrize("name", COMPOSE["services"])
-def test_a_service_names_its_image_and_only_what_there_is(name: str) -> None:
+def test_compose_names_images_and_existing_settings(name: str) -> None:
     service = COMPOSE["services"][name]
     assert name in NODES or re.fullmatch(r"[a-z/]+:\d+\.\d+[a-z.-]*", service["image"])
     assert set(service["networks"]) <= set(COMPOSE["networks"])
@@ -154,7 +154,7 @@ def test_a_service_names_its_image_and_only_what_there_is(name: str) -> None:
         assert where in COMPOSE["volumes"] or (DOCKER / where).is_file()
 
 
-def test_only_the_proxy_can_be_reached_and_only_from_this_machine() -> None:
+def test_compose_publishes_only_the_proxy_on_this_machine() -> None:
     assert COMPOSE["networks"]["inside"] == {"internal": True}
     open_ones = {name for name, service in COMPOSE["services"].items() if "outside" in service["networks"]}
     assert open_ones == {"proxy"}
@@ -163,7 +163,7 @@ def test_only_the_proxy_can_be_reached_and_only_from_this_machine() -> None:
 
 
 @pytest.mark.parametrize("name", NODES)
-def test_a_node_is_told_what_the_service_understands(name: str) -> None:
+def test_compose_gives_nodes_options_that_exist(name: str) -> None:
     node = NODES[name]
     assert (DOCKER / node["build"]["context"] / node["build"]["dockerfile"]).is_file()
     assert node["command"][0] == "serve"
@@ -178,7 +178,7 @@ def test_a_node_is_told_what_the_service_understands(name: str) -> None:
     assert settings.drain < float(node["stop_grace_period"].removesuffix("s"))
 
 
-def test_the_proxy_knows_every_node() -> None:
+def test_proxy_knows_every_node() -> None:
     configuration = (DOCKER / "haproxy.cfg").read_text("utf-8")
     servers = dict(re.findall(r'^    server (\S+) "\$\{\w+-(\S+)\}"$', configuration, re.M))
     assert servers == {name: f"{name}:{variables()['REALIZER_PORT']}" for name in NODES}
@@ -203,14 +203,14 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return target
 
 
-def test_the_script_says_how_it_is_used() -> None:
+def test_install_script_prints_its_usage() -> None:
     done = subprocess.run([DOCKER / "install.sh"], capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert "TARGET" in done.stderr
 
 
 @pytest.mark.slow
-def test_what_is_installed_is_itself_and_has_no_pip(installed: Path) -> None:
+def test_install_script_installs_realizer_without_pip(installed: Path) -> None:
     assert (installed / "bin" / "realizer").is_file()
     assert list(installed.glob("lib/*/site-packages/realizer/_faces/*/face.toml"))
     assert not list(installed.glob("lib/*/site-packages/pip"))
@@ -248,7 +248,7 @@ def confined(command: list[str], writable: Path, environment: Mapping[str, str])
 @pytest.mark.gl("onboard")
 @pytest.mark.espeak
 @pytest.mark.slow
-def test_the_service_speaks_and_draws_where_nothing_can_be_written(installed: Path) -> None:
+def test_service_works_on_a_read_only_disk(installed: Path) -> None:
     async def test(url: str) -> list[str]:
         streams, told = set(), []
         async with asyncio.timeout(LIMIT), connect(url, max_size=None) as client:

@@ -68,19 +68,19 @@ def page(browser, address, tmp_path):  # type: ignore[no-untyped-def]
     assert faults == []
 
 
-def test_hello_tells_what_there_is(page) -> None:  # type: ignore[no-untyped-def]
+def test_connect_resolves_with_the_capabilities(page) -> None:  # type: ignore[no-untyped-def]
     welcome = page.evaluate("welcome")
     assert (welcome["session"], welcome["version"]) == ("module", 1)
     assert {"NOD", "SHAKE"} <= set(welcome["capabilities"]["lexemes"]["head"])
 
 
-def test_a_block_is_played_to_its_end(page) -> None:  # type: ignore[no-untyped-def]
+def test_play_resolves_at_the_end_of_the_block(page) -> None:  # type: ignore[no-untyped-def]
     bml = WAIT.format("b", 0.1)
     assert page.evaluate("async (bml) => (await realizer.play(bml)).getAttribute('id')", bml) == "b:end"
     assert page.evaluate("told.length") >= 4
 
 
-def test_what_is_played_before_the_connection_is_there_is_not_lost(page) -> None:  # type: ignore[no-untyped-def]
+def test_play_before_the_connection_is_not_lost(page) -> None:  # type: ignore[no-untyped-def]
     script = """async (bml) => {
       const other = new realizer.constructor({ url: realizer.url.href, session: "early" });
       const end = other.play(bml);
@@ -93,17 +93,17 @@ def test_what_is_played_before_the_connection_is_there_is_not_lost(page) -> None
 
 
 @pytest.mark.parametrize("nothing", ["", " \n", "<!-- later -->"])
-def test_nothing_to_play_is_refused_at_once(page, nothing) -> None:  # type: ignore[no-untyped-def]
+def test_play_refuses_an_empty_text(page, nothing) -> None:  # type: ignore[no-untyped-def]
     script = "(nothing) => realizer.play(nothing).catch((error) => [error.code, error.message])"
     assert page.evaluate(script, nothing) == ["refused", "wanted <bml>, got nothing"]
 
 
-def test_the_block_that_is_awaited_is_no_comment(page) -> None:  # type: ignore[no-untyped-def]
+def test_play_does_not_wait_for_a_block_in_a_comment(page) -> None:  # type: ignore[no-untyped-def]
     bml = WAIT.format("real", 0.1) + "<!-- " + WAIT.format("not", 0.1) + " -->"
     assert page.evaluate("async (bml) => (await realizer.play(bml)).getAttribute('id')", bml) == "real:end"
 
 
-def test_a_refused_block_rejects_with_its_warning(page) -> None:  # type: ignore[no-untyped-def]
+def test_play_of_a_refused_block_rejects_with_its_warning(page) -> None:  # type: ignore[no-untyped-def]
     refused = '<bml id="no"><required><head id="n" lexeme="NONE"/></required></bml>'
     said = page.evaluate("(bml) => realizer.play(bml).catch((error) => [error.code, error.where])", refused)
     assert said == ["refused", "no"]
@@ -117,7 +117,7 @@ def test_a_refused_block_rejects_with_its_warning(page) -> None:  # type: ignore
         ("arkit", {"fps": 50, "encoding": "json"}, 59, "Array"),
     ],
 )
-def test_frames_come_as_numbers(page, stream, options, values, kind) -> None:  # type: ignore[no-untyped-def]
+def test_subscribe_yields_frames_of_numbers(page, stream, options, values, kind) -> None:  # type: ignore[no-untyped-def]
     script = """async ([stream, options]) => {
       const frames = [];
       const first = new Promise((done) => (globalThis.take = (frame) => done(frame)));
@@ -129,7 +129,7 @@ def test_frames_come_as_numbers(page, stream, options, values, kind) -> None:  #
     assert page.evaluate(script, [stream, options]) == [values, stream, values, kind]
 
 
-def test_a_frame_brings_what_it_means_also_after_its_character_has_another_face(page) -> None:  # type: ignore[no-untyped-def]
+def test_subscribe_yields_names_after_a_change_of_face(page) -> None:  # type: ignore[no-untyped-def]
     script = """async (faces) => {
       const shown = [];
       let done;
@@ -150,7 +150,7 @@ def test_a_frame_brings_what_it_means_also_after_its_character_has_another_face(
         assert scale == pytest.approx(float(face_scale(load_face(name))[0]))
 
 
-def test_a_picture_is_the_bytes_of_its_file(page) -> None:  # type: ignore[no-untyped-def]
+def test_subscribe_yields_pictures_as_bytes(page) -> None:  # type: ignore[no-untyped-def]
     script = """async () => {
       const first = new Promise((done) => (globalThis.take = done));
       const options = { size: [64, 48], format: "webp", fps: 5 };
@@ -163,14 +163,14 @@ def test_a_picture_is_the_bytes_of_its_file(page) -> None:  # type: ignore[no-un
     assert page.evaluate(script) == ["image/webp", 64, 48]
 
 
-def test_what_cannot_be_had_rejects_with_code_and_place(page) -> None:  # type: ignore[no-untyped-def]
+def test_subscribe_rejects_with_code_and_place(page) -> None:  # type: ignore[no-untyped-def]
     script = "(m) => realizer.ask(m).then(() => null, (error) => [error.code, error.where])"
     smell = {"type": "subscribe", "stream": "smell"}
     assert page.evaluate(script, smell) == ["unsupported", "subscribe.stream"]
     assert page.evaluate(script, {"type": "hello", "version": 99}) == ["version", "hello.version"]
 
 
-def test_a_lost_connection_comes_back_with_its_streams_and_its_feedback(page) -> None:  # type: ignore[no-untyped-def]
+def test_connection_comes_back_with_streams_and_feedback(page) -> None:  # type: ignore[no-untyped-def]
     script = """async (bml) => {
       const frames = [];
       await realizer.subscribe("au", { fps: 20 }, (frame) => frames.push(frame.frame));

@@ -166,7 +166,7 @@ def face_of(image):  # type: ignore[no-untyped-def]
     return image[int(0.30 * STILL) : int(0.68 * STILL), int(0.36 * STILL) : int(0.64 * STILL)]
 
 
-def test_the_page_draws_what_the_stills_show_in_every_light(quiet_page) -> None:  # type: ignore[no-untyped-def]
+def test_page_draws_like_stills_in_every_light(quiet_page) -> None:  # type: ignore[no-untyped-def]
     import numpy as np
 
     for light in ("portrait", "daylight", "evening"):
@@ -178,7 +178,7 @@ def test_the_page_draws_what_the_stills_show_in_every_light(quiet_page) -> None:
         assert np.abs(here[100:200, 5:40] - there[100:200, 5:40]).mean() < 12, light
 
 
-def test_a_frown_furrows_the_page_s_forehead_as_the_still_s(quiet_page) -> None:  # type: ignore[no-untyped-def]
+def test_page_draws_wrinkles_like_stills(quiet_page) -> None:  # type: ignore[no-untyped-def]
     import numpy as np
 
     def furrows(image):  # type: ignore[no-untyped-def]
@@ -202,7 +202,7 @@ def test_a_frown_furrows_the_page_s_forehead_as_the_still_s(quiet_page) -> None:
     assert furrows(here) == pytest.approx(furrows(there), rel=0.5)
 
 
-def test_a_light_is_chosen_on_the_page(page) -> None:  # type: ignore[no-untyped-def]
+def test_page_changes_the_light(page) -> None:  # type: ignore[no-untyped-def]
     page.wait_for_selector("#lights button")
     pressed = "#lights button[aria-pressed='true']"
     assert page.locator(pressed).all_text_contents() == ["Portrait"]
@@ -213,7 +213,7 @@ def test_a_light_is_chosen_on_the_page(page) -> None:  # type: ignore[no-untyped
     assert sum(pixel(picture(page), 0.03, 0.5)) > sum(dark) + 200
 
 
-def test_another_face_is_chosen_on_the_page(page) -> None:  # type: ignore[no-untyped-def]
+def test_page_changes_the_face(page) -> None:  # type: ignore[no-untyped-def]
     page.wait_for_function("realizerPage.stage.shownFrames > 1")
     names = [info.name for info in list_faces()]
     assert page.locator("#faces button").all_text_contents() == [name.capitalize() for name in names]
@@ -226,7 +226,7 @@ def test_another_face_is_chosen_on_the_page(page) -> None:  # type: ignore[no-un
     page.wait_for_function(f"realizerPage.stage.shownFrames > {shown} + 5")
 
 
-def test_a_face_that_somebody_else_has_chosen_is_shown(page) -> None:  # type: ignore[no-untyped-def]
+def test_page_shows_a_face_that_another_client_chose(page) -> None:  # type: ignore[no-untyped-def]
     page.wait_for_function("realizerPage.stage.shownFrames > 1")
     mine = page.locator("#faces button[aria-pressed='true']").text_content().lower()
     other = next(info.name for info in list_faces() if info.name != mine)
@@ -240,14 +240,14 @@ def test_a_face_that_somebody_else_has_chosen_is_shown(page) -> None:  # type: i
     assert width == pytest.approx(vertices.max(), abs=0.01), "by the scale of that face"
 
 
-def test_the_face_is_there_and_alive(page) -> None:  # type: ignore[no-untyped-def]
+def test_page_shows_a_moving_face(page) -> None:  # type: ignore[no-untyped-def]
     page.wait_for_function("realizerPage.stage.shownFrames > 5")
     skin = pixel(picture(page), 0.5, 0.5)
     assert skin[0] > skin[1] > skin[2], "skin is warmer than the backdrop"
     assert pixel(picture(page), 0.02, 0.02) != skin
 
 
-def test_a_typed_document_plays_and_its_feedback_is_shown(page) -> None:  # type: ignore[no-untyped-def]
+def test_page_plays_a_typed_document_and_shows_feedback(page) -> None:  # type: ignore[no-untyped-def]
     page.wait_for_function("realizerPage.stage.shownFrames > 1")
     page.fill("#document", '<bml id="typed"><faceLexeme id="s" lexeme="SMILE" end="0.8"/></bml>')
     page.press("#document", "Control+Enter")
@@ -257,7 +257,7 @@ def test_a_typed_document_plays_and_its_feedback_is_shown(page) -> None:  # type
     assert [line for line in lines if line in told] == told
 
 
-def test_a_broken_document_is_told_and_the_page_lives_on(page) -> None:  # type: ignore[no-untyped-def]
+def test_page_reports_a_broken_document_and_goes_on(page) -> None:  # type: ignore[no-untyped-def]
     page.fill("#document", '<bml id="broken"><head')
     page.click("#play")
     page.wait_for_selector("#log .warning")
@@ -267,7 +267,7 @@ def test_a_broken_document_is_told_and_the_page_lives_on(page) -> None:  # type:
     assert page.get_attribute("#status", "data-state") == "live"
 
 
-def test_the_examples_are_at_hand(page) -> None:  # type: ignore[no-untyped-def]
+def test_page_offers_the_examples(page) -> None:  # type: ignore[no-untyped-def]
     page.wait_for_selector("#gallery button")
     names = page.locator("#gallery button b").all_text_contents()
     assert "Greeting" in names
@@ -279,13 +279,13 @@ def test_the_examples_are_at_hand(page) -> None:  # type: ignore[no-untyped-def]
 
 
 @pytest.mark.parametrize("width", [1280, 1366, 1920])
-def test_what_sifts_the_feedback_stands_in_whole_rows(page, width) -> None:  # type: ignore[no-untyped-def]
+def test_page_wraps_feedback_filters_in_whole_rows(page, width) -> None:  # type: ignore[no-untyped-def]
     page.set_viewport_size({"width": width, "height": 800})
     title, clear = (page.locator(f"#log-head {what}").bounding_box() for what in ("h2", "#clear"))
     assert abs(title["y"] + title["height"] / 2 - clear["y"] - clear["height"] / 2) < 2
 
 
-def test_the_same_document_can_be_played_while_it_plays(page) -> None:  # type: ignore[no-untyped-def]
+def test_page_plays_a_document_again_while_it_plays(page) -> None:  # type: ignore[no-untyped-def]
     page.fill("#document", '<bml id="twice"><wait id="w" duration="600"/></bml>')
     page.click("#play")
     page.wait_for_selector("#log li:has-text('twice starts')")
@@ -294,7 +294,7 @@ def test_the_same_document_can_be_played_while_it_plays(page) -> None:  # type: 
     assert page.locator("#log .warning").count() == 0
 
 
-def test_replace_ends_what_plays_and_stop_ends_all(page) -> None:  # type: ignore[no-untyped-def]
+def test_page_replaces_and_stops_blocks(page) -> None:  # type: ignore[no-untyped-def]
     page.fill("#document", '<bml id="long"><wait id="w" duration="600"/></bml>')
     page.click("#play")
     page.wait_for_selector("#log li:has-text('long starts')")
@@ -306,7 +306,7 @@ def test_replace_ends_what_plays_and_stop_ends_all(page) -> None:  # type: ignor
     page.wait_for_selector("#log li:has-text('other ends')")
 
 
-def test_speech_is_heard_and_the_sound_is_the_clock(page) -> None:  # type: ignore[no-untyped-def]
+def test_page_plays_speech_and_follows_its_clock(page) -> None:  # type: ignore[no-untyped-def]
     page.fill(
         "#document", '<bml id="talk"><speech id="s"><text>Hello there, how are you?</text></speech></bml>'
     )
@@ -317,7 +317,7 @@ def test_speech_is_heard_and_the_sound_is_the_clock(page) -> None:  # type: igno
     assert page.get_attribute("#sound", "aria-pressed") == "true"
 
 
-def test_a_lost_connection_comes_back_with_what_was_missed(page) -> None:  # type: ignore[no-untyped-def]
+def test_page_reconnects_and_shows_missed_feedback(page) -> None:  # type: ignore[no-untyped-def]
     page.fill("#document", '<bml id="kept"><wait id="w" duration="0.3"/></bml>')
     page.click("#play")
     page.wait_for_selector("#log li:has-text('kept starts')")
@@ -334,7 +334,7 @@ def test_a_lost_connection_comes_back_with_what_was_missed(page) -> None:  # typ
     assert lines.count("kept starts") == lines.count("kept ends") == 1
 
 
-def test_the_page_obeys_its_own_policy(browser, address) -> None:  # type: ignore[no-untyped-def]
+def test_page_obeys_its_content_policy(browser, address) -> None:  # type: ignore[no-untyped-def]
     opened = browser.new_page()
     faults: list[str] = []
     opened.on("console", lambda message: faults.append(message.text) if message.type == "error" else None)
@@ -345,7 +345,7 @@ def test_the_page_obeys_its_own_policy(browser, address) -> None:  # type: ignor
     assert faults == []
 
 
-def test_the_page_fits_a_phone(page) -> None:  # type: ignore[no-untyped-def]
+def test_page_fits_a_phone(page) -> None:  # type: ignore[no-untyped-def]
     page.set_viewport_size({"width": 390, "height": 844})
     assert page.locator("#play").is_visible()
     for tab in page.locator("#tabs button").all():

@@ -100,7 +100,7 @@ def accept(page, label: str) -> str:  # type: ignore[no-untyped-def]
 # the editor ---------------------------------------------------------------------------------------
 
 
-def test_faults_are_underlined_where_the_service_sees_them_and_advice_beside_them(page) -> None:  # type: ignore[no-untyped-def]
+def test_editor_underlines_faults_and_shows_advice(page) -> None:  # type: ignore[no-untyped-def]
     page.fill("#document", '<bml id="a">\n<head id="n" lexeme="NIX"/>\n<wait id="w" duration="400"/>\n</bml>')
     page.wait_for_selector("#problems[data-state='bad']")
     assert page.locator(".cm-lintRange-error").all_text_contents() == ["NIX"]
@@ -113,20 +113,20 @@ def test_faults_are_underlined_where_the_service_sees_them_and_advice_beside_the
     assert page.locator(".cm-lintRange-error").count() == 0
 
 
-def test_columns_count_characters_wherever_a_fault_stands(page) -> None:  # type: ignore[no-untyped-def]
+def test_editor_counts_columns_in_characters(page) -> None:  # type: ignore[no-untyped-def]
     page.fill("#document", '<bml id="a"><!-- 😀𝒳 --><head id="n" lexeme="NIX"/></bml>')
     page.wait_for_selector(".cm-lintRange-error:has-text('NIX')")
     assert page.locator(".cm-lintRange-error").all_text_contents() == ["NIX"]
 
 
-def test_the_text_is_highlighted(page) -> None:  # type: ignore[no-untyped-def]
+def test_editor_highlights_the_text(page) -> None:  # type: ignore[no-untyped-def]
     page.fill("#document", '<bml id="a"></bml>')
     colour = "e => getComputedStyle(e).color"
     parts = {text: page.locator(f"#document span:text-is('{text}')").first for text in ("bml", "id", '"a"')}
     assert len({part.evaluate(colour) for part in parts.values()}) == 3
 
 
-def test_elements_are_completed_where_they_may_stand(page) -> None:  # type: ignore[no-untyped-def]
+def test_editor_completes_elements_where_they_are_valid(page) -> None:  # type: ignore[no-untyped-def]
     write(page, '<bml id="a">\n|\n</bml>')
     page.keyboard.type("<")
     names = offered(page)
@@ -136,7 +136,7 @@ def test_elements_are_completed_where_they_may_stand(page) -> None:  # type: ign
     assert "<faceLexeme " in accept(page, "faceLexeme")
 
 
-def test_an_extension_brings_its_namespace(page) -> None:  # type: ignore[no-untyped-def]
+def test_editor_adds_the_namespace_of_an_extension(page) -> None:  # type: ignore[no-untyped-def]
     write(page, '<bml id="a">\n|\n</bml>')
     page.keyboard.type("<realizer:emo")
     offered(page)
@@ -155,7 +155,7 @@ def test_an_extension_brings_its_namespace(page) -> None:  # type: ignore[no-unt
         ('<head id="n" stroke="|"/>', "s", {"s1:word", "s1:end", "s1:start"}, "s1:word", 'stroke="s1:word"'),
     ],
 )
-def test_attributes_words_and_sync_points_are_completed(page, before, typed, wanted, taken, then) -> None:  # type: ignore[no-untyped-def]
+def test_editor_completes_attributes_values_and_sync_points(page, before, typed, wanted, taken, then) -> None:  # type: ignore[no-untyped-def]
     speech = '<speech id="s1"><text>One <sync id="word"/>two</text></speech>'
     write(page, f'<bml id="a">{speech}\n{before}\n</bml>')
     page.keyboard.type(typed)
@@ -168,7 +168,7 @@ def test_attributes_words_and_sync_points_are_completed(page, before, typed, wan
 # the timeline -------------------------------------------------------------------------------------
 
 
-def test_behaviours_are_drawn_as_scheduled_and_as_they_happened(page) -> None:  # type: ignore[no-untyped-def]
+def test_timeline_draws_scheduled_and_actual_times(page) -> None:  # type: ignore[no-untyped-def]
     page.fill("#document", NOD.format("drawn"))
     page.press("#document", "Control+Enter")
     page.wait_for_selector("#log li:has-text('drawn ends')")
@@ -185,7 +185,7 @@ def test_behaviours_are_drawn_as_scheduled_and_as_they_happened(page) -> None:  
         assert dots.evaluate_all(left) == pytest.approx(ticks.evaluate_all(left), abs=1.0)
 
 
-def test_the_curves_that_move_are_shown_as_aus_or_as_faps(page) -> None:  # type: ignore[no-untyped-def]
+def test_curves_show_moving_aus_or_faps(page) -> None:  # type: ignore[no-untyped-def]
     page.click("#tab-aus")
     slide(page, "AU 12 Lip corner puller, left", 1)
     page.wait_for_selector("#score .curve:has-text('12 Lip corner puller') canvas")
@@ -196,7 +196,7 @@ def test_the_curves_that_move_are_shown_as_aus_or_as_faps(page) -> None:  # type
     page.click("#curves button:has-text('AUs')")
 
 
-def test_the_past_is_looked_at_and_left_again_by_mouse_and_keyboard(page) -> None:  # type: ignore[no-untyped-def]
+def test_timeline_scrubs_by_mouse_and_keyboard(page) -> None:  # type: ignore[no-untyped-def]
     page.fill("#document", NOD.format("past"))
     page.click("#play")
     page.wait_for_selector("#log li:has-text('past ends')")
@@ -224,7 +224,7 @@ def test_the_past_is_looked_at_and_left_again_by_mouse_and_keyboard(page) -> Non
 # what is held -------------------------------------------------------------------------------------
 
 
-def test_action_units_are_set_for_both_sides_or_one(page) -> None:  # type: ignore[no-untyped-def]
+def test_sliders_set_action_units_on_both_sides_or_one(page) -> None:  # type: ignore[no-untyped-def]
     page.click("#tab-aus")
     assert page.locator(".row.au").count() == len(action_units())
     slide(page, "AU 12 Lip corner puller, left", 0.8)
@@ -252,7 +252,7 @@ def test_sliders_are_found_by_number_and_name(page) -> None:  # type: ignore[no-
     page.fill("#find-faps", "")
 
 
-def test_a_fap_is_set_by_its_slider_or_its_number_and_saved_as_a_file(page) -> None:  # type: ignore[no-untyped-def]
+def test_sliders_set_faps_and_save_them_as_a_file(page) -> None:  # type: ignore[no-untyped-def]
     page.click("#tab-faps")
     slide(page, "FAP 3 open jaw", 400)
     number = page.locator("input[aria-label='FAP 5 raise b midlip, value']")
@@ -268,7 +268,7 @@ def test_a_fap_is_set_by_its_slider_or_its_number_and_saved_as_a_file(page) -> N
     page.wait_for_function("realizerPage.timeline.kinds.fap.at(Infinity).open_jaw === 400", timeout=10_000)
 
 
-def test_the_wheel_shows_what_is_clicked_by_the_profiles_that_are_chosen(page) -> None:  # type: ignore[no-untyped-def]
+def test_wheel_shows_the_clicked_place_by_the_chosen_profiles(page) -> None:  # type: ignore[no-untyped-def]
     page.click("#tab-wheel")
     box = page.locator("#wheel svg").bounding_box()
     middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
@@ -298,7 +298,7 @@ def test_the_wheel_shows_what_is_clicked_by_the_profiles_that_are_chosen(page) -
 # the rest -----------------------------------------------------------------------------------------
 
 
-def test_a_voice_is_chosen(page) -> None:  # type: ignore[no-untyped-def]
+def test_page_changes_the_voice(page) -> None:  # type: ignore[no-untyped-def]
     names = page.locator("#voice option").all_text_contents()
     assert page.input_value("#voice") == "silent" in names
     page.dispatch_event("#voice", "change")
@@ -307,7 +307,7 @@ def test_a_voice_is_chosen(page) -> None:  # type: ignore[no-untyped-def]
     )
 
 
-def test_the_feedback_is_filtered_by_kind_and_words(page) -> None:  # type: ignore[no-untyped-def]
+def test_feedback_is_filtered_by_kind_and_words(page) -> None:  # type: ignore[no-untyped-def]
     page.fill("#document", NOD.format("told"))
     page.click("#play")
     page.wait_for_selector("#log li:has-text('told ends')")
@@ -324,7 +324,7 @@ def test_the_feedback_is_filtered_by_kind_and_words(page) -> None:  # type: igno
     assert page.get_attribute("#log", "class") == ""
 
 
-def test_a_film_is_recorded_and_saved(page) -> None:  # type: ignore[no-untyped-def]
+def test_page_records_and_saves_a_film(page) -> None:  # type: ignore[no-untyped-def]
     av = pytest.importorskip("av", reason="the film extra is not installed")
     page.click("#tab-aus")
     page.click("#record")
@@ -340,7 +340,7 @@ def test_a_film_is_recorded_and_saved(page) -> None:  # type: ignore[no-untyped-
     assert picture[8, 8].sum() > 30, "the backdrop is in the film"
 
 
-def test_the_page_is_light_or_dark_as_it_is_told(page) -> None:  # type: ignore[no-untyped-def]
+def test_page_is_light_or_dark(page) -> None:  # type: ignore[no-untyped-def]
     paper = "() => getComputedStyle(document.body).backgroundColor"
     page.emulate_media(color_scheme="dark")
     dark = page.evaluate(paper)
@@ -354,7 +354,7 @@ def test_the_page_is_light_or_dark_as_it_is_told(page) -> None:  # type: ignore[
     assert seen == [("Theme: light", light), ("Theme: dark", dark), ("Theme: as the system", light)]
 
 
-def test_everything_is_reached_by_keyboard(page) -> None:  # type: ignore[no-untyped-def]
+def test_page_is_usable_by_keyboard(page) -> None:  # type: ignore[no-untyped-def]
     page.focus("#tab-script")
     for panel in ("aus", "faps", "emotion", "script"):
         page.keyboard.press("ArrowRight")

@@ -98,7 +98,7 @@ def words(printed: str) -> list[str]:
 STORY = words(next(iter(dialogue.SCRIPT.values())))
 
 
-def test_a_line_interrupts_the_story_and_it_goes_on_behind_the_last_word_that_was_heard() -> None:
+def test_dialogue_goes_on_after_an_interruption() -> None:
     async def test(console: Console) -> None:
         await console.until("> ")
         await console.type("Tell me a story.")
@@ -131,7 +131,7 @@ def reply(history):
 """
 
 
-def test_tokens_become_words_and_behaviours_of_a_service_that_runs(tmp_path: Path) -> None:
+def test_dialogue_plays_tokens_on_a_running_service(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(MODEL)
     told: list[Feedback] = []
 
@@ -165,7 +165,7 @@ def test_tokens_become_words_and_behaviours_of_a_service_that_runs(tmp_path: Pat
     assert said[f"{nod.id.partition(':')[2]}:start"] == pytest.approx(said["turn1:s2"]), "where it stands"
 
 
-def test_the_history_holds_what_was_heard() -> None:
+def test_history_has_only_what_was_heard() -> None:
     def model(history: list[dict[str, str]]) -> Iterator[str]:
         yield "One two three. "
         if len(history) == 1:
@@ -203,12 +203,12 @@ def test_the_history_holds_what_was_heard() -> None:
         ("Well don't stop", '[joy] Well, [nod] "don\'t!" [smile]stop.'),
     ],
 )
-def test_a_text_is_divided_behind_the_last_word_that_was_said(said: str, was_heard: str) -> None:
+def test_heard_ends_after_the_last_spoken_word(said: str, was_heard: str) -> None:
     text = '[joy] Well, [nod] "don\'t!" [smile]stop.'
     assert dialogue.heard(text, said) == (was_heard, text.removeprefix(was_heard))
 
 
-def test_what_was_said_stands_for_a_text_that_the_voice_says_otherwise() -> None:
+def test_heard_takes_the_spoken_form_of_a_text() -> None:
     assert dialogue.heard("At 5 o'clock.", "At five") == ("At five", "At 5 o'clock.")
 
 
@@ -235,7 +235,7 @@ def speaking_openai(bodies: list[dict[str, object]], *events: str) -> Iterator[s
         thread.join()
 
 
-def test_a_model_at_an_address_gives_its_tokens() -> None:
+def test_model_at_an_address_gives_its_tokens() -> None:
     bodies: list[dict[str, object]] = []
     deltas = [{"role": "assistant", "content": None}, {"content": "Hel"}, {"content": "lo."}, {}]
     events = [json.dumps({"choices": [{"index": 0, "delta": delta}]}) for delta in deltas]
@@ -250,7 +250,7 @@ def test_a_model_at_an_address_gives_its_tokens() -> None:
     ]
 
 
-def test_a_model_that_fails_ends_the_dialogue_with_its_reason() -> None:
+def test_dialogue_ends_with_the_reason_of_a_failed_model() -> None:
     def model(history: list[dict[str, str]]) -> Iterator[str]:
         yield "One two three. Four"
         raise ConnectionRefusedError("no model listens there")
@@ -271,7 +271,7 @@ def test_a_model_that_fails_ends_the_dialogue_with_its_reason() -> None:
         (["--service", "ws://127.0.0.1:1/ws"], 1, "dialogue: "),
     ],
 )
-def test_it_says_how_it_is_used_and_what_is_wrong(options: list[str], status: int, message: str) -> None:
+def test_dialogue_prints_its_usage_and_errors(options: list[str], status: int, message: str) -> None:
     command = [sys.executable, str(PROGRAM), *options]
     done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL, timeout=LIMIT)
     assert done.returncode == status

@@ -21,7 +21,7 @@ def face() -> Face:
 
 
 @pytest.mark.parametrize("profiles", ["own", "published"])
-def test_what_moves_the_mesh_is_recognised_from_it(face: Face, profiles: str) -> None:
+def test_faps_from_mesh_recovers_emotions(face: Face, profiles: str) -> None:
     made = [p for numbered in archetypes(profiles).values() for p in numbered.values()]
     frames = np.stack([p.draw(seed) for p in made for seed in SEEDS])
     read, seen = faps_from_mesh(face, deform(face, frames))
@@ -29,7 +29,7 @@ def test_what_moves_the_mesh_is_recognised_from_it(face: Face, profiles: str) ->
     assert recogniser(profiles).names(read, seen) == wanted
 
 
-def test_faps_come_back_as_they_were_asked_for(face: Face) -> None:
+def test_faps_from_mesh_recovers_the_faps(face: Face) -> None:
     frames = np.stack([archetypes("own")[name][0].frame() for name in ("joy", "surprise", "anger")])
     read, seen = faps_from_mesh(face, deform(face, frames))
     for asked, got in zip(frames, read, strict=True):
@@ -37,13 +37,13 @@ def test_faps_come_back_as_they_were_asked_for(face: Face) -> None:
         assert np.abs(got - asked)[there].max() < 2
 
 
-def test_the_feature_points_alone_say_the_same_wherever_the_head_is(face: Face) -> None:
+def test_faps_from_face_does_not_depend_on_the_pose_of_the_head(face: Face) -> None:
     joy = archetypes("own")["joy"][0].frame()
     points = points_of(face, deform(face, joy[None]))
     read, seen = faps_from_face(face, {name: at + np.array([0, 0.2, 1]) for name, at in points.items()})
     assert recogniser().names(read, seen) == ["joy"]
 
 
-def test_vertices_of_another_face_are_refused(face: Face) -> None:
+def test_faps_from_mesh_refuses_vertices_of_another_face(face: Face) -> None:
     with pytest.raises(ValueError, match=r"vertices: wanted \(n, \d+, 3\), got \(3, 3\)"):
         faps_from_mesh(face, np.zeros((3, 3)))

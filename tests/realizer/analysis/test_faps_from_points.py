@@ -37,7 +37,7 @@ def row(**values: float) -> np.ndarray:
     return frame
 
 
-def test_each_fap_is_measured_at_its_own_point(face: Face) -> None:
+def test_faps_from_points_measures_each_fap_at_its_point(face: Face) -> None:
     local = [fap for fap in faps()[2:] if fap.unit not in ("none", "angle_unit") and fap.fap not in (29, 30)]
     frames = np.stack([row(**{f"F{fap.fap}": 50}) for fap in local])
     read, seen = faps_from_points(points_of(face, deform(face, frames)), rest(face), face.fapu)
@@ -47,7 +47,7 @@ def test_each_fap_is_measured_at_its_own_point(face: Face) -> None:
         assert read[k, fap.fap - 1] == pytest.approx(50, abs=9 if fap.fap == 18 else 1), fap.name
 
 
-def test_a_turned_head_is_found_and_taken_away(face: Face) -> None:
+def test_faps_from_points_removes_the_pose_of_the_head(face: Face) -> None:
     frames = np.stack([row(F48=9000, F49=-20000, F50=5000, F12=200, F13=200, F31=150), row()])
     points = points_of(face, deform(face, frames))
     read, _ = faps_from_points(points, rest(face), face.fapu)
@@ -59,7 +59,7 @@ def test_a_turned_head_is_found_and_taken_away(face: Face) -> None:
     assert np.allclose(again, read, atol=1)
 
 
-def test_corners_of_the_eyes_stand_in_for_a_skull_that_nobody_tracked(face: Face) -> None:
+def test_faps_from_points_uses_corners_of_the_eyes_without_a_skull(face: Face) -> None:
     frames = row(F49=15000, F31=150)[None]
     points = points_of(face, deform(face, frames))
     few = {name: points[name] for name in ("3.7", "3.8", "3.11", "3.12", "4.1", "2.4")}
@@ -69,7 +69,7 @@ def test_corners_of_the_eyes_stand_in_for_a_skull_that_nobody_tracked(face: Face
     assert set(np.flatnonzero(seen) + 1) == {6, 12, 31, 37, 48, 49, 50}
 
 
-def test_a_point_that_was_lost_tells_nothing(face: Face) -> None:
+def test_faps_from_points_of_a_lost_point_are_unobserved(face: Face) -> None:
     points = points_of(face, deform(face, np.stack([row(F12=100), row(F12=100)])))
     points["2.4"] = points["2.4"].copy()
     points["2.4"][1] = np.nan
@@ -80,7 +80,7 @@ def test_a_point_that_was_lost_tells_nothing(face: Face) -> None:
     assert np.isfinite(read).all()
 
 
-def test_features_of_a_mesh_agree_with_those_of_its_faps(face: Face) -> None:
+def test_features_from_points_agree_with_those_from_faps(face: Face) -> None:
     frames = np.stack([row(F19=200, F21=100), row(F31=100), row(F53=80, F54=80), row(F51=60)])
     features = features_from_points(points_of(face, deform(face, frames)), rest(face), face.fapu)
     asked = features_from_faps(frames)
@@ -90,7 +90,7 @@ def test_features_of_a_mesh_agree_with_those_of_its_faps(face: Face) -> None:
     assert features[3, 2] == pytest.approx(60, rel=0.15)  # the outer lip, where the paper names the inner FAP
 
 
-def test_features_do_not_depend_on_where_the_head_is(face: Face) -> None:
+def test_features_from_points_do_not_depend_on_the_pose_of_the_head(face: Face) -> None:
     still, turned = row(F31=100, F19=-150), row(F31=100, F19=-150, F48=9000, F49=20000)
     features = features_from_points(
         points_of(face, deform(face, np.stack([still, turned]))), rest(face), face.fapu
@@ -98,7 +98,7 @@ def test_features_do_not_depend_on_where_the_head_is(face: Face) -> None:
     assert np.allclose(features[0], features[1], atol=3)
 
 
-def test_a_feature_of_several_faps_gives_each_an_equal_part() -> None:
+def test_faps_from_features_shares_a_feature_equally() -> None:
     features = np.zeros((1, 15))
     features[0, [0, 11, 13, 14]] = 30, 100, 80, 500
     frames, seen = faps_from_features(features)
@@ -108,7 +108,7 @@ def test_a_feature_of_several_faps_gives_each_an_equal_part() -> None:
     assert set(np.flatnonzero(seen) + 1) == {fap for f in facial_features() for fap in (*f.signs, *f.also)}
 
 
-def test_a_profile_as_features_see_it_has_lids_together_and_the_outer_lips_for_the_inner() -> None:
+def test_measurable_profile_joins_lids_and_uses_outer_lips() -> None:
     told = measurable_profile(
         Profile.parse("F19 [100, 120], F21 [10, 20], F5 [0, 5], F52 [-200, -100], F51 [20, 30]")
     )
@@ -121,7 +121,7 @@ def test_a_profile_as_features_see_it_has_lids_together_and_the_outer_lips_for_t
     assert dict(shut.ranges) == {3: (100, 200)}
 
 
-def test_what_features_tell_of_a_frame_is_in_the_profile_as_they_see_it() -> None:
+def test_measurable_profile_contains_measured_frames() -> None:
     profile = Profile.parse("F19 [90, 110], F21 [40, 60], F53 [70, 90], F54 [70, 90], F31 [100, 120]")
     frames, seen = faps_from_features(features_from_faps(profile.frame()[None]))
     for fap, (low, high) in measurable_profile(profile).ranges.items():
@@ -129,7 +129,7 @@ def test_what_features_tell_of_a_frame_is_in_the_profile_as_they_see_it() -> Non
         assert low <= frames[0, fap - 1] <= high
 
 
-def test_bad_points_are_refused_in_words(face: Face) -> None:
+def test_faps_from_points_refuses_invalid_points(face: Face) -> None:
     here = {name: at[None] for name, at in rest(face).items()}
     for points, neutral, said in (
         ({}, rest(face), "wanted at least one feature point, got none"),

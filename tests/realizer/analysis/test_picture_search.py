@@ -28,7 +28,7 @@ def drawn(face: str, light: str, size: tuple[int, int], intensity: float) -> lis
         return [picture[..., :3].copy() for picture in renderer.draw(poses(frames, input_names(face)))]
 
 
-def test_expression_is_found_in_a_picture_of_a_face_that_is_known() -> None:
+def test_by_picture_finds_the_expression_of_a_known_face() -> None:
     _, picture, *_ = drawn("ada", "evening", (150, 200), 0.7)
     seen = by_picture(picture, KNOWN, ["ada"])
     assert (seen.face, seen.light, seen.neutral) == ("ada", "evening", False)
@@ -36,7 +36,7 @@ def test_expression_is_found_in_a_picture_of_a_face_that_is_known() -> None:
 
 
 @pytest.mark.slow
-def test_face_light_and_expression_are_found_in_a_picture_of_any_size() -> None:
+def test_by_picture_finds_face_light_and_expression_at_any_size() -> None:
     neutral, *pictures = drawn("ben", "evening", (300, 400), 0.7)
     for one, picture in list(zip(KNOWN, pictures, strict=True))[:2]:
         seen = by_picture(picture, KNOWN)
@@ -51,13 +51,13 @@ def test_face_light_and_expression_are_found_in_a_picture_of_any_size() -> None:
 
 
 @pytest.mark.parametrize("shape", [(200, 200, 3), (900, 20, 3), (20, 900, 3)])
-def test_what_is_no_face_of_ours_is_said(shape: tuple[int, int, int]) -> None:
+def test_by_picture_refuses_an_unknown_face(shape: tuple[int, int, int]) -> None:
     noise = np.random.default_rng(0).integers(0, 255, shape).astype(np.uint8)
     with pytest.raises(UnknownPictureError, match="wanted a picture of one of our faces from the front"):
         by_picture(noise, KNOWN, ["ada"])
 
 
-def test_a_file_that_is_no_picture_is_said(tmp_path) -> None:
+def test_read_picture_refuses_other_files(tmp_path) -> None:
     (tmp_path / "a.png").write_text("no", "utf-8")
     with pytest.raises(UnknownPictureError, match=r"a\.png: wanted a picture"):
         read_picture(tmp_path / "a.png")

@@ -21,7 +21,7 @@ frame,point,x,y,z
 """
 
 
-def test_points_are_read_and_what_was_lost_is_nan() -> None:
+def test_read_points_has_nan_for_lost_points() -> None:
     points, rest = read_points(TABLE)
     assert points["4.1"].shape == points["2.1"].shape == (4, 3)
     assert np.isnan(points["4.1"][2]).all()
@@ -29,7 +29,7 @@ def test_points_are_read_and_what_was_lost_is_nan() -> None:
     assert list(rest["4.1"]) == [0.015, 0.017, 0.028]
 
 
-def test_a_gap_is_bridged_straight() -> None:
+def test_bridge_interpolates_linearly() -> None:
     points, _ = read_points(TABLE)
     whole = bridge(points)
     assert whole["4.1"][2] == pytest.approx([0.015, 0.019, 0.028])
@@ -50,6 +50,6 @@ def test_a_gap_is_bridged_straight() -> None:
         (TABLE + "3,4.2,0,0,0\n", "t: wanted every point at rest in frame 0, got none of 4.2"),
     ],
 )
-def test_a_bad_table_is_refused_with_its_line(text: str, said: str) -> None:
+def test_read_points_refuses_an_invalid_line(text: str, said: str) -> None:
     with pytest.raises(ValueError, match=said):
         read_points(text, "t")

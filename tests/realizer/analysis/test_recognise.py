@@ -25,14 +25,14 @@ def noisy(profile: Profile, seed: int) -> np.ndarray:
     return draws + chance.normal(0, 0.1 * lengths, draws.shape)
 
 
-def test_membership_is_sure_within_the_range_and_gone_half_a_length_beyond() -> None:
+def test_beliefs_fall_from_the_range_to_half_a_length_beyond() -> None:
     known = Recogniser([Profile.parse("F31 [100, 200]", "up 0")])
     frames = np.zeros((7, 68))
     frames[:, 30] = 50, 75, 100, 150, 200, 225, 250
     assert known.beliefs(frames)[:, 0] == pytest.approx([0, 0.5, 1, 1, 1, 0.5, 0])
 
 
-def test_a_profile_is_the_product_of_its_faps_and_an_emotion_the_best_of_its_profiles() -> None:
+def test_beliefs_are_products_and_emotions_have_the_best_profile() -> None:
     known = Recogniser(
         [
             Profile.parse("F31 [100, 200], F32 [100, 200]", "up 0"),
@@ -48,7 +48,7 @@ def test_a_profile_is_the_product_of_its_faps_and_an_emotion_the_best_of_its_pro
     assert seen.emotion == "up"
 
 
-def test_without_a_class_for_absent_faps_a_small_profile_is_seen_in_a_larger_one() -> None:
+def test_beliefs_without_absent_faps_find_a_small_profile_in_a_larger() -> None:
     small, large = (
         Profile.parse("F31 [100, 200]", "small"),
         Profile.parse("F31 [100, 200], F4 [90, 110]", "large"),
@@ -61,7 +61,7 @@ def test_without_a_class_for_absent_faps_a_small_profile_is_seen_in_a_larger_one
     assert ours.recognise(small.frame()).emotion == "small"
 
 
-def test_what_was_not_observed_is_not_judged() -> None:
+def test_beliefs_ignore_unobserved_faps() -> None:
     known = Recogniser(
         [Profile.parse("F31 [100, 200], F4 [90, 110]", "a"), Profile.parse("F5 [50, 60]", "b")]
     )
@@ -72,13 +72,13 @@ def test_what_was_not_observed_is_not_judged() -> None:
 
 
 @pytest.mark.parametrize("profiles", ["own", "published", "raw"])
-def test_a_neutral_face_is_neutral_where_what_is_absent_counts(profiles: str) -> None:
+def test_recogniser_recognises_the_neutral_face(profiles: str) -> None:
     assert recogniser(profiles).recognise(np.zeros(68)).emotion == "neutral"
     assert "neutral" not in recogniser(profiles, absent=False).recognise(np.zeros(68)).emotions
 
 
 @pytest.mark.parametrize("profiles", ["own", "published"])
-def test_the_archetypes_are_recognised_as_themselves_through_noise(profiles: str) -> None:
+def test_recogniser_recognises_archetypes_through_noise(profiles: str) -> None:
     known = recogniser(profiles)
     for name, numbered in archetypes(profiles).items():
         for profile in numbered.values():
@@ -87,7 +87,7 @@ def test_the_archetypes_are_recognised_as_themselves_through_noise(profiles: str
 
 
 @pytest.mark.parametrize("strength", [0.4, 0.5, 0.56, 0.7, 0.85, 1.1])
-def test_our_own_archetypes_are_recognised_at_less_than_full_strength(strength: float) -> None:
+def test_recogniser_recognises_our_own_archetypes_at_less_strength(strength: float) -> None:
     known = recogniser()
     for name, numbered in archetypes().items():
         weaker = numbered[0].scaled(strength)
@@ -97,13 +97,13 @@ def test_our_own_archetypes_are_recognised_at_less_than_full_strength(strength: 
 
 
 @pytest.mark.parametrize("name", [place.name for place in ring("paul").values() if place.kind == "advanced"])
-def test_a_blend_in_the_middle_of_two_archetypes_is_named_with_its_belief(name: str) -> None:
+def test_recogniser_names_a_blend_of_two_archetypes(name: str) -> None:
     seen = recogniser().recognise(emotion(name).frame())
     assert seen.emotion == name
     assert seen.emotions[name] == 1
 
 
-def test_a_word_of_a_category_is_recognised_as_its_archetype() -> None:
+def test_recogniser_recognises_a_word_as_its_archetype() -> None:
     known = recogniser()
     wanted = {"sad": "sadness", "afraid": "fear", "angry": "anger", "disgusted": "disgust", "happy": "joy"}
     assert {word: known.recognise(emotion(word).frame()).emotion for word in wanted} == wanted
@@ -111,7 +111,7 @@ def test_a_word_of_a_category_is_recognised_as_its_archetype() -> None:
 
 
 @pytest.mark.parametrize("profiles", ["own", "published"])
-def test_the_words_that_whissell_rated_are_told_from_each_other_through_noise(profiles: str) -> None:
+def test_recogniser_distinguishes_words_through_noise(profiles: str) -> None:
     words = [word for word, source in known_words().items() if source == "whissell"]
     made = [emotion(word, profiles) for word in words]
     known = Recogniser(made)
@@ -121,7 +121,7 @@ def test_the_words_that_whissell_rated_are_told_from_each_other_through_noise(pr
     assert min(right.values()) >= 0.85, right
 
 
-def test_what_cannot_be_judged_is_refused() -> None:
+def test_beliefs_refuse_invalid_frames() -> None:
     with pytest.raises(ValueError, match="wanted at least one"):
         Recogniser([])
     with pytest.raises(ValueError, match=r"wanted \(n, 68\), got \(2, 15\)"):

@@ -11,7 +11,7 @@ from realizer.emotions.archetypes import archetypes
 
 @pytest.mark.parametrize(("profiles", "raw"), [("raw", True), ("published", False)])
 @pytest.mark.parametrize("emotion", ["anger", "sadness", "joy", "disgust", "fear", "surprise"])
-def test_the_statistics_give_the_first_published_profile(emotion: str, profiles: str, raw: bool) -> None:
+def test_from_statistics_gives_the_first_published_profile(emotion: str, profiles: str, raw: bool) -> None:
     made = from_statistics(emotion, published_statistics(emotion, raw))
     printed = archetypes(profiles)[emotion][0]
     assert made.ranges.keys() == printed.ranges.keys()
@@ -20,12 +20,12 @@ def test_the_statistics_give_the_first_published_profile(emotion: str, profiles:
         assert made.ranges[fap] == pytest.approx(ends, abs=10 if raw else 2), fap
 
 
-def test_a_fap_of_one_direction_keeps_to_it() -> None:
+def test_from_statistics_keeps_the_direction_of_a_fap() -> None:
     made = from_statistics("sigh", {3: (100, 150), 41: (-10, 5), 4: (100, 150)})
     assert dict(made.ranges) == {3: (0, 250), 4: (-50, 250), 41: (0, 0)}
 
 
-def test_faces_that_were_drawn_from_a_profile_give_ranges_within_it() -> None:
+def test_from_faces_of_a_profile_gives_ranges_within_it() -> None:
     joy = archetypes("own")["joy"][0]
     chance = np.random.default_rng(0)
     made = from_faces("joy", np.stack([joy.draw(chance) for _ in range(400)]))
@@ -47,11 +47,11 @@ def test_faces_that_were_drawn_from_a_profile_give_ranges_within_it() -> None:
         (np.full((4, 68), np.nan), "finite values"),
     ],
 )
-def test_bad_faces_are_refused(frames: np.ndarray, said: str) -> None:
+def test_from_faces_refuses_invalid_frames(frames: np.ndarray, said: str) -> None:
     with pytest.raises(ValueError, match=said):
         from_faces("x", frames)
 
 
-def test_a_bad_deviation_is_refused() -> None:
+def test_from_statistics_refuses_an_invalid_deviation() -> None:
     with pytest.raises(ValueError, match="x, FAP 4: wanted a deviation of 0 or more, got -1"):
         from_statistics("x", {4: (3, -1)})

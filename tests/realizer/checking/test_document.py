@@ -20,7 +20,7 @@ def findings(text: str) -> list[Finding]:
     ]
 
 
-def test_a_sound_document_is_read_and_scheduled_without_a_finding() -> None:
+def test_check_document_without_faults_has_no_finding() -> None:
     (part,) = check_document("typed", Source(GOOD), GOOD, Player(PlayOptions(idle=False)))
     assert part.block is not None
     assert part.schedule is not None
@@ -37,14 +37,14 @@ def test_a_sound_document_is_read_and_scheduled_without_a_finding() -> None:
         ('<bml id="a"><frown id="n"/></bml>', "frown"),
     ],
 )
-def test_a_fault_is_marked_where_it_is(text: str, marked: str) -> None:
+def test_check_document_marks_a_fault(text: str, marked: str) -> None:
     (finding,) = findings(text)
     assert finding.spot is not None
     line, column, length = finding.spot
     assert (line, text[column - 1 : column - 1 + length]) == (1, marked)
 
 
-def test_every_block_of_a_text_has_its_own_findings() -> None:
+def test_check_document_has_findings_for_each_block() -> None:
     bad = '<bml id="b"><head id="n" lexeme="NIX"/></bml>'
     text = GOOD + "\n" + bad + '\n<bml id="c"><head'
     parts = list(check_document("typed", Source(text), text, Player(PlayOptions(idle=False))))
@@ -53,5 +53,5 @@ def test_every_block_of_a_text_has_its_own_findings() -> None:
     assert [f.spot.line for part in parts for f in part.findings if f.spot] == [2, 3]
 
 
-def test_a_later_block_may_refer_to_an_earlier_one() -> None:
+def test_check_document_lets_blocks_refer_to_earlier_ones() -> None:
     assert not findings(GOOD + '<bml id="b"><head id="m" lexeme="NOD" start="a:n:end"/></bml>')

@@ -27,21 +27,21 @@ def finding(behaviours: str) -> Finding:
         ('<heed id="n" lexeme="NOD"/>', "head"),
     ],
 )
-def test_explanation_says_what_might_have_been_meant(behaviours: str, note: str) -> None:
+def test_finding_of_suggests_what_was_meant(behaviours: str, note: str) -> None:
     assert any(note in one for one in finding(behaviours).notes)
 
 
-def test_explanation_of_an_id_that_is_taken_marks_the_first_holder() -> None:
+def test_finding_of_a_taken_id_marks_its_first_use() -> None:
     found = finding('<head id="n" lexeme="NOD"/>\n<head id="n" lexeme="SHAKE"/>')
     assert [(label.spot.line, label.primary) for label in found.labels] == [(2, True), (1, False)]
 
 
-def test_near_words_are_found_in_any_case() -> None:
+def test_near_ignores_case() -> None:
     assert near("smlie", ["SMILE", "FROWN"]) == "SMILE"
     assert near("xyz", ["SMILE", "FROWN"]) is None
 
 
-def test_attributes_are_those_that_a_warning_mentions() -> None:
+def test_attributes_of_a_warning_are_those_it_mentions() -> None:
     assert attributes_of("start, end: wanted one; amount: wanted 0..1, got 7") == ["start", "end", "amount"]
     assert attributes_of("amount: wanted 0..1, got 7; with it went b") == ["amount"]
     assert attributes_of("something else") == []

@@ -13,7 +13,7 @@ def findings(text: str) -> list[Finding]:
     return [found for part in check_document("typed", Source(text), text, player) for found in part.findings]
 
 
-def test_conflict_is_labelled_on_every_line_that_takes_part() -> None:
+def test_explain_conflict_labels_every_line_that_takes_part() -> None:
     text = '<bml id="a">\n<head id="n" lexeme="NOD" start="2"\n end="1"/></bml>'
     (found,) = findings(text)
     spots = [label.spot for label in found.labels]

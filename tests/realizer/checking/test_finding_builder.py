@@ -8,7 +8,7 @@ from realizer.checking.finding_builder import FindingBuilder
 SOURCE = Source('<bml id="a">\n<head id="n"/>\n</bml>\n<bml id="b">\n<head id="n"/>\n</bml>')
 
 
-def test_a_draft_finds_its_element_by_the_id_of_its_block() -> None:
+def test_finding_builder_finds_its_element_by_id() -> None:
     for block, line in (("a", 2), ("b", 5)):
         draft = FindingBuilder(SOURCE, f"{block}:n", None, "")
         assert draft.block == block
@@ -16,11 +16,11 @@ def test_a_draft_finds_its_element_by_the_id_of_its_block() -> None:
         assert SOURCE.name_spot(draft.element).line == line
 
 
-def test_a_draft_finds_its_element_by_its_path_and_line() -> None:
+def test_finding_builder_finds_its_element_by_path_and_line() -> None:
     draft = FindingBuilder(SOURCE, "b:?", 5, "/bml/head")
     assert draft.element is not None
     assert SOURCE.name_spot(draft.element).line == 5
 
 
-def test_a_draft_of_an_unknown_behaviour_has_no_element() -> None:
+def test_finding_builder_of_an_unknown_behaviour_has_no_element() -> None:
     assert FindingBuilder(SOURCE, "a:m", None, "").element is None

@@ -33,14 +33,14 @@ def faults(text: str) -> list[tuple[str, str, str]]:
         ('<head id="f" lexeme="NOD" amount="7"/>', ["7"]),
     ],
 )
-def test_what_the_parser_finds_hides_nothing_of_what_is_unknown(behaviour: str, told: list[str]) -> None:
+def test_masked_faults_has_faults_behind_those_of_the_parser(behaviour: str, told: list[str]) -> None:
     good = '<head id="n" lexeme="NOD"/>'
     found = faults(f'<bml id="b">\n{good}{behaviour}</bml>')
     assert [what for _, _, what in found] == told
     assert {id for _, id, _ in found} == {"b:f"}
 
 
-def test_each_of_several_documents_has_its_own() -> None:
+def test_masked_faults_of_several_documents_are_separate() -> None:
     one = '<bml id="{}"><faceLexeme id="f" lexeme="{}" amount="7"/></bml>\n'
     found = faults(
         one.format("a", "XYZ") + "<bml id='broken'><oops" + one.format("c", "SMILE") + one.format("d", "QQQ")
@@ -54,11 +54,11 @@ def test_each_of_several_documents_has_its_own() -> None:
     ]
 
 
-def test_a_behaviour_whose_id_another_one_has_is_told_of_once() -> None:
+def test_masked_faults_report_a_repeated_id_once() -> None:
     found = faults('<bml id="b"><head id="n" lexeme="NOD"/><head id="n" lexeme="NODD"/></bml>')
     assert [what for _, _, what in found] == ["n"]
 
 
-def test_a_fault_of_the_type_of_each_step_is_told_as_it_would_be_alone() -> None:
+def test_masked_faults_are_reported_as_if_alone() -> None:
     found = faults('<bml id="b"><faceLexeme id="f" lexeme="XYZ" amount="7"/></bml>')
     assert [type for type, _, _ in found] == ["CANNOT_CREATE_BEHAVIOR", "PARSING_FAILURE"]

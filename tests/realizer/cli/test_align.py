@@ -16,7 +16,7 @@ from tests.realizer.behaviours.conftest import wav
 pytestmark = pytest.mark.skipif(bool(install_hint()), reason=str(install_hint()))
 
 
-def test_words_are_written_with_their_times(tmp_path: Path) -> None:
+def test_align_writes_words_with_their_times(tmp_path: Path) -> None:
     voice = EspeakVoice()
     said = voice.say(SpeechRequest("Guten Morgen, wie geht es Ihnen?", language="de", voice="de+m3"))
     voice.close()
@@ -35,7 +35,7 @@ def test_words_are_written_with_their_times(tmp_path: Path) -> None:
     assert "Morgen" in shown.output
 
 
-def test_an_output_of_another_kind_is_wrong_usage(tmp_path: Path) -> None:
+def test_align_refuses_an_unknown_suffix(tmp_path: Path) -> None:
     (tmp_path / "a.wav").write_bytes(b"")
     run = CliRunner().invoke(cli, ["align", str(tmp_path / "a.wav"), "x", "-o", "x.txt"])
     assert run.exit_code == 2

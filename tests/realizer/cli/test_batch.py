@@ -31,7 +31,7 @@ def rows(folder: Path) -> dict[str, str]:
     return {row["document"]: row["status"] for row in map(json.loads, lines)}
 
 
-def test_a_folder_becomes_a_file_a_document_and_format(talks: Path, tmp_path: Path) -> None:
+def test_batch_writes_a_file_for_each_document_and_format(talks: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     command = [str(talks), "-o", str(out), "--format", "fap", "--format", ".JSON", "--workers", "1"]
     done = batch(*command)
@@ -42,14 +42,14 @@ def test_a_folder_becomes_a_file_a_document_and_format(talks: Path, tmp_path: Pa
     assert "2 done (2 of them before)" in batch(*command).stderr
 
 
-def test_what_was_refused_is_told_by_the_exit_status(talks: Path, tmp_path: Path) -> None:
+def test_batch_exits_with_1_for_a_refused_document(talks: Path, tmp_path: Path) -> None:
     (talks / "c.bml").write_text("<bml")
     done = batch("-", "-o", str(tmp_path / "out"), "--format", "fap", "--workers", "1", text=f"{talks}\n")
     assert done.return_value == 1
     assert rows(tmp_path / "out") == {"a": "done", "b": "done", "c": "refused"}
 
 
-def test_with_strict_a_behaviour_that_was_dropped_counts(talks: Path, tmp_path: Path) -> None:
+def test_batch_exits_with_1_for_a_dropped_behaviour_if_strict(talks: Path, tmp_path: Path) -> None:
     (talks / "a.bml").write_text('<bml id="b"><faceLexeme id="f" lexeme="NOPE"/></bml>')
     command = [str(talks), "-o", str(tmp_path / "out"), "--format", "fap", "--workers", "1"]
     assert batch(*command).return_value == 0
@@ -64,7 +64,7 @@ def test_with_strict_a_behaviour_that_was_dropped_counts(talks: Path, tmp_path: 
         (["--format", "mp4", "--camera", "from-behind"], "from-behind"),
     ],
 )
-def test_wrong_usage_is_told_before_anything_is_played(
+def test_batch_refuses_wrong_options_before_it_plays(
     args: list[str], words: str, talks: Path, tmp_path: Path
 ) -> None:
     import click
@@ -75,7 +75,7 @@ def test_wrong_usage_is_told_before_anything_is_played(
     assert not (tmp_path / "out").exists()
 
 
-def test_a_place_without_documents_is_told(tmp_path: Path) -> None:
+def test_batch_refuses_a_place_without_documents(tmp_path: Path) -> None:
     import click
 
     with pytest.raises(click.UsageError, match="nowhere: wanted a document"):

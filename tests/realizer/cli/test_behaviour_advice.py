@@ -17,7 +17,7 @@ def check(tmp_path: Path, body: str, *options: str) -> Result:
     return CliRunner().invoke(cli, ["check", str(document), *options], standalone_mode=False)
 
 
-def test_advice_stands_on_standard_error_with_its_place_and_does_not_count(tmp_path: Path) -> None:
+def test_advice_is_on_standard_error_with_its_place_and_does_not_count(tmp_path: Path) -> None:
     done = check(tmp_path, '<r:expression id="e" name="template:disgust"/>')
     assert (done.return_value, done.stdout) == (0, "")
     assert (
@@ -26,7 +26,7 @@ def test_advice_stands_on_standard_error_with_its_place_and_does_not_count(tmp_p
     )
 
 
-def test_a_word_is_looked_up_where_it_is_spoken(tmp_path: Path) -> None:
+def test_advice_finds_a_word_at_the_time_when_it_is_spoken(tmp_path: Path) -> None:
     speech = '<speech id="s" start="2"><text>I say: <sync id="k"/>nonsense.</text></speech>'
     missing = '"nonsense" is said without anger'
     assert missing in check(tmp_path, speech).stderr
@@ -36,12 +36,12 @@ def test_a_word_is_looked_up_where_it_is_spoken(tmp_path: Path) -> None:
     assert missing in check(tmp_path, too_early).stderr
 
 
-def test_a_listener_is_measured_as_a_listener(tmp_path: Path) -> None:
+def test_advice_depends_on_the_role(tmp_path: Path) -> None:
     body = '<r:expression id="e" name="template:happiness"/>'
     assert "a listener shows happiness" in check(tmp_path, body, "--role", "listener").stderr
     assert "a listener" not in check(tmp_path, body).stderr
 
 
-def test_faces_that_are_no_templates_are_nobodys_business(tmp_path: Path) -> None:
+def test_advice_ignores_faces_that_are_not_templates(tmp_path: Path) -> None:
     done = check(tmp_path, '<faceLexeme id="e" lexeme="RAISE_BROWS" start="0" end="60"/>')
     assert "ADVICE" not in done.stderr

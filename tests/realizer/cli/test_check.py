@@ -42,14 +42,14 @@ def marked(block: list[str]) -> list[str]:
     return found
 
 
-def test_a_fault_is_one_line_where_nobody_looks(tmp_path: Path) -> None:
+def test_check_prints_a_fault_on_one_line_without_a_terminal(tmp_path: Path) -> None:
     done = check(tmp_path, HEAD + '<head id="n" lexeme="NOD" amount="7"/>\n</bml>')
     assert done.return_value == 1
     (line,) = done.stdout.splitlines()
     assert line.endswith("d.bml:2:35: PARSING_FAILURE b1:n: line 2, /bml/head[1]: amount: wanted 0..1, got 7")
 
 
-def test_a_sound_document_says_nothing_on_standard_output_and_ends_with_0(tmp_path: Path) -> None:
+def test_check_of_a_document_without_faults_prints_nothing(tmp_path: Path) -> None:
     done = check(tmp_path, HEAD + '<head id="n" lexeme="NOD"/></bml>', "--long")
     assert (done.return_value, done.stdout) == (0, "")
     assert "no fault in 1 block" in done.stderr
@@ -78,7 +78,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_what_is_wrong_is_underlined_and_what_may_help_is_said(case: str, tmp_path: Path) -> None:
+def test_check_underlines_a_fault_and_suggests_a_fix(case: str, tmp_path: Path) -> None:
     text, under, help = CASES[case]
     done = check(tmp_path, f"{HEAD}{text}\n</bml>", "--long")
     assert done.return_value == 1
@@ -88,14 +88,14 @@ def test_what_is_wrong_is_underlined_and_what_may_help_is_said(case: str, tmp_pa
     assert "line 2" in block[0] or case == "duplicate"
 
 
-def test_two_faults_of_one_element_are_both_marked(tmp_path: Path) -> None:
+def test_check_marks_both_faults_of_one_element(tmp_path: Path) -> None:
     text = '<head id="n" lexeme="NOD"\n  amount="x"\n  repetition="0.5"/>'
     (block,) = blocks(check(tmp_path, f"{HEAD}{text}</bml>", "--long"))
     assert marked(block) == ["x", "0.5"]
     assert block[0].split(":")[1:3] == ["3", "11"]
 
 
-def test_constraints_that_cannot_hold_show_each_line(tmp_path: Path) -> None:
+def test_check_shows_every_line_of_a_conflict(tmp_path: Path) -> None:
     text = HEAD + (
         '<head id="a" lexeme="NOD" start="b:end"/>\n<head id="b" lexeme="NOD"\n  start="a:end + 1"/>\n</bml>'
     )
@@ -108,7 +108,7 @@ def test_constraints_that_cannot_hold_show_each_line(tmp_path: Path) -> None:
     assert "b was dropped because it comes later" in done.stdout
 
 
-def test_a_clash_of_a_constraint_marks_its_reference(tmp_path: Path) -> None:
+def test_check_marks_the_references_of_a_conflicting_constraint(tmp_path: Path) -> None:
     text = HEAD + (
         '<head id="a" lexeme="NOD" start="1"/>\n'
         '<constraint id="c"><synchronize>\n<sync ref="a:start"/><sync ref="3"/>\n</synchronize>'
@@ -140,14 +140,14 @@ ASTRAY = {
 
 
 @pytest.mark.parametrize("case", ASTRAY)
-def test_a_reference_that_leads_nowhere_is_marked(case: str, tmp_path: Path) -> None:
+def test_check_marks_a_dangling_reference(case: str, tmp_path: Path) -> None:
     text, under, path = ASTRAY[case]
     (block,) = blocks(check(tmp_path, f"{HEAD}{text}</bml>", "--long"))
     assert under in marked(block)
     assert f"line 2, {path}: " in block[0]
 
 
-def test_whoever_has_what_a_behaviour_wanted_is_shown(tmp_path: Path) -> None:
+def test_check_shows_the_behaviour_that_holds_a_resource(tmp_path: Path) -> None:
     text = '<gaze id="g" target="a"/>\n<gaze id="h" target="b"/>'
     done = check(tmp_path, f"{HEAD}{text}</bml>", "--long")
     (block,) = blocks(done)
@@ -156,14 +156,14 @@ def test_whoever_has_what_a_behaviour_wanted_is_shown(tmp_path: Path) -> None:
     assert "g is here" in done.stdout
 
 
-def test_a_fault_of_the_whole_block_is_marked_in_its_start_tag(tmp_path: Path) -> None:
+def test_check_marks_a_fault_of_a_block_in_its_start_tag(tmp_path: Path) -> None:
     text = '<bml id="c" composition="MRGE"/>'
     (block,) = blocks(check(tmp_path, text, "--long"))
     assert marked(block) == ["MRGE"]
     assert 'did you mean "MERGE"?' in "\n".join(block)
 
 
-def test_faults_of_a_block_that_fails_are_told_all_the_same(tmp_path: Path) -> None:
+def test_check_prints_all_faults_of_a_block_that_fails(tmp_path: Path) -> None:
     text = HEAD + (
         '<required><head id="a" lexeme="NOPE"/>\n<head id="b" amount="7" lexeme="NOD"/></required>\n'
         '<faceFacs id="c" au="999"/>\n'
@@ -173,7 +173,7 @@ def test_faults_of_a_block_that_fails_are_told_all_the_same(tmp_path: Path) -> N
     assert [line.split(" ")[2] for line in done.stdout.splitlines()] == ["b1:a:", "b1:b:", "b1:c:", "b1:d:"]
 
 
-def test_a_target_that_the_scene_does_not_have_is_marked(tmp_path: Path) -> None:
+def test_check_marks_an_unknown_target(tmp_path: Path) -> None:
     scene = tmp_path / "scene.txt"
     scene.write_text("cup 0 0 1\n")
     done = check(tmp_path, f'{HEAD}<gaze id="g" target="cupp"/></bml>', "--long", "--scene", str(scene))
@@ -194,7 +194,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("case", BROKEN)
-def test_broken_xml_is_marked_where_it_breaks(case: str, tmp_path: Path) -> None:
+def test_check_marks_where_xml_is_broken(case: str, tmp_path: Path) -> None:
     text, under = BROKEN[case]
     done = check(tmp_path, HEAD + text, "--long")
     (block,) = blocks(done)
@@ -202,7 +202,7 @@ def test_broken_xml_is_marked_where_it_breaks(case: str, tmp_path: Path) -> None
     assert sorted(marked(block)) == sorted(under)
 
 
-def test_several_documents_are_told_apart(tmp_path: Path) -> None:
+def test_check_distinguishes_several_documents_of_a_file(tmp_path: Path) -> None:
     one = '<bml id="x"><wait id="w" duration="1"/></bml>'
     two = '<bml id="y"><wait id="w" duration="long"/></bml>'
     (block,) = blocks(check(tmp_path, one + two + "\n", "--long"))
@@ -212,7 +212,7 @@ def test_several_documents_are_told_apart(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
-def test_the_mark_stands_below_wide_characters_and_tabs(encoding: str, tmp_path: Path) -> None:
+def test_check_marks_below_wide_characters_and_tabs(encoding: str, tmp_path: Path) -> None:
     text = '<bml id="y"><!-- 中文 é e\u0301 -->\t<wait id="w" duration="long"/></bml>'
     (block,) = blocks(check(tmp_path, text.encode(encoding), "--long"))
     row, mark = block[2], block[3]
@@ -222,7 +222,7 @@ def test_the_mark_stands_below_wide_characters_and_tabs(encoding: str, tmp_path:
     assert mark.count("^") == 4
 
 
-def test_a_very_long_line_is_cut_around_the_fault(tmp_path: Path) -> None:
+def test_check_cuts_a_very_long_line_around_the_fault(tmp_path: Path) -> None:
     waits = "".join(f'<wait id="w{n}"/>' for n in range(2000))
     done = check(tmp_path, f'<bml id="y">{waits}<wait id="w" duration="long"/></bml>', "--long")
     (block,) = blocks(done)
@@ -231,7 +231,7 @@ def test_a_very_long_line_is_cut_around_the_fault(tmp_path: Path) -> None:
     assert "..." in block[2]
 
 
-def test_bytes_that_are_no_text_are_marked(tmp_path: Path) -> None:
+def test_check_marks_bytes_that_are_not_text(tmp_path: Path) -> None:
     done = check(tmp_path, b'<bml id="b">\n<wait id="\xff"/></bml>', "--long")
     (block,) = blocks(done)
     assert "0xFF" in block[0]
@@ -256,7 +256,7 @@ ADVICE = {
 
 
 @pytest.mark.parametrize("case", ADVICE)
-def test_what_looks_like_a_slip_is_advice_and_no_fault(case: str, tmp_path: Path) -> None:
+def test_check_gives_advice_on_likely_mistakes(case: str, tmp_path: Path) -> None:
     text, under, help = ADVICE[case]
     done = check(tmp_path, f"{HEAD}{text}</bml>", "--long")
     assert (done.return_value, done.stdout) == (0, "")
@@ -274,16 +274,16 @@ def test_what_looks_like_a_slip_is_advice_and_no_fault(case: str, tmp_path: Path
         '<head id="h" lexeme="NOD" stroke="1"/><face id="f" start="0" end="4"><faceFacs au="1"/></face>',
     ],
 )
-def test_what_is_merely_unknown_gets_no_advice(text: str, tmp_path: Path) -> None:
+def test_check_gives_no_advice_on_foreign_attributes_and_usual_times(text: str, tmp_path: Path) -> None:
     assert "ADVICE" not in check(tmp_path, f"{HEAD}{text}</bml>").stderr
 
 
-def test_advice_on_one_block_is_not_endless(tmp_path: Path) -> None:
+def test_check_limits_the_advice_on_one_block(tmp_path: Path) -> None:
     heads = "".join(f'<head id="h{n}" lexeme="NOD" start="1500"/>' for n in range(50))
     assert check(tmp_path, f"{HEAD}{heads}</bml>").stderr.count("ADVICE") == 20
 
 
-def test_faults_far_apart_in_one_line_are_each_shown(tmp_path: Path) -> None:
+def test_check_shows_distant_faults_of_a_line_separately(tmp_path: Path) -> None:
     gap = "<!--" + "-*" * 200 + "-->"
     text = f'<wait id="a" start="1" end="0.5"/>{gap}<wait id="b" start="a:nd"/>{gap}<wait id="a"/>'
     first, second, third = blocks(check(tmp_path, f"{HEAD}{text}</bml>", "--long"))
@@ -291,7 +291,7 @@ def test_faults_far_apart_in_one_line_are_each_shown(tmp_path: Path) -> None:
     assert all(len(line) <= 100 for block in (first, second, third) for line in block[1:])
 
 
-def test_quiet_holds_advice_back(tmp_path: Path) -> None:
+def test_check_prints_no_advice_if_quiet(tmp_path: Path) -> None:
     document = tmp_path / "d.bml"
     document.write_text(f'{HEAD}<head id="h" lexeme="NOD" start="1500"/></bml>')
     done = CliRunner().invoke(cli, ["-q", "check", str(document)], standalone_mode=False)
@@ -321,7 +321,7 @@ def on_a_terminal(document: Path, **environment: str) -> str:
     return said.decode()
 
 
-def test_a_terminal_gets_the_source_and_colours_unless_it_wants_none(tmp_path: Path) -> None:
+def test_check_prints_source_and_colours_on_a_terminal(tmp_path: Path) -> None:
     document = tmp_path / "d.bml"
     document.write_text(f'{HEAD}<head id="n" lexeme="NOD" amount="7"/></bml>')
     shown, plain = on_a_terminal(document), on_a_terminal(document, NO_COLOR="1")
@@ -337,14 +337,14 @@ DUTCH = (
 )
 
 
-def test_words_are_those_of_the_language_that_the_document_names(tmp_path: Path) -> None:
+def test_check_uses_the_words_of_the_language_of_a_document(tmp_path: Path) -> None:
     told = check(tmp_path, DUTCH).stderr
     assert '"Nonsense" is said without anger' in told
     assert '"nonsense"' not in told
     assert "no emotional words" not in told
 
 
-def test_a_language_without_words_is_told_once_to_who_asks_for_more(tmp_path: Path) -> None:
+def test_check_names_a_language_without_words_once_if_verbose(tmp_path: Path) -> None:
     document = tmp_path / "d.bml"
     document.write_text(DUTCH + DUTCH)
     arguments = ["-v", "check", str(document)]
@@ -352,7 +352,7 @@ def test_a_language_without_words_is_told_once_to_who_asks_for_more(tmp_path: Pa
     assert told.count("no emotional words for language 'nl'") == 1
 
 
-def test_words_of_another_language_come_from_a_file_for_advice_too(tmp_path: Path) -> None:
+def test_check_reads_words_of_another_language_from_a_file(tmp_path: Path) -> None:
     words = tmp_path / "nl.csv"
     words.write_text(
         "# source: own\n# units: none\n# licence: MIT\nword,category,origin\nonzin,disapproval,own\n"
@@ -370,7 +370,7 @@ def test_words_of_another_language_come_from_a_file_for_advice_too(tmp_path: Pat
     assert str(wrong) in str(check(tmp_path, document, "--words", str(wrong)).exception)
 
 
-def test_a_description_that_says_something_else_gets_no_advice_on_words_of_the_text(tmp_path: Path) -> None:
+def test_check_ignores_words_of_a_text_that_a_description_replaces(tmp_path: Path) -> None:
     ssml = '<description priority="1" type="application/ssml+xml"><speak>Something else</speak></description>'
     said = HEAD + f'<speech id="s"><text>Nonsense.</text>{ssml}</speech></bml>'
     assert "without anger" not in check(tmp_path, said).stderr

@@ -19,7 +19,7 @@ def run(*args: str) -> Result:
     return CliRunner().invoke(cli, ["emotion", *args], standalone_mode=True)
 
 
-def test_a_word_is_told_with_its_ranges_and_middles() -> None:
+def test_emotion_prints_the_ranges_and_middles_of_a_word() -> None:
     said = run("joy").stdout.splitlines()
     assert said[0] == "joy (own)"
     low, high = emotion("joy").ranges[12]
@@ -34,27 +34,27 @@ def test_a_word_is_told_with_its_ranges_and_middles() -> None:
     ]
 
 
-def test_json_has_ranges_and_the_68_values() -> None:
+def test_emotion_as_json_has_ranges_and_68_values() -> None:
     said = json.loads(run("afraid", "--profiles", "published", "--json").stdout)
     assert said["ranges"]["open_jaw"] == [400, 560]
     assert len(said["values"]) == 68
     assert said["values"][2] == 480
 
 
-def test_a_seed_draws_within_the_ranges() -> None:
+def test_emotion_with_a_seed_has_random_values_within_the_ranges() -> None:
     values = [json.loads(run("joy", "--json", "--seed", seed).stdout)["values"] for seed in ("1", "1", "2")]
     assert values[0] == values[1] != values[2]
     assert values[2] == pytest.approx(emotion("joy").draw(2), abs=1e-3)
 
 
-def test_places_go_by_angle_and_by_valence_and_arousal() -> None:
+def test_emotion_takes_a_place_by_angle_or_by_valence_and_arousal() -> None:
     by_angle = json.loads(run("--angle", "-700", "--activation", "5", "--json").stdout)
     assert np.allclose(by_angle["values"], wheel(20, 5).frame(), atol=1e-2)
     by_affect = json.loads(run("--valence", "-0.6", "--arousal", "0.4", "--json").stdout)
     assert np.allclose(by_affect["values"], affect(-0.6, 0.4).frame(), atol=1e-2)
 
 
-def test_a_place_says_how_much_of_which_emotion_is_there_and_no_minus_before_a_zero() -> None:
+def test_emotion_prints_the_shares_of_a_place_and_no_negative_zero() -> None:
     assert run("--angle", "-700").stdout.splitlines()[0] == "trust 56% and fear 44% (own)"
     assert run("--angle", "45").stdout.splitlines()[0] == "fear 100% (own)"
     assert json.loads(run("--angle", "20", "--json").stdout)["shares"] == {"trust": 0.5556, "fear": 0.4444}
@@ -65,30 +65,30 @@ def test_a_place_says_how_much_of_which_emotion_is_there_and_no_minus_before_a_z
 @pytest.mark.parametrize(
     "place", [["--valence", "0", "--arousal", "0"], ["--angle", "45", "--activation", "0"], ["neutral"]]
 )
-def test_the_middle_of_the_wheel_is_neutral(place: list[str]) -> None:
+def test_emotion_in_the_middle_of_the_wheel_is_neutral(place: list[str]) -> None:
     assert run(*place).stdout == "neutral (own)\n"
     said = json.loads(run(*place, "--json").stdout)
     assert (said["emotion"], said["ranges"], "shares" in said) == ("neutral", {}, False)
 
 
-def test_the_help_names_no_range_that_is_none() -> None:
+def test_emotion_help_shows_no_empty_range() -> None:
     assert "None" not in run("--help").stdout
 
 
-def test_nothing_is_told_where_the_file_cannot_be_written(tmp_path: Path) -> None:
+def test_emotion_prints_nothing_if_the_file_cannot_be_written(tmp_path: Path) -> None:
     done = run("joy", "-o", str(tmp_path / "no" / "joy.txt"))
     assert done.exit_code != 0
     assert done.stdout == ""
 
 
-def test_a_profile_is_written_as_a_file_of_pauls(tmp_path: Path) -> None:
+def test_emotion_writes_a_profile_file(tmp_path: Path) -> None:
     assert run("fear 3", "--profiles", "raw", "-o", str(tmp_path / "fear.txt")).exit_code == 0
     (back,) = read_profiles((tmp_path / "fear.txt").read_text())
     assert back.name == "Fear 3"
     assert back.ranges == emotion("fear 3", "raw").ranges
 
 
-def test_a_file_of_pauls_is_told_as_a_word_is(tmp_path: Path) -> None:
+def test_emotion_reads_a_profile_file(tmp_path: Path) -> None:
     path = tmp_path / "Fear.TXT"
     run("fear 3", "--profiles", "raw", "-o", str(path))
     said = json.loads(run(str(path), "--json").stdout)
@@ -105,7 +105,9 @@ def test_a_file_of_pauls_is_told_as_a_word_is(tmp_path: Path) -> None:
         ("Joy 0\nF3 [1\n", "line 2: Joy 0, column 1: wanted F3 [low, high]"),
     ],
 )
-def test_what_is_no_file_of_one_profile_is_refused(text: str | None, said: str, tmp_path: Path) -> None:
+def test_emotion_refuses_a_file_without_exactly_one_profile(
+    text: str | None, said: str, tmp_path: Path
+) -> None:
     path = tmp_path / "mine.txt"
     if text is not None:
         path.write_text(text, "utf-8")
@@ -114,7 +116,7 @@ def test_what_is_no_file_of_one_profile_is_refused(text: str | None, said: str, 
     assert said in " ".join(done.stderr.split())
 
 
-def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
+def test_emotion_refuses_a_file_that_is_not_text(tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_bytes(b"\xff\xfe")
     done = run(str(tmp_path / "mine.txt"))
     assert done.exit_code == 2
@@ -122,7 +124,7 @@ def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_wheel_is_a_picture_of_64_faces_and_the_word_one_of_its_own(tmp_path: Path) -> None:
+def test_emotion_draws_a_word_and_the_wheel_of_64_faces(tmp_path: Path) -> None:
     from PIL import Image
 
     chart, picture = tmp_path / "wheel.png", tmp_path / "awe.png"
@@ -165,7 +167,7 @@ def test_the_wheel_is_a_picture_of_64_faces_and_the_word_one_of_its_own(tmp_path
         (["joy", "-o", "x.png", "--camera", "above"], "--camera"),
     ],
 )
-def test_what_cannot_be_done_is_said_and_wrong_usage(args: list[str], said: str, tmp_path: Path) -> None:
+def test_emotion_refuses_wrong_options(args: list[str], said: str, tmp_path: Path) -> None:
     done = run(*args)
     assert done.exit_code == 2
     assert said in " ".join(done.stderr.split())

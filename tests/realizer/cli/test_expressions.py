@@ -16,7 +16,7 @@ def run(*words: str) -> Result:
     return CliRunner().invoke(cli, ["expressions", *words])
 
 
-def test_all_are_listed_with_their_units_and_times() -> None:
+def test_list_has_all_expressions_with_units_and_times() -> None:
     done = run("list")
     assert done.exit_code == 0
     lines = done.stdout.splitlines()
@@ -24,7 +24,7 @@ def test_all_are_listed_with_their_units_and_times() -> None:
     assert any(line.split()[:2] == ["SMILE", "6+12"] for line in lines)
 
 
-def test_the_list_as_json_has_everything() -> None:
+def test_list_as_json_has_all_fields() -> None:
     told = {one["name"]: one for one in json.loads(run("list", "--json").stdout)}
     grief = told["template:grief"]
     assert grief["aus"] == {"1": 1.0}
@@ -32,19 +32,19 @@ def test_the_list_as_json_has_everything() -> None:
     assert "Wojdel" in grief["apex"]["source"]
 
 
-def test_an_expression_is_found_by_words_and_by_units() -> None:
+def test_find_searches_by_words_and_by_action_units() -> None:
     assert "template:regret" in run("find", "sorry").stdout.splitlines()[0]
     assert "template:disgust" in run("find", "--au", "9").stdout.splitlines()[0]
     assert "LEFT_BROW" in run("find", "--au", "AU1L=0.8, 2L").stdout.splitlines()[0]
 
 
-def test_no_more_are_told_than_asked_for() -> None:
+def test_find_prints_at_most_the_requested_number() -> None:
     told = json.loads(run("find", "smile", "--most", "2", "--json").stdout)
     assert len(told) == 2
     assert told[0]["score"] >= told[1]["score"] > 0
 
 
-def test_ones_own_are_found_too(tmp_path: Path) -> None:
+def test_find_includes_a_users_expressions(tmp_path: Path) -> None:
     (tmp_path / "wave.toml").write_text('means = ["hullo"]\naus = { 12R = 0.5 }\n', "utf-8")
     done = run("find", "hullo", "--expressions", str(tmp_path))
     assert "wave" in done.stdout
@@ -61,20 +61,20 @@ def test_ones_own_are_found_too(tmp_path: Path) -> None:
         (["list", "-o", "sheet.txt"], "sheet.txt: wanted a name that ends in .png"),
     ],
 )
-def test_what_cannot_be_asked_is_refused(words: list[str], told: str) -> None:
+def test_expressions_refuse_wrong_options(words: list[str], told: str) -> None:
     done = CliRunner().invoke(cli, ["expressions", *words])
     assert done.exit_code == 2
     assert told in " ".join(done.stderr.split())
 
 
-def test_nothing_found_is_said_and_counts() -> None:
+def test_find_without_a_match_exits_with_1() -> None:
     done = CliRunner().invoke(cli, ["expressions", "find", "qqqq"], standalone_mode=False)
     assert done.return_value == 1
     assert "no expression matches 'qqqq'" in done.stderr
 
 
 @pytest.mark.slow
-def test_a_neutral_face_with_its_head_turned_a_little_is_like_no_expression(tmp_path: Path) -> None:
+def test_find_like_a_neutral_face_that_idles_has_no_match(tmp_path: Path) -> None:
     import numpy as np
     from PIL import Image
 

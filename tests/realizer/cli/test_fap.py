@@ -30,7 +30,7 @@ def actor(tmp_path: Path) -> Path:
     return path
 
 
-def test_info_says_how_long_how_fast_and_how_far(actor: Path) -> None:
+def test_info_prints_duration_rate_and_ranges(actor: Path) -> None:
     told = run("info", str(actor))
     assert told.exit_code == 0
     assert told.stdout.splitlines() == [
@@ -42,7 +42,7 @@ def test_info_says_how_long_how_fast_and_how_far(actor: Path) -> None:
     assert told.stderr == f"{actor}: line 1: the name has blanks\n"
 
 
-def test_info_as_json_says_the_same(actor: Path) -> None:
+def test_info_as_json_has_the_same_values(actor: Path) -> None:
     told = json.loads(run("info", str(actor), "--json").stdout)
     assert told == {
         "name": "C:\\my clips\\actor.fap",
@@ -56,12 +56,12 @@ def test_info_as_json_says_the_same(actor: Path) -> None:
     }
 
 
-def test_standard_input_and_a_file_without_frames(actor: Path) -> None:
+def test_info_reads_standard_input_and_a_file_without_frames(actor: Path) -> None:
     assert run("info", "-", input=actor.read_bytes()).stdout.startswith("C:\\my clips")
     assert run("info", "-", input=b"2.1 x 25 0\n").stdout == "x: 0 frames at 25 fps, 0 s\n"
 
 
-def test_convert_writes_what_the_standard_has(actor: Path, tmp_path: Path) -> None:
+def test_convert_writes_the_form_of_the_standard(actor: Path, tmp_path: Path) -> None:
     out = tmp_path / "clean.fap"
     done = run("convert", str(actor), "-o", str(out))
     assert done.exit_code == 0
@@ -72,7 +72,7 @@ def test_convert_writes_what_the_standard_has(actor: Path, tmp_path: Path) -> No
     assert read_fap(text).notes == ()
 
 
-def test_convert_goes_round_by_table_and_json_at_another_rate(actor: Path, tmp_path: Path) -> None:
+def test_convert_round_trips_by_csv_and_json_at_another_rate(actor: Path, tmp_path: Path) -> None:
     table, data, back = (str(tmp_path / name) for name in ("a.csv", "a.json", "a.fap"))
     for args in (
         (str(actor), "-o", table, "--fps", "50"),
@@ -87,7 +87,7 @@ def test_convert_goes_round_by_table_and_json_at_another_rate(actor: Path, tmp_p
     np.testing.assert_array_equal(got.expressions, original.expressions)
 
 
-def test_convert_may_write_what_visemes_and_expressions_show(actor: Path, tmp_path: Path) -> None:
+def test_convert_expands_visemes_and_expressions(actor: Path, tmp_path: Path) -> None:
     out = tmp_path / "plain.fap"
     assert run("convert", str(actor), "-o", str(out), "--expand").exit_code == 0
     got = read_fap(out.read_text())
@@ -96,14 +96,14 @@ def test_convert_may_write_what_visemes_and_expressions_show(actor: Path, tmp_pa
     assert got.values[:, 31].min() > 100
 
 
-def test_convert_limits_a_fap_file_and_says_so(tmp_path: Path) -> None:
+def test_convert_limits_values_and_reports_it(tmp_path: Path) -> None:
     mask = " ".join("1" if fap == 3 else "0" for fap in range(1, 69))
     done = run("convert", "-", "-o", str(tmp_path / "x.fap"), input=f"2.1 x 25 1\n{mask}\n0 -9\n".encode())
     assert "FAP 3 (open_jaw): wanted 0..4320, got -9; limited to it" in done.stderr
     assert read_fap((tmp_path / "x.fap").read_text()).values[0, 2] == 0
 
 
-def test_play_writes_any_output_at_the_file_s_own_rate(actor: Path, tmp_path: Path) -> None:
+def test_play_writes_a_file_at_the_rate_of_the_clip(actor: Path, tmp_path: Path) -> None:
     out = tmp_path / "played.json"
     done = run("play", str(actor), "--no-idle", "-o", str(out))
     assert done.exit_code == 0, done.output
@@ -126,7 +126,7 @@ def test_play_holds_a_file_of_one_frame_for_a_second(tmp_path: Path) -> None:
     assert rows[13][jaw] == "400"
 
 
-def test_play_draws(actor: Path, tmp_path: Path) -> None:
+def test_play_draws_a_picture(actor: Path, tmp_path: Path) -> None:
     out = tmp_path / "face.png"
     done = run("play", str(actor), "--at", "0.5", "--size", "64x64", "--face", "ben", "-o", str(out))
     assert done.exit_code == 0, done.output
@@ -134,7 +134,7 @@ def test_play_draws(actor: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("command", ["info", "play", "convert"])
-def test_what_is_no_fap_file_is_refused_as_documents_are(command: str, tmp_path: Path) -> None:
+def test_fap_exits_with_1_for_a_file_that_is_not_fap(command: str, tmp_path: Path) -> None:
     (tmp_path / "x.fap").write_text("hello world")
     out = ["-o", str(tmp_path / "out.fap")] if command != "info" else []
     done = run(command, str(tmp_path / "x.fap"), *out)
@@ -144,7 +144,7 @@ def test_what_is_no_fap_file_is_refused_as_documents_are(command: str, tmp_path:
 
 
 @pytest.mark.parametrize("content", [b"2.1 x 25 0\n", b"2.1 x 25 1\n" + b"0 " * 68 + b"\n0\n"])
-def test_what_has_nothing_to_play_is_refused(content: bytes) -> None:
+def test_play_refuses_a_file_without_frames(content: bytes) -> None:
     done = run("play", "-", input=content)
     assert done.exit_code == 1
     assert "wanted at least two frames of a FAP from 3 on" in done.output
@@ -160,13 +160,13 @@ def test_what_has_nothing_to_play_is_refused(content: bytes) -> None:
         (["-o", "no/such/folder/x.fap"], "No such file or directory"),
     ],
 )
-def test_wrong_usage_is_said(actor: Path, args: list[str], says: str) -> None:
+def test_convert_refuses_wrong_options(actor: Path, args: list[str], says: str) -> None:
     done = run("convert", str(actor), *args)
     assert done.exit_code == 2
     assert says in done.output
 
 
-def test_a_file_too_long_for_one_document_is_refused_in_frames(tmp_path: Path) -> None:
+def test_play_refuses_too_many_frames(tmp_path: Path) -> None:
     mask = " ".join("01"[fap > 2] for fap in range(1, 69))
     frames = "".join(f"{mask}\n{frame} {'1000 ' * 66}\n" for frame in range(4_000))
     done = run("play", "-", "-o", str(tmp_path / "long.csv"), input=f"2.1 long 25 4000\n{frames}".encode())

@@ -12,7 +12,7 @@ from realizer.cli.mapping import mapping
 from realizer.tables.mappings import read_mapping
 
 
-def test_the_mapping_of_a_face_is_printed_in_pauls_form() -> None:
+def test_mapping_prints_the_text_form() -> None:
     said = CliRunner().invoke(mapping, ["ada"])
     assert said.exit_code == 0
     assert said.stdout.startswith("# AU to FAP: ada: au_to_fap.csv\n")
@@ -21,7 +21,7 @@ def test_the_mapping_of_a_face_is_printed_in_pauls_form() -> None:
 
 
 @pytest.mark.parametrize("form", ["txt", "csv"])
-def test_what_is_written_is_the_table_with_the_users_rows_in_place(tmp_path: Path, form: str) -> None:
+def test_mapping_writes_the_table_with_the_users_rows(tmp_path: Path, form: str) -> None:
     (tmp_path / "mine.txt").write_text("26\n3 0 1 0 111\n", "utf-8")
     asked = ["ada", "-o", str(tmp_path / f"all.{form}"), "--mapping", str(tmp_path / "mine.txt")]
     said = CliRunner().invoke(mapping, asked)
@@ -32,7 +32,7 @@ def test_what_is_written_is_the_table_with_the_users_rows_in_place(tmp_path: Pat
     assert others == sorted((row for row in tables.au_to_fap() if row.au != 26), key=repr)
 
 
-def test_another_ending_is_refused(tmp_path: Path) -> None:
+def test_mapping_refuses_an_unknown_suffix(tmp_path: Path) -> None:
     said = CliRunner().invoke(mapping, ["ada", "-o", str(tmp_path / "all.xml")])
     assert said.exit_code == 2
     assert "wanted a name that ends in .txt or .csv" in said.output

@@ -24,7 +24,7 @@ def leaves(command: click.Command) -> list[click.Command]:
 
 
 @pytest.mark.parametrize("command", leaves(cli), ids=lambda command: str(command.name))
-def test_every_command_can_be_told_to_be_quiet_or_to_say_more(command: click.Command) -> None:
+def test_verbosity_is_an_option_of_every_command(command: click.Command) -> None:
     flags = {flag for parameter in command.params for flag in parameter.opts}
     assert {"-q", "--quiet", "-v", "--verbose"} <= flags
 
@@ -32,7 +32,7 @@ def test_every_command_can_be_told_to_be_quiet_or_to_say_more(command: click.Com
 @pytest.mark.parametrize(
     "args", [["-q", "realize", "-"], ["realize", "-", "--quiet"], ["realize", "-q", "-"]]
 )
-def test_quiet_is_the_same_before_and_after_the_command(args: list[str], tmp_path: Path) -> None:
+def test_verbosity_may_come_before_or_after_the_command(args: list[str], tmp_path: Path) -> None:
     done = run(*args, "--voice", "silent", "-o", str(tmp_path / "x.fap"))
     assert (done.exit_code, done.stderr) == (0, "")
 
@@ -49,7 +49,7 @@ def test_quiet_is_the_same_before_and_after_the_command(args: list[str], tmp_pat
         (["-o", "x.mp4", "--background", "transparent"], "a .png with --at, can be transparent"),
     ],
 )
-def test_a_wrong_look_is_wrong_usage(args: list[str], words: str) -> None:
+def test_realize_refuses_an_unknown_camera_light_or_background(args: list[str], words: str) -> None:
     done = run("realize", "-", *args)
     assert done.exit_code == 2
     assert words in " ".join(done.stderr.split())
@@ -63,7 +63,7 @@ def test_a_wrong_look_is_wrong_usage(args: list[str], words: str) -> None:
         (["--background", "transparent"], "these pictures are opaque"),
     ],
 )
-def test_serve_refuses_a_wrong_look_before_a_door_opens(args: list[str], words: str) -> None:
+def test_serve_refuses_an_unknown_camera_light_or_background(args: list[str], words: str) -> None:
     done = run("serve", "--port", "0", *args)
     assert done.exit_code == 2
     assert words in " ".join(done.stderr.split())
@@ -71,7 +71,7 @@ def test_serve_refuses_a_wrong_look_before_a_door_opens(args: list[str], words: 
 
 @pytest.mark.gl
 @pytest.mark.slow
-def test_light_and_background_are_seen_in_the_picture(tmp_path: Path) -> None:
+def test_light_and_background_are_visible_in_the_picture(tmp_path: Path) -> None:
     from PIL import Image
 
     def picture(*args: str) -> Image.Image:

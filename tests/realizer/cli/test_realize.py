@@ -37,7 +37,7 @@ def times(text: str) -> list[dict[str, object]]:
     return out if isinstance(out, list) else [out]
 
 
-def test_the_document_comes_back_with_every_time_as_a_number() -> None:
+def test_schedule_as_bml_has_every_time_as_a_number() -> None:
     done = schedule("-", "--bml", text=TALK)
     assert done.return_value == 0
     assert "b:f: CANNOT_CREATE_BEHAVIOR" in done.stderr
@@ -59,7 +59,7 @@ DOCUMENTS = [
 @pytest.mark.parametrize(
     "path", DOCUMENTS, ids=[str(p.relative_to(CORPUS).with_suffix("")) for p in DOCUMENTS]
 )
-def test_what_was_written_back_gives_the_same_times(path: Path) -> None:
+def test_schedule_of_its_own_bml_gives_the_same_times(path: Path) -> None:
     first = schedule(str(path), "--json")
     written = schedule(str(path), "--bml")
     assert written.return_value == first.return_value
@@ -74,7 +74,7 @@ def test_what_was_written_back_gives_the_same_times(path: Path) -> None:
         assert again["behaviours"][behaviour] == pytest.approx(points, abs=1e-6)
 
 
-def test_several_documents_come_back_in_one_text(tmp_path: Path) -> None:
+def test_schedule_as_bml_writes_several_documents(tmp_path: Path) -> None:
     out = tmp_path / "timed.bml"
     two = TALK + '<bml id="c" composition="APPEND"><head id="h" lexeme="NOD" start="b:n:end + 1"/></bml>'
     done = schedule("-", "--bml", "-o", str(out), text=two)
@@ -86,7 +86,7 @@ def test_several_documents_come_back_in_one_text(tmp_path: Path) -> None:
     )
 
 
-def test_a_block_that_is_refused_is_left_out_and_said() -> None:
+def test_schedule_as_bml_leaves_out_a_refused_block() -> None:
     done = schedule("-", "--bml", text=TALK + '<bml id="c"><required><head id="h"/></required></bml>')
     assert done.return_value == 1
     assert [item.id for item in read(done.stdout) if isinstance(item, Block)] == ["b"]
@@ -94,7 +94,7 @@ def test_a_block_that_is_refused_is_left_out_and_said() -> None:
 
 
 @pytest.mark.parametrize("text", ["", "<!-- later -->", 'title = "x"', "<bml/>", "<bml id='b'><oops"])
-def test_where_nothing_was_accepted_nothing_is_written(tmp_path: Path, text: str) -> None:
+def test_realize_writes_nothing_if_no_block_was_accepted(tmp_path: Path, text: str) -> None:
     out = tmp_path / "x.png"
     out.write_bytes(b"of before")
     done = CliRunner().invoke(cli, ["realize", "-", "-o", str(out)], input=text, standalone_mode=False)
@@ -104,9 +104,7 @@ def test_where_nothing_was_accepted_nothing_is_written(tmp_path: Path, text: str
 
 
 @pytest.mark.parametrize("command", ["realize -o out/0.json", "batch -o out --format json"])
-def test_where_there_is_no_room_the_file_is_named_and_no_part_of_it_left(
-    tmp_path: Path, command: str
-) -> None:
+def test_realize_on_a_full_disk_names_the_file_and_leaves_no_part(tmp_path: Path, command: str) -> None:
     (tmp_path / "0.bml").write_text(TALK)
     (tmp_path / "out").mkdir()
     name, *flags = command.split()
@@ -120,21 +118,21 @@ def test_where_there_is_no_room_the_file_is_named_and_no_part_of_it_left(
 
 
 @pytest.mark.parametrize(("suffix", "told"), [(".fap", True), (".vtt", False)])
-def test_what_holds_one_face_says_whose_it_is_not(tmp_path: Path, suffix: str, told: bool) -> None:
+def test_realize_names_characters_that_a_format_leaves_out(tmp_path: Path, suffix: str, told: bool) -> None:
     two = "".join(f'<bml id="{who}" characterId="{who}"><wait id="w" duration="1"/></bml>' for who in "ab")
     done = CliRunner().invoke(cli, ["-q", "realize", "-", "-o", str(tmp_path / f"x{suffix}")], input=two)
     assert done.exit_code == 0
     assert ("shows a, not b" in done.stderr) is told
 
 
-def test_a_block_that_a_later_one_replaces_keeps_the_times_it_was_planned_with() -> None:
+def test_schedule_keeps_the_planned_times_of_a_replaced_block() -> None:
     text = TALK + '<bml id="c" composition="REPLACE"><wait id="w" duration="1"/></bml>'
     first, second = times(text)
     assert first["behaviours"] == times(TALK)[0]["behaviours"]
     assert second["behaviours"] == {"w": {"start": 0.0, "end": 1.0}}
 
 
-def test_json_and_bml_at_once_are_wrong_usage(tmp_path: Path) -> None:
+def test_schedule_refuses_json_and_bml_together(tmp_path: Path) -> None:
     done = CliRunner().invoke(cli, ["schedule", "-", "--bml", "--json"], input=TALK)
     assert done.exit_code == 2
     done = CliRunner().invoke(cli, ["schedule", "-", "-o", str(tmp_path / "no" / "x")], input=TALK)
@@ -143,21 +141,21 @@ def test_json_and_bml_at_once_are_wrong_usage(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".svg", ".png"])
-def test_a_plot_is_drawn_instead_of_a_table(tmp_path: Path, suffix: str) -> None:
+def test_schedule_draws_a_plot_instead_of_a_table(tmp_path: Path, suffix: str) -> None:
     out = tmp_path / f"timeline{suffix}"
     done = schedule("-", "--plot", str(out), text=TALK)
     assert (done.return_value, done.stdout) == (0, "")
     assert out.read_bytes().startswith(b"<svg" if suffix == ".svg" else b"\x89PNG")
 
 
-def test_a_plot_and_its_times_come_together_where_both_are_wanted(tmp_path: Path) -> None:
+def test_schedule_draws_a_plot_and_prints_json(tmp_path: Path) -> None:
     out = tmp_path / "timeline.svg"
     both = schedule("-", "--json", "--plot", str(out), text=TALK)
     assert json.loads(both.stdout) == json.loads(schedule("-", "--json", text=TALK).stdout)
     assert ">n<" in out.read_text()
 
 
-def test_several_documents_share_a_plot(tmp_path: Path) -> None:
+def test_schedule_draws_several_documents_in_one_plot(tmp_path: Path) -> None:
     (tmp_path / "a.bml").write_text(TALK)
     (tmp_path / "b.bml").write_text(TALK.replace('id="b"', 'id="later" composition="APPEND"'))
     out = tmp_path / "timeline.svg"
@@ -166,18 +164,18 @@ def test_several_documents_share_a_plot(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["timeline.pdf", "timeline"])
-def test_a_plot_of_another_kind_is_refused_before_anything_is_planned(tmp_path: Path, name: str) -> None:
+def test_schedule_refuses_an_unknown_suffix_of_a_plot(tmp_path: Path, name: str) -> None:
     with pytest.raises(click.BadParameter, match=r"wanted a suffix of \.svg \.png"):
         schedule("-", "--plot", str(tmp_path / name), text=TALK)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_plot_that_cannot_be_written_is_wrong_usage(tmp_path: Path) -> None:
+def test_schedule_refuses_a_plot_that_cannot_be_written(tmp_path: Path) -> None:
     with pytest.raises(click.UsageError, match="No such file or directory"):
         schedule("-", "--plot", str(tmp_path / "nowhere" / "timeline.svg"), text=TALK)
 
 
-def test_json_in_detail_has_the_fixed_keys_and_more() -> None:
+def test_schedule_in_detail_has_further_keys() -> None:
     plain = json.loads(schedule("-", "--json", text=TALK).stdout)
     detailed = json.loads(schedule("-", "--json", "--detail", text=TALK).stdout)
     assert {key: detailed[key] for key in plain} == plain
@@ -187,12 +185,12 @@ def test_json_in_detail_has_the_fixed_keys_and_more() -> None:
     assert [gone["id"] for gone in detailed["dropped"]] == ["f"]
 
 
-def test_detail_without_json_is_wrong_usage() -> None:
+def test_schedule_refuses_detail_without_json() -> None:
     with pytest.raises(click.UsageError, match="wanted --json"):
         schedule("-", "--detail", text=TALK)
 
 
-def test_visemes_are_for_fap_files_alone(tmp_path: Path) -> None:
+def test_realize_refuses_visemes_except_for_fap_files(tmp_path: Path) -> None:
     for out, status in (("clip.fap", 0), ("clip.json", 2)):
         path = tmp_path / out
         arguments = ["-q", "realize", "-", "-o", str(path), "--voice", "silent", "--visemes"]

@@ -28,14 +28,14 @@ LIMITS = [f for f in fields(Settings) if f.name.startswith("max_")]
 
 
 @pytest.mark.parametrize("limit", LIMITS, ids=lambda f: f.name)
-def test_every_limit_has_a_flag(limit: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_serve_has_an_option_for_every_limit(limit: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     settings = told(monkeypatch, f"--{limit.name.replace('_', '-')}", "321")
     assert getattr(settings, limit.name) == 321
     assert told(monkeypatch) == Settings(voice="silent")
 
 
 @pytest.mark.parametrize("limit", LIMITS, ids=lambda f: f.name)
-def test_a_wrong_limit_is_told_with_what_was_wanted(limit: Any) -> None:
+def test_serve_refuses_an_invalid_limit(limit: Any) -> None:
     flag = f"--{limit.name.replace('_', '-')}"
     done = CliRunner().invoke(cli, ["serve", flag, "much"])
     assert done.exit_code == 2

@@ -18,7 +18,7 @@ def sheet(*args: str) -> Result:
 
 @pytest.mark.gl
 @pytest.mark.slow
-def test_the_archetypes_from_two_sides_stand_beside_what_changed(tmp_path: Path) -> None:
+def test_sheet_draws_archetypes_from_two_sides_with_differences(tmp_path: Path) -> None:
     path = tmp_path / "x.png"
     done = sheet("-o", str(path), "--emotions", "--size", "60x80", "--camera", "front", "--camera", "profile")
     assert done.exit_code == 0
@@ -41,7 +41,7 @@ def test_the_archetypes_from_two_sides_stand_beside_what_changed(tmp_path: Path)
         (["-o", "x.png", "--value", "0"], "0"),
     ],
 )
-def test_wrong_wishes_are_wrong_usage_and_the_words_list_what_there_is(args: list[str], words: str) -> None:
+def test_sheet_refuses_wrong_options(args: list[str], words: str) -> None:
     done = sheet(*args)
     assert done.exit_code == 2
     assert words in " ".join(done.stderr.split())

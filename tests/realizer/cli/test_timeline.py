@@ -35,7 +35,7 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_timeline_plays_as_a_document_does(file: Path) -> None:
+def test_timeline_plays_like_a_document(file: Path) -> None:
     out = file.with_suffix(".json")
     done = run("timeline", str(file), "--expressions", str(file.parent / "mine"), "-o", str(out), "--no-idle")
     assert done.return_value == 0, done.stderr
@@ -48,14 +48,14 @@ def test_a_timeline_plays_as_a_document_does(file: Path) -> None:
     assert told["duration"] == pytest.approx(1.4 + 0.5 + 3, abs=1e-3)
 
 
-def test_a_bad_timeline_is_refused_with_every_fault(file: Path) -> None:
+def test_timeline_prints_every_fault(file: Path) -> None:
     done = run("timeline", str(file))
     assert done.return_value == 1
     assert f"{file}: channel brows, entry 3, expression: wanted a name" in done.stderr
     assert done.stdout == ""
 
 
-def test_checking_tells_faults_on_standard_output(file: Path) -> None:
+def test_check_prints_faults_of_a_timeline_on_standard_output(file: Path) -> None:
     done = run("check", str(file))
     assert done.return_value == 1
     assert done.stdout.startswith(f"{file}: channel brows, entry 3, expression: wanted")
@@ -63,7 +63,7 @@ def test_checking_tells_faults_on_standard_output(file: Path) -> None:
     assert len(run("check", str(file)).stdout.splitlines()) == 2
 
 
-def test_a_sound_timeline_gets_advice_that_does_not_count(file: Path) -> None:
+def test_check_gives_advice_on_a_timeline_without_faults(file: Path) -> None:
     done = run("check", str(file), "--expressions", str(file.parent / "mine"))
     assert done.return_value == 0
     assert done.stdout == ""
@@ -83,14 +83,14 @@ def test_a_sound_timeline_gets_advice_that_does_not_count(file: Path) -> None:
         (["x.toml", "--media", "."], "refers to no"),
     ],
 )
-def test_what_cannot_be_played_is_refused(tmp_path: Path, words: list[str], told: str) -> None:
+def test_timeline_refuses_wrong_options(tmp_path: Path, words: list[str], told: str) -> None:
     (tmp_path / words[0]).write_text("", "utf-8")
     done = CliRunner().invoke(cli, ["timeline", str(tmp_path / words[0]), *words[1:]])
     assert done.exit_code == 2
     assert told in " ".join(done.stderr.split())
 
 
-def test_a_mixer_that_a_face_has_not_is_told_and_it_plays(file: Path) -> None:
+def test_timeline_plays_with_a_warning_on_a_mixer_without_effect(file: Path) -> None:
     file.write_text('mixer = "successive"\n[[channel]]\nentries = [{ expression = "smile" }]', "utf-8")
     out = str(file.with_suffix(".json"))
     done = run("timeline", str(file), "--deformer", "mpeg4", "-o", out)
@@ -101,7 +101,7 @@ def test_a_mixer_that_a_face_has_not_is_told_and_it_plays(file: Path) -> None:
     assert "no effect" not in done.stderr
 
 
-def test_an_order_without_the_successive_mixer_gets_advice(file: Path) -> None:
+def test_check_gives_advice_on_an_order_without_effect(file: Path) -> None:
     file.write_text('order = [4, 1]\n[[channel]]\nentries = [{ expression = "smile" }]', "utf-8")
     done = run("check", str(file))
     assert done.return_value == 0

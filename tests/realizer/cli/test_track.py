@@ -35,7 +35,7 @@ def acted(path: Path, leave_out: tuple[str, ...] = ()) -> np.ndarray:
     return frames
 
 
-def test_points_become_a_fap_file_and_the_emotion_is_named(tmp_path: Path) -> None:
+def test_track_writes_a_fap_file_and_names_the_emotion(tmp_path: Path) -> None:
     frames = acted(tmp_path / "actor.csv")
     done = run(
         str(tmp_path / "actor.csv"), "--fps", "30", "-o", str(tmp_path / "a.fap"), "--profiles", "published"
@@ -58,7 +58,7 @@ def test_points_become_a_fap_file_and_the_emotion_is_named(tmp_path: Path) -> No
         ((), "a.csv", "a.csv: wanted a name that ends in .fap"),
     ],
 )
-def test_what_cannot_be_tracked_is_said(
+def test_track_refuses_missing_points_and_other_suffixes(
     tmp_path: Path, leave_out: tuple[str, ...], output: str, said: str
 ) -> None:
     acted(tmp_path / "actor.csv", leave_out)
@@ -67,14 +67,14 @@ def test_what_cannot_be_tracked_is_said(
     assert said in " ".join(done.stderr.split())
 
 
-def test_a_table_of_something_else_is_said_with_its_line(tmp_path: Path) -> None:
+def test_track_refuses_a_table_with_other_columns(tmp_path: Path) -> None:
     (tmp_path / "x.csv").write_text("a,b\n1,2\n")
     done = run(str(tmp_path / "x.csv"), "-o", str(tmp_path / "x.fap"))
     assert done.exit_code == 2
     assert "wanted a first line frame,point,x,y,z, got 'a,b'" in " ".join(done.stderr.split())
 
 
-def test_a_table_in_another_encoding_is_named_and_a_mark_of_utf8_is_no_cell(tmp_path: Path) -> None:
+def test_track_refuses_other_encodings_but_takes_a_byte_order_mark(tmp_path: Path) -> None:
     table = tmp_path / "actor.csv"
     table.write_bytes(b"frame,point,x,y,z\n0,\xe4,0,0,0\n")
     done = run(str(table), "-o", str(tmp_path / "a.fap"))

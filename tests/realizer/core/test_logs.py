@@ -24,7 +24,7 @@ def lines() -> Iterator[io.StringIO]:
     service.setLevel(levels[1])
 
 
-def test_a_record_is_one_line_with_what_it_was_told(lines: io.StringIO) -> None:
+def test_json_formatter_writes_a_record_on_one_line(lines: io.StringIO) -> None:
     logging.getLogger("realizer.server.x").info("joined %s\nfor good", "show", extra={"connection": 7})
     (line,) = lines.getvalue().splitlines()
     told = json.loads(line)
@@ -37,7 +37,7 @@ def test_a_record_is_one_line_with_what_it_was_told(lines: io.StringIO) -> None:
     }
 
 
-def test_a_traceback_is_in_its_line(lines: io.StringIO) -> None:
+def test_json_formatter_includes_the_traceback(lines: io.StringIO) -> None:
     try:
         raise ValueError("of no use")
     except ValueError:
@@ -46,6 +46,6 @@ def test_a_traceback_is_in_its_line(lines: io.StringIO) -> None:
     assert json.loads(line)["exception"].endswith("ValueError: of no use")
 
 
-def test_libraries_say_no_more_than_before(lines: io.StringIO) -> None:
+def test_write_json_does_not_make_libraries_verbose(lines: io.StringIO) -> None:
     logging.getLogger("somebody.else").info("chatter")
     assert lines.getvalue() == ""

@@ -31,17 +31,17 @@ def agree(got: Profile, printed: str, within: float) -> None:
 
 
 @pytest.mark.parametrize(("activation", "within"), [(1.3 * 4.9, 5), (6.3, 10)])
-def test_table_7_terrified(activation: float, within: float) -> None:
+def test_same_category_gives_terrified_of_table_7(activation: float, within: float) -> None:
     # The print has used the ratio rounded to 1.3.
     agree(same_category(FEAR, 4.9, activation), TERRIFIED, within)
 
 
-def test_table_7_worried() -> None:
+def test_same_category_gives_worried_of_table_7() -> None:
     words = whissell_words()
     agree(same_category(FEAR, words["afraid"].activation, words["worried"].activation), WORRIED, 5)
 
 
-def test_table_8_guilty() -> None:
+def test_between_gives_guilty_of_table_8() -> None:
     words = whissell_words()
     afraid, sad, guilty = (words[word] for word in ("afraid", "sad", "guilty"))
     made = between(
@@ -56,7 +56,7 @@ def test_table_8_guilty() -> None:
     assert high - low == pytest.approx(199, abs=3)
 
 
-def test_pauls_worked_example() -> None:
+def test_between_gives_the_example_of_paul() -> None:
     # Paul 2010, 6.2, with the slips of his arithmetic put right (anger 4.2, both ends translated).
     anger = Profile.parse("F20 [-335, -205]")
     joy = Profile.parse("F3 [195, 205], F20 [-426, -302]")
@@ -67,31 +67,31 @@ def test_pauls_worked_example() -> None:
     assert made.ranges[20] == pytest.approx((-301.8, -196.3), abs=0.1)
 
 
-def test_the_same_emotion_less_activated_is_pauls_smaller_surprise() -> None:
+def test_same_category_gives_the_smaller_surprise_of_paul() -> None:
     surprise = archetypes("raw")["surprise"][0]
     assert same_category(surprise, 6.5, 4.0).ranges[3] == pytest.approx((350, 739), abs=0.5)  # eq. 6.1
 
 
-def test_contradicting_faps_keep_what_both_agree_on_or_go() -> None:
+def test_between_intersects_contradicting_ranges() -> None:
     one = Profile.parse("F4 [-100, 20], F31 [10, 50]")
     two = Profile.parse("F4 [-10, 100], F31 [-50, -10]")
     made = between(Anchor(one, 4, 0), Anchor(two, 4, 90), 30, 4)
     assert dict(made.ranges) == {4: (-10, 20)}
 
 
-def test_the_way_leads_over_the_top_of_the_ring_if_it_must() -> None:
+def test_between_crosses_angle_0() -> None:
     one, two = Profile.parse("F31 [90, 110]"), Profile.parse("F31 [190, 210]")
     made = between(Anchor(one, 4, 315), Anchor(two, 4, 45), 0, 4)
     assert made.ranges[31] == (140, 160)
 
 
 @pytest.mark.parametrize("angle", [200, 60, float("nan")])
-def test_an_angle_that_is_not_between_is_refused(angle: float) -> None:
+def test_between_refuses_an_angle_outside(angle: float) -> None:
     with pytest.raises(ValueError, match=r"wanted one from 70\.3 to 108\.5 degrees"):
         between(Anchor(FEAR, 4.9, 70.3), Anchor(SAD, 3.9, 108.5), angle, 4)
 
 
 @pytest.mark.parametrize(("own", "activation"), [(0, 4), (4, -1), (4, float("nan"))])
-def test_a_bad_activation_is_refused(own: float, activation: float) -> None:
+def test_same_category_refuses_an_invalid_activation(own: float, activation: float) -> None:
     with pytest.raises(ValueError, match="activation: wanted 0 or more"):
         same_category(FEAR, own, activation)

@@ -13,14 +13,14 @@ from realizer.emotions.profile import Profile
 FEAR = "F3 [400, 560], F5 [-240, -160], F31 [460, 540], F32 [460, 540]"
 
 
-def test_text_and_profile_are_each_the_other() -> None:
+def test_parse_and_str_are_inverse() -> None:
     profile = Profile.parse(FEAR, "fear 3")
     assert profile.ranges[5] == (-240, -160)
     assert str(profile) == FEAR
     assert Profile.parse(str(profile), "fear 3") == profile
 
 
-def test_the_frame_is_the_middle_of_each_range() -> None:
+def test_frame_has_the_middle_of_each_range() -> None:
     frame = Profile.parse(FEAR).frame()
     assert frame.dtype == np.float32
     assert frame.shape == (68,)
@@ -28,7 +28,7 @@ def test_the_frame_is_the_middle_of_each_range() -> None:
 
 
 @given(st.integers(0, 2**32), st.sampled_from(["own", "published", "raw"]))
-def test_a_draw_stays_within_the_ranges_and_is_the_same_for_a_seed(seed: int, profiles: str) -> None:
+def test_draw_stays_within_ranges_and_repeats_for_a_seed(seed: int, profiles: str) -> None:
     for numbered in archetypes(profiles).values():
         for profile in numbered.values():
             frame = profile.draw(seed)
@@ -37,12 +37,12 @@ def test_a_draw_stays_within_the_ranges_and_is_the_same_for_a_seed(seed: int, pr
             assert np.array_equal(frame, profile.draw(seed))
 
 
-def test_a_generator_draws_another_face_each_time() -> None:
+def test_draw_with_a_generator_varies() -> None:
     chance, profile = np.random.default_rng(1), Profile.parse(FEAR)
     assert not np.array_equal(profile.draw(chance), profile.draw(chance))
 
 
-def test_a_draw_does_not_tear_sides_and_lips_apart() -> None:
+def test_draw_keeps_sides_and_lips_together() -> None:
     joy = archetypes("own")["joy"][0]
     for seed in range(20):
         frame = joy.draw(seed)
@@ -54,7 +54,7 @@ def test_a_draw_does_not_tear_sides_and_lips_apart() -> None:
         assert max(parts.values()) - min(parts.values()) < 1e-4
 
 
-def test_scaling_is_of_both_ends() -> None:
+def test_scaled_multiplies_both_ends() -> None:
     assert Profile.parse(FEAR).scaled(0.5).ranges[3] == (200, 280)
     with pytest.raises(ValueError, match="factor of 0 or more, got nan"):
         Profile.parse(FEAR).scaled(float("nan"))
@@ -72,6 +72,6 @@ def test_scaling_is_of_both_ends() -> None:
         ("F3 [1, nan]", "FAP 3: wanted low <= high, finite"),
     ],
 )
-def test_a_bad_text_is_refused_with_its_place(text: str, said: str) -> None:
+def test_parse_refuses_an_invalid_text_with_its_place(text: str, said: str) -> None:
     with pytest.raises(ValueError, match=said):
         Profile.parse(text)

@@ -18,7 +18,7 @@ F3 [1150, 1252], F5 [-792,-700], F54 [-141,-101]
 """
 
 
-def test_his_own_lines_are_read() -> None:
+def test_read_profiles_reads_the_lines_of_paul() -> None:
     fear, surprise, _ = read_profiles(FIGURE)
     assert fear.name == "Fear 9"
     assert fear.ranges[5] == (307, 399)
@@ -27,7 +27,7 @@ def test_his_own_lines_are_read() -> None:
 
 
 @pytest.mark.parametrize("profiles", ["own", "published", "raw"])
-def test_every_set_survives_the_file(profiles: str) -> None:
+def test_write_profiles_round_trips_every_set(profiles: str) -> None:
     every = [profile for numbered in archetypes(profiles).values() for profile in numbered.values()]
     back = read_profiles("# ours\n\n" + write_profiles(every))
     assert [p.name.lower() for p in back] == [p.name for p in every]
@@ -44,6 +44,6 @@ def test_every_set_survives_the_file(profiles: str) -> None:
         ("Fear 9\nSurprise 0\n", "mine, line 2: Fear 9, column 1: wanted F3"),
     ],
 )
-def test_a_bad_file_is_refused_with_the_line(text: str, said: str) -> None:
+def test_read_profiles_refuses_an_invalid_line(text: str, said: str) -> None:
     with pytest.raises(ValueError, match=said):
         read_profiles(text, "mine")

@@ -17,7 +17,7 @@ RINGS = st.sampled_from(["paul", "plutchik", "affect"])
 
 @pytest.mark.parametrize("profiles", ["own", "published", "raw"])
 @pytest.mark.parametrize("ring", ["paul", "plutchik"])
-def test_an_archetype_shows_itself_at_its_own_place(profiles: str, ring: str) -> None:
+def test_wheel_has_each_archetype_at_its_place(profiles: str, ring: str) -> None:
     known = archetypes(profiles)
     for place in places(ring).values():
         if place.name not in known:
@@ -31,7 +31,7 @@ def test_an_archetype_shows_itself_at_its_own_place(profiles: str, ring: str) ->
 
 
 @given(st.floats(-720, 720), st.floats(0, 7), SETS, RINGS)
-def test_the_whole_disc_is_continuous(angle: float, activation: float, profiles: str, ring: str) -> None:
+def test_wheel_is_continuous(angle: float, activation: float, profiles: str, ring: str) -> None:
     here = wheel(angle, activation, profiles, ring).frame()
     for there in (
         wheel(angle + 1e-4, activation, profiles, ring),
@@ -41,19 +41,19 @@ def test_the_whole_disc_is_continuous(angle: float, activation: float, profiles:
 
 
 @given(st.floats(-1, 1), st.floats(-1, 1), SETS)
-def test_valence_and_arousal_are_continuous_too(valence: float, arousal: float, profiles: str) -> None:
+def test_affect_is_continuous(valence: float, arousal: float, profiles: str) -> None:
     here = affect(valence, arousal, profiles).frame()
     nearby = [max(min(valence + step, 1), -1) for step in (1e-5, -1e-5)]
     for there in nearby:
         assert np.abs(affect(there, arousal, profiles).frame() - here).max() < 0.5
 
 
-def test_a_range_is_continuous_in_width_too() -> None:
+def test_wheel_is_continuous_in_the_width_of_ranges() -> None:
     widths = [wheel(angle, 5, "published").ranges.get(3, (0.0, 0.0)) for angle in np.arange(0, 360, 0.01)]
     assert np.abs(np.diff(np.array(widths), axis=0)).max() < 1
 
 
-def test_the_middle_shows_nothing_and_the_rim_most() -> None:
+def test_wheel_is_neutral_in_the_middle_and_strongest_at_the_rim() -> None:
     for place in places("paul").values():
         assert not wheel(place.angle, 0).frame().any()
         low, high = wheel(place.angle, 3).frame(), wheel(place.angle, 7).frame()
@@ -61,11 +61,11 @@ def test_the_middle_shows_nothing_and_the_rim_most() -> None:
         assert high.any()
 
 
-def test_turns_do_not_count() -> None:
+def test_wheel_takes_angles_modulo_360() -> None:
     assert np.allclose(wheel(-700, 5).frame(), wheel(20, 5).frame())
 
 
-def test_in_the_middle_of_two_both_show_by_half() -> None:
+def test_wheel_between_two_archetypes_shows_half_of_each() -> None:
     assert blend_weights(67.5) == {"fear": 0.5, "surprise": 0.5}
     assert blend_weights(270) == {"anticipation": 1}
     assert blend_weights(270, "published") == {
@@ -76,7 +76,7 @@ def test_in_the_middle_of_two_both_show_by_half() -> None:
     assert np.allclose(awe.frame(), (fear.frame() + surprise.frame()) / 2, atol=1e-3)
 
 
-def test_valence_and_arousal_find_the_words_that_whissell_rated() -> None:
+def test_affect_finds_the_words_rated_by_whissell() -> None:
     assert affect(0.7, 0.467).name.startswith("joy 0")
     joy = archetypes("own")["joy"][0]
     assert affect(0.9, 0.6).ranges[12] == pytest.approx(joy.ranges[12], rel=0.02)
@@ -98,17 +98,17 @@ def test_valence_and_arousal_find_the_words_that_whissell_rated() -> None:
         ((45, 4, "own", "geneva"), "ring: wanted paul, plutchik or affect, got 'geneva'"),
     ],
 )
-def test_what_is_off_the_wheel_is_refused_in_words(arguments: tuple[float, ...], said: str) -> None:
+def test_wheel_refuses_places_outside(arguments: tuple[float, ...], said: str) -> None:
     with pytest.raises(ValueError, match=said):
         wheel(*arguments)
 
 
 @pytest.mark.parametrize(("valence", "arousal"), [(1.1, 0), (0, -2), (float("nan"), 0)])
-def test_what_is_off_the_plane_is_refused_in_words(valence: float, arousal: float) -> None:
+def test_affect_refuses_places_outside(valence: float, arousal: float) -> None:
     with pytest.raises(ValueError, match=r"(valence|arousal): wanted -1\.\.1"):
         affect(valence, arousal)
 
 
-def test_a_huge_angle_is_a_place_like_any_other() -> None:
+def test_wheel_takes_a_huge_angle() -> None:
     assert wheel(1e308).ranges == wheel(1e308 % 360).ranges
     assert sum(blend_weights(-1e300).values()) == pytest.approx(1)

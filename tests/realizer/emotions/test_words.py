@@ -11,7 +11,7 @@ from realizer.emotions.words import UnknownWordError, WordPlace, emotion, known_
 
 
 @pytest.mark.parametrize("profiles", ["own", "published", "raw"])
-def test_every_known_word_has_a_profile_of_its_name(profiles: str) -> None:
+def test_emotion_has_a_profile_for_every_known_word(profiles: str) -> None:
     for word in known_words():
         made = emotion(word, profiles)
         assert made.name == word
@@ -19,14 +19,14 @@ def test_every_known_word_has_a_profile_of_its_name(profiles: str) -> None:
         assert made.frame().any() != (word == "neutral")
 
 
-def test_words_tell_where_they_come_from() -> None:
+def test_known_words_name_their_source() -> None:
     sources = known_words()
     assert (sources["remorse"], sources["guilty"], sources["scared"]) == ("wheel", "whissell", "own")
     assert "accepting" not in sources
     assert emotion("scared").ranges == emotion("afraid").ranges
 
 
-def test_an_emotion_of_the_wheel_is_its_archetype_and_so_is_a_word_that_was_rated_as_it_was() -> None:
+def test_emotion_of_the_wheel_is_its_archetype() -> None:
     anger = archetypes("own")["anger"][0]
     assert emotion("Anger").ranges == anger.ranges
     assert emotion(" ANGRY ").ranges[31] == pytest.approx(anger.ranges[31])
@@ -34,14 +34,14 @@ def test_an_emotion_of_the_wheel_is_its_archetype_and_so_is_a_word_that_was_rate
     assert emotion("angry", "published").ranges == archetypes("published")["anger"][3].ranges
 
 
-def test_a_word_of_a_category_goes_by_activation_and_not_by_angle() -> None:
+def test_emotion_of_a_category_is_scaled_by_activation() -> None:
     afraid, worried, terrified = (emotion(word).frame() for word in ("afraid", "worried", "terrified"))
     assert np.allclose(worried * 4.9, afraid * 3.9, atol=1e-2)
     assert np.allclose(terrified * 4.9, afraid * 6.3, atol=1e-2)
 
 
 @pytest.mark.parametrize("word", ["terrified", "sad", "guilty", "delighted", "bashful", "anger", "remorse"])
-def test_our_own_word_is_its_place_on_the_ring_at_the_strength_that_documents_use(word: str) -> None:
+def test_emotion_of_our_own_set_has_the_strength_of_documents(word: str) -> None:
     place = place_of(word)
     assert place is not None
     wanted = wheel(place.angle, None, "own", place.ring).scaled(strength_of(place))
@@ -50,19 +50,19 @@ def test_our_own_word_is_its_place_on_the_ring_at_the_strength_that_documents_us
     assert strength_of(WordPlace("paul", 45.0)) == 1.0
 
 
-def test_terrified_is_more_than_fear_and_worried_less() -> None:
+def test_emotion_terrified_is_stronger_than_fear_and_worried_weaker() -> None:
     fear = emotion("fear").frame()
     assert np.allclose(emotion("terrified").frame(), fear * 6.3 / 4.9, atol=1e-2)
     assert np.allclose(emotion("worried").frame(), fear * 3.9 / 4.9, atol=1e-2)
 
 
-def test_an_archetype_and_a_number_is_that_profile() -> None:
+def test_emotion_with_a_number_is_that_profile() -> None:
     assert emotion("fear 3", "raw") is archetypes("raw")["fear"][3]
     with pytest.raises(UnknownWordError):
         emotion("fear 33", "raw")
 
 
-def test_a_word_between_archetypes_is_on_plutchiks_ring() -> None:
+def test_place_of_a_word_between_archetypes_is_on_plutchiks_ring() -> None:
     guilty, place = emotion("guilty").ranges, wheel(102.3, None, "own", "plutchik").ranges
     near_sad = (102.3 - 70.3) / (108.5 - 70.3)
     strength = 4 / (near_sad * 3.9 + (1 - near_sad) * 4.9)
@@ -70,7 +70,7 @@ def test_a_word_between_archetypes_is_on_plutchiks_ring() -> None:
     assert set(emotion("guilty", "published").ranges) < {3, 5, *range(19, 23), *range(31, 37)}
 
 
-def test_an_unknown_word_gets_those_near_it() -> None:
+def test_emotion_suggests_words_for_an_unknown_one() -> None:
     with pytest.raises(UnknownWordError, match="got 'gilty', did you mean guilty"):
         emotion("Gilty")
     with pytest.raises(UnknownWordError, match=r"wanted one of .*afraid.*; got 'радость'"):
@@ -82,6 +82,6 @@ def test_an_unknown_word_gets_those_near_it() -> None:
     assert len(str(caught.value)) < 1000
 
 
-def test_a_word_that_nobody_rated_says_so() -> None:
+def test_emotion_refuses_a_word_without_activation() -> None:
     with pytest.raises(ValueError, match="accepting: its activation was never rated"):
         emotion("accepting")

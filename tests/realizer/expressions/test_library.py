@@ -15,24 +15,24 @@ SMIRK = 'means = ["irony"]\naus = { 12L = 0.6, 2R = 0.3 }\nonset = 0.2\napex = 0
 
 
 @pytest.mark.parametrize("one", builtin().values(), ids=lambda one: one.name)
-def test_every_expression_that_ships_says_what_it_means_shows_and_how_long(one) -> None:
+def test_builtin_expressions_have_meanings_units_and_durations(one) -> None:
     for said in (one.means, one.features, one.aus, one.source):
         assert said
     assert min(one.onset, one.apex, one.offset) > 0
     assert all(gap.source for gap in one.gaps)
 
 
-def test_the_words_are_of_expressions_that_there_are() -> None:
+def test_builtin_has_every_expression_with_words() -> None:
     assert set(expression_words()) == set(builtin())
 
 
-def test_templates_and_the_six_emotions_are_in_it() -> None:
+def test_builtin_has_templates_and_the_six_emotions() -> None:
     assert {f"template:{name.lower()}" for name in templates()} <= set(builtin())
     assert {emotion.name for emotion in archetypes()} <= set(builtin())
 
 
 @pytest.mark.parametrize("template", templates().values(), ids=lambda one: one.name)
-def test_a_template_is_seen_for_a_time_that_her_table_has(template) -> None:
+def test_builtin_templates_have_possible_durations(template) -> None:
     one = builtin()[f"template:{template.name}"]
     for ends in (template.possible, template.probable):
         assert ends is None or ends[0] <= one.visible_duration <= ends[1] + 1e-9
@@ -40,20 +40,20 @@ def test_a_template_is_seen_for_a_time_that_her_table_has(template) -> None:
     assert all(gap.source.startswith("ours") for gap in one.gaps[::2])
 
 
-def test_a_name_may_be_spelt_in_several_ways() -> None:
+def test_library_finds_a_name_in_several_spellings() -> None:
     assert key("Template: Ironic-smile") == key("template:ironic  smile")
     assert builtin()["raise brows"] is builtin()["RAISE_BROWS"]
     assert "template" not in builtin()
 
 
-def test_near_names_are_found_with_and_without_their_prefix() -> None:
+def test_near_finds_names_with_and_without_prefix() -> None:
     assert builtin().near("template:astonishmant")[0] == "template:astonishment"
     assert builtin().near("smiel") == ["SMILE"]
     assert builtin().near("grieff") == ["template:grief"]
     assert builtin().near("zzz") == []
 
 
-def test_ones_own_go_before_what_ships_and_that_is_said(folder, caplog) -> None:
+def test_library_of_a_folder_replaces_builtin_ones_with_a_note(folder, caplog) -> None:
     library = library_of(folder(smirk=SMIRK, other=SMIRK.replace("means", 'name = "Smile"\nmeans')))
     assert library["smirk"].units == "12L+2R"
     assert library["SMILE"].units == "12L+2R"
@@ -64,11 +64,11 @@ def test_ones_own_go_before_what_ships_and_that_is_said(folder, caplog) -> None:
     assert builtin()["SMILE"].units == "6+12"
 
 
-def test_an_empty_folder_is_no_fault_but_is_told(folder, caplog) -> None:
+def test_library_of_an_empty_folder_logs_a_warning(folder, caplog) -> None:
     assert len(library_of(folder())) == len(builtin())
     assert "found none" in caplog.text
 
 
-def test_a_folder_with_a_bad_file_is_refused(folder) -> None:
+def test_library_of_a_folder_with_a_bad_file_fails(folder) -> None:
     with pytest.raises(TableError, match=r"smirk\.toml: aus"):
         library_of(folder(smirk="onset = 1\n"))

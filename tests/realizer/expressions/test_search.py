@@ -30,13 +30,13 @@ def names(found) -> list[str]:
         ("smiel", "SMILE"),
     ],
 )
-def test_an_expression_is_found_by_what_it_means(text: str, meant: str) -> None:
+def test_by_meaning_finds_an_expression_by_its_meanings(text: str, meant: str) -> None:
     found = by_meaning(text, builtin().values())
     best = [one.name for one, score in found if score == found[0][1]]
     assert meant in best
 
 
-def test_more_of_the_words_and_better_places_come_first() -> None:
+def test_by_meaning_prefers_more_words_and_better_places() -> None:
     found = by_meaning("raised left brow", builtin().values())
     assert names(found)[0] == "RAISE_LEFT_BROW"
     scores = [score for _, score in found]
@@ -44,19 +44,19 @@ def test_more_of_the_words_and_better_places_come_first() -> None:
     assert all(0 < score <= 1 for score in scores)
 
 
-def test_words_that_nobody_knows_find_nothing() -> None:
+def test_by_meaning_of_unknown_words_is_empty() -> None:
     assert by_meaning("qqqq", builtin().values()) == []
     assert by_meaning("...", builtin().values()) == []
 
 
 @pytest.mark.parametrize("one", builtin().values(), ids=lambda one: one.name)
-def test_what_is_asked_for_as_it_is_shown_is_found_first(one) -> None:
+def test_by_action_units_finds_an_expression_by_its_own_units(one) -> None:
     (_, best), *_ = found = by_action_units(one.aus, builtin().values())
     assert best == pytest.approx(1)
     assert one.name in {other.name for other, score in found if score == pytest.approx(1)}
 
 
-def test_sides_count_and_so_does_how_much() -> None:
+def test_by_action_units_considers_sides_and_intensities() -> None:
     left = {(1, "LEFT"): 1.0, (2, "LEFT"): 1.0}
     found = names(by_action_units(left, builtin().values()))
     assert found[0] == "RAISE_LEFT_BROW"
@@ -65,7 +65,7 @@ def test_sides_count_and_so_does_how_much() -> None:
     assert by_action_units({(28, "BOTH"): 1.0}, builtin().values()) == []
 
 
-def test_endings_do_not_count() -> None:
+def test_stem_ignores_endings() -> None:
     assert len({stem(word) for word in ("surprise", "surprised", "surprising", "surprises")}) == 1
     assert stem("worried") == stem("worry") == stem("worries")
     assert stem("happiness") == stem("happy") == stem("happily")

@@ -13,7 +13,7 @@ from realizer.expressions.spans import duration_of, spans, visible_spans
 from realizer.expressions.timeline import Entry, Timeline, Track
 
 
-def test_an_entry_without_a_duration_lasts_as_its_expression_does() -> None:
+def test_spans_have_the_duration_of_the_expression_by_default() -> None:
     (span,) = spans(Track("a", (Entry("smile"),)), builtin())
     smile = builtin()["SMILE"]
     assert span.reached == pytest.approx(smile.onset)
@@ -33,7 +33,7 @@ NAMES = [*builtin(), "neutral"]
     joins=st.sampled_from(["both", "onset", "offset"]),
     start=st.floats(0, 5),
 )
-def test_whatever_the_entries_time_goes_forward(entries, joins, start: float) -> None:
+def test_spans_have_rising_times(entries, joins, start: float) -> None:
     track = Track(
         "a", tuple(Entry(name, 1.0, duration) for name, duration in entries), joins, "linear", start
     )
@@ -48,7 +48,7 @@ def test_whatever_the_entries_time_goes_forward(entries, joins, start: float) ->
         assert one.end == pytest.approx(other.start)
 
 
-def test_an_expression_is_evident_from_half_of_its_coming_to_half_of_its_going() -> None:
+def test_visible_spans_begin_and_end_in_the_middle_of_transitions() -> None:
     track = Track("a", (Entry("template:surprise", 1.0, 1.0), Entry("neutral"), Entry("smile")))
     (place, one, begin, end), (_, other, _, _) = visible_spans(Timeline((track,)), builtin())
     assert (place, one.name, other.name) == ("channel a, entry 1", "template:surprise", "SMILE")

@@ -7,7 +7,7 @@ from realizer.expressions.timeline import Entry, Timeline, Track, faults_of, rem
 from realizer.face.load import input_names
 
 
-def test_names_that_nobody_knows_are_faults_and_breaks_are_not() -> None:
+def test_faults_of_unknown_names_but_not_of_breaks() -> None:
     track = Track("a", (Entry("nobody"), Entry("NEUTRAL"), Entry("smiel")))
     first, second = faults_of(Timeline((track,)), builtin())
     assert first.startswith("channel a, entry 1, expression: wanted a name")
@@ -17,13 +17,13 @@ def test_names_that_nobody_knows_are_faults_and_breaks_are_not() -> None:
 TRACK = Track("a", (Entry("smile"),))
 
 
-def test_what_the_mixer_of_a_face_can_do_needs_no_remark() -> None:
+def test_remarks_are_empty_if_the_face_supports_the_mixer() -> None:
     assert remarks(Timeline((TRACK,)), input_names(deformer="mpeg4")) == []
     assert remarks(Timeline((TRACK,), "successive", (4, 1)), input_names(deformer="au")) == []
     assert remarks(Timeline((TRACK,), "successive", (4, 1))) == []
 
 
-def test_a_choice_without_effect_is_told_in_a_sentence() -> None:
+def test_remarks_name_settings_without_effect() -> None:
     (told,) = remarks(Timeline((TRACK,), "successive", (4,)), input_names(deformer="mpeg4"))
     assert told.startswith("mixer: no effect, FAPs move this face; wanted")
     (told,) = remarks(Timeline((TRACK,), "additive", (4,)), input_names(deformer="au"))

@@ -21,14 +21,14 @@ entries = [{ expression = "smile" }]
 JSON = b'{"channel": [{"name": "2", "entries": [{"expression": "smile"}]}]}'
 
 
-def test_a_file_is_read_as_toml_and_as_json() -> None:
+def test_read_timeline_takes_toml_and_json() -> None:
     read = read_timeline(FILE)
     brows = Track("brows", (Entry("template:surprise", 0.8, 1.2), Entry("Neutral")), "onset", "smooth", 0.5)
     assert read == Timeline((brows, Track("2", (Entry("smile"),))))
     assert read_timeline(b"\n" + JSON).tracks == read.tracks[1:]
 
 
-def test_the_mixer_and_the_order_stand_before_the_channels() -> None:
+def test_read_timeline_takes_mixer_and_order() -> None:
     read = read_timeline(b'mixer = "successive"\norder = [4, 1, 2]\n' + FILE)
     assert (read.mixer, read.order) == ("successive", (4, 1, 2))
     assert read.tracks == read_timeline(FILE).tracks
@@ -36,7 +36,7 @@ def test_the_mixer_and_the_order_stand_before_the_channels() -> None:
 
 
 @pytest.mark.parametrize("content", [JSON[JSON.index(b"[") : -1], b"[]", b' [{"channel": []}]'])
-def test_a_bare_list_of_json_is_said_to_be_one(content: bytes) -> None:
+def test_read_timeline_refuses_a_bare_list(content: bytes) -> None:
     with pytest.raises(TableError, match=r'^timeline: wanted \{"channel": \[\.\.\.\]\}, got a list$'):
         read_timeline(content)
 
@@ -75,14 +75,14 @@ BAD = {
 
 
 @pytest.mark.parametrize("text", BAD)
-def test_a_fault_is_told_with_its_channel_and_entry(text: bytes) -> None:
+def test_read_timeline_names_channel_and_entry_of_a_fault(text: bytes) -> None:
     with pytest.raises(TableError) as caught:
         read_timeline(text)
     assert BAD[text] in str(caught.value)
     assert len(str(caught.value).splitlines()) == 1
 
 
-def test_all_faults_are_told_at_once() -> None:
+def test_read_timeline_reports_all_faults_at_once() -> None:
     with pytest.raises(TableError) as caught:
         read_timeline(
             b"[[channel]]\njoins = 1\nentries = [{}, { expression = 'a', intensity = 7 }]\n[[channel]]"

@@ -10,7 +10,7 @@ from realizer.core.errors import TableError
 from realizer.expressions.user_expressions import read_folder
 
 
-def test_a_whole_file_is_read(folder) -> None:
+def test_read_folder_reads_all_keys(folder) -> None:
     made = folder(
         polite="""
 name = "polite smile"
@@ -37,7 +37,7 @@ source = "the front desk"
     assert str(one.file) in one.to_json()["onset"]["source"]
 
 
-def test_all_but_the_action_units_may_be_missing(folder) -> None:
+def test_read_folder_needs_only_action_units(folder) -> None:
     (one,) = read_folder(folder(wry="aus = { 14R = 1 }"))
     assert one.name == "wry"
     assert one.gaps[0].source.startswith("ours")
@@ -73,7 +73,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_a_fault_is_told_with_file_key_and_what_was_wanted(folder, case: str) -> None:
+def test_read_folder_names_file_and_key_of_a_fault(folder, case: str) -> None:
     text, told = BAD[case]
     with pytest.raises(TableError) as caught:
         read_folder(folder(a=text))
@@ -81,7 +81,7 @@ def test_a_fault_is_told_with_file_key_and_what_was_wanted(folder, case: str) ->
     assert len(str(caught.value).splitlines()) == 1
 
 
-def test_all_faults_of_all_files_are_told_at_once(folder) -> None:
+def test_read_folder_reports_all_faults_at_once(folder) -> None:
     made = folder(a="aus = { 99 = 1, 98 = 1 }\nonset = -1", b="aus = {", c="aus = { 12 = 1 }")
     with pytest.raises(TableError) as caught:
         read_folder(made)
@@ -90,6 +90,6 @@ def test_all_faults_of_all_files_are_told_at_once(folder) -> None:
     assert "b.toml" in lines[3]
 
 
-def test_two_files_of_one_name_are_a_fault(folder) -> None:
+def test_read_folder_refuses_two_files_of_one_name(folder) -> None:
     with pytest.raises(TableError, match=r"b.toml: name: wanted one of its own, got 'A', which .*a.toml has"):
         read_folder(folder(a="aus = { 12 = 1 }", b='name = "A"\naus = { 12 = 1 }'))

@@ -33,18 +33,18 @@ def series(count: int, every: float, template: str = "surprise") -> list[Visible
         (5.0, ["anger is visible for 5 s; it was never observed so long"]),
     ],
 )
-def test_how_long_an_expression_lasts(lasts: float, says: list[str]) -> None:
+def test_advise_on_the_duration_of_an_expression(lasts: float, says: list[str]) -> None:
     assert said(VisibleExpression("a", "anger", 1.0, 1.0 + lasts)) == says
 
 
-def test_what_a_sad_speaker_shows_longer_is_not_unusual_for_that_mood() -> None:
+def test_advise_considers_the_mood_for_durations() -> None:
     assert said(VisibleExpression("a", "anger", 1.0, 3.5), mood="sad") == []
     assert said(VisibleExpression("a", "anger", 1.0, 3.5), mood="confused") != []
     assert said(VisibleExpression("a", "anger", 1.0, 6.0), mood="sad") != []
 
 
 @pytest.mark.parametrize("mood", ["sad", "happy", "confused", "irritated", ""])
-def test_what_enrich_places_for_a_mood_is_usual_for_it(mood: str) -> None:
+def test_advise_accepts_what_enrich_places_for_a_mood(mood: str) -> None:
     asked = knowledge().mood(mood) if mood else None
     block = Enricher(mood=asked).text("Nonsense, he said. What a horror! Are you sure? Yes.")
     times = realizer.schedule(write(block)).times
@@ -58,7 +58,7 @@ def test_what_enrich_places_for_a_mood_is_usual_for_it(mood: str) -> None:
     assert not [one for one in said(*seen, mood=mood) if "is visible for" in one]
 
 
-def test_sadness_keeps_away_from_what_ends_before_it() -> None:
+def test_advise_on_sadness_soon_after_another_expression() -> None:
     surprise = VisibleExpression("a", "surprise", 0.0, 0.5)
     assert said(surprise, VisibleExpression("b", "sadness", 1.0, 2.0)) == [
         "sadness begins 0.5 s after surprise (a)"
@@ -66,27 +66,27 @@ def test_sadness_keeps_away_from_what_ends_before_it() -> None:
     assert said(surprise, VisibleExpression("b", "sadness", 1.6, 2.6)) == []
 
 
-def test_disgust_wants_anger_near_it() -> None:
+def test_advise_on_disgust_without_anger() -> None:
     disgust = VisibleExpression("a", "disgust", 1.0, 1.8)
     assert said(disgust) == ["disgust stands alone"]
     assert said(disgust, VisibleExpression("b", "surprise", 1.0, 1.8)) == ["disgust stands alone"]
     assert said(disgust, VisibleExpression("b", "anger", 0.9, 1.9)) == []
 
 
-def test_grief_wants_any_company() -> None:
+def test_advise_on_grief_alone() -> None:
     grief = VisibleExpression("a", "grief", 1.0, 1.5)
     assert said(grief) == ["grief stands alone"]
     assert said(grief, VisibleExpression("b", "anger", 0.9, 1.9)) == []
 
 
-def test_a_word_of_disapproval_without_anger_is_told() -> None:
+def test_advise_on_disapproval_without_anger() -> None:
     block = Block(id="b", children=(Speech(id="s", text=SpeechText(parts=("Nonsense.",))),))
     assert said(block=block) == ['"Nonsense" is said without anger']
     assert said(VisibleExpression("a", "anger", 1.0, 1.8), block=block) == []
     assert said(block=block, role="listener") == []
 
 
-def test_a_listener_is_calm_and_shows_other_things() -> None:
+def test_advise_on_unusual_expressions_of_a_listener() -> None:
     assert said(*series(3, 2.0), role="listener") == [
         "a listener with 3 expressions, 1.5 s between two of them on average"
     ]
@@ -96,7 +96,7 @@ def test_a_listener_is_calm_and_shows_other_things() -> None:
     ]
 
 
-def test_a_pace_that_is_not_the_moods_is_told() -> None:
+def test_advise_on_a_pace_that_is_not_that_of_the_mood() -> None:
     often = "3 expressions, 0.5 s between two of them on average: often for the mood 'depressed'"
     assert said(*series(3, 1.0), mood="depressed") == [often]
     assert said(*series(3, 3.4), mood="depressed") == []

@@ -29,7 +29,7 @@ def placed(block: Block) -> dict[str, str]:
     }
 
 
-def test_a_text_becomes_a_document_that_says_it_with_expressions_at_its_words() -> None:
+def test_text_becomes_a_block_with_expressions_at_words() -> None:
     block = Enricher().text(TEXT)
     speech = block["speech1"]
     assert isinstance(speech, Speech)
@@ -44,13 +44,13 @@ def test_a_text_becomes_a_document_that_says_it_with_expressions_at_its_words() 
     }
 
 
-def test_every_placed_expression_says_which_rule_placed_it() -> None:
+def test_block_names_the_rule_of_every_placed_expression() -> None:
     nodes = [node for node in Enricher().text(TEXT).behaviours if isinstance(node, Expression)]
     assert nodes
     assert all("Wojdel" in (node.because or "") for node in nodes)
 
 
-def test_what_is_written_plays_without_a_warning() -> None:
+def test_text_gives_a_block_that_plays_without_warnings() -> None:
     text = write(Enricher().text(TEXT))
     assert parse(text) == Enricher().text(TEXT)
     schedule = realizer.schedule(text)
@@ -67,11 +67,11 @@ def test_what_is_written_plays_without_a_warning() -> None:
         ('<r:expression id="a" name="Template:Happiness" start="3"/>', "surprise a:start - 0.6"),
     ],
 )
-def test_an_expression_gets_the_company_it_is_seen_in(behaviour: str, starts: str) -> None:
+def test_block_adds_companions_of_an_expression(behaviour: str, starts: str) -> None:
     assert list(placed(Enricher().block(document(behaviour))).values()) == [starts]
 
 
-def test_nothing_is_placed_before_the_block_starts() -> None:
+def test_block_places_nothing_before_its_start() -> None:
     block = Enricher().block(document('<r:expression id="a" name="template:happiness" start="0"/>'))
     assert placed(block) == {}
     block = Enricher().block(document('<r:expression id="a" name="template:astonishment" start="0.05"/>'))
@@ -79,7 +79,7 @@ def test_nothing_is_placed_before_the_block_starts() -> None:
     assert not realizer.schedule(write(block)).warnings
 
 
-def test_a_document_keeps_what_it_says_and_its_own_marks() -> None:
+def test_block_keeps_its_text_and_marks() -> None:
     block = document(
         '<required><speech id="w1" start="1"><text>Hm, <sync id="k"/>really? No?</text></speech></required>',
         '<head id="surprise1" lexeme="NOD" stroke="w1:k"/>',
@@ -93,7 +93,7 @@ def test_a_document_keeps_what_it_says_and_its_own_marks() -> None:
     assert placed(rich) == {"surprise2": "surprise w1:k", "surprise3": "surprise w1:w2"}
 
 
-def test_speech_in_another_form_is_left_as_it_is() -> None:
+def test_block_leaves_speech_with_descriptions_unchanged() -> None:
     speech = (
         '<speech id="s"><text>Really?</text><description priority="1" type="application/ssml+xml">'
         '<speak xmlns="http://www.w3.org/2001/10/synthesis">Really?</speak></description></speech>'
@@ -101,7 +101,7 @@ def test_speech_in_another_form_is_left_as_it_is() -> None:
     assert Enricher().block(document(speech)) == document(speech)
 
 
-def test_a_mood_makes_expressions_last_longer_or_shorter() -> None:
+def test_block_scales_durations_by_mood() -> None:
     def held(mood: str) -> float:
         block = Enricher(mood=knowledge().mood(mood)).text("Are you sure about it?")
         return float(block["surprise1"].syncs["relax"].offset)
@@ -109,7 +109,7 @@ def test_a_mood_makes_expressions_last_longer_or_shorter() -> None:
     assert held("confused") < held("depressed")
 
 
-def test_a_listener_says_nothing_and_is_shown_when_the_words_fall() -> None:
+def test_listener_shows_expressions_at_the_times_of_words() -> None:
     block = Enricher(role="listener").text("Do you know it?")
     assert [type(node) for node in block.behaviours] == [Expression]
     assert placed(block) == {"sadness1": "sadness 0.6"}
@@ -133,7 +133,7 @@ WORDS = [
 
 
 @given(st.lists(st.sampled_from(WORDS), max_size=12).map(" ".join))
-def test_doing_it_twice_adds_nothing(text: str) -> None:
+def test_block_enriched_twice_is_the_same(text: str) -> None:
     block = parse(write(Enricher().text(text)))
     assert Enricher().block(block) == block
 
@@ -141,7 +141,7 @@ def test_doing_it_twice_adds_nothing(text: str) -> None:
 @pytest.mark.parametrize(
     "text", ['Are you sure? What a horror, he said; "nonsense!" ' * 1000, "No! & yes. " * 2000, "x" * 30_000]
 )
-def test_a_long_text_becomes_several_documents_that_can_each_be_played(text: str) -> None:
+def test_texts_splits_a_long_text_into_playable_blocks(text: str) -> None:
     blocks = list(Enricher().texts(text, MAX_TEXT))
     assert "".join(str(block["speech1"].text) for block in blocks) == text
     assert len({block.id for block in blocks}) == len(blocks) > 2
@@ -149,7 +149,7 @@ def test_a_long_text_becomes_several_documents_that_can_each_be_played(text: str
     assert not any(realizer.schedule(write(block)).warnings for block in (blocks[0], blocks[-1]))
 
 
-def test_a_long_text_is_cut_before_a_sentence_and_a_short_one_stays_whole() -> None:
+def test_texts_splits_between_sentences() -> None:
     blocks = list(Enricher().texts('Are you sure? What a horror, he said; "nonsense!" ' * 1000, MAX_TEXT))
     assert all(str(block["speech1"].text).startswith(("Are", "What", '"')) for block in blocks)
     assert [len(list(Enricher().texts(short, MAX_TEXT))) for short in ("Hi.", "no, " * 2500)] == [1, 1]

@@ -35,12 +35,12 @@ def placed(text: str, role: Role = "speaker", mood: str = "") -> list[tuple[str,
         ("Really?!", [("Really", ("surprise",))]),
     ],
 )
-def test_what_a_speaker_shows(text: str, shows: list[tuple[str, tuple[str, ...]]]) -> None:
+def test_place_expressions_of_a_speaker(text: str, shows: list[tuple[str, tuple[str, ...]]]) -> None:
     assert placed(text) == shows
 
 
 @pytest.mark.parametrize("text", ["Do not be afraid.", "I am not so very angry.", "That isn’t nonsense."])
-def test_a_negation_turns_a_word_around(text: str) -> None:
+def test_place_expressions_considers_negations(text: str) -> None:
     assert placed(text) == []
 
 
@@ -54,22 +54,22 @@ def test_a_negation_turns_a_word_around(text: str) -> None:
         ("I won the race!", "astonishment"),
     ],
 )
-def test_what_a_listener_shows(text: str, shows: str) -> None:
+def test_place_expressions_of_a_listener(text: str, shows: str) -> None:
     assert [show for _, (show,) in placed(text, "listener")] == [shows]
 
 
-def test_a_listener_shows_far_less_than_a_speaker() -> None:
+def test_place_expressions_of_a_listener_are_fewer() -> None:
     text = "Are you here? It was horrible. " * 10
     assert 0 < len(placed(text, "listener")) < len(placed(text)) / 3
 
 
-def test_a_sad_mood_leaves_out_what_would_come_too_soon() -> None:
+def test_place_expressions_in_a_mood_keeps_a_distance() -> None:
     text = "Are you here now, on this island? " * 4
     assert len(placed(text)) == 4
     assert len(placed(text, mood="confused")) > len(placed(text, mood="depressed")) > 0
 
 
-def test_a_rule_that_stays_is_kept_in_any_mood() -> None:
+def test_place_expressions_keeps_rules_with_keep_in_any_mood() -> None:
     text = "Nonsense, nonsense I say. Are you mad?"
     assert [word for word, _ in placed(text, mood="disorientation")] == ["Nonsense"]
     assert [word for word, _ in placed("Rubbish. Nonsense.", mood="disorientation")] == [
@@ -78,6 +78,6 @@ def test_a_rule_that_stays_is_kept_in_any_mood() -> None:
     ]
 
 
-def test_without_words_only_punctuation_counts() -> None:
+def test_place_expressions_without_words_uses_punctuation() -> None:
     found = place_expressions(sentences("Nonsense. Czy to ty?"), knowledge(), words=None)
     assert [(one.word.text, one.rule.when) for one in found] == [("ty", "question")]

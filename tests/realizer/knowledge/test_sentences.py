@@ -25,11 +25,11 @@ def test_sentences_end_with_their_marks() -> None:
 
 
 @pytest.mark.parametrize("text", ["真的吗？", "هل أنت بخير؟", "“Really?” she said", "Really?!"])
-def test_questions_of_other_scripts_and_in_quotes_are_questions(text: str) -> None:
+def test_sentences_know_questions_of_other_scripts_and_in_quotes(text: str) -> None:
     assert sentences(text)[0].question
 
 
-def test_words_last_as_many_units_as_they_have_vowels_and_marks_last_one() -> None:
+def test_sentences_have_words_of_one_unit_per_vowel() -> None:
     (one,) = sentences("banana, cat")
     assert [[word.start, word.end] for word in one.words] == [
         pytest.approx([0.0, 0.6]),
@@ -38,18 +38,18 @@ def test_words_last_as_many_units_as_they_have_vowels_and_marks_last_one() -> No
 
 
 @pytest.mark.parametrize("text", ["", "   ", "?!", "… — …"])
-def test_a_text_without_words_has_no_sentences(text: str) -> None:
+def test_sentences_of_a_text_without_words_are_none(text: str) -> None:
     assert sentences(text) == ()
 
 
 @given(st.text(max_size=80))
-def test_any_text_gives_words_in_its_order_at_rising_times(text: str) -> None:
+def test_sentences_have_words_in_order_at_rising_times(text: str) -> None:
     words = [word for one in sentences(text) for word in one.words]
     assert all(text[word.place :].startswith(word.text) for word in words)
     assert all(a.end <= b.start + 1e-9 and a.place < b.place for a, b in pairwise(words))
 
 
-def test_emoji_end_a_sentence_and_are_no_words() -> None:
+def test_sentences_end_at_emoji() -> None:
     one, other = sentences("Really?😱 No 😀!")
     assert [word.text for word in one.words] == ["Really"]
     assert one.question
@@ -58,7 +58,7 @@ def test_emoji_end_a_sentence_and_are_no_words() -> None:
     assert sentences("😱!") == ()
 
 
-def test_greek_asks_with_a_semicolon() -> None:
+def test_sentences_in_greek_ask_with_a_semicolon() -> None:
     text = "Είσαι σίγουρος; Ναι."
     assert [one.question for one in sentences(text, "el-GR")] == [True, False]
     assert not sentences(text)[0].question

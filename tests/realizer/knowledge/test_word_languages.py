@@ -28,7 +28,7 @@ def language(block: str = "", speech: str = "", text: str = "", ssml: str = "", 
     return language_of(node, document, "en-US")
 
 
-def test_the_nearest_element_says_the_language() -> None:
+def test_language_of_is_that_of_the_nearest_element() -> None:
     assert language() == "en-US"
     assert language(block="nl") == "nl"
     assert language(block="nl", speech="de") == "de"
@@ -36,23 +36,23 @@ def test_the_nearest_element_says_the_language() -> None:
     assert language(block="nl", speech="de", text="fr", ssml="pl") == "pl"
 
 
-def test_a_description_that_is_not_spoken_does_not_say_the_language() -> None:
+def test_language_of_ignores_a_description_that_is_not_spoken() -> None:
     assert language(text="fr", ssml="pl", priority=-1) == "fr"
 
 
 @pytest.mark.parametrize("tag", ["en", "en-GB", "EN", "en_US"])
-def test_english_words_count_in_every_kind_of_english(tag: str) -> None:
+def test_words_of_english_count_in_every_country(tag: str) -> None:
     words = ENGLISH.of(tag)
     assert words is not None
     assert words.categories(["nonsense"]) == ["disapproval"]
 
 
 @pytest.mark.parametrize("tag", ["nl", "de-AT", "eng", "../en", "", "\0"])
-def test_english_words_do_not_count_in_other_languages(tag: str) -> None:
+def test_words_of_english_do_not_count_in_other_languages(tag: str) -> None:
     assert ENGLISH.of(tag) is None
 
 
-def test_a_users_list_is_for_the_language_that_was_asked_for_or_for_all() -> None:
+def test_words_of_a_user_are_for_one_language_or_for_all() -> None:
     dutch = Words("nl-BE", OWN, everywhere=False)
     assert dutch.of("nl") is OWN
     assert dutch.of("fr") is None

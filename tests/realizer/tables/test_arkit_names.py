@@ -20,25 +20,25 @@ def test_shapes_are_the_52_of_arkit() -> None:
     [lambda n: n.replace("Left", "_L").replace("Right", "_R"), lambda n: n[0].upper() + n[1:],
      lambda n: f"blendShape1.{n}", lambda n: f"Head_{n}"],
 )  # fmt: skip
-def test_usual_spellings_are_understood(spell: Callable[[str], str]) -> None:
+def test_canonical_understands_usual_spellings(spell: Callable[[str], str]) -> None:
     assert {canonical(spell(name)) for name in shapes()} == set(shapes())
 
 
-def test_a_side_may_stand_behind_a_dot() -> None:
+def test_canonical_understands_a_side_after_a_dot() -> None:
     assert canonical("head_eyeBlink.R") == "eyeBlinkRight"
 
 
 @pytest.mark.parametrize("name", ["viseme_aa", "", "jaw", "open", "L"])
-def test_a_name_of_something_else_is_none_of_arkit_s(name: str) -> None:
+def test_canonical_returns_none_for_other_names(name: str) -> None:
     assert canonical(name) is None
 
 
-def test_a_misspelt_name_has_near_ones() -> None:
+def test_nearest_suggests_names_for_a_misspelt_one() -> None:
     assert nearest("mouthSmileLeftt")[0] == "mouthSmileLeft"
     assert nearest("hat") == ()
 
 
-def test_names_are_gathered_by_what_they_mean() -> None:
+def test_group_names_groups_spellings_of_one_shape() -> None:
     known, foreign = group_names(["mouthSmile_L", "MouthSmileLeft", "hat", "jawOpen"])
     assert known == {"mouthSmileLeft": ["mouthSmile_L", "MouthSmileLeft"], "jawOpen": ["jawOpen"]}
     assert foreign == ("hat",)

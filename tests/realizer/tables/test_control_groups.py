@@ -9,20 +9,20 @@ from realizer.core.errors import TableError
 from realizer.tables import control_groups
 
 
-def test_every_action_unit_and_low_level_fap_stands_under_one_heading() -> None:
+def test_regions_have_every_action_unit_and_low_level_fap_once() -> None:
     aus = [au for region in control_groups.au_regions() for au in region.members]
     faps = [fap for region in control_groups.fap_regions() for fap in region.members]
     assert sorted(aus) == [row.au for row in tables.action_units()]
     assert faps == list(range(3, 69))
 
 
-def test_fap_regions_are_the_standard_s_groups() -> None:
+def test_fap_regions_are_the_groups_of_the_standard() -> None:
     groups = {row.fap: row.group for row in tables.faps()}
     for region in control_groups.fap_regions():
         assert len({groups[fap] for fap in region.members}) == 1
 
 
-def test_one_left_out_or_named_twice_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_regions_refuse_missing_and_repeated_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     text = tables.text_of(control_groups.FILE).replace("[61, 62, 63, 64]", "[61, 62, 63, 63]", 1)
     monkeypatch.setattr(tables, "text_of", lambda _: text)
     control_groups.fap_regions.cache_clear()

@@ -12,7 +12,7 @@ from realizer.tables.cooccurrence import Unit, read_rules, rules
 HEAD = "# source: test\n# units: none\n# licence: MIT\n[sets]\nX = [1, 0, 0]\nZ = [0, 0, 1]\n"
 
 
-def test_the_table_holds_all_rules_of_appendix_c() -> None:
+def test_rules_are_those_of_appendix_c() -> None:
     found = rules().rules
     by_kind = [sum(rule.kind == kind for rule in found) for kind in ("domination", "opposition")]
     assert by_kind == [15 + 15 + 2, 7]
@@ -20,7 +20,7 @@ def test_the_table_holds_all_rules_of_appendix_c() -> None:
     assert len({rule.text for rule in found}) == len(found)
 
 
-def test_a_dominated_unit_stands_left_and_an_excluded_one_right() -> None:
+def test_parse_rule_knows_which_unit_is_weaker() -> None:
     found = {rule.text: rule for rule in rules().rules}
     assert (found["16<12+18"].weaker, found["16<12+18"].stronger) == (16, (Unit(12), Unit(18)))
     assert (found["12<15Z"].weaker, found["12<15Z"].stronger) == (12, (Unit(15, "Z"),))
@@ -40,14 +40,14 @@ def test_a_dominated_unit_stands_left_and_an_excluded_one_right() -> None:
         ("opposition", "51<52", "wanted two sides with '@' between them, as 27@25"),
     ],
 )
-def test_a_rule_that_cannot_be_read_says_what_was_wanted(section: str, rule: str, says: str) -> None:
+def test_read_rules_refuses_an_invalid_rule(section: str, rule: str, says: str) -> None:
     with pytest.raises(TableError) as caught:
         read_rules(f'{HEAD}[{section}]\nrules = ["{rule}"]\n', "mine.toml")
     line = HEAD.count("\n") + 2
     assert str(caught.value) == f"mine.toml:{line}, [{section}] {rule!r}: {says}"
 
 
-def test_a_rule_that_stands_twice_is_found_where_it_stands_the_second_time() -> None:
+def test_read_rules_names_the_line_of_a_repeated_rule() -> None:
     with pytest.raises(TableError) as caught:
         read_rules(
             f'{HEAD}[domination]\nrules = [\n  "5<63",\n  "7<6",  # "5<63"\n  "5<63",\n]\n', "mine.toml"
@@ -57,14 +57,14 @@ def test_a_rule_that_stands_twice_is_found_where_it_stands_the_second_time() -> 
     )
 
 
-def test_rules_that_would_silence_units_in_a_round_are_refused() -> None:
+def test_read_rules_refuses_a_cycle() -> None:
     with pytest.raises(TableError) as caught:
         read_rules(f'{HEAD}[domination]\nrules = ["5<63", "1<2", "2<4", "4<1"]\n', "mine.toml")
     line = HEAD.count("\n") + 2
     assert str(caught.value) == f"mine.toml:{line}, [domination] '4<1': closes a cycle with 1<2, 2<4"
 
 
-def test_all_faults_of_a_file_are_said_at_once() -> None:
+def test_read_rules_reports_all_faults_at_once() -> None:
     with pytest.raises(TableError) as caught:
         read_rules(
             f'{HEAD}Y = [0, 2]\n[dominance]\n[domination]\nrules = ["5<63", "63<5", "5<63"]\n', "mine.toml"
@@ -77,7 +77,7 @@ def test_all_faults_of_a_file_are_said_at_once() -> None:
     assert "'5<63': says the same as '5<63'" in lines[3]
 
 
-def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+def test_rules_name_a_missing_file(tmp_path: Path) -> None:
     with pytest.raises(TableError, match=r"none\.toml: wanted a file of co-occurrence rules"):
         rules(tmp_path / "none.toml")
 
@@ -92,7 +92,7 @@ def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
         ('[exclusion]\nrules = ["1@2"]\n', "[sets]: wanted X = [1, 0, 0], or how else a unit is small"),
     ],
 )
-def test_a_file_of_another_shape_says_what_was_wanted(text: str, says: str) -> None:
+def test_read_rules_refuses_other_sections(text: str, says: str) -> None:
     with pytest.raises(TableError) as caught:
         read_rules(f"# source: test\n# units: none\n# licence: MIT\n{text}", "mine.toml")
     (line,) = str(caught.value).splitlines()

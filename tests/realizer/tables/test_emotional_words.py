@@ -18,26 +18,26 @@ def categories(text: str) -> list[str]:
     return words.categories(text.split())
 
 
-def test_english_has_words_of_every_category() -> None:
+def test_word_list_of_english_has_words_of_every_category() -> None:
     words = word_list("en")
     assert words is not None
     found = {category for some in words.phrases.values() for _, category in some}
     assert found | set(words.beginnings.values()) == set(CATEGORIES)
 
 
-def test_a_phrase_wins_over_its_words() -> None:
+def test_categories_prefer_a_phrase_to_its_words() -> None:
     assert categories("I understand but you understand") == ["approval", "approval", "", "", "assent"]
 
 
-def test_a_longer_beginning_wins_over_a_shorter_one() -> None:
+def test_categories_prefer_a_longer_beginning() -> None:
     assert categories("Sadists sadly") == ["fright", "sorrow"]
 
 
-def test_typographic_apostrophes_are_apostrophes() -> None:
+def test_categories_take_typographic_apostrophes() -> None:
     assert categories("you’re right") == ["assent", "assent"]
 
 
-def test_a_language_without_a_list_has_none() -> None:
+def test_word_list_of_an_unknown_language_is_none() -> None:
     assert word_list("pl") is None
 
 
@@ -49,17 +49,17 @@ def test_a_language_without_a_list_has_none() -> None:
         ("gut,praise,own\ngut,sorrow,own", "wanted each word once"),
     ],
 )
-def test_a_bad_row_says_what_was_wanted(tmp_path: Path, row: str, says: str) -> None:
+def test_read_words_refuses_an_invalid_row(tmp_path: Path, row: str, says: str) -> None:
     with pytest.raises(TableError, match=says):
         read_words(HEAD + row + "\n", "mine.csv")
 
 
-def test_a_file_that_is_no_text_is_named(tmp_path: Path) -> None:
+def test_words_of_names_a_file_that_is_not_text(tmp_path: Path) -> None:
     (tmp_path / "bytes.csv").write_bytes(b"\xff\xfe\xff")
     with pytest.raises(TableError, match=r"bytes\.csv: wanted a list of words"):
         words_of(tmp_path / "bytes.csv")
 
 
-def test_a_file_may_begin_with_the_mark_that_spreadsheets_write(tmp_path: Path) -> None:
+def test_words_of_takes_a_byte_order_mark(tmp_path: Path) -> None:
     (tmp_path / "marked.csv").write_text("\ufeff" + HEAD + "gut,praise,own\n", "utf-8")
     assert words_of(tmp_path / "marked.csv").categories(["gut"]) == ["praise"]

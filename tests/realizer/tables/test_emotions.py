@@ -12,27 +12,27 @@ from realizer.tables.profiles import own_ranges
 from realizer.tables.wheel_words import ring
 
 
-def test_the_archetypes_stand_on_the_wheel_in_plutchiks_order() -> None:
+def test_archetypes_have_the_order_of_plutchik() -> None:
     names = [archetype.name for archetype in archetypes()]
     assert names == ["FEAR", "SADNESS", "SURPRISE", "DISGUST", "ANGER", "HAPPINESS"]
     angles = [archetype.angle for archetype in archetypes()]
     assert angles == sorted(set(angles))
 
 
-def test_every_basic_emotion_of_the_wheel_has_a_face_and_a_profile() -> None:
+def test_emotion_faces_have_every_basic_emotion_with_a_profile() -> None:
     basic = {place.name for place in ring("paul").values() if place.kind == "basic"}
     assert set(emotion_faces()) == basic == {row.emotion for row in own_ranges()}
 
 
 @pytest.mark.parametrize("face", emotion_faces().values(), ids=lambda face: face.emotion)
-def test_a_face_is_its_lexeme_or_has_units_of_its_own(face) -> None:
+def test_emotion_faces_are_lexemes_or_have_their_own_units(face) -> None:
     assert face.aus
     if face.lexeme:
         assert face.aus == face_lexemes()[face.lexeme].aus
 
 
 @pytest.mark.parametrize("name", [place.name for place in ring("paul").values() if place.opposite])
-def test_opposites_on_the_wheel_do_not_resemble_each_other(name: str) -> None:
+def test_emotion_faces_of_opposites_are_different(name: str) -> None:
     """Table 6.1 of Paul 2010: as FAPs, whose signs tell brows that rise from brows that fall."""
     here = ring("paul")[name]
     one, other = wheel(here.angle).frame(), wheel(ring("paul")[here.opposite].angle).frame()

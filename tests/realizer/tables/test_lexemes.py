@@ -19,19 +19,19 @@ STANDARD = (*BROWS, *CORNERS, "OBLIQUE_BROWS", "OPEN_MOUTH", "OPEN_LIPS", "WIDEN
 EMOTIONS = ("ANGER", "DISGUST", "FEAR", "HAPPINESS", "JOY", "SADNESS", "SURPRISE")
 
 
-def test_the_lexemes_of_the_standard_and_the_emotions_are_there() -> None:
+def test_face_lexemes_have_those_of_the_standard_and_the_emotions() -> None:
     assert len(STANDARD) == 17
     assert {*STANDARD, *EMOTIONS, "SMILE", "BLINK"} <= set(face_lexemes())
     assert {"NOD", "SHAKE", "TILT"} <= set(head_lexemes())
 
 
-def test_joy_is_happiness() -> None:
+def test_face_lexemes_have_joy_as_happiness() -> None:
     known = face_lexemes()
     assert known["JOY"].aus == known["HAPPINESS"].aus
 
 
 @pytest.mark.parametrize("name", sorted(face_lexemes()))
-def test_a_lexeme_of_one_side_mirrors_that_of_the_other(name: str) -> None:
+def test_face_lexemes_of_one_side_mirror_those_of_the_other(name: str) -> None:
     swapped = {"LEFT": "RIGHT", "RIGHT": "LEFT", "BOTH": "BOTH"}
     swap = name.replace("LEFT", "?").replace("RIGHT", "LEFT").replace("?", "RIGHT")
     known = face_lexemes()
@@ -39,12 +39,12 @@ def test_a_lexeme_of_one_side_mirrors_that_of_the_other(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(face_lexemes()))
-def test_every_action_unit_of_a_lexeme_moves_a_fap(name: str) -> None:
+def test_face_lexemes_use_action_units_that_move_faps(name: str) -> None:
     moved = {row.au for row in au_to_fap()}
     assert {au for au, _ in face_lexemes()[name].aus} <= moved
 
 
-def test_a_row_of_action_units_names_the_sides() -> None:
+def test_read_aus_parses_sides() -> None:
     assert read_aus({"1": 0.5, "12L": 1.0, "12R": 0.25}, "x") == {
         (1, "BOTH"): 0.5,
         (12, "LEFT"): 1.0,
@@ -61,6 +61,6 @@ def test_a_row_of_action_units_names_the_sides() -> None:
         ({"12": 1.5}, "got 1.5"),
     ],
 )
-def test_a_row_of_action_units_is_checked(cells: dict[str, float], words: str) -> None:
+def test_read_aus_refuses_invalid_units_and_intensities(cells: dict[str, float], words: str) -> None:
     with pytest.raises(TableError, match=words):
         read_aus(cells, "x")

@@ -38,7 +38,7 @@ def written(folder: Path, text: str, name: str = "own.txt") -> Path:
     return path
 
 
-def test_the_figure_of_the_thesis_is_read(tmp_path: Path) -> None:
+def test_read_mapping_reads_the_figure_of_the_thesis(tmp_path: Path) -> None:
     units = read_mapping(written(tmp_path, FIGURE))
     assert units[23, ""] == tuple(AuToFap(23, "", fap, 0.0, 1.0, 0.0, -300.0) for fap in (53, 54))
     assert [row.fap_to for row in units[24, ""]] == [1000, 500]
@@ -52,7 +52,7 @@ def test_the_figure_of_the_thesis_is_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_what_is_written_reads_back_the_same(tmp_path: Path, form: str) -> None:
+def test_write_mapping_round_trips(tmp_path: Path, form: str) -> None:
     rows = tables.au_to_fap()
     write_mapping(tmp_path / f"all{form}", rows, "the table")
     units = read_mapping(tmp_path / f"all{form}")
@@ -60,21 +60,21 @@ def test_what_is_written_reads_back_the_same(tmp_path: Path, form: str) -> None:
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_an_action_unit_that_asks_nothing_is_written_too(tmp_path: Path, form: str) -> None:
+def test_write_mapping_writes_an_action_unit_without_effect(tmp_path: Path, form: str) -> None:
     write_mapping(tmp_path / f"few{form}", [row for row in tables.au_to_fap() if row.au != 25], "without 25")
     assert not any(row.fap_to for row in read_mapping(tmp_path / f"few{form}")[25, ""])
 
 
-def test_a_blank_comments_and_a_byte_order_mark_do_not_count(tmp_path: Path) -> None:
+def test_read_mapping_ignores_blanks_comments_and_a_byte_order_mark(tmp_path: Path) -> None:
     units = read_mapping(written(tmp_path, "\ufeff# mine\r\n\r\n26 # the jaw\r\n 3 0 1  0 500 # down\r\n"))
     assert units == {(26, ""): (AuToFap(26, "", 3, 0.0, 1.0, 0.0, 500.0),)}
 
 
-def test_an_action_unit_without_lines_asks_nothing(tmp_path: Path) -> None:
+def test_read_mapping_of_an_action_unit_without_lines_has_no_rows(tmp_path: Path) -> None:
     assert read_mapping(written(tmp_path, "12\tL\n9\n")) == {(9, "L"): (), (9, "R"): (), (12, "L"): ()}
 
 
-def test_without_a_side_each_fap_goes_with_the_side_it_is_on_and_the_middle_with_both(tmp_path: Path) -> None:
+def test_read_mapping_without_a_side_assigns_faps_to_their_sides(tmp_path: Path) -> None:
     units = read_mapping(written(tmp_path, "10\n8 0 1 0 -90\n56 0 1 0 -80\n4 0 1 0 -70\n"))
     assert {side: [row.fap for row in unit] for (_, side), unit in units.items()} == {
         "L": [4, 8],
@@ -85,16 +85,16 @@ def test_without_a_side_each_fap_goes_with_the_side_it_is_on_and_the_middle_with
 @pytest.mark.parametrize(
     "row", [row for row in tables.faps()[2:] if row.mirror != row.fap], ids=lambda r: r.name
 )
-def test_every_fap_that_has_a_mirror_has_a_side(tmp_path: Path, row: tables.Fap) -> None:
+def test_read_mapping_gives_a_mirrored_fap_one_side(tmp_path: Path, row: tables.Fap) -> None:
     units = read_mapping(written(tmp_path, f"12\n{row.fap} 0 1 0 9\n{row.mirror} 0 1 0 9\n"))
     assert {len(unit) for unit in units.values()} == {1}
 
 
-def test_a_line_said_for_both_sides_of_a_unit_that_has_none_counts_once(tmp_path: Path) -> None:
+def test_read_mapping_counts_equal_lines_of_both_sides_once(tmp_path: Path) -> None:
     assert len(read_mapping(written(tmp_path, "17 L\n18 0 1 0 50\n17 R\n18 0 1 0 50\n"))[17, ""]) == 1
 
 
-def test_pieces_of_one_fap_join(tmp_path: Path) -> None:
+def test_read_mapping_joins_segments_of_one_fap(tmp_path: Path) -> None:
     units = read_mapping(written(tmp_path, "26\n3 0.5 1 300 400\n3 0 0.5 0 300\n"))
     assert [row.fap_to for row in units[26, ""]] == [300, 400]
 
@@ -122,7 +122,7 @@ def test_pieces_of_one_fap_join(tmp_path: Path) -> None:
         ("26\n3 0 1 0 5\n\n3 .5 1 5 7\n", "line 4: AU26, FAP 3: wanted it to begin at 1"),
     ],
 )
-def test_a_bad_line_is_refused_with_what_was_wanted(tmp_path: Path, text: str, says: str) -> None:
+def test_read_mapping_refuses_an_invalid_line(tmp_path: Path, text: str, says: str) -> None:
     with pytest.raises(TableError, match=f"own.txt.*{says}"):
         read_mapping(written(tmp_path, text))
 
@@ -135,11 +135,11 @@ def test_a_bad_line_is_refused_with_what_was_wanted(tmp_path: Path, text: str, s
         ("26,,3,0,1\n", "line 5: wanted 7 cells"),
     ],
 )
-def test_a_bad_row_is_refused_with_its_line(tmp_path: Path, rows: str, says: str) -> None:
+def test_read_mapping_refuses_an_invalid_row(tmp_path: Path, rows: str, says: str) -> None:
     with pytest.raises(TableError, match=f"own.csv.*{says}"):
         read_mapping(written(tmp_path, HEAD + rows, "own.csv"))
 
 
-def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+def test_read_mapping_names_a_missing_file(tmp_path: Path) -> None:
     with pytest.raises(TableError, match=r"none\.txt: wanted a mapping of action units to FAPs"):
         read_mapping(tmp_path / "none.txt")

@@ -8,7 +8,7 @@ from realizer.tables.profiles import published_ranges, statistics, vocabularies
 from tests import own_profiles
 
 
-def test_the_first_profiles_are_mean_and_deviation_of_the_statistics_in_print_and_corrected() -> None:
+def test_published_ranges_of_first_profiles_follow_the_statistics() -> None:
     measured = {(row.emotion, row.fap): row for row in statistics() if row.mean is not None}
     seen = 0
     for row in published_ranges():
@@ -22,7 +22,7 @@ def test_the_first_profiles_are_mean_and_deviation_of_the_statistics_in_print_an
     assert seen == 57
 
 
-def test_a_misprint_is_one_against_the_statistics() -> None:
+def test_published_ranges_with_misprints_contradict_the_statistics() -> None:
     measured = {(row.emotion, row.fap): row for row in statistics() if row.mean is not None}
     wrong = [row for row in published_ranges() if row.fault == "misprint"]
     assert [(row.emotion, row.fap) for row in wrong] == [("anger", 31), ("disgust", 33), ("disgust", 34)]
@@ -32,7 +32,7 @@ def test_a_misprint_is_one_against_the_statistics() -> None:
         assert (row.raw_low, row.raw_high) != (row.low, row.high)
 
 
-def test_every_verified_fap_is_in_the_vocabulary_of_its_emotion() -> None:
+def test_vocabularies_have_every_verified_fap() -> None:
     known = vocabularies()
     outside = {(row.emotion, row.fap) for row in statistics() if row.mean is not None} - {
         (emotion, fap) for emotion, faps in known.items() for fap in faps
@@ -40,12 +40,12 @@ def test_every_verified_fap_is_in_the_vocabulary_of_its_emotion() -> None:
     assert not outside
 
 
-def test_only_fear_is_misprinted_among_the_vocabularies() -> None:
+def test_vocabularies_correct_only_fear() -> None:
     raw, known = vocabularies(raw=True), vocabularies()
     assert {emotion for emotion in known if known[emotion] != raw[emotion]} == {"fear"}
     assert known["fear"] - raw["fear"] == {19}
     assert raw["fear"] - known["fear"] == {12}
 
 
-def test_our_own_profiles_are_what_the_faces_of_their_emotions_ask_of_the_faps() -> None:
+def test_own_ranges_follow_from_the_faces_of_the_emotions() -> None:
     assert own_profiles.FILE.read_text("utf-8") == own_profiles.render(), "python -m tests.own_profiles"

@@ -34,7 +34,7 @@ def at_one(au: int, side: str, fap: int) -> float:
 @pytest.mark.parametrize(
     "name", [f.name for f in files(tables).iterdir() if f.name.endswith((".csv", ".toml"))]
 )
-def test_every_file_names_source_units_and_licence(name: str) -> None:
+def test_tables_name_source_units_and_licence(name: str) -> None:
     tables._check_head(tables.text_of(name), name)
 
 
@@ -46,12 +46,12 @@ def test_faps_are_the_68_of_the_standard_in_order() -> None:
     assert list(sizes.values()) == [2, 16, 12, 8, 4, 5, 3, 10, 4, 4]
 
 
-def test_only_the_five_unidirectional_faps_stop_at_zero() -> None:
+def test_faps_that_stop_at_zero_are_the_five_unidirectional_ones() -> None:
     assert {row.fap for row in tables.faps() if row.least == 0 and row.most > 0} == {3, 14, 41, 42, 47}
 
 
 @pytest.mark.parametrize("row", tables.faps(), ids=lambda row: row.name)
-def test_the_mirror_of_a_mirrored_fap_is_itself(row: Fap) -> None:
+def test_faps_are_the_mirror_of_their_mirror(row: Fap) -> None:
     other = FAPS[row.mirror]
     assert other.mirror == row.fap
     assert other.sign == row.sign
@@ -65,7 +65,7 @@ def test_action_units_are_numbered_once_and_upwards() -> None:
 
 
 @pytest.mark.parametrize("key", sorted(polylines()), ids=str)
-def test_a_polyline_starts_at_rest_and_stays_whole_and_within_the_fap(key: tuple[int, str, int]) -> None:
+def test_au_to_fap_has_continuous_polylines_within_ranges(key: tuple[int, str, int]) -> None:
     au, side, fap = key
     assert side in (("L", "R") if AUS[au].sides else ("",))
     points = polylines()[key]
@@ -79,12 +79,12 @@ def test_a_polyline_starts_at_rest_and_stays_whole_and_within_the_fap(key: tuple
     assert any(f for _, f in points)
 
 
-def test_every_action_unit_of_facs_is_listed() -> None:
+def test_action_units_have_every_one_of_facs() -> None:
     assert set(AUS) == FACS
 
 
 @pytest.mark.parametrize("unit", tables.action_units(), ids=lambda unit: f"AU{unit.au}")
-def test_an_action_unit_moves_a_fap_on_each_of_its_sides_or_says_why_none(unit: tables.ActionUnit) -> None:
+def test_action_units_move_a_fap_on_each_side_or_say_why_not(unit: tables.ActionUnit) -> None:
     sides = {row.side for row in ROWS if row.au == unit.au}
     if unit.no_fap:
         assert not sides
@@ -92,13 +92,13 @@ def test_an_action_unit_moves_a_fap_on_each_of_its_sides_or_says_why_none(unit: 
         assert sides == ({"L", "R"} if unit.sides else {""})
 
 
-def test_a_side_of_an_action_unit_does_not_move_the_other_half_of_the_face() -> None:
+def test_au_to_fap_of_one_side_does_not_move_the_other_side() -> None:
     for row in ROWS:
         if row.side and FAPS[row.fap].mirror != row.fap:
             assert f"_{row.side.lower()}" in FAPS[row.fap].name
 
 
-def test_left_and_right_mirror_each_other() -> None:
+def test_au_to_fap_is_symmetric() -> None:
     lines = polylines()
     for (au, side, fap), points in lines.items():
         mirror = FAPS[fap]
@@ -113,14 +113,14 @@ def test_left_and_right_mirror_each_other() -> None:
 
 
 @pytest.mark.parametrize("au", [row.au for row in tables.action_units() if row.degrees])
-def test_a_rotation_turns_by_the_degrees_of_its_action_unit(au: int) -> None:
+def test_au_to_fap_of_a_rotation_has_the_degrees_of_its_action_unit(au: int) -> None:
     turned = {abs(row.fap_to) for row in ROWS if row.au == au and FAPS[row.fap].unit == "angle_unit"}
     assert list(turned) == [pytest.approx(math.radians(AUS[au].degrees) * 1e5, abs=1)]
 
 
 @pytest.mark.parametrize("au", [43, 45, 46])
 @pytest.mark.parametrize(("side", "upper", "lower"), [("L", 19, 21), ("R", 20, 22)])
-def test_closed_lids_meet_exactly(au: int, side: str, upper: int, lower: int) -> None:
+def test_au_to_fap_closes_the_lids_exactly(au: int, side: str, upper: int, lower: int) -> None:
     assert at_one(au, side, upper) + at_one(au, side, lower) == 1024
 
 
@@ -159,7 +159,7 @@ def test_closed_lids_meet_exactly(au: int, side: str, upper: int, lower: int) ->
         (64, "", 19, 1),
     ],
 )
-def test_signs_are_those_of_mpeg_4(au: int, side: str, fap: int, sign: int) -> None:
+def test_au_to_fap_has_the_signs_of_mpeg_4(au: int, side: str, fap: int, sign: int) -> None:
     assert at_one(au, side, fap) * sign > 0
 
 
@@ -169,13 +169,13 @@ LIPS = [(4, 5), (8, 10), (9, 11), (51, 52), (55, 57), (56, 58)]
 
 @pytest.mark.parametrize("au", sorted({row.au for row in ROWS}))
 @pytest.mark.parametrize(("upper", "lower"), LIPS[:3])
-def test_no_action_unit_pushes_a_lip_through_the_other(au: int, upper: int, lower: int) -> None:
+def test_au_to_fap_does_not_push_a_lip_through_the_other(au: int, upper: int, lower: int) -> None:
     for side in ("L", "R", ""):
         assert at_one(au, side, upper) + at_one(au, side, lower) <= 0
 
 
 @pytest.mark.parametrize(("upper", "lower"), LIPS)
-def test_the_jaw_drop_includes_the_parting_of_the_lips(upper: int, lower: int) -> None:
+def test_au_to_fap_of_the_jaw_includes_the_parting_of_the_lips(upper: int, lower: int) -> None:
     gaps = [-(at_one(au, "", upper) + at_one(au, "", lower)) for au in (25, 26, 27)]
     assert gaps == sorted(gaps)
     assert gaps[0] > 0
@@ -198,7 +198,7 @@ HEAD = "# source: x\n# units: x\n# licence: x\n"
         (HEAD + "au,side,fap,au_from,au_to,fap_from,fap_to\n1,L,x,0,1,0,1\n", "line 5, fap: wanted int"),
     ],
 )
-def test_a_bad_table_is_refused_with_its_place(text: str, says: str) -> None:
+def test_read_csv_refuses_an_invalid_table_with_its_place(text: str, says: str) -> None:
     with pytest.raises(TableError, match=says):
         tables.read_csv(text, tables.AuToFap, "bad.csv")
 
@@ -213,7 +213,7 @@ BODY = ("gesture", "pointing", "posture", "postureShift", "locomotion", "wait")
 
 
 @pytest.mark.parametrize("element", [*FACE, *BODY])
-def test_every_element_has_its_gaps_with_a_source(element: str) -> None:
+def test_gaps_of_every_element_have_a_source(element: str) -> None:
     row = timing.gaps(element)
     assert row.points[0] == "start"
     assert row.points[-1] == "end"
@@ -221,28 +221,28 @@ def test_every_element_has_its_gaps_with_a_source(element: str) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(timing.all_gaps()))
-def test_a_variant_has_the_sync_points_of_its_element(name: str) -> None:
+def test_gaps_of_a_variant_have_the_points_of_its_element(name: str) -> None:
     element, _, variant = name.partition(".")
     assert timing.gaps(element, variant.lower()).points == timing.gaps(element).points
 
 
-def test_a_variant_without_times_of_its_own_takes_those_of_its_element() -> None:
+def test_gaps_of_an_unknown_variant_are_those_of_its_element() -> None:
     assert timing.gaps("faceLexeme", "WIDEN_EYES") == timing.gaps("faceLexeme")
     assert timing.gaps("faceLexeme", "BLINK") != timing.gaps("faceLexeme")
 
 
-def test_variants_are_lexemes_or_influences_that_exist() -> None:
+def test_gaps_have_only_variants_that_exist() -> None:
     variants = {name.split(".")[1] for name in timing.all_gaps() if "." in name}
     assert variants <= {*lexemes.face_lexemes(), *lexemes.head_lexemes(), "EYES"}
 
 
-def test_a_nod_takes_six_to_nine_tenths_of_a_second_and_a_blink_three() -> None:
+def test_gaps_of_a_nod_and_a_blink_have_natural_lengths() -> None:
     nod = sum(gap.preferred for gap in timing.gaps("head", "NOD").gaps)
     assert 0.6 <= nod <= 0.9
     assert sum(gap.preferred for gap in timing.gaps("faceLexeme", "BLINK").gaps) == pytest.approx(0.3)
 
 
-def test_every_row_class_is_frozen() -> None:
+def test_row_classes_are_frozen() -> None:
     row = tables.faps()[0]
     with pytest.raises(AttributeError):
         row.fap = 2  # type: ignore[misc]

@@ -7,7 +7,7 @@ import pytest
 from realizer.tables.templates import templates
 
 
-def test_there_are_the_twelve_of_wojdel() -> None:
+def test_templates_are_the_twelve_of_wojdel() -> None:
     assert list(templates()) == [
         "ASTONISHMENT",
         "SURPRISE",
@@ -25,7 +25,7 @@ def test_there_are_the_twelve_of_wojdel() -> None:
 
 
 @pytest.mark.parametrize("template", templates().values(), ids=lambda template: template.name)
-def test_lengths_make_sense(template) -> None:
+def test_templates_have_plausible_durations(template) -> None:
     assert template.features
     if template.possible:
         assert template.possible[0] <= template.evident <= template.possible[1]

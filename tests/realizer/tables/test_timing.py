@@ -15,7 +15,7 @@ MEASURED = re.compile(r"Wojdel 2005 table 6\.4, template (\w+) \(?.*?(\d+) frame
 
 
 @pytest.mark.parametrize("name", ROWS)
-def test_points_are_those_of_the_element(name: str) -> None:
+def test_gaps_have_the_points_of_the_element(name: str) -> None:
     row: Gaps = ROWS[name]
     element = name.partition(".")[0]
     nodes = [cls for tag, cls in VOCABULARY.items() if tag.rpartition("}")[2] == element]
@@ -26,7 +26,7 @@ def test_points_are_those_of_the_element(name: str) -> None:
     assert any(row.points == tuple(cls.sync_points) for cls in nodes)
 
 
-def test_holds_that_were_measured_make_what_was_evident() -> None:
+def test_gaps_of_measured_holds_give_the_evident_durations() -> None:
     """An expression is evident from half of its attack to half of its relaxation."""
     found = 0
     for name, row in ROWS.items():

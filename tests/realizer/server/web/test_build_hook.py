@@ -34,7 +34,7 @@ def build(hook):
     return hook.PageBuildHook(str(HOOK.parents[3]), {}, None, None, "", "wheel", None)
 
 
-def test_a_bundle_of_these_sources_is_left_alone(hook, monkeypatch) -> None:
+def test_build_hook_keeps_a_bundle_of_these_sources(hook, monkeypatch) -> None:
     monkeypatch.setattr(hook, "bundle", lambda: pytest.fail("nothing has changed"))
     monkeypatch.setattr(hook.shutil, "which", lambda name: None)
     assert build(hook).dependencies() == []
@@ -42,7 +42,7 @@ def test_a_bundle_of_these_sources_is_left_alone(hook, monkeypatch) -> None:
 
 
 @pytest.mark.parametrize("name", ["index.html", "style.css", "package-lock.json", "src/app.js"])
-def test_any_change_of_a_source_makes_it_anew(hook, monkeypatch, name) -> None:
+def test_build_hook_builds_again_after_a_change(hook, monkeypatch, name) -> None:
     source = hook.WEB / name
     source.write_bytes(source.read_bytes() + b"\n")
     bundled = []
@@ -51,7 +51,7 @@ def test_any_change_of_a_source_makes_it_anew(hook, monkeypatch, name) -> None:
     assert bundled
 
 
-def test_a_node_is_asked_for_only_where_there_is_no_npm(hook, monkeypatch) -> None:
+def test_build_hook_requires_node_only_without_npm(hook, monkeypatch) -> None:
     (hook.STATIC / hook.MARK).unlink()
     monkeypatch.setattr(hook.shutil, "which", lambda name: "/usr/bin/npm")
     assert build(hook).dependencies() == []
@@ -61,7 +61,7 @@ def test_a_node_is_asked_for_only_where_there_is_no_npm(hook, monkeypatch) -> No
     assert build(hook).dependencies() == []
 
 
-def test_a_failure_says_what_failed_and_the_way_around(hook, tmp_path, monkeypatch) -> None:
+def test_build_hook_explains_a_failure(hook, tmp_path, monkeypatch) -> None:
     npm = tmp_path / "npm"
     npm.write_text("#!/bin/sh\necho no network >&2\nexit 1\n")
     npm.chmod(0o755)
@@ -71,5 +71,5 @@ def test_a_failure_says_what_failed_and_the_way_around(hook, tmp_path, monkeypat
     assert "no network" in str(caught.value)
 
 
-def test_the_lock_file_names_no_host() -> None:
+def test_lock_file_names_no_host() -> None:
     assert "resolved" not in (HOOK.parent / "package-lock.json").read_text("utf-8")
