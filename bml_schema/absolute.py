@@ -11,8 +11,6 @@ from bml_schema.nodes import After, Before, Behaviour, Block, Constraint, Requir
 from bml_schema.sync_refs import SyncRef
 from bml_schema.values import MAX_SECONDS
 
-__all__ = ["with_absolute_times"]
-
 _SAME = 1e-6  # s; rounding of solvers between times that should be equal
 
 

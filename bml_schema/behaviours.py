@@ -9,28 +9,6 @@ from bml_schema.nodes import Behaviour, Part, core, extension
 from bml_schema.sync_refs import SyncRef
 from bml_schema.values import integer, name, number, one_of, string, word
 
-__all__ = [
-    "Face",
-    "FaceFacs",
-    "FaceLexeme",
-    "FaceShift",
-    "Gaze",
-    "GazeShift",
-    "Gesture",
-    "Head",
-    "HeadDirectionShift",
-    "Locomotion",
-    "Pointing",
-    "Pose",
-    "Posture",
-    "PostureShift",
-    "Speech",
-    "SpeechText",
-    "Stance",
-    "Sync",
-    "Wait",
-]
-
 HOLD: Final = ("start", "ready", "relax", "end")
 STROKE: Final = ("start", "ready", "strokeStart", "stroke", "strokeEnd", "relax", "end")
 PEAK: Final = ("start", "attackPeak", "relax", "end")

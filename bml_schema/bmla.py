@@ -6,16 +6,6 @@ from bml_schema.node_schema import attribute, child, node, text
 from bml_schema.nodes import Behaviour, Part, bmla, bmlt
 from bml_schema.values import Value, block_name, name, names, number, one_of, word
 
-__all__ = [
-    "Activate",
-    "AudioFile",
-    "FaceInterpolator",
-    "FaceKeyframe",
-    "Interrupt",
-    "ParameterValueChange",
-    "Trajectory",
-]
-
 
 def _read_target(text: str) -> tuple[str, str]:
     block, _, behaviour = text.strip().partition(":")

@@ -17,8 +17,6 @@ from bml_schema.nodes import Behaviour, Block
 from bml_schema.parser import MAX_BEHAVIOURS, read_block
 from bml_schema.vocabulary import VOCABULARY
 
-__all__ = ["MAX_BYTES", "MAX_DOCUMENTS", "parse", "read"]
-
 MAX_BYTES = 1 << 20  # of one document; an hour of speech with a nod on every word is a third of it
 _MAX_RETRIES = 20  # searches for a good document inside a broken one
 _MAX_AGAIN = 100_000  # characters of one text that are searched again; more would take seconds

@@ -10,8 +10,6 @@ from bml_schema.behaviours import Speech, SpeechText, Sync
 from bml_schema.nodes import Behaviour, Block, Constraint, Required, Synchronize
 from bml_schema.sync_refs import SyncRef
 
-__all__ = ["ReducedBlock", "without"]
-
 
 class ReducedBlock(NamedTuple):
     """A block without some of its behaviours.

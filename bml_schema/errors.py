@@ -16,8 +16,6 @@ from typing import NamedTuple
 
 from lxml.etree import _Element
 
-__all__ = ["BMLError", "BMLSizeError", "BMLSyntaxError", "Place", "Problem"]
-
 # Warning types of the standard, in its (American) spelling.
 PARSING_FAILURE = "PARSING_FAILURE"
 BEHAVIOR_TYPE_NOT_SUPPORTED = "BEHAVIOR_TYPE_NOT_SUPPORTED"

@@ -7,8 +7,6 @@ from bml_schema.node_schema import attribute, children, node
 from bml_schema.nodes import Behaviour, Part, own
 from bml_schema.values import integer, number, one_of, string, word
 
-__all__ = ["Blink", "Emotion", "Expression", "Fap", "FapFile", "Faps", "Idle", "Mood", "Timeline"]
-
 _ANGLE = number(-1e6, 1e6, wanted="degrees")  # on the wheel of emotions; full turns are ignored
 _AFFECT = number(-1, 1)
 _SEED = integer(0, 2**31 - 1)

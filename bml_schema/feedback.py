@@ -26,17 +26,6 @@ from bml_schema.values import NUMBER, decimal
 from bml_schema.vocabulary import VOCABULARY
 from bml_schema.writer import Writer
 
-__all__ = [
-    "BlockPrediction",
-    "BlockProgress",
-    "Feedback",
-    "PredictionFeedback",
-    "SyncPointProgress",
-    "WarningFeedback",
-    "parse_feedback",
-    "prediction_of",
-]
-
 
 @node
 class BlockProgress:

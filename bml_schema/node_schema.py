@@ -22,8 +22,6 @@ from typing import Any, TypeVar, dataclass_transform
 
 from bml_schema.values import Value
 
-__all__ = ["attribute", "child", "children", "mixed", "node", "sync_ref", "text"]
-
 _KEY = "bml"
 _T = TypeVar("_T")
 

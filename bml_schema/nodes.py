@@ -11,23 +11,6 @@ from bml_schema.node_schema import attribute, node, sync_ref
 from bml_schema.sync_refs import SyncRef
 from bml_schema.values import block_name, block_names, flag, integer, name, number, one_of, word
 
-__all__ = [
-    "BMLA",
-    "BMLT",
-    "CORE",
-    "EXTENSIONS",
-    "OWN",
-    "After",
-    "Before",
-    "Behaviour",
-    "Block",
-    "Constraint",
-    "Description",
-    "Part",
-    "Required",
-    "Synchronize",
-]
-
 CORE = "http://www.bml-initiative.org/bml/bml-1.0"
 EXTENSIONS = "http://www.bml-initiative.org/bml/coreextensions-1.0"
 BMLA = "http://www.asap-project.org/bmla"

@@ -35,8 +35,6 @@ from bml_schema.nodes import CORE, EXTENSIONS, Behaviour, Block, Constraint, Req
 from bml_schema.sync_refs import Names
 from bml_schema.values import block_names, describe_mismatch
 
-__all__ = ["MAX_BEHAVIOURS"]
-
 MAX_BEHAVIOURS = 10_000  # in one block; scheduled in about a second
 _MAX_LISTED = 10  # lost references in a warning's text; `Problem.lost_references` has all
 # BMLA writes this in composition or in an attribute of its own.

@@ -11,8 +11,6 @@ from bml_schema.errors import did_you_mean, quoted
 from bml_schema.node_schema import node
 from bml_schema.values import MAX_SECONDS, NUMBER, decimal, describe_mismatch
 
-__all__ = ["SyncRef"]
-
 # Sync points of the core. In the middle of three names, one of these is not a behaviour's id.
 _POINTS = frozenset({"start", "ready", "strokeStart", "stroke", "strokeEnd", "attackPeak", "relax", "end"})
 _LONGEST = 1000  # characters of a reference: two ids of 256, a sync id, an offset

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
 
-__all__ = ["Value", "flag", "integer", "number", "one_of", "seconds", "string", "word"]
-
 MAX_SECONDS = 86400.0  # a day; longer times in a document are a unit mistake or an attack
 _MAX_DIGITS = 400  # the smallest float written without exponent has 345 characters
 _MAX_NAME = 256  # characters; ids come back in feedback start tags, which clients cut at 4096

@@ -8,12 +8,10 @@ from typing import Final
 from bml_schema import behaviours, bmla, extensions
 from bml_schema.nodes import Behaviour
 
-__all__ = ["VOCABULARY"]
-
 # Clark tag -> class; extend it by {**VOCABULARY, Wink.tag: Wink}.
 VOCABULARY: Final[Mapping[str, type[Behaviour]]] = {
     cls.tag: cls
     for module in (behaviours, bmla, extensions)
-    for cls in map(vars(module).get, module.__all__)
-    if isinstance(cls, type) and issubclass(cls, Behaviour)
+    for _, cls in sorted(vars(module).items())
+    if isinstance(cls, type) and issubclass(cls, Behaviour) and hasattr(cls, "tag")
 }

@@ -24,8 +24,6 @@ from bml_schema.nodes import (
 from bml_schema.sync_refs import SyncRef
 from bml_schema.values import decimal
 
-__all__ = ["write"]
-
 _IN_CORE = f"{{{CORE}}}"
 _XML = "http://www.w3.org/XML/1998/namespace"
 # Well-known prefixes; any other namespace becomes ns1, ns2, ...
