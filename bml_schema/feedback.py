@@ -8,7 +8,7 @@ BMLA does. Neither is part of ==.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import field, replace
 from typing import Any
 
 from lxml import etree
@@ -18,7 +18,7 @@ from bml_schema.bmla import FaceKeyframe
 from bml_schema.documents import element
 from bml_schema.errors import BMLError, BMLSyntaxError, quoted
 from bml_schema.escape import escape, sanitized, sanitized_value
-from bml_schema.node_schema import changed, local, node
+from bml_schema.node_schema import local, node
 from bml_schema.nodes import BMLA, CORE, OWN, Behaviour, bmla, core, own
 from bml_schema.parser import read_behaviour
 from bml_schema.sync_refs import SyncRef
@@ -188,18 +188,18 @@ def prediction_of(node: Behaviour, block: str, times: Mapping[str, float]) -> Be
     """
     syncs = {p: SyncRef(offset=round(times[p], 6)) for p in node.sync_points if p in times}
     id = f"{block}:{node.id}"
-    node = changed(
+    node = replace(
         node, id=id, syncs=syncs, descriptions=(), unknown_attributes={}, unknown_children=(), priority=0.0
     )
     if isinstance(node, Speech):
         refs = {p: SyncRef(offset=round(time, 6)) for p, time in times.items() if p not in node.sync_points}
         parts = node.text.parts if node.text is not None else ()
-        parts = tuple(p if isinstance(p, str) else changed(p, ref=refs.pop(p.id, None)) for p in parts)
+        parts = tuple(p if isinstance(p, str) else replace(p, ref=refs.pop(p.id, None)) for p in parts)
         # Marks that only a description names follow the text.
         parts += tuple(Sync(id=mark, ref=ref) for mark, ref in refs.items())
-        return changed(node, text=SpeechText(parts=parts) if parts else node.text)
+        return replace(node, text=SpeechText(parts=parts) if parts else node.text)
     if isinstance(node, FaceKeyframe):
-        return changed(node, interpolator=None)  # thousands of numbers that no client needs in feedback
+        return replace(node, interpolator=None)  # thousands of numbers that no client needs in feedback
     return node
 
 

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, field, fields
-from operator import attrgetter
 from typing import Any, TypeVar, dataclass_transform
 
 from bml_schema.values import Value
@@ -137,59 +136,7 @@ def text(*, default: Any = MISSING) -> Any:
 )
 def node(cls: type[_T]) -> type[_T]:
     """Make a class a node class: a frozen dataclass with slots and keyword arguments."""
-    made = dataclass(frozen=True, slots=True, kw_only=True)(cls)
-    made.__init__ = _quick_init(made)  # type: ignore[method-assign]
-    return made
-
-
-_ABSENT: Any = object()
-
-
-def _quick_init(cls: type[Any]) -> Callable[..., None]:
-    """Return an `__init__` like a dataclass's, in half the time: documents have thousands of nodes.
-
-    The `__init__` of a frozen dataclass looks up each slot by its name; this one has the slots.
-    """
-    known: dict[str, Any] = {"absent": _ABSENT}
-    parameters: list[str] = []
-    lines: list[str] = []
-    for f in fields(cls):
-        if not f.init:
-            continue
-        known[f"set_{f.name}"] = getattr(cls, f.name).__set__
-        value = f.name
-        if f.default_factory is not MISSING:
-            known[f"make_{f.name}"] = f.default_factory
-            parameters.append(f"{f.name}=absent")
-            value = f"make_{f.name}() if {f.name} is absent else {f.name}"
-        elif f.default is not MISSING:
-            known[f"default_{f.name}"] = f.default
-            parameters.append(f"{f.name}=default_{f.name}")
-        else:
-            parameters.append(f.name)
-        lines.append(f"    set_{f.name}(self, {value})")
-    if hasattr(cls, "__post_init__"):
-        lines.append("    self.__post_init__()")
-    start = f"def __init__(self, *, {', '.join(parameters)}):" if parameters else "def __init__(self):"
-    exec("\n".join([start, *(lines or ["    pass"])]), known)
-    init: Callable[..., None] = known["__init__"]
-    init.__qualname__ = f"{cls.__qualname__}.__init__"
-    return init
-
-
-def changed(one: _T, **values: Any) -> _T:
-    """Return a node with other values in some fields, as `dataclasses.replace` in a third of its time."""
-    cls: type[Any] = type(one)
-    known = _FIELDS.get(cls)
-    if known is None:
-        names = tuple(f.name for f in fields(cls) if f.init)
-        known = _FIELDS[cls] = names, attrgetter(*names)
-    names, get = known
-    made: _T = cls(**dict(zip(names, get(one), strict=True)) | values)
-    return made
-
-
-_FIELDS: dict[type[Any], tuple[tuple[str, ...], Callable[[Any], tuple[Any, ...]]]] = {}
+    return dataclass(frozen=True, slots=True, kw_only=True)(cls)
 
 
 def local(tag: str) -> str:

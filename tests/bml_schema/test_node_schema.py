@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import FrozenInstanceError, replace
+from dataclasses import FrozenInstanceError
 
 import pytest
 
@@ -24,7 +24,7 @@ from bml_schema import (
     word,
     write,
 )
-from bml_schema.node_schema import camel, changed, local, schema_of
+from bml_schema.node_schema import camel, local, schema_of
 
 OURS = "urn:bml-realizer:test"
 
@@ -137,27 +137,6 @@ def test_node_is_frozen_and_has_no_dict() -> None:
     assert not hasattr(wink, "__dict__")
 
 
-def test_node_is_made_as_a_dataclass_is() -> None:
-    assert Wink(id="w", side="LEFT") == replace(Wink(id="x", side="LEFT"), id="w")
-    one, two = Wink(id="a", side="LEFT"), Wink(id="b", side="LEFT")
-    assert one.syncs is not two.syncs, "each has a dict of its own"
-    with pytest.raises(TypeError, match="missing 1 required keyword-only argument: 'side'"):
-        Wink(id="w")  # type: ignore[call-arg]
-    with pytest.raises(TypeError, match="unexpected keyword argument 'sides'"):
-        Wink(id="w", side="LEFT", sides=1)  # type: ignore[call-arg]
-    with pytest.raises(TypeError, match="positional"):
-        Wink("w")  # type: ignore[call-arg, misc]
-
-
 def test_schema_of_a_class_is_made_once() -> None:
     assert schema_of(Block) is schema_of(Block)
     assert local("{urn:x}a") == local("a") == "a"
-
-
-def test_changed_replaces_the_given_fields_only() -> None:
-    nod = parse('<bml id="b"><head id="n" lexeme="NOD" start="1" amount="0.3"/></bml>')["n"]
-    other = changed(nod, id="m", syncs={})
-    assert other == replace(nod, id="m", syncs={})
-    assert (nod.id, set(nod.syncs)) == ("n", {"start"})
-    with pytest.raises(TypeError):
-        changed(nod, nothing=1)
