@@ -6,13 +6,8 @@ from bml_schema import Blink
 from realizer.animation.channel import Channel
 from realizer.behaviours import pose_channels
 from realizer.behaviours.kind import BehaviourKind, PlanningContext
-from realizer.behaviours.table_timing import timing_from_table
+from realizer.behaviours.table_timing import table_timing
 from realizer.core.array_types import Float64
-from realizer.scheduling.timing import Timing
-
-
-def timing(node: Blink, context: PlanningContext) -> Timing:
-    return timing_from_table("blink")
 
 
 def expand(node: Blink, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
@@ -20,4 +15,4 @@ def expand(node: Blink, times: Float64, context: PlanningContext) -> tuple[Chann
     return pose_channels.hold(pose_channels.columns({(45, node.side): 1.0}, node.amount), times, node.id)
 
 
-KINDS = (BehaviourKind(Blink, timing, expand, parameters={"amount": "amount"}),)
+KINDS = (BehaviourKind(Blink, table_timing("blink"), expand, parameters={"amount": "amount"}),)

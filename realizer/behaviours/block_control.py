@@ -3,31 +3,9 @@
 from __future__ import annotations
 
 from bml_schema import Activate, Interrupt, ParameterValueChange
-from realizer.animation.channel import Channel
 from realizer.behaviours import kind
-from realizer.behaviours.kind import BehaviourKind, PlanningContext
-from realizer.behaviours.table_timing import timing_from_table
-from realizer.core.array_types import Float64
-from realizer.scheduling.timing import Timing
-
-
-def timing_of_interrupt(node: Interrupt, context: PlanningContext) -> Timing:
-    return timing_from_table("interrupt")
-
-
-def timing_of_activate(node: Activate, context: PlanningContext) -> Timing:
-    return timing_from_table("activate")
-
-
-def timing_of_change(node: ParameterValueChange, context: PlanningContext) -> Timing:
-    """At once, or as long as its start and end say."""
-    return timing_from_table("parametervaluechange")
-
-
-def nothing(
-    node: Interrupt | Activate | ParameterValueChange, times: Float64, context: PlanningContext
-) -> tuple[Channel, ...]:
-    return ()
+from realizer.behaviours.kind import BehaviourKind
+from realizer.behaviours.table_timing import table_timing
 
 
 def interrupt(node: Interrupt) -> kind.Interrupt:
@@ -56,7 +34,7 @@ def change(node: ParameterValueChange) -> kind.Change:
 
 
 KINDS = (
-    BehaviourKind(Interrupt, timing_of_interrupt, nothing, command=interrupt),
-    BehaviourKind(Activate, timing_of_activate, nothing, command=activate),
-    BehaviourKind(ParameterValueChange, timing_of_change, nothing, command=change),
+    BehaviourKind(Interrupt, table_timing("interrupt"), command=interrupt),
+    BehaviourKind(Activate, table_timing("activate"), command=activate),
+    BehaviourKind(ParameterValueChange, table_timing("parametervaluechange"), command=change),
 )

@@ -14,8 +14,8 @@ from bml_schema import Emotion, Mood
 from realizer.animation.axis import Target, fap
 from realizer.animation.channel import Channel
 from realizer.behaviours import pose_channels
-from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
-from realizer.behaviours.table_timing import timing_from_table
+from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext, claiming
+from realizer.behaviours.table_timing import table_timing, timing_from_table
 from realizer.core.array_types import Float64
 from realizer.emotions.wheel import affect, blend_weights, place_of_affect, strength_at, wheel
 from realizer.emotions.words import UnknownWordError, known_words, place_of, strength_of
@@ -66,10 +66,6 @@ def _timing(feeling: EmotionRequest) -> Timing:
     return replace(parts[0][1], **wanted)
 
 
-def timing_of_mood(node: Mood, context: PlanningContext) -> Timing:
-    return timing_from_table("mood")
-
-
 def expand(node: Emotion, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     """Return channels with the emotion from attackPeak to relax."""
     return pose_channels.hold(values_of(node), times, node.id)
@@ -107,11 +103,6 @@ def _has_profile(feeling: EmotionRequest) -> bool:
     """
     profile_of(feeling.name or "", feeling.profiles)
     return True
-
-
-def claims_of_mood(node: Mood, context: PlanningContext) -> frozenset[str]:
-    """Return the claim on the resting state, of which a face has one."""
-    return frozenset({"base face"})
 
 
 def values_of(node: Emotion | Mood) -> dict[Target, float]:
@@ -176,10 +167,10 @@ KINDS = (
     BehaviourKind(Emotion, timing, expand, check, parameters=PARAMETERS),
     BehaviourKind(
         Mood,
-        timing_of_mood,
+        table_timing("mood"),
         expand_mood,
         check,
-        claims=claims_of_mood,
+        claims=claiming("base face"),
         parameters=PARAMETERS,
         region="face",
     ),

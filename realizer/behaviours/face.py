@@ -10,10 +10,10 @@ import numpy as np
 from bml_schema import Face, FaceFacs, FaceLexeme, FaceShift
 from realizer import tables
 from realizer.animation.axis import Target, au
-from realizer.animation.channel import Channel, Layer
+from realizer.animation.channel import Channel
 from realizer.behaviours import pose_channels
-from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
-from realizer.behaviours.table_timing import from_gaps, timing_from_table
+from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext, claiming
+from realizer.behaviours.table_timing import from_gaps, table_timing
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
@@ -27,18 +27,6 @@ SETTLE = 0.25
 
 def timing_of_lexeme(node: FaceLexeme, context: PlanningContext) -> Timing:
     return from_gaps(POINTS, context.library[node.lexeme].gaps)
-
-
-def timing_of_facs(node: FaceFacs, context: PlanningContext) -> Timing:
-    return timing_from_table("faceFacs")
-
-
-def timing_of_face(node: Face, context: PlanningContext) -> Timing:
-    return timing_from_table("face")
-
-
-def timing_of_shift(node: FaceShift, context: PlanningContext) -> Timing:
-    return timing_from_table("faceShift")
 
 
 def expand_part(node: Part, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
@@ -66,10 +54,7 @@ def expand_shift(node: FaceShift, times: Float64, context: PlanningContext) -> t
     for part in node.parts:
         for target, value in _targets(part, context).items():
             values[target] = max(values.get(target, 0.0), value * node.amount)
-    return tuple(
-        Channel(target, times, np.array([0.0, value]), layer=Layer.BASE, keeps_last=True, source=node.id)
-        for target, value in values.items()
-    )
+    return pose_channels.keep_base(values, times, node.id)
 
 
 def check_part(node: Part, context: PlanningContext) -> tuple[Fault, ...]:
@@ -129,17 +114,17 @@ def _faults(parts: Iterable[Part], context: PlanningContext) -> tuple[Fault, ...
     return tuple(faults)
 
 
-def claims_of_shift(node: FaceShift, context: PlanningContext) -> frozenset[str]:
-    """Return the claim on the resting state, of which a face has one."""
-    return frozenset({"base face"})
-
-
 AMOUNT = {"amount": "amount"}
 KINDS = (
     BehaviourKind(FaceLexeme, timing_of_lexeme, expand_part, check_part, parameters=AMOUNT),
-    BehaviourKind(FaceFacs, timing_of_facs, expand_part, check_part, parameters=AMOUNT),
-    BehaviourKind(Face, timing_of_face, expand_face, check_compound, parameters=AMOUNT),
+    BehaviourKind(FaceFacs, table_timing("faceFacs"), expand_part, check_part, parameters=AMOUNT),
+    BehaviourKind(Face, table_timing("face"), expand_face, check_compound, parameters=AMOUNT),
     BehaviourKind(
-        FaceShift, timing_of_shift, expand_shift, check_compound, claims=claims_of_shift, region="face"
+        FaceShift,
+        table_timing("faceShift"),
+        expand_shift,
+        check_compound,
+        claims=claiming("base face"),
+        region="face",
     ),
 )

@@ -12,17 +12,13 @@ from realizer.animation.fap.fap_clip import FAPClip
 from realizer.behaviours import media
 from realizer.behaviours.key_channels import track
 from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
-from realizer.behaviours.table_timing import timing_from_table
+from realizer.behaviours.table_timing import table_timing
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
 # 1/s^2; a recording is stiffer than an expression, and less stiff than speech.
 RECORDED = 100.0
 MAX_BYTES = 8 * 2**20  # of text; about ten minutes, read in about a second
-
-
-def timing(node: Faps, context: PlanningContext) -> Timing:
-    return timing_from_table("faps")
 
 
 def expand(node: Faps, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
@@ -129,7 +125,7 @@ def _extremes(clip: FAPClip, number: int) -> tuple[float, float]:
 
 
 KINDS = (
-    BehaviourKind(Faps, timing, expand, check, claims=claims, parameters={"amount": 1.0}),
+    BehaviourKind(Faps, table_timing("faps"), expand, check, claims=claims, parameters={"amount": 1.0}),
     BehaviourKind(
         FapFile, timing_of_file, expand_file, check_file, claims=claims_of_file, parameters={"amount": 1.0}
     ),

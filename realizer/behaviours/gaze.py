@@ -12,7 +12,7 @@ from realizer import tables
 from realizer.animation.axis import au, mask_channel
 from realizer.animation.channel import Channel, Layer
 from realizer.behaviours.gaze_targets import Turn, angles, facts, limited, limits, target_faults, turn
-from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
+from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext, claiming
 from realizer.behaviours.table_timing import timing_from_table
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
@@ -152,17 +152,10 @@ def _converge(
     return (Channel(au(66)[0], times, values, layer=layer, keeps_last=holds, source=source),)
 
 
-def claims(node: Gaze, context: PlanningContext) -> frozenset[str]:
-    """Return the claim on the gaze, which every influence needs."""
-    return frozenset({"gaze"})
-
-
-def claims_of_shift(node: GazeShift, context: PlanningContext) -> frozenset[str]:
-    """Return the claim on the base gaze, which a temporary gaze does not need."""
-    return frozenset({"base gaze"})
-
-
+# Every influence needs the gaze; a temporary one does not need the base gaze.
 KINDS = (
-    BehaviourKind(Gaze, timing, expand, check, claims=claims),
-    BehaviourKind(GazeShift, timing_of_shift, expand_shift, check, claims=claims_of_shift, region="eyes"),
+    BehaviourKind(Gaze, timing, expand, check, claims=claiming("gaze")),
+    BehaviourKind(
+        GazeShift, timing_of_shift, expand_shift, check, claims=claiming("base gaze"), region="eyes"
+    ),
 )

@@ -12,9 +12,9 @@ from realizer import tables
 from realizer.animation.axis import au
 from realizer.animation.channel import Channel, Layer
 from realizer.behaviours.gaze_targets import angles, limited, limits, target_faults, turn
-from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
+from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext, claiming
 from realizer.behaviours.pose_channels import unknown_word
-from realizer.behaviours.table_timing import from_gaps, timing_from_table
+from realizer.behaviours.table_timing import from_gaps, table_timing
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 from realizer.tables.lexemes import head_lexemes
@@ -91,10 +91,6 @@ def check(node: Head, context: PlanningContext) -> tuple[Fault, ...]:
     return () if node.lexeme.upper() in known else (unknown_word("lexeme", node.lexeme, known),)
 
 
-def timing_of_shift(node: HeadDirectionShift, context: PlanningContext) -> Timing:
-    return timing_from_table("headDirectionShift")
-
-
 def expand_shift(node: HeadDirectionShift, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     """Return channels that turn the head to the target up to its limit, and stay."""
     yaw, pitch, _ = angles(node.target, context)
@@ -106,13 +102,14 @@ def check_shift(node: HeadDirectionShift, context: PlanningContext) -> tuple[Fau
     return target_faults(node.target, context)
 
 
-def claims_of_shift(node: HeadDirectionShift, context: PlanningContext) -> frozenset[str]:
-    return frozenset({"base head"})
-
-
 KINDS = (
     BehaviourKind(Head, timing, expand, check, parameters={"amount": "amount"}),
     BehaviourKind(
-        HeadDirectionShift, timing_of_shift, expand_shift, check_shift, claims=claims_of_shift, region="head"
+        HeadDirectionShift,
+        table_timing("headDirectionShift"),
+        expand_shift,
+        check_shift,
+        claims=claiming("base head"),
+        region="head",
     ),
 )

@@ -8,14 +8,9 @@ from bml_schema import Idle
 from realizer.animation.axis import mask_channel
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.idle.blinks import BlinkReduction
-from realizer.behaviours.kind import BehaviourKind, PlanningContext
-from realizer.behaviours.table_timing import timing_from_table
+from realizer.behaviours.kind import BehaviourKind, PlanningContext, claiming
+from realizer.behaviours.table_timing import table_timing
 from realizer.core.array_types import Float64
-from realizer.scheduling.timing import Timing
-
-
-def timing(node: Idle, context: PlanningContext) -> Timing:
-    return timing_from_table("idle")
 
 
 def expand(node: Idle, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
@@ -36,8 +31,4 @@ def expand(node: Idle, times: Float64, context: PlanningContext) -> tuple[Channe
     )
 
 
-def claims(node: Idle, context: PlanningContext) -> frozenset[str]:
-    return frozenset({"idle face"})
-
-
-KINDS = (BehaviourKind(Idle, timing, expand, claims=claims, region="idle"),)
+KINDS = (BehaviourKind(Idle, table_timing("idle"), expand, claims=claiming("idle face"), region="idle"),)

@@ -94,7 +94,7 @@ class BehaviourKind:
         node: its class in `bml_schema` (core) or in the module itself (extension); `node.tag` is its name.
         timing: (node, context) -> Timing, step 2. A speech needs `context.utterances[node.id]`.
         expand: (node, times (k,) seconds from block start, context) -> Channels, step 4. Times follow
-            `timing(...).points`.
+            `timing(...).points`. By default the face does not move.
         check: (node, context) -> faults: unknown lexeme or AU, no such target. Called before timing.
         speech_request: (node, context) -> the request to the voice, or None. Only for speech.
         command: node -> its command to other blocks and behaviours, executed when it starts.
@@ -112,7 +112,7 @@ class BehaviourKind:
 
     node: type[Any]
     timing: Callable[[Any, PlanningContext], Timing]
-    expand: Callable[[Any, Float64, PlanningContext], tuple[Channel, ...]]
+    expand: Callable[[Any, Float64, PlanningContext], tuple[Channel, ...]] = lambda node, times, context: ()
     check: Callable[[Any, PlanningContext], tuple[Fault, ...]] = lambda node, context: ()
     speech_request: Callable[[Any, PlanningContext], SpeechRequest | None] | None = None
     command: Callable[[Any], BlockCommand] | None = None
@@ -126,3 +126,8 @@ class BehaviourKind:
     def tag(self) -> str:
         tag: str = self.node.tag
         return tag
+
+
+def claiming(resource: str) -> Callable[[Any, PlanningContext], frozenset[str]]:
+    """Return the function `claims` of a behaviour that always needs one resource."""
+    return lambda node, context: frozenset({resource})

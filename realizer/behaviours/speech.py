@@ -12,7 +12,7 @@ import numpy as np
 from bml_schema import AudioFile, Speech, Sync
 from realizer.animation.channel import Channel
 from realizer.behaviours import recordings
-from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
+from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext, claiming
 from realizer.behaviours.media import MediaError
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
@@ -208,15 +208,6 @@ def _places(node: Speech) -> dict[str, float]:
     return {name: place / length if length else 0.0 for name, place in places.items()}
 
 
-def sound(node: Speech, context: PlanningContext) -> Utterance | None:
-    return context.utterances.get(node.id)
-
-
-def claims(node: Speech, context: PlanningContext) -> frozenset[str]:
-    """Return the claim on the character's voice."""
-    return frozenset({"voice"})
-
-
 KINDS = (
     BehaviourKind(
         Speech,
@@ -225,8 +216,8 @@ KINDS = (
         check,
         speech_request,
         stretch=stretch,
-        sound=sound,
-        claims=claims,
+        sound=lambda node, context: context.utterances.get(node.id),
+        claims=claiming("voice"),
         parameters={"volume": 100.0},
     ),
 )

@@ -7,10 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from bml_schema import Wait
-from realizer.animation.channel import Channel
 from realizer.behaviours.kind import BehaviourKind, PlanningContext
 from realizer.behaviours.table_timing import timing_from_table
-from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
 # 1/s^2; a stated duration is stiffer than any gap of the table.
@@ -25,8 +23,4 @@ def timing(node: Wait, context: PlanningContext) -> Timing:
     return replace(wanted, preferred=np.array([node.duration]), stiffness=np.array([STATED]))
 
 
-def expand(node: Wait, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
-    return ()
-
-
-KINDS = (BehaviourKind(Wait, timing, expand),)
+KINDS = (BehaviourKind(Wait, timing),)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from realizer.behaviours.table_timing import from_gaps, timing_from_table
+from realizer.behaviours.kind import PlanningContext
+from realizer.behaviours.table_timing import from_gaps, table_timing, timing_from_table
 from realizer.tables.timing import all_gaps, gaps
 
 
@@ -24,3 +25,7 @@ def test_from_gaps_shares_arrays_that_cannot_be_written() -> None:
     assert from_gaps(row.points, row.gaps) is from_gaps(row.points, row.gaps)
     with pytest.raises(ValueError, match="read-only"):
         from_gaps(row.points, row.gaps).preferred[0] = 1.0
+
+
+def test_table_timing_is_that_of_the_element() -> None:
+    assert table_timing("blink")(None, PlanningContext()) is timing_from_table("blink")
