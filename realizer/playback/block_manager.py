@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from itertools import islice
 
 from bml_schema import Block, Feedback
 from realizer.behaviours.kind import BehaviourKind, BlockCommand, PlanningContext
 from realizer.playback import block_links
 from realizer.playback.active_block import ActiveBlock, Dependency
-from realizer.playback.announced_blocks import AnnouncedBlock, AnnouncedBlocks
 from realizer.playback.block_commands import CommandError, execute
 from realizer.playback.block_states import BlockEvent, State, next_state
 from realizer.playback.character import Character
@@ -30,6 +29,30 @@ from realizer.speech.utterance import Utterance
 FOREVER = float("inf")
 # Maximum number of anticipators; of the others the oldest that no block is tied to are dropped.
 ANTICIPATORS = 2_000
+
+
+@dataclass(eq=False)
+class AnnouncedBlock:
+    """A block that was announced and has not arrived, with the commands that it received so far.
+
+    Attributes:
+        state: IN_PREP, or REVOKED after it was ended and reported.
+        activated: it does not wait for activation.
+        dependencies: blocks that were placed before it.
+    """
+
+    block: Block
+    state: State = State.IN_PREP
+    activated: bool = False
+    dependencies: list[Dependency] = field(default_factory=list)
+
+    @property
+    def is_revoked(self) -> bool:
+        return self.state is State.REVOKED
+
+    def change_state(self, event: BlockEvent) -> None:
+        """Change to the state that follows from an event."""
+        self.state = next_state(self.state, event)
 
 
 class BlockManager:
@@ -57,7 +80,7 @@ class BlockManager:
         self.timeline = BlockTimeline(kinds, characters)
         self.blocks = self.timeline.blocks
         self.reports = self.timeline.reports
-        self._announced = AnnouncedBlocks()
+        self._announced: dict[str, AnnouncedBlock] = {}
 
     # blocks in ----------------------------------------------------------------------------------
 
@@ -65,15 +88,15 @@ class BlockManager:
         """Acknowledge a block, once."""
         if block.id in self._announced or self._in_use(block, character):
             return
-        self._announced.add(block)
+        self._announced[block.id] = AnnouncedBlock(block)
         start = max([now, *(w.until for w in self._dependencies(block, character))])
         self.reports.add(acknowledgement(block, now if start == FOREVER else start))
 
     def withdraw(self, block: Block, now: float) -> None:
         """Remove a block that was announced, and report its end."""
-        fate = self._announced.pop(block)
-        if not fate.revoked:
-            self._revoke(fate, now)
+        announced = self._announced.pop(block.id, None) or AnnouncedBlock(block)
+        if not announced.is_revoked:
+            self._revoke(announced, now)
 
     def submit(self, block: Block, character: int, context: PlanningContext, now: float) -> Schedule:
         """Plan a block and accept or refuse it."""
@@ -85,19 +108,19 @@ class BlockManager:
                 raise _Rejection(Warning(block.id, "PARSING_FAILURE", text))
             waits, behind = self._links(block, character)
         except _Rejection as refused:
-            self._announced.pop(block)
+            self._announced.pop(block.id, None)
             return self._refuse(block, refused.warning, now)
-        fate = self._announced.get(block.id) or AnnouncedBlock(block)
-        if fate.revoked:
-            self._announced.pop(block)
+        announced = self._announced.get(block.id) or AnnouncedBlock(block)
+        if announced.is_revoked:
+            self._announced.pop(block.id, None)
             return Schedule(block.id, {}, {}, start=now, failed=True)
         ended = block_links.blocks_to_end(block, character, self.blocks.active())
-        pending = block.preplan and not fate.activated
+        pending = block.preplan and not announced.activated
         start = FOREVER if pending else max([now, *(w.until for w in waits)])
         planned, others = self.timeline.plan(block, character, context, start, now, waits=waits, ended=ended)
         if planned.schedule.lengths:
             return planned.schedule
-        self._announced.pop(block)
+        self._announced.pop(block.id, None)
         if planned.schedule.failed:
             return self._refuse(block, planned.schedule.warnings[0], now)
         if (words := self._veto(block, planned.schedule)) is not None:
@@ -106,7 +129,7 @@ class BlockManager:
             self.timeline.stop(earlier, now)
         for name in block.interrupt:
             self.revoke(name, now)
-        state = next_state(fate.state, BlockEvent.PREPLAN if pending else BlockEvent.PLAN)
+        state = next_state(announced.state, BlockEvent.PREPLAN if pending else BlockEvent.PLAN)
         playing = ActiveBlock(
             planned, self.kinds, context, character, self.blocks.next_number, now, waits, state
         )
@@ -209,15 +232,15 @@ class BlockManager:
 
     def revoke(self, id: str, now: float) -> bool:
         """End a block that was announced and has not arrived; return False if there is none."""
-        fate = self._announced.get(id)
-        if fate is None or fate.revoked:
+        announced = self._announced.get(id)
+        if announced is None or announced.is_revoked:
             return False
-        self._revoke(fate, now)
+        self._revoke(announced, now)
         return True
 
-    def _revoke(self, fate: AnnouncedBlock, now: float) -> None:
-        fate.change_state(BlockEvent.STOP)
-        self.reports.add(progress(fate.block, "end", now, fate.state))
+    def _revoke(self, announced: AnnouncedBlock, now: float) -> None:
+        announced.change_state(BlockEvent.STOP)
+        self.reports.add(progress(announced.block, "end", now, announced.state))
 
     def stop_all(self, now: float, ids: Collection[str] | None) -> list[str]:
         """Stop these blocks, or all; return the ids of those that played or waited."""
@@ -233,10 +256,10 @@ class BlockManager:
         """Let a preplanned block start after its dependencies; return False if there is none."""
         playing = self.blocks.find(id)
         if playing is None:
-            fate = self._announced.get(id)
-            if fate is None or not fate.block.preplan:
+            announced = self._announced.get(id)
+            if announced is None or not announced.block.preplan:
                 return False
-            fate.activated = True
+            announced.activated = True
             return True
         if playing.state is not State.PENDING:
             return False
@@ -309,8 +332,8 @@ class BlockManager:
         return waits, behind
 
     def _dependencies(self, block: Block, character: int) -> list[Dependency]:
-        fate = self._announced.get(block.id)
-        ahead = [w for w in fate.dependencies if not w.block.is_done] if fate is not None else []
+        announced = self._announced.get(block.id)
+        ahead = [w for w in announced.dependencies if not w.block.is_done] if announced is not None else []
         return block_links.dependencies(block, character, self.blocks.active()) + ahead
 
     def _in_use(self, block: Block, character: int) -> bool:
