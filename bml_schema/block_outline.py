@@ -12,9 +12,6 @@ from bml_schema.node_schema import local, schema_of
 from bml_schema.nodes import Behaviour, Constraint, Description, Required
 from bml_schema.sync_refs import Names, Points
 
-# NamedTuples are made in a third of the time without their own `__new__`, which is Python code.
-made = tuple.__new__
-
 
 class Kind(NamedTuple):
     """The common properties of all children of a block with the same tag.
@@ -31,18 +28,6 @@ class Kind(NamedTuple):
     cls: type[Behaviour] | None = None
     points: Points | None = None
     varies: bool = False
-
-
-def _kind_of(cls: type[Behaviour]) -> Kind:
-    kind = _KINDS.get(cls)
-    if kind is None:
-        shape = schema_of(cls)
-        varies = cls.marks or shape.strokes
-        kind = _KINDS[cls] = Kind(cls.tag, shape.name, cls, Points(shape.points), varies)
-    return kind
-
-
-_KINDS: dict[type[Behaviour], Kind] = {}
 
 
 class Entry(NamedTuple):
@@ -97,7 +82,7 @@ class BlockOutline:
                 tree.append(flat(inside))
                 continue
             id = element.get("id", "").strip()
-            entry = made(Entry, (element, kind, id, here, required))
+            entry = Entry(element, kind, id, here, required)
             tree.append(entry)
             # All names must be known before the first reference is read.
             if id and id not in owners and kind.tag != Constraint.tag:
@@ -111,7 +96,11 @@ class BlockOutline:
         """Return the kind of an element, by its tag."""
         tag = self.elements.tag(element)
         cls = self.elements.vocabulary.get(tag)
-        return Kind(tag, local(tag)) if cls is None else _kind_of(cls)
+        if cls is None:
+            return Kind(tag, local(tag))
+        schema = schema_of(cls)
+        varies = cls.marks or ("stroke" in schema.sync_points and "repetition" in schema.attributes)
+        return Kind(cls.tag, schema.name, cls, Points(frozenset(schema.sync_points)), varies)
 
     def points(self, element: etree._Element, kind: Kind) -> Points | None:
         """Return the sync points of an element of a kind that varies."""

@@ -99,7 +99,7 @@ class ElementReader:
         elif (loose := element.text) and not loose.isspace():
             self.no_text(element)
         node: Any = cls(**values)
-        if timed and shape.checked and (fault := node.fault()):
+        if timed and (fault := node.fault()):
             raise Fault(fault, element)
         return node
 
@@ -110,7 +110,7 @@ class ElementReader:
         foreign: dict[str, str] = {}
         faults: list[str] = []
         known = shape.attributes
-        points = shape.points if timed else ()
+        points = shape.sync_points if timed else ()
         if len(element.attrib) > MAX_ATTRIBUTES:
             attributes(element)  # which refuses them
         items: Any = element.items()
@@ -132,11 +132,10 @@ class ElementReader:
                 faults.append(f"{local(name)}: {reason}")
         if shape.old:
             faults += _drafts(shape, values, foreign)
-        if not values.keys() >= shape.needed:
-            if shape.timed and not timed and "id" not in element.attrib:
-                values["id"] = ""  # a part of <face> has no timing, so its id is optional
-            missing = (s for s in shape.required if s.field not in values and s.name not in element.attrib)
-            faults += [f"{s.name}: wanted {s.value.wanted}, got none" for s in missing]
+        if shape.timed and not timed and "id" not in element.attrib:
+            values["id"] = ""  # a part of <face> has no timing, so its id is optional
+        missing = (s for s in shape.required if s.field not in values and s.name not in element.attrib)
+        faults += [f"{s.name}: wanted {s.value.wanted}, got none" for s in missing]
         unknown = self.describe_unknown(shape, element, foreign, timed) if foreign else ""
         if faults:
             raise Fault("; ".join([*faults, unknown] if unknown else faults), element)

@@ -66,13 +66,8 @@ class NodeSchema:
             extension's own children into another namespace.
         mixed: field of the mixed content (text and children in order), or "".
         text: field of the character data, or "".
-        names: names of all fields.
         name: local name of the element.
         timed: it has sync points, and can have descriptions and unknown attributes and children.
-        sync_points: in order; `points`: the same as a set; `strokes`: it can have several strokes,
-            "stroke:n".
-        checked: its class overrides `fault`.
-        needed: the fields of `required`.
     """
 
     attributes: Mapping[str, Attribute]
@@ -83,14 +78,9 @@ class NodeSchema:
     by_local: Mapping[str, tuple[Child, type[Any]]]
     mixed: str = ""
     text: str = ""
-    names: frozenset[str] = frozenset()
     name: str = ""
     timed: bool = False
     sync_points: tuple[str, ...] = ()
-    points: frozenset[str] = frozenset()
-    strokes: bool = False
-    checked: bool = False
-    needed: frozenset[str] = frozenset()
 
     @property
     def listed(self) -> str:
@@ -152,16 +142,15 @@ def camel(name: str) -> str:
 
 def schema_of(cls: type[Any]) -> NodeSchema:
     """Return the schema of a node class, derived once from its fields."""
-    shape = _SHAPES.get(cls)
-    if shape is None:
-        shape = _SHAPES[cls] = _shape(cls)
-    return shape
+    if cls not in _SCHEMAS:
+        _SCHEMAS[cls] = _derived(cls)
+    return _SCHEMAS[cls]
 
 
-_SHAPES: dict[type[Any], NodeSchema] = {}
+_SCHEMAS: dict[type[Any], NodeSchema] = {}
 
 
-def _shape(cls: type[Any]) -> NodeSchema:
+def _derived(cls: type[Any]) -> NodeSchema:
     attributes: dict[str, Attribute] = {}
     kinds: list[Child] = []
     content = {"mixed": "", "text": ""}
@@ -183,24 +172,16 @@ def _shape(cls: type[Any]) -> NodeSchema:
             kinds.append(Child(f.name, what, kind != "child", int(more)))
     by_tag = {c.tag: (k, c) for k in kinds for c in k.classes}
     timed = hasattr(cls, "sync_points")
-    sync_points = cls.sync_points if timed else ()
-    points = frozenset(sync_points)
-    needed = tuple(a for a in attributes.values() if a.required)
     return NodeSchema(
         attributes=attributes,
         old={a.old: a for a in attributes.values() if a.old},
-        required=needed,
+        required=tuple(a for a in attributes.values() if a.required),
         children=tuple(kinds),
         by_tag=by_tag,
         by_local={local(tag): found for tag, found in by_tag.items()},
         mixed=content["mixed"],
         text=content["text"],
-        names=frozenset(f.name for f in fields(cls)),
-        needed=frozenset(a.field for a in needed),
         name=local(getattr(cls, "tag", "")),
         timed=timed,
-        sync_points=sync_points,
-        points=points,
-        strokes="stroke" in points and "repetition" in attributes,
-        checked=timed and "fault" in {name for base in cls.__mro__[:-2] for name in vars(base)},
+        sync_points=cls.sync_points if timed else (),
     )

@@ -7,15 +7,14 @@ Unknown attributes are reported too, and nothing is dropped because of them.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
-from operator import attrgetter
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from lxml import etree
 
-from bml_schema.block_outline import BlockOutline, Entry, flat, made
+from bml_schema.block_outline import BlockOutline, Entry, flat
 from bml_schema.canonical import attributes
 from bml_schema.dropped_references import ReferenceRemover
 from bml_schema.element_reader import ElementReader, Vocabulary
@@ -180,8 +179,7 @@ class _Reader:
         self.elements = outline.elements
         self.names = outline.names
         self.owners = outline.owners
-        # Mostly the lines of lxml are those of the text.
-        self.line: Callable[[etree._Element], int] = lines.of if any(lines) else attrgetter("sourceline")
+        self.line = lines.of
         self.problems: list[Problem] = []
         self.places: dict[str, Place] = {}
 
@@ -204,7 +202,7 @@ class _Reader:
             id = entry.id if 0 < len(entry.id) <= _MAX_ID else entry.path
             self.problem(f"{self.names.block}:{id}", fault, entry.path, element, entry.required)
             return None
-        self.places[node.id] = made(Place, (self.line(element), entry.path))
+        self.places[node.id] = Place(self.line(element), entry.path)
         if self.elements.unknown_attributes:
             self.report_unknown_attributes(f"{self.names.block}:{node.id}", entry)
         return node

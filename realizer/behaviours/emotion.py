@@ -80,7 +80,8 @@ def check(node: Emotion | Mood, context: PlanningContext) -> tuple[Fault, ...]:
     """Return faults: an unknown word, or one without a face, is fatal, an unknown profile is not."""
     if node.name is not None:
         try:
-            _has_profile(EmotionRequest.of(node))
+            request = EmotionRequest.of(node)
+            profile_of(request.name or "", request.profiles)
         except UnknownWordError as wrong:
             if node.name[-1:].isdecimal():
                 return (Fault("CANNOT_CREATE_BEHAVIOR", str(wrong).replace("emotion: ", "name: ", 1)),)
@@ -92,17 +93,6 @@ def check(node: Emotion | Mood, context: PlanningContext) -> tuple[Fault, ...]:
         text = f"profile: wanted one of {wanted}, got {node.profile!r}; shown as usual"
         return (Fault("CUSTOM_ATTRIBUTE_NOT_SUPPORTED", text, fatal=False),)
     return ()
-
-
-@lru_cache(maxsize=1000)
-def _has_profile(feeling: EmotionRequest) -> bool:
-    """Return True; an error is not cached.
-
-    Raises:
-        UnknownWordError, ValueError: as `realizer.emotions.emotion`.
-    """
-    profile_of(feeling.name or "", feeling.profiles)
-    return True
 
 
 def values_of(node: Emotion | Mood) -> dict[Target, float]:

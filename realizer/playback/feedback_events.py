@@ -54,10 +54,6 @@ class Event(NamedTuple):
     sync: str = ""
 
 
-# NamedTuples are made in a third of the time without their own `__new__`, which is Python code.
-_new_event = tuple.__new__
-
-
 def parse_warning(error: BMLError) -> Warning:
     """Return the BML warning for a document without a valid block."""
     return Warning(error.block or "<no id>", "PARSING_FAILURE", str(error))
@@ -119,7 +115,7 @@ def events(block: Block, schedule: Schedule, order: int, number: int) -> list[Ev
             continue
         times = (schedule.start + schedule.times[id]).tolist()
         found += [
-            _new_event(Event, (time, order, phase, place, index, number, id, sync))
+            Event(time, order, phase, place, index, number, id, sync)
             for index, (sync, time) in enumerate(zip(schedule.points[id], times, strict=True))
         ]
     return found
