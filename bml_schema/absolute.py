@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from bml_schema.behaviours import Speech, SpeechText, Sync
+from bml_schema.behaviours import Speech
 from bml_schema.dropped_references import without
-from bml_schema.nodes import After, Before, Behaviour, Block, Constraint, Required, Synchronize
+from bml_schema.nodes import After, Before, Behaviour, Block, Constraint, Synchronize
 from bml_schema.sync_refs import SyncRef
 from bml_schema.values import MAX_SECONDS
 
@@ -33,34 +33,25 @@ def with_absolute_times(block: Block, times: Mapping[str, Mapping[str, float]]) 
     left = without(block, [b.id for b in block.behaviours if b.id not in times]).block
     fixed: list[Synchronize] = []
 
-    def with_times(node: Behaviour | Constraint) -> Behaviour | Constraint | None:
+    def with_times(node: Behaviour | Constraint, required: bool) -> Behaviour | Constraint | None:
         if isinstance(node, Constraint):
             return node if all(_holds(part, times) for part in node.parts) else None
         return _timed(node, times[node.id], fixed)
 
-    children: list[Behaviour | Required | Constraint] = []
-    for node in left.children:
-        if isinstance(node, Required):
-            inside = map(with_times, node.children)
-            children.append(replace(node, children=tuple(n for n in inside if n is not None)))
-        elif (one := with_times(node)) is not None:
-            children.append(one)
+    timed = left.with_children(with_times)
     # A block with absolute times already has them.
     known = {part for c in left.constraints for part in c.parts}
     if new := tuple(part for part in fixed if part not in known):
-        children.append(Constraint(parts=new))
-    return replace(left, children=tuple(children), problems=(), places={})
+        timed = replace(timed, children=(*timed.children, Constraint(parts=new)))
+    return replace(timed, problems=(), places={})
 
 
 def _timed(node: Behaviour, times: Mapping[str, float], fixed: list[Synchronize]) -> Behaviour:
     """Return the behaviour with its times; add those that have no attribute to `fixed`."""
     at = {point: _number(f"{node.id}:{point}", time) for point, time in times.items()}
     syncs = {p: at.pop(p) for p in node.sync_points if p in at}
-    if isinstance(node, Speech) and node.text is not None:
-        parts = tuple(
-            replace(p, ref=at.pop(p.id, None)) if isinstance(p, Sync) else p for p in node.text.parts
-        )
-        node = replace(node, text=SpeechText(parts=parts))
+    if isinstance(node, Speech):
+        node = node.with_references(lambda sync: at.pop(sync.id, None))
     for point, ref in at.items():
         sync, _, index = point.partition(":")
         named = SyncRef(behaviour=node.id, sync=sync, index=int(index) if index else None)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
 from bml_schema.node_schema import attribute, child, children, mixed, node, sync_ref
@@ -150,6 +152,19 @@ class Speech(Behaviour):
     def marked(self) -> tuple[str, ...]:
         """The ids of the syncs in the text, in order."""
         return tuple(p.id for p in self.text.parts if isinstance(p, Sync)) if self.text else ()
+
+    @property
+    def references(self) -> tuple[tuple[str, SyncRef], ...]:
+        """(sync point, reference) of each sync point with a reference, then those of syncs in the text."""
+        syncs = (p for p in (self.text.parts if self.text else ()) if isinstance(p, Sync))
+        return (*self.syncs.items(), *((p.id, p.ref) for p in syncs if p.ref is not None))
+
+    def with_references(self, ref_of: Callable[[Sync], SyncRef | None]) -> Speech:
+        """Return the speech with `ref_of(sync)` as the reference of each sync in its text."""
+        if self.text is None:
+            return self
+        parts = tuple(replace(p, ref=ref_of(p)) if isinstance(p, Sync) else p for p in self.text.parts)
+        return replace(self, text=replace(self.text, parts=parts))
 
     def fault(self) -> str:
         seen = set(self.sync_points)

@@ -6,8 +6,8 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
-from bml_schema.behaviours import Speech, SpeechText, Sync
-from bml_schema.nodes import Behaviour, Block, Constraint, Required, Synchronize
+from bml_schema.behaviours import Speech
+from bml_schema.nodes import Behaviour, Block, Constraint
 from bml_schema.sync_refs import SyncRef
 
 
@@ -35,15 +35,9 @@ def without(block: Block, gone: Collection[str]) -> ReducedBlock:
     """
     gone = frozenset(gone)
     losses = ReferenceRemover(gone)
-    children: list[Behaviour | Required | Constraint] = []
-    for child in block.children:
-        if isinstance(child, Required):
-            inside = (losses.without(c, required=True) for c in child.children)
-            children.append(replace(child, children=tuple(c for c in inside if c is not None)))
-        elif (left := losses.without(child)) is not None:
-            children.append(left)
+    rest = block.with_children(losses.without)
     lost = {id: tuple(names) for id, names in losses.lost_references.items()}
-    return ReducedBlock(replace(block, children=tuple(children)), lost, frozenset(losses.fatal))
+    return ReducedBlock(rest, lost, frozenset(losses.fatal))
 
 
 class ReferenceRemover:
@@ -54,9 +48,7 @@ class ReferenceRemover:
         self.lost_references: dict[str, list[str]] = {}
         self.fatal: set[str] = set()
 
-    def without(
-        self, node: Behaviour | Constraint, *, required: bool = False
-    ) -> Behaviour | Constraint | None:
+    def without(self, node: Behaviour | Constraint, required: bool = False) -> Behaviour | Constraint | None:
         """Return a node without references to dropped behaviours, or None if the node itself goes."""
         if isinstance(node, Constraint):
             return self._constraint(node, required or node.required)
@@ -71,25 +63,16 @@ class ReferenceRemover:
         return True
 
     def _behaviour(self, node: Behaviour) -> Behaviour:
-        syncs = {p: ref for p, ref in node.syncs.items() if not self._is_gone(ref, f"{node.id}:{p}")}
-        if len(syncs) < len(node.syncs):
-            node = replace(node, syncs=syncs)
-        if isinstance(node, Speech) and node.text is not None:
-            parts = tuple(
-                Sync(id=p.id)
-                if isinstance(p, Sync) and p.ref is not None and self._is_gone(p.ref, f"{node.id}:{p.id}")
-                else p
-                for p in node.text.parts
-            )
-            if parts != node.text.parts:
-                node = replace(node, text=SpeechText(parts=parts))
-        return node
+        lost = {point for point, ref in node.references if self._is_gone(ref, f"{node.id}:{point}")}
+        if not lost:
+            return node
+        if isinstance(node, Speech):
+            node = node.with_references(lambda sync: None if sync.id in lost else sync.ref)
+        return replace(node, syncs={p: ref for p, ref in node.syncs.items() if p not in lost})
 
     def _constraint(self, node: Constraint, required: bool) -> Constraint | None:
         name = node.id or (node.place.path if node.place else "constraint")
-        refs = [ref for part in node.parts for ref in part.refs]
-        refs += [part.ref for part in node.parts if not isinstance(part, Synchronize)]
-        gone = {ref.behaviour for ref in refs if self._is_gone(ref, name) and ref.behaviour}
+        gone = {ref.behaviour for ref in node.references if self._is_gone(ref, name) and ref.behaviour}
         if required:
             self.fatal |= gone
         return None if gone else node

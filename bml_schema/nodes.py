@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import field
+from collections.abc import Callable, Mapping
+from dataclasses import field, replace
 from typing import ClassVar
 
 from bml_schema.errors import Place, Problem
@@ -95,6 +95,11 @@ class Behaviour:
     unknown_attributes: Mapping[str, str] = field(default_factory=dict, hash=False)
     unknown_children: tuple[str, ...] = ()
 
+    @property
+    def references(self) -> tuple[tuple[str, SyncRef], ...]:
+        """(sync point, reference) of each sync point with a reference."""
+        return tuple(self.syncs.items())
+
     def fault(self) -> str:
         """Return a fault of the behaviour as a whole, beyond single attributes, or ""."""
         return ""
@@ -142,6 +147,15 @@ class Constraint(Part):
     parts: tuple[Synchronize | Before | After, ...] = ()
     required: bool = field(default=False, compare=False)
     place: Place | None = field(default=None, compare=False)
+
+    @property
+    def references(self) -> tuple[SyncRef, ...]:
+        """All references of its parts, in order."""
+        return tuple(
+            ref
+            for part in self.parts
+            for ref in (part.refs if isinstance(part, Synchronize) else (*part.refs, part.ref))
+        )
 
 
 @node
@@ -217,3 +231,16 @@ class Block:
     def __getitem__(self, id: str) -> Behaviour:
         """Return the behaviour with an id; raise KeyError if there is none."""
         return self._by_id[id]
+
+    def with_children(
+        self, change: Callable[[Behaviour | Constraint, bool], Behaviour | Constraint | None]
+    ) -> Block:
+        """Return the block with `change(child, is_required)` of each child; None drops it."""
+        children: list[Behaviour | Required | Constraint] = []
+        for child in self.children:
+            if isinstance(child, Required):
+                inside = (change(c, True) for c in child.children)
+                children.append(replace(child, children=tuple(c for c in inside if c is not None)))
+            elif (changed := change(child, False)) is not None:
+                children.append(changed)
+        return replace(self, children=tuple(children))

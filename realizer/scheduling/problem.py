@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -184,7 +184,7 @@ def problem_of(
         if node.id in member.passed_times:
             _pass(problem, member, part, start, points, member.passed_times[node.id])
         resolver = resolvers[member.block.id]
-        for sync, ref in _references(node):
+        for sync, ref in node.references:
             try:
                 if (target := resolver.point(ref)) is None:
                     continue
@@ -223,23 +223,12 @@ def _pass(
             problem.orders.append(Relation(ORIGIN, first + i, member.earliest, part, says))
 
 
-def _references(node: Behaviour) -> Iterator[tuple[str, SyncRef]]:
-    """Yield every sync point that a behaviour ties, as attribute or inside its text."""
-    yield from node.syncs.items()
-    text = getattr(node, "text", None)
-    for mark in getattr(text, "parts", ()):
-        if not isinstance(mark, str) and mark.ref is not None:
-            yield mark.id, mark.ref
-
-
 def _add_constraint(
     problem: Problem, resolver: _ReferenceResolver, constraint: Constraint, order: int
 ) -> None:
     member = resolver.member
     block = member.block
-    refs = [ref for piece in constraint.parts for ref in piece.refs]
-    refs += [piece.ref for piece in constraint.parts if not isinstance(piece, Synchronize)]
-    named = {ref.behaviour for ref in refs if resolver.is_own(ref)} - {None, "bml"}
+    named = {ref.behaviour for ref in constraint.references if resolver.is_own(ref)} - {None, "bml"}
     if not all((block.id, name) in resolver.first for name in named):
         return
     place = block.places.get(constraint.id) if constraint.id else constraint.place

@@ -167,3 +167,11 @@ def test_with_absolute_times_is_scheduled_to_the_same_times(case: Path) -> None:
             text
         )
         assert {(w.id, w.type) for w in again.warnings} <= {(w.id, w.type) for w in first.warnings}
+
+
+def test_with_absolute_times_keeps_the_language_of_a_text() -> None:
+    block = parse("<bml id='b'><speech id='s'><text xml:lang='nl'>a<sync id='m'/></text></speech></bml>")
+    speech = with_absolute_times(block, {"s": {"start": 0.0, "m": 0.5, "end": 1.0}})["s"]
+    assert isinstance(speech, Speech)
+    assert speech.text is not None
+    assert speech.text.language == "nl"

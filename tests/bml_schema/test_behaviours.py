@@ -18,6 +18,7 @@ from bml_schema import (
     Speech,
     SpeechText,
     Sync,
+    SyncRef,
     Wait,
     parse,
     write,
@@ -213,3 +214,11 @@ def test_speech_without_text_is_empty() -> None:
     block = only("<speech id='s'/>")
     assert block.children == (Speech(id="s"),)
     assert not block.problems
+
+
+def test_speech_references_are_of_its_sync_points_and_its_text() -> None:
+    speech = only("<speech id='s' start='1'><text>a<sync id='m' ref='2'/><sync id='n'/></text></speech>")["s"]
+    assert speech.references == (("start", SyncRef(offset=1.0)), ("m", SyncRef(offset=2.0)))
+    assert isinstance(speech, Speech)
+    moved = speech.with_references(lambda sync: SyncRef(offset=9.0) if sync.id == "n" else None)
+    assert moved.references == (("start", SyncRef(offset=1.0)), ("n", SyncRef(offset=9.0)))

@@ -11,6 +11,7 @@ from bml_schema import (
     Problem,
     Required,
     Speech,
+    SpeechText,
     Sync,
     SyncRef,
     Wait,
@@ -139,3 +140,10 @@ def test_without_leaves_a_sound_document(block: Block, data: st.DataObject) -> N
     assert not back.problems
     assert back == left
     assert without(block, ()) == (block, {}, frozenset())
+
+
+def test_dropped_references_leave_the_language_of_a_text() -> None:
+    block = only(f"{BAD}<speech id='s'><text xml:lang='nl'>a<sync id='m' ref='bad:end'/></text></speech>")
+    speech = block["s"]
+    assert isinstance(speech, Speech)
+    assert speech.text == SpeechText(parts=("a", Sync(id="m")), language="nl")

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
 
-from bml_schema import Behaviour, Block, Constraint, Head, Required, Synchronize, SyncRef, Wait
+from bml_schema import Behaviour, Block, Constraint, Head, Required, Synchronize, SyncRef, Wait, parse
 from tests.strategies import blocks
 
 
@@ -37,3 +38,25 @@ def test_block_can_be_pickled_and_hashed(block: Block) -> None:
     assert hash(back) == hash(block)
     assert back.behaviours == block.behaviours
     assert all(isinstance(b, Behaviour) and back[b.id] == b for b in block.behaviours)
+
+
+def test_constraint_references_are_those_of_all_parts_in_order() -> None:
+    inner = '<before ref="a:end"><sync ref="b:start"/></before><synchronize><sync ref="1"/></synchronize>'
+    (constraint,) = parse(
+        f'<bml id="x"><wait id="a"/><wait id="b"/><constraint id="k">{inner}</constraint></bml>'
+    ).constraints
+    assert [str(ref) for ref in constraint.references] == ["b:start", "a:end", "1"]
+
+
+def test_with_children_changes_and_drops_children_inside_required_too() -> None:
+    block = parse('<bml id="x"><wait id="a"/><required><wait id="b"/><wait id="c"/></required></bml>')
+    seen = []
+
+    def change(node: Behaviour | Constraint, required: bool) -> Behaviour | Constraint | None:
+        seen.append((node.id, required))
+        return None if node.id == "b" else replace(node, id=f"{node.id}2")
+
+    changed = block.with_children(change)
+    assert seen == [("a", False), ("b", True), ("c", True)]
+    assert [b.id for b in changed.behaviours] == ["a2", "c2"]
+    assert changed.required == {"c2"}
