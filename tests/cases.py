@@ -70,7 +70,7 @@ _KEYS = frozenset(re.findall(r"^    \[*(\w+)", __doc__, re.MULTILINE)) | {"path"
 
 
 class Told(NamedTuple):
-    """One feedback, or an expectation of one, as a line of `log` has it."""
+    """A feedback message, or an expectation of one, as a line of `log`."""
 
     kind: str
     id: str
@@ -79,7 +79,7 @@ class Told(NamedTuple):
 
     @classmethod
     def read(cls, line: str) -> Told:
-        """Raises ValueError for a line that is none."""
+        """Parse a line; raise ValueError for a wrong one."""
         kind, id, *rest = line.split()
         if kind not in ("prediction", "start", "sync", "end", "warning"):
             raise ValueError(f"{line}: wanted prediction, start, sync, end or warning")
@@ -87,7 +87,7 @@ class Told(NamedTuple):
         return cls(kind, id, words, tuple(map(float, rest[len(words) :])))
 
     def is_as(self, wanted: Told, within: float) -> bool:
-        """It is what `wanted` asks for; what that leaves out at its end may be anything."""
+        """Whether it matches `wanted`, whose last words and seconds may be missing."""
         return (
             (self.kind, self.id) == (wanted.kind, wanted.id)
             and self.words[: len(wanted.words)] == wanted.words
@@ -100,7 +100,7 @@ class Told(NamedTuple):
 
 
 def told(feedback: Feedback) -> Iterable[Told]:
-    """The lines of one feedback; a prediction has one for each block it names."""
+    """Return the lines of one feedback message; a prediction has one for each block."""
     match feedback:
         case BlockProgress():
             id, _, point = feedback.id.rpartition(":")
@@ -116,7 +116,7 @@ def told(feedback: Feedback) -> Iterable[Told]:
 
 
 class Instant(NamedTuple):
-    """A face at a time."""
+    """A time at which a face is checked."""
 
     time: float
     character: str | None = None
@@ -149,12 +149,12 @@ class Case:
 
     @property
     def looks(self) -> list[Instant]:
-        """When this case looks at a face that plays."""
+        """The instants at which this case looks at a playing face."""
         return [Instant(float(face["at"]), face.get("character")) for face in self.wanted.get("face", ())]
 
     @property
     def watches(self) -> list[Instant]:
-        """What it looks over afterwards, instant by instant."""
+        """The instants that it checks after the end."""
         seen: list[Instant] = []
         for smooth in self.wanted.get("smooth", ()):
             steps = np.arange(math.floor(smooth["from"] * 100), math.ceil(smooth["to"] * 100) + 1)

@@ -50,15 +50,15 @@ _MOST_SHOWN = 3  # cases named beside a rule
 
 @dataclass(frozen=True)
 class Rule:
-    """One thing that must be so.
+    """One rule of the language.
 
     Attributes:
         id: such as "gaze.offsetAngle.default" or "ref.offset-negative".
-        chapter: where it stands in the file.
-        kind: element, attribute, required, value, default, sync point, reference, or as rules.toml has it.
-        says: what must be so, in Markdown.
+        chapter: its chapter in the file.
+        kind: element, attribute, required, value, default, sync point, reference, or as in rules.toml.
+        says: the rule, in Markdown.
         core: of BML 1.0 and its feedback; otherwise of an extension.
-        element, name, value: what a derived rule is about.
+        element, name, value: the subject of a derived rule.
     """
 
     id: str
@@ -72,13 +72,13 @@ class Rule:
 
 
 def prefixed(clark: str) -> str:
-    """The name as documents usually write it: "{...bmla}interrupt" -> "bmla:interrupt"."""
+    """Return the name as in most documents: "{...bmla}interrupt" -> "bmla:interrupt"."""
     space, _, name = clark.removeprefix("{").rpartition("}")
     return _PREFIXES.get(space, "") + name
 
 
 def classes() -> Iterator[type[Any]]:
-    """Every element there is: the block and its frame, then each behaviour with what it may hold."""
+    """Return every element: the block and its frame, then each behaviour with its children."""
     seen: set[type[Any]] = set()
 
     def within(cls: type[Any]) -> Iterator[type[Any]]:
@@ -94,7 +94,7 @@ def classes() -> Iterator[type[Any]]:
 
 
 def derived() -> Iterator[Rule]:
-    """The rules that the node classes state."""
+    """Yield the rules that the node classes state."""
     yield from _attributes("behaviour", Behaviour, "Every behaviour", True, set())
     own = set(schema_of(Behaviour).attributes)
     for cls in classes():
@@ -160,7 +160,7 @@ def rules() -> Mapping[str, Rule]:
 
 @cache
 def proofs() -> Mapping[str, tuple[Case, ...]]:
-    """Rule -> the cases that say they prove it, those that prove least else first."""
+    """Return rule -> the cases that prove it, those that prove the fewest other rules first."""
     out: dict[str, list[Case]] = {}
     for case in CASES:
         for id in case.proves:
@@ -169,19 +169,19 @@ def proofs() -> Mapping[str, tuple[Case, ...]]:
 
 
 def gaps() -> Mapping[str, str]:
-    """Rule -> why nothing proves it."""
+    """Return rule -> why nothing proves it."""
     found: Mapping[str, str] = _table().get("gaps", {})
     return found
 
 
 def elsewhere() -> Mapping[str, str]:
-    """Rule -> "tests/path.py::test" that proves it, where a document alone cannot."""
+    """Return rule -> "tests/path.py::test" that proves it, if a document alone cannot."""
     found: Mapping[str, str] = _table().get("elsewhere", {})
     return found
 
 
 def render() -> str:
-    """The whole of CONFORMANCE.md."""
+    """Return the text of CONFORMANCE.md."""
     known = list(rules().values())
     core = [rule for rule in known if rule.core]
     more = [rule for rule in known if not rule.core]
@@ -220,7 +220,7 @@ def _by_chapter(group: Iterable[Rule]) -> Iterator[tuple[str, list[Rule]]]:
 
 
 def _rows(members: list[Rule]) -> Iterator[str]:
-    """A row each; values and sync points that the same cases prove share one."""
+    """Return a row for each rule; values and sync points with the same cases share one."""
 
     def alike(rule: Rule) -> tuple[str, str, str]:
         shared = rule.kind in ("value", "lexeme", "sync point", "reference")

@@ -63,12 +63,12 @@ VALUES = (None, True, 0, -1, 1e308, 2**70, "", "x" * 300, "\ud800", [], {}, [[]]
 
 
 class HangError(Exception):
-    """More CPU than anything may take."""
+    """A try took more CPU time than allowed."""
 
 
 @contextmanager
 def no_hang(what: object) -> Iterator[list[float]]:
-    """Ends what takes too long; the list then holds the CPU seconds it took."""
+    """Interrupt code that takes too long; the list then has the CPU seconds it took."""
 
     def ring(*_: object) -> None:
         raise HangError(what)
@@ -92,7 +92,7 @@ def corpus() -> tuple[bytes, ...]:
 
 
 def tried(target: str, seeds: range) -> float:
-    """Try a target with each of the seeds; the CPU seconds of the slowest.
+    """Try a target with each of the seeds; return the CPU seconds of the slowest.
 
     Raises:
         AssertionError: one failed; with its seed.
@@ -111,7 +111,7 @@ def tried(target: str, seeds: range) -> float:
 
 
 def _or_words(read: Callable[[], T]) -> T | RealizerError:
-    """What is read, or the error that says why not."""
+    """Return the result of reading, or the error."""
     try:
         return read()
     except RealizerError as error:
@@ -124,14 +124,14 @@ def _or_words(read: Callable[[], T]) -> T | RealizerError:
 
 
 def documents(seed: int, mutant: bytes) -> None:
-    """A broken document gives blocks and errors, and blocks play to their end."""
+    """Check that a broken document gives blocks and errors, and that the blocks play to their end."""
     items = list(read(mutant, VOCABULARY))
     assert all(isinstance(item, Block | BMLError) for item in items), mutant
     plays(items, faces=seed % 20 == 0)
 
 
 def plays(items: list[Block | BMLError], *, faces: bool) -> None:
-    """Submit what is a block, and let time jump from deadline to deadline until nothing moves any more."""
+    """Submit the blocks, and advance time from deadline to deadline until the end."""
     player = Player(PlayOptions(idle=False))
     for item in items:
         if isinstance(item, Block):
@@ -159,7 +159,7 @@ def plays(items: list[Block | BMLError], *, faces: bool) -> None:
 
 @cache
 def fap_files() -> tuple[bytes, ...]:
-    """Sound ones of both versions: few FAPs and all, one frame and many, shifted and with visemes."""
+    """Return valid files of both versions: with few FAPs and all, one frame and many, and with visemes."""
     found = [path.read_bytes() for path in sorted(CORPUS.rglob("*.fap"))]
     random = np.random.default_rng(0)
     for count, mask in ((1, [2]), (3, [0, 2, 3]), (5, range(68)), (40, [1, 18, 19, 47])):
@@ -174,7 +174,7 @@ def fap_files() -> tuple[bytes, ...]:
 
 
 def faps(seed: int, mutant: bytes) -> None:
-    """A broken FAP file is a clip that plays and is written again, or words that say what was wanted."""
+    """Check that a broken FAP file is a clip that plays and can be written, or a clear error."""
     clip = _or_words(lambda: read_fap(mutant))
     if not isinstance(clip, FAPClip):
         return
@@ -192,7 +192,7 @@ def faps(seed: int, mutant: bytes) -> None:
 
 @cache
 def task_streams() -> tuple[bytes, ...]:
-    """What clients of the player send, several tasks each."""
+    """Return streams of clients of the player, with several tasks each."""
     texts = [file.decode() for file in fap_files()]
     script = '<bml id="b"><head id="n" lexeme="NOD"/></bml>'
     streams = []
@@ -209,7 +209,7 @@ def task_streams() -> tuple[bytes, ...]:
 
 
 def tasks(seed: int, mutant: bytes) -> None:
-    """Broken tasks are found alike however the stream is cut, and a player answers what it understands."""
+    """Check that broken tasks are found however the stream is cut, and that a player answers them."""
     random, reader, whole = Random(seed), TaskReader(LIMIT), TaskReader(LIMIT)
     found: list[Task | Content | Fault] = []
     at = 0
@@ -231,7 +231,7 @@ def tasks(seed: int, mutant: bytes) -> None:
 
 
 def _answered(desk: TaskRunner, answers: list[Answer], now: float) -> None:
-    """Notes are notes; what goes to the session is understood there, and what it tells is answered."""
+    """Check notes and messages to the session, and the answers to them."""
     for answer in answers:
         if isinstance(answer, bytes):
             assert len(read_notes(bytearray(answer))) == 1, answer
@@ -253,7 +253,7 @@ def _answered(desk: TaskRunner, answers: list[Answer], now: float) -> None:
 
 
 def controls(seed: int, _: bytes) -> None:
-    """Control messages with anything anywhere are followed or answered by one error; nothing else happens."""
+    """Check that control messages with random values are followed or answered by one error."""
     random = Random(seed)
     session = Session("fuzz", Settings(), 0.0, named=True)
     session.connect(1, 0.0)
@@ -280,7 +280,7 @@ def controls(seed: int, _: bytes) -> None:
 
 
 def _change(message: dict[str, object], random: Random) -> None:
-    """Something else in one place, at any depth."""
+    """Change a random place of a value, at any depth."""
     place: object = message
     while isinstance(place, dict) and place:
         key = random.choice(list(place))
@@ -292,7 +292,7 @@ def _change(message: dict[str, object], random: Random) -> None:
 
 
 def _sent(session: Session) -> str:
-    """All that a client got, which can be read."""
+    """Return all readable messages to a client."""
     told = [effect.data for effect in session.take_effects() if isinstance(effect, Send)]
     for data in told:
         if isinstance(data, str) and data.startswith("<"):
@@ -307,7 +307,7 @@ def _sent(session: Session) -> str:
 
 
 def sessions(seed: int, _: bytes) -> None:
-    """Sessions to which anything is done in any order keep their laws; a third has a journal that fails."""
+    """Check the laws of sessions with random actions; the journal of a third of them fails."""
     Interleaving(seed, corpus(), full=0.2 if seed % 3 == 2 else 0.0).run(STEPS)
 
 

@@ -54,7 +54,7 @@ class Known:
 
 @dataclass(frozen=True)
 class Tag:
-    """What becomes an element: its prefix ("" core), name, attributes in any order, content as XML."""
+    """An element: its prefix ("" core), name, attributes in any order, content as XML."""
 
     prefix: str
     name: str
@@ -63,7 +63,7 @@ class Tag:
 
 
 class Author:
-    """Writes one text; `draw` makes every choice."""
+    """The writer of one text; `draw` makes every choice."""
 
     def __init__(self, draw: st.DrawFn) -> None:
         self.draw = draw
@@ -77,14 +77,14 @@ class Author:
         return choices[self.draw(_below(len(choices)))]
 
     def often(self, n: int) -> bool:
-        """False once in n times, and in the plainest document."""
+        """Return False once in n times, and in the simplest document."""
         return self.draw(_below(n)) > 0
 
     def seldom(self, n: int) -> bool:
         return self.draw(_below(n)) == n - 1
 
     def number(self, low: int = 0, high: int = 30) -> str:
-        """A decimal of tenths, in one of the ways to write it."""
+        """Return a decimal of tenths, in one of its spellings."""
         value = self.draw(_tenths(low, high))
         plain = f"{value / 10:g}"
         form = self.draw(_below(6))
@@ -100,7 +100,7 @@ class Author:
     # XML
 
     def text(self, words: str) -> str:
-        """Character data: escaped, as CDATA, or with references to characters."""
+        """Return character data: escaped, as CDATA, or with references to characters."""
         form = self.draw(_below(4))
         if form == 2:
             return f"<![CDATA[{words}]]>"
@@ -109,7 +109,7 @@ class Author:
         return escape(words, {">": "&gt;"} if form else {})
 
     def value(self, words: str) -> str:
-        """An attribute's value with its quotes."""
+        """Return an attribute's value with its quotes."""
         form = self.draw(_below(4))
         quote = "'" if form == 1 else '"'
         inside = escape(words, {quote: "&quot;" if quote == '"' else "&apos;"})
@@ -131,13 +131,13 @@ class Author:
         return f"<{name}{inside}>{tag.content}</{name}>"
 
     def filler(self) -> str:
-        """What may stand between elements."""
+        """Return whitespace or a comment between elements."""
         return self.pick(("\n", "", "  ", "\n<!-- <bml id='no'> -->\n", "<?stop here?>\n", "\t\r\n"))
 
     # references
 
     def reference(self, own: Sequence[str] = (), id: str = "") -> str:
-        """Any reference that is valid, most often into the own block."""
+        """Return any valid reference, most often into the own block."""
         block = self.known.blocks[self.block]
         kind = self.draw(_below(10))
         if kind <= 2 or not block:
@@ -163,7 +163,7 @@ class Author:
         if not value:
             return self.pick(("", "", "+0", " - 0.0"))
         blank = self.pick((" ", " ", ""))
-        # An id that ends in a digit behind a hyphen needs no blank either: what is known is tried first.
+        # After an id such as "a-1" no blank is needed either, because known names are tried first.
         return f"{blank}{'-' if value < 0 else '+'}{blank}{abs(value) / 10:g}"
 
     # behaviours
@@ -248,7 +248,7 @@ class Author:
         return attributes
 
     def whole(self) -> str:
-        """One to three documents."""
+        """Return one to three documents."""
         before = self.pick(("", "", "\ufeff", '<?xml version="1.0" encoding="UTF-8"?>\n', "<!-- hello -->"))
         documents = [self.document(n) for n in range(self.pick((1, 1, 1, 2, 3)))]
         between = self.pick(("\n", "", "<!-- next -->"))
@@ -420,7 +420,7 @@ POINTS: dict[str, Sequence[str]] = {
     **dict.fromkeys(("gaze", "posture"), HOLD),
     **dict.fromkeys(("face", "faceLexeme", "faceFacs", "emotion", "expression", "faps", "blink"), PEAK),
 }
-# What is written most comes first and more than once.
+# Frequent elements come first and more than once.
 FREQUENT = (*list(KINDS)[:7], *list(KINDS)[:7], *list(KINDS))
 EXCLUSIVE = frozenset({"head", "gaze", "gesture", "facekeyframe"})
 WITHOUT_DESCRIPTION = frozenset({"parametervaluechange", "facekeyframe"})

@@ -1,4 +1,4 @@
-"""A case of the corpus in; what was told, shown and heard while it played out."""
+"""Plays a case of the corpus and records its feedback, faces and sound."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ MOST_STEPS = 10_000  # deadlines of one case
 
 
 class Step(Enum):
-    """What is done at a time."""
+    """An action at a time."""
 
     SEND = auto()
     PLAN = auto()
@@ -42,15 +42,15 @@ class Step(Enum):
 
 @dataclass
 class Played:
-    """What playing came to.
+    """The result of playing a case.
 
     Attributes:
         blocks: those that were read, in order; an id may be used again.
-        schedules: block id -> what became of the schedule of the last block of that id.
+        schedules: block id -> the final schedule of the last block with that id.
         feedback: as a client gets it: written as XML and read again.
-        faces: instant -> name of AU or FAP -> value, looked at when it was there.
-        film: the same, looked over when all had played.
-        speaking: what sounded, or would have with a voice, in order.
+        faces: instant -> name of AU or FAP -> value, sampled at that time.
+        film: the same, sampled after the end.
+        speaking: the utterances, in order.
     """
 
     blocks: list[Block] = field(default_factory=list)
@@ -70,11 +70,13 @@ class Played:
 
     @property
     def end(self) -> float:
-        """When the last thing was told."""
+        """The time of the last message."""
         return max((t for line in self.log for t in line.times), default=0.0)
 
     def time(self, point: str) -> float:
-        """Seconds from block start of "behaviour:sync" of the first block, or of "block:behaviour:sync"."""
+        """Return the seconds from block start of "behaviour:sync" of the first block, or
+        "block:behaviour:sync".
+        """
         first = next(iter(self.schedules.values()))
         behaviour, _, sync = point.partition(":")
         if behaviour in first.times:
@@ -83,7 +85,7 @@ class Played:
         return self.schedules[block].at(behaviour, sync)
 
     def predicted(self, point: str) -> float:
-        """Seconds from block start, as the last prediction that names the behaviour has it."""
+        """Return the seconds from block start in the last prediction that names the behaviour."""
         name, _, sync = point.rpartition(":")
         for feedback in reversed(self.feedback):
             if isinstance(feedback, PredictionFeedback):
@@ -108,11 +110,11 @@ def play(
     """Play a case.
 
     Args:
-        document: another one in its place.
-        looks: when to look at a face that plays.
-        watches: what to look over when all has played.
-        punctual: the player hears of each deadline when it is there; otherwise only when a document is sent
-            or a face is looked at.
+        document: used instead of the case's own.
+        looks: when to look at a playing face.
+        watches: the instants to sample after the end.
+        punctual: the player is called at each deadline; otherwise only when a document is sent or a face is
+            looked at.
     """
     wanted = case.wanted
     scene = {name: (x, y, z) for name, (x, y, z) in wanted.get("scene", {}).items()}
@@ -154,7 +156,7 @@ def play(
 
 
 def hear(player: Player, played: Played, now: float, until: float, punctual: bool) -> None:
-    """Let the time pass, in the steps in which there is something to tell."""
+    """Advance the time, from deadline to deadline."""
     for _ in range(MOST_STEPS):
         deadline = player.next_deadline()
         if not punctual or deadline is None or deadline > until:
@@ -173,7 +175,7 @@ def collect(player: Player, played: Played, now: float) -> None:
 
 
 def shown(player: Player, instants: Iterable[Instant]) -> dict[Instant, dict[str, float]]:
-    """Name of AU ("12" where both sides are equal, "12L", "12R") or FAP -> value, at each instant."""
+    """Return name of AU ("12" if both sides are equal, "12L", "12R") or FAP -> value, at each instant."""
     out: dict[Instant, dict[str, float]] = {}
     by_character: dict[str | None, list[Instant]] = {}
     for instant in sorted(set(instants), key=lambda i: i.time):

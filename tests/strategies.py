@@ -32,7 +32,7 @@ from bml_schema.node_schema import schema_of, sync_ref
 __all__ = ["attribute_values", "blocks", "descriptions", "names", "numbers", "xml_text"]
 
 _LETTERS = "abcxyzABCXYZ0123456789_.-+éß中"
-# Everything XML 1.0 can hold, and often what needs escapes.
+# Everything XML 1.0 can hold, with many characters that need escapes.
 _CHARACTERS = st.one_of(
     st.sampled_from(" \t\n\r<>&\"'\u0085\u2028é中😀ab"),
     st.characters(exclude_categories=["Cs", "Cc"], exclude_characters="\ufffe\uffff"),
@@ -47,12 +47,12 @@ numbers = st.one_of(
 
 
 def xml_text(min_size: int = 0, max_size: int = 12) -> st.SearchStrategy[str]:
-    """Any characters an XML document can hold."""
+    """Return a strategy for any characters an XML document can hold."""
     return st.text(_CHARACTERS, min_size=min_size, max_size=max_size)
 
 
 def attribute_values(value: Value) -> st.SearchStrategy[Any]:
-    """Values an attribute of this kind can have."""
+    """Return a strategy for the values of an attribute."""
     if value.words:
         return st.sampled_from(value.words)
     if value.low is not None and value.high is not None:
@@ -72,7 +72,7 @@ def attribute_values(value: Value) -> st.SearchStrategy[Any]:
 
 @st.composite
 def descriptions(draw: st.DrawFn) -> Description:
-    """SSML, or anything well-formed in canonical form."""
+    """Draw SSML, or any well-formed content in canonical form."""
     words = draw(st.text("abc é", max_size=5))
     content = draw(
         st.sampled_from(
@@ -100,7 +100,7 @@ def _references(draw: st.DrawFn, points: Mapping[str, list[tuple[str, int | None
     if kind == 1:
         return SyncRef(behaviour="bml", sync="start", offset=offset)
     if kind == 2:
-        # Another block's names are not looked up, so they must not look like an offset.
+        # Names of another block are not checked, so they must not look like an offset.
         other = st.text("abc_", min_size=1, max_size=4)
         sync = draw(st.sampled_from(["start", "end", "tm1"]))
         return SyncRef(block="other block", behaviour=draw(other), sync=sync, offset=offset)
@@ -109,7 +109,7 @@ def _references(draw: st.DrawFn, points: Mapping[str, list[tuple[str, int | None
     return SyncRef(behaviour=behaviour, sync=sync, index=index, offset=offset)
 
 
-# Elements of others, in canonical form.
+# Elements of other languages, in canonical form.
 OTHERS = [
     '<parameter xmlns="http://hmi.ewi.utwente.nl/bmlt" name="a" value="&lt;1"/>',
     '<a xmlns="urn:x" xmlns:p1="urn:y" p1:b=""> x <b xmlns=""/>\n</a>',
@@ -117,7 +117,7 @@ OTHERS = [
 
 
 def _own_values(draw: st.DrawFn, cls: type[Any]) -> dict[str, Any]:
-    """Values for the plain attributes of a class; optional ones sometimes left out."""
+    """Draw values for the plain attributes of a class, with some optional ones."""
     values: dict[str, Any] = {}
     for spec in schema_of(cls).attributes.values():
         if spec.field != "id" and spec.value is not sync_ref and (spec.required or draw(st.booleans())):
@@ -137,7 +137,7 @@ def _own_values(draw: st.DrawFn, cls: type[Any]) -> dict[str, Any]:
 
 
 def _content(draw: st.DrawFn, cls: type[Any]) -> dict[str, Any]:
-    """Values for the children and the text of a class; not for mixed content, which holds references."""
+    """Draw the children and the text of a class, except mixed content, which has references."""
     shape = schema_of(cls)
     values: dict[str, Any] = {shape.text: draw(xml_text())} if shape.text else {}
     for kind in shape.children:
@@ -162,7 +162,7 @@ def _part(draw: st.DrawFn, cls: type[Any]) -> Any:
 
 @st.composite
 def blocks(draw: st.DrawFn, foreign: bool = True) -> Block:
-    """Valid blocks: any behaviours, references that lead somewhere, constraints, required parts.
+    """Draw valid blocks: any behaviours, valid references, constraints, required parts.
 
     Args:
         foreign: also attributes and elements of other languages.
@@ -217,7 +217,7 @@ def blocks(draw: st.DrawFn, foreign: bool = True) -> Block:
     children = (*nodes[:cut], *((Required(children=inside),) if draw(st.booleans()) else inside))
     id = draw(names)
     values = _own_values(draw, Block)
-    # Its own id in a list of blocks says nothing, and is not kept.
+    # Its own id in a list of blocks is ignored.
     lists = {k: tuple(n for n in v if n != id) for k, v in values.items() if isinstance(v, tuple)}
     return Block(
         id=id, children=children, unknown_attributes=draw(others) if foreign else {}, **values | lists

@@ -1,4 +1,4 @@
-"""CONFORMANCE.md is current, and what the cases claim to prove they do have in their documents."""
+"""Tests of CONFORMANCE.md and of the claims of corpus cases."""
 
 from __future__ import annotations
 
@@ -80,15 +80,15 @@ def test_conformance_claims_are_in_the_documents_of_cases(case: Case, rule: Rule
 
 
 def root(case: Case) -> Any:
-    """All documents of a case under one element; what is not well-formed is mended somehow."""
+    """Return all documents of a case under one element; broken ones are repaired."""
     text = re.sub(rb"<\?xml[^>]*\?>|<!DOCTYPE[^>]*>", b"", case.document)
     return etree.fromstring(b"<all>" + text + b"</all>", etree.XMLParser(recover=True, remove_comments=True))
 
 
 def elements(case: Case, cls: type[Any] | None) -> list[Any]:
-    """The elements of a class in the documents of a case, with a namespace or without.
+    """Return the elements of a class in the documents of a case, with a namespace or without.
 
-    What every behaviour has, any behaviour shows.
+    For the base class of behaviours, these are all behaviours.
     """
     assert cls is not None
     tag = getattr(cls, "tag", None)

@@ -1,4 +1,4 @@
-"""Every document of the corpus is played, and what its .toml says must hold (keys: tests/cases.py)."""
+"""Tests of every case of the corpus."""
 
 from __future__ import annotations
 
@@ -128,13 +128,13 @@ def check_reading(case: Case, played: Played) -> None:
 
 
 def field_of(node: object, name: str) -> str:
-    """The field that an attribute goes to; children and all else are named as they are."""
+    """Return the field of an attribute; children and others keep their name."""
     spec = schema_of(type(node)).attributes.get(name)
     return spec.field if spec else name
 
 
 def check_meaning(case: Case, played: Played) -> None:
-    """`as_if` is the same in every way, `distance` differs in what is read and in what comes of it."""
+    """Check that `as_if` is the same in every way, and that `unlike` differs when read and played."""
     if not {"as_if", "unlike"} & case.wanted.keys():
         return
     film = [Instant(float(time)) for time in np.arange(0, min(played.end, 30) + 0.25, 0.1)]
@@ -152,7 +152,7 @@ def check_meaning(case: Case, played: Played) -> None:
 
 @cache
 def plain(case: Case) -> Played:
-    """A case, played without a look at its faces."""
+    """Return a case, played without a look at its faces."""
     return play(case)
 
 
@@ -209,7 +209,7 @@ def test_corpus_predictions_are_what_happens(case: Case) -> None:
             case SyncPointProgress():
                 behaviour = ":".join(feedback.id.split(":")[:2])
                 point = feedback.id[len(behaviour) + 1 :]
-                # The n-th stroke, and a mark that only a description has, cannot be said in a prediction.
+                # A prediction cannot have the n-th stroke, and a mark that only a description has.
                 if ":" not in point and (behaviour not in described or point in points[behaviour]):
                     assert points[behaviour][point] == pytest.approx(feedback.time, abs=WITHIN)
             case BlockProgress(status="IN_EXEC" | "DONE"):
@@ -237,13 +237,13 @@ def test_corpus_warns_of_nothing_twice(case: Case) -> None:
             warned = {id for id in warned if not id.startswith(feedback.id.removesuffix("end"))}
 
 
-# What lasts a hundredth of a second cannot but jump.
+# A change within a hundredth of a second is a jump.
 UNHURRIED = [case for case in CASES if "behaviour.short" not in case.proves]
 
 
 @pytest.mark.parametrize("case", UNHURRIED, ids=[case.name for case in UNHURRIED])
 def test_corpus_faces_never_jump(case: Case) -> None:
-    """Where a block starts, is replaced or interrupted, where a point passes and a plan changes."""
+    """When a block starts, is replaced or interrupted, when a point passes and a plan changes."""
     played = plain(case)
     times = {*case.wanted.get("sent", ()), *(time for line in played.log for time in line.times)}
     around = [(time - 1e-4, time + 1e-4) for time in sorted(times) if time > 0]
@@ -265,7 +265,7 @@ def test_corpus_blocks_pass_every_sync_point_in_order(case: Case) -> None:
     lines = [line for line in played.log if line.kind == "sync"]
     for id, schedule in played.schedules.items():
         if [b.id for b in played.blocks].count(id) > 1:
-            continue  # its schedule is that of the last of its name
+            continue  # its schedule is that of the last block with its id
         ends = [line for line in played.log if line.kind == "end" and line.id == id]
         if not ends or ends[0].words[:1] != ("DONE",):
             continue

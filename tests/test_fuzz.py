@@ -1,4 +1,4 @@
-"""Whatever comes in broken: blocks and errors come of documents, nothing hangs, no session ends of it."""
+"""Tests of mutated documents; `python -m tests.fuzz` runs more of them."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_fuzz_of_any_text_gives_errors_and_blocks_that_play_to_the_end(
 
 @pytest.mark.parametrize(
     ("target", "part"),
-    # Of as many seeds as there are mutants, so many: one try costs as much more.
+    # The number of tries for as many seeds as mutants: one try costs as much as several mutants.
     [("faps", 10), ("tasks", 80), ("controls", 40), ("sessions", 300)],
 )
 def test_fuzz_stands_every_kind_of_damage(target: str, part: int, count: int, seed: int) -> None:
@@ -104,7 +104,7 @@ def test_fuzz_of_a_connection_never_ends_it(count: int, seed: int) -> None:
 
 
 async def answers(socket, number: int) -> None:
-    """The service still hears, and lets go of what plays."""
+    """Check that the service still answers, and releases what plays."""
     await socket.send('{"type":"stop"}')
     await socket.send(json.dumps({"type": "ping", "id": f"ping {number}"}))
     async for message in socket:

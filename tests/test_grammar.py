@@ -1,4 +1,4 @@
-"""Random valid documents, written as text: all parse, schedule and play to their end, well told of."""
+"""Tests of random valid documents, and of the laws that their feedback must keep."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_check_feedback_notices_missing_repeated_and_late_messages() -> None:
 
 
 def plays(text: str) -> None:
-    """Read, submit, play to the end; all that must hold of any valid text."""
+    """Read, submit and play to the end; check all laws of valid texts."""
     player = Player(PlayOptions(idle=False))
     blocks: list[Block] = []
     schedules: list[Schedule] = []
@@ -113,9 +113,9 @@ def plays(text: str) -> None:
 
 
 def can_be_asked_for(block: Block, schedule: Schedule) -> bool:
-    """Return whether a document may state the lengths that the voice chose between the syncs of its speeches.
+    """Whether a document may state the lengths that the voice chose between the syncs of its speeches.
 
-    A voice that speaks a text faster shortens some of its parts more than `STRETCH` lets a document ask.
+    A voice that speaks a text faster shortens some parts more than `STRETCH` allows a document to state.
     """
     for id, say in Player(PlayOptions(idle=False)).speech_requests(block).items():
         if id not in schedule.times:
@@ -129,7 +129,7 @@ def can_be_asked_for(block: Block, schedule: Schedule) -> bool:
 
 
 def stays(block: Block, schedule: Schedule) -> None:
-    """A block that is written back with its times is scheduled to the same times."""
+    """Check that a block written back with its times is scheduled to the same times."""
     (again,) = read(write(with_absolute_times(block, schedule.behaviours)), VOCABULARY)
     assert isinstance(again, Block)
     player = Player(PlayOptions(idle=False))
@@ -140,13 +140,13 @@ def stays(block: Block, schedule: Schedule) -> None:
 
 
 def ends_or_withholds(block: Block) -> bool:
-    """It may end blocks before their time, or not start on its own."""
+    """Whether it may end blocks early, or not start on its own."""
     interrupts = block.interrupt or any(isinstance(node, Interrupt) for node in block.behaviours)
     return bool(interrupts) or block.composition == "REPLACE" or block.preplan
 
 
 def run(player: Player, until: float) -> list[Feedback]:
-    """Everything that comes due up to `until`, asked for at each deadline."""
+    """Return everything that is due up to `until`, from deadline to deadline."""
     told: list[Feedback] = []
     for _ in range(10_000):
         deadline = player.next_deadline()
@@ -157,7 +157,7 @@ def run(player: Player, until: float) -> list[Feedback]:
 
 
 def faces(player: Player) -> None:
-    """At a few instants every face is one that can be shown."""
+    """Check the ranges of every face at a few instants."""
     times = np.linspace(0, max(player.end, 0.1), 4)
     for character in range(len(player.characters)):
         frames = player.frames(times, character)
@@ -168,10 +168,10 @@ def faces(player: Player) -> None:
 
 
 def well_told(block: Block, schedule: Schedule, told: list[Feedback], calm: bool) -> None:
-    """The feedback of one block: what is there, once, in order.
+    """Check that the feedback of one block is complete, without repetition, and in order.
 
     Args:
-        calm: nothing in the text ends or withholds blocks before their time.
+        calm: nothing in the text ends or withholds blocks early.
     """
     own = [f for f in told if block.id in ids(f)]
     starts = [n for n, f in enumerate(own) if isinstance(f, BlockProgress) and f.id == f"{block.id}:start"]
@@ -223,7 +223,7 @@ def well_told(block: Block, schedule: Schedule, told: list[Feedback], calm: bool
 
 
 def well_predicted(block: Block, told: list[Feedback]) -> None:
-    """What was last predicted of a block that was played is what happened."""
+    """Check that the last prediction of a played block is what happened."""
     start: float | None = None
     times: dict[str, float] = {}
     happened: dict[str, float] = {}
@@ -242,7 +242,7 @@ def well_predicted(block: Block, told: list[Feedback]) -> None:
 
 
 def well_composed(blocks: list[Block], told: list[Feedback]) -> None:
-    """What APPEND waits for has ended; what REPLACE replaces has ended."""
+    """Check that dependencies of APPEND, and blocks that REPLACE replaces, have ended."""
     starts = {f.id.rpartition(":")[0]: (n, f) for n, f in enumerate(told) if started(f)}
     ends = {f.id.rpartition(":")[0]: (n, f) for n, f in enumerate(told) if ended(f)}
     first = next((b.character_id for b in blocks if b.character_id), None)
@@ -251,7 +251,7 @@ def well_composed(blocks: list[Block], told: list[Feedback]) -> None:
             continue
         for earlier in blocks[:n]:
             if earlier.preplan:
-                continue  # it waits for somebody to activate it, so nobody waits for it
+                continue  # it waits for its activation, so no block waits for it
             if (earlier.character_id or first) == (block.character_id or first) and earlier.id in starts:
                 assert ends[earlier.id][0] < starts[block.id][0], (
                     f"{earlier.id} ends before {block.id} starts"
@@ -267,7 +267,7 @@ def ended(f: Feedback) -> bool:
 
 
 def ids(feedback: Feedback) -> set[str]:
-    """Ids of the blocks that a message speaks of."""
+    """Return the ids of the blocks that a message is about."""
     if isinstance(feedback, PredictionFeedback):
         return {block.id for block in feedback.blocks}
     return {feedback.id.split(":")[0]}

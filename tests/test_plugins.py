@@ -14,7 +14,7 @@ from pathlib import Path
 from bml_schema.node_schema import node
 from bml_schema.nodes import Behaviour
 from realizer.behaviours.kind import BehaviourKind
-from realizer.behaviours.table_timing import timing_from_table
+from realizer.behaviours.table_timing import table_timing
 from realizer.outputs.output import Output
 from realizer.speech.base_voice import BaseVoice
 
@@ -23,7 +23,7 @@ class Shrug(Behaviour):
     """Do nothing for a while."""
     tag = "{urn:test}shrug"
 
-KINDS = (BehaviourKind(Shrug, lambda node, context: timing_from_table("idle"), lambda node, times, context: ()),)
+KINDS = (BehaviourKind(Shrug, table_timing("idle")),)
 COUNT = Output(".count", "text/plain", "the number of frames", lambda played, drawing: b"%d" % played.frames)
 FACES = Path(__file__).parent / "faces"
 

@@ -1,4 +1,4 @@
-"""A block that says its own times: nothing moves when it is scheduled again."""
+"""Tests of blocks with absolute times."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ Times = Mapping[str, Mapping[str, float]]
 
 
 def points(node: Behaviour) -> list[str]:
-    """The sync points of a behaviour, strokes and syncs of speech with them."""
+    """Return the sync points of a behaviour, with strokes and syncs of speech."""
     times = getattr(node, "repetition", 1)
     strokes = [f"stroke:{n}" for n in range(1, min(times, 4) + 1)] if times > 1 else []
     return [*node.sync_points, *strokes, *(node.marked if isinstance(node, Speech) else ())]
@@ -50,7 +50,7 @@ def scheduled(draw: st.DrawFn) -> tuple[Block, Times]:
 
 
 def told(block: Block) -> dict[str, dict[str, float]]:
-    """The times a block says as numbers, wherever it says them."""
+    """Return the times that a block states as numbers."""
     found: dict[str, dict[str, float]] = {}
     for node in block.behaviours:
         syncs = dict(node.syncs)

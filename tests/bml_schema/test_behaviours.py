@@ -1,4 +1,4 @@
-"""Every behaviour, by looping over the vocabulary; then what is special about those of the core."""
+"""Tests of the behaviours of BML 1.0."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ SAMPLES = {"integer": "1", "decimal": "0.25", "behaviourName": "other:one"}
 
 
 def sample(cls: type[Behaviour], *, leave_out: str = "", extra: str = "") -> str:
-    """A document with one behaviour that has exactly its required attributes."""
+    """Return a document with one behaviour that has exactly its required attributes."""
     space, name = cls.tag[1:].split("}")
     values = {
         a.name: a.value.words[0] if a.value.words else SAMPLES.get(a.value.type, "X")

@@ -1,4 +1,4 @@
-"""What stands in a block, and what references may name, before anything is read."""
+"""Tests of the first pass over a <bml> element."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The extensions of AsapRealizer and Elckerlyc, in the ways their documents write them."""
+"""Tests of the behaviours of BMLA and BMLT."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from bml_schema import (
 
 
 def only(inside: str) -> Behaviour:
-    """The one behaviour of a document, which must be sound and survive being written."""
+    """Return the one behaviour of a document, after writing and reading it."""
     block = document(inside)
     assert not block.problems
     assert parse(write(block)) == block

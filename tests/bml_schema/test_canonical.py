@@ -1,4 +1,4 @@
-"""The canonical text of an element depends on the element alone."""
+"""Tests of canonical XML text."""
 
 from __future__ import annotations
 

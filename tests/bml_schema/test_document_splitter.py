@@ -1,4 +1,4 @@
-"""Where documents begin and end in a text, whatever else stands in it."""
+"""Tests of the splitter that finds documents in a text."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from bml_schema.document_splitter import document_spans
 
 
 def cut(text: str) -> list[str]:
-    """Each stretch; what cannot be a document with "!" before it."""
+    """Return each span of a text, with "!" before those that are no documents."""
     return [("!" if s.fault else "") + text[s.start : s.end] for s in document_spans(text)]
 
 

@@ -1,4 +1,4 @@
-"""Texts with any number of documents, sound and broken; nothing but Blocks and BMLErrors comes out."""
+"""Tests of the reader of documents: decoding, limits, broken and several documents."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ A, B, C = '<bml id="a"/>', '<bml id="b"></bml>', '<bml id="c">\n</bml>'
 
 
 def told(text: str | bytes) -> list[str]:
-    """The id of each block, the message of each error."""
+    """Return the id of each block and the message of each error."""
     return [found.id if isinstance(found, Block) else str(found) for found in read(text)]
 
 
@@ -158,7 +158,7 @@ HOSTILE = {
 
 @pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE.keys())
 def test_read_hostile_texts_gives_few_errors(text: str) -> None:
-    # Each of them once took minutes or a flood of warnings: this test ends, or somebody notices.
+    # Each of them once took minutes or gave a flood of warnings.
     assert 1 <= len(list(read(text))) <= MAX_DOCUMENTS + 1
 
 

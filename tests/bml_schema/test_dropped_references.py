@@ -1,4 +1,4 @@
-"""What names a dropped behaviour vanishes with it, and its one Problem lists it."""
+"""Tests of the removal of behaviours and of the references to them."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def test_without_reports_ids_that_a_required_constraint_names() -> None:
     assert left.children == (Wait(id="c"), Required())
     assert lost == {"a": ("/bml/required[1]/constraint[1]",)}
     assert fatal == {"a"}
-    # Made by hand, a constraint is required because of where it stands.
+    # In a block made by code, a constraint is required by its position.
     made = Block(
         id="b", children=(Wait(id="a"), Required(children=(Constraint(parts=block.constraints[0].parts),)))
     )

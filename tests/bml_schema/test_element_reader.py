@@ -1,4 +1,4 @@
-"""Descriptions, constraints, and children nobody knows."""
+"""Tests of the reader of one element."""
 
 from __future__ import annotations
 
@@ -154,7 +154,7 @@ def test_unknown_children_are_kept_in_their_namespaces() -> None:
 def test_attributes_may_have_blanks_around_numbers() -> None:
     block = only("<head id='h' lexeme='NOD' repetition=' 3 '/><wait id='w' start='h:stroke:3'/>")
     assert not block.problems
-    # A gesture has one stroke, whatever its author hoped for.
+    # A gesture has one stroke.
     block = only("<gesture id='g' lexeme='BEAT' repetition='3'/><wait id='w' start='g:stroke:3'/>")
     slip, problem = block.problems
     assert slip.text.startswith("repetition: no attribute of <gesture>")

@@ -1,4 +1,4 @@
-"""Messages say what was wanted, what came, and where."""
+"""Tests of errors, problems and suggestions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Escaped text reads back as it was."""
+"""Tests of XML escapes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What this project adds to BML, in its own namespace."""
+"""Tests of the behaviours that this project adds to BML."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def document(inside: str) -> Block:
 
 
 def only(inside: str) -> Behaviour:
-    """The one behaviour of a document, which must be sound and survive being written."""
+    """Return the one behaviour of a document, after writing and reading it."""
     block = document(inside)
     assert not block.problems
     assert parse(write(block)) == block

@@ -1,4 +1,4 @@
-"""Feedback: all in the core namespace, plain for the clients there are, and read back as it was."""
+"""Tests of BML feedback messages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A new behaviour is a few lines: its class says all the parser and the writer need."""
+"""Tests of node classes and their schemas."""
 
 from __future__ import annotations
 

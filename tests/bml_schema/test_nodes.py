@@ -1,4 +1,4 @@
-"""Blocks know their behaviours and constraints, and what is required."""
+"""Tests of blocks, constraints and their children."""
 
 from __future__ import annotations
 

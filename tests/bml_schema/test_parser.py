@@ -1,4 +1,4 @@
-"""Who pays for a fault: the block, one behaviour, or nobody."""
+"""Tests of the parser of one <bml> element."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where things stand in a text: line, column, length, in whatever the parser took."""
+"""Tests of source positions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sync references: grammar, hyphens, offsets, names that are not there."""
+"""Tests of sync references."""
 
 from __future__ import annotations
 

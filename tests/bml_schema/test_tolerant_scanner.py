@@ -1,4 +1,4 @@
-"""A text of any kind in, its start tags and slips out."""
+"""Tests of the tolerant scanner."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Attributes that BML has not: told of, each with where it stands, and nothing else happens."""
+"""Tests of messages about unknown attributes."""
 
 from __future__ import annotations
 

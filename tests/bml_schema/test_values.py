@@ -1,4 +1,4 @@
-"""Attribute values: what is read, what is refused, what is written."""
+"""Tests of attribute values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which elements are behaviours."""
+"""Tests of the vocabulary."""
 
 from __future__ import annotations
 

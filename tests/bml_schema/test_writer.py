@@ -1,4 +1,4 @@
-"""What is written reads back as the same block."""
+"""Tests of the writer of blocks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The XML Schemas and the node classes say the same, and what is written is valid."""
+"""Tests of the XML schemas against node classes, the parser and the writer."""
 
 from __future__ import annotations
 
@@ -66,13 +66,13 @@ def referred(kind: str, qname: str) -> Element:
 
 
 def type_of(element: Element) -> Element:
-    """The complex type of an element declaration."""
+    """Return the complex type of an element declaration."""
     inner = element.find(XS + "complexType")
     return inner if inner is not None else referred("complexType", element.get("type", ""))
 
 
 def attributes(declaration: Element) -> dict[str, Element]:
-    """The attributes a complex type or an attribute group allows, by name."""
+    """Return the attributes of a complex type or an attribute group, by name."""
     found: dict[str, Element] = {}
     for part in declaration:
         if part.tag == XS + "attribute":
@@ -85,7 +85,7 @@ def attributes(declaration: Element) -> dict[str, Element]:
 
 
 def children(declaration: Element) -> set[str]:
-    """Names of the elements a complex type or a group allows."""
+    """Return the names of the elements of a complex type or a group."""
     found: set[str] = set()
     for part in declaration:
         if part.tag == XS + "element":
@@ -98,7 +98,7 @@ def children(declaration: Element) -> set[str]:
 
 
 def facets(attribute: Element) -> dict[str, Any]:
-    """What the type of an attribute says: base, words, range."""
+    """Return the base, words and range of an attribute's type."""
     qname = attribute.get("type", "")
     if qname.startswith("xs:"):
         return {"base": qname}
@@ -149,7 +149,7 @@ def assert_agrees(spec: Attribute, declared: Element) -> None:
 
 
 def own_attributes(cls: type[Any]) -> dict[str, Attribute]:
-    """The attributes of a class that are its element's own, not of another namespace."""
+    """Return the attributes of a class in no namespace or its element's."""
     return {name: spec for name, spec in schema_of(cls).attributes.items() if not name.startswith("{")}
 
 

@@ -1,4 +1,4 @@
-"""The public functions that play and schedule documents without a clock."""
+"""Tests of realize and schedule."""
 
 from __future__ import annotations
 

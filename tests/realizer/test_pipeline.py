@@ -1,4 +1,4 @@
-"""Documents in; schedule, frames, sound and feedback out, without a clock."""
+"""Tests of the pipeline: examples, golden values, sound and lips."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_play_long_documents_without_a_seam_between_windows() -> None:
 
 @pytest.mark.parametrize("name", ["greeting", "nod-on-a-word", "gaze-and-back"])
 def test_play_gives_the_golden_frames(name: str, request: pytest.FixtureRequest) -> None:
-    """FAP frames at 25 fps as text, one frame a line: a change is a diff that can be read."""
+    """FAP frames at 25 fps as text, one frame a line, so that a change is a readable diff."""
     played = realize(examples()[name], voice=SilentVoice())
     used = [i for i in range(68) if played.faps.integers()[:, i].any()]
     lines = [" ".join(["frame", *(faps()[i].name for i in used)])]
@@ -87,7 +87,7 @@ def test_play_gives_the_golden_frames(name: str, request: pytest.FixtureRequest)
     ours = np.array([line.split() for line in lines[1:]], int)
     theirs = np.array([row.split() for row in rows], int)
     assert ours.shape == theirs.shape
-    # One unit for the last bit of another machine's arithmetic.
+    # One unit of tolerance for rounding on other machines.
     assert np.abs(ours - theirs).max() <= 1
 
 
@@ -100,7 +100,7 @@ NOD = (
 def test_play_passes_the_golden_values_between_steps(
     request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Every step runs under its name, in order, and what it gives is what the golden file says."""
+    """Every step is called by its name, in order, with the values of the golden file."""
     passed: dict[str, Any] = {}
 
     def note(step: str, holder: Any, name: str, describe: Any) -> None:
@@ -144,13 +144,13 @@ def rounded(values: Any, digits: int = 4) -> list[float]:
 
 
 def described(channels: Any) -> dict[str, list[float]]:
-    """{target: first key, last key, greatest value} of the last channel of each target."""
+    """Return {target: first key, last key, greatest value} of the last channel of each target."""
     ends = {c.target.name: (c.times[0], c.times[-1], np.abs(c.values).max()) for c in channels}
     return {name: rounded(values) for name, values in ends.items()}
 
 
 def flat(value: Any, path: str = "") -> dict[str, Any]:
-    """{path: number or text} of all that is in a value."""
+    """Return {path: number or text} of all parts of a value."""
     if isinstance(value, str):
         return {f"{path}={value}": 0.0}
     if isinstance(value, dict | list):
@@ -174,7 +174,7 @@ def test_pictures_draw_the_given_frames() -> None:
 
 @pytest.fixture
 def spoken() -> Realization:
-    """The nod on a word, really spoken, without idle motion."""
+    """Play the nod on a word with a real voice and without idle motion."""
     if find_spec("espeakng_loader") is None:
         pytest.skip("no speech extra: pip install 'bml-realizer[speech]'")
     return realize(examples()["nod-on-a-word"], voice="espeak", idle=False)

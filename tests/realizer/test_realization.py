@@ -1,4 +1,4 @@
-"""Tests of what a player has played, sampled."""
+"""Tests of realizations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Documents played offline, and files for them to name."""
+"""Fixtures that play documents offline, and files for them to name."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ FPS = 100
 
 @dataclass(frozen=True)
 class Played:
-    """What came of the first block."""
+    """A played document, with access to its first block."""
 
     realization: Realization
 
     def times(self, behaviour: str) -> dict[str, float]:
-        """Sync point -> seconds."""
+        """Return sync point -> seconds."""
         return self.realization.schedules[0][behaviour]
 
     def aus(self, time: float) -> dict[str, float]:
-        """AU -> 0..1 of those that are up."""
+        """Return AU -> 0..1 of the visible ones."""
         names = self.realization.to_json()["au"]["names"]
         values = self.realization.aus.aus[round(time * FPS)]
         return {name: round(float(v), 4) for name, v in zip(names, values, strict=True) if v > 1e-6}
@@ -57,7 +57,7 @@ class Played:
 
 @pytest.fixture(scope="session")
 def play() -> Callable[..., Played]:
-    """Plays one block with these elements in it, without idle motion."""
+    """Return a function that plays one block with some elements, without idle motion."""
 
     def run(
         body: str, *, media: Path | None = None, idle: bool = False, deformer: str | None = None
@@ -71,7 +71,7 @@ def play() -> Callable[..., Played]:
 
 
 def wav(data: bytes, *, rate: int = 8000, channels: int = 1, bits: int = 16, coding: int = 1) -> bytes:
-    """A WAV file with these samples; coding 1 whole numbers, 3 floats."""
+    """Return a WAV file with these samples; coding 1 is integers, 3 floats."""
     block = channels * bits // 8
     form = struct.pack("<HHIIHH", coding, channels, rate, rate * block, block, bits)
     chunks = b"fmt " + struct.pack("<I", len(form)) + form + b"data" + struct.pack("<I", len(data)) + data
@@ -79,13 +79,13 @@ def wav(data: bytes, *, rate: int = 8000, channels: int = 1, bits: int = 16, cod
 
 
 def tone(seconds: float, rate: int = 8000, loud: float = 0.5) -> np.ndarray:
-    """(n,) float, a tone of 440 Hz."""
+    """Return (n,) float, a tone of 440 Hz."""
     return loud * np.sin(2 * np.pi * 440 * np.arange(round(seconds * rate)) / rate)
 
 
 @pytest.fixture
 def media(tmp_path: Path) -> Path:
-    """A media folder with half a second of a tone, hello.wav, and a nod-free smile, smile.fap."""
+    """Return a media folder with half a second of a tone, hello.wav, and a smile, smile.fap."""
     folder = tmp_path / "media"
     (folder / "sounds").mkdir(parents=True)
     (folder / "hello.wav").write_bytes(wav((tone(0.5) * 32767).astype("<i2").tobytes()))

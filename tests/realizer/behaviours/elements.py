@@ -1,4 +1,4 @@
-"""Elements of behaviours as timings, faults and channels, and what the channels show."""
+"""Helpers that read an element as a behaviour, and give its timing, faults and channels."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def at(channels: Sequence[Channel], name: str, *times: float) -> list[float]:
 
 
 def degrees(channels: Sequence[Channel], part: str, *times: float) -> list[tuple[float, float]]:
-    """(yaw to the left, pitch up) of eyes or head."""
+    """Return (yaw to the left, pitch up) of eyes or head."""
     left, right, up, down = {"eyes": ("61", "62", "63", "64"), "head": ("51", "52", "53", "54")}[part]
     yaw, pitch = (40, 30) if part == "eyes" else (60, 40)
     values = {name: at(channels, name, *times) for name in (left, right, up, down)}

@@ -1,4 +1,4 @@
-"""Sounds of the media folder."""
+"""Tests of audiofile, and of speech with a recording."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One blink, or a wink."""
+"""Tests of blink."""
 
 from __future__ import annotations
 

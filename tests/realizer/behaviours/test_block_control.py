@@ -1,4 +1,4 @@
-"""What interrupt, activate and parametervaluechange do to others."""
+"""Tests of behaviours that act on other blocks."""
 
 from __future__ import annotations
 

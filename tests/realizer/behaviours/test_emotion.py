@@ -1,4 +1,4 @@
-"""Emotions by word and by place on the wheel, for a while and as a mood."""
+"""Tests of emotion and mood."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ def lexeme(name: str, scale: float = 1.0) -> dict[str, float]:
 
 
 def asked(played, time: float) -> dict[str, float]:
-    """AU -> 0..1 before the rules of what a face shows together."""
+    """Return AU -> 0..1 before the co-occurrence rules."""
     names = played.realization.to_json()["au"]["names"]
     values = played.realization.aus.before_rules[round(time * 100)]
     return {name: round(float(v), 4) for name, v in zip(names, values, strict=True) if v > 1e-6}
 
 
 def same(got: dict[str, float], wanted: dict[str, float]) -> bool:
-    """Equal where an AU of the wanted ones has no sides too."""
+    """Whether two sets of AUs are equal, where wanted AUs without sides match both."""
     wide = {name: wanted.get(name, wanted.get(f"{name}L")) for name in got}
     return got == pytest.approx(wide, abs=2e-4) and len(got) == len({w.rstrip("LR") for w in wanted}) + sum(
         name.endswith("R") for name in got
@@ -124,7 +124,7 @@ def test_emotion_with_an_unknown_profile_warns_and_shows_the_default(play) -> No
 
 
 def test_emotion_shows_fully_without_an_intensity(play) -> None:
-    """A word is already as strong as it says; half of anger reads as no emotion at all."""
+    """The strength of a word is in the word; half of anger would be read as no emotion."""
     full = play(f'<own:emotion id="e" name="anger" {AT}/>')
     assert full.aus(1.0) == play(f'<own:emotion id="e" name="anger" intensity="1" {AT}/>').aus(1.0)
 

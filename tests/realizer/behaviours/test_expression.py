@@ -1,4 +1,4 @@
-"""The expression library: the twelve templates, and every face lexeme."""
+"""Tests of expression."""
 
 from __future__ import annotations
 

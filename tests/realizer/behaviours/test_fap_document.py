@@ -1,4 +1,4 @@
-"""A clip as a document: what it plays is what the clip says."""
+"""Tests of documents that play a FAP clip."""
 
 from __future__ import annotations
 

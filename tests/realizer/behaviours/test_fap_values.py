@@ -1,4 +1,4 @@
-"""Raw FAPs, and files of them."""
+"""Tests of faps and fapFile."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def test_fap_file_that_does_not_begin_at_rest_is_eased(play, media: Path) -> Non
 
 
 def with_compound(media: Path, viseme: str, expression: str) -> None:
-    """A file v.fap of a second with these and FAP 31."""
+    """Return a file v.fap of a second with these values and FAP 31."""
     mask = " ".join("1" if fap in (1, 2, 31) else "0" for fap in range(1, 69))
     lines = [f"{mask}\n{k} {viseme} {expression} {10 * (k % 2)}" for k in range(26)]
     (media / "v.fap").write_text("\n".join(["2.1 v 25 26", *lines]), "utf-8")

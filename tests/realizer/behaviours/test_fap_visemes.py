@@ -1,4 +1,4 @@
-"""Visemes and expressions of a FAP file become the FAPs that show them."""
+"""Tests of the expansion of FAP 1 and 2."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def clip(
     expressions: list[list[int]] | None = None,
     **low: list[int],
 ) -> FAPClip:
-    """A clip of these frames; fap3=[...] are FAPs that it gives itself."""
+    """Return a clip of these frames; fap3=[...] are FAPs of its own."""
     count = len(visemes or expressions or next(iter(low.values())))
     values, mask = np.zeros((count, 68), np.int32), np.zeros(68, bool)
     mask[:2] = visemes is not None, expressions is not None

@@ -1,4 +1,4 @@
-"""How many blinks and how much motion an idle face keeps."""
+"""Tests of idle."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def aus(play, body: str) -> np.ndarray:
 
 
 def blinks(frames: np.ndarray) -> list[int]:
-    """Frames at which a lid begins to close."""
+    """Return the frames at which a lid begins to close."""
     lid = frames[:, LID] > 0
     return np.flatnonzero(lid[1:] & ~lid[:-1]).tolist()
 

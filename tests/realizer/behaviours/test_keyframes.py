@@ -1,4 +1,4 @@
-"""Face animations by keys."""
+"""Tests of facekeyframe."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Names in documents lead into the media folder, and nowhere else."""
+"""Tests of files of the media folder."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def test_media_file_without_a_folder_is_a_fault_with_a_hint(play) -> None:
 
 def test_load_refuses_a_file_that_is_too_large(media: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with (media / "large.wav").open("wb") as file:
-        file.truncate(files.MAX_BYTES + 1)  # sparse: it takes no place
+        file.truncate(files.MAX_BYTES + 1)  # sparse
 
     def read(content: bytes) -> bytes:
         raise AssertionError("it was read")
@@ -119,7 +119,7 @@ def test_load_reads_a_file_again_only_after_a_change(media: Path) -> None:
     os.utime(media / "x", ns=(1, 1))
     assert faults("x", world, read) == ()
     assert load("x", world, read) == 2
-    # What plays goes on where the file vanishes; a new behaviour finds it gone.
+    # A playing behaviour is not affected when the file is deleted; a new one is.
     (media / "x").unlink()
     assert load("x", world, read) == 2
     assert faults("x", world, read)

@@ -15,7 +15,7 @@ from tests.realizer.behaviours.elements import ELEMENTS, check, expand, keys, no
 
 
 def test_kinds_cover_every_core_element() -> None:
-    # A behaviour beyond these has its class in its own module, or in a plug-in.
+    # Other behaviours have their class in their own module, or in a plug-in.
     assert {tag: VOCABULARY.get(tag) for tag in CORE} == dict(CORE)
     assert set(KINDS) == set(VOCABULARY)
 

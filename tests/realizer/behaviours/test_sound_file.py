@@ -1,4 +1,4 @@
-"""Sound files of other kinds than WAV."""
+"""Tests of the reader of sound files."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ av = pytest.importorskip("av", reason="pip install 'bml-realizer[film]'")
 
 
 def encoded(kind: str, codec: str, rate: int = 48_000) -> bytes:
-    """Half a second of a tone."""
+    """Return half a second of a tone as a file."""
     tone = (0.5 * 32767 * np.sin(2 * np.pi * 440 * np.arange(rate // 2) / rate)).astype(np.int16)
     file = io.BytesIO()
     with av.open(file, "w", format=kind) as out:

@@ -1,4 +1,4 @@
-"""Timelines: channels of expressions that grow out of each other, in documents."""
+"""Tests of timeline."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ANGER = {"expression": "template:anger", "duration": 1.0}
 
 @pytest.fixture
 def timeline(play, tmp_path: Path):
-    """Plays a timeline with these channels."""
+    """Play a timeline with these channels."""
 
     def run(*channels: dict, attributes: str = "", also: str = "", mixing: dict | None = None, **asked):
         (tmp_path / "t.json").write_text(json.dumps({"channel": list(channels)} | (mixing or {})), "utf-8")
@@ -36,10 +36,10 @@ def test_timeline_moves_between_expressions_without_a_neutral_face(timeline) -> 
     assert played.warnings == []
     assert played.times("t") == pytest.approx({"start": 0, "end": 2})
     brows, frown = course(played, "1L"), course(played, "4L")
-    # Surprise leaves at 0.5, half a second before the border; anger is whole 0.3 s behind it.
+    # Surprise starts to leave at 0.5, half a second before the border; anger is complete 0.3 s after it.
     assert brows[[0, 30, 50, 130, 200]] == pytest.approx([0, 0.9, 0.9, 0, 0], abs=1e-6)
     assert frown[[0, 50, 130, 150, 200]] == pytest.approx([0, 0, 1, 1, 0], abs=1e-6)
-    # Between, one comes as the other goes, in a straight line.
+    # In between, both change linearly.
     assert brows[50:131] / 0.9 + frown[50:131] == pytest.approx(np.ones(81), abs=1e-5)
     assert brows[90] == pytest.approx(0.45, abs=1e-5)
 
@@ -53,7 +53,7 @@ def test_timeline_onset_or_offset_alone_leads_to_the_next_entry(timeline, joins,
     assert brows[there] == pytest.approx(0, abs=1e-5)
     assert frown[there] == pytest.approx(1, abs=1e-5)
     assert frown[there - 2] < 1
-    # At the very ends onset and offset count whatever leads between.
+    # At both ends of the timeline, onset and offset are always used.
     assert brows[[0, 15, 30]] == pytest.approx([0, 0.45, 0.9], abs=1e-5)
     assert frown[[150, 175, 200]] == pytest.approx([1, 0.5, 0], abs=1e-5)
 
@@ -135,7 +135,7 @@ def mixed(played, face, name: str) -> np.ndarray:
 
 
 def test_timeline_mixer_and_order_reach_the_face(timeline) -> None:
-    """Softly, so that what else the face shows does not jump; between, wholly, in the file's order."""
+    """The change is soft at both ends; in between the mixer works fully, in the file's order."""
     face = load_face(deformer="au")
     asked = {"mixer": "successive", "order": [26, 12, 1]}
     played = timeline(GRIN, AMAZED, mixing=asked, attributes='start="1" end="4"', deformer="au")
@@ -150,7 +150,7 @@ def test_timeline_mixer_and_order_reach_the_face(timeline) -> None:
 
 
 def test_timeline_mixers_and_orders_give_different_faces(timeline) -> None:
-    """Her figures 5.1 and 5.2; before and after it, and of its own accord, units are added up."""
+    """Wojdel's figures 5.1 and 5.2; before and after the timeline, units are added up."""
     face = load_face(deformer="au")
 
     def shown(**mixing) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""WAV files of all usual codings become the same sound."""
+"""Tests of the reader of WAV files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One block on the session clock: laid, cut, made weaker."""
+"""Tests of accepted blocks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tests of the sound of an utterance as it is heard."""
+"""Tests of the rendering of utterances."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What behaviours do to others: interrupt, activate, change."""
+"""Tests of interrupt, activate and parametervaluechange."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SMILE = '<faceLexeme id="s" lexeme="SMILE" start="0" attackPeak="0.4" relax="4" 
 
 
 def play(*inside: str) -> Realization:
-    """Blocks a, b, c ... that begin together."""
+    """Play blocks a, b, c ... that begin together."""
     documents = [
         f'<bml id="{name}" {BMLA}{text if text.startswith(" ") else ">" + text}</bml>'
         for name, text in zip("abcdef", inside, strict=False)

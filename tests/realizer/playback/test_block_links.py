@@ -1,4 +1,4 @@
-"""How a block stands to those that are alive."""
+"""Tests of links between blocks."""
 
 from __future__ import annotations
 

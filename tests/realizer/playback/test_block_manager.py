@@ -1,4 +1,4 @@
-"""Blocks together: who starts when, who ends whom, and what is told of it."""
+"""Tests of the manager of blocks: composition, BMLA's attributes, preplanned blocks, resources."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ BMLA = 'xmlns:bmla="http://www.asap-project.org/bmla"'
 
 
 class Stage:
-    """A player and the log of what it told: "a:start 0.0", "a IN_PREP 0.0-", "! a:b TYPE"."""
+    """A player and the log of its feedback: "a:start 0.0", "a IN_PREP 0.0-", "! a:b TYPE"."""
 
     def __init__(self) -> None:
         self.player = Player(PlayOptions(idle=False))

@@ -1,4 +1,4 @@
-"""One block, planned: what is dropped, what it is told of, what is left to play."""
+"""Tests of the planning of one block."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The table of a block's states: every row, what it leaves out, who uses it, and its drawing in docs."""
+"""Tests of the states of blocks."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ACTIVATE = f'<bml id="b" {BMLA}><bmla:activate id="x" target="a"/></bml>'
 
 
 class Recorder(dict[tuple[State, BlockEvent], State]):
-    """The table, and the rows of it that were used."""
+    """The table, and its rows that were used."""
 
     def __init__(self) -> None:
         super().__init__(TRANSITIONS)
@@ -38,7 +38,7 @@ def block(attributes: str = "") -> Block:
 
 
 def drawing() -> str:
-    """The table as a state diagram of Mermaid."""
+    """Return the table as a state diagram of Mermaid."""
     lines = [f"    {state} --> {after}: {event}" for (state, event), after in TRANSITIONS.items()]
     final = [f"    {state} --> [*]" for state in State if not any(s is state for s, _ in TRANSITIONS)]
     return "\n".join(["```mermaid", "stateDiagram-v2", "    [*] --> IN_PREP", *lines, *final, "```"])

@@ -1,4 +1,4 @@
-"""Who is alive, who is still to be seen, what is remembered."""
+"""Tests of the store of blocks."""
 
 from __future__ import annotations
 

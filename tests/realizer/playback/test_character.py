@@ -1,4 +1,4 @@
-"""Base states take over from one another, and what a client sets holds until it lets go."""
+"""Tests of base states and direct values of a character."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def test_set_direct_and_set_emotion_do_not_depend_on_their_order(
 def test_set_direct_never_jumps(
     steps: list[tuple[float, float | None]],
 ) -> None:
-    """Each message changes nothing of the frame in which it comes."""
+    """A message does not change the frame at its own time."""
     ann = Character(None)
     ann.set_emotion({"12L": 0.8}, 0.0)
     now = 1.0

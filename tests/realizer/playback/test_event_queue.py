@@ -1,4 +1,4 @@
-"""What is due comes in order, once, and can be taken out again."""
+"""Tests of the queue of events."""
 
 from __future__ import annotations
 

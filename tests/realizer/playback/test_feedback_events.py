@@ -1,4 +1,4 @@
-"""Feedback made of a schedule: everything once, in the order of report."""
+"""Tests of BML feedback of planned blocks."""
 
 from __future__ import annotations
 

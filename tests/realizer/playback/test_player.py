@@ -1,4 +1,4 @@
-"""Composition, feedback and frames of a player that is told the time."""
+"""Tests of the player."""
 
 from __future__ import annotations
 
@@ -256,7 +256,7 @@ def test_due_gives_the_same_feedback_however_often_it_is_called(asked: list[floa
     assert told([*sorted(asked), 100.0]) == told([100.0])
 
 
-# What a face moves by itself: brows, lids, head, eyes.
+# The parts that idle motion and prosody move: brows, lids, head, eyes.
 OWN = ("1L", "1R", "2L", "2R", "45L", "45R", *map(str, range(51, 57)), *map(str, range(61, 65)))
 WORDS = "Whoever follows the river to the tower, will discover a little door."
 TALK = f'<speech id="t"><text>{WORDS}</text></speech>'
@@ -310,7 +310,7 @@ def test_prosody_leaves_a_nod_of_the_document_unchanged(seed: int) -> None:
 def test_frames_while_speech_grows_are_those_of_the_playback(
     seed: int, starts: list[float], nod: float
 ) -> None:
-    """Blocks that have ended are forgotten by and by; what was shown and what comes stay what they are."""
+    """Dropping ended blocks changes neither past nor future frames."""
     live, played = Player(PlayOptions(seed=seed)), Player(PlayOptions(seed=seed), history=float("inf"))
     todo = sorted([(start, TALK) for start in starts] + [(nod, '<head id="n" lexeme="NOD"/>')])
     own = [AU_NAMES().index(name) for name in OWN]

@@ -1,4 +1,4 @@
-"""Every sync reference of a block is found, wherever it stands."""
+"""Tests of the references of a block."""
 
 from __future__ import annotations
 

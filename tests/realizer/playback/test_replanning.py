@@ -1,4 +1,4 @@
-"""Blocks that are tied to each other are solved together while they play."""
+"""Tests of blocks that move when other blocks are tied to them."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def stage() -> Stage:
 
 def test_replanning_shares_the_stretch_between_a_new_and_a_running_block(stage: Stage) -> None:
     alone = stage.send("a", FACE.format(""))
-    # A wait of 9 s is tied to the whole of the face, at half a second: the face must be longer, it shorter.
+    # A wait of 9 s is tied to both ends of the face after half a second, so that both stretch.
     stage.send("b", '<wait id="w" duration="9" start="0" end="a:f:end"/>', at=0.1)
     times = stage.times()
     assert times["b:w:end"] == pytest.approx(times["a:f:end"])

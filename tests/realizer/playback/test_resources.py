@@ -1,4 +1,4 @@
-"""Who has to go where two want the same."""
+"""Tests of exclusive resources."""
 
 from __future__ import annotations
 

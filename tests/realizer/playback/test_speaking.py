@@ -1,4 +1,4 @@
-"""The speech of blocks: what a voice that fails or is slow means for a block."""
+"""Tests of speech synthesis for blocks."""
 
 from __future__ import annotations
 

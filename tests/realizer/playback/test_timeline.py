@@ -1,4 +1,4 @@
-"""What becomes of accepted blocks: they are laid, moved, cut off, stopped, and their followers with them."""
+"""Tests of the timeline of blocks."""
 
 from __future__ import annotations
 

@@ -14,12 +14,12 @@ from realizer.scheduling import Schedule, schedule_block
 from realizer.scheduling.problem import ORIGIN, Part, Problem, Relation
 from realizer.scheduling.timing import Timing
 
-# (behaviour, point), counted modulo what there is.
+# (behaviour, point), modulo their numbers.
 Spot = tuple[int, int]
 
 
 class Body(NamedTuple):
-    """A behaviour; its gaps get stiffer from the first to the last."""
+    """A behaviour; the stiffness of its gaps increases from the first to the last."""
 
     gaps: list[float]
     least: float
@@ -50,7 +50,7 @@ bodies = st.builds(
     st.sampled_from([None, None, 0.5, 1.5]),
 )
 ties = st.tuples(spots, spots, st.integers(-10, 10).map(lambda k: k / 10))
-# Most of these cannot be kept.
+# Most of these have no solution.
 wild = st.builds(
     Recipe,
     st.lists(bodies, min_size=1, max_size=MOST_BODIES),
@@ -62,13 +62,13 @@ wild = st.builds(
 
 @st.composite
 def possible(draw: st.DrawFn, stiffness: tuple[float, ...] = (0.5, 1.0, 4.0)) -> Recipe:
-    """Problems that have a solution, because all they say is true of times that are drawn first."""
+    """Problems that have a solution, because all relations are true of times that are drawn first."""
     number = st.integers(0, 20)
     count = draw(st.integers(1, MOST_BODIES))
     made, when = [], []
     for _ in range(count):
         true = draw(st.lists(number, min_size=1, max_size=3))
-        # What is said in tenths is made of whole numbers, so that sums do not depend on their order.
+        # Tenths are made from integers, so that sums do not depend on their order.
         rigid, free = draw(st.booleans()), draw(st.booleans())
         wished = true if rigid else draw(st.lists(number, min_size=len(true), max_size=len(true)))
         least = draw(st.integers(0, min(true)))
@@ -106,9 +106,9 @@ def point(problem: Problem, spot: Spot) -> int:
 def built(
     recipe: Recipe, order: list[int] | None = None, *, earliest: float = 0.0, late: float = 0.0
 ) -> Problem:
-    """The problem of a recipe; its behaviours in another order, its relations backwards then.
+    """Return the problem of a recipe; with `order` its behaviours in that order and its relations reversed.
 
-    `late`: all fixed times are so much later.
+    `late`: all fixed times are later by this.
     """
     places = list(range(len(recipe.bodies))) if order is None else order
     problem = Problem()
@@ -167,7 +167,7 @@ def cost_of(problem: Problem, time: Float64) -> float:
 
 
 def slope_of(problem: Problem, time: Float64) -> Float64:
-    """By how much the cost rises with each point's time."""
+    """Return the derivative of the cost by each point's time."""
     slope = np.zeros(len(problem.owner))
     for s in spans(problem):
         force = 2 * s.stiffness * (time[s.point + 1] - time[s.point] - s.wanted)
@@ -177,7 +177,7 @@ def slope_of(problem: Problem, time: Float64) -> Float64:
 
 
 def check_kept(problem: Problem, time: Float64, within: float = 1e-6) -> None:
-    """Everything that must hold, holds."""
+    """Check all equalities, orders and bounds."""
     for u, v, seconds, _, _ in problem.equalities:
         assert abs(time[u] - time[v] - seconds) <= within
     for u, v, seconds, _, _ in problem.orders:
@@ -190,7 +190,7 @@ def check_kept(problem: Problem, time: Float64, within: float = 1e-6) -> None:
 
 
 def linear(problem: Problem) -> tuple[Float64, Float64, Float64, Float64]:
-    """(A, b, C, d): A t = b and C t >= d for the times of all points, written down plainly."""
+    """Return (A, b, C, d): A t = b and C t >= d for the times of all points."""
     n = len(problem.owner)
 
     def row(plus: int, minus: int) -> Float64:
@@ -217,7 +217,7 @@ FACE = ("start", "attackPeak", "relax", "end")
 
 
 def schedule(body: str, timings: dict[str, Timing], **more: object) -> Schedule:
-    """The schedule of a block; its first behaviour is on line 2."""
+    """Return the schedule of a block; its first behaviour is on line 2."""
     text = f'<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0" id="b1">\n{body}</bml>'
     return schedule_block(parse(text, strict=True), timings, **more)  # type: ignore[arg-type]
 

@@ -1,4 +1,4 @@
-"""Guessing what binds comes to the same as the interior point, which is asked where guesses do not end."""
+"""Tests of the active-set method against the interior point method."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ number = st.integers(0, 20)
 
 @st.composite
 def quadratics(draw: st.DrawFn) -> Quadratic:
-    """A chain of springs with more across, and inequalities that a hidden x keeps."""
+    """Draw a chain of springs with more across, and inequalities that a hidden x satisfies."""
     hidden = [0, *draw(st.lists(number, min_size=NODES - 1, max_size=NODES - 1))]
     pairs = [(k, k + 1) for k in range(NODES - 1)]
     pairs += draw(st.lists(st.tuples(nodes, nodes).filter(lambda p: p[0] != p[1]), max_size=4))

@@ -1,4 +1,4 @@
-"""Laws of whole documents: random waits, references and orders, written down and read."""
+"""Laws of the scheduling of random documents."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Document(NamedTuple):
     def schedule(
         self, names: Iterable[str] | None = None, without: Collection[str] = (), **more: float
     ) -> Schedule:
-        """The schedule of all that it holds or what is named, in that order, as if some were not there."""
+        """Return the schedule of all elements or the named ones, in that order, as if some were absent."""
         nodes = self.waits | self.orders
         chosen = [name for name in (names or nodes) if name in self.waits or name not in without]
         body = "\n".join(nodes[name] for name in chosen)
@@ -69,7 +69,7 @@ def documents(draw: st.DrawFn, fixed: bool = True) -> Document:
 
 @st.composite
 def possible(draw: st.DrawFn) -> Document:
-    """A document in which nothing clashes, because all it says is true of tenths of seconds drawn first."""
+    """Draw a document without conflicts: all relations are true of times that are drawn first."""
     when = {}
     for k in range(WAITS):
         start = draw(st.integers(0, 20))
@@ -77,7 +77,7 @@ def possible(draw: st.DrawFn) -> Document:
     anywhere, slacks = st.sampled_from(sorted(when)), st.sampled_from([0, 0, 2, 9])
 
     def beside(time: int) -> str:
-        """A reference to a point in time, which may be a number."""
+        """Return a reference to a point in time, which may be a number."""
         point = draw(st.none() | anywhere)
         return f"{time / 10:g}" if point is None else written(point, time - when[point])
 
@@ -112,7 +112,7 @@ def check_same(one: Schedule, other: Schedule) -> None:
 @settings(max_examples=60)
 @given(documents())
 def test_schedule_block_leaves_no_trace_of_dropped_parts(document: Document) -> None:
-    """The rest has the times that it has in a document in which nothing else ever was."""
+    """The rest has the same times as in a document without the dropped parts."""
     found = document.schedule()
     assume(found.warnings)
     gone = {w.id.removeprefix("b1:") for w in found.warnings}

@@ -1,4 +1,4 @@
-"""Ties, longest paths and strong components, on random graphs beside SciPy's."""
+"""Tests of longest paths and strong components."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What cannot hold together is told exactly: nothing could be left out of it, and nothing shorter says it."""
+"""Tests of conflicts against linear programs: none is too large, and none could be shorter."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from realizer.scheduling.problem import ORIGIN, Problem, Relation
 from realizer.scheduling.solve import Solution, solve
 from tests.realizer.scheduling.recipes import Recipe, built, lasting, schedule, spans, wild
 
-# From point to point: the second is not sooner than the first and so many seconds.
+# (u, v, seconds): time[v] >= time[u] + seconds.
 Edge = tuple[int, int, float]
 
 
 def statements(problem: Problem, clash: Conflict) -> list[list[Edge]]:
-    """What each statement of a clash says, as edges."""
+    """Return the edges of each statement of a conflict."""
     equal = {id(r) for r in problem.equalities}
     said = [both(r) if id(r) in equal else [(r.u, r.v, r.seconds)] for r in clash.relations]
     for gap in clash.gaps:
@@ -79,7 +79,7 @@ def test_minimal_cycles_can_hold_without_any_one_statement(recipe: Recipe) -> No
 
 
 def ways(problem: Problem) -> Float64:
-    """(n, n) by how much a column's point is later than a row's by one statement; -inf where none says."""
+    """Return (n, n) the greatest gain from row to column by one statement; -inf for none."""
     n = len(problem.owner)
     found = np.full((n, n), -np.inf)
     edges = [edge for r in problem.equalities for edge in both(r)]
@@ -101,14 +101,14 @@ def ways(problem: Problem) -> Float64:
 @settings(max_examples=100)
 @given(wild)
 def test_minimal_cycles_have_the_fewest_statements_at_their_points(recipe: Recipe) -> None:
-    # A length that the document states wins over least gaps, so that these do not clash.
+    # A length that the document states takes precedence over least gaps, so these never conflict.
     recipe = recipe._replace(bodies=[body._replace(least=0.0) for body in recipe.bodies])
     problem, clashes = clashes_of(recipe)
     one = ways(problem)
     for clash in clashes:
         said = statements(problem, clash)
         if all(len(edges) == 2 for edges in said):
-            continue  # equalities alone are looked at before anything else
+            continue  # equalities alone are examined first
         points = {end for edges in said for u, v, _ in edges for end in (u, v)}
         walk = one.copy()
         for length in range(1, len(said)):
@@ -127,7 +127,7 @@ def test_minimal_cycles_prefer_the_short_of_two_cycles() -> None:
     short, long = found.warnings
     assert (short.id, long.id) == ("l", "k")
     assert [clause.id for clause in short.clash] == ["k", "l"]
-    # Three waits, that each of the later ones follows, and what wants the last one not to be after the first.
+    # Three waits, the references between them, and the constraint on the first and the last.
     assert len(long.clash) == 7
 
 

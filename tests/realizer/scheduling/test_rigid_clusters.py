@@ -1,4 +1,4 @@
-"""Springs settle where their pulls cancel, few or many, and what many need can be loaded ahead."""
+"""Tests of least squares and of the imports for large blocks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Documents and timings in, sync times out: Paul 2010 (figures 3.5 to 3.7) and what else can be asked."""
+"""Tests of the scheduling of documents, with the figures 3.5 to 3.7 of Paul 2010."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def dropped(found: Schedule) -> list[str]:
     return [w.id for w in found.warnings]
 
 
-# What Paul describes.
+# Examples of Paul 2010.
 
 
 def test_schedule_shifts_one_behaviour() -> None:
@@ -124,7 +124,7 @@ def test_schedule_moves_three_interlocked_behaviours_together(length: float) -> 
         wait("one") + wait("two", start="one:end") + wait("three", start="one:start", end="two:end"),
         {"one": timing([1.0]), "two": timing([1.0]), "three": timing([length])},
     )
-    # One and two give alike and half as much each as both together: t minimises (t - L)^2 + (t - 2)^2 / 2.
+    # One and two stretch equally, half as much each as both together: t minimises (t - L)^2 + (t - 2)^2 / 2.
     total = (2 * length + 2.0) / 3
     assert found.duration == pytest.approx(total)
     assert found.at("one", "end") == pytest.approx(total / 2)
@@ -142,7 +142,7 @@ def test_schedule_of_a_virtual_conductor_nods_on_every_beat() -> None:
 
 
 def test_schedule_of_a_conductor_of_waits_drives_head_and_face() -> None:
-    """Paul 3.3.2 without a speech: beats tied to nothing but each other; what is too long for them gives."""
+    """Paul 3.3.2 without a speech: the beats are tied to each other, and longer behaviours are shortened."""
     beats = "".join(
         wait(f"beat{k}", end=f"beat{k}:start + 0.5", **({"start": f"beat{k - 1}:end"} if k else {}))
         for k in range(6)
@@ -159,7 +159,7 @@ def test_schedule_of_a_conductor_of_waits_drives_head_and_face() -> None:
         },
     )
     assert not found.warnings
-    # The first stroke comes as early as its nod allows, and sets the tempo off.
+    # The first stroke is as early as its nod allows, and determines the tempo.
     for k in range(6):
         start = 0.25 + 0.5 * k
         assert found.at(f"n{k}", "stroke") == pytest.approx(start)
@@ -169,7 +169,7 @@ def test_schedule_of_a_conductor_of_waits_drives_head_and_face() -> None:
         )
 
 
-# Chains, speech, what pushes what.
+# Chains and speech.
 
 
 @pytest.mark.parametrize("backwards", [False, True])
@@ -359,7 +359,7 @@ def test_schedule_of_orders_with_numbers() -> None:
 
 
 def test_schedule_shares_the_strain_of_a_circle_of_orders() -> None:
-    """One inside two at both ends: the cheapest lengths, then everything as early as it can."""
+    """One behaviour inside another at both ends: the cheapest lengths, as early as possible."""
     body = (
         wait("one") + wait("two") + constraint(after("one:start", "two:start") + before("one:end", "two:end"))
     )
@@ -435,7 +435,7 @@ def test_schedule_adds_up_successive_lengths_in_a_warning() -> None:
     assert "a takes at most 2.3 s from start to relax" in found.warnings[0].text
 
 
-# What cannot hold.
+# Conflicts.
 
 
 def test_schedule_keeps_a_cycle_that_closes() -> None:

@@ -1,4 +1,4 @@
-"""In plain floats a problem has the times it has in arrays, and what breaks something is left to those."""
+"""Tests of the solver for small problems against the one in arrays."""
 
 from __future__ import annotations
 

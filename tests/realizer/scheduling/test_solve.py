@@ -1,4 +1,4 @@
-"""Laws of the solver on random problems, and its answers beside those of SciPy's slow general ones."""
+"""Laws of the solver on random problems, and a comparison with solvers of SciPy."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ def solved(recipe: Recipe, order: list[int] | None = None, **more: float) -> Flo
 
 
 def by_scipy(problem: Problem) -> Float64 | None:
-    """The reference: SLSQP for the gaps, then a linear program moves everything to its earliest place."""
+    """Return the solution of SLSQP for the gaps, moved to the earliest times by a linear program."""
     a, b, c, d = linear(problem)
     n = len(problem.owner)
-    # As far from all inequalities as can be, and from corners, from which SLSQP may not find its way.
+    # Start far from all inequalities and corners, from which SLSQP may not converge.
     room = np.hstack([-c, np.ones((len(c), 1))])
     equal = np.hstack([a, np.zeros((len(a), 1))])
     aims = np.random.default_rng(n).normal(size=(3, n)) * 0.01
@@ -55,7 +55,7 @@ def by_scipy(problem: Problem) -> Float64 | None:
     middle = np.mean([corner.x[:n] for corner in corners], axis=0)
     springs = list(spans(problem))
     if springs:
-        # SLSQP stumbles over what others imply; so it moves within what the equalities leave free.
+        # SLSQP has problems with redundant equalities, so it searches the space that they leave free.
         free = null_space(a)
         moving = np.abs(c @ free).max(axis=1, initial=0.0) > 1e-9
         left, sides = (d - c @ middle)[moving], (c @ free)[moving]
@@ -73,7 +73,7 @@ def by_scipy(problem: Problem) -> Float64 | None:
     keep = np.zeros((len(springs), n))
     for k, s in enumerate(springs):
         keep[k, s.point], keep[k, s.point + 1] = -1, 1
-    slack = 1e-6  # what SLSQP leaves
+    slack = 1e-6  # the error of SLSQP
     early = linprog(
         np.ones(n),
         A_ub=np.vstack([-c, keep, -keep]),
@@ -93,7 +93,7 @@ def test_solve_agrees_with_a_slow_general_solver(recipe: Recipe) -> None:
     assert isinstance(found, Solution)
     assume(reference is not None)
     assert found.cost <= cost_of(problem, reference) + 1e-4
-    # It gives up early now and then; what it says of the times counts where it got as far.
+    # It sometimes stops early; its times only count if its cost is as low.
     assume(cost_of(problem, reference) <= found.cost + 1e-4)
     np.testing.assert_allclose(found.time, reference, atol=3e-3)
 
@@ -101,7 +101,7 @@ def test_solve_agrees_with_a_slow_general_solver(recipe: Recipe) -> None:
 @settings(max_examples=120)
 @given(wild)
 def test_solve_finds_a_conflict_iff_a_linear_program_is_infeasible(recipe: Recipe) -> None:
-    # No least gaps: a length that the document states wins over them, which a linear program does not know.
+    # No least gaps: a stated length takes precedence over them, which a linear program does not know.
     recipe = recipe._replace(bodies=[body._replace(least=0.0) for body in recipe.bodies])
     problem = built(recipe)
     a, b, c, d = linear(problem)
@@ -121,7 +121,7 @@ def test_solve_keeps_everything_exactly(recipe: Recipe, earliest: float) -> None
         assert found, "a problem without a solution has at least one clash"
 
 
-# A circle of orders that leaves no room at all, and two behaviours that an order to a held one joins.
+# A circle of orders without slack, and two behaviours that an order joins to a held one.
 CLOSED = Recipe(
     [
         Body([0.5, 2.0], 0.0, 1.0, False, None),
@@ -132,7 +132,7 @@ CLOSED = Recipe(
     [((0, 0), (1, 2), 0.1), ((2, 2), (2, 0), 0.0)],
     [],
 )
-# A length of nothing that is stated, by way of sums that rounding makes a little less than nothing.
+# A stated length of 0 that rounding makes slightly negative.
 ROUNDED = Recipe(
     [
         Body([0.1], 0.0, 1.0, False, None),
@@ -204,7 +204,7 @@ def test_solve_has_no_cheaper_feasible_neighbour(recipe: Recipe) -> None:
     found = solve(problem)
     if not isinstance(found, Solution):
         return
-    # Downhill as far as the constraints let it go: a linear program over a small box around the solution.
+    # The steepest feasible descent: a linear program over a small box around the solution.
     a, b, c, d = linear(problem)
     step = 1e-3
     room = np.minimum(d - c @ found.time, 0.0)

@@ -1,4 +1,4 @@
-"""Blocks that are solved together: what has passed stays, the rest is as good as it can be."""
+"""Tests of blocks that are scheduled together."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def member(block: Block, timings: dict[str, Timing], **more: object) -> Member:
 
 
 def running(plays: Schedule, block: Block, timings: dict[str, Timing], origin: float, now: float) -> Member:
-    """A block that plays, as a new block that starts at `origin` sees it; both on one session clock."""
+    """Return a playing block as a new block that starts at `origin` sees it; both on one session clock."""
     passed = {
         name: {
             point: plays.start + float(time) - origin
@@ -90,7 +90,7 @@ def same(one: Schedule, other: Schedule) -> None:
 def test_schedule_together_keeps_the_past_and_moves_the_future_after_now(
     faces: Faces, late: float, length: float
 ) -> None:
-    """A wait of a new block is tied to the last face of one that plays."""
+    """A wait of a new block is tied to the last face of a playing one."""
     first, timings = drawn("a", faces)
     plays = schedule_block(first, timings)
     if not plays.times:
@@ -146,7 +146,7 @@ def test_schedule_together_does_not_depend_on_the_origin_of_the_clock(faces: Fac
 
 
 def test_schedule_together_stretches_both_blocks_equally() -> None:
-    """Paul's figure 3.6 over two blocks: 3 s that play and 2 s that come, tied at both ends."""
+    """Paul's figure 3.6 over two blocks: 3 s that play and 2 s that are new, tied at both ends."""
     first = block("a", '<wait id="w"/>')
     new = block("b", '<wait id="v" start="a:w:start" end="a:w:end"/>')
     found = schedule_together([member(new, {"v": lasting(2.0)}), member(first, {"w": lasting(3.0)})])
