@@ -102,11 +102,6 @@ def warm_up(mapping: FapMapping | None = None) -> None:
     _system(mapping)
 
 
-def arkit_faps(weights: Float32, mapping: FapMapping | None = None) -> Float32:
-    """Return the (n, 68) FAPs, in FAPU, that weights (n, 52) produce; the head's are 0."""
-    return np.asarray(weights @ _effects(mapping), np.float32)
-
-
 def _nearest(first: Float64, rest: Float32, mapping: FapMapping | None) -> Float64:
     """Return weights (n, 52), 0..1, that best show `first` plus the FAPs `rest` (n, 68)."""
     moves, scale, inverse, rho = _system(mapping)
@@ -132,7 +127,7 @@ def _nearest(first: Float64, rest: Float32, mapping: FapMapping | None) -> Float
 def _system(mapping: FapMapping | None) -> tuple[Float64, Float64, Float64, float]:
     """Return the shapes' movements (52, 68) in mm, scale (68,), inverse matrix and rho for `_nearest`."""
     scale = np.array([0.0 if row.fap in UNTOLD else MILLIMETRES[row.unit] for row in faps()])
-    moves = _effects(mapping) * scale
+    moves = shape_faps(mapping) * scale
     square = moves @ moves.T + RIDGE * np.eye(len(moves))
     sizes = np.linalg.eigvalsh(square)
     rho = float(np.sqrt(sizes[0] * sizes[-1]))
@@ -147,7 +142,7 @@ def _from_aus(mapping: FapMapping | None) -> tuple[list[int], Float32, Float32]:
         for column in _columns(shapes()[name].au, shapes()[name].side):
             # A shape that spans both sides shows their mean.
             share[column, k] = 1 / len(_columns(shapes()[name].au, shapes()[name].side))
-    effects = np.abs(_effects(mapping)) * [MILLIMETRES[row.unit] for row in faps()]
+    effects = np.abs(shape_faps(mapping)) * [MILLIMETRES[row.unit] for row in faps()]
     own = np.array([row.speech_owns for row in faps()])
     size = effects.sum(axis=1)
     return (
@@ -171,7 +166,7 @@ def _beside(side: str) -> Float32:
 
 
 @cache
-def _effects(mapping: FapMapping | None) -> Float32:
+def shape_faps(mapping: FapMapping | None) -> Float32:
     """Return the FAPs (52, 68), in FAPU, of each shape at weight 1, derived from its action unit."""
     names = ARKIT_NAMES()
     values = np.zeros((len(names), len(axis())), np.float32)

@@ -29,22 +29,17 @@ def axis() -> dict[str, Target]:
     """Return the target of every column by name: AUs (by side), 68 FAPs, mask channels, ranks."""
     # Rotations have no rank, because they add up in any order.
     ranks = (f"rank {row.au}" for row in tables.action_units() if not row.degrees)
-    names = [*_au_names(), *(row.name for row in tables.faps()), *MASKED_REGIONS, *ranks]
+    names = [*AU_NAMES(), *(row.name for row in tables.faps()), *MASKED_REGIONS, *ranks]
     return {name: Target(name, column) for column, name in enumerate(names)}
 
 
 @cache
-def _au_names() -> tuple[str, ...]:
-    """Return "1L", "1R", ... "17", ...: by AU number, left before right."""
+def AU_NAMES() -> tuple[str, ...]:
+    """Return the names of the AU columns: "1L", "1R", ... "17", ..., by number, left before right."""
     names: list[str] = []
     for row in tables.action_units():
         names += [f"{row.au}L", f"{row.au}R"] if row.sides else [str(row.au)]
     return tuple(names)
-
-
-def AU_NAMES() -> tuple[str, ...]:
-    """Return the names of the AU columns in order; the `au.names` of the JSON."""
-    return _au_names()
 
 
 @lru_cache(maxsize=512)  # more than all AUs and sides

@@ -1,10 +1,15 @@
-"""Co-occurrence rules, which reduce action units to what a face can show together (Wojdel 2005, 5.2)."""
+"""Co-occurrence rules, which reduce action units to what a face can show together (Wojdel 2005, 5.2).
+
+All rules are applied at once: each reads the requested intensities, and a unit keeps the least value that any
+rule allows. So the order of rules does not matter, a second pass changes nothing, and a small change of the
+input changes the output by at most twice as much. Domination is eq. 5.2, 5.5, 5.7, 5.8; exclusion eq. 5.9;
+opposition eq. 5.10.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,39 +17,6 @@ from realizer.animation.axis import AU_NAMES
 from realizer.animation.group_reduce import GroupReduction
 from realizer.core.array_types import Bool, Float32, Index
 from realizer.tables.cooccurrence import Rule, Rules, Unit
-
-
-class Allowed(NamedTuple):
-    """The action units that the rules leave.
-
-    Attributes:
-        aus: (n_au, n) float32, 0..1: what a FACS coder would score.
-        overridden: (n_au, n) float32: what is not scored because it is part of another unit's appearance
-            (the lips part when the jaw drops), but still moves the face.
-    """
-
-    aus: Float32
-    overridden: Float32
-
-
-def cooccur(aus: Float32, rules: Rules) -> Allowed:
-    """Apply all rules at once: each reads the input, and a unit keeps the least value that any rule allows.
-
-    So the order of rules does not matter, a second pass changes nothing, and a small change of the input
-    changes the output by at most twice as much.
-
-    Args:
-        aus: (n_au, n) float32 intensities 0..1, rows named by `AU_NAMES()`.
-        rules: the rules; domination eq. 5.2, 5.5, 5.7, 5.8; exclusion eq. 5.9; opposition eq. 5.10.
-    """
-    live = np.flatnonzero(aus.any(axis=1))
-    known = bounds(rules, tuple(live.tolist()))
-    asked = aus[live]
-    moving = known.moving(asked)
-    shown, held = np.zeros_like(aus), np.zeros_like(aus)
-    shown[live] = known.scored(asked, moving)
-    held[live] = moving - shown[live]
-    return Allowed(shown, held)
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +92,8 @@ class Bound:
 class Bounds:
     """The rules among active units, by their rows.
 
-    `taking` reduces movement, `holding` the score alone; `opposed` is (2, k).
+    `taking` reduces movement; `holding` reduces the score alone, by units whose appearance includes another
+    one (the lips part when the jaw drops); `opposed` is (2, k).
     """
 
     taking: Bound | None
@@ -149,36 +122,18 @@ class Bounds:
         return left
 
 
-def bounds(rules: Rules, live: tuple[int, ...]) -> Bounds:
-    """Return the rules among the units in rows `live`, rising, which are the ones that may differ from 0."""
-    return _bounds(_Key(rules), live)
-
-
-class _Key:
-    """A hash key for rules, by identity, so that they are compiled once."""
-
-    def __init__(self, rules: Rules) -> None:
-        self.rules = rules
-
-    def __hash__(self) -> int:
-        return id(self.rules)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Key) and other.rules is self.rules
-
-
 # Sessions repeat a few sets of units; each entry takes 5 kB.
 @lru_cache(maxsize=512)
-def _bounds(key: _Key, live: tuple[int, ...]) -> Bounds:
-    taking, holding, opposed = _compile(key)
+def bounds(rules: Rules, live: tuple[int, ...]) -> Bounds:
+    """Return the rules among the units in rows `live`, rising, which are the ones that may differ from 0."""
+    taking, holding, opposed = _compile(rules)
     row = np.full(len(AU_NAMES()), -1)
     row[list(live)] = np.arange(len(live))
     return Bounds(taking.among(row), holding.among(row), row[opposed[:, (row[opposed] >= 0).all(axis=0)]])
 
 
 @lru_cache(maxsize=8)
-def _compile(key: _Key) -> tuple[Terms, Terms, Index]:
-    rules = key.rules
+def _compile(rules: Rules) -> tuple[Terms, Terms, Index]:
     opposed = [
         (row, _rows(rule.stronger[0].au, side)[0])
         for rule in rules.rules
@@ -194,7 +149,13 @@ def _compile(key: _Key) -> tuple[Terms, Terms, Index]:
 
 def _terms(chosen: list[Rule], rules: Rules) -> Terms:
     lines = sorted(
-        (row, [(_rows(unit.au, side), _membership(unit, rule, rules)) for unit in _pair(rule)])
+        (
+            row,
+            [
+                (_rows(unit.au, side), _membership(unit, rule, rules))
+                for unit in (rule.stronger[0], rule.stronger[-1])
+            ],
+        )
         for rule in chosen
         for row, side in _sides(rule.weaker)
     )
@@ -209,10 +170,6 @@ def _terms(chosen: list[Rule], rules: Rules) -> Terms:
         2 * (at_half - at_0),
         2 * (at_1 - at_half),
     )
-
-
-def _pair(rule: Rule) -> tuple[Unit, Unit]:
-    return rule.stronger[0], rule.stronger[-1]
 
 
 def _membership(unit: Unit, rule: Rule, rules: Rules) -> tuple[float, float, float]:

@@ -124,8 +124,8 @@ def read_script(request: SpeechRequest) -> Script:
     names = [part.name for part in parts if isinstance(part, Mark) and part.name]
     for name in sorted({name for name in names if names.count(name) > 1}):
         warnings.append(f"there are several marks {name!r}: the first one is used")
-    seen = {""}
-    parts = [part for part in parts if not (isinstance(part, Mark) and _twice(part.name, seen))]
+    firsts = {part.name: part for part in reversed(parts) if isinstance(part, Mark) and part.name}
+    parts = [part for part in parts if not isinstance(part, Mark) or part is firsts.get(part.name)]
     if any(isinstance(part, str) and PICTURES.search(part) for part in parts):
         warnings.append("emoji in the text are not spoken")
         parts = [PICTURES.sub(" ", part) if isinstance(part, str) else part for part in parts]
@@ -134,13 +134,6 @@ def read_script(request: SpeechRequest) -> Script:
         warnings.append("the text is empty: nothing is spoken")
         script = Script(script.parts, tuple(warnings))
     return script
-
-
-def _twice(name: str, seen: set[str]) -> bool:
-    """Return whether a name was seen before, and remember it."""
-    there = name in seen
-    seen.add(name)
-    return there
 
 
 def _parse(ssml: str) -> tuple[list[Part], list[str]]:

@@ -47,7 +47,7 @@ class Rule:
     text: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Rules:
     """A file of rules; `sets` maps a fuzzy set to the memberships of intensities 0, 0.5 and 1."""
 

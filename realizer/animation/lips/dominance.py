@@ -11,16 +11,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from realizer.animation.lips.visemes import SHAPE, VISEMES, coarticulation, shape_table, sounds
-from realizer.core.array_types import Bool, Float64
+from realizer.core.array_types import Bool, Float64, Index
 from realizer.speech.utterance import Phoneme
 
 CLASSES = {"jaw": ("jaw",), "lips": ("upper", "lower"), "shape": SHAPE[3:7], "tongue": SHAPE[7:]}
 STRESS = {0: "none", 1: "primary", 2: "secondary"}
-
-Index = npt.NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)

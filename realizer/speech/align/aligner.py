@@ -77,9 +77,8 @@ def align_request(
         AlignError, VoiceError: as `align`.
     """
     heard, duration = to_aligner(sound, rate), len(sound) / rate
-    fix = _unusable_reason(aligner, voice)
-    if fix:
-        raise AlignError(fix)
+    if reason := _unusable_reason(aligner, voice):
+        raise AlignError(reason)
     speaker = voice or reference_voice()
     plain = replace(request, voice=None, rate=1.0, seconds=None, recording=None)
     reference = speaker.say(plain)
@@ -90,26 +89,29 @@ def align_request(
         raise AlignError(
             f"recording: wanted about {needed:.1f} s for {len(reference.words)} words, got {duration:.2f} s"
         )
-    told = reference.warnings
+    warnings = reference.warnings
     found = None
     if aligner == "pocketsphinx" or (
         aligner is None and _english(request.language) and not sphinx.install_hint()
     ):
         found = model_align(heard, duration, reference)
         if found is None:
-            words = "pocketsphinx does not find the text in the recording"
+            reason = "pocketsphinx does not find the text in the recording"
             if aligner is not None:
-                raise AlignError(words)
-            log.info("%s: aligned by espeak-ng instead", words)
+                raise AlignError(reason)
+            log.info("%s: aligned by espeak-ng instead", reason)
     if found is None:
         if reference.pcm is None:
             found = uniform_align(heard, duration, reference)
         else:
             others = [speaker.say(replace(plain, voice=OTHER))] if voice is None else []
-            found = _by_sound(heard, duration, [reference, *others])
+            spans = dtw_align(heard, [reference, *others])
+            each = [probability(cost, COST_OF_WORD) for cost in spans.costs]
+            whole = probability(spans.cost, COST)
+            found = moved("espeak", spans.reference, duration, spans.words, spans.phonemes, each, whole)
     if found.confidence < DOUBT and found.aligner != "even":
-        told += (f"the recording does not sound like the text (confidence {found.confidence:.2f})",)
-    return replace(found, warnings=(*told, *found.warnings)), reference
+        warnings += (f"the recording does not sound like the text (confidence {found.confidence:.2f})",)
+    return replace(found, warnings=(*warnings, *found.warnings)), reference
 
 
 def _unusable_reason(aligner: str | None, voice: Voice | None) -> str | None:
@@ -125,15 +127,3 @@ def _unusable_reason(aligner: str | None, voice: Voice | None) -> str | None:
 
 def _english(language: str) -> bool:
     return language.replace("_", "-").split("-")[0].lower() == "en"
-
-
-HOP = 160  # samples
-
-
-def _by_sound(sound: Float32, duration: float, references: list[Utterance]) -> Alignment:
-    """Align with the most similar of several voices that speak the text."""
-    spans = dtw_align(sound, references)
-    each = [probability(cost, COST_OF_WORD) for cost in spans.costs]
-    return moved(
-        "espeak", spans.reference, duration, spans.words, spans.phonemes, each, probability(spans.cost, COST)
-    )

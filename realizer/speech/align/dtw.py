@@ -8,9 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from realizer.core.array_types import Bool, Float64
-
-Index = npt.NDArray[np.intp]
+from realizer.core.array_types import Bool, Float64, Index
 
 # Costs, in units of the usual difference of a frame and a state; tuned on human and synthetic speech.
 STAY, SKIP, SKIP_TWO = 0.3, 0.3, 1.0  # of staying in a state, and of skipping one or two

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from realizer.core.array_types import Bool, Float32, Float64
+from realizer.core.array_types import Bool, Float32, Float64, Index
 from realizer.speech.align import features as f
-from realizer.speech.align.dtw import Index, Observed, States, best_path, quiet, usual
+from realizer.speech.align.dtw import Observed, States, best_path, quiet, usual
 from realizer.speech.utterance import Utterance
 
 COARSE, FINE = 320, 80  # samples between frames: 20 and 5 ms

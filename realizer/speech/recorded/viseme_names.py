@@ -18,11 +18,6 @@ class NamedViseme:
     ipa: str
 
 
-def viseme_sets() -> tuple[str, ...]:
-    """Return the names of the known sets."""
-    return tuple(_sounds())
-
-
 def sound_of(set: str, viseme: str) -> str:
     """Return the IPA whose mouth shape the viseme is; "" for silence.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.animation.arkit import ARKIT_NAMES, arkit, arkit_faps
+from realizer.animation.arkit import ARKIT_NAMES, arkit, shape_faps
 from realizer.animation.axis import AU_NAMES, axis, fap
 from realizer.animation.frames import AUFrames
 from realizer.offline import realize
@@ -80,7 +80,7 @@ def test_arkit_turns_eyes_and_head_like_the_faps():
 
 
 def test_arkit_of_speech_reproduces_its_faps(spoken):
-    back = arkit_faps(arkit(spoken.aus, spoken.mapping).weights, spoken.mapping)
+    back = arkit(spoken.aus, spoken.mapping).weights @ shape_faps(spoken.mapping)
     scale = np.array([UNITS.get(row.unit, 0.0) for row in faps()])
     wanted, off = spoken.faps.values * scale, (back - spoken.faps.values) * scale
     mouth = [row.fap - 1 for row in faps() if row.group in (2, 8) and row.fap not in (14, 15)]
