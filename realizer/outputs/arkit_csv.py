@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from realizer.animation.arkit import ARKIT_NAMES, ArkitFrames, arkit
-from realizer.outputs.output import Output, RenderSettings
-
-if TYPE_CHECKING:
-    from realizer.realization import Realization
+from realizer.outputs.csv_table import csv_text
+from realizer.outputs.output import Output
 
 _EYE = ("Blink", "LookDown", "LookIn", "LookOut", "LookUp", "Squint", "Wide")
 # The order of the app's files.
@@ -41,16 +35,10 @@ def encode_arkit_csv(frames: ArkitFrames, fps: float) -> str:
     order = [ARKIT_NAMES().index(name[0].lower() + name[1:]) for name in SHAPES]
     eyes = np.pad(frames.eyes, ((0, 0), (0, 0), (0, 1))).reshape(len(frames.times), 6)
     rows = np.concatenate([frames.weights[:, order], frames.head, eyes], axis=1) + 0.0  # no -0
-    buffer = io.StringIO()
-    table = csv.writer(buffer, lineterminator="\n")
-    table.writerow(COLUMNS)
-    for time, row in zip(frames.times.tolist(), rows.tolist(), strict=True):
-        table.writerow([_timecode(time, fps), len(row), *(f"{value:.6f}" for value in row)])
-    return buffer.getvalue()
-
-
-def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
-    return encode_arkit_csv(arkit(realization.aus, realization.mapping), realization.fps).encode()
+    timed = zip(frames.times.tolist(), rows.tolist(), strict=True)
+    return csv_text(
+        COLUMNS, ([_timecode(time, fps), len(row), *(f"{value:.6f}" for value in row)] for time, row in timed)
+    )
 
 
 def _timecode(seconds: float, fps: float) -> str:
@@ -63,6 +51,6 @@ ARKIT_CSV = Output(
     ".arkit.csv",
     "text/csv",
     "a row a frame: ARKit's 52 weights as Live Link Face writes them",
-    _encode,
+    lambda made, _: encode_arkit_csv(arkit(made.aus, made.mapping), made.fps).encode(),
     reader="openfacefx",
 )

@@ -16,6 +16,8 @@ from realizer.animation.fap.fap_clip import FAPClip
 from realizer.animation.fap.fap_reader import read_fap
 from realizer.core.errors import RealizerError
 from realizer.outputs import fap_text
+from realizer.outputs.csv_table import csv_text
+from realizer.outputs.json_text import json_line
 from realizer.tables import faps
 
 # Table columns of FAP 1 and 2.
@@ -67,12 +69,8 @@ def _to_csv(clip: FAPClip) -> str:
     if clip.mask[0]:
         parts.insert(0, clip.visemes)
         names = [*VISEME, *names]
-    buffer = io.StringIO()
-    table = csv.writer(buffer, lineterminator="\n")
-    table.writerow(["time", *names])
-    for frame, row in enumerate(np.hstack(parts).tolist()):
-        table.writerow([f"{frame / clip.fps:.9g}", *row])
-    return buffer.getvalue()
+    rows = enumerate(np.hstack(parts).tolist())
+    return csv_text(["time", *names], ([f"{frame / clip.fps:.9g}", *row] for frame, row in rows))
 
 
 def _from_csv(text: str) -> FAPClip:
@@ -141,8 +139,7 @@ def _to_json(clip: FAPClip) -> str:
         fap["viseme"] = clip.visemes.tolist()
     if clip.mask[1]:
         fap["expression"] = clip.expressions.tolist()
-    whole = {"name": clip.name, "fps": clip.fps, "frames": len(clip.values), "fap": fap}
-    return json.dumps(whole, ensure_ascii=False, allow_nan=False, separators=(",", ":")) + "\n"
+    return json_line({"name": clip.name, "fps": clip.fps, "frames": len(clip.values), "fap": fap})
 
 
 def _from_json(text: str) -> FAPClip:

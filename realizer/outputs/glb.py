@@ -10,11 +10,10 @@ from realizer.core.array_types import Float32
 from realizer.face.glb_file import GlbFile
 from realizer.outputs.glb_mesh import morphing_mesh, rigid_mesh
 from realizer.outputs.morph_targets import make_morph_targets
-from realizer.outputs.output import Output, RenderSettings
+from realizer.outputs.output import Output
 
 if TYPE_CHECKING:
     from realizer.face.model import Face
-    from realizer.realization import Realization
 
 # Node numbers; those of the eyes follow.
 FACE, NECK, HEAD = 0, 1, 2
@@ -78,10 +77,6 @@ def encode_glb(face: Face, poses: Float32, fps: float) -> bytes:
     )
 
 
-def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
-    return encode_glb(realization.face, realization.poses, realization.fps)
-
-
 def quaternions(turns: Float32) -> Float32:
     """Convert pitch, yaw, roll (n, 3) to x, y, z, w (n, 4), as `face.deform` does: roll first, yaw last."""
     from scipy.spatial.transform import Rotation
@@ -107,5 +102,9 @@ def _material(name: str, roughness: float) -> dict[str, Any]:
 
 
 GLB = Output(
-    ".glb", "model/gltf-binary", "the head, animated: morph targets, head and eyes", _encode, reader="trimesh"
+    ".glb",
+    "model/gltf-binary",
+    "the head, animated: morph targets, head and eyes",
+    lambda realization, _: encode_glb(realization.face, realization.poses, realization.fps),
+    reader="trimesh",
 )

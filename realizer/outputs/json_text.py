@@ -3,28 +3,32 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from realizer.outputs.output import Output, RenderSettings
+from realizer.outputs.output import Output
 
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
 
-def encode_json(realization: Realization) -> str:
+def json_line(content: Any) -> str:
     """Return a line of JSON.
 
     Raises:
         ValueError: if a number is not finite.
     """
-    text = json.dumps(realization.to_json(), ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    return text + "\n"
+    return json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":")) + "\n"
 
 
-def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
-    return encode_json(realization).encode()
+def encode_json(realization: Realization) -> str:
+    """Return `Realization.to_json` as a line; errors as `json_line`."""
+    return json_line(realization.to_json())
 
 
 JSON = Output(
-    ".json", "application/json", "schedule, FAPs, AUs, feedback and warnings", _encode, all_characters=True
+    ".json",
+    "application/json",
+    "schedule, FAPs, AUs, feedback and warnings",
+    lambda realization, _: encode_json(realization).encode(),
+    all_characters=True,
 )

@@ -95,15 +95,15 @@ def _picture_size(drawing: RenderSettings) -> tuple[tuple[int, int], bool]:
 
 def _points(realization: Realization, count: int) -> dict[int, tuple[str, ...]]:
     """Return the sync points nearest to each frame, with block names if there are several blocks."""
-    found: dict[int, list[str]] = {}
+    names: dict[int, list[str]] = {}
     several = len(realization.schedules) > 1
     for schedule in realization.schedules:
         for behaviour, times in schedule.times.items():
             for point, time in zip(schedule.points[behaviour], times, strict=True):
                 frame = min(max(round((schedule.start + float(time)) * realization.fps), 0), count - 1)
                 name = f"{schedule.block}:{behaviour}:{point}" if several else f"{behaviour}:{point}"
-                found.setdefault(frame, []).append(name)
-    return {frame: tuple(names) for frame, names in found.items()}
+                names.setdefault(frame, []).append(name)
+    return {frame: tuple(points) for frame, points in names.items()}
 
 
 PNG = Output(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import json
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -14,7 +13,8 @@ from realizer.animation.arkit import ARKIT_NAMES, arkit
 from realizer.animation.lips.viseme_weights import oculus_visemes
 from realizer.animation.lips.visemes import sounds
 from realizer.outputs import speech_spans
-from realizer.outputs.output import Output, RenderSettings
+from realizer.outputs.json_text import json_line
+from realizer.outputs.output import Output
 from realizer.outputs.speech_spans import Span
 
 if TYPE_CHECKING:
@@ -53,11 +53,7 @@ def encode_talkinghead(realization: Realization) -> str:
         "sampleRate": RATE,
         "audio": base64.b64encode(sound.astype("<i2").tobytes()).decode(),
     }
-    return json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":")) + "\n"
-
-
-def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
-    return encode_talkinghead(realization).encode()
+    return json_line(content)
 
 
 def _timed(name: str, letter: str, spans: Iterable[Span]) -> dict[str, Any]:
@@ -116,6 +112,6 @@ TALKINGHEAD = Output(
     ".talkinghead.json",
     "application/json",
     "words, visemes, face and sound for TalkingHead",
-    _encode,
+    lambda realization, _: encode_talkinghead(realization).encode(),
     reader="talkinghead.html",
 )

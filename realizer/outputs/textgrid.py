@@ -7,7 +7,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING
 
 from realizer.outputs import speech_spans
-from realizer.outputs.output import Output, RenderSettings
+from realizer.outputs.output import Output
 from realizer.outputs.speech_spans import Span
 
 if TYPE_CHECKING:
@@ -40,10 +40,6 @@ def encode_textgrid(realization: Realization) -> str:
     for k, tier in enumerate(tiers, 1):
         lines += [f"    item [{k}]:", *(f"        {line}" for line in tier)]
     return "\n".join(lines) + "\n"
-
-
-def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
-    return encode_textgrid(realization).encode()
 
 
 def _intervals(name: str, end: float, spans: Iterable[Span]) -> list[str]:
@@ -107,7 +103,7 @@ TEXTGRID = Output(
     ".textgrid",
     "text/x-textgrid",
     "words, phonemes and sync points for Praat",
-    _encode,
+    lambda realization, _: encode_textgrid(realization).encode(),
     all_characters=True,
     reader="praatio",
 )

@@ -13,7 +13,7 @@ from realizer.animation.axis import AU_NAMES, au
 from realizer.core.array_types import Float32, Float64
 from realizer.face.glb_file import GlbFile
 from realizer.outputs.glb import quaternions
-from realizer.outputs.output import Output, RenderSettings
+from realizer.outputs.output import Output
 from realizer.tables import read_toml, text_of
 from realizer.tables.lexemes import face_lexemes
 
@@ -85,10 +85,6 @@ def expressions(realization: Realization) -> dict[str, Float32]:
     return {name: np.clip(weights, 0, 1).astype(np.float32) for name, weights in found.items()}
 
 
-def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
-    return encode_vrma(realization)
-
-
 def _mixture(shown: Float32) -> Float64:
     """Return the parts (n, k) of the faces, by trying all subsets of these few."""
     _, faces = _faces()
@@ -143,5 +139,9 @@ def _table() -> dict[str, Any]:
 
 
 VRMA = Output(
-    ".vrma", "model/gltf-binary", "expressions, head and gaze for VRM avatars", _encode, reader="vrma.mjs"
+    ".vrma",
+    "model/gltf-binary",
+    "expressions, head and gaze for VRM avatars",
+    lambda realization, _: encode_vrma(realization),
+    reader="vrma.mjs",
 )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from realizer.outputs import speech_spans
-from realizer.outputs.output import Output, RenderSettings
+from realizer.outputs.output import Output
 
 if TYPE_CHECKING:
     from realizer.realization import Realization
@@ -31,28 +31,19 @@ def encode_vtt(realization: Realization) -> str:
 
     The cue of a sync point lasts a frame, and its identifier is its name.
     """
-    cues = sorted(_cues(realization), key=lambda cue: (cue.start, KINDS.index(cue.kind), cue.id))
-    blocks = ["WEBVTT"]
-    for cue in cues:
-        head = f"{timestamp(cue.start)} --> {timestamp(max(cue.end, cue.start + LEAST))}"
-        identifier = [cue.id.replace("-->", "--")] if cue.id else []
-        blocks.append(
-            "\n".join([*identifier, head, f"<c.{cue.kind}>{html.escape(cue.text, quote=False)}</c>"])
-        )
-    return "\n\n".join(blocks) + "\n"
-
-
-def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
-    return encode_vtt(realization).encode()
+    blocks = ["WEBVTT\n"]
+    for cue in sorted(_cues(realization), key=lambda cue: (cue.start, KINDS.index(cue.kind), cue.id)):
+        identifier = cue.id.replace("-->", "--") + "\n" if cue.id else ""
+        clock = f"{timestamp(cue.start)} --> {timestamp(max(cue.end, cue.start + LEAST))}"
+        text = html.escape(cue.text, quote=False)
+        blocks.append(f"{identifier}{clock}\n<c.{cue.kind}>{text}</c>\n")
+    return "\n".join(blocks)
 
 
 def _cues(realization: Realization) -> Iterator[_Cue]:
-    for speaking in realization.speeches:
-        for kind, spans in (
-            ("word", speech_spans.words(speaking)),
-            ("phoneme", speech_spans.phonemes(speaking)),
-        ):
-            for span in spans:
+    for kind, spans_of in (("word", speech_spans.words), ("phoneme", speech_spans.phonemes)):
+        for speaking in realization.speeches:
+            for span in spans_of(speaking):
                 yield _Cue(span.start, span.end, kind, span.text)
     for time, name in speech_spans.points(realization):
         yield _Cue(time, time + 1 / realization.fps, "sync", name, name)
@@ -69,7 +60,7 @@ VTT = Output(
     ".vtt",
     "text/vtt",
     "words, phonemes and sync points as WebVTT cues",
-    _encode,
+    lambda realization, _: encode_vtt(realization).encode(),
     all_characters=True,
     reader="webvtt",
 )

@@ -4,13 +4,9 @@ from __future__ import annotations
 
 import io
 import wave
-from typing import TYPE_CHECKING
 
 from realizer.core.array_types import Int16
-from realizer.outputs.output import Output, RenderSettings
-
-if TYPE_CHECKING:
-    from realizer.realization import Realization
+from realizer.outputs.output import Output
 
 RATE = 22050  # Hz; the rate of espeak-ng, whose sound is not resampled
 
@@ -26,10 +22,11 @@ def encode_wav(pcm: Int16, rate: int) -> bytes:
     return buffer.getvalue()
 
 
-def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
-    return encode_wav(realization.sound(RATE), RATE)
-
-
 WAV = Output(
-    ".wav", "audio/wav", "the sound, 16 bit mono, 22,050 Hz", _encode, all_characters=True, reader="wave"
+    ".wav",
+    "audio/wav",
+    "the sound, 16 bit mono, 22,050 Hz",
+    lambda realization, _: encode_wav(realization.sound(RATE), RATE),
+    all_characters=True,
+    reader="wave",
 )
