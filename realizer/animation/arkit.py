@@ -79,10 +79,10 @@ def arkit(frames: AUFrames, mapping: FapMapping | None = None) -> ArkitFrames:
     lips = frames.values[:, mask_channel("lips").column, None]
     moving = frames.moving.T
     first = moving @ share * (1 - owned * lips)
-    told = frames.values.copy()
-    told[:, : len(AU_NAMES()) + 68] = 0
-    told[:, columns] = moving[:, columns]
-    rest = whole - to_fap(AUFrames(frames.times, told, overridden=frames.overridden), mapping).values
+    covered = frames.values.copy()
+    covered[:, : len(AU_NAMES()) + 68] = 0
+    covered[:, columns] = moving[:, columns]
+    rest = whole - to_fap(AUFrames(frames.times, covered, overridden=frames.overridden), mapping).values
     weights = np.empty((len(whole), len(ARKIT_NAMES())), np.float32)
     for start in range(0, len(whole), CHUNK):
         part = slice(start, start + CHUNK)

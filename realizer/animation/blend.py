@@ -48,17 +48,17 @@ def blend(
         rules: co-occurrence rules; None for none.
         idle: the idle motion of the face between the first and the last of the times.
     """
-    asked = np.asarray(times, np.float64)
-    order = in_order(asked)
-    times = asked if order is None else asked[order]
-    alive = _visible(channels, times)
+    requested = np.asarray(times, np.float64)
+    order = in_order(requested)
+    times = requested if order is None else requested[order]
+    visible = _visible(channels, times)
     # Only columns that move are computed; `place` holds the row of each of them.
-    moved = {channel.target.column for channel in alive}
+    moved = {channel.target.column for channel in visible}
     if idle is not None:
         moved |= {*idle.motion.columns, *_lids()}
     columns = sorted(moved)
     place = {column: i for i, column in enumerate(columns)}
-    values, base, gaze = _layers(alive, idle, place, times)
+    values, base, gaze = _layers(visible, idle, place, times)
     if gaze is not None:
         _share_regions(gaze, base, place)
         values += gaze
@@ -66,16 +66,18 @@ def blend(
         # Of base states and expressions the stronger is shown; rotations add up.
         adds = np.array([_sums()[column] for column in columns])[:, None]
         values = np.where(adds, base + values, np.maximum(base, values))
-    held = _override(values, alive, place, times)
+    overridden = _override(values, visible, place, times)
     # FAPs, between AUs and mask channels, have limits of their own.
     first, last = (bisect_left(columns, len(AU_NAMES()) + count) for count in (0, 68))
     for limited in (values[:first], values[last:]) if first < last else (values,):
         np.clip(limited, 0.0, 1.0, out=limited)
     frames = _by_column(values, columns, len(axis()), order)
-    if held is None or not held[first:last].any():
-        return AUFrames(asked, frames, rules, None, tuple(columns))
+    if overridden is None or not overridden[first:last].any():
+        return AUFrames(requested, frames, rules, None, tuple(columns))
     faps = [column - len(AU_NAMES()) for column in columns[first:last]]
-    return AUFrames(asked, frames, rules, _by_column(held[first:last], faps, 68, order), tuple(columns))
+    return AUFrames(
+        requested, frames, rules, _by_column(overridden[first:last], faps, 68, order), tuple(columns)
+    )
 
 
 def _visible(channels: Iterable[Channel], times: Float64) -> list[Channel]:
@@ -110,9 +112,9 @@ def _layers(
         at = found.spread(np.array(rows) * len(times))
         at += found.frames
         adding = found.spread(np.array(adds))
-        some, others = adding.nonzero()[0], (~adding).nonzero()[0]
-        np.add.at(whole.reshape(-1), at[some], values[some])
-        np.maximum.at(whole.reshape(-1), at[others], values[others])
+        summed, strongest = adding.nonzero()[0], (~adding).nonzero()[0]
+        np.add.at(whole.reshape(-1), at[summed], values[summed])
+        np.maximum.at(whole.reshape(-1), at[strongest], values[strongest])
     one, base, gaze = (
         whole[layers[layer]] if layer in layers else None for layer in (Layer.EXPRESSION, *APART)
     )
@@ -180,19 +182,19 @@ def _override(
     Returns:
         (c, n) 0..1 how far each value was replaced, or None if nowhere.
     """
-    held: Float64 | None = None
+    overridden: Float64 | None = None
     for layer in OVER:
         if over := [channel for channel in channels if channel.layer is layer]:
             rows = [place[channel.target.column] for channel in over]
-            there, shown = np.zeros_like(values), np.zeros_like(values)
-            np.add.at(there, rows, weights(over, times))
+            weight, shown = np.zeros_like(values), np.zeros_like(values)
+            np.add.at(weight, rows, weights(over, times))
             np.add.at(shown, rows, sample(over, times))
-            shown /= np.maximum(there, 1.0)
-            left = 1.0 - np.minimum(there, 1.0)
+            shown /= np.maximum(weight, 1.0)
+            left = 1.0 - np.minimum(weight, 1.0)
             values *= left
             values += shown
-            held = 1.0 - left if held is None else 1.0 - (1.0 - held) * left
-    return held
+            overridden = 1.0 - left if overridden is None else 1.0 - (1.0 - overridden) * left
+    return overridden
 
 
 @cache

@@ -128,11 +128,11 @@ class Channel:
     @property
     def weight_channel(self) -> Channel:
         """The weight over time, as a channel itself."""
-        there = np.ones(len(self.times)) if self.weight is None else self.weight
-        joint = (
+        weights = np.ones(len(self.times)) if self.weight is None else self.weight
+        crossfade = (
             None if self.crossfade is None else self.crossfade._replace(value=self.crossfade.share, slope=0.0)
         )
-        return replace(self, values=there, crossfade=joint)
+        return replace(self, values=weights, crossfade=crossfade)
 
     @property
     def faded_at(self) -> float:

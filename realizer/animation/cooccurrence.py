@@ -100,25 +100,25 @@ class Bounds:
     holding: Bound | None
     opposed: Index
 
-    def moving(self, asked: Float32) -> Float32:
+    def moving(self, requested: Float32) -> Float32:
         """Return the part (u, n) of requested intensities that moves the face, scored or not."""
         if self.taking is None and not self.opposed.size:
-            return asked
-        left = asked.copy()
+            return requested
+        left = requested.copy()
         if self.opposed.size:
-            pairs = asked.take(self.opposed, axis=0)  # (2, k, n)
+            pairs = requested.take(self.opposed, axis=0)  # (2, k, n)
             pairs -= np.minimum(*pairs)
             left[self.opposed] = pairs
         if self.taking is not None:
-            self.taking.lower(left, asked)
+            self.taking.lower(left, requested)
         return left
 
-    def scored(self, asked: Float32, moving: Float32) -> Float32:
+    def scored(self, requested: Float32, moving: Float32) -> Float32:
         """Return the part (u, n) of `moving` (u, n) that a FACS coder would score."""
         if self.holding is None:
             return moving
         left = moving.copy()
-        self.holding.lower(left, asked)
+        self.holding.lower(left, requested)
         return left
 
 

@@ -28,33 +28,33 @@ def crossfade(old: Sequence[Channel], new: Sequence[Channel], now: float) -> tup
     kept = [c for c in old if c.until < float("inf")]
     playing = [c for c in old if c.until == float("inf")]
     # When a speech grows, most of its channels stay equal.
-    there = {(id(c.values), c.target): c for c in playing if c.crossfade is None and not c.gains}
-    stays: set[int] = set()
-    news: list[Channel] = []
+    comparable = {(id(c.values), c.target): c for c in playing if c.crossfade is None and not c.gains}
+    unchanged: set[int] = set()
+    pending: list[Channel] = []
     for channel in new:
-        was = there.get((id(channel.values), channel.target))
-        if was is not None and np.abs(was.times - channel.times).max() < SAME:
-            stays.add(id(was))
+        previous = comparable.get((id(channel.values), channel.target))
+        if previous is not None and np.abs(previous.times - channel.times).max() < SAME:
+            unchanged.add(id(previous))
         else:
-            news.append(channel)
-    kept += [c for c in playing if id(c) in stays]
-    playing = [c for c in playing if id(c) not in stays]
-    pairs = [(c, _twin(c, n, playing, news)) for n, c in enumerate(playing)]
+            pending.append(channel)
+    kept += [c for c in playing if id(c) in unchanged]
+    playing = [c for c in playing if id(c) not in unchanged]
+    pairs = [(c, _twin(c, n, playing, pending)) for n, c in enumerate(playing)]
     follow = [(c, replace(twin, gains=c.gains)) for c, twin in pairs if twin is not None]
-    lonely = [c.faded(now, now + HEALS) for c, twin in pairs if twin is None]
-    taken = {id(twin) for _, twin in pairs}
-    fresh = [c for c in news if id(c) not in taken]
+    unmatched = [c.faded(now, now + HEALS) for c, twin in pairs if twin is None]
+    matched = {id(twin) for _, twin in pairs}
+    fresh = [c for c in pending if id(c) not in matched]
     if not follow:
-        return (*kept, *lonely, *fresh)
+        return (*kept, *unmatched, *fresh)
     before, after = (list(side) for side in zip(*follow, strict=True))
     shown = sample([*before, *after], np.array([now, now + STEP])).reshape(2, len(follow), 2)
     value, ahead = (shown[0] - shown[1]).T
     present = weights([*before, *after], np.array([now])).reshape(2, len(follow))
-    joints = [
+    continued = [
         replace(c, crossfade=Crossfade(now, float(v), float((a - v) / STEP), HEALS, float(share)))
         for c, v, a, share in zip(after, value, ahead, present[0] - present[1], strict=True)
     ]
-    return (*kept, *(replace(c, until=now) for c in before), *joints, *lonely, *fresh)
+    return (*kept, *(replace(c, until=now) for c in before), *continued, *unmatched, *fresh)
 
 
 def _twin(channel: Channel, n: int, old: Sequence[Channel], new: Sequence[Channel]) -> Channel | None:

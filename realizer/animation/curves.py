@@ -110,11 +110,11 @@ def samples(channels: Sequence[Channel], times: Float64) -> Samples:
             changed.append(i)
     found: list[Samples] = []
     for curve, rows in by_curve.items():
-        some = [channels[i] for i in rows]
+        group = [channels[i] for i in rows]
         if curve is None:
-            found.append(_interpolated(np.array(rows), some, times))
+            found.append(_interpolated(np.array(rows), group, times))
         else:
-            found.append(_between(np.array(rows), some, times, CURVES[curve]))
+            found.append(_between(np.array(rows), group, times, CURVES[curve]))
     whole = found[0] if len(found) == 1 else _joined(found)
     return _changed(whole, channels, changed, times) if changed else whole
 
@@ -220,10 +220,10 @@ def _changed(found: Samples, channels: Sequence[Channel], changed: Sequence[int]
     gains: dict[tuple[Gain, ...], Float64] = {}  # channels of one behaviour usually share theirs
     more = [found]
     for i in changed:
-        channel, joint = channels[i], channels[i].crossfade
+        channel, crossfade = channels[i], channels[i].crossfade
         part = slice(stops[i] - counts[i], stops[i])
         frames, values = found.frames[part], found.values[part]
-        if joint is not None:  # a crossfade may last beyond the keys
+        if crossfade is not None:  # a crossfade may last beyond the keys
             row = np.zeros(len(times))
             row[frames] = values
             values[:] = 0.0
@@ -234,19 +234,19 @@ def _changed(found: Samples, channels: Sequence[Channel], changed: Sequence[int]
                 gains[channel.gains] = gain_at(channel.gains, times)
             values *= gains[channel.gains][frames]
         shown = times[frames]
-        if joint is not None:
-            values += _healing(joint, shown)
-            values[shown < joint.at] = 0.0
+        if crossfade is not None:
+            values += _healing(crossfade, shown)
+            values[shown < crossfade.at] = 0.0
         if channel.until < np.inf:
             values[shown >= channel.until] = 0.0
     return found if len(more) == 1 else _joined(more)
 
 
-def _healing(joint: Crossfade, times: Float64) -> Float64:
+def _healing(crossfade: Crossfade, times: Float64) -> Float64:
     """Return the correction (n,) that makes value and slope continuous at the crossfade; 0 after its end."""
-    passed = times - joint.at
-    left = 1.0 - smooth(np.clip(passed / joint.length, 0.0, 1.0))
-    return (joint.value + joint.slope * passed) * left
+    passed = times - crossfade.at
+    left = 1.0 - smooth(np.clip(passed / crossfade.length, 0.0, 1.0))
+    return (crossfade.value + crossfade.slope * passed) * left
 
 
 def gain_at(gains: Sequence[Gain], times: Float64) -> Float64:

@@ -37,10 +37,10 @@ class AUFrames:
     @classmethod
     def concatenate(cls, windows: Sequence[AUFrames]) -> AUFrames:
         """Join windows, at least one, which all have the same rules."""
-        held = None
+        overridden = None
         if any(window.overridden is not None for window in windows):
             none = [np.zeros((len(window.times), 68), np.float32) for window in windows]
-            held = np.concatenate(
+            overridden = np.concatenate(
                 [n if w.overridden is None else w.overridden for w, n in zip(windows, none, strict=True)]
             )
         columns = None
@@ -50,14 +50,14 @@ class AUFrames:
             np.concatenate([window.times for window in windows]),
             np.concatenate([window.values for window in windows]),
             windows[0].rules,
-            held,
+            overridden,
             columns,
         )
 
     def part(self, first: int, last: int) -> AUFrames:
         """Return frames `first` .. `last - 1`."""
-        held = None if self.overridden is None else self.overridden[first:last]
-        return AUFrames(self.times[first:last], self.values[first:last], self.rules, held, self.columns)
+        overridden = None if self.overridden is None else self.overridden[first:last]
+        return AUFrames(self.times[first:last], self.values[first:last], self.rules, overridden, self.columns)
 
     @cached_property
     def moving_columns(self) -> tuple[int, ...]:

@@ -19,23 +19,23 @@ BENT = 0.01  # smaller changes of a normal, half a degree, are invisible
 
 
 def rigid_mesh(
-    file: GlbFile, face: Face, mine: Bool, name: str, material: int, centre: Float32 | float = 0.0
+    file: GlbFile, face: Face, part: Bool, name: str, material: int, centre: Float32 | float = 0.0
 ) -> dict[str, Any]:
     """Return the mesh of a part of a face at rest.
 
     Args:
-        mine: (n_vertices,) whether a vertex belongs to the part; triangles with other vertices are omitted.
+        part: (n_vertices,) whether a vertex belongs to the part; triangles with other vertices are omitted.
         centre: (3,) metres, the origin of the mesh.
     """
     # Colours include the baked occlusion, because viewers do not support it by vertex.
-    colours = np.full((mine.sum(), 4), 65535, np.uint16)
-    colours[:, :3] = np.rint(linear(face.colours[mine]) * face.occlusion[mine, None] * 65535)
-    triangles = face.triangles[mine[face.triangles].all(axis=1)]
-    numbers = np.cumsum(mine) - 1
+    colours = np.full((part.sum(), 4), 65535, np.uint16)
+    colours[:, :3] = np.rint(linear(face.colours[part]) * face.occlusion[part, None] * 65535)
+    triangles = face.triangles[part[face.triangles].all(axis=1)]
+    numbers = np.cumsum(part) - 1
     primitive = {
         "attributes": {
-            "POSITION": file.add(face.vertices[mine] - np.float32(centre), target=ARRAY_BUFFER, bounds=True),
-            "NORMAL": file.add(_ups(face, face.vertices)[mine], target=ARRAY_BUFFER),
+            "POSITION": file.add(face.vertices[part] - np.float32(centre), target=ARRAY_BUFFER, bounds=True),
+            "NORMAL": file.add(_ups(face, face.vertices)[part], target=ARRAY_BUFFER),
             "COLOR_0": file.add(colours, target=ARRAY_BUFFER, normalised=True),
         },
         "indices": file.add(numbers[triangles].astype(np.uint32).ravel(), target=ELEMENT_ARRAY_BUFFER),
@@ -44,12 +44,12 @@ def rigid_mesh(
     return {"name": name, "primitives": [primitive]}
 
 
-def morphing_mesh(file: GlbFile, face: Face, mine: Bool, material: int, made: MorphTargets) -> dict[str, Any]:
+def morphing_mesh(file: GlbFile, face: Face, part: Bool, material: int, made: MorphTargets) -> dict[str, Any]:
     """Return the mesh of a part with morph targets, and two joints: 0 is fixed, 1 is the head."""
-    mesh = rigid_mesh(file, face, mine, face.name, material)
+    mesh = rigid_mesh(file, face, part, face.name, material)
     (primitive,) = mesh["primitives"]
-    shares = np.zeros((mine.sum(), 4), np.float32)
-    shares[:, 1] = face.basis["head"][mine, 0]
+    shares = np.zeros((part.sum(), 4), np.float32)
+    shares[:, 1] = face.basis["head"][part, 0]
     shares[:, 0] = 1 - shares[:, 1]
     # glTF requires joint 0 for weights of 0.
     joints = (shares > 0) * np.array([0, 1, 0, 0], np.uint8)
@@ -57,19 +57,19 @@ def morphing_mesh(file: GlbFile, face: Face, mine: Bool, material: int, made: Mo
     primitive["attributes"]["WEIGHTS_0"] = file.add(shares, target=ARRAY_BUFFER)
     if made.names:
         ups = _ups(face, face.vertices)
-        primitive["targets"] = [_target(file, face, mine, moves, ups) for moves in made.moves]
+        primitive["targets"] = [_target(file, face, part, moves, ups) for moves in made.moves]
         mesh["weights"] = [0.0] * len(made.names)
         # The usual place for names of targets, which glTF does not define.
         mesh["extras"] = {"targetNames": list(made.names)}
     return mesh
 
 
-def _target(file: GlbFile, face: Face, mine: Bool, moves: Float32, ups: Float32) -> dict[str, int]:
+def _target(file: GlbFile, face: Face, part: Bool, moves: Float32, ups: Float32) -> dict[str, int]:
     bent = _ups(face, face.vertices + moves) - ups
     bent[np.abs(bent).max(axis=1) < BENT] = 0
     return {
-        "POSITION": file.add_sparse(moves[mine], bounds=True),
-        "NORMAL": file.add_sparse(bent[mine]),
+        "POSITION": file.add_sparse(moves[part], bounds=True),
+        "NORMAL": file.add_sparse(bent[part]),
     }
 
 

@@ -44,8 +44,8 @@ def points(realization: Realization) -> tuple[tuple[float, str], ...]:
     return tuple(sorted(found))
 
 
-def _audible(speaking: ScheduledSpeech, told: Iterator[tuple[Word | Phoneme, str]]) -> Iterator[Span]:
-    for part, text in told:
+def _audible(speaking: ScheduledSpeech, timed: Iterator[tuple[Word | Phoneme, str]]) -> Iterator[Span]:
+    for part, text in timed:
         start = speaking.start + part.start
         end = min(speaking.start + part.end, speaking.until)
         if end - start >= LEAST and text.strip():

@@ -39,11 +39,11 @@ def encode_talkinghead(realization: Realization) -> str:
     `markers` are names of sync points, to be replaced by functions; `audio`, to be passed as `[bytes]`, is
     base64 of 16-bit mono PCM at `sampleRate`.
     """
-    mine = tuple(s for s in realization.speeches if s.character == 0)
-    words = [word for speaking in mine for word in speech_spans.words(speaking)]
-    visemes = [viseme for speaking in mine for viseme in _visemes(speaking)]
+    own = tuple(s for s in realization.speeches if s.character == 0)
+    words = [word for speaking in own for word in speech_spans.words(speaking)]
+    visemes = [viseme for speaking in own for viseme in _visemes(speaking)]
     points = speech_spans.points(realization)
-    sound = replace(realization, speeches=mine).sound(RATE)
+    sound = replace(realization, speeches=own).sound(RATE)
     content = {
         **_timed("words", "w", words),
         **_timed("visemes", "v", visemes),

@@ -25,13 +25,11 @@ def encode_textgrid(realization: Realization) -> str:
     end = max([realization.duration, 1 / realization.fps, *_ends(realization)])
     tiers = []
     for index, name in enumerate(realization.characters):
-        mine = [speaking for speaking in realization.speeches if speaking.character == index]
-        mine.sort(key=lambda speaking: speaking.start)
+        own = [speaking for speaking in realization.speeches if speaking.character == index]
+        own.sort(key=lambda speaking: speaking.start)
         prefix = f"{name or index} " if index else ""
-        tiers.append(_intervals(f"{prefix}words", end, (w for s in mine for w in speech_spans.words(s))))
-        tiers.append(
-            _intervals(f"{prefix}phonemes", end, (p for s in mine for p in speech_spans.phonemes(s)))
-        )
+        tiers.append(_intervals(f"{prefix}words", end, (w for s in own for w in speech_spans.words(s))))
+        tiers.append(_intervals(f"{prefix}phonemes", end, (p for s in own for p in speech_spans.phonemes(s))))
     tiers.append(_points("syncs", end, speech_spans.points(realization)))
     lines = [
         'File type = "ooTextFile"', 'Object class = "TextGrid"', "",

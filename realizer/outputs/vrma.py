@@ -92,9 +92,9 @@ def _mixture(shown: Float32) -> Float64:
     least = np.square(shown * faces.any(axis=0)).sum(axis=1).astype(np.float64)
     for count in range(1, len(faces) + 1):
         for chosen in combinations(range(len(faces)), count):
-            mine = faces[list(chosen)]
-            parts = shown @ np.linalg.pinv(mine)
-            left = np.square((shown - parts @ mine) * faces.any(axis=0)).sum(axis=1)
+            subset = faces[list(chosen)]
+            parts = shown @ np.linalg.pinv(subset)
+            left = np.square((shown - parts @ subset) * faces.any(axis=0)).sum(axis=1)
             better = (parts >= 0).all(axis=1) & (left < least - 1e-9)
             least[better] = left[better]
             best[better] = 0

@@ -83,12 +83,12 @@ def _accent_times(utterance: Utterance, words: Sequence[tuple[float, float]]) ->
     """Return the times at which the loudest words are loudest, or the middle of the longest word."""
     if not words:
         return []
-    heard = [_loudest(utterance, start, end) for start, end in words]
-    most = max(loudness for loudness, _ in heard)
+    loudest = [_loudest(utterance, start, end) for start, end in words]
+    most = max(loudness for loudness, _ in loudest)
     if most == 0.0:
         start, end = max(words, key=lambda word: word[1] - word[0])
         return [(start + end) / 2]
-    return [time for loudness, time in heard if loudness >= prosody_facts()["accents"]["loud"] * most]
+    return [time for loudness, time in loudest if loudness >= prosody_facts()["accents"]["loud"] * most]
 
 
 def _loudest(utterance: Utterance, start: float, end: float) -> tuple[float, float]:

@@ -18,7 +18,7 @@ from typing import IO, Any
 from realizer.core.errors import VoiceError
 
 RUN = Path(__file__).with_name("engine_worker.py")
-LOOKS = 20  # checks of a running request within its time limit
+CHECKS = 20  # checks of a running request within its time limit
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,23 +148,23 @@ class _Running:
 
     def __init__(self, process: subprocess.Popen[bytes], limit: float) -> None:
         self.process = process
-        self._every = limit / LOOKS
-        self._until = float("inf")  # deadline of the current request
-        self._over = threading.Event()
-        threading.Thread(target=self._look, name="watch", daemon=True).start()
+        self._every = limit / CHECKS
+        self._deadline = float("inf")  # deadline of the current request
+        self._ended = threading.Event()
+        threading.Thread(target=self._watch, name="watch", daemon=True).start()
 
     @contextlib.contextmanager
     def waiting(self, limit: float) -> Iterator[None]:
         """Limit the time until the end of the block, in seconds."""
-        self._until = time.monotonic() + limit
+        self._deadline = time.monotonic() + limit
         try:
             yield
         finally:
-            self._until = float("inf")
+            self._deadline = float("inf")
 
     def end(self) -> None:
         """Kill the process and close its pipes."""
-        self._over.set()
+        self._ended.set()
         self.process.kill()
         self.process.wait()
         for pipe in (self.process.stdin, self.process.stdout):
@@ -172,9 +172,9 @@ class _Running:
                 with contextlib.suppress(OSError):  # buffered output has no reader
                     pipe.close()
 
-    def _look(self) -> None:
-        while not self._over.wait(self._every):
-            if time.monotonic() > self._until:
+    def _watch(self) -> None:
+        while not self._ended.wait(self._every):
+            if time.monotonic() > self._deadline:
                 self.process.kill()
 
 

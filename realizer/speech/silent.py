@@ -39,32 +39,32 @@ class SilentVoice(BaseVoice):
         return _layout(tokens(script, facts["phrase"]), request.language, rate, script.warnings)
 
 
-def _layout(things: Sequence[Token], language: str, rate: float, warnings: tuple[str, ...]) -> Utterance:
+def _layout(items: Sequence[Token], language: str, rate: float, warnings: tuple[str, ...]) -> Utterance:
     facts = syllable_facts()
     now = facts["edge"]
     words: list[Word] = []
     phonemes = [Phoneme(0.0, now, "")]
     marks: dict[str, float] = {}
     waiting: list[str] = []  # marks before the next word
-    for thing in things:
-        if isinstance(thing, Mark):
-            waiting.append(thing.name)
+    for item in items:
+        if isinstance(item, Mark):
+            waiting.append(item.name)
             continue
-        if isinstance(thing, Pause):
-            if thing.seconds:  # a mark before a <break> is at its start
+        if isinstance(item, Pause):
+            if item.seconds:  # a mark before a <break> is at its start
                 marks.update(dict.fromkeys(waiting, now))
                 waiting = []
-            length = thing.seconds or facts["unit"] / rate
+            length = item.seconds or facts["unit"] / rate
             phonemes.append(Phoneme(now, now + length, ""))
         else:
             marks.update(dict.fromkeys(waiting, now))
             waiting = []
-            length = vowel_units(thing.text, language) * facts["unit"] / (rate * thing.rate)
-            words.append(Word(now, now + length, thing.text))
-            phonemes += _phonemes(thing, language, now, length, facts["consonant"])
+            length = vowel_units(item.text, language) * facts["unit"] / (rate * item.rate)
+            words.append(Word(now, now + length, item.text))
+            phonemes += _phonemes(item, language, now, length, facts["consonant"])
         now += length
-    said = words[-1].end if words else now
-    marks.update(dict.fromkeys(waiting, said))
+    spoken_end = words[-1].end if words else now
+    marks.update(dict.fromkeys(waiting, spoken_end))
     phonemes.append(Phoneme(now, now + facts["closing"], ""))
     return Utterance(
         duration=now + facts["closing"],

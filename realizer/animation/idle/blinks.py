@@ -59,8 +59,8 @@ class Blinks:
 
     def reduced(self, part: Float64) -> Blinks:
         """Return a random part (b,), 0..1, of the blinks; each is kept whole or not at all."""
-        comes = part > self.draws
-        return Blinks(self.onsets[comes], self.draws[comes])
+        kept = part > self.draws
+        return Blinks(self.onsets[kept], self.draws[kept])
 
     def at(self, times: Float64) -> Float64:
         """Return how far the lids are shut, (n,) 0..1, at times (n,), not falling."""

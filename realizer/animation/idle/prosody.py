@@ -138,17 +138,17 @@ def _parts() -> dict[int, str]:
 
 
 @lru_cache(maxsize=64)
-def _gestures(said: tuple[Phrase, ...], start: float, seed: int) -> tuple[Gesture, ...]:
+def _gestures(all_phrases: tuple[Phrase, ...], start: float, seed: int) -> tuple[Gesture, ...]:
     """Return all movements that may accompany an utterance that starts at `start`."""
-    return (*_accents(said, start, seed), *_looks_aside(said, start, seed))
+    return (*_accents(all_phrases, start, seed), *_looks_aside(all_phrases, start, seed))
 
 
-def _accents(said: tuple[Phrase, ...], start: float, seed: int) -> Iterator[Gesture]:
+def _accents(all_phrases: tuple[Phrase, ...], start: float, seed: int) -> Iterator[Gesture]:
     nod, brows = prosody_facts()["nod"], prosody_facts()["brows"]
-    nods, raises, sizes = _draws(seed, 400, start, sum(len(phrase.accents) for phrase in said))
+    nods, raises, sizes = _draws(seed, 400, start, sum(len(phrase.accents) for phrase in all_phrases))
     k = 0
     nodded = raised = -np.inf
-    for phrase in said:
+    for phrase in all_phrases:
         for accent in phrase.accents:
             chance = "nuclear" if accent.nuclear else "others"
             # An accent too close to the start for a full attack peaks later: nothing moves before the speech.
@@ -189,14 +189,14 @@ def _raise(time: float, most: float) -> Gesture:
     return Gesture("brows", tuple(Channel(t, keys, values, layer=Layer.IDLE, source=SOURCE) for t in lifts))
 
 
-def _looks_aside(said: tuple[Phrase, ...], start: float, seed: int) -> Iterator[Gesture]:
+def _looks_aside(all_phrases: tuple[Phrase, ...], start: float, seed: int) -> Iterator[Gesture]:
     aside = prosody_facts()["aside"]
-    if not said or said[-1].end - said[0].start < aside["least"]:
+    if not all_phrases or all_phrases[-1].end - all_phrases[0].start < aside["least"]:
         return
-    comes, lengths, late, yaws, pitches = _draws(seed, 450, start, len(said), kinds=5)
-    for k, phrase in enumerate(said):
+    chances, lengths, late, yaws, pitches = _draws(seed, 450, start, len(all_phrases), kinds=5)
+    for k, phrase in enumerate(all_phrases):
         length = phrase.end - phrase.start
-        if length < aside["phrase"] or comes[k] >= aside["chance"]:
+        if length < aside["phrase"] or chances[k] >= aside["chance"]:
             continue
         most = min(aside["longest"], aside["share"] * length)
         away = min(most, aside["shortest"] + lengths[k] * max(0.0, most - aside["shortest"]))
@@ -206,8 +206,8 @@ def _looks_aside(said: tuple[Phrase, ...], start: float, seed: int) -> Iterator[
         yaw = np.interp(abs(2.0 * yaws[k] - 1.0), (0.0, 1.0), aside["yaw"]) * np.sign(yaws[k] - 0.5)
         pitch = np.interp(pitches[k], (0.0, 1.0), aside["pitch"])
         keys = begin + np.array([0.0, aside["saccade"], away, away + aside["saccade"]])
-        there = np.array([0.0, 1.0, 1.0, 0.0])
-        yield Gesture("eyes", (*_turn(EYES_YAW, keys, yaw * there), *_turn(EYES_PITCH, keys, pitch * there)))
+        curve = np.array([0.0, 1.0, 1.0, 0.0])
+        yield Gesture("eyes", (*_turn(EYES_YAW, keys, yaw * curve), *_turn(EYES_PITCH, keys, pitch * curve)))
 
 
 def _draws(seed: int, kind: int, start: float, count: int, kinds: int = 3) -> list[Float64]:

@@ -24,7 +24,7 @@ def lip_weight(track: Track, times: Float64) -> Float64:
     middle = (track.begin + track.end) / 2
     closing = track.mix[:, list(facts["closure"]["visemes"])].sum(axis=1) > 0.5
     half = np.maximum(facts["closure"]["hold"], track.end - track.begin) / 2
-    taken = np.zeros(len(times))
+    masked = np.zeros(len(times))
     for run in np.split(np.arange(len(let_go)), np.flatnonzero(np.diff(let_go)) + 1):
         if let_go[run[0]]:
             continue
@@ -38,8 +38,8 @@ def lip_weight(track: Track, times: Float64) -> Float64:
             attack = max(min(attack, before), pauses["least"])
             release = max(min(release, after), pauses["least"])
         up, down = _smoothstep((times - rise) / attack), _smoothstep((fall - times) / release)
-        taken = np.maximum(taken, np.minimum(up, down))
-    return taken
+        masked = np.maximum(masked, np.minimum(up, down))
+    return masked
 
 
 def _smoothstep(x: Float64) -> Float64:
@@ -69,7 +69,7 @@ def closure_mask(track: Track, times: Float64) -> tuple[Bool, Bool]:
             border = (closes[k] + opens[k + 1]) / 2 + (1 if bites[k] else -1) * closure["gives"]
             closes[k], opens[k + 1] = max(border, opens[k]), min(border, closes[k + 1])
     holds = np.zeros((2, len(times)), bool)
-    for row, mine in zip(holds, (~bites, bites), strict=True):
-        begun = np.searchsorted(np.sort(opens[mine]), times, "right")
-        row[:] = begun > np.searchsorted(np.sort(closes[mine]), times, "left")
+    for row, kind in zip(holds, (~bites, bites), strict=True):
+        begun = np.searchsorted(np.sort(opens[kind]), times, "right")
+        row[:] = begun > np.searchsorted(np.sort(closes[kind]), times, "left")
     return holds[0], holds[1]

@@ -148,19 +148,19 @@ def dominances(track: Track, times: Float64) -> Iterator[tuple[Index, Float64, t
     near = np.searchsorted(track.begin, times, "right") - 1 + band
     beyond = (near < 0) | (near >= len(length))
     near = near.clip(0, len(length) - 1)
-    fall = _taken(rate, near)
-    before = fall * np.maximum(_taken(core_begin, near) - times, 0)
-    after = fall * np.maximum(times - _taken(core_end, near), 0)
+    fall = _at(rate, near)
+    before = fall * np.maximum(_at(core_begin, near) - times, 0)
+    after = fall * np.maximum(times - _at(core_end, near), 0)
     before[beyond] = np.inf
 
     for own, (name, members) in zip(weight, CLASSES.items(), strict=True):
         pace = facts["articulators"][name]
         d = np.exp(-pace["before"] * before - pace["after"] * after)
-        d *= _taken(own, near)
+        d *= _at(own, near)
         d /= d.sum(axis=0) + rule["rest"]
         yield near, d, members
 
 
-def _taken(values: Float64, near: Index) -> Float64:
+def _at(values: Float64, near: Index) -> Float64:
     """Return `values[..., near]` for valid indices, in half the time."""
     return values.take(near, axis=-1, mode="clip")

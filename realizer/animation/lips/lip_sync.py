@@ -42,11 +42,11 @@ def lip_channels(phonemes: Sequence[Phoneme], start: float, room: float = 0.0) -
     if track is None:
         return ()
     times = key_times(phonemes, min(room, facts["pauses"]["attack"]))
-    taken = lip_weight(track, times)
-    mouth = _mouth(track, times) * taken
-    _constrain(mouth, track, times, taken, facts)
+    masked = lip_weight(track, times)
+    mouth = _mouth(track, times) * masked
+    _constrain(mouth, track, times, masked, facts)
     mouth[:, [0, -1]] = 0.0  # smoothing leaves traces of very short sounds
-    return _channels(times + start, mouth, taken)
+    return _channels(times + start, mouth, masked)
 
 
 def _mouth(track: Track, times: Float64) -> Float64:
@@ -65,7 +65,7 @@ def _block(members: Sequence[str]) -> slice:
     return slice(SHAPE.index(members[0]), SHAPE.index(members[-1]) + 1)
 
 
-def _constrain(mouth: Float64, track: Track, times: Float64, taken: Float64, facts: dict[str, Any]) -> None:
+def _constrain(mouth: Float64, track: Track, times: Float64, masked: Float64, facts: dict[str, Any]) -> None:
     """Apply closures, limits of speed and smoothing, in place."""
     shapes, _ = shape_table()
     column = {name: k for k, name in enumerate(SHAPE)}
@@ -73,14 +73,14 @@ def _constrain(mouth: Float64, track: Track, times: Float64, taken: Float64, fac
     upper, lower, jaw = mouth[column["upper"]], mouth[column["lower"]], mouth[column["jaw"]]
     speed = facts["speed"]["lips"]
     # The upper lip uncovers the teeth for f v: it is raised there, and then lowered where p b m close.
-    raised = shapes[LABIODENTAL, column["upper"]] * taken
+    raised = shapes[LABIODENTAL, column["upper"]] * masked
     upper[:] = _reachable(upper, times, speed)
     upper[:] = -_reachable(-np.where(bitten, np.maximum(upper, raised), upper), times, speed)
     upper[[0, -1]] = 0.0
     for lip, name in ((upper, "upper"), (lower, "lower")):
-        lip[:] = np.where(closed, np.minimum(lip, shapes[BILABIAL, column[name]] * taken), lip)
+        lip[:] = np.where(closed, np.minimum(lip, shapes[BILABIAL, column[name]] * masked), lip)
     lower[:] = np.where(
-        bitten & ~closed, np.minimum(lower, shapes[LABIODENTAL, column["lower"]] * taken), lower
+        bitten & ~closed, np.minimum(lower, shapes[LABIODENTAL, column["lower"]] * masked), lower
     )
     jaw[:] = np.where(closed | bitten, np.minimum(jaw, facts["closure"]["jaw"]), jaw)
     for name, members in CLASSES.items():
@@ -121,7 +121,7 @@ def _bell(half: int) -> Float64:
     return weights
 
 
-def _channels(times: Float64, mouth: Float64, taken: Float64) -> tuple[Channel, ...]:
-    lips = Channel(mask_channel("lips"), times, taken, "linear", Layer.SPEECH)
+def _channels(times: Float64, mouth: Float64, masked: Float64) -> tuple[Channel, ...]:
+    lips = Channel(mask_channel("lips"), times, masked, "linear", Layer.SPEECH)
     moved = mouth_faps(mouth.T).items()
     return (lips, *(Channel(fap(number), times, value, "linear", Layer.SPEECH) for number, value in moved))

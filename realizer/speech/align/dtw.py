@@ -61,8 +61,8 @@ def distance(features: Float64, others: Float64) -> Float64:
 
 def usual(features: Float64, others: Float64) -> float:
     """Return the median of `distance` for a sample of rows."""
-    some = (rows[:: max(1, len(rows) // SAMPLED)] for rows in (features, others))
-    return max(float(np.median(distance(*some))), 1e-6)
+    sampled = (rows[:: max(1, len(rows) // SAMPLED)] for rows in (features, others))
+    return max(float(np.median(distance(*sampled))), 1e-6)
 
 
 def quiet(part: Float64, threshold: float) -> Float64:

@@ -57,8 +57,8 @@ class _Match:
 
     @property
     def cost(self) -> float:
-        said = ~self.states.pause[self.way]
-        return float(self.spent[said].mean()) / self.null if said.any() else 1.0
+        voiced = ~self.states.pause[self.way]
+        return float(self.spent[voiced].mean()) / self.null if voiced.any() else 1.0
 
 
 def dtw_align(sound: Float32, references: Sequence[Utterance]) -> Spans:
@@ -122,14 +122,14 @@ def _states(spoken: Float32, hop: float, reference: Utterance) -> States:
     """Return the frames of the reference, with one pause before each word and at the end for its pauses."""
     values = f.cepstra(f.energies(spoken, hop))
     times = np.arange(len(values)) * hop / f.RATE
-    said = np.ones(len(times), bool)
+    voiced = np.ones(len(times), bool)
     for phoneme in reference.phonemes:
         if not phoneme.ipa:
-            said &= (times < phoneme.start) | (times >= phoneme.end)
-    if not said.any():
-        said[:] = True
-    values = f.normalised(values, said)[said]
-    times = times[said]
+            voiced &= (times < phoneme.start) | (times >= phoneme.end)
+    if not voiced.any():
+        voiced[:] = True
+    values = f.normalised(values, voiced)[voiced]
+    times = times[voiced]
     starts = [word.start for word in reference.words]
     word = np.maximum(np.searchsorted(starts, times + 1e-9, side="right") - 1, 0)
     breaks = np.append(np.flatnonzero(np.diff(word, prepend=-1)), len(times))
@@ -163,17 +163,17 @@ def _null(heard: Observed, states: States, centre: Index, reach: int) -> float:
         pause = states.pause[order]
         pause[[0, -1]] = True
         way, spent = best_path(heard, States(states.features[order], pause, states.times), centre, reach)
-        said = ~pause[way]
-        if said.any():
-            found.append(float(spent[said].mean()))
+        voiced = ~pause[way]
+        if voiced.any():
+            found.append(float(spent[voiced].mean()))
     return max(min(found[1:] or found), 1e-6)
 
 
 def _costs(words: Float64, way: Index, spent: Float64, pause: Bool, null: float) -> Float64:
     """Return the mean cost (n,) of the frames of each word."""
-    said = ~pause[way]
-    total = np.append(0.0, np.cumsum(np.where(said, spent, 0.0)))
-    count = np.append(0, np.cumsum(said))
+    voiced = ~pause[way]
+    total = np.append(0.0, np.cumsum(np.where(voiced, spent, 0.0)))
+    count = np.append(0, np.cumsum(voiced))
     first, last = (np.clip(np.rint(words * f.RATE / COARSE), 0, len(way)).astype(np.intp)).T
     last = np.minimum(np.maximum(last, first + 1), len(way))
     first = np.minimum(first, last - 1)
@@ -184,12 +184,12 @@ def _costs(words: Float64, way: Index, spent: Float64, pause: Bool, null: float)
 
 def _spans(pairs: Float64, states: States, way: Index) -> Float64:
     """Return (n, 2) the frames at which the path enters and leaves the interval between two times."""
-    said = np.flatnonzero(~states.pause)
-    times = states.times[said]
+    voiced = np.flatnonzero(~states.pause)
+    times = states.times[voiced]
     first = np.searchsorted(times, pairs[:, 0] - 1e-9)
     last = np.searchsorted(times, pairs[:, 1] - 1e-9) - 1
-    enters = np.searchsorted(way, said[np.minimum(first, len(said) - 1)])
-    leaves = np.searchsorted(way, said[np.clip(last, 0, len(said) - 1)], side="right")
+    enters = np.searchsorted(way, voiced[np.minimum(first, len(voiced) - 1)])
+    leaves = np.searchsorted(way, voiced[np.clip(last, 0, len(voiced) - 1)], side="right")
     found = np.stack([enters, np.maximum(enters, leaves)], axis=1).astype(np.float64)
     found[np.isnan(pairs).any(axis=1)] = np.nan
     return found

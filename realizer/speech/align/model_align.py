@@ -31,17 +31,17 @@ def model_align(sound: Float32, duration: float, reference: Utterance) -> Alignm
         [p for p in reference.phonemes if p.ipa and word.start - 1e-6 <= p.start < word.end - 1e-6]
         for word in reference.words
     ]
-    asked = [
-        (word.text, to_arpabet(p.ipa for p in mine))
-        for word, mine in zip(reference.words, of_words, strict=True)
+    wanted = [
+        (word.text, to_arpabet(p.ipa for p in own))
+        for word, own in zip(reference.words, of_words, strict=True)
     ]
-    said = sphinx.align_words(sound, asked)
-    if said is None:
+    aligned = sphinx.align_words(sound, wanted)
+    if aligned is None:
         return None
     spans, phonemes, owners, latest = [], [], [], 0.0
-    for k, (word, mine) in enumerate(zip(said, of_words, strict=True)):
+    for k, (word, own) in enumerate(zip(aligned, of_words, strict=True)):
         if word is not None:
-            stresses = [p.stress for p in mine if p.ipa[0] in VOWELS]
+            stresses = [p.stress for p in own if p.ipa[0] in VOWELS]
             sounds = [(start, end, to_ipa(name)) for start, end, name in word.phones]
             vowels = sum(ipa[:1] in VOWELS for *_, ipa in sounds)
             rest = iter(stresses if vowels == len(stresses) else [0] * vowels)
@@ -51,7 +51,7 @@ def model_align(sound: Float32, duration: float, reference: Utterance) -> Alignm
                 owners.append(k)
             latest = word.phones[-1][1]
         spans.append((word.phones[0][0], latest) if word is not None else (latest, latest))
-    found = [word for word in said if word is not None]
+    found = [word for word in aligned if word is not None]
     lengths = np.array([word.phones[-1][1] - word.phones[0][0] for word in found])
     score = float(np.average([word.score for word in found], weights=lengths))
     return build(
@@ -60,6 +60,6 @@ def model_align(sound: Float32, duration: float, reference: Utterance) -> Alignm
         duration,
         np.array(spans),
         (phonemes, owners),
-        [0.0 if word is None else probability(word.score, SCORE_OF_WORD) for word in said],
+        [0.0 if word is None else probability(word.score, SCORE_OF_WORD) for word in aligned],
         probability(score, SCORE),
     )

@@ -54,6 +54,6 @@ def align_recording(request: SpeechRequest, recording: Recording) -> Utterance:
     try:
         return utterance_of_recording(recording.pcm, recording.rate, request)
     except RealizerError as error:
-        told = f"the lips do not move with the recording: {error}"
+        warning = f"the lips do not move with the recording: {error}"
         duration = len(recording.pcm) / recording.rate
-        return Utterance(duration, (), (), {}, recording.rate, recording.pcm, (told,))
+        return Utterance(duration, (), (), {}, recording.rate, recording.pcm, (warning,))

@@ -62,11 +62,11 @@ def _stops_first(parts: Sequence[Part]) -> list[Part]:
         at = len(moved)
         while at and isinstance(moved[at - 1], Mark):
             at -= 1
-        said = moved[at - 1] if at else None
-        if stops is None or at == len(moved) or not isinstance(said, str) or said[-1].isspace():
+        before = moved[at - 1] if at else None
+        if stops is None or at == len(moved) or not isinstance(before, str) or before[-1].isspace():
             moved.append(part)
             continue
-        moved[at - 1] = said + stops[0]
+        moved[at - 1] = before + stops[0]
         if rest := str(part)[stops.end() :]:
             moved.append(rest)
     return moved
@@ -79,10 +79,10 @@ def _in_its_units(tag: Tag) -> Tag:
     """
     if tag.name != "prosody" or tag.attributes is None:
         return tag
-    given = dict(tag.attributes)
-    manner = PLAIN.within(given)
-    if "volume" in given:
-        given["volume"] = f"{100 * manner.volume:.1f}%"
+    values = dict(tag.attributes)
+    manner = PLAIN.within(values)
+    if "volume" in values:
+        values["volume"] = f"{100 * manner.volume:.1f}%"
     if manner.pitch != PLAIN.pitch:  # values in Hz are passed on unchanged
-        given["pitch"] = f"{min(MAX_PITCH, max(0.0, 100 + 100 * np.log2(manner.pitch) / OCTAVES)):.1f}%"
-    return Tag(tag.name, tuple(given.items()))
+        values["pitch"] = f"{min(MAX_PITCH, max(0.0, 100 + 100 * np.log2(manner.pitch) / OCTAVES)):.1f}%"
+    return Tag(tag.name, tuple(values.items()))

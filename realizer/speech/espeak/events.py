@@ -135,15 +135,15 @@ def _words(
             places = boundaries([alone[w] for w in group.words], [sounds[i] for i in own], hints)
         places.append(len(own))
         for n in range(len(group.words)):
-            mine = own[places[n] : places[n + 1]]
+            part = own[places[n] : places[n + 1]]
             if n == 0:
                 first = group.sample
-            elif mine:
-                first = inner.get(mine[0], begins[mine[0]])
+            elif part:
+                first = inner.get(part[0], begins[part[0]])
             else:
                 first = found[-1][1]
-            until = begins[mine[-1] + 1] if mine and mine[-1] + 1 < len(begins) else end
-            found.append((first, max(first, until if mine else first)))
+            until = begins[part[-1] + 1] if part and part[-1] + 1 < len(begins) else end
+            found.append((first, max(first, until if part else first)))
     # A word ends at the latest where the next one begins.
     return [
         (first, min(last, found[k + 1][0]) if k + 1 < len(found) else last)
@@ -181,16 +181,16 @@ def _with_closures(begins: Sequence[int], sounds: Sequence[str], pcm: Int16, rat
     """
     begins = list(begins)
     loud = (pcm > SILENCE) | (pcm < -SILENCE)
-    mostly = [True, *loud.take([here - 1 for here in begins[1:]], mode="wrap").tolist()]
+    mostly = [True, *loud.take([start - 1 for start in begins[1:]], mode="wrap").tolist()]
     for k in range(1, len(begins)):
-        before, here = begins[k - 1], begins[k]
-        if mostly[k] or before == here or not sounds[k] or not sounds[k - 1] or _is_vowel(sounds[k]):
+        before, start = begins[k - 1], begins[k]
+        if mostly[k] or before == start or not sounds[k] or not sounds[k - 1] or _is_vowel(sounds[k]):
             continue
-        backwards = loud[before:here][::-1]
+        backwards = loud[before:start][::-1]
         still = int(backwards.argmax())  # 0 also if nothing is loud
-        quiet = here - still if still else before
-        if here - quiet >= MIN_CLOSURE * rate:
-            begins[k] = max(quiet, before + round(KEPT_OF_VOWEL * (here - before)))
+        quiet = start - still if still else before
+        if start - quiet >= MIN_CLOSURE * rate:
+            begins[k] = max(quiet, before + round(KEPT_OF_VOWEL * (start - before)))
     return begins
 
 

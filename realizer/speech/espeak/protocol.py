@@ -38,10 +38,10 @@ def read_answer(head: Mapping[str, Any], body: bytes) -> tuple[list[Event], Int1
         IPA or a mark's name; and (n,) int16 samples, read-only.
     """
     size: int = head["events"]
-    told = np.frombuffer(body, LAYOUT, size // LAYOUT.itemsize)
+    fields = np.frombuffer(body, LAYOUT, size // LAYOUT.itemsize)
     marks = iter(head["marks"])
     events: list[Event] = []
-    columns = (told[name].tolist() for name in ("type", "sample", "place", "text"))
+    columns = (fields[name].tolist() for name in ("type", "sample", "place", "text"))
     for kind, sample, place, raw in zip(*columns, strict=True):
         if kind == PHONEME:
             events.append((kind, sample, place, _label(raw)))

@@ -69,9 +69,9 @@ def signs_of(sentence: Sequence[Token]) -> tuple[str, tuple[int, ...]]:
     """Return the signs of a sentence for hibari, and for each the index of its token."""
     signs, owners = "", []
     for k, (_, phonemes, blank) in enumerate(sentence):
-        said = phonemes + (" " if blank and k + 1 < len(sentence) else "")
-        signs += said
-        owners += [k] * len(said)
+        written = phonemes + (" " if blank and k + 1 < len(sentence) else "")
+        signs += written
+        owners += [k] * len(written)
     return signs, tuple(owners)
 
 
@@ -109,9 +109,9 @@ def sounds(sentence: Sequence[Token], lengths: Lengths) -> list[Sound]:
     return [sound for sound in found if sound.end > sound.start]
 
 
-def trim_to_sound(told: Sequence[Sound], pcm: Int16) -> list[Sound]:
+def trim_to_sound(timed: Sequence[Sound], pcm: Int16) -> list[Sound]:
     """Return the sounds with pauses that start where silence does; last sounds of phrases are too long."""
-    found = list(told)
+    found = list(timed)
     for k in range(1, len(found)):
         last, pause = found[k - 1], found[k]
         if pause.ipa or not last.ipa:
@@ -173,10 +173,10 @@ def word_spans(
     theirs = list(words_in(text))
     begins: dict[int, int] = {}
     latest = -1
-    for mine, other in _matched([w.lower() for w in words], [w.lower() for w, _ in theirs]):
+    for index, other in _matched([w.lower() for w in words], [w.lower() for w, _ in theirs]):
         first = firsts.get(starts.get(theirs[other][1], -1), -1)
         if first > latest:
-            begins[mine] = latest = first
+            begins[index] = latest = first
     begins[0] = next(iter(firsts.values()))
 
     order = sorted(begins)

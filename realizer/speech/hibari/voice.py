@@ -38,8 +38,8 @@ SHOWN = 3  # words quoted in a warning
 
 def install_hint() -> str | None:
     """Return a sentence that says how to install hibari, or None if it is installed."""
-    there = all(importlib.util.find_spec(name) for name in ("hibari", "onnxruntime"))
-    return None if there else INSTALL
+    installed = all(importlib.util.find_spec(name) for name in ("hibari", "onnxruntime"))
+    return None if installed else INSTALL
 
 
 def voice_hint(name: str) -> str | None:
@@ -142,14 +142,14 @@ class HibariVoice(EngineVoice):
             if not any(phonemes for _, phonemes, _ in sentence):
                 tokens += sentence
                 continue
-            pcm, told = self._sentence(sentence, run, pace, rate)
+            pcm, timed = self._sentence(sentence, run, pace, rate)
             # The silence at its start is kept, except for the first sentence.
             lead = 0 if joined else round(syllable_facts()["edge"] * rate)
-            first = max(0, told[0].end - lead) if not heard and not told[0].ipa else 0
+            first = max(0, timed[0].end - lead) if not heard and not timed[0].ipa else 0
             ends_open = goes_on and k + 1 == len(reading) and not _ends_in_pause(sentence)
-            last = told[-1].start if ends_open and not told[-1].ipa else len(pcm)
+            last = timed[-1].start if ends_open and not timed[-1].ipa else len(pcm)
             at = track.length - first
-            for sound in told:
+            for sound in timed:
                 start, end = max(sound.start, first), min(sound.end, last)
                 if end > start:
                     moved = replace(sound, start=at + start, end=at + end, token=sound.token + len(tokens))
@@ -171,18 +171,18 @@ class HibariVoice(EngineVoice):
         """Return the sound of a sentence and its phonemes, which cover it without gaps."""
         facts = _facts()
         speed = min(facts["fastest"], max(facts["slowest"], pace * run.prosody.rate))
-        asked = {"op": "say", "phonemes": signs_of(sentence)[0], "speed": speed, "pitch": run.prosody.pitch}
-        head, body = self._process.ask(asked)
+        request = {"op": "say", "phonemes": signs_of(sentence)[0], "speed": speed, "pitch": run.prosody.pitch}
+        head, body = self._process.ask(request)
         volume = 32767 * run.prosody.volume
         pcm = np.rint(np.clip(np.frombuffer(body, "<f4") * volume, -32768, 32767)).astype(np.int16)
         if head["signs"] is None:
             return pcm, sounds(sentence, guess_lengths(sentence, pcm))
-        told = sounds(sentence, Lengths(head["lead"], tuple(head["signs"]), head["tail"]))
+        timed = sounds(sentence, Lengths(head["lead"], tuple(head["signs"]), head["tail"]))
         shift = round(facts["offset"] * rate)
-        borders = [0, *(min(max(0, sound.end + shift), len(pcm)) for sound in told[:-1]), len(pcm)]
+        borders = [0, *(min(max(0, sound.end + shift), len(pcm)) for sound in timed[:-1]), len(pcm)]
         heard = [
             replace(sound, start=start, end=end)
-            for sound, start, end in zip(told, borders, borders[1:], strict=False)
+            for sound, start, end in zip(timed, borders, borders[1:], strict=False)
         ]
         return pcm, trim_to_sound(heard, pcm)
 
@@ -192,7 +192,7 @@ class HibariVoice(EngineVoice):
         found = []
         for text in head["texts"]:
             each = (sounds(sentence, Lengths(0, (1,) * len(signs_of(sentence)[0]), 0)) for sentence in text)
-            found.append([sound.ipa for told in each for sound in told if sound.ipa])
+            found.append([sound.ipa for timed in each for sound in timed if sound.ipa])
         return found
 
 

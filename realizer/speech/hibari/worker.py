@@ -70,18 +70,18 @@ class Speaker:
 
         known = self.hibari.vocab
         signs = [sign for sign in request["phonemes"] if sign in known]
-        given = {
+        inputs = {
             "ids": np.array([[0, *(known[sign] for sign in signs), 0]], np.int64),
             "speed": np.array([request["speed"]], np.float32),
         }
-        heights, angles, noise, rest, phase, pitch, *told = self.hibari.sess.run(None, given)
+        heights, angles, noise, rest, phase, pitch, *durations = self.hibari.sess.run(None, inputs)
         random = np.random.default_rng(SEED)
         sound = dsp.synth(
             heights[0], angles[0], noise[0], rest[0], phase[0], pitch[0] * request["pitch"], random
         )
         head: dict[str, Any] = {"lead": 0, "signs": None, "tail": 0}
-        if told:
-            frames = told[0].ravel()
+        if durations:
+            frames = durations[0].ravel()
             hop = len(sound) / frames.sum()
             lengths = iter((frames * hop).round().astype(int).tolist())
             lead = next(lengths)

@@ -97,8 +97,8 @@ def _reference(request: SpeechRequest) -> Utterance:
 
 def _one_word(phonemes: Sequence[Phoneme], reference: Utterance) -> tuple[Word, ...]:
     """Return all the text as one word, from the first sound to the last."""
-    said = [p for p in phonemes if p.ipa] or list(phonemes)
-    return (Word(said[0].start, said[-1].end, "".join(w.text for w in reference.words)),)
+    spoken = [p for p in phonemes if p.ipa] or list(phonemes)
+    return (Word(spoken[0].start, spoken[-1].end, "".join(w.text for w in reference.words)),)
 
 
 def _knots(reference: Sequence[Word], own: Sequence[Word]) -> tuple[Float64, Float64]:
@@ -120,9 +120,9 @@ def _knots(reference: Sequence[Word], own: Sequence[Word]) -> tuple[Float64, Flo
 
 def _letters(words: Sequence[Word]) -> tuple[Float64, Float64]:
     """Return the number of letters of the text before each word's start and end, and the times of these."""
-    said = [(word, sum(map(str.isalnum, word.text))) for word in words]
-    said = [(word, length) for word, length in said if length]
-    ends = np.cumsum([length for _, length in said], dtype=np.float64)
+    spoken = [(word, sum(map(str.isalnum, word.text))) for word in words]
+    spoken = [(word, length) for word, length in spoken if length]
+    ends = np.cumsum([length for _, length in spoken], dtype=np.float64)
     letters = np.column_stack([np.append(0.0, ends)[:-1], ends]).ravel()
-    times = np.array([time for word, _ in said for time in (word.start, word.end)], np.float64)
+    times = np.array([time for word, _ in spoken for time in (word.start, word.end)], np.float64)
     return letters, np.maximum.accumulate(times)

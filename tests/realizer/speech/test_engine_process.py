@@ -116,7 +116,7 @@ def test_engine_process_can_be_closed_during_a_request(start: Start) -> None:
 
     thread = threading.Thread(target=wait)
     thread.start()
-    while process._running is None or process._running._until == float("inf"):
+    while process._running is None or process._running._deadline == float("inf"):
         assert thread.is_alive()
     process.close()
     thread.join(10)
