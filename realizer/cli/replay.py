@@ -55,12 +55,12 @@ def replay(
     from realizer.outputs.output import RenderSettings
     from realizer.server.journal import JournalError
     from realizer.server.journal.playback import replay_feedback, replay_recording
-    from realizer.server.journal.recordings import read_record
+    from realizer.server.journal.recordings import read_recording
 
     writer = writer_for(output)
     changes = {"fps": fps, "face": face, "voice": voice}
     try:
-        recording = read_record(record)
+        recording = read_recording(record)
         if writer is None or output is None:
             for text in replay_feedback(recording, **changes):
                 click.echo(text)

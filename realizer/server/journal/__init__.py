@@ -7,20 +7,21 @@ from realizer.server.journal.entry import Entry, Journal, JournalError, Log, Rec
 __all__ = ["Entry", "Journal", "JournalError", "Log", "Recorder", "SavedSession", "TakenOver", "journal_at"]
 
 
-def journal_at(where: str) -> Journal:
-    """The journal a setting names: redis://HOST:PORT/N, which many nodes share, or a file of this machine.
+def journal_at(address: str) -> Journal:
+    """Return the journal at an address: redis://HOST:PORT/N, which several hosts can share, or a file.
 
     Raises:
-        JournalError: it cannot be opened, or something must be installed.
+        JournalError: it cannot be opened, or a package is not installed.
     """
-    if where.startswith(("redis://", "rediss://", "unix://")):
+    if address.startswith(("redis://", "rediss://", "unix://")):
         from realizer.server.journal.redis_journal import RedisJournal
 
-        return RedisJournal(where)
-    if "://" in where.removeprefix("sqlite://"):  # as it came it may have a password in it
+        return RedisJournal(address)
+    path = address.removeprefix("sqlite://")
+    if "://" in path:  # the address is not quoted: it may contain a password
         raise JournalError(
             "the journal: wanted a file, or redis://HOST:PORT/NUMBER, got an address of another kind"
         )
     from realizer.server.journal.sqlite_journal import SqliteJournal
 
-    return SqliteJournal(where.removeprefix("sqlite://"))
+    return SqliteJournal(path)

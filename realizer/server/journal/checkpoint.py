@@ -1,4 +1,4 @@
-"""Checkpoints: the state of a session that outlives its blocks, as journal parts."""
+"""Checkpoints: the state of a session while no block plays, as parts of a journal."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ STATE, CLIP = "state", "clip:"
 
 @dataclass(frozen=True)
 class SessionState:
-    """What outlives the blocks of a session.
+    """The state of a session that outlives its blocks.
 
     Attributes:
         at: seconds on the session clock.
-        connections: ids of its clients.
-        seq: of the last feedback.
+        connections: numbers of the connections.
+        seq: sequence number of the last feedback.
         last_messages: the last feedback messages, the oldest first.
-        faces, voices: index of a character -> the name of what a client chose for it.
-        past, expected: schedules of blocks that have ended, and of what is anticipated.
-        request_count: how many requests its voices got.
-        fault: why a voice failed last.
-        clips: ids of its sound clips, the oldest first.
+        faces, voices: index of a character -> name of the face or voice that a client chose.
+        past, expected: schedules of ended blocks, and of anticipated sync points.
+        request_count: number of speech requests so far.
+        fault: last error of a voice.
+        clips: ids of the sound clips, the oldest first.
     """
 
     at: float
@@ -57,9 +57,9 @@ def write(state: SessionState, clips: Mapping[str, str | None]) -> dict[str, str
     """Return the parts that a journal stores.
 
     Args:
-        clips: id -> JSON of each clip that has changed since the last checkpoint; None: it is gone.
+        clips: id -> JSON of each clip that has changed since the last checkpoint, None for a deleted clip.
     """
-    told = {
+    data = {
         "version": VERSION,
         "at": state.at,
         "connections": list(state.connections),
@@ -75,39 +75,38 @@ def write(state: SessionState, clips: Mapping[str, str | None]) -> dict[str, str
         "fault": state.fault,
         "clips": list(state.clips),
     }
-    return {STATE: json.dumps(told, ensure_ascii=False), **{CLIP + id: text for id, text in clips.items()}}
+    return {STATE: json.dumps(data, ensure_ascii=False), **{CLIP + id: text for id, text in clips.items()}}
 
 
 def read(session: str, parts: Mapping[str, str]) -> tuple[SessionState, dict[str, Clip]]:
-    """Return the state in a checkpoint, and its clips by id.
+    """Return the state in the checkpoint of a session, and its clips by id.
 
     Args:
-        session: its name.
-        parts: as `Kept` has them.
+        parts: as in `SavedSession`.
 
     Raises:
-        JournalError: these are no parts, or of another version.
+        JournalError: the parts are not a checkpoint, or of another version.
     """
     try:
-        told = json.loads(parts[STATE])
-        if told["version"] != VERSION:
-            words = f"wanted one of version {VERSION}, got {told['version']!r}"
+        data = json.loads(parts[STATE])
+        if data["version"] != VERSION:
+            words = f"wanted one of version {VERSION}, got {data['version']!r}"
             raise JournalError(f"the checkpoint of session {session}: {words}")
-        scene = told["scene"]
+        scene = data["scene"]
         state = SessionState(
-            at=float(told["at"]),
-            connections=[int(connection) for connection in told["connections"]],
-            seq=int(told["seq"]),
-            last_messages=[str(text) for text in told["told"]],
+            at=float(data["at"]),
+            connections=[int(connection) for connection in data["connections"]],
+            seq=int(data["seq"]),
+            last_messages=[str(text) for text in data["told"]],
             scene=None if scene is None else {name: (x, y, z) for name, (x, y, z) in scene.items()},
-            characters=[character_from_json(character) for character in told["characters"]],
-            faces={int(index): face for index, face in told["faces"].items()},
-            voices={int(index): voice for index, voice in told["voices"].items()},
-            past=[schedule_from_json(schedule) for schedule in told["past"]],
-            expected=schedule_from_json(told["expected"]),
-            request_count=int(told["spoken"]),
-            fault=told["fault"],
-            clips=told["clips"],
+            characters=[character_from_json(character) for character in data["characters"]],
+            faces={int(index): face for index, face in data["faces"].items()},
+            voices={int(index): voice for index, voice in data["voices"].items()},
+            past=[schedule_from_json(schedule) for schedule in data["past"]],
+            expected=schedule_from_json(data["expected"]),
+            request_count=int(data["spoken"]),
+            fault=data["fault"],
+            clips=data["clips"],
         )
         return state, {id: Clip.from_json(json.loads(parts[CLIP + id])) for id in state.clips}
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:

@@ -1,39 +1,43 @@
-"""The journal's entries and protocols."""
+"""Journal entries, saved sessions and the protocols of journals and recorders."""
 
 from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal, Protocol, get_args
+from typing import Any, Literal, Protocol, get_args
 
 from realizer.core.errors import RealizerError
 
-# Sessions whose process died and that nobody came back to are forgotten after so long.
+# Sessions whose process died and that no client resumed are deleted after this time.
 RETENTION = 7 * 24 * 3600  # s
+ROUNDING = 1e-6  # s; error of times converted from one clock to another
 
-# join, leave: of a connection. text, sound: a message of one. spoken: a voice answered. tick: something that
-# waited was read or planned.
+# join, leave: a connection joined or left. text, sound: a message of a connection. spoken: a voice finished.
+# tick: a pending document was parsed or planned.
 Kind = Literal["join", "leave", "text", "sound", "spoken", "tick"]
 
 
 class JournalError(RealizerError):
-    """A journal that cannot be written or read; the text says why."""
+    """A journal or recording cannot be written or read."""
 
 
 class TakenOver(JournalError):
-    """Another process has taken the session over."""
+    """Another process has taken a session over."""
+
+    def __init__(self, session: str) -> None:
+        super().__init__(f"session {session} is another process's now")
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One thing that was done.
+    """One event that changed a session.
 
     Attributes:
-        at: seconds on the session's clock.
-        number: of the connection, or of what was to be spoken.
-        body: a message; of "spoken" why there is nothing to hear, "" where there is.
+        at: seconds on the session clock.
+        number: of the connection, or of the speech request.
+        body: the message; for "spoken" the voice's error, or "".
     """
 
     at: float
@@ -42,121 +46,161 @@ class Entry:
     body: str | bytes = ""
 
     def line(self) -> str:
-        """As JSON, without a line feed."""
-        told: dict[str, object] = {"at": self.at, "kind": self.kind}
+        """Return the entry as one line of JSON, without a line feed."""
+        data: dict[str, object] = {"at": self.at, "kind": self.kind}
         if self.number:
-            told["number"] = self.number
+            data["number"] = self.number
         if isinstance(self.body, bytes):
-            told["sound"] = base64.b64encode(self.body).decode()
+            data["sound"] = base64.b64encode(self.body).decode()
         elif self.body:
-            told["body"] = self.body
-        return json.dumps(told, ensure_ascii=False)
+            data["body"] = self.body
+        return json.dumps(data, ensure_ascii=False)
 
     @classmethod
     def read(cls, line: str) -> Entry:
-        """What `line` wrote.
+        """Parse a line that `line` returned.
 
         Raises:
-            JournalError: it is none.
+            JournalError: the line is not an entry.
         """
         try:
-            told = json.loads(line)
-            kind, body = told["kind"], told.get("body", "")
-            if "sound" in told:
-                body = base64.b64decode(told["sound"], validate=True)
+            data = json.loads(line)
+            kind, body = data["kind"], data.get("body", "")
+            if "sound" in data:
+                body = base64.b64decode(data["sound"], validate=True)
             if kind not in get_args(Kind) or not isinstance(body, str | bytes):
                 raise ValueError(f"kind: wanted one of {', '.join(get_args(Kind))}, got {kind!r}")
-            return cls(float(told["at"]), kind, int(told.get("number", 0)), body)
+            return cls(float(data["at"]), kind, int(data.get("number", 0)), body)
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
             raise JournalError(f"wanted an entry of a journal, got {line[:80]!r}: {error}") from None
 
 
 @dataclass(frozen=True, slots=True)
 class SavedSession:
-    """What there is of a session.
+    """A session as a journal or a recording holds it.
 
     Attributes:
-        epoch: POSIX seconds at 0 of its clock.
-        entries: what was done to it, all of it or what followed the checkpoint.
-        parts: name -> text: what it was at its last checkpoint; {} where there was none.
+        epoch: POSIX time at 0 of the session clock.
+        entries: all entries, or those after the checkpoint; the oldest first.
+        parts: name -> text of the checkpoint; {} without one.
+        head: what a recording says about the session beside the epoch: `session` (its name), `settings`,
+            `scene`; {} in a journal.
     """
 
     epoch: float
     entries: list[Entry]
     parts: Mapping[str, str] = field(default_factory=dict)
+    head: Mapping[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def read(
+        cls,
+        epoch: float,
+        lines: Iterable[str | bytes],
+        parts: Mapping[str, str],
+        head: Mapping[str, Any] | None = None,
+        place: str = "the journal:",
+    ) -> SavedSession:
+        """Parse the stored lines of a session.
+
+        Args:
+            place: prefix of error messages, before the number of the line; the head of a recording is line 1.
+
+        Raises:
+            JournalError: a line is not an entry, or its time is not finite or before that of the line above.
+        """
+        entries: list[Entry] = []
+        for number, line in enumerate(lines, 2 if head else 1):
+            try:
+                entry = Entry.read(line if isinstance(line, str) else line.decode())
+                check_time(entry.at, entries[-1].at if entries else 0.0)
+            except UnicodeDecodeError:
+                raise JournalError(f"{place}{number}: wanted UTF-8, got {quoted(line)!r}") from None
+            except (JournalError, ValueError) as error:
+                raise JournalError(f"{place}{number}: {error}") from None
+            entries.append(entry)
+        return cls(epoch, entries, parts, head or {})
+
+
+def check_time(at: float, least: float = float("-inf")) -> None:
+    """Raise ValueError if a time is not finite, or before `least`."""
+    if not least - ROUNDING <= at < float("inf"):
+        raise ValueError(f"at: wanted seconds, not before {least:g}, got {at:g}")
+
+
+def quoted(line: str | bytes) -> str:
+    """Return the beginning of a line for an error message."""
+    return line[:80] if isinstance(line, str) else line[:80].decode(errors="replace")
 
 
 class Log(Protocol):
-    """Where what is done to sessions is written. Called in the event loop: a call takes well under 1 ms."""
+    """A log of session events. Its methods run in the event loop: each takes well under 1 ms."""
 
     def begin(self, session: str, epoch: float) -> None:
-        """Keep a new session.
-
-        Args:
-            epoch: POSIX seconds at 0 of its clock.
+        """Add a new session, whose clock is 0 at the POSIX time `epoch`.
 
         Raises:
-            JournalError: it cannot be written.
+            JournalError: the session cannot be written.
         """
         ...
 
     def add(self, session: str, entry: Entry) -> None:
-        """Keep one more entry; it is safe when this returns.
+        """Append an entry; it is stored when this returns.
 
         Raises:
-            Lost: another process has taken the session over.
-            JournalError: it cannot be written.
+            TakenOver: another process has taken the session over.
+            JournalError: the entry cannot be written.
         """
         ...
 
     def end(self, session: str) -> None:
-        """The session is over. A fault is left to those who clean up."""
+        """End a session. Errors are ignored: expired sessions are deleted later."""
         ...
 
     def close(self) -> None:
-        """Write what is not written."""
+        """Close the log."""
         ...
 
 
 class Journal(Log, Protocol):
-    """Where sessions are kept until they end, so that another process can go on with them."""
+    """A log from which another process can resume sessions; it keeps them until they end."""
 
     def claim(self, session: str) -> SavedSession | None:
-        """Take a session over, to be gone on with; None where it is not there.
+        """Take a session over and return it, or None if there is none.
 
         Raises:
-            JournalError: it cannot be read.
+            JournalError: the session cannot be read.
         """
         ...
 
     def taken_over(self, sessions: Collection[str]) -> set[str]:
-        """Those of them that another process has taken over. May be called in another thread, and wait.
+        """Return which of these sessions another process has taken over. May block; any thread may call it.
 
         Raises:
-            JournalError: it cannot be read.
+            JournalError: the journal cannot be read.
         """
         ...
 
     def compact(self, session: str, parts: Mapping[str, str | None]) -> None:
-        """A checkpoint: put what the session is in the place of what was done to it, all or nothing of it.
+        """Replace the entries of a session by a checkpoint, in one transaction.
 
         Args:
-            parts: name -> text of each that is new or another one; None: it is gone. The others stay.
+            parts: name -> text of each new or changed part, None for a part to delete; others stay.
 
         Raises:
-            Lost: another process has taken the session over.
-            JournalError: it cannot be written, and all is as it was.
+            TakenOver: another process has taken the session over.
+            JournalError: the checkpoint cannot be written; nothing has changed.
         """
         ...
 
 
 class Recorder(Log, Protocol):
-    """Where sessions are written to be played again."""
+    """A log of sessions for replay."""
 
     def resume(self, session: str, saved: SavedSession) -> None:
-        """Go on with the record of a session that was taken over. May read a long file.
+        """Continue the recording of a session that was taken over. May read a long file.
 
         Raises:
-            JournalError: it cannot be written.
+            JournalError: the recording cannot be written.
         """
         ...

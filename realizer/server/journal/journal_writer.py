@@ -17,41 +17,40 @@ from realizer.server.journal.entry import (
 
 log = logging.getLogger(__name__)
 
-# A checkpoint is due after so many entries, which are done again in about half a second, or so many bytes.
+# A checkpoint is due after this many entries, whose replay takes about half a second, or bytes.
 ENTRIES = 250
 BYTES = 2**20
-# So many times as much is long.
-LONG = 4
-# After so many, which take a good part of a minute to be done again, it is time to say so.
+LONG = 4  # times as many are far too long
+# A warning is due after each so many entries, whose replay takes a good part of a minute.
 ENDLESS = 10_000
-# And where it could not be written, again after so many.
+# A checkpoint that failed is due again after so many entries.
 AGAIN = 25
 
 
 class JournalWriter:
-    """The hand that writes for a session.
+    """A writer that appends a session's entries to its journal and its recording.
 
     Args:
-        session: its name.
-        journal: what another process would go on from; None: none does.
-        record: what is played again to look at it. It may fail: nobody waits for it.
-        stopped: is called when a record has failed; nothing more is written of it.
-        saved: what is in the journal already.
+        session: the session's name.
+        journal: from which another process can resume the session, or None.
+        recorder: of the session for replay, or None. The session does not depend on it.
+        on_stopped: is called when the recording has failed and stops.
+        saved: the content of the journal so far.
     """
 
     def __init__(
         self,
         session: str,
         journal: Journal | None = None,
-        record: Recorder | None = None,
+        recorder: Recorder | None = None,
         *,
-        stopped: Callable[[], None] = lambda: None,
+        on_stopped: Callable[[], None] = lambda: None,
         saved: SavedSession | None = None,
     ) -> None:
         self._session = session
         self._journal = journal
-        self._recorder = record
-        self._stopped = stopped
+        self._recorder = recorder
+        self._on_stopped = on_stopped
         self._failing = False
         entries = [] if saved is None else saved.entries
         self._entries = len(entries)
@@ -59,44 +58,44 @@ class JournalWriter:
 
     @property
     def needs_checkpoint(self) -> bool:
-        """A checkpoint is due."""
+        """Whether a checkpoint is due."""
         return self._entries >= ENTRIES or self._bytes >= BYTES
 
     @property
     def is_far_too_long(self) -> bool:
-        """A checkpoint was due long ago."""
+        """Whether a checkpoint was due long ago."""
         return self._entries >= LONG * ENTRIES or self._bytes >= LONG * BYTES
 
     def begin(self, epoch: float) -> None:
-        """The session is new.
+        """Add a new session.
 
         Raises:
-            JournalError: it cannot be kept.
+            JournalError: it cannot be written to the journal.
         """
         if self._journal is not None:
             self._journal.begin(self._session, epoch)
-        self._record(lambda record: record.begin(self._session, epoch))
+        self._record(lambda recorder: recorder.begin(self._session, epoch))
 
     def resume(self, saved: SavedSession) -> None:
-        """The session was taken over: its record goes on."""
-        self._record(lambda record: record.resume(self._session, saved))
+        """Continue the recording of a session that was taken over."""
+        self._record(lambda recorder: recorder.resume(self._session, saved))
 
     def append(self, at: float, kind: Kind, number: int = 0, body: str | bytes = "") -> None:
-        """What must not be done unless it is kept.
+        """Append an entry for an event that must not happen unless it is stored.
 
         Raises:
-            Lost: another process has the session.
-            JournalError: it cannot be kept.
+            TakenOver: another process has taken the session over.
+            JournalError: the entry cannot be written to the journal.
         """
         entry = Entry(at, kind, number, body)
         self._append_to_journal(entry)
-        self._record(lambda record: record.add(self._session, entry))
+        self._record(lambda recorder: recorder.add(self._session, entry))
 
     def try_append(self, at: float, kind: Kind, number: int = 0, body: str | bytes = "") -> None:
-        """What happens all the same. A fault is logged once, until it is over.
+        """Append an entry for an event that happens anyway. Only the first of several failures is logged.
 
         Raises:
-            Lost: another process has the session.
+            TakenOver: another process has taken the session over.
         """
         entry = Entry(at, kind, number, body)
         try:
@@ -105,14 +104,14 @@ class JournalWriter:
             raise
         except JournalError as error:
             self._log_failure(error)
-            self._entries = ENTRIES  # what the journal lacks now, a checkpoint gives it back
-        self._record(lambda record: record.add(self._session, entry))
+            self._entries = ENTRIES  # a checkpoint makes the missing entry unnecessary
+        self._record(lambda recorder: recorder.add(self._session, entry))
 
     def compact(self, parts: Mapping[str, str | None]) -> bool:
-        """A checkpoint; False where it cannot be kept: then it is due again soon.
+        """Write a checkpoint. Return False if that fails; another one is due soon.
 
         Raises:
-            Lost: another process has the session.
+            TakenOver: another process has taken the session over.
         """
         try:
             if self._journal is not None:
@@ -127,10 +126,10 @@ class JournalWriter:
         return True
 
     def end(self) -> None:
-        """The session is over."""
-        for one in (self._journal, self._recorder):
-            if one is not None:
-                one.end(self._session)
+        """End the session in the journal and the recording."""
+        for log_ in (self._journal, self._recorder):
+            if log_ is not None:
+                log_.end(self._session)
 
     def _append_to_journal(self, entry: Entry) -> None:
         if self._journal is None:
@@ -147,16 +146,16 @@ class JournalWriter:
             )
 
     def _record(self, write: Callable[[Recorder], None]) -> None:
-        """A record has all or ends: one with a hole would be played otherwise than the session was."""
+        """Write to the recording. Stop at the first error: a recording with a gap cannot be replayed."""
         if self._recorder is None:
             return
         try:
             write(self._recorder)
         except JournalError as error:
-            log.warning("session %s is recorded no further: %s", self._session, error)
+            log.warning("the recording of session %s has stopped: %s", self._session, error)
             self._recorder.end(self._session)
             self._recorder = None
-            self._stopped()
+            self._on_stopped()
 
     def _log_failure(self, error: JournalError) -> None:
         if not self._failing:

@@ -10,8 +10,7 @@ from bml_schema import Feedback
 from realizer.core.settings import Settings, SettingsError
 from realizer.playback.active_block import ScheduledSpeech
 from realizer.realization import Realization, frames_until, merge_warnings
-from realizer.server.journal.entry import JournalError
-from realizer.server.journal.recordings import Record
+from realizer.server.journal.entry import JournalError, SavedSession
 from realizer.server.journal.replay import replay
 from realizer.server.journal.replay_viewer import ReplayViewer
 from realizer.server.runtime.engines import Engines
@@ -20,88 +19,89 @@ from realizer.server.session.session import Session
 from realizer.server.speech.speech_streams import OPEN
 
 
-def replay_feedback(record: Record, **changed: Any) -> list[str]:
-    """The feedback of a session that is played again, XML texts with their `seq`; as `replay_recording`."""
-    again = _Replay(record, changed)
-    again.play()
-    return [text for _, text in again.log.told]
+def replay_feedback(recording: SavedSession, **changed: Any) -> list[str]:
+    """Replay a recording and return its feedback, XML texts with `seq`. Raises as `replay_recording`."""
+    rerun = _Replay(recording, changed)
+    rerun.play()
+    return [text for _, text in rerun.log.messages]
 
 
-def replay_recording(record: Record, **changed: Any) -> tuple[Realization, list[str]]:
-    """Play a record again, as it was seen: to its end, or until nothing moves that was planned or held.
+def replay_recording(recording: SavedSession, **changed: Any) -> tuple[Realization, list[str]]:
+    """Replay a recording until it ends, or until nothing moves any more that was planned or set.
 
-    What was only planned before something else was done is not in it; nor is what is past changed by what
-    was done later. A record that begins with a checkpoint is seen from there: all times are from then on.
+    The result is what viewers saw: plans that a later message changed have no effect after it, and the
+    message none before. If the recording begins with a checkpoint, times count from there.
 
     Args:
-        changed: settings that are to be other than they were, where they are not None.
+        changed: settings to override, where they are not None.
 
     Returns:
-        What was seen and heard, and the feedback as it was told, XML texts with their `seq`.
+        The frames and the sound, and the feedback, XML texts with `seq`.
 
     Raises:
-        JournalError: a setting, the scene or the checkpoint of its head cannot be used here.
-        FaceError: its face is not there.
-        RealizerError: it lasts too long.
+        JournalError: a setting, the scene or the checkpoint of the recording cannot be used here.
+        FaceError: there is no such face.
+        RealizerError: the recording lasts too long.
     """
-    again = _Replay(record, changed)
-    session, settings = again.session, again.session.settings
-    viewer = ReplayViewer(session, settings.fps, again.begin)
+    rerun = _Replay(recording, changed)
+    session, settings = rerun.session, rerun.session.settings
+    viewer = ReplayViewer(session, settings.fps, rerun.begin)
     begin = viewer.first / settings.fps
-    frames_until(again.last - begin, settings.fps)
-    again.play(viewer.capture)
-    end = max(again.last, viewer.idle_from) - begin
+    frames_until(rerun.last - begin, settings.fps)  # raises if it lasts too long
+    rerun.play(viewer.capture)
+    end = max(rerun.last, viewer.idle_from) - begin
     characters = viewer.performances(frames_until(end, settings.fps))
-    feedback = [feedback for feedback, _ in again.log.told]
-    schedules = [playing.latest for playing in viewer.blocks]
-    speaking = [said for playing in viewer.blocks for said in playing.speech.values()]
+    feedback = [feedback for feedback, _ in rerun.log.messages]
+    schedules = [block.latest for block in viewer.blocks]
+    speeches = [_earlier(speech, begin) for block in viewer.blocks for speech in block.speech.values()]
     realization = Realization(
         fps=settings.fps,
         duration=end,
         face_name=session.faces.name(0),
         face_changes=viewer.face_changes,
         characters=characters,
-        schedules=tuple(replace(one, start=one.start - begin) for one in schedules),
+        schedules=tuple(replace(schedule, start=schedule.start - begin) for schedule in schedules),
         feedback_events=tuple(feedback),
         warnings=merge_warnings(feedback, schedules),
-        speeches=tuple(sorted((_earlier(one, begin) for one in speaking), key=lambda one: one.start)),
+        speeches=tuple(sorted(speeches, key=lambda speech: speech.start)),
         deformer=settings.deformer,
         mapping=session.faces.mapping(0),
     )
-    return realization, [text for _, text in again.log.told]
+    return realization, [text for _, text in rerun.log.messages]
 
 
 class _Replay:
-    """A session that is to be what was recorded.
+    """A session that repeats a recorded one.
 
     Attributes:
-        begin: seconds on its clock where the record begins.
-        last: and of what was done last.
+        begin, last: seconds on the session clock, of the begin of the recording and of its last entry.
     """
 
-    def __init__(self, record: Record, changed: Mapping[str, Any]) -> None:
-        head = record.head
-        asked = {name: value for name, value in changed.items() if value is not None}
+    def __init__(self, recording: SavedSession, changed: Mapping[str, Any]) -> None:
+        head, name = recording.head, recording.head["session"]
+        if not isinstance(recorded := head.get("settings", {}), dict):
+            raise JournalError(f"the head of a recording: settings: wanted an object, got {recorded!r:.80}")
+        overrides = {option: value for option, value in changed.items() if value is not None}
         try:
-            settings = Settings.read({**_settings(head), **asked})
+            settings = Settings.read({**recorded, **overrides})
         except SettingsError as error:
-            raise JournalError(f"the record of {head['session']}: {error}") from None
-        self.log = _FullLog(head["epoch"])
-        self.session = Session(head["session"], settings, 0.0, named=True, scene=_scene(head), log=self.log)
-        self.begin = self.session.restore(record.parts) if record.parts else 0.0
-        self._entries = record.entries
-        self.last = record.entries[-1].at if record.entries else self.begin
+            raise JournalError(f"the recording of {name}: {error}") from None
+        self.log = _FullLog(recording.epoch)
+        self.session = Session(name, settings, 0.0, named=True, scene=_scene(head), log=self.log)
+        self.begin = self.session.restore(recording.parts) if recording.parts else 0.0
+        self._entries = recording.entries
+        self.last = recording.entries[-1].at if recording.entries else self.begin
 
     def play(self, look: Callable[[float], None] = lambda t: None) -> None:
-        """Do all of it, and let what plays then come to its end; `look` as in `replay`."""
+        """Replay all entries, and then the rest of what is planned; `look` as in `replay`."""
         session = self.session
-        studio = Engines(session.settings.deformer)
+        engines = Engines(session.settings.deformer)
         try:
-            replay(session, self._entries, studio.speak, look)
+            replay(session, self._entries, engines.speak, look)
         finally:
-            studio.close()
-        # What was being said when the record broke off has no end of its own: it ends with what is planned.
-        ends = [playing.end for playing in session.player.blocks.active()]
+            engines.close()
+        # A speech that was still open has no end of its own: it ends with what is planned.
+        ends = [block.end for block in session.player.blocks.active()]
         end = max((end for end in ends if end < self.last + OPEN / 2), default=self.last)
         session.replay_until(end, look, since=self.last)
         look(end)
@@ -110,28 +110,21 @@ class _Replay:
 
 
 class _FullLog(FeedbackLog):
-    """All that a session ever tells, with its text."""
+    """A log of all feedback of a session, with its texts."""
 
     def __init__(self, epoch: float | None) -> None:
         super().__init__(epoch)
-        self.told: list[tuple[Feedback, str]] = []
+        self.messages: list[tuple[Feedback, str]] = []
 
     def add(self, feedback: Feedback, now: float) -> str:
         text = super().add(feedback, now)
-        self.told.append((feedback, text))
+        self.messages.append((feedback, text))
         return text
 
 
-def _earlier(speaking: ScheduledSpeech, seconds: float) -> ScheduledSpeech:
-    gains = tuple(gain.shifted(-seconds) for gain in speaking.gains)
-    return replace(speaking, start=speaking.start - seconds, until=speaking.until - seconds, gains=gains)
-
-
-def _settings(head: Mapping[str, Any]) -> dict[str, Any]:
-    found = head.get("settings", {})
-    if not isinstance(found, dict):
-        raise JournalError(f"the head of a record: settings: wanted an object, got {found!r:.80}")
-    return found
+def _earlier(speech: ScheduledSpeech, seconds: float) -> ScheduledSpeech:
+    gains = tuple(gain.shifted(-seconds) for gain in speech.gains)
+    return replace(speech, start=speech.start - seconds, until=speech.until - seconds, gains=gains)
 
 
 def _scene(head: Mapping[str, Any]) -> dict[str, tuple[float, float, float]] | None:
@@ -140,4 +133,4 @@ def _scene(head: Mapping[str, Any]) -> dict[str, tuple[float, float, float]] | N
     try:
         return {str(name): (float(x), float(y), float(z)) for name, (x, y, z) in scene.items()}
     except (AttributeError, TypeError, ValueError):
-        raise JournalError(f"the head of a record: scene: wanted places, got {scene!r:.80}") from None
+        raise JournalError(f"the head of a recording: scene: wanted positions, got {scene!r:.80}") from None

@@ -8,110 +8,108 @@ import json
 import os
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 from io import FileIO
 from pathlib import Path
 from typing import Any
 
 from realizer.behaviours.kind import Position
 from realizer.core.settings import Settings
-from realizer.server.journal.entry import Entry, JournalError, SavedSession
+from realizer.server.journal.entry import Entry, JournalError, SavedSession, check_time, quoted
 
 SUFFIX = ".jsonl"
-SHOWN_RECORDS = 20  # of those one can choose from
-ROUNDING = 1e-6  # s; of times that went from one clock to another
+MAX_LISTED = 20  # files that an error message lists
 
 
 class RecordingFolder:
-    """Records every session, of which nothing is taken back: `SESSION-TIME.jsonl`, the head first.
+    """A folder of recordings, a file `SESSION-TIME.jsonl` for each session: the head, then its entries.
 
     Args:
-        folder: made where it is not there.
-        head: what else is told first of each session; plain data.
+        folder: is created if it is missing.
+        head: JSON data that the head of each recording contains beside the session and its epoch.
 
     Raises:
-        JournalError: it cannot be made.
+        JournalError: the folder cannot be created.
     """
 
     def __init__(self, folder: Path, head: Mapping[str, Any]) -> None:
         self._folder = folder
-        self._head: dict[str, Any] = json.loads(json.dumps(head))  # as it is read again
+        self._head: dict[str, Any] = json.loads(json.dumps(head))  # as it will be read, lists for tuples
         self._files: dict[str, FileIO] = {}
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise JournalError(f"the folder of records {folder}: {error.strerror}") from None
+            raise JournalError(f"the folder of recordings {folder}: {error.strerror}") from None
 
     def begin(self, session: str, epoch: float) -> None:
         self.end(session)
         self._begin(session, epoch)
 
     def resume(self, session: str, saved: SavedSession) -> None:
-        """Go on with the record of a session that was taken over; what it lacks is written first.
+        """Continue the recording of a session that was taken over, with the entries it lacks.
 
-        Where there is none here that only lacks something at its end, or another process still writes it, a
-        new one begins with what is kept. It is played from there: from the checkpoint, if there is one.
+        If none of its recordings lacks only the last entries, or another process still writes it, a new file
+        begins with the saved session: its replay starts at the checkpoint, if there is one.
 
         Raises:
-            JournalError: it cannot be written.
+            JournalError: the recording cannot be written.
         """
         self.end(session)
-        there = itertools.takewhile(os.path.exists, self._paths(session, saved.epoch))
-        joined = (self._join(session, path, saved) for path in there)
-        if (lacks := next((one for one in joined if one is not None), None)) is None:
+        existing = itertools.takewhile(os.path.exists, self._paths(session, saved.epoch))
+        reopened = (self._reopen(session, path, saved) for path in existing)
+        if (missing := next((entries for entries in reopened if entries is not None), None)) is None:
             self._begin(session, saved.epoch, saved.parts)
-            lacks = saved.entries
-        for entry in lacks:
+            missing = saved.entries
+        for entry in missing:
             self.add(session, entry)
 
     def _paths(self, session: str, epoch: float) -> Iterator[Path]:
-        """Of a record, and of those that begin where one could not be gone on with."""
+        """Yield the path of a session's recording, then those of its continuations."""
         began = time.strftime("%Y%m%dT%H%M%S", time.gmtime(epoch)) + f"{epoch % 1:.3f}"[1:]
-        for more in itertools.chain([""], (f"-{number}" for number in itertools.count(2))):
-            yield self._folder / f"{session}-{began}{more}{SUFFIX}"
+        for suffix in itertools.chain([""], (f"-{number}" for number in itertools.count(2))):
+            yield self._folder / f"{session}-{began}{suffix}{SUFFIX}"
 
     def _begin(self, session: str, epoch: float, parts: Mapping[str, str] = {}) -> None:
-        told = {"session": session, "epoch": epoch, **self._head}
+        head = {"session": session, "epoch": epoch, **self._head}
         path = self._folder
         try:
             path = next(path for path in self._paths(session, epoch) if not path.exists())
             file = self._files[session] = path.open("xb", buffering=0)
             _lock(file)
-            _write(file, json.dumps(told | {"parts": dict(parts)} if parts else told))
+            _write(file, json.dumps(head | {"parts": dict(parts)} if parts else head))
         except OSError as error:
             if session in self._files:
                 self.end(session)
                 with contextlib.suppress(OSError):
-                    path.unlink()  # an empty file is no record
-            raise JournalError(f"the record {path}: {error.strerror}") from None
+                    path.unlink()  # without a head it is not a recording
+            raise JournalError(f"the recording {path}: {error.strerror}") from None
 
-    def _join(self, session: str, path: Path, kept: SavedSession) -> list[Entry] | None:
-        """Open a record behind its last whole line; what it lacks, or None where it must not grow."""
+    def _reopen(self, session: str, path: Path, saved: SavedSession) -> list[Entry] | None:
+        """Open a recording after its last whole line. Return the entries it lacks; None if it must stay."""
         try:
             file = path.open("r+b", buffering=0)
         except OSError:
             return None
         try:
-            if _lock(file) and (lacks := self._missing_entries(read_record(path), kept)) is not None:
+            if _lock(file) and (missing := self._missing_entries(read_recording(path), saved)) is not None:
                 file.seek(path.read_bytes().rfind(b"\n") + 1)
                 file.truncate()
                 self._files[session] = file
-                return lacks
+                return missing
         except (JournalError, OSError):
-            pass  # it is no record, or not to be written: another one is
+            pass  # not a recording, or not writable
         file.close()
         return None
 
-    def _missing_entries(self, record: Record, kept: SavedSession) -> list[Entry] | None:
-        """What was done last and is not in a record; None where that is not all that it lacks."""
-        if any(record.head.get(name) != told for name, told in self._head.items()):
-            return None  # it is gone on with under other settings
-        have = list(record.entries)
-        if dict(record.parts) == dict(kept.parts):
-            return kept.entries[len(have) :] if have == kept.entries[: len(have)] else None
-        for count in range(min(len(have), len(kept.entries)), 0, -1):
-            if have[-count:] == kept.entries[:count]:
-                return kept.entries[count:]
+    def _missing_entries(self, recorded: SavedSession, saved: SavedSession) -> list[Entry] | None:
+        """Return the last entries that a recording lacks; None if it lacks others or has other settings."""
+        if any(recorded.head.get(name) != value for name, value in self._head.items()):
+            return None
+        have = recorded.entries
+        if recorded.parts == saved.parts:
+            return saved.entries[len(have) :] if have == saved.entries[: len(have)] else None
+        for count in range(min(len(have), len(saved.entries)), 0, -1):
+            if have[-count:] == saved.entries[:count]:
+                return saved.entries[count:]
         return None
 
     def add(self, session: str, entry: Entry) -> None:
@@ -120,7 +118,7 @@ class RecordingFolder:
         try:
             _write(file, entry.line())
         except OSError as error:
-            raise JournalError(f"the record {file.name}: {error.strerror}") from None
+            raise JournalError(f"the recording {file.name}: {error.strerror}") from None
 
     def end(self, session: str) -> None:
         if (file := self._files.pop(session, None)) is not None:
@@ -133,10 +131,10 @@ class RecordingFolder:
 
 
 def _lock(file: FileIO) -> bool:
-    """Let nobody else go on with a file as long as it is open; False where another process has it."""
+    """Take an exclusive lock on a file. Return False if another process holds it."""
     try:
         import fcntl
-    except ImportError:  # not on every system: then nobody else is there either
+    except ImportError:  # not POSIX: there are no other workers either
         return True
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -146,7 +144,7 @@ def _lock(file: FileIO) -> bool:
 
 
 def _write(file: FileIO, line: str) -> None:
-    """The whole line or nothing of it: a disk may be full in the middle, and have room again later."""
+    """Write a whole line, or nothing: a disk may be full now and have space again later."""
     begin = file.tell()
     data = memoryview(f"{line}\n".encode())
     try:
@@ -159,87 +157,57 @@ def _write(file: FileIO, line: str) -> None:
         raise
 
 
-# Settings that change what is seen and heard, or what is taken at all.
-SHOWN = (
+# Settings that change what a session shows, or which messages it accepts.
+RECORDED_SETTINGS = (
     *("face", "deformer", "voice", "language", "fps", "seed", "idle", "prosody", "cooccurrence"),
     *("mapping", "media", "expressions"),
     *("max_document", "max_elements", "max_behaviours", "max_duration", "max_blocks", "max_speech"),
 )
 
 
-def head(settings: Settings, scene: Mapping[str, Position] | None) -> dict[str, Any]:
-    """What a record tells first, beside which session it is."""
-    told = {name: getattr(settings, name) for name in SHOWN}
-    told = {name: str(value) if isinstance(value, Path) else value for name, value in told.items()}
+def recording_head(settings: Settings, scene: Mapping[str, Position] | None) -> dict[str, Any]:
+    """Return the head of a service's recordings, as JSON data."""
+    values = {name: getattr(settings, name) for name in RECORDED_SETTINGS}
     return {
-        "settings": {name: value for name, value in told.items() if value is not None},
+        "settings": {
+            name: str(value) if isinstance(value, Path) else value
+            for name, value in values.items()
+            if value is not None
+        },
         "scene": None if scene is None else {name: list(at) for name, at in scene.items()},
     }
 
 
-@dataclass(frozen=True)
-class Record:
-    """What was recorded of a session.
-
-    Attributes:
-        head: what was told first: `session`, `epoch`, `settings`, `scene`.
-        parts: what the session was where the record begins, as `SavedSession` has them; {}: it was new.
-    """
-
-    head: Mapping[str, Any]
-    entries: tuple[Entry, ...]
-    parts: Mapping[str, str] = field(default_factory=dict)
-
-
-def read_record(path: Path) -> Record:
-    """A record; the last line of one that broke off may be half.
+def read_recording(path: Path) -> SavedSession:
+    """Read a recording, without a last line that was cut short.
 
     Args:
-        path: its file, or a folder where there is no other.
+        path: a file, or a folder with one recording.
 
     Raises:
-        JournalError: it is none; with its line.
+        JournalError: the file is not a recording; with the number of the line.
     """
     try:
         if path.is_dir():
-            path = _only(path)
+            path = _only_recording(path)
         first, *lines = path.read_bytes().split(b"\n")
     except OSError as error:
         raise JournalError(f"{path}: {error.strerror}") from None
     try:
         head = json.loads(first)
-        _time(head["epoch"])
+        check_time(epoch := head.pop("epoch"))
         head["session"] + ""
         parts = {name + "": text + "" for name, text in head.pop("parts", {}).items()}
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        raise JournalError(f"{path}:1: wanted the head of a record, got {_quoted(first)!r}") from None
-    entries: list[Entry] = []
-    # What is behind the last line feed was not written to its end.
-    for number, line in enumerate(lines[:-1], 2):
-        try:
-            entry = Entry.read(line.decode())
-            _time(entry.at, entries[-1].at if entries else 0.0)
-            entries.append(entry)
-        except UnicodeDecodeError:
-            raise JournalError(f"{path}:{number}: wanted UTF-8, got {_quoted(line)!r}") from None
-        except (JournalError, ValueError) as error:
-            raise JournalError(f"{path}:{number}: {error}") from None
-    return Record(head, tuple(entries), parts)
+        raise JournalError(f"{path}:1: wanted the head of a recording, got {quoted(first)!r}") from None
+    # The text after the last line feed is a line that was cut short.
+    return SavedSession.read(epoch, lines[:-1], parts, head, f"{path}:")
 
 
-def _time(at: float, least: float = float("-inf")) -> None:
-    if not least - ROUNDING <= at < float("inf"):
-        raise ValueError(f"at: wanted seconds, not before {least:g}, got {at:g}")
-
-
-def _only(folder: Path) -> Path:
-    found = sorted(path for path in folder.iterdir() if path.suffix == SUFFIX)
-    if len(found) != 1:
-        names = "".join(f"\n  {path}" for path in found[:SHOWN_RECORDS])
-        more = "\n  ..." if len(found) > SHOWN_RECORDS else ""
-        raise JournalError(f"{folder}: wanted one record (*{SUFFIX}), got {len(found)}{names}{more}")
-    return found[0]
-
-
-def _quoted(line: bytes) -> str:
-    return line[:80].decode(errors="replace")
+def _only_recording(folder: Path) -> Path:
+    paths = sorted(path for path in folder.iterdir() if path.suffix == SUFFIX)
+    if len(paths) != 1:
+        names = "".join(f"\n  {path}" for path in paths[:MAX_LISTED])
+        more = "\n  ..." if len(paths) > MAX_LISTED else ""
+        raise JournalError(f"{folder}: wanted one recording (*{SUFFIX}), got {len(paths)}{names}{more}")
+    return paths[0]

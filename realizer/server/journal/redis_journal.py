@@ -1,4 +1,4 @@
-"""The journal in Redis, which several nodes share."""
+"""The journal in Redis, which several hosts share."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from typing import Any
 from realizer.server.journal.entry import RETENTION, Entry, JournalError, SavedSession, TakenOver
 
 PATIENCE = 1.0  # s for an answer
-# Everybody waits for it meanwhile: who has not answered in that time is not asked again before so long.
+# All sessions wait meanwhile: after a timeout the server is not asked again for this time.
 PAUSE = 4.0  # s
 
-# What may stand before it, and after it, is nobody's business: passwords.
+# The named groups are what messages may show; the rest may contain passwords.
 ADDRESS = re.compile(
     r"(?P<scheme>rediss?)://([^/?#]*@)?(?P<place>(\[[0-9a-fA-F:.]+\]|[^@:/?#\[\]]*)(:\d+)?(/\d*)?)(\?[^#]*)?"
     r"|(?P<unix>unix)://([^/?#]*@)?(?P<path>/[^@?#]*)(\?[^#]*)?"
 )
 
-# KEYS: of the head (owner, epoch), of the list of entries, and of the parts by name. Nobody comes between
-# the look and the write, and who restarts the store finds all of a script's writes in its log, or none.
-# An answer may be lost after its write: what is there beyond the entries that its owner knows of, ARGV[3] of
-# them, is what somebody was told could not be kept, and goes.
+# KEYS: the head (owner, epoch), the list of entries, and the parts by name. A script is atomic: no other
+# command runs between its check and its write, and a restarted server has all of its writes or none.
+# An answer may get lost after its write. Its owner knows of ARGV[3] entries: those beyond were reported to
+# clients as not written, and are deleted.
 ADD = """
 if redis.call('HGET', KEYS[1], 'owner') ~= ARGV[1] then return 0 end
 local known = tonumber(ARGV[3])
@@ -40,7 +40,7 @@ return {
     redis.call('HGET', KEYS[1], 'epoch'), redis.call('LRANGE', KEYS[2], 0, -1), redis.call('HGETALL', KEYS[3])
 }
 """
-# ARGV: ..., how many parts are gone, their names, and then name and text of each that is new.
+# ARGV: ..., the number of parts to delete, their names, then name and text of each new part.
 COMPACT = """
 if redis.call('HGET', KEYS[1], 'owner') ~= ARGV[1] then return 0 end
 redis.call('DEL', KEYS[2])
@@ -55,10 +55,10 @@ if redis.call('HGET', KEYS[1], 'owner') == ARGV[1] then redis.call('DEL', unpack
 
 
 class RedisJournal:
-    """The store at a URL such as redis://HOST:6379/0. An entry is one round trip.
+    """A journal at a URL such as redis://HOST:6379/0. An entry takes one round trip.
 
     Raises:
-        JournalError: it cannot be reached, or its client is not installed.
+        JournalError: the server cannot be reached, or its client is not installed.
     """
 
     def __init__(self, url: str) -> None:
@@ -68,20 +68,16 @@ class RedisJournal:
             from redis.retry import Retry
         except ImportError:
             raise JournalError("a journal in Redis: pip install 'bml-realizer[cluster]'") from None
-        if (found := ADDRESS.fullmatch(url)) is None:
+        if (match := ADDRESS.fullmatch(url)) is None:
             raise JournalError(
                 "the journal: wanted redis://USER:PASSWORD@HOST:PORT/NUMBER, or unix:///PATH, got another; "
                 "in a password / ? # @ % are written as %2F %3F %23 %40 %25"
             )
-        self._url = (
-            "{scheme}://{place}".format_map(found.groupdict())
-            if found["scheme"]
-            else f"unix://{found['path']}"
-        )
+        self._url = f"{match['scheme']}://{match['place']}" if match["scheme"] else f"unix://{match['path']}"
         self._owner = secrets.token_hex(8)
-        self._counts: dict[str, int] = {}  # session -> how many entries it has
+        self._counts: dict[str, int] = {}  # session -> number of its entries
         self._pause_ends = 0.0
-        self._late: type[Exception] = redis.TimeoutError
+        self._timeout: type[Exception] = redis.TimeoutError
         self._faults: tuple[type[Exception], ...] = (redis.RedisError, OSError)
         try:
             self._store: Any = redis.Redis.from_url(
@@ -89,10 +85,10 @@ class RedisJournal:
                 socket_timeout=PATIENCE,
                 socket_connect_timeout=PATIENCE,
                 decode_responses=True,
-                # One that restarts is there again at once, or not at all; a write twice is as one.
+                # For a server that has restarted. Repeating a write is harmless: see ADD.
                 retry=Retry(NoBackoff(), 1, (redis.ConnectionError,)),
             )
-            self._store.connection_pool.make_connection()  # which knows what may stand behind the "?"
+            self._store.connection_pool.make_connection()  # validates the query of the URL
         except (ValueError, TypeError) as error:
             raise JournalError(f"the journal {self._url}: {error}") from None
         scripts = map(self._store.register_script, (ADD, TAKE, COMPACT, END))
@@ -115,18 +111,17 @@ class RedisJournal:
             known = self._counts.get(session, 0)
             count = self._add(_keys(session), [self._owner, RETENTION, known, entry.line()])
         if not count:
-            raise _taken_over_error(session)
+            raise TakenOver(session)
         self._counts[session] = count
 
     def claim(self, session: str) -> SavedSession | None:
         with self._translate_errors():
-            there = self._take(_keys(session), [self._owner])
-        if there is None:
+            answer = self._take(_keys(session), [self._owner])
+        if answer is None:
             return None
-        epoch, lines, parts = there
-        texts = dict(zip(parts[::2], parts[1::2], strict=True))
+        epoch, lines, parts = answer
         self._counts[session] = len(lines)
-        return SavedSession(float(epoch), [Entry.read(line) for line in lines], texts)
+        return SavedSession.read(float(epoch), lines, dict(zip(parts[::2], parts[1::2], strict=True)))
 
     def taken_over(self, sessions: Collection[str]) -> set[str]:
         with self._translate_errors():
@@ -137,12 +132,12 @@ class RedisJournal:
         return {session for session, owner in owners.items() if owner not in (None, self._owner)}
 
     def compact(self, session: str, parts: Mapping[str, str | None]) -> None:
-        gone = [name for name, text in parts.items() if text is None]
+        deleted = [name for name, text in parts.items() if text is None]
         new = [word for name, text in parts.items() if text is not None for word in (name, text)]
         with self._translate_errors():
-            done = self._compact(_keys(session), [self._owner, RETENTION, len(gone), *gone, *new])
+            done = self._compact(_keys(session), [self._owner, RETENTION, len(deleted), *deleted, *new])
         if not done:
-            raise _taken_over_error(session)
+            raise TakenOver(session)
         self._counts[session] = 0
 
     def end(self, session: str) -> None:
@@ -157,21 +152,17 @@ class RedisJournal:
     @contextlib.contextmanager
     def _translate_errors(self) -> Iterator[None]:
         if time.monotonic() < self._pause_ends:
-            raise JournalError(f"the journal {self._url}: it did not answer, and is asked again in a moment")
+            raise JournalError(
+                f"the journal {self._url}: it did not answer, and is asked again in {PAUSE:g} s"
+            )
         try:
             yield
-        except self._late as error:
-            self._pause_ends = time.monotonic() + PAUSE
-            raise JournalError(f"the journal {self._url}: {error}") from None
         except self._faults as error:
+            if isinstance(error, self._timeout):
+                self._pause_ends = time.monotonic() + PAUSE
             raise JournalError(f"the journal {self._url}: {error}") from None
 
 
 def _keys(session: str) -> list[str]:
-    """The braces keep them in one place of a cluster."""
-    head = f"realizer:{{{session}}}"
+    head = f"realizer:{{{session}}}"  # a cluster stores keys with the same {...} on one node
     return [head, f"{head}:entries", f"{head}:parts"]
-
-
-def _taken_over_error(session: str) -> TakenOver:
-    return TakenOver(f"session {session} is another node's now")

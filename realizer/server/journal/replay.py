@@ -17,17 +17,17 @@ def replay(
     speak: Callable[[Speak], Utterance | RealizerError],
     look: Callable[[float], None] = lambda t: None,
 ) -> list[Effect]:
-    """Do to a new session what was done to one before.
+    """Replay entries into a session.
 
     Args:
-        session: its clock is its caller's: it was opened at 0, and is written for by nobody.
-        speak: says it again; a voice says the same twice.
-        look: is called with every time at which something happens, before it does.
+        session: a new one without a journal, opened at 0 of the caller's clock.
+        speak: synthesizes a request again; a voice gives the same result twice.
+        look: is called with the time of each event, before it.
 
     Returns:
-        What its shell still owes it: what was to be spoken and had not been.
+        The speech requests that are not answered yet.
     """
-    owed: dict[int, Speak] = {}
+    unanswered: dict[int, Speak] = {}
     for entry in entries:
         session.replay_until(entry.at, look)
         look(entry.at)
@@ -39,45 +39,45 @@ def replay(
             case "text" | "sound":
                 session.receive(entry.number, entry.body, entry.at)
             case "spoken":
-                order = owed.pop(entry.number, None)
-                # What was asked for before a checkpoint nobody waits for any more.
-                said = None if order is None or entry.body else speak(order)
-                session.on_speech(entry.number, said or VoiceError(str(entry.body)), entry.at)
+                request = unanswered.pop(entry.number, None)
+                # No block waits for a request from before the checkpoint any more.
+                speech = None if request is None or entry.body else speak(request)
+                session.on_speech(entry.number, speech or VoiceError(str(entry.body)), entry.at)
             case "tick":
                 session.tick(entry.at)
         for effect in session.take_effects():
             if isinstance(effect, Speak):
-                owed[effect.id] = effect
-    return list(owed.values())
+                unanswered[effect.id] = effect
+    return list(unanswered.values())
 
 
 def restore_session(
     session: Session, saved: SavedSession, speak: Callable[[Speak], Utterance | RealizerError]
 ) -> tuple[float, list[Effect]]:
-    """Let a new session be what a journal has kept, up to the last entry; as `replay`.
+    """Restore a new session from a journal; arguments as of `replay`.
 
     Returns:
-        Seconds on its clock, and what its shell owes it.
+        The session clock at the last entry, in seconds, and the speech requests that are not answered yet.
 
     Raises:
-        JournalError: its checkpoint cannot be read.
+        JournalError: the checkpoint cannot be read.
     """
     at = session.restore(saved.parts) if saved.parts else 0.0
-    owed = replay(session, saved.entries, speak)
-    return saved.entries[-1].at if saved.entries else at, owed
+    unanswered = replay(session, saved.entries, speak)
+    return saved.entries[-1].at if saved.entries else at, unanswered
 
 
 def catch_up(session: Session, now: float, seen: int) -> float:
-    """Let time pass until a session has told again what somebody has seen of it already.
+    """Advance a restored session until it has repeated the feedback that a client has already seen.
 
-    The clock that says how much has passed may be another machine's, or have been set back.
+    The clock that says how much time has passed may belong to another host, or have been set back.
 
     Args:
-        now: seconds on its caller's clock.
-        seen: seq of the feedback that its client had last.
+        now: seconds on the caller's clock.
+        seen: sequence number of the last feedback that the client received.
 
     Returns:
-        Seconds on that clock, as late as it must be.
+        Seconds on that clock, `now` or later.
     """
     while session.feedback_log.newest < seen and not session.closed:
         if (due := session.player.next_deadline()) is None:

@@ -16,16 +16,16 @@ from realizer.server.streams.frame_windows import EPSILON, FrameWindow, first_fr
 
 
 class ReplayViewer:
-    """Who looks at all faces of a session while time passes, and remembers what was to be seen.
+    """A viewer of all characters of a session, which stores their frames while time passes.
 
-    A session forgets what is past, as it did when it was live: what it held, which blocks there were.
+    The session itself forgets its past, as a live one does.
 
     Args:
         fps: frames a second; frame k is sampled at k / fps.
-        begin: seconds on the session clock, of the first frame or less than one behind it.
+        begin: seconds on the session clock, at the first frame or less than a frame after it.
 
     Attributes:
-        first: the number of the first frame.
+        first: number of the first frame.
     """
 
     def __init__(self, session: Session, fps: float, begin: float = 0.0) -> None:
@@ -36,22 +36,22 @@ class ReplayViewer:
         self._blocks: dict[int, ActiveBlock] = {}
 
     def capture(self, t: float) -> None:
-        """Take in every frame before `t`, as it is planned now: something is about to change."""
+        """Store every frame before `t` as it is planned now, because the plan is about to change."""
         if t * self._fps > self.first:
-            self._take(first_frame_at(t, self._fps))
+            self._capture(first_frame_at(t, self._fps))
 
     @property
     def blocks(self) -> list[ActiveBlock]:
-        """All that were accepted, in that order."""
+        """All accepted blocks, in order of acceptance."""
         return list(self._blocks.values())
 
     @property
     def idle_from(self) -> float:
-        """When nothing moves any more, but what the face does by itself: seconds on the session clock."""
-        ends = [playing.invisible_after for playing in self.blocks if playing.end < math.inf]
+        """Seconds on the session clock from which only idle motion is left."""
+        ends = [block.invisible_after for block in self.blocks if block.end < math.inf]
         for character in self._session.player.character_states:
-            held = (*character.direct.values(), *character.emotion.values())
-            ends += [float(one.times[-1]) if one.faded_at == math.inf else one.faded_at for one in held]
+            for channel in (*character.direct.values(), *character.emotion.values()):
+                ends.append(float(channel.times[-1]) if channel.faded_at == math.inf else channel.faded_at)
             ends += [shift.end for shift in character.shifts]
         return max(ends, default=0.0)
 
@@ -61,40 +61,42 @@ class ReplayViewer:
         return self._face_changes(self._recorders[0])
 
     def performances(self, count: int) -> dict[str | None, Performance]:
-        """What each character does in the first `count` frames, the time of the first one being 0."""
-        self._take(self.first + count)
+        """Return the first `count` frames of each character; the first one is at time 0."""
+        self._capture(self.first + count)
         names = self._session.player.characters
-        return {name: self._performance(seat) for name, seat in zip(names, self._recorders, strict=True)}
+        return {
+            name: self._performance(recorder) for name, recorder in zip(names, self._recorders, strict=True)
+        }
 
-    def _take(self, end: int) -> None:
+    def _capture(self, end: int) -> None:
         player = self._session.player
-        self._blocks.update((playing.number, playing) for playing in player.blocks.all())
+        self._blocks.update((block.number, block) for block in player.blocks.all())
         for index in range(len(player.characters)):
             if index == len(self._recorders):
                 self._recorders.append(_CharacterRecorder(self._session, index, self._fps, self.first))
             self._recorders[index].capture(end)
 
-    def _performance(self, seat: _CharacterRecorder) -> Performance:
-        aus = seat.frames()
-        worn = self._face_changes(seat)
-        ends = [*(one.frame for one in worn[1:]), len(aus.times)]
-        faps = [to_fap(aus.part(one.frame, end), one.mapping) for one, end in zip(worn, ends, strict=True)]
+    def _performance(self, recorder: _CharacterRecorder) -> Performance:
+        aus = recorder.frames()
+        changes = self._face_changes(recorder)
+        ends = [*(change.frame for change in changes[1:]), len(aus.times)]
+        faps = [to_fap(aus.part(c.frame, end), c.mapping) for c, end in zip(changes, ends, strict=True)]
         values = np.concatenate([part.values for part in faps])
         mask = np.any([part.mask for part in faps], axis=0)
         return Performance(aus, FAPFrames(aus.times, values, mask))
 
-    def _face_changes(self, seat: _CharacterRecorder) -> tuple[FaceChange, ...]:
+    def _face_changes(self, recorder: _CharacterRecorder) -> tuple[FaceChange, ...]:
         mapping = self._session.settings.mapping
         return tuple(
-            FaceChange(frame - self.first, name, mapping_of(name, mapping)) for frame, name in seat.faces
+            FaceChange(frame - self.first, name, mapping_of(name, mapping)) for frame, name in recorder.faces
         )
 
 
 class _CharacterRecorder:
-    """Where one character is looked at from: its frames so far.
+    """The frames of one character so far.
 
     Attributes:
-        faces: (frame, name): the face it has from there on.
+        faces: (frame, name) of each face change.
     """
 
     def __init__(self, session: Session, index: int, fps: float, first: int) -> None:
@@ -104,14 +106,12 @@ class _CharacterRecorder:
         self._timeline = session.broadcast.timeline(index, fps)
         self._next = first
         self._parts: list[AUFrames] = []
-        self._window: FrameWindow | None = (
-            None  # the frames from `_begin` on are looked at, and are no part yet
-        )
+        self._window: FrameWindow | None = None  # its frames from `_begin` on are not in `_parts` yet
         self._begin = first
         self.faces: list[tuple[int, str]] = []
 
     def capture(self, end: int) -> None:
-        """All frames before this one."""
+        """Capture all frames before `end`."""
         if self._next >= end:
             return
         if (face := self._session.faces.name(self._index)) not in (name for _, name in self.faces[-1:]):
@@ -121,21 +121,21 @@ class _CharacterRecorder:
             if window is not self._window:
                 self._store_window()
                 self._window, self._begin = window, self._next
-            assert len(window.aus.times)  # they are made when they are first asked for: now, of this plan
+            assert len(window.aus.times)  # computes the lazy frames now, from this plan
             self._next = min(end, window.end)
 
     def frames(self) -> AUFrames:
-        """All of them; the time of the first one is 0."""
+        """Return all frames; the first one is at time 0."""
         self._store_window()
         joined = AUFrames.concatenate(self._parts)
         times = np.arange(len(joined.times)) / self._fps
         return AUFrames(times, joined.values, joined.rules, joined.overridden, joined.columns)
 
     def _store_window(self) -> None:
-        """Keep of a window what was looked at: a plan may change long before its end."""
+        """Store the captured frames of the window: the plan may change long before its end."""
         if self._window is not None:
             first, last = (frame - self._window.first for frame in (self._begin, self._next))
             part = self._window.aus.part(first, last)
-            held = None if part.overridden is None else part.overridden.copy()
-            self._parts.append(AUFrames(part.times, part.values.copy(), part.rules, held, part.columns))
+            overridden = None if part.overridden is None else part.overridden.copy()
+            self._parts.append(AUFrames(part.times, part.values.copy(), part.rules, overridden, part.columns))
         self._window = None

@@ -13,12 +13,11 @@ from realizer.animation.idle.blinks import BlinkReduction
 from realizer.playback.character import BaseShift, Character
 from realizer.scheduling.timing import Schedule
 
-# Python writes a float so that it is read again to the last bit.
 CHANNELS = {"channel": Channel, "fewer": BlinkReduction}
 
 
 def character_to_json(character: Character) -> dict[str, Any]:
-    """A face with all that it holds beyond any block."""
+    """Return a character with the channels that outlive blocks."""
     return {
         "id": character.id,
         "shifts": [
@@ -35,11 +34,11 @@ def character_to_json(character: Character) -> dict[str, Any]:
     }
 
 
-def character_from_json(told: Mapping[str, Any]) -> Character:
-    """What `character_to_json` told of.
+def character_from_json(data: Mapping[str, Any]) -> Character:
+    """Return the character that `character_to_json` wrote.
 
     Raises:
-        KeyError, TypeError, ValueError: it is none.
+        KeyError, TypeError, ValueError: the data is not a character.
     """
     shifts = [
         BaseShift(
@@ -48,16 +47,17 @@ def character_from_json(told: Mapping[str, Any]) -> Character:
             frozenset(shift["regions"]),
             tuple(map(_channel_from_json, shift["channels"])),
         )
-        for shift in told["shifts"]
+        for shift in data["shifts"]
     ]
-    direct, feeling = (
-        {name: _channel_from_json(one) for name, one in told[of].items()} for of in ("direct", "feeling")
+    direct, emotion = (
+        {name: _channel_from_json(channel) for name, channel in data[key].items()}
+        for key in ("direct", "feeling")
     )
-    return Character(told["id"], shifts, direct, feeling)
+    return Character(data["id"], shifts, direct, emotion)
 
 
 def schedule_to_json(schedule: Schedule) -> dict[str, Any]:
-    """When the sync points of a block were: what references to it may still ask."""
+    """Return the sync points of a block and their times, to which later blocks may refer."""
     return {
         "block": schedule.block,
         "start": schedule.start,
@@ -66,22 +66,21 @@ def schedule_to_json(schedule: Schedule) -> dict[str, Any]:
     }
 
 
-def schedule_from_json(told: Mapping[str, Any]) -> Schedule:
-    """What `schedule_to_json` told of.
+def schedule_from_json(data: Mapping[str, Any]) -> Schedule:
+    """Return the schedule that `schedule_to_json` wrote.
 
     Raises:
-        KeyError, TypeError, ValueError: it is none.
+        KeyError, TypeError, ValueError: the data is not a schedule.
     """
-    points = {behaviour: tuple(names) for behaviour, names in told["points"].items()}
-    times = {behaviour: np.array(at, np.float64) for behaviour, at in told["times"].items()}
-    return Schedule(told["block"], points, times, start=float(told["start"]))
+    points = {behaviour: tuple(names) for behaviour, names in data["points"].items()}
+    times = {behaviour: np.array(at, np.float64) for behaviour, at in data["times"].items()}
+    return Schedule(data["block"], points, times, start=float(data["start"]))
 
 
 def _channel_to_json(channel: Channel) -> dict[str, Any]:
-    """Its attributes, but those that are as they are where nobody says anything."""
-    kind = next(name for name, one in CHANNELS.items() if one is type(channel))
-    told: dict[str, Any] = {
-        "kind": kind,
+    """Return the attributes of a channel except the default values."""
+    data: dict[str, Any] = {
+        "kind": next(name for name, kind in CHANNELS.items() if kind is type(channel)),
         "target": channel.target.name,
         "times": channel.times.tolist(),
         "values": channel.values.tolist(),
@@ -91,28 +90,27 @@ def _channel_to_json(channel: Channel) -> dict[str, Any]:
         "source": channel.source,
     }
     if channel.gains:
-        told["gains"] = [list(gain) for gain in channel.gains]
+        data["gains"] = [list(gain) for gain in channel.gains]
     if channel.until < float("inf"):
-        told["until"] = channel.until
+        data["until"] = channel.until
     if channel.crossfade is not None:
-        told["joint"] = list(channel.crossfade)
+        data["joint"] = list(channel.crossfade)
     if channel.weight is not None:
-        told["there"] = channel.weight.tolist()
-    return told
+        data["there"] = channel.weight.tolist()
+    return data
 
 
-def _channel_from_json(told: Mapping[str, Any]) -> Channel:
-    there = told.get("there")
-    return CHANNELS[told["kind"]](
-        axis()[told["target"]],
-        np.array(told["times"], np.float64),
-        np.array(told["values"], np.float64),
-        curve=told["curve"],
-        layer=Layer[told["layer"]],
-        keeps_last=told["holds"],
-        gains=tuple(Gain(*gain) for gain in told.get("gains", ())),
-        until=told.get("until", float("inf")),
-        crossfade=None if told.get("joint") is None else Crossfade(*told["joint"]),
-        weight=None if there is None else np.array(there, np.float64),
-        source=told["source"],
+def _channel_from_json(data: Mapping[str, Any]) -> Channel:
+    return CHANNELS[data["kind"]](
+        axis()[data["target"]],
+        np.array(data["times"], np.float64),
+        np.array(data["values"], np.float64),
+        curve=data["curve"],
+        layer=Layer[data["layer"]],
+        keeps_last=data["holds"],
+        gains=tuple(Gain(*gain) for gain in data.get("gains", ())),
+        until=data.get("until", float("inf")),
+        crossfade=Crossfade(*data["joint"]) if "joint" in data else None,
+        weight=np.array(data["there"], np.float64) if "there" in data else None,
+        source=data["source"],
     )

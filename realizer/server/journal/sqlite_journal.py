@@ -12,6 +12,7 @@ from time import time
 
 from realizer.server.journal.entry import RETENTION, Entry, JournalError, SavedSession, TakenOver
 
+# The tables of version 1; later versions must read them.
 TABLES = """
 CREATE TABLE IF NOT EXISTS sessions (id TEXT PRIMARY KEY, owner TEXT NOT NULL, epoch REAL NOT NULL);
 CREATE TABLE IF NOT EXISTS entries (n INTEGER PRIMARY KEY, session TEXT NOT NULL, line TEXT NOT NULL);
@@ -20,7 +21,7 @@ CREATE TABLE IF NOT EXISTS parts (
     session TEXT NOT NULL, name TEXT NOT NULL, text TEXT NOT NULL, PRIMARY KEY (session, name)
 );
 """
-# POSIX seconds at which something was done to each session last.
+# POSIX time of the last entry or checkpoint of each session.
 LAST = """
 SELECT id, epoch + max(
     coalesce((SELECT json_extract(line, '$.at') FROM entries
@@ -30,25 +31,24 @@ SELECT id, epoch + max(
 ) FROM sessions
 """
 TAKEN = "SELECT id FROM sessions WHERE owner != ? AND id IN (SELECT value FROM json_each(?))"
-# How long a write waits for another worker's.
-BUSY = 2.0  # s
+BUSY = 2.0  # s; how long a write waits for one of another worker
 
 
 class SqliteJournal:
-    """The file of that name, made where it is not there; several workers of one machine may share it.
+    """A journal in a file, which is created if it is missing; several workers of one host may share it.
 
-    A killed process loses nothing of it; a machine that loses power may lose its last moments. What sessions
-    no longer need is room for others: the file does not grow by it, and does not shrink.
+    A killed process loses no entry, a host that loses power may lose the last ones. Space of deleted entries
+    is used again, but the file does not shrink.
 
     Raises:
-        JournalError: the file cannot be had.
+        JournalError: the file cannot be opened, or is not a journal.
     """
 
     def __init__(self, path: str | Path) -> None:
         self._path = path
         self._owner = secrets.token_hex(8)
         with self._translate_errors():
-            # Each statement by itself: what is added is safe at once.
+            # Each statement is its own transaction, so that an added entry is stored at once.
             self._file = sqlite3.connect(path, timeout=BUSY, isolation_level=None)
             self._file.execute("PRAGMA journal_mode=WAL")
             self._file.execute("PRAGMA synchronous=NORMAL")
@@ -70,34 +70,27 @@ class SqliteJournal:
                 (entry.line(), session, self._owner),
             )
         if not done.rowcount:
-            raise _taken_over_error(session)
+            raise TakenOver(session)
 
     def claim(self, session: str) -> SavedSession | None:
         with self._transaction():
-            mine = self._file.execute(
+            row = self._file.execute(
                 "UPDATE sessions SET owner = ? WHERE id = ? RETURNING epoch", (self._owner, session)
             ).fetchone()
-            lines = self._file.execute(
-                "SELECT line FROM entries WHERE session = ? ORDER BY n", (session,)
-            ).fetchall()
-            parts = self._file.execute(
-                "SELECT name, text FROM parts WHERE session = ?", (session,)
-            ).fetchall()
-        return (
-            None
-            if mine is None
-            else SavedSession(mine[0], [Entry.read(line) for (line,) in lines], dict(parts))
-        )
+            entries = "SELECT line FROM entries WHERE session = ? ORDER BY n"
+            lines = [line for (line,) in self._file.execute(entries, (session,))]
+            parts = dict(self._file.execute("SELECT name, text FROM parts WHERE session = ?", (session,)))
+        return None if row is None else SavedSession.read(row[0], lines, parts)
 
     def taken_over(self, sessions: Collection[str]) -> set[str]:
-        # A connection of its own: the other one is of the thread that writes.
+        # The main connection belongs to the thread that writes.
         with self._translate_errors(), contextlib.closing(sqlite3.connect(self._path, timeout=BUSY)) as file:
             return {id for (id,) in file.execute(TAKEN, (self._owner, json.dumps(list(sessions))))}
 
     def compact(self, session: str, parts: Mapping[str, str | None]) -> None:
         with self._transaction():
             if not self._owns(session):
-                raise _taken_over_error(session)
+                raise TakenOver(session)
             self._file.execute("DELETE FROM entries WHERE session = ?", (session,))
             for name, text in parts.items():
                 if text is None:
@@ -115,10 +108,8 @@ class SqliteJournal:
             self._file.close()
 
     def _owns(self, session: str) -> bool:
-        found = self._file.execute(
-            "SELECT 1 FROM sessions WHERE id = ? AND owner = ?", (session, self._owner)
-        ).fetchone()
-        return found is not None
+        query = "SELECT 1 FROM sessions WHERE id = ? AND owner = ?"
+        return self._file.execute(query, (session, self._owner)).fetchone() is not None
 
     def _forget(self, session: str) -> None:
         for table, column in (("entries", "session"), ("parts", "session"), ("sessions", "id")):
@@ -126,7 +117,6 @@ class SqliteJournal:
 
     @contextlib.contextmanager
     def _transaction(self) -> Iterator[None]:
-        """All that is done inside, or nothing of it."""
         with self._translate_errors():
             self._file.execute("BEGIN IMMEDIATE")
             try:
@@ -142,7 +132,3 @@ class SqliteJournal:
             yield
         except (sqlite3.Error, OSError) as error:
             raise JournalError(f"the journal {self._path}: {error}") from None
-
-
-def _taken_over_error(session: str) -> TakenOver:
-    return TakenOver(f"session {session} is another process's now")

@@ -16,7 +16,7 @@ from realizer.face.fap_mapping import mapping_of
 from realizer.server.http.metrics import Metrics
 from realizer.server.journal import Journal, JournalError, Recorder, SavedSession, journal_at
 from realizer.server.journal.journal_writer import JournalWriter
-from realizer.server.journal.recordings import RecordingFolder, head
+from realizer.server.journal.recordings import RecordingFolder, recording_head
 from realizer.server.journal.replay import catch_up, restore_session
 from realizer.server.runtime.session_registry import JoinError
 from realizer.server.session.effects import Effect, Speak
@@ -28,14 +28,14 @@ log = logging.getLogger(__name__)
 
 
 class SessionFactory:
-    """Makes the sessions of one process.
+    """The factory of the sessions of one process.
 
     Args:
-        metrics: counts records that had to stop.
+        metrics: counts recordings that have stopped.
 
     Attributes:
-        journal: what another process goes on from; None: none does.
-        ending: sessions take no more documents.
+        journal: from which another process can resume sessions, or None.
+        ending: whether new sessions take no documents.
     """
 
     def __init__(self, settings: Settings, metrics: Metrics) -> None:
@@ -43,12 +43,12 @@ class SessionFactory:
         self.ending = False
         self._settings = settings
         self._metrics = metrics
-        self._record: Recorder | None = None
+        self._recorder: Recorder | None = None
         self._scene: Mapping[str, Position] | None = None
         self._capabilities: dict[str, Any] = {}
 
     async def load(self) -> None:
-        """What every session shares; raises as `SessionHost.start`."""
+        """Load what all sessions share. Raises as `SessionHost.start`."""
         settings, loop = self._settings, asyncio.get_running_loop()
         if settings.journal is not None:
             self.journal = journal_at(settings.journal)
@@ -57,8 +57,8 @@ class SessionFactory:
 
             self._scene = parse_scene(settings.scene.read_text("utf-8"))
         if settings.record is not None:
-            self._record = RecordingFolder(settings.record, head(settings, self._scene))
-        # A face that is not there is said before a door opens.
+            self._recorder = RecordingFolder(settings.record, recording_head(settings, self._scene))
+        # Load the face now: a missing one is an error before any transport opens.
         from realizer.face.load import load_face
 
         await loop.run_in_executor(None, lambda: load_face(settings.face, deformer=settings.deformer))
@@ -67,16 +67,16 @@ class SessionFactory:
         self._capabilities = await loop.run_in_executor(None, capabilities_of, settings)
 
     def close(self) -> None:
-        """Nothing more is to be kept."""
-        for journal in (self.journal, self._record):
-            if journal is not None:
-                journal.close()
+        """Close the journal and the recordings."""
+        for log_ in (self.journal, self._recorder):
+            if log_ is not None:
+                log_.close()
 
     def new(self, id: str, now: float, named: bool) -> Session:
-        """A session that begins now, on the caller's clock; one with a name is kept in the journal.
+        """Return a session that begins now, on the caller's clock. A named one is added to the journal.
 
         Raises:
-            HubError: it cannot be kept.
+            JoinError: the journal cannot be written.
         """
         epoch = time.time()
         session = self._session(id, now, named=named, epoch=epoch)
@@ -90,39 +90,39 @@ class SessionFactory:
     async def restore(
         self, name: str, seen: int, speak: Callable[[Speak], Utterance | RealizerError]
     ) -> tuple[Session, list[Effect]] | None:
-        """A session as the journal has it, without its connections; None where it has none of that name.
+        """Restore a session from the journal, without its connections; None if the journal has none.
 
         Args:
-            seen: seq of the feedback that a client had last: the session has come at least so far.
-            speak: says again what was said.
+            seen: sequence number of the last feedback that a client received; the session is advanced to it.
+            speak: synthesizes a speech request again.
 
         Returns:
-            It, and what its shell owes it.
+            The session, and the speech requests that are not answered yet.
 
         Raises:
-            JournalError: the journal cannot be read.
+            JournalError: the journal cannot be read, or the session not be restored.
         """
-        if self.journal is None or (kept := self.journal.claim(name)) is None:
+        if self.journal is None or (saved := self.journal.claim(name)) is None:
             return None
         loop = asyncio.get_running_loop()
-        session = self._session(name, 0.0, named=True, epoch=kept.epoch)
+        session = self._session(name, 0.0, named=True, epoch=saved.epoch)
         try:
-            at, owed = await loop.run_in_executor(None, restore_session, session, kept, speak)
+            at, unanswered = await loop.run_in_executor(None, restore_session, session, saved, speak)
         except JournalError:
             raise
         except Exception:
-            log.exception("session %s cannot be gone on with", name)
-            raise JournalError(f"session {name} cannot be gone on with: internal error") from None
-        session.journal = self._journal_writer(name, self.journal, kept)
-        await loop.run_in_executor(None, session.journal.resume, kept)
+            log.exception("session %s cannot be resumed", name)
+            raise JournalError(f"session {name} cannot be resumed: internal error") from None
+        session.journal = self._journal_writer(name, self.journal, saved)
+        await loop.run_in_executor(None, session.journal.resume, saved)
         at = catch_up(session, at, seen)
-        owed += [effect for effect in session.take_effects() if isinstance(effect, Speak)]
+        unanswered += [effect for effect in session.take_effects() if isinstance(effect, Speak)]
         now = loop.time()
-        session.opened = now - max(at, time.time() - kept.epoch)
-        for connection in session.connections:  # which went with the other process
+        session.opened = now - max(at, time.time() - saved.epoch)
+        for connection in session.connections:  # of the other process
             session.disconnect(connection, now)
-        log.info("session %s is gone on with, %d entries long", name, len(kept.entries))
-        return session, owed
+        log.info("session %s is resumed, %d entries long", name, len(saved.entries))
+        return session, unanswered
 
     def _session(self, id: str, now: float, *, named: bool, epoch: float) -> Session:
         session = Session(
@@ -138,6 +138,7 @@ class SessionFactory:
         return session
 
     def _journal_writer(
-        self, id: str, journal: Journal | None, kept: SavedSession | None = None
+        self, id: str, journal: Journal | None, saved: SavedSession | None = None
     ) -> JournalWriter:
-        return JournalWriter(id, journal, self._record, stopped=self._metrics.record_stopped, saved=kept)
+        on_stopped = self._metrics.record_stopped
+        return JournalWriter(id, journal, self._recorder, on_stopped=on_stopped, saved=saved)

@@ -69,3 +69,16 @@ def where(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     except JournalError as error:
         pytest.fail(str(error))
     return url
+
+
+class Clock:
+    """The time as the SQLite journal reads it."""
+
+    now = 1000.0
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    clock = Clock()
+    monkeypatch.setattr("realizer.server.journal.sqlite_journal.time", lambda: clock.now)
+    return clock

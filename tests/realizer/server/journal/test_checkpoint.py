@@ -181,7 +181,7 @@ def eager(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(thresholds, "ENTRIES", 1)
 
 
-def test_whatever_is_done_to_it_a_session_that_goes_on_from_a_checkpoint_is_as_if_it_had_never_died(
+def test_checkpoint_restores_a_session_as_if_it_had_never_died(
     eager: None,
 ) -> None:
     taken = restored = 0

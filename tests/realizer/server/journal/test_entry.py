@@ -19,7 +19,7 @@ SECONDS = st.floats(0, 1e9)
     st.integers(0, 2**31),
     st.text(st.characters(codec="utf-8")) | st.binary(min_size=1),
 )
-def test_what_is_written_is_what_is_read(at: float, kind: Kind, number: int, body: str | bytes) -> None:
+def test_entry_reads_the_lines_it_writes(at: float, kind: Kind, number: int, body: str | bytes) -> None:
     entry = Entry(at, kind, number, body)
     assert "\n" not in entry.line()
     assert Entry.read(entry.line()) == entry
@@ -39,6 +39,6 @@ NONE = """
 
 
 @pytest.mark.parametrize("line", NONE.split("\n"))
-def test_what_is_no_entry_is_shown_with_what_was_wanted(line: str) -> None:
+def test_entry_refuses_other_lines_and_quotes_them(line: str) -> None:
     with pytest.raises(JournalError, match="wanted an entry of a journal, got"):
         Entry.read(line)

@@ -88,7 +88,7 @@ def nodes(redis_url: str) -> Iterator[tuple[Node, Node]]:
         yield one, other
 
 
-def test_a_client_that_comes_back_through_the_proxy_has_all_feedback_once_and_in_order(
+def test_fleet_repeats_no_feedback_to_a_client_that_comes_back(
     nodes: tuple[Node, Node], tmp_path: Path
 ) -> None:
     async def test(at: str) -> list[str]:
@@ -124,9 +124,7 @@ def test_a_client_that_comes_back_through_the_proxy_has_all_feedback_once_and_in
     assert "hidden" not in written
 
 
-def test_the_clients_of_a_session_meet_and_sessions_are_shared_out(
-    nodes: tuple[Node, Node], tmp_path: Path
-) -> None:
+def test_fleet_distributes_sessions_and_joins_their_clients(nodes: tuple[Node, Node], tmp_path: Path) -> None:
     names = [f"show-{number}" for number in range(16)]
 
     async def test(at: str) -> None:
@@ -146,9 +144,7 @@ def test_the_clients_of_a_session_meet_and_sessions_are_shared_out(
         asyncio.run(test(at))
 
 
-def test_an_address_has_its_share_of_connections_and_no_more(
-    nodes: tuple[Node, Node], tmp_path: Path
-) -> None:
+def test_fleet_limits_the_connections_of_an_address(nodes: tuple[Node, Node], tmp_path: Path) -> None:
     async def test(url: str) -> None:
         async with asyncio.timeout(LIMIT), connect(url), connect(url):
             with pytest.raises(InvalidStatus) as refused:
@@ -159,7 +155,7 @@ def test_an_address_has_its_share_of_connections_and_no_more(
         asyncio.run(test(f"ws://{at}/ws?session=one"))
 
 
-def test_the_proxy_is_well_while_a_node_is(nodes: tuple[Node, Node], tmp_path: Path) -> None:
+def test_fleet_is_healthy_while_one_node_is(nodes: tuple[Node, Node], tmp_path: Path) -> None:
     services = yaml.safe_load(CONFIGURATION.with_name("compose.yaml").read_text("utf-8"))["services"]
     _, program, *options = services["proxy"]["healthcheck"]["test"]
     if shutil.which(program) is None:
@@ -173,7 +169,7 @@ def test_the_proxy_is_well_while_a_node_is(nodes: tuple[Node, Node], tmp_path: P
         assert subprocess.run(check, check=False).returncode
 
 
-def test_the_numbers_of_a_node_are_not_shown_to_everybody(nodes: tuple[Node, Node], tmp_path: Path) -> None:
+def test_fleet_hides_the_metrics_of_its_nodes(nodes: tuple[Node, Node], tmp_path: Path) -> None:
     with (tmp_path / "proxy.log").open("w") as log, proxy(nodes, log) as at:
         with urllib.request.urlopen(f"http://{at}/healthz") as answer:
             assert json.load(answer)["status"] == "ok"

@@ -59,7 +59,7 @@ def talked(session: Session, documents: int) -> float:
     return APART * documents
 
 
-def test_after_thousands_of_documents_there_are_no_more_entries_than_after_hundreds(where: str) -> None:
+def test_journal_has_no_more_entries_after_thousands_of_documents(where: str) -> None:
     journal = journal_at(where)
     session = opened(journal)
     most = size = 0
@@ -88,7 +88,7 @@ def test_after_thousands_of_documents_there_are_no_more_entries_than_after_hundr
     journal.end("long")
 
 
-def test_the_file_of_a_journal_does_not_grow_with_what_was_done(tmp_path: Path) -> None:
+def test_journal_file_does_not_grow_with_the_number_of_documents(tmp_path: Path) -> None:
     path = tmp_path / "journal.db"
     session = opened(journal_at(str(path)))
     pages = []
@@ -101,7 +101,7 @@ def test_the_file_of_a_journal_does_not_grow_with_what_was_done(tmp_path: Path) 
     assert pages[2] == pages[1]
 
 
-def test_a_client_that_missed_more_than_a_checkpoint_has_is_told_of_a_gap() -> None:
+def test_checkpoint_with_less_feedback_than_a_client_missed_sends_a_gap() -> None:
     journal = Memory()
     session = opened(journal)
     end = talked(session, 400)
@@ -118,7 +118,7 @@ def test_a_client_that_missed_more_than_a_checkpoint_has_is_told_of_a_gap() -> N
     assert numbers(rest) == list(range(told["first"], again.feedback_log.newest + 1))
 
 
-def test_a_clip_is_written_once_and_goes_with_its_session() -> None:
+def test_checkpoint_writes_a_clip_once_and_deletes_it_with_its_session() -> None:
     journal = Memory()
     session = opened(journal)
     sounds = []
@@ -137,7 +137,7 @@ def test_a_clip_is_written_once_and_goes_with_its_session() -> None:
     assert sounds[2]["clip:c1"] is sounds[1]["clip:c1"]  # it was not written again
 
 
-def test_a_session_whose_face_is_never_still_has_a_checkpoint_where_nothing_plays() -> None:
+def test_checkpoint_is_written_while_only_emotions_and_idle_motion_move() -> None:
     journal, apart = Memory(), 0.75  # s; the next block comes before the last one's blinks are past
     session = opened(journal)
     for k in range(LONG * ENTRIES // 2 + 10):
@@ -159,7 +159,7 @@ def test_a_session_whose_face_is_never_still_has_a_checkpoint_where_nothing_play
     assert np.array_equal(again.player.frames(times).faps, session.player.frames(times).faps)
 
 
-def test_while_a_block_waits_or_a_speech_is_open_nothing_is_left_out() -> None:
+def test_checkpoint_waits_for_pending_blocks_and_open_speeches() -> None:
     preplanned = '<bml id="p" xmlns:bmla="http://www.asap-project.org/bmla" bmla:preplan="true"/>'
     for holds, ends in (
         (preplanned, '{"type": "stop"}'),
@@ -190,7 +190,7 @@ def test_while_a_block_waits_or_a_speech_is_open_nothing_is_left_out() -> None:
         ('{"version": 1}', "KeyError"),
     ],
 )
-def test_a_checkpoint_that_cannot_be_read_is_no_session(state: str, why: str) -> None:
+def test_checkpoint_that_cannot_be_read_is_an_error(state: str, why: str) -> None:
     session = Session("s", SETTINGS, 0.0, named=True)
     with pytest.raises(JournalError, match=f"the checkpoint of session s.*{why}"):
         session.restore({"state": state})

@@ -10,7 +10,7 @@ import pytest
 from realizer.server.journal import JournalError, SavedSession
 from realizer.server.journal.entry import Entry
 from realizer.server.journal.journal_writer import AGAIN, BYTES, ENTRIES, JournalWriter
-from realizer.server.journal.recordings import RecordingFolder, read_record
+from realizer.server.journal.recordings import RecordingFolder, read_recording
 from tests.interleavings import Memory
 
 
@@ -21,11 +21,11 @@ class Full(RecordingFolder):
         raise JournalError("no space left")
 
 
-def test_a_record_that_fails_is_stopped_and_counted_and_the_journal_goes_on(
+def test_writer_stops_and_counts_a_recording_that_fails(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     journal, stopped = Memory(), []
-    notes = JournalWriter("s", journal, Full(tmp_path, {}), stopped=lambda: stopped.append(1))
+    notes = JournalWriter("s", journal, Full(tmp_path, {}), on_stopped=lambda: stopped.append(1))
     notes.begin(0.0)
     with caplog.at_level(logging.WARNING):
         for at in (1.0, 2.0, 3.0):
@@ -33,35 +33,37 @@ def test_a_record_that_fails_is_stopped_and_counted_and_the_journal_goes_on(
     assert [entry.at for entry in journal.entries["s"]] == [1.0, 2.0, 3.0]
     assert stopped == [1]
     assert [record.getMessage() for record in caplog.records] == [
-        "session s is recorded no further: no space left"
+        "the recording of session s has stopped: no space left"
     ]
 
 
-def test_a_record_that_cannot_begin_refuses_nobody(tmp_path: Path) -> None:
+def test_writer_goes_on_if_a_recording_cannot_begin(tmp_path: Path) -> None:
     folder = tmp_path / "records"
     record = RecordingFolder(folder, {})
     folder.rmdir()
     stopped: list[int] = []
-    notes = JournalWriter("s", Memory(), record, stopped=lambda: stopped.append(1))
+    notes = JournalWriter("s", Memory(), record, on_stopped=lambda: stopped.append(1))
     notes.begin(0.0)
     notes.append(1.0, "join", 1)
     assert stopped == [1]
 
 
-def test_a_record_that_cannot_go_on_refuses_nobody(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_writer_goes_on_if_a_recording_cannot_be_resumed(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     folder = tmp_path / "records"
     record = RecordingFolder(folder, {})
     folder.rmdir()
     stopped: list[int] = []
     kept = SavedSession(0.0, [Entry(1.0, "join", 1)])
-    notes = JournalWriter("s", Memory(), record, stopped=lambda: stopped.append(1), saved=kept)
+    notes = JournalWriter("s", Memory(), record, on_stopped=lambda: stopped.append(1), saved=kept)
     with caplog.at_level(logging.WARNING):
         notes.resume(kept)
     assert stopped == [1]
-    assert "s is recorded no further" in caplog.text
+    assert "s has stopped" in caplog.text
 
 
-def test_a_record_has_all_that_was_done_though_the_journal_has_no_room(tmp_path: Path) -> None:
+def test_writer_records_all_events_although_the_journal_is_full(tmp_path: Path) -> None:
     full = False
     notes = JournalWriter("s", Memory(lambda: full), RecordingFolder(tmp_path, {}))
     notes.begin(0.0)
@@ -72,10 +74,10 @@ def test_a_record_has_all_that_was_done_though_the_journal_has_no_room(tmp_path:
     notes.try_append(3.0, "tick")
     notes.end()
     (path,) = tmp_path.iterdir()
-    assert read_record(path).entries == (Entry(1.0, "join", 1), Entry(3.0, "tick"))
+    assert read_recording(path).entries == [Entry(1.0, "join", 1), Entry(3.0, "tick")]
 
 
-def test_a_checkpoint_is_due_after_so_many_entries_or_bytes_also_of_one_that_was_taken_over() -> None:
+def test_writer_needs_a_checkpoint_after_many_entries_or_bytes() -> None:
     def notes(kept: list[Entry]) -> JournalWriter:
         made = JournalWriter("s", Memory(), saved=SavedSession(0.0, kept))
         made.begin(0.0)
@@ -93,7 +95,7 @@ def test_a_checkpoint_is_due_after_so_many_entries_or_bytes_also_of_one_that_was
     assert large.needs_checkpoint
 
 
-def test_what_a_journal_lacks_a_checkpoint_brings_as_soon_as_there_is_room() -> None:
+def test_writer_makes_up_for_lost_entries_by_a_checkpoint() -> None:
     full = True
     journal = Memory(lambda: full)
     notes = JournalWriter("s", journal)
@@ -110,7 +112,7 @@ def test_what_a_journal_lacks_a_checkpoint_brings_as_soon_as_there_is_room() -> 
     assert journal.claim("s") == SavedSession(1.7e9, [], {"state": "x"})
 
 
-def test_a_journal_that_only_grows_is_told_of_now_and_then(
+def test_writer_warns_now_and_then_of_a_journal_that_only_grows(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr("realizer.server.journal.journal_writer.ENDLESS", 10)
@@ -122,8 +124,8 @@ def test_a_journal_that_only_grows_is_told_of_now_and_then(
     assert [record.args for record in caplog.records] == [("s", 10), ("s", 20)]
 
 
-def test_a_session_that_is_only_recorded_is_never_compacted(tmp_path: Path) -> None:
-    notes = JournalWriter("s", record=RecordingFolder(tmp_path, {}))
+def test_writer_never_compacts_a_session_that_is_only_recorded(tmp_path: Path) -> None:
+    notes = JournalWriter("s", recorder=RecordingFolder(tmp_path, {}))
     notes.begin(0.0)
     for _ in range(2 * ENTRIES):
         notes.try_append(1.0, "tick")

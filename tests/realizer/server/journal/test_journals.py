@@ -1,16 +1,15 @@
-"""What every journal holds to, wherever it keeps its entries."""
+"""The contract of every journal: SQLite and Redis."""
 
 from __future__ import annotations
 
 import threading
 import uuid
-from pathlib import Path
 
 import pytest
 
 from realizer.server.journal import Entry, JournalError, SavedSession, TakenOver, journal_at
-from realizer.server.journal.entry import RETENTION
-from realizer.server.journal.sqlite_journal import SqliteJournal
+
+pytestmark = pytest.mark.usefixtures("clock")
 
 ENTRIES = [
     Entry(0.0, "join", 1),
@@ -26,20 +25,7 @@ def session() -> str:
     return f"s-{uuid.uuid4()}"
 
 
-class Clock:
-    """What the journals take for the time."""
-
-    now = 1000.0
-
-
-@pytest.fixture(autouse=True)
-def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
-    clock = Clock()
-    monkeypatch.setattr("realizer.server.journal.sqlite_journal.time", lambda: clock.now)
-    return clock
-
-
-def test_what_was_kept_is_there_for_whoever_takes_the_session_over(where: str, session: str) -> None:
+def test_journal_gives_all_entries_to_the_process_that_claims_a_session(where: str, session: str) -> None:
     one, other = journal_at(where), journal_at(where)
     one.begin(session, 1234.5)
     for entry in ENTRIES:
@@ -49,7 +35,7 @@ def test_what_was_kept_is_there_for_whoever_takes_the_session_over(where: str, s
     other.close()
 
 
-def test_who_has_lost_a_session_is_told_when_it_writes(where: str, session: str) -> None:
+def test_journal_refuses_entries_of_a_session_taken_over(where: str, session: str) -> None:
     one, other = journal_at(where), journal_at(where)
     one.begin(session, 0.0)
     assert other.claim(session) == SavedSession(0.0, [])
@@ -60,9 +46,7 @@ def test_who_has_lost_a_session_is_told_when_it_writes(where: str, session: str)
     assert one.claim(session) == SavedSession(0.0, [ENTRIES[1]])
 
 
-def test_who_looks_finds_which_sessions_are_another_s_now_and_changes_nothing(
-    where: str, session: str
-) -> None:
+def test_journal_finds_sessions_taken_over_and_changes_nothing(where: str, session: str) -> None:
     one, other = journal_at(where), journal_at(where)
     mine, gone, never = session, f"{session}-gone", f"{session}-never"
     one.begin(mine, 0.0)
@@ -81,7 +65,7 @@ def test_who_looks_finds_which_sessions_are_another_s_now_and_changes_nothing(
     other.close()
 
 
-def test_a_session_that_ended_or_never_was_is_not_taken(where: str, session: str) -> None:
+def test_journal_has_no_session_that_ended_or_never_began(where: str, session: str) -> None:
     journal = journal_at(where)
     assert journal.claim(session) is None
     journal.begin(session, 0.0)
@@ -90,7 +74,7 @@ def test_a_session_that_ended_or_never_was_is_not_taken(where: str, session: str
     assert journal.claim(session) is None
 
 
-def test_a_session_that_begins_again_has_nothing_of_the_one_before(where: str, session: str) -> None:
+def test_journal_begins_a_session_again_without_its_old_entries(where: str, session: str) -> None:
     journal = journal_at(where)
     journal.begin(session, 1.0)
     journal.add(session, ENTRIES[0])
@@ -98,7 +82,7 @@ def test_a_session_that_begins_again_has_nothing_of_the_one_before(where: str, s
     assert journal.claim(session) == SavedSession(2.0, [])
 
 
-def test_a_checkpoint_stands_for_what_came_before_and_says_what_has_changed(where: str, session: str) -> None:
+def test_journal_replaces_entries_by_the_parts_of_a_checkpoint(where: str, session: str) -> None:
     journal = journal_at(where)
     journal.begin(session, 1.0)
     journal.add(session, ENTRIES[0])
@@ -115,7 +99,7 @@ def test_a_checkpoint_stands_for_what_came_before_and_says_what_has_changed(wher
     )
 
 
-def test_a_session_that_begins_again_or_ends_has_no_checkpoint(where: str, session: str) -> None:
+def test_journal_deletes_the_checkpoint_of_a_session_that_ends(where: str, session: str) -> None:
     journal = journal_at(where)
     for end in (lambda: journal.begin(session, 2.0), lambda: journal.end(session)):
         journal.begin(session, 1.0)
@@ -125,7 +109,7 @@ def test_a_session_that_begins_again_or_ends_has_no_checkpoint(where: str, sessi
         assert journal.claim(session) == SavedSession(2.0, [])
 
 
-def test_who_has_lost_a_session_changes_nothing_by_a_checkpoint(where: str, session: str) -> None:
+def test_journal_refuses_the_checkpoint_of_a_session_taken_over(where: str, session: str) -> None:
     one, other = journal_at(where), journal_at(where)
     one.begin(session, 0.0)
     one.add(session, ENTRIES[0])
@@ -135,18 +119,7 @@ def test_who_has_lost_a_session_changes_nothing_by_a_checkpoint(where: str, sess
     assert other.claim(session) == SavedSession(0.0, [ENTRIES[0]])
 
 
-def test_a_checkpoint_that_cannot_be_written_leaves_all_as_it_was(tmp_path: Path, session: str) -> None:
-    journal = SqliteJournal(tmp_path / "journal.db")
-    journal.begin(session, 0.0)
-    journal.add(session, ENTRIES[0])
-    (used,) = journal._file.execute("PRAGMA page_count").fetchone()
-    journal._file.execute(f"PRAGMA max_page_count = {used}")
-    with pytest.raises(JournalError, match="full"):
-        journal.compact(session, {"state": "small", "clip:a": "x" * 100_000})
-    assert journal.claim(session) == SavedSession(0.0, [ENTRIES[0]])
-
-
-def test_sessions_have_nothing_to_do_with_each_other(where: str, session: str) -> None:
+def test_journal_keeps_sessions_apart(where: str, session: str) -> None:
     journal = journal_at(where)
     for name, entry in ((session, ENTRIES[0]), (session + "~", ENTRIES[1])):
         journal.begin(name, 0.0)
@@ -157,36 +130,10 @@ def test_sessions_have_nothing_to_do_with_each_other(where: str, session: str) -
 @pytest.mark.parametrize(
     "where", ["/nowhere/at/all.db", "redis://127.0.0.1:1/0", "redis://:hush@127.0.0.1:1/0"]
 )
-def test_a_journal_that_cannot_be_had_says_so_without_its_password(where: str) -> None:
+def test_journal_at_raises_without_the_password(where: str) -> None:
     with pytest.raises(JournalError, match=r"^the journal \S+: \w") as fault:
         journal_at(where)
     assert "hush" not in str(fault.value)
-
-
-def test_sessions_that_nobody_came_back_to_are_forgotten_in_the_end(tmp_path: Path, clock: Clock) -> None:
-    begin, path = clock.now, str(tmp_path / "journal.db")
-    journal = journal_at(path)
-    for name in ("left", "entry", "checkpoint", "both"):
-        journal.begin(name, begin)
-    journal.add("entry", Entry(100.0, "sound", 1, b"x"))
-    journal.compact("checkpoint", {"state": '{"at": 100.0}', "clip:c": "{}"})
-    journal.compact("both", {"state": '{"at": 50.0}'})
-    journal.add("both", Entry(100.0, "tick"))
-    clock.now = begin + RETENTION + 1
-    journal = journal_at(path)
-    assert journal.claim("left") is None
-    assert all(journal.claim(name) is not None for name in ("entry", "checkpoint", "both"))
-    clock.now = begin + RETENTION + 101
-    journal = journal_at(path)
-    assert not any(journal.claim(name) for name in ("entry", "checkpoint", "both"))
-
-
-def test_a_file_that_is_no_journal_is_not_written_to(tmp_path: Path) -> None:
-    path = tmp_path / "notes.txt"
-    path.write_text("something of mine, of more than a few bytes\n" * 40)
-    with pytest.raises(JournalError, match="not a database"):
-        journal_at(str(path))
-    assert path.read_text().startswith("something of mine")
 
 
 @pytest.mark.parametrize(
@@ -206,7 +153,7 @@ def test_a_file_that_is_no_journal_is_not_written_to(tmp_path: Path) -> None:
         ("sqlite:///no/such/folder/x.db", "the journal /no/such/folder/x.db: unable to open"),
     ],
 )
-def test_an_address_that_is_no_journals_is_refused_without_its_password(where: str, says: str) -> None:
+def test_journal_at_refuses_other_addresses_without_the_password(where: str, says: str) -> None:
     with pytest.raises(JournalError, match=says) as refused:
         journal_at(where)
     assert "hunter2" not in str(refused.value)

@@ -13,7 +13,7 @@ from realizer.core.settings import Settings
 from realizer.server.journal import JournalError, playback
 from realizer.server.journal.journal_writer import JournalWriter
 from realizer.server.journal.playback import replay_recording
-from realizer.server.journal.recordings import RecordingFolder, head, read_record
+from realizer.server.journal.recordings import RecordingFolder, read_recording, recording_head
 from realizer.server.session.effects import Send, Speak
 from realizer.server.session.session import Session
 from realizer.speech.duration_fit import speak_to_length
@@ -29,7 +29,7 @@ SCENE = '{"type": "scene", "objects": {"cup": {"x": 0.2, "y": -0.1, "z": 0.5}}}'
 def recorded(folder: Path) -> tuple[Path, list[str]]:
     """A session that was played with a voice that takes its time: its record, and what was told."""
     session = Session("s", SETTINGS, 100.0, named=True, epoch=1e9)
-    session.journal = JournalWriter("s", record=RecordingFolder(folder, head(SETTINGS, None)))
+    session.journal = JournalWriter("s", recorder=RecordingFolder(folder, recording_head(SETTINGS, None)))
     session.journal.begin(1e9)
     session.connect(1, 100.0)
     coming = [
@@ -59,29 +59,29 @@ def recorded(folder: Path) -> tuple[Path, list[str]]:
     return next(folder.glob("*.jsonl")), told
 
 
-def test_feedback_is_the_same_to_the_last_digit(tmp_path: Path) -> None:
+def test_replay_recording_repeats_the_feedback_to_the_last_digit(tmp_path: Path) -> None:
     path, told = recorded(tmp_path)
-    realization, again = replay_recording(read_record(path))
-    assert again == playback.replay_feedback(read_record(path)) == told
+    realization, again = replay_recording(read_recording(path))
+    assert again == playback.replay_feedback(read_recording(path)) == told
     assert any('"b:end"' in text for text in told)
     assert [w.text for w in realization.speeches[0].utterance.words] == ["Hello", "how", "are", "you"]
 
 
-def test_a_record_that_broke_off_is_played_to_the_end_of_what_was_planned(tmp_path: Path) -> None:
+def test_replay_recording_plays_what_was_planned_to_its_end(tmp_path: Path) -> None:
     path, told = recorded(tmp_path)
     lines = path.read_text().splitlines()
     spoken = next(k for k, line in enumerate(lines) if '"spoken"' in line)
     path.write_text("\n".join(lines[: spoken + 1]) + '\n{"at": 0.9, "kind": "te')
-    _, again = replay_recording(read_record(path))
+    _, again = replay_recording(read_recording(path))
     assert any('id="a:end"' in text for text in again)
     assert not any('id="b:' in text for text in again)
     assert again[:4] == told[:4]
 
 
-def test_a_record_that_broke_off_in_a_speech_ends_with_what_had_been_said(tmp_path: Path) -> None:
+def test_replay_recording_ends_with_the_words_of_an_open_speech(tmp_path: Path) -> None:
     session = Session("s", SETTINGS, 100.0, named=True, epoch=1e9)
-    record = RecordingFolder(tmp_path, head(SETTINGS, None))
-    session.journal = JournalWriter("s", record=record)
+    record = RecordingFolder(tmp_path, recording_head(SETTINGS, None))
+    session.journal = JournalWriter("s", recorder=record)
     session.journal.begin(1e9)
     session.connect(1, 100.0)
     session.receive(1, '{"type": "speech", "id": "turn", "append": "One two three. Four"}', 100.1)
@@ -93,7 +93,7 @@ def test_a_record_that_broke_off_in_a_speech_ends_with_what_had_been_said(tmp_pa
                 session.on_speech(effect.id, speak_to_length(SilentVoice(), effect.request), now)
     record.close()
     (path,) = tmp_path.glob("*.jsonl")
-    realization, again = replay_recording(read_record(path))
+    realization, again = replay_recording(read_recording(path))
     assert any('"turn:end"' in text for text in again)
     assert 1.0 < realization.duration < 10.0
 
@@ -101,29 +101,29 @@ def test_a_record_that_broke_off_in_a_speech_ends_with_what_had_been_said(tmp_pa
 @pytest.mark.parametrize(
     ("first", "fault"),
     [
-        ("", "1: wanted the head of a record"),
-        ('{"session": "s"}', "1: wanted the head of a record"),
+        ("", "1: wanted the head of a recording"),
+        ('{"session": "s"}', "1: wanted the head of a recording"),
         ('{"session": "s", "epoch": 0, "settings": {"fps": "quick"}}', "fps"),
         ('{"session": "s", "epoch": 0, "settings": 7}', "settings: wanted an object"),
-        ('{"session": "s", "epoch": 0, "scene": {"cup": 1}}', "scene: wanted places"),
+        ('{"session": "s", "epoch": 0, "scene": {"cup": 1}}', "scene: wanted positions"),
     ],
 )
-def test_a_head_that_is_none_is_told_of(first: str, fault: str, tmp_path: Path) -> None:
+def test_replay_recording_refuses_a_bad_head(first: str, fault: str, tmp_path: Path) -> None:
     path = tmp_path / "x.jsonl"
     path.write_text(first + "\n")
     with pytest.raises(JournalError, match=fault):
-        replay_recording(read_record(path))
+        replay_recording(read_recording(path))
 
 
-def test_a_line_that_is_no_entry_is_told_of_with_its_number(tmp_path: Path) -> None:
+def test_replay_recording_names_the_line_that_is_no_entry(tmp_path: Path) -> None:
     path, _ = recorded(tmp_path)
     lines = path.read_text().splitlines()
     path.write_text("\n".join([*lines[:3], "?", *lines[3:], ""]))
     with pytest.raises(JournalError, match=r"jsonl:4: wanted an entry"):
-        read_record(path)
+        read_recording(path)
 
 
-def test_the_command_prints_the_feedback_and_writes_any_output(tmp_path: Path) -> None:
+def test_replay_command_prints_feedback_and_writes_any_output(tmp_path: Path) -> None:
     path, told = recorded(tmp_path)
     printed = CliRunner().invoke(cli, ["replay", str(path)])
     assert printed.output.splitlines() == "\n".join(told).splitlines()
@@ -132,13 +132,13 @@ def test_the_command_prints_the_feedback_and_writes_any_output(tmp_path: Path) -
     assert json.loads(out.read_text())["fps"] == 10
 
 
-def test_a_voice_that_is_not_here_is_silent_as_it_would_be_live_or_another_one_is_asked_for(
+def test_replay_recording_is_silent_without_its_voice(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path, told = recorded(tmp_path)
     path.write_text(path.read_text().replace('"voice": "silent"', '"voice": "no-such-voice"'))
-    assert len(replay_recording(read_record(path), voice="silent")[1]) == len(told)
-    again = replay_recording(read_record(path))[1]
+    assert len(replay_recording(read_recording(path), voice="silent")[1]) == len(told)
+    again = replay_recording(read_recording(path))[1]
     assert sum("no-such-voice" in text for text in again) == 1  # in a warning
     assert any('id="b:end"' in text for text in again)
     assert "no-such-voice" in capsys.readouterr().err

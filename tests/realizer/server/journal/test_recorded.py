@@ -21,7 +21,7 @@ from realizer.cli import cli
 from realizer.core.settings import Settings
 from realizer.server.journal.journal_writer import ENTRIES
 from realizer.server.journal.playback import replay_feedback
-from realizer.server.journal.recordings import read_record
+from realizer.server.journal.recordings import read_recording
 from realizer.server.serve import Server
 from tests.programs import serving
 from tests.told import feedback, numbers
@@ -61,7 +61,7 @@ def written(record: Path) -> list[list[int]]:
     return values
 
 
-def test_a_replay_shows_each_frame_as_a_viewer_of_the_live_session_got_it(tmp_path: Path) -> None:
+def test_recorded_frames_are_those_of_a_live_viewer(tmp_path: Path) -> None:
     live: dict[int, list[int]] = {}
     doings = [
         setting(aus={"1": 0.8, "12L": 0.4}),
@@ -92,7 +92,7 @@ def test_a_replay_shows_each_frame_as_a_viewer_of_the_live_session_got_it(tmp_pa
 
     asyncio.run(watch())
     (path,) = tmp_path.iterdir()
-    assert [text for text in replay_feedback(read_record(path)) if "warning" in text] == []
+    assert [text for text in replay_feedback(read_recording(path)) if "warning" in text] == []
     again = written(path)
     assert len(live) > 100
     assert {frame: again[frame] for frame in live if frame < len(again)} == live
@@ -109,7 +109,7 @@ async def until(url: str, last: str, *messages: str) -> list[str]:
         return await feedback(client, last)
 
 
-def test_the_record_of_a_session_that_was_taken_over_goes_on_and_is_whole(tmp_path: Path) -> None:
+def test_recorded_session_is_whole_after_a_takeover(tmp_path: Path) -> None:
     records, options = tmp_path / "r", ("--journal", str(tmp_path / "j"), "--record", str(tmp_path / "r"))
     with serving(*options) as (url, service):
         first = asyncio.run(until(f"{url}?session=s", "talk:start", setting(aus={"4": 1}), TALK))
@@ -121,10 +121,10 @@ def test_the_record_of_a_session_that_was_taken_over_goes_on_and_is_whole(tmp_pa
         seen = numbers(first)[-1]
         rest = asyncio.run(until(f"{url}?session=s&seen={seen}", "two:end", NOD.format("two")))
     assert list(records.iterdir()) == [path]
-    assert replay_feedback(read_record(path))[: len(first + rest)] == first + rest
+    assert replay_feedback(read_recording(path))[: len(first + rest)] == first + rest
 
 
-def test_where_the_record_is_not_here_another_one_begins_with_what_the_session_was(tmp_path: Path) -> None:
+def test_recorded_session_begins_anew_where_its_file_is_missing(tmp_path: Path) -> None:
     journal = tmp_path / "journal.db"
 
     def checked() -> bool:
@@ -153,7 +153,7 @@ def test_where_the_record_is_not_here_another_one_begins_with_what_the_session_w
 
     first, rest = asyncio.run(play())
     (path,) = (tmp_path / "there").iterdir()
-    record = read_record(path)
+    record = read_recording(path)
     assert "state" in record.parts
     again = replay_feedback(record)
     begins = numbers(again)[0]
@@ -164,7 +164,7 @@ def test_where_the_record_is_not_here_another_one_begins_with_what_the_session_w
 
 
 @pytest.mark.slow
-def test_with_two_workers_each_session_has_one_whole_record(tmp_path: Path) -> None:
+def test_recorded_sessions_of_two_workers_have_one_file_each(tmp_path: Path) -> None:
     async def play(url: str) -> dict[str, list[str]]:
         names = [f"s{k}" for k in range(6)]
         got = await asyncio.gather(
@@ -177,10 +177,10 @@ def test_with_two_workers_each_session_has_one_whole_record(tmp_path: Path) -> N
     assert len(list(tmp_path.iterdir())) == len(live)
     for name, texts in live.items():
         (path,) = tmp_path.glob(f"{name}-*.jsonl")
-        assert replay_feedback(read_record(path)) == texts
+        assert replay_feedback(read_recording(path)) == texts
 
 
-def test_on_a_full_disk_the_service_plays_on_and_what_was_recorded_is_played_again(tmp_path: Path) -> None:
+def test_recorded_session_can_be_replayed_after_a_full_disk(tmp_path: Path) -> None:
     large = f'<bml id="large"><head id="n" lexeme="NOD" end="0.4"/><!-- {"x" * 5000} --></bml>'
 
     async def play(url: str) -> tuple[list[str], str]:
@@ -203,6 +203,6 @@ def test_on_a_full_disk_the_service_plays_on_and_what_was_recorded_is_played_aga
     assert any('id="c:end"' in text for text in live)
     assert "realizer_records_stopped_total 1" in metrics
     (path,) = tmp_path.iterdir()
-    again = replay_feedback(read_record(path))
+    again = replay_feedback(read_recording(path))
     assert again == live[: len(again)]
     assert any('id="b:end"' in text for text in again)

@@ -14,12 +14,12 @@ from tests.realizer.server.journal.conftest import RedisServer
 FIRST, REFUSED, LAST = (Entry(at, "text", 1, f"<bml id='b{at:g}'/>") for at in (1.0, 2.0, 3.0))
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(redis_journal, "PATIENCE", 0.2)
 
 
-def test_a_server_that_is_killed_and_started_again_has_lost_nothing(redis_server: RedisServer) -> None:
+def test_redis_journal_loses_nothing_when_its_server_is_killed(redis_server: RedisServer) -> None:
     journal = journal_at(redis_server.url)
     journal.begin("s", 1.0)
     journal.add("s", Entry(0.5, "join", 1))
@@ -33,7 +33,8 @@ def test_a_server_that_is_killed_and_started_again_has_lost_nothing(redis_server
     assert journal_at(redis_server.url).claim("s") == SavedSession(1.0, [FIRST, LAST], {"state": "so far"})
 
 
-def test_what_was_written_though_its_answer_never_came_is_not_kept_as_its_client_was_told(
+@pytest.mark.usefixtures("impatient")
+def test_redis_journal_deletes_entries_reported_as_not_written(
     redis_server: RedisServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(redis_journal, "PAUSE", 0.0)
@@ -48,7 +49,8 @@ def test_what_was_written_though_its_answer_never_came_is_not_kept_as_its_client
     assert journal.claim("s") == SavedSession(1.0, [FIRST, LAST])
 
 
-def test_a_server_that_hangs_is_not_waited_for_by_one_after_the_other(
+@pytest.mark.usefixtures("impatient")
+def test_redis_journal_does_not_ask_a_hanging_server_again_at_once(
     redis_server: RedisServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     journal = journal_at(redis_server.url)
@@ -60,7 +62,7 @@ def test_a_server_that_hangs_is_not_waited_for_by_one_after_the_other(
         journal.add("s", REFUSED)
     monkeypatch.setattr(redis_journal, "PATIENCE", float("inf"))
     for _ in range(100):
-        with pytest.raises(JournalError, match="is asked again in a moment"):
+        with pytest.raises(JournalError, match="is asked again in 4 s"):
             journal.add("s", REFUSED)
     redis_server.process.send_signal(signal.SIGCONT)
     now += redis_journal.PAUSE
@@ -68,7 +70,8 @@ def test_a_server_that_hangs_is_not_waited_for_by_one_after_the_other(
     assert journal.claim("s") == SavedSession(1.0, [LAST])
 
 
-def test_a_checkpoint_whose_answer_never_came_is_whole_or_was_not(
+@pytest.mark.usefixtures("impatient")
+def test_redis_journal_writes_a_checkpoint_whole_or_not_at_all(
     redis_server: RedisServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(redis_journal, "PAUSE", 0.0)
@@ -85,7 +88,7 @@ def test_a_checkpoint_whose_answer_never_came_is_whole_or_was_not(
     assert journal.claim("s") in (old, new)
 
 
-def test_whoever_looks_while_checkpoints_are_written_finds_the_old_or_the_new(where: str) -> None:
+def test_journal_shows_the_old_or_the_new_checkpoint_to_others(where: str) -> None:
     """Another process takes the session at any moment, again and again."""
     journal, done = journal_at(where), threading.Event()
     found: list[tuple[str, ...]] = []

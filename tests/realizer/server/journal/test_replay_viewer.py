@@ -16,9 +16,10 @@ from realizer.core.settings import Settings
 from realizer.outputs.output import RenderSettings
 from realizer.protocol.wire import ClipPiece, pack_clip, unpack
 from realizer.render import Renderer
+from realizer.server.journal.entry import SavedSession
 from realizer.server.journal.journal_writer import JournalWriter
 from realizer.server.journal.playback import replay_recording
-from realizer.server.journal.recordings import Record, RecordingFolder, head, read_record
+from realizer.server.journal.recordings import RecordingFolder, read_recording, recording_head
 from realizer.server.session.effects import Send, Speak
 from realizer.server.session.session import Session
 from realizer.speech.duration_fit import speak_to_length
@@ -49,7 +50,7 @@ def recorded(
     seconds: float,
     late: Random | None = None,
     watch: str = WATCH,
-) -> tuple[Record, list[bytes]]:
+) -> tuple[SavedSession, list[bytes]]:
     """A session to which that is done: its record, and what its client got of the stream it asked for.
 
     Args:
@@ -57,7 +58,7 @@ def recorded(
         late: draws how late it is woken; None: never.
     """
     session = Session("s", SETTINGS, OPENED, named=True, epoch=1e9)
-    session.journal = JournalWriter("s", record=RecordingFolder(folder, head(SETTINGS, None)))
+    session.journal = JournalWriter("s", recorder=RecordingFolder(folder, recording_head(SETTINGS, None)))
     session.journal.begin(1e9)
     session.connect(1, OPENED)
     got: list[bytes] = []
@@ -83,7 +84,7 @@ def recorded(
                 got.append(effect.data)
     session.disconnect(1, now)
     session.journal.end()
-    return read_record(folder), got
+    return read_recording(folder), got
 
 
 def faps(got: list[bytes]) -> dict[int, Int32]:
@@ -121,7 +122,7 @@ def some(random: Random, seconds: float) -> list[tuple[float, str]]:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_every_frame_is_as_it_was_got_though_the_session_was_woken_late(seed: int, tmp_path: Path) -> None:
+def test_viewer_has_the_frames_of_a_session_woken_late(seed: int, tmp_path: Path) -> None:
     random = Random(seed)
     record, got = recorded(tmp_path, some(random, 6.0), 8.0, random if seed % 2 else None)
     live = faps(got)
@@ -131,7 +132,7 @@ def test_every_frame_is_as_it_was_got_though_the_session_was_woken_late(seed: in
         assert np.array_equal(again[number], row), number
 
 
-def test_an_output_lasts_until_the_record_ends_and_what_is_held_has_come_to_stand(tmp_path: Path) -> None:
+def test_viewer_frames_last_until_set_values_are_reached(tmp_path: Path) -> None:
     doings = [(0.5, setting(aus={"4": 1})), (1.0, '{"type": "stop"}')]
     record, _ = recorded(tmp_path / "held", doings, 3.0)
     assert replay_recording(record)[0].duration == record.entries[-1].at == pytest.approx(3.0)
@@ -143,7 +144,7 @@ def test_an_output_lasts_until_the_record_ends_and_what_is_held_has_come_to_stan
     assert brow[-1] < 0.05
 
 
-def test_what_is_said_is_heard_again_until_it_was_cut_off(tmp_path: Path) -> None:
+def test_viewer_hears_a_speech_until_it_was_cut_off(tmp_path: Path) -> None:
     rate = 8000
     pcm = np.random.default_rng(1).integers(-9000, 9000, 3 * rate).astype("<i2")
     clip = pack_clip(ClipPiece("c", 0, rate, pcm.tobytes(), final=True))
@@ -173,7 +174,7 @@ def test_what_is_said_is_heard_again_until_it_was_cut_off(tmp_path: Path) -> Non
     assert np.array_equal(again, live)
 
 
-def test_what_was_held_once_is_seen_at_its_time_only(tmp_path: Path) -> None:
+def test_viewer_sees_set_values_at_their_time_only(tmp_path: Path) -> None:
     doings = [(at, setting(faps={"open_jaw": value})) for at, value in ((0.5, 100), (1.5, None), (2.5, 60))]
     record, _ = recorded(tmp_path, doings, 3.5)
     jaw = replay_recording(record)[0].faps.integers()[:, 2]
@@ -181,7 +182,7 @@ def test_what_was_held_once_is_seen_at_its_time_only(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_pictures_have_the_face_that_a_character_had_then(tmp_path: Path) -> None:
+def test_viewer_sees_the_face_of_the_time(tmp_path: Path) -> None:
     doings = [(0.2, setting(aus={"12": 1})), (1.01, '{"type": "character", "face": "ben"}')]
     record, got = recorded(tmp_path, doings, 2.0)
     realization, _ = replay_recording(record)
@@ -199,7 +200,7 @@ def test_pictures_have_the_face_that_a_character_had_then(tmp_path: Path) -> Non
     assert np.abs(pictures[0].astype(int) - shown[0]).mean() > 5
 
 
-def test_a_character_that_comes_later_is_there_from_the_first_frame(tmp_path: Path) -> None:
+def test_viewer_has_later_characters_from_the_first_frame(tmp_path: Path) -> None:
     doings = [(0.5, setting(character="a", aus={"1": 1})), (1.0, setting(character="b", aus={"4": 1}))]
     record, _ = recorded(tmp_path, doings, 2.0)
     realization, _ = replay_recording(record)

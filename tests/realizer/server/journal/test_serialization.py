@@ -76,12 +76,12 @@ def same(one: object, other: object) -> bool:
 
 
 @given(CHARACTERS)
-def test_a_face_holds_what_it_held(character: Character) -> None:
+def test_character_to_json_round_trip(character: Character) -> None:
     assert same(character_from_json(json.loads(json.dumps(character_to_json(character)))), character)
 
 
 @given(NAMES, NUMBER, st.dictionaries(NAMES, st.lists(st.tuples(NAMES, NUMBER), max_size=4), max_size=4))
-def test_points_are_when_they_were(
+def test_schedule_to_json_round_trip(
     block: str, start: float, behaviours: dict[str, list[tuple[str, float]]]
 ) -> None:
     points = {name: tuple(point for point, _ in pairs) for name, pairs in behaviours.items()}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import errno
 import json
 import sqlite3
 import subprocess
@@ -19,11 +18,9 @@ from websockets.exceptions import ConnectionClosed
 
 from bml_schema.feedback import parse_feedback
 from realizer.core.settings import Settings
-from realizer.server.documents.document_queue import Submission
 from realizer.server.journal.journal_writer import ENTRIES
 from realizer.server.runtime import session_host
 from realizer.server.serve import Server
-from realizer.server.session.session import Session
 from realizer.server.transports.websocket import connection
 from tests.programs import serving
 from tests.realizer.server.conftest import Clock
@@ -49,7 +46,7 @@ async def drained(client: ClientConnection) -> None:
         await client.recv()
 
 
-def test_a_client_that_resumes_after_a_kill_has_all_feedback_once_and_in_order(where: str) -> None:
+def test_restored_session_sends_all_feedback_once_and_in_order(where: str) -> None:
     async def before(url: str, service: subprocess.Popen[str]) -> list[str]:
         async with asyncio.timeout(LIMIT), connect(f"{url}?session=killed") as client:
             await client.send(SCENE)
@@ -102,7 +99,7 @@ def in_a_checkpoint(where: str, session: str) -> bool:
 
 
 @pytest.mark.slow
-def test_a_session_that_is_killed_after_a_checkpoint_goes_on_with_all_that_outlived_its_blocks(
+def test_restored_session_has_the_state_of_its_checkpoint(
     where: str,
 ) -> None:
     hold = json.dumps({"type": "set", "aus": {"12L": 0.5}})
@@ -142,7 +139,7 @@ def test_a_session_that_is_killed_after_a_checkpoint_goes_on_with_all_that_outli
     assert not any("warningFeedback" in text for text in again)  # the points of what has gone are known
 
 
-def test_a_checkpoint_comes_though_nobody_says_anything_any_more(
+def test_restored_session_writes_a_checkpoint_without_messages(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr("realizer.server.runtime.session_host.EXPIRY_INTERVAL", 0.05)
@@ -166,7 +163,7 @@ def test_a_checkpoint_comes_though_nobody_says_anything_any_more(
 
 
 @pytest.mark.slow
-def test_fifty_clients_of_a_service_that_is_killed_all_have_their_feedback_once_and_in_order(
+def test_restored_sessions_of_fifty_clients_repeat_no_feedback(
     where: str,
 ) -> None:
     block = '<bml id="b"><head id="n" lexeme="NOD" start="{:.2f}" end="{:.2f}"/></bml>'
@@ -208,7 +205,7 @@ def test_fifty_clients_of_a_service_that_is_killed_all_have_their_feedback_once_
 
 
 @pytest.mark.slow
-def test_what_is_held_is_held_afterwards(where: str) -> None:
+def test_restored_session_holds_set_values(where: str) -> None:
     async def hold(url: str) -> None:
         async with asyncio.timeout(LIMIT), connect(f"{url}?session=held") as client:
             await client.send(json.dumps({"type": "set", "aus": {"12L": 0.5}}))
@@ -231,7 +228,7 @@ def test_what_is_held_is_held_afterwards(where: str) -> None:
             assert asyncio.run(state(url))["12L"] == 0.5
 
 
-def test_a_session_belongs_to_whoever_took_it_last(where: str) -> None:
+def test_restored_session_belongs_to_the_last_process(where: str) -> None:
     async def test(one: str, other: str) -> None:
         async with asyncio.timeout(LIMIT), connect(f"{one}?session=torn") as first:
             await first.send(NEXT)
@@ -267,7 +264,7 @@ async def held(client: ClientConnection) -> float:
     return float(layers.get("direct", {"aus": {}})["aus"].get("12L", 0.0))
 
 
-def test_who_comes_back_before_one_who_is_let_go_has_left_finds_the_session_as_it_was(
+def test_restored_session_is_unchanged_by_connections_that_still_leave(
     where: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(session_host, "EXPIRY_INTERVAL", 0.05)
@@ -292,7 +289,7 @@ def test_who_comes_back_before_one_who_is_let_go_has_left_finds_the_session_as_i
     asyncio.run(run())
 
 
-def test_who_only_watches_is_let_go_when_another_process_takes_the_session_over_and_may_come_back(
+def test_restored_session_disconnects_viewers_of_the_old_process(
     where: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(session_host, "EXPIRY_INTERVAL", 0.05)
@@ -321,9 +318,7 @@ def test_who_only_watches_is_let_go_when_another_process_takes_the_session_over_
     asyncio.run(run())
 
 
-def test_the_second_client_that_comes_back_is_told_no_gap_though_it_had_seen_more_and_clocks_differ(
-    clock: Clock, kept: Settings
-) -> None:
+def test_restored_session_catches_up_for_a_second_client_without_a_gap(clock: Clock, kept: Settings) -> None:
     block = '<bml id="b"><head id="n" lexeme="NOD"/><wait id="w" duration="3"/></bml>'
 
     async def run() -> None:
@@ -343,83 +338,7 @@ def test_the_second_client_that_comes_back_is_told_no_gap_though_it_had_seen_mor
     asyncio.run(run())
 
 
-def test_a_session_that_a_fault_of_ours_ended_can_be_begun_anew(
-    monkeypatch: pytest.MonkeyPatch, kept: Settings
-) -> None:
-    put = Submission.enqueue
-
-    def faulty(intake: Submission, text: str, t: float) -> None:
-        if "fault" in text:
-            raise ZeroDivisionError
-        put(intake, text, t)
-
-    monkeypatch.setattr(Submission, "enqueue", faulty)
-
-    async def run() -> None:
-        async with asyncio.timeout(LIMIT), Server(kept) as server:
-            async with connect(f"{server.url}?session=s") as client:
-                await client.send('<bml id="fault"/>')
-                with pytest.raises(ConnectionClosed) as closed:
-                    await drained(client)
-                assert closed.value.rcvd is not None
-                assert closed.value.rcvd.code == 1011
-            async with connect(f"{server.url}?session=s") as client:
-                await client.send(NEXT)
-                assert numbers(await feedback(client, "b:end"))[0] == 1
-
-    asyncio.run(run())
-
-
-def test_what_cannot_be_done_again_is_told_and_is_still_there_for_who_can(
-    monkeypatch: pytest.MonkeyPatch, kept: Settings
-) -> None:
-    async def run() -> None:
-        async with asyncio.timeout(LIMIT):
-            async with Server(kept) as server, connect(f"{server.url}?session=s") as client:
-                await client.send(NEXT)
-                told = await feedback(client, "b:end")
-            async with Server(kept) as server:
-                with monkeypatch.context() as here:
-                    here.setattr(Session, "receive", None)
-                    async with connect(f"{server.url}?session=s&seen=0") as client:
-                        with pytest.raises(ConnectionClosed) as closed:
-                            await drained(client)
-                    assert closed.value.rcvd is not None
-                    assert (closed.value.rcvd.code, closed.value.rcvd.reason) == (
-                        1013,
-                        "session s cannot be gone on with: internal error",
-                    )
-                async with connect(f"{server.url}?session=s&seen=0") as client:
-                    assert await feedback(client, "b:end") == told
-
-    asyncio.run(run())
-
-
-def test_documents_are_played_and_kept_though_there_is_no_room_for_their_record(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    def full(file: object, line: str) -> None:
-        if NEXT in json.loads(line).get("body", ""):
-            raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr("realizer.server.journal.recordings._write", full)
-
-    async def run() -> None:
-        settings = Settings(
-            port=0, voice="silent", journal=str(tmp_path / "journal.db"), record=tmp_path / "records"
-        )
-        async with asyncio.timeout(LIMIT):
-            async with Server(settings) as server, connect(f"{server.url}?session=s") as client:
-                await client.send(NEXT)
-                told = await feedback(client, "b:end")
-                assert "realizer_records_stopped_total 1" in server._sessions.metrics_text()
-            async with Server(settings) as server, connect(f"{server.url}?session=s&seen=0") as client:
-                assert await feedback(client, "b:end") == told
-
-    asyncio.run(run())
-
-
-def test_a_hello_does_not_begin_a_session_anew_that_is_in_the_journal(where: str) -> None:
+def test_restored_session_is_not_replaced_by_a_hello(where: str) -> None:
     async def play(url: str) -> list[str]:
         async with asyncio.timeout(LIMIT), connect(f"{url}?session=kept") as client:
             await client.send(NEXT)

@@ -1,0 +1,147 @@
+"""The factory of sessions: restored, not restorable, and without their recording."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import json
+from pathlib import Path
+
+import pytest
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
+
+from realizer.core.errors import FaceError
+from realizer.core.settings import Settings
+from realizer.server.documents.document_queue import Submission
+from realizer.server.http.metrics import Metrics
+from realizer.server.journal import JournalError
+from realizer.server.runtime.session_factory import SessionFactory
+from realizer.server.runtime.session_registry import JoinError
+from realizer.server.serve import Server
+from realizer.server.session.session import Session
+from tests.told import feedback, numbers
+
+LIMIT = 60  # s; a hung test ends
+NEXT = '<bml id="b" composition="APPEND"><head id="n" lexeme="SHAKE" end="0.8"/></bml>'
+
+
+async def drained(client: ClientConnection) -> None:
+    """Read until the connection ends."""
+    while True:
+        await client.recv()
+
+
+def test_factory_load_refuses_an_unknown_face_and_a_bad_scene(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.json"
+    scene.write_text("[]")
+    for settings, error in ((Settings(face="nobody"), FaceError), (Settings(scene=scene), ValueError)):
+        with pytest.raises(error):
+            asyncio.run(SessionFactory(settings, Metrics()).load())
+
+
+def test_factory_keeps_named_sessions_only_in_its_journal(kept: Settings) -> None:
+    async def run() -> None:
+        factory = SessionFactory(kept, Metrics())
+        await factory.load()
+        assert factory.journal is not None
+        for name, named in (("named", True), ("unnamed", False)):
+            session = factory.new(name, 0.0, named)
+            assert session.id == name
+        assert factory.journal.claim("named") is not None
+        assert factory.journal.claim("unnamed") is None
+        factory.close()
+        with pytest.raises(JoinError, match="the journal"):
+            factory.new("late", 0.0, True)
+
+    asyncio.run(run())
+
+
+def test_factory_restores_nothing_without_an_entry_in_the_journal(kept: Settings) -> None:
+    def speak(order: object) -> JournalError:
+        raise AssertionError
+
+    async def run() -> None:
+        for settings in (kept, Settings()):
+            factory = SessionFactory(settings, Metrics())
+            await factory.load()
+            assert await factory.restore("nobody", 0, speak) is None
+            factory.close()
+
+    asyncio.run(run())
+
+
+def test_factory_begins_a_session_anew_after_an_internal_error(
+    monkeypatch: pytest.MonkeyPatch, kept: Settings
+) -> None:
+    put = Submission.enqueue
+
+    def faulty(intake: Submission, text: str, t: float) -> None:
+        if "fault" in text:
+            raise ZeroDivisionError
+        put(intake, text, t)
+
+    monkeypatch.setattr(Submission, "enqueue", faulty)
+
+    async def run() -> None:
+        async with asyncio.timeout(LIMIT), Server(kept) as server:
+            async with connect(f"{server.url}?session=s") as client:
+                await client.send('<bml id="fault"/>')
+                with pytest.raises(ConnectionClosed) as closed:
+                    await drained(client)
+                assert closed.value.rcvd is not None
+                assert closed.value.rcvd.code == 1011
+            async with connect(f"{server.url}?session=s") as client:
+                await client.send(NEXT)
+                assert numbers(await feedback(client, "b:end"))[0] == 1
+
+    asyncio.run(run())
+
+
+def test_factory_that_cannot_restore_leaves_the_journal_unchanged(
+    monkeypatch: pytest.MonkeyPatch, kept: Settings
+) -> None:
+    async def run() -> None:
+        async with asyncio.timeout(LIMIT):
+            async with Server(kept) as server, connect(f"{server.url}?session=s") as client:
+                await client.send(NEXT)
+                told = await feedback(client, "b:end")
+            async with Server(kept) as server:
+                with monkeypatch.context() as here:
+                    here.setattr(Session, "receive", None)
+                    async with connect(f"{server.url}?session=s&seen=0") as client:
+                        with pytest.raises(ConnectionClosed) as closed:
+                            await drained(client)
+                    assert closed.value.rcvd is not None
+                    assert (closed.value.rcvd.code, closed.value.rcvd.reason) == (
+                        1013,
+                        "session s cannot be resumed: internal error",
+                    )
+                async with connect(f"{server.url}?session=s&seen=0") as client:
+                    assert await feedback(client, "b:end") == told
+
+    asyncio.run(run())
+
+
+def test_factory_restores_a_session_whose_recording_failed(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def full(file: object, line: str) -> None:
+        if NEXT in json.loads(line).get("body", ""):
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("realizer.server.journal.recordings._write", full)
+
+    async def run() -> None:
+        settings = Settings(
+            port=0, voice="silent", journal=str(tmp_path / "journal.db"), record=tmp_path / "records"
+        )
+        async with asyncio.timeout(LIMIT):
+            async with Server(settings) as server, connect(f"{server.url}?session=s") as client:
+                await client.send(NEXT)
+                told = await feedback(client, "b:end")
+                assert "realizer_records_stopped_total 1" in server._sessions.metrics_text()
+            async with Server(settings) as server, connect(f"{server.url}?session=s&seen=0") as client:
+                assert await feedback(client, "b:end") == told
+
+    asyncio.run(run())
