@@ -1,4 +1,4 @@
-"""Voices and renderers in threads; they answer the effects Speak and Draw."""
+"""The voices and renderers of the service, which carry out the effects Speak and Draw in threads."""
 
 from __future__ import annotations
 
@@ -18,15 +18,20 @@ from realizer.speech.utterance import Utterance, Voice
 if TYPE_CHECKING:
     from realizer.render import Renderer
 
-# Pictures of different faces, sizes, cameras, lights and backgrounds each have a process: so many at a time.
+# Each combination of face, size, camera, light and background has a renderer, which is a process.
 RENDERERS = 6
-# One that nobody has looked at for so long makes room for another one.
-IDLE = 5.0  # s
+IDLE = 5.0  # s; a renderer unused for so long makes room for another one
 
 
 @dataclass(slots=True)
 class _RendererSlot:
-    """A renderer, how many draw with it just now, and when one last did."""
+    """A renderer.
+
+    Attributes:
+        used: when it drew last, seconds on the clock of `Engines`.
+        busy: number of threads that draw with it now.
+        begun: whether its process has started.
+    """
 
     renderer: Renderer
     used: float
@@ -35,30 +40,29 @@ class _RendererSlot:
 
 
 class Engines:
-    """The engines. `speech_pool` and `render_pool` are the threads that may call `speak` and `draw`.
+    """The voices and renderers. `speak` and `draw` may be called by the threads of their pools.
 
     Args:
-        deformer: what moves faces, in spite of what they say themselves.
-        clock: seconds that only rise.
+        deformer: overrides that of the faces.
+        clock: monotonic seconds.
     """
 
     def __init__(self, deformer: str | None = None, clock: Callable[[], float] = time.monotonic) -> None:
         self._deformer = deformer
         self._clock = clock
-        # Two texts can be spoken at a time: one long text must not hold up the short ones of all others.
+        # Two threads each: a long text or a starting process must not delay all other sessions.
         self.speech_pool = ThreadPoolExecutor(2, "voice")
-        # And a process that starts must not hold up the pictures of all others.
         self.render_pool = ThreadPoolExecutor(2, "renderer")
         self._voices: dict[str | None, Voice] = {}
         self._slots: dict[tuple[str, RenderOptions], _RendererSlot] = {}
-        self._begun = clock()  # when one last had started: all the others waited for their turn until then
+        self._begun = clock()  # when a renderer last finished starting; until then the others may have waited
         self._lock = threading.Lock()
         self._reported: set[str] = set()
 
     def speak(self, order: Speak) -> Utterance | RealizerError:
-        """What a voice made of it; or why it could not, which is also said once on stderr."""
+        """Synthesize an utterance. Return the error if the voice fails, and print it once on stderr."""
         try:
-            # The name is the whole of what chooses the voice; an engine would take it for one of its own.
+            # The name has chosen the voice here; the engine would take it for one of its own voices.
             return speak_to_length(self._voice(order.request.voice), replace(order.request, voice=None))
         except VoiceError as error:
             self._report(str(error))
@@ -68,30 +72,29 @@ class Engines:
             return VoiceError(f"the voice failed: {error}")
 
     def draw(self, order: Draw) -> bytes | RealizerError:
-        """Bytes of the picture; or why there are none."""
+        """Draw and encode a picture. Return the error if that fails."""
         try:
-            place, look = self._acquire(order), order.options
+            slot, options = self._acquire(order), order.options
             try:
                 try:
-                    return place.renderer.encoded(order.pose, look.form, look.quality)
-                except RenderError:
-                    # A process that died is started anew by the next call; one that cannot fails again.
-                    return place.renderer.encoded(order.pose, look.form, look.quality)
+                    return slot.renderer.encoded(order.pose, options.form, options.quality)
+                except RenderError:  # the next call starts the process again if it has died
+                    return slot.renderer.encoded(order.pose, options.form, options.quality)
             finally:
-                self._release(place)
+                self._release(slot)
         except RealizerError as error:
             return error
         except Exception as error:
             return RenderError(f"the picture could not be drawn: {error}")
 
     def close(self) -> None:
-        """End all engines; what waits for them is dropped."""
+        """Close all engines, and drop the requests that wait for them."""
         self.speech_pool.shutdown(wait=False, cancel_futures=True)
         self.render_pool.shutdown(wait=False, cancel_futures=True)
         for voice in self._voices.values():
             voice.close()
-        for place in self._slots.values():
-            place.renderer.close()
+        for slot in self._slots.values():
+            slot.renderer.close()
 
     def _voice(self, name: str | None) -> Voice:
         from realizer.speech.registry import find_voice
@@ -102,64 +105,60 @@ class Engines:
             return self._voices[name]
 
     def _acquire(self, order: Draw) -> _RendererSlot:
-        """The renderer of a face and a look, until `_release`.
+        """Return the renderer of a picture, until `_release`.
 
         Raises:
-            RenderError: there are too many that somebody looks at.
+            RenderError: too many others are in use.
         """
         from realizer.render import Renderer
 
-        look = replace(order.options, quality=0, form="jpeg")  # which need no other process
-        key, left = (order.face, look), None
+        options = replace(order.options, quality=0, form="jpeg")  # these need no process of their own
+        key, removed = (order.face, options), None
         with self._lock:
             now = self._clock()
-            place = self._slots.get(key)
-            if place is None:
+            slot = self._slots.get(key)
+            if slot is None:
                 if len(self._slots) >= RENDERERS:
-                    left = self._slots.pop(self._least_recent(now))
-                place = self._slots[key] = _RendererSlot(
+                    removed = self._slots.pop(self._least_recent(now))
+                slot = self._slots[key] = _RendererSlot(
                     Renderer(
                         order.face,
-                        look.size,
-                        look.camera,
-                        light=look.light,
-                        background=look.background,
+                        options.size,
+                        options.camera,
+                        light=options.light,
+                        background=options.background,
                         deformer=self._deformer,
                     ),
                     now,
                 )
-            place.busy += 1
-            place.used = now
-        if left is not None:
-            left.renderer.close()
-        return place
+            slot.busy += 1
+            slot.used = now
+        if removed is not None:
+            removed.renderer.close()
+        return slot
 
     def _least_recent(self, now: float) -> tuple[str, RenderOptions]:
-        """Of what nobody has looked at for a while, that of the longest ago.
-
-        Raises:
-            RenderError: somebody looks at all of them.
-        """
-        unseen = [
-            (place.used, key)
-            for key, place in self._slots.items()
-            if not place.busy and now - max(place.used, self._begun) >= IDLE
-        ]
-        if not unseen:
+        """Return the key of the idle renderer that was used the longest ago."""
+        idle = {
+            key: slot.used
+            for key, slot in self._slots.items()
+            if not slot.busy and now - max(slot.used, self._begun) >= IDLE
+        }
+        if not idle:
             raise RenderError(
                 f"{RENDERERS} different pictures (face, size, camera, light, background) are "
                 "drawn already: wanted one of them, or fewer"
             )
-        return min(unseen, key=lambda one: one[0])[1]
+        return min(idle, key=lambda key: idle[key])
 
-    def _release(self, place: _RendererSlot) -> None:
+    def _release(self, slot: _RendererSlot) -> None:
         with self._lock:
-            place.busy -= 1
-            place.used = self._clock()
-            if not place.begun:
-                place.begun, self._begun = True, place.used
+            slot.busy -= 1
+            slot.used = self._clock()
+            if not slot.begun:
+                slot.begun, self._begun = True, slot.used
 
-    def _report(self, fault: str) -> None:
-        if fault not in self._reported:
-            self._reported.add(fault)
-            print(f"realizer: {fault}; going on without sound", file=sys.stderr)
+    def _report(self, error: str) -> None:
+        if error not in self._reported:
+            self._reported.add(error)
+            print(f"realizer: {error}; going on without sound", file=sys.stderr)

@@ -6,29 +6,28 @@ import gc
 
 from realizer.server.documents.limits import memory
 
-# Connections that have ended leave cycles behind, which are looked for when there are so many of them, and as
-# many as have not ended.
+# Closed connections leave cycles: a collection is due after this many, or as many as are still open.
 ENDED = 100
-# Whatever else leaves some is noticed by what the process takes: so much more than when they were looked for.
-GROWN, MORE = 1.5, 100e6  # bytes
+# Other cycles show in the memory of the process: it has grown to this factor and by these bytes.
+GROWN, MORE = 1.5, 100e6
 
 
 def disable_automatic_gc() -> None:
-    """Let Python look for no cycles of its own accord.
+    """Disable Python's automatic collections.
 
-    What plays leaves none behind; among the objects of a thousand sessions a search takes a quarter of a
-    second, and even of the new ones 10 ms.
+    Playing leaves no cycles, and a full collection among the objects of a thousand sessions takes a quarter
+    of a second, one of the youngest generation 10 ms.
     """
     gc.collect()
-    gc.freeze()  # tables and faces stay as long as the service
+    gc.freeze()  # tables and faces live as long as the service
     gc.disable()
 
 
 class GcPolicy:
-    """Looks for cycles where there may be many.
+    """A policy of full collections, for when there may be many cycles.
 
     Attributes:
-        ended_connections: connections that have ended since.
+        ended_connections: number of connections that have closed since the last collection.
     """
 
     def __init__(self) -> None:
@@ -36,10 +35,10 @@ class GcPolicy:
         self._least = memory()
 
     def collect_if_needed(self, alive: int) -> bool:
-        """Free what nothing else holds, if it is time; whether it was.
+        """Run a full collection if one is due. Return whether it was.
 
         Args:
-            alive: how many connections there are.
+            alive: number of open connections.
         """
         used = memory()
         self._least = min(self._least, used)

@@ -26,50 +26,52 @@ from realizer.server.transports.transport import Outbound
 
 log = logging.getLogger(__name__)
 
-# How often sessions that nobody visits are looked for.
-EXPIRY_INTERVAL = 5.0  # s
+EXPIRY_INTERVAL = 5.0  # s; how often expired sessions and due checkpoints are looked for
 
 
 class SessionHost:
-    """All sessions of the service with their timers and engines. Doors let their clients `join` here.
+    """All sessions of the service with their timers and engines, in an event loop.
 
-    It is told what comes from a connection by the number that `join` gave, and hands what goes to it to the
-    Client that joined.
+    Transports let their clients `join`, pass on messages by the number that this returns, and `leave`. What a
+    session sends goes to the `Outbound` that joined.
 
     Args:
-        worker: the number of this process among `settings.workers`; None where it is the only one.
+        worker: number of this process among `settings.workers`; None if it is the only one.
+
+    Attributes:
+        metrics: the counters of the service.
     """
 
     def __init__(self, settings: Settings, worker: int | None = None) -> None:
         self.settings = settings
 
-        def ours(session: str) -> bool:
+        def is_local(session: str) -> bool:
             if self._factory.journal is not None and not self._is_live(session):
-                return False  # another process may have it: only `restore` asks, before somebody joins
+                return False  # another process may have it; only `restore`, before `join`, finds out
             return worker is None or worker_of(session, settings.workers, settings) == worker
 
         self.metrics = Metrics(worker)
         self._factory = SessionFactory(settings, self.metrics)
-        self._registry = SessionRegistry(self._factory.new, settings, ours)
+        self._registry = SessionRegistry(self._factory.new, settings, is_local)
         self._engines = Engines(settings.deformer)
         self._clients: dict[int, Outbound] = {}
-        self._reading: dict[Session, None] = {}  # those with documents to read or plan, in turn
+        self._reading: dict[Session, None] = {}  # sessions with documents to parse or plan, in turn
         self._numbers = itertools.count(1)
         self._expiry_timer: asyncio.TimerHandle | None = None
         self._gc_policy = GcPolicy()
         self._closed = False
         self._takeover_check: asyncio.Task[None] | None = None
         self._restoring: dict[str, asyncio.Task[None]] = {}
-        self._taken_over: dict[str, float] = {}  # session -> until when clients come back to it; loop time
+        self._resumed: dict[str, float] = {}  # session -> until when clients may still reconnect; loop time
 
     async def start(self) -> None:
-        """Load what every session shares.
+        """Load what all sessions share.
 
         Raises:
             ValueError: the scene file is not a scene.
-            FaceError: no such face.
-            TableError: a mapping, or an expression of one's own, that cannot be used.
-            JournalError: a journal that cannot be had.
+            FaceError: there is no such face.
+            TableError: the mapping, or a user's expression, cannot be used.
+            JournalError: the journal cannot be opened.
         """
         self._loop = asyncio.get_running_loop()
         self._timers = TimerWheel(self._loop, self._tick)
@@ -77,14 +79,14 @@ class SessionHost:
         self._expiry_timer = self._loop.call_later(EXPIRY_INTERVAL, self._expire_sessions)
 
     def stop_accepting(self) -> None:
-        """Sessions take no more documents from now on."""
+        """Refuse documents from now on."""
         self._factory.ending = True
         for session in self._registry.sessions.values():
             session.ending = True
 
     @property
     def busy(self) -> bool:
-        """Something plays, waits or is being prepared."""
+        """Whether a block plays, waits or is being prepared."""
         return any(session.busy for session in self._registry.sessions.values())
 
     async def close(self) -> None:
@@ -92,20 +94,20 @@ class SessionHost:
         self._closed = True
         self._timers.close()
         self._reading.clear()
-        for waiting in (self._expiry_timer, self._takeover_check):
-            if waiting is not None:
-                waiting.cancel()
+        for task in (self._expiry_timer, self._takeover_check):
+            if task is not None:
+                task.cancel()
         for session in self._registry.sessions.values():
             session.close()
         self._factory.close()
         await self._loop.run_in_executor(None, self._engines.close)
 
     def health(self) -> dict[str, object]:
-        """How many there are."""
+        """Return what `/healthz` reports beside the status."""
         return {"sessions": len(self._registry.sessions), "connections": len(self._clients)}
 
     def metrics_text(self) -> str:
-        """What Prometheus reads."""
+        """Return the metrics in the Prometheus text format."""
         sessions = self._registry.sessions.values()
         dropped = sum(session.dropped_count(number) for session in sessions for number in session.connections)
         return self.metrics.text(
@@ -123,21 +125,17 @@ class SessionHost:
     # connections --------------------------------------------------------------------------------
 
     def check(self, name: str | None, visitor: Visitor = ANYBODY) -> None:
-        """Whether a client could join.
-
-        Raises:
-            HubError: a bad name, one that is not for it, or too many sessions.
-        """
+        """Check whether a client may join. Raises as `SessionRegistry.check`."""
         self._registry.check(name, visitor)
 
     async def restore(self, name: str | None, seen: int | None = None) -> None:
-        """Go on with a session that another process has had, before somebody joins it.
+        """Take over a session of another process, before a client joins it.
 
         Args:
-            seen: seq of the feedback that who comes had last: the session has come at least so far.
+            seen: sequence number of the last feedback the client received, to which the session is advanced.
 
         Raises:
-            JournalError: the journal cannot be read.
+            JournalError: the journal cannot be read, or the session not be restored.
         """
         if self._factory.journal is None or name is None:
             return
@@ -146,41 +144,40 @@ class SessionHost:
                 self._restoring[name] = self._loop.create_task(self._restore(name, seen or 0))
             await asyncio.shield(self._restoring[name])
         session = self._registry.sessions.get(name)
-        if session is not None and name in self._taken_over and session.feedback_log.newest < (seen or 0):
+        if session is not None and name in self._resumed and session.feedback_log.newest < (seen or 0):
             now = self._loop.time()
             session.opened -= catch_up(session, now, seen or 0) - now
             self._apply_effects(session)
 
     def _is_live(self, name: str) -> bool:
-        """A session of that name is here; one that another process has may only still be known."""
-        known = self._registry.sessions.get(name)
-        return known is not None and not known.closed
+        """Whether the session plays here. One that another process has taken over may still be registered."""
+        session = self._registry.sessions.get(name)
+        return session is not None and not session.closed
 
     async def _restore(self, name: str, seen: int) -> None:
         try:
-            found = await self._factory.restore(name, seen, self._engines.speak)
-            if found is None:
+            restored = await self._factory.restore(name, seen, self._engines.speak)
+            if restored is None:
                 return
-            session, owed = found
+            session, unanswered = restored
             self._registry.sessions[name] = session
-            self._taken_over[name] = self._loop.time() + self.settings.keep
-            for effect in owed:
+            self._resumed[name] = self._loop.time() + self.settings.keep
+            for effect in unanswered:
                 self._apply_effect(session, effect)
             self._apply_effects(session)
         finally:
             del self._restoring[name]
 
     def join(
-        self,
-        client: Outbound,
-        name: str | None = None,
-        seen: int | None = None,
-        visitor: Visitor = ANYBODY,
+        self, client: Outbound, name: str | None = None, seen: int | None = None, visitor: Visitor = ANYBODY
     ) -> int:
-        """Let a client into the session of that name, or into one of its own; its number from now on.
+        """Let a client join the named session, or a new one, and return the number of the connection.
+
+        Args:
+            seen: sequence number of the last feedback that the client received.
 
         Raises:
-            HubError: as `check`.
+            JoinError: as `check`.
         """
         number = next(self._numbers)
         session = self._registry.open(number, name, self._loop.time(), seen, visitor)
@@ -189,13 +186,13 @@ class SessionHost:
         return number
 
     def receive(self, number: int, message: str | bytes) -> bool:
-        """A message from a connection; False where it is in no session any more."""
+        """Pass on a message of a connection. Return False if it is in no session any more."""
         session = self._registry.session_of(number)
         if session is None or session.closed:
             return False
         self.metrics.counts["messages"] += 1
         try:
-            # Who asks and never reads the answers is found here: nothing else may ever be due.
+            # A client that only asks and never reads must be noticed here: nothing else may ever be due.
             session.update_backlog(number, self._clients[number].unsent_bytes)
             session.receive(number, message, self._loop.time())
         except Exception:
@@ -204,7 +201,7 @@ class SessionHost:
         return True
 
     def leave(self, number: int) -> None:
-        """A connection is gone."""
+        """Remove a closed connection."""
         left = self._registry.session_of(number)
         if left is not None:
             self.metrics.counts["frames_dropped"] += left.dropped_count(number)
@@ -217,13 +214,13 @@ class SessionHost:
     # sessions -----------------------------------------------------------------------------------
 
     def _apply_effects(self, session: Session) -> None:
-        """Do what a session wants done, then wake it when it next has something."""
+        """Carry out the effects of a session, and schedule its next wake-up."""
         for effect in self._registry.take_effects(session, self._loop.time()):
             self._apply_effect(session, effect)
         self._schedule_wakeup(session)
 
     def _schedule_wakeup(self, session: Session) -> None:
-        """Wake it when something is due; what it has to read waits for its turn."""
+        """Schedule the next wake-up of a session, and its next document, which waits for its turn."""
         if self._closed:
             return
         self._timers.schedule(session, session.next_due())
@@ -233,7 +230,7 @@ class SessionHost:
             self._reading.setdefault(session)
 
     def _tick(self, session: Session, when: float) -> None:
-        """Frames, feedback and whatever else is due."""
+        """Send the frames and the feedback of a session that are due, and do what else is."""
         now = self._loop.time()
         self.metrics.late.observe(now - when)
         run = session.fast_path
@@ -245,14 +242,14 @@ class SessionHost:
             self._timers.schedule(session, run.wake_at)
             return
         try:
-            found = session.frames(now)
+            frames = session.frames(now)
         except Exception:
             self._fail(session)
             return
-        if found is None:
+        if frames is None:
             self._work(session, now, read_documents=False)
             return
-        effects, due = found
+        effects, due = frames
         for effect in effects:
             self._apply_effect(session, effect)
         for number in session.connections:
@@ -261,7 +258,7 @@ class SessionHost:
         self._timers.schedule(session, due)
 
     def _read(self) -> None:
-        """Read or plan one document of one session; whatever is due in others comes before the next."""
+        """Parse or plan one document of one session. What is due in others comes before the next one."""
         if not self._reading:
             return
         session = next(iter(self._reading))
@@ -283,13 +280,13 @@ class SessionHost:
         self._apply_effects(session)
 
     def _fail(self, session: Session) -> None:
-        """A bug: the traceback is ours, this session ends, the others play on."""
+        """Log an internal error and end its session; the others play on."""
         log.exception("session %s ends: it failed", session.id)
         self.metrics.counts["failures"] += 1
         for number in session.connections:
             self._apply_effect(session, Close(number, 1011, "internal error"))
         session.close()
-        session.journal.end()  # who does the same again from the journal would fail again
+        session.journal.end()  # a restored session would fail again
         self._registry.remove(session)
 
     def _apply_effect(self, session: Session, effect: Effect) -> None:
@@ -298,22 +295,22 @@ class SessionHost:
                 if (client := self._clients.get(connection)) is not None:
                     client.send(data)
             case Speak(id):
-                future = self._loop.run_in_executor(self._engines.speech_pool, self._engines.speak, effect)
-                future.add_done_callback(
+                speech = self._loop.run_in_executor(self._engines.speech_pool, self._engines.speak, effect)
+                speech.add_done_callback(
                     functools.partial(self._deliver_result, session, session.on_speech, id)
                 )
             case Draw(id):
-                drawing = self._loop.run_in_executor(self._engines.render_pool, self._engines.draw, effect)
-                drawing.add_done_callback(
+                picture = self._loop.run_in_executor(self._engines.render_pool, self._engines.draw, effect)
+                picture.add_done_callback(
                     functools.partial(self._deliver_result, session, session.on_picture, id)
                 )
             case Close(connection, code, reason):
                 if (client := self._clients.get(connection)) is not None:
                     client.disconnect(code, reason)
 
-    def _deliver_result(self, session: Session, tell: Any, id: int, future: asyncio.Future[Any]) -> None:
+    def _deliver_result(self, session: Session, deliver: Any, id: int, future: asyncio.Future[Any]) -> None:
         if not future.cancelled() and not self._closed:
-            tell(id, future.result(), self._loop.time())
+            deliver(id, future.result(), self._loop.time())
             self._apply_effects(session)
 
     def _compact_journal(self, session: Session) -> None:
@@ -326,20 +323,20 @@ class SessionHost:
         self._apply_effects(session)
 
     async def _check_takeovers(self, journal: Journal) -> None:
-        """Let go of who watches a session that plays elsewhere now."""
+        """Disconnect the clients of sessions that another process has taken over."""
         for session in await taken_over(journal, self._registry.sessions.values()):
-            session.hand_over(TakenOver(f"session {session.id} is another process's now"))
+            session.hand_over(TakenOver(session.id))
             self._apply_effects(session)
 
     def _expire_sessions(self) -> None:
         self._gc_policy.collect_if_needed(len(self._clients))
         now = self._loop.time()
         self._registry.remove_expired(now)
-        self._taken_over = {name: end for name, end in self._taken_over.items() if end > now}
-        # What is written for all of them is written one after the other, until the next sweep.
+        self._resumed = {name: end for name, end in self._resumed.items() if end > now}
+        # Spread the checkpoints over the time until the next call.
         grown = [session for session in self._registry.sessions.values() if session.journal.needs_checkpoint]
-        for place, session in enumerate(grown):
-            self._loop.call_later(EXPIRY_INTERVAL * place / len(grown), self._compact_journal, session)
+        for k, session in enumerate(grown):
+            self._loop.call_later(EXPIRY_INTERVAL * k / len(grown), self._compact_journal, session)
         if self._factory.journal is not None and (
             self._takeover_check is None or self._takeover_check.done()
         ):

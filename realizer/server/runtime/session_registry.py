@@ -17,21 +17,19 @@ from realizer.server.session.effects import Close, Effect, MoveConnection, Send
 from realizer.server.session.session import Session
 
 SESSION_ID = re.compile(r"[A-Za-z0-9._~-]{1,64}")
-
-
-# Sessions that other doors than the WebSocket make; these doors are open in the first worker.
-OF_DOORS = re.compile("(asap|xface|stomp)-")
+# Sessions of other transports than the WebSocket, which are open in the first worker only.
+FIRST_WORKER = re.compile("(asap|xface|stomp)-")
 
 
 def worker_of(session: str, workers: int, settings: Settings) -> int:
     """Return the number of the worker that has the session of that name."""
-    if workers == 1 or OF_DOORS.match(session) or session == settings.xface_player_session:
+    if workers == 1 or FIRST_WORKER.match(session) or session == settings.xface_player_session:
         return 0
     return zlib.crc32(session.encode()) % workers
 
 
 class JoinError(RealizerError):
-    """A connection that cannot be had; `status` is the HTTP status to answer with."""
+    """A connection that is refused; `status` is the HTTP status of the answer."""
 
     def __init__(self, status: int, text: str) -> None:
         super().__init__(text)
@@ -40,11 +38,11 @@ class JoinError(RealizerError):
 
 @dataclass(frozen=True, slots=True)
 class Visitor:
-    """Who comes in.
+    """The origin and the rights of a connection.
 
     Attributes:
-        address: where from; "" where that is not known, as of doors of our own.
-        sessions: those it may be in; None: any.
+        address: IP address; "" if unknown, as for other transports than the WebSocket.
+        sessions: names of the sessions it may join; None: any.
     """
 
     address: str = ""
@@ -55,12 +53,12 @@ ANYBODY = Visitor()
 
 
 class SessionRegistry:
-    """All sessions of the service.
+    """All sessions of the service, by name and by connection.
 
     Args:
         make: (id, now, named) -> Session.
-        settings: how many there may be.
-        is_local: (name) -> whether the session of that name is in this process.
+        settings: the limits of sessions.
+        is_local: (name) -> whether the session of that name belongs to this process.
     """
 
     def __init__(
@@ -76,19 +74,18 @@ class SessionRegistry:
         self._session_of: dict[int, Session] = {}
         self._visitors: dict[int, Visitor] = {}
         self._opened_by: dict[str, str] = {}  # session -> the address that opened it
-        self._opened_count: Counter[str] = Counter()  # address -> how many of them live
+        self._opened_count: Counter[str] = Counter()  # address -> number of sessions it has opened
 
-    def check(self, name: str | None, visitor: Visitor = ANYBODY) -> None:
-        """Whether a connection may join or make a session.
+    def check(self, name: str | None, visitor: Visitor = ANYBODY, ends: Session | None = None) -> None:
+        """Check whether a connection may join or create a session.
+
+        Args:
+            ends: a session that will end before.
 
         Raises:
-            HubError: 400 for a bad name, 403 for one that is not for this visitor, 429 where it has opened
-                too many, 503 where there are too many or there is no memory.
+            JoinError: 400: the name is invalid; 403: the visitor may not join that session; 429: it has
+                opened too many sessions; 503: too many sessions are open, or memory is used up.
         """
-        self._check(name, visitor)
-
-    def _check(self, name: str | None, visitor: Visitor, ends: Session | None = None) -> None:
-        """As `check`, where another session ends first."""
         if name is not None and not SESSION_ID.fullmatch(name):
             words = f"session: wanted 1..64 letters, digits or . _ ~ -, got {name[:80]!r}"
             raise JoinError(400, words)
@@ -120,16 +117,16 @@ class SessionRegistry:
         seen: int | None = None,
         visitor: Visitor = ANYBODY,
     ) -> Session:
-        """Let a connection join the named session, or make it; without a name, one of its own.
+        """Let a connection join the named session, which is created if it is missing, or a new one.
 
         Raises:
-            HubError: as `check`.
+            JoinError: as `check`.
         """
         if name is not None and (old := self.sessions.get(name)) is not None and old.closed:
-            self.remove(old)  # another process has it; those who were in it are on their way
-        self._check(name, visitor)
+            self.remove(old)  # another process has taken it over; its connections are closing
+        self.check(name, visitor)
         id = secrets.token_urlsafe(9) if name is None else name
-        # One that was brought back from a journal is opened by who comes to it first.
+        # A restored session counts against the address of the first client that joins it.
         if id not in self._opened_by or id not in self.sessions:
             if visitor.address and self._opened_count[visitor.address] >= self._settings.max_address_sessions:
                 self._end(self._abandoned(visitor.address)[0])
@@ -145,11 +142,11 @@ class SessionRegistry:
         return session
 
     def session_of(self, connection: int) -> Session | None:
-        """The session a connection is in."""
+        """Return the session of a connection."""
         return self._session_of.get(connection)
 
     def leave(self, connection: int, now: float) -> None:
-        """A connection is gone."""
+        """Remove a closed connection, and its session if that ends with it."""
         self._visitors.pop(connection, None)
         session = self._session_of.pop(connection, None)
         if session is not None:
@@ -159,7 +156,7 @@ class SessionRegistry:
                 self.remove(session)
 
     def remove(self, session: Session) -> None:
-        """A session has ended."""
+        """Remove a session that has ended."""
         if self.sessions.get(session.id) is session:
             del self.sessions[session.id]
             address = self._opened_by.pop(session.id, None)
@@ -169,62 +166,62 @@ class SessionRegistry:
                     del self._opened_count[address]
 
     def take_effects(self, session: Session, now: float) -> list[Effect]:
-        """What is to be done for a session; connections that move to another one are moved here."""
+        """Return the effects of a session, after moving connections that change to another session."""
         effects: list[Effect] = []
         moved: set[int] = set()
         for effect in session.take_effects():
             if isinstance(effect, Send) and effect.connection in moved:
-                continue  # it has been welcomed elsewhere: what comes from here would be taken for theirs
-            if isinstance(effect, MoveConnection):
-                visitor = self._visitors.get(effect.connection, ANYBODY)
-                words = self._refusal(effect, session, visitor)
-                if words is not None:
-                    error = ErrorMessage(code="invalid", message=words, where="hello.session")
-                    effects.append(Send(effect.connection, error.text()))
-                    continue
-                self.leave(effect.connection, now)
-                moved.add(effect.connection)
-                try:
-                    there = self.open(effect.connection, effect.session, now, visitor=visitor)
-                except JoinError as error:  # it cannot be kept; what it has left may be gone
-                    effects.append(Close(effect.connection, 1013, str(error)))
-                    continue
-                there.send_welcome(effect.connection, now)
-                if effect.seen is not None:
-                    there.send_missed_feedback(effect.connection, effect.seen)
-                effects += there.take_effects()
-            else:
+                continue  # the client would take it for a message of the session it is in now
+            if not isinstance(effect, MoveConnection):
                 effects.append(effect)
+                continue
+            visitor = self._visitors.get(effect.connection, ANYBODY)
+            words = self._refusal(effect, session, visitor)
+            if words is not None:
+                refused = ErrorMessage(code="invalid", message=words, where="hello.session")
+                effects.append(Send(effect.connection, refused.text()))
+                continue
+            self.leave(effect.connection, now)
+            moved.add(effect.connection)
+            try:
+                joined = self.open(effect.connection, effect.session, now, visitor=visitor)
+            except JoinError as error:  # the journal cannot store it, and the old session may have ended
+                effects.append(Close(effect.connection, 1013, str(error)))
+                continue
+            joined.send_welcome(effect.connection, now)
+            if effect.seen is not None:
+                joined.send_missed_feedback(effect.connection, effect.seen)
+            effects += joined.take_effects()
         return effects
 
     def _refusal(self, move: MoveConnection, left: Session, visitor: Visitor) -> str | None:
-        """Why a connection cannot move; None where it can. It may leave room behind it."""
+        """Return why a connection cannot move from a session to another, or None."""
         if not self._is_local(move.session):
-            there = f"/ws?session={move.session}" + ("" if move.seen is None else f"&seen={move.seen}")
-            return f"hello reaches the sessions of this process only: connect to {there} instead"
+            target = f"/ws?session={move.session}" + ("" if move.seen is None else f"&seen={move.seen}")
+            return f"hello reaches the sessions of this process only: connect to {target} instead"
         try:
-            self._check(move.session, visitor, None if left.named or len(left.connections) > 1 else left)
+            self.check(move.session, visitor, None if left.named or len(left.connections) > 1 else left)
         except JoinError as error:
             return str(error)
         return None
 
     def remove_expired(self, now: float) -> None:
-        """Close the sessions nobody has been in for too long."""
+        """End the sessions that have had no connection for too long."""
         for session in [s for s in self.sessions.values() if s.is_expired(now)]:
             self._end(session)
 
     def _abandoned(self, address: str | None = None) -> list[Session]:
-        """Sessions that wait for somebody to come back, the longest left first: they make room for others.
+        """Return the sessions without connections, the longest abandoned first: they make room for others.
 
         Args:
-            address: of these, those that it has opened.
+            address: only the sessions that it has opened.
         """
-        left = [
+        abandoned = [
             (s.empty_since, s.id, s)
             for s in self.sessions.values()
             if s.empty_since is not None and address in (None, self._opened_by.get(s.id))
         ]
-        return [session for *_, session in sorted(left)]
+        return [session for *_, session in sorted(abandoned)]
 
     def _end(self, session: Session) -> None:
         session.close()

@@ -14,11 +14,9 @@ from realizer.server.http.metrics import sum_samples
 
 log = logging.getLogger(__name__)
 
-# A worker that has not answered by then is left out.
-PATIENCE = 3.0  # s
-# Of who asks whether all is well: such checks do not wait long themselves.
-HASTE = 1.0  # s
-LONGEST = 16 * 1024  # bytes of a request before its end
+# Workers that have not answered by then are left out; health checks do not wait long themselves.
+PATIENCE, HASTE = 3.0, 1.0  # s
+LONGEST = 16 * 1024  # bytes of the head of a request
 LARGEST = 2**20  # bytes of an answer
 OK = re.compile(rb"HTTP/1\.[01] 200 ")
 LENGTH = re.compile(rb"(?im)^(Content-Length:\s*)\d+")
@@ -29,30 +27,30 @@ UNAVAILABLE = (
 
 
 def _combined_health(texts: Mapping[int, str], workers: int) -> str:
-    """What `/healthz` tells of all: the sums, and who does not serve; it is well while one does."""
+    """Return the sums of the workers' `/healthz`, and which workers are silent; "ok" if none is."""
     sums: Counter[str] = Counter()
     for text in texts.values():
         sums.update({name: n for name, n in json.loads(text).items() if isinstance(n, int)})
     silent = [number for number in range(workers) if number not in texts]
-    told: dict[str, object] = {"status": "partly" if silent else "ok", **sums, "workers": workers}
-    return json.dumps(told | ({"silent": silent} if silent else {}))
+    health: dict[str, object] = {"status": "partly" if silent else "ok", **sums, "workers": workers}
+    return json.dumps(health | ({"silent": silent} if silent else {}))
 
 
-# What is asked of all workers -> what their answers come to.
-_SUMS: Mapping[str, Callable[[Mapping[int, str], int], str]] = {
+# Path -> (answers by worker, number of workers) -> their combination.
+_COMBINE: Mapping[str, Callable[[Mapping[int, str], int], str]] = {
     "/metrics": lambda texts, workers: sum_samples(texts),
     "/healthz": _combined_health,
 }
 
 
 def is_for_all_workers(line: str) -> bool:
-    """Whether the first line of a request asks what all workers can tell, and not one that it names."""
+    """Return whether the first line of a request is for all workers: no session's, and naming no worker."""
     path, query = _request_target(line)
-    return path in _SUMS and not re.search(r"(^|&)worker=", query)
+    return path in _COMBINE and not re.search(r"(^|&)worker=", query)
 
 
 def _request_target(line: str) -> tuple[str, str]:
-    """Path and query of the first line of a request; ("", "") of one that does not only look."""
+    """Return path and query of the first line of a GET request; ("", "") of another."""
     method, _, rest = line.partition(" ")
     path, _, query = rest.partition(" ")[0].partition("?")
     return (path, query) if method == "GET" else ("", "")
@@ -63,11 +61,10 @@ async def aggregate(
 ) -> None:
     """Answer a request for the metrics, or the health, of all workers.
 
-    Each gets it as it came, with its token, over a socket of our own, and lets in whom it would let in: what
-    it refuses is refused.
+    Each worker gets the request with its token and checks it itself. If one refuses it, so does the answer.
 
     Args:
-        give: hands a socket to the worker of that number, as it hands over a client's.
+        give: passes a socket to the worker of that number.
     """
     loop = asyncio.get_running_loop()
     request = b""
@@ -84,18 +81,17 @@ async def aggregate(
             async with asyncio.timeout(HASTE if path == "/healthz" else PATIENCE):
                 return await _ask_worker(request, number, give)
         except (OSError, TimeoutError) as error:
-            log.warning("worker %d tells nothing for %s: %s", number, path, str(error) or "it takes too long")
+            words = str(error) or "it takes too long"
+            log.warning("worker %d does not answer for %s: %s", number, path, words)
             return None
 
-    answers = await asyncio.gather(*map(ask, range(workers)))
-    told = {k: answer for k, answer in enumerate(answers) if answer}
-    await loop.sock_sendall(client, _combine(told, lambda texts: _SUMS[path](texts, workers)))
+    answers = {k: a for k, a in enumerate(await asyncio.gather(*map(ask, range(workers)))) if a}
+    await loop.sock_sendall(client, _combined(answers, lambda texts: _COMBINE[path](texts, workers)))
 
 
 async def _ask_worker(
     request: bytes, number: int, give: Callable[[int, socket.socket], Awaitable[None]]
 ) -> bytes:
-    """What one worker answers."""
     loop = asyncio.get_running_loop()
     ours, theirs = socket.socketpair()
     with ours:
@@ -109,14 +105,14 @@ async def _ask_worker(
     return answer
 
 
-def _combine(answers: Mapping[int, bytes], come_to: Callable[[Mapping[int, str]], str]) -> bytes:
-    """The answers of workers, by their numbers, as one; the first refusal where there is one."""
+def _combined(answers: Mapping[int, bytes], combine: Callable[[Mapping[int, str]], str]) -> bytes:
+    """Return one answer for those of the workers, by their numbers: the first refusal if there is one."""
     if not answers:
         return UNAVAILABLE
-    refusal = next((answer for answer in answers.values() if not OK.match(answer)), None)
-    if refusal is not None:
-        return refusal
-    parted = {number: answer.partition(b"\r\n\r\n") for number, answer in answers.items()}
-    body = come_to({number: text.decode() for number, (_, _, text) in parted.items()}).encode()
-    head, end, _ = next(iter(parted.values()))
+    for answer in answers.values():
+        if not OK.match(answer):
+            return answer
+    parts = {number: answer.partition(b"\r\n\r\n") for number, answer in answers.items()}
+    body = combine({number: text.decode() for number, (_, _, text) in parts.items()}).encode()
+    head, end, _ = next(iter(parts.values()))
     return LENGTH.sub(rb"\g<1>%d" % len(body), head) + end + body

@@ -1,7 +1,7 @@
-"""Worker processes; connections of one port are passed to the worker of their session.
+"""Worker processes behind one port: each connection is passed to the worker of its session.
 
-The parent looks at the first line of a request and leaves it in the socket. What it hands over is the socket
-itself, so that nothing stands between a client and its worker afterwards.
+The parent peeks at the first line of a request, which stays in the socket, and passes the socket itself, so
+that later messages go directly to the worker.
 """
 
 from __future__ import annotations
@@ -26,13 +26,11 @@ from realizer.server.runtime.worker_aggregation import aggregate, is_for_all_wor
 
 log = logging.getLogger(__name__)
 
-# A request's first line must have come by then, and be no longer.
+# Limits of the first line of a request: time to arrive, and length.
 PATIENCE, LONGEST = 10.0, 8192  # s, bytes
-# How long a worker is waited for that should have ended: then it hangs.
-GRACE = 5.0  # s
-# How long a worker that is full is waited for, and how often a request that is not whole is looked at.
-STEP = 0.005  # s
-# What a worker says when its doors are open; and, before the words, when they cannot be.
+GRACE = 5.0  # s; a worker that has not ended so long after its drain is killed
+STEP = 0.005  # s; between attempts to pass a socket to a busy worker, or to read an incomplete line
+# The first byte from a worker: its transports are open, or an error text follows.
 READY, FAULT = b"r", b"!"
 
 
@@ -40,18 +38,18 @@ Serve = Callable[[Settings, int, socket.socket], None]
 
 
 class WorkerError(RealizerError):
-    """A worker that cannot be started, and why."""
+    """A worker cannot be started."""
 
 
 class Workers:
     """The parent of `settings.workers` processes: `start`, then `close`.
 
     Args:
-        serve: (settings, number, control) -> serves in a worker's own process the connections that come
-            through `control`; a function of a module, which that process imports.
+        serve: (settings, number, control): serves the connections that arrive through `control`, in a worker
+            process; a function of a module, which that process imports.
 
     Attributes:
-        port: the one that is open after `start`.
+        port: the open port after `start`.
     """
 
     def __init__(self, settings: Settings, serve: Serve) -> None:
@@ -69,19 +67,19 @@ class Workers:
         """Start the workers, then open the port.
 
         Raises:
-            OSError: the address cannot be had.
-            WorkerError: a worker lacks something, or ended before it was ready.
+            OSError: the address is not available.
+            WorkerError: a worker cannot start.
         """
         loop = asyncio.get_running_loop()
-        found = await loop.getaddrinfo(
+        addresses = await loop.getaddrinfo(
             self._settings.host or None, self.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
         )
-        for family, _, _, _, address in dict.fromkeys(found):
+        for family, _, _, _, address in dict.fromkeys(addresses):
             if self._sockets and self.port == 0:
                 address = (address[0], self._sockets[0].getsockname()[1], *address[2:])
-            here = socket.create_server(address[:2], family=family, backlog=1024)
-            here.setblocking(False)
-            self._sockets.append(here)
+            listener = socket.create_server(address[:2], family=family, backlog=1024)
+            listener.setblocking(False)
+            self._sockets.append(listener)
         self.port = self._sockets[0].getsockname()[1]
         try:
             for number in range(self._settings.workers):
@@ -92,44 +90,42 @@ class Workers:
         except BaseException:
             await self.close()
             raise
-        for here in self._sockets:
-            self._keep(self._accept(here))
+        for listener in self._sockets:
+            self._add_task(self._accept(listener))
         for number, (_, control) in enumerate(self._children):
-            self._keep(self._watch(number, control))
+            self._add_task(self._watch(number, control))
         return self
 
     @property
     def processes(self) -> list[int]:
-        """Their numbers, in order."""
+        """The process ids, in order of the workers."""
         return [child.pid for child, _ in self._children if child.pid is not None]
 
     def stop_accepting(self) -> None:
-        """Take no more connections; each worker gives what plays its time, and ends."""
+        """Accept no more connections, and ask the workers to drain and end."""
         self._ending = True
-        for here in self._sockets:
-            here.close()
+        for listener in self._sockets:
+            listener.close()
         for child, _ in self._children:
             if child.pid is not None and child.is_alive():
                 child.terminate()
 
     async def close(self) -> None:
-        """`stop_accepting`, and wait for the workers; one that hangs is killed."""
+        """Stop accepting and wait for the workers to end; kill those that hang."""
         self.stop_accepting()
         for task in self._tasks:
             task.cancel()
         loop = asyncio.get_running_loop()
         last = loop.time() + self._settings.drain + GRACE
         for number, (child, control) in enumerate(self._children):
-            control.close()  # a worker that is still starting ends by that
+            control.close()  # which also ends a worker that is still starting
             await loop.run_in_executor(None, child.join, max(0.0, last - loop.time()))
             if child.is_alive():
                 log.error("worker %d does not end: it is killed", number)
                 child.kill()
                 await loop.run_in_executor(None, child.join)
 
-    # inside -------------------------------------------------------------------------------------
-
-    def _keep(self, coroutine: Coroutine[None, None, None]) -> None:
+    def _add_task(self, coroutine: Coroutine[None, None, None]) -> None:
         task = asyncio.get_running_loop().create_task(coroutine)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
@@ -147,7 +143,7 @@ class Workers:
         return child, ours
 
     async def _watch(self, number: int, control: socket.socket) -> None:
-        """Start a worker again that ends by itself."""
+        """Restart a worker that has ended by itself."""
         loop = asyncio.get_running_loop()
         while not self._ending:
             with contextlib.suppress(OSError):
@@ -163,23 +159,22 @@ class Workers:
             self._children[number] = child, control = self._start_worker(number)
             if (words := await _startup_error(control)) is not None:
                 log.error("worker %d: %s", number, words)
-                await asyncio.sleep(1.0)  # no more than one try a second
+                await asyncio.sleep(1.0)  # at most one attempt a second
 
-    async def _accept(self, here: socket.socket) -> None:
+    async def _accept(self, listener: socket.socket) -> None:
         loop = asyncio.get_running_loop()
         while True:
             try:
-                client, _ = await loop.sock_accept(here)
+                client, _ = await loop.sock_accept(listener)
             except OSError as error:
                 if self._ending:
                     return
-                log.error("a connection could not be taken: %s", error)
+                log.error("a connection could not be accepted: %s", error)
                 await asyncio.sleep(0.1)
                 continue
-            self._keep(self._route(client))
+            self._add_task(self._route(client))
 
     async def _route(self, client: socket.socket) -> None:
-        """Look who it is for, and give it away."""
         with client, contextlib.suppress(TimeoutError, OSError):
             async with asyncio.timeout(PATIENCE):
                 line = await _first_line(client)
@@ -189,7 +184,6 @@ class Workers:
                     await self._pass_socket(self._number(line), client)
 
     async def _pass_socket(self, number: int, client: socket.socket) -> None:
-        """Hand a connection over."""
         while True:
             try:
                 socket.send_fds(self._children[number][1], [READY], [client.fileno()])
@@ -198,7 +192,7 @@ class Workers:
                 await asyncio.sleep(STEP)
 
     def _number(self, line: str) -> int:
-        """The worker of a request: that of its session, the one it names (`?worker=1`), or the next."""
+        """Return the worker of a request: of its session, the one it names (`?worker=1`), or the next one."""
         query, count = parse_qs(line.partition("?")[2].partition(" ")[0]), len(self._children)
         if "session" in query:
             return worker_of(query["session"][-1], count, self._settings)
@@ -209,13 +203,13 @@ class Workers:
 
 
 async def _first_line(client: socket.socket) -> str:
-    """The first line of what a client says, which stays to be read."""
+    """Return the first line of a request without removing it from the socket."""
     loop = asyncio.get_running_loop()
     while True:
-        came = asyncio.Event()
-        loop.add_reader(client, came.set)
+        readable = asyncio.Event()
+        loop.add_reader(client, readable.set)
         try:
-            await came.wait()
+            await readable.wait()
         finally:
             loop.remove_reader(client)
         data = client.recv(LONGEST, socket.MSG_PEEK)
@@ -226,7 +220,7 @@ async def _first_line(client: socket.socket) -> str:
 
 
 async def _startup_error(control: socket.socket) -> str | None:
-    """Why a worker does not become ready; None once it is."""
+    """Wait until a worker is ready and return None, or why it cannot start."""
     loop = asyncio.get_running_loop()
     if (first := await loop.sock_recv(control, 1)) == READY:
         return None
@@ -237,7 +231,11 @@ async def _startup_error(control: socket.socket) -> str | None:
 
 
 def receive_sockets(control: socket.socket) -> list[socket.socket]:
-    """The sockets that the parent has handed over since; none where it has ended."""
+    """Return the sockets that the parent has passed.
+
+    Raises:
+        EOFError: the parent has ended.
+    """
     data, numbers, _, _ = socket.recv_fds(control, 64, 64)
     if not data:
         raise EOFError
@@ -250,10 +248,10 @@ def receive_sockets(control: socket.socket) -> list[socket.socket]:
 def _work(
     serve: Serve, settings: Settings, number: int, port: int, control: socket.socket, level: int
 ) -> None:
-    """Run a worker in its own process, with the log level of its parent."""
+    """Run a worker process, with the log level of its parent."""
     write_words(level, f"worker {number}: ")
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends us, also from a terminal
-    if number:  # doors that have a port or a broker of their own are open once
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to the parent, which ends the workers
+    if number:  # other transports than the WebSocket are open in the first worker only
         settings = replace(settings, asap_ports=None, xface_port=None, xface_player=None, stomp=None)
     control.setblocking(False)
     serve(replace(settings, port=port), number, control)

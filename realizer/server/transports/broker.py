@@ -13,28 +13,28 @@ from typing import Any
 from realizer.core.errors import RealizerError
 from realizer.server.transports.message_format import Message
 
-HEARTBEAT = 10_000  # ms, both ways: what else would tell that the broker's machine is gone
-REASON = 0.1  # s between the loss of a connection and its telling, so that the reason is known by then
-# Messages that have come in and are not handled: so a session keeps step, and the broker waits with more.
+HEARTBEAT = 10_000  # ms, both ways: the only sign that the broker's host has died
+REASON = 0.1  # s from the loss of a connection until it is reported, for its reason to arrive first
+# Received messages that may wait to be handled; the broker holds back the others.
 AHEAD = 1
 
 
 def check_installed() -> None:
-    """Raises a RealizerError that says what to install."""
+    """Raise RealizerError if stomp.py is not installed."""
     try:
         import stomp  # noqa: F401
     except ImportError:
         raise RealizerError("--stomp needs stomp.py: pip install 'bml-realizer[stomp]'") from None
-    # It tells of every lost connection, with a traceback; so do we, in a line.
+    # It logs a traceback for each lost connection, which we log in one line.
     logging.getLogger("stomp.py").setLevel(logging.CRITICAL)
 
 
 class BrokerConnection:
-    """One connection, from `connect` to `lost`; what blocks is called in a thread of the caller's.
+    """One connection, from `connect` to `lost`. Methods that block are called in a thread of the caller.
 
     Args:
-        loop: where `take(self, topic, body)` is called for each message, with the place of its topic among
-            those that were subscribed to; and where the events are set.
+        loop: the event loop in which events are set and `take` is called.
+        take: (self, topic, body), called for each message; `topic` is the index in `subscribe`.
         timeout: seconds to connect in.
     """
 
@@ -44,8 +44,8 @@ class BrokerConnection:
         take: Callable[[BrokerConnection, int, bytes], None],
         timeout: float,
     ) -> None:
-        self.settled = asyncio.Event()  # connected, or not
-        self.reading = asyncio.Event()  # all topics are subscribed to; or lost
+        self.settled = asyncio.Event()  # connected or failed
+        self.reading = asyncio.Event()  # subscribed to all topics, or lost
         self.lost = asyncio.Event()
         self.connected = False
         self.fault = ""
@@ -56,49 +56,49 @@ class BrokerConnection:
         self._stomp: Any = None
         self._dropped = False
 
-    # in the door's thread
+    # in the transport's thread
 
     def connect(
         self, address: tuple[str, int], host: str | None, login: str | None, password: str | None
     ) -> None:
-        """Ask for a connection; `settled` says when there is one, or none."""
+        """Open the connection; `settled` is set when it has succeeded or failed."""
         import stomp
         from stomp.exception import StompException
 
         self._stomp = stomp.Connection12(
             [address],
-            try_loopback_connect=False,  # that address and no other
+            try_loopback_connect=False,  # only that address
             reconnect_attempts_max=1,
-            reconnect_sleep_initial=0,  # we wait ourselves
+            reconnect_sleep_initial=0,  # the transport waits itself
             reconnect_sleep_max=0,
             timeout=self._timeout,
             heartbeats=(HEARTBEAT, HEARTBEAT),
             heart_beat_receive_scale=2.5,
             vhost=host,
             auto_decode=False,
-            # With a length ActiveMQ makes messages of bytes, which Java clients that wait for text pass over.
+            # ActiveMQ turns messages with a length into byte messages, which Java clients for text ignore.
             auto_content_length=False,
         )
-        self._stomp.set_listener("door", self)
+        self._stomp.set_listener("transport", self)
         try:
             self._stomp.connect(login, password)
         except StompException as error:
             raise RealizerError(str(error) or "nobody answers") from None
-        # Otherwise each message waits until the one before is acknowledged: 50 ms a block instead of 7.
+        # With Nagle's algorithm a block takes 50 ms instead of 7.
         with contextlib.suppress(OSError, AttributeError):
             self._stomp.transport.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        if self._dropped:  # meanwhile; there was nothing to close yet
+        if self._dropped:  # before there was a socket to close
             self.drop()
 
     def subscribe(self, topics: Sequence[str]) -> None:
-        """Ask for the messages of all topics; `reading` says when they come."""
+        """Subscribe to all topics; `reading` is set when that is done."""
         for number, topic in enumerate(topics):
-            # The broker takes one after the other: its word on the last one is enough.
+            # The broker handles subscriptions in order: the receipt of the last one is enough.
             receipt = {"receipt": "reading"} if number == len(topics) - 1 else {}
             self._guarded(self._stomp.subscribe, topic, id=str(number), headers=receipt)
 
     def send(self, message: Message) -> None:
-        """Blocks while the broker does not read.
+        """Send a message. Blocks while the broker does not read.
 
         Raises:
             OSError, RealizerError: the connection is lost.
@@ -106,7 +106,7 @@ class BrokerConnection:
         self._guarded(self._stomp.send, message.topic, message.body, headers=dict(message.headers))
 
     def disconnect(self) -> None:
-        """Say good-bye; `lost` says when the broker has."""
+        """Begin to disconnect; `lost` is set when the broker has closed."""
         self._guarded(self._stomp.disconnect)
 
     @staticmethod
@@ -115,13 +115,13 @@ class BrokerConnection:
 
         try:
             call(*arguments, **named)
-        except (StompException, AttributeError) as error:  # it clears its socket under our hands
+        except (StompException, AttributeError) as error:  # its socket may become None meanwhile
             raise RealizerError(str(error) or "the connection is lost") from None
 
     # in any thread
 
     def drop(self) -> None:
-        """Close the socket, if it is still open or as soon as it is."""
+        """Close the socket if it is open, or as soon as it is."""
         self._dropped = True
         if self._stomp is not None:
             with contextlib.suppress(OSError, AttributeError):
@@ -137,15 +137,15 @@ class BrokerConnection:
             self._in_loop(self.reading.set)
 
     def on_error(self, frame: Any) -> None:
-        said = frame.headers.get("message", "")
-        why, *_ = bytes(frame.body or b"").decode("utf-8", "replace").strip().splitlines() or [""]
-        if said not in why:  # some brokers say it again at the head of a long trace
-            said = f"{said}: {why}".removesuffix(": ")
-        self._in_loop(self._settle, False, " ".join((said or why).split())[:200])
+        title = frame.headers.get("message", "")
+        detail, *_ = bytes(frame.body or b"").decode("utf-8", "replace").strip().splitlines() or [""]
+        if title not in detail:  # some brokers repeat the title at the head of a long trace
+            title = f"{title}: {detail}".removesuffix(": ")
+        self._in_loop(self._settle, False, " ".join((title or detail).split())[:200])
 
     def on_disconnected(self) -> None:
         self._in_loop(self._settle, False, "")
-        # stomp.py closes the socket of a silent broker before it says so; the reading thread may be first.
+        # If the broker is silent, the reading thread may report its loss before the heartbeat thread does.
         self._in_loop(self._loop.call_later, REASON, self.lost.set)
         self._in_loop(self.reading.set)
 
@@ -165,7 +165,7 @@ class BrokerConnection:
     # in the event loop
 
     def handled(self) -> None:
-        """One message less that has come in and waits."""
+        """Let the next message come in."""
         self._ahead.release()
 
     def _settle(self, connected: bool, fault: str) -> None:

@@ -8,10 +8,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A stretch of the stream that gave no document: why, and the block's id where it can be read.
+    """A span of the stream that is no document.
 
     Attributes:
-        large: it was longer than a document may be.
+        text: why.
+        block: the block's id, if it can be read.
+        large: whether it is longer than a document may be.
     """
 
     text: str
@@ -19,11 +21,11 @@ class Fault:
     large: bool = False
 
 
-# What decides where documents begin and end, and what may hide such marks. The lookahead wants the byte
-# after a name, so that no mark is taken for another one while it is still coming in.
+# The marks at which documents begin and end, and constructs that may hide such marks. The lookahead needs the
+# byte after a name, so that an incomplete mark is not taken for another one.
 _NAME = rb"(?:[\w.\x80-\xff-]{1,64}:)?bml(?=[\s/>])"
 _MARK = re.compile(rb"<!--|<!\[CDATA\[|<!DOCTYPE|<\?|<" + _NAME + rb"|</" + _NAME)
-# What the end of the data may turn into a mark when more comes; no mark is longer.
+# An end of the data that more data may turn into a mark; no mark is longer.
 _COMING = re.compile(rb"<[^\s<>]{0,79}\Z")
 _CLOSERS = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>"}
 _IN_TAG = re.compile(rb"[<>\"']")
@@ -34,16 +36,16 @@ _EDGE = re.compile(rb"[<>]")
 _ID = re.compile(rb"""\sid\s*=\s*(?:"([^"<]{1,256})"|'([^'<]{1,256})')""")
 _BLANKS = b" \t\r\n\xef\xbb\xbf"  # and the bytes of a BOM
 _SOLID = re.compile(rb"[^" + _BLANKS + rb"]")
-_SHOWN = 60  # bytes of a stray stretch that its message shows
+_SHOWN = 60  # bytes of a stray span that its message quotes
 
 
 class DocumentFramer:
-    """Finds the documents of one stream.
+    """A splitter of one byte stream into documents.
 
-    Between documents blanks, comments, declarations, processing instructions and DOCTYPEs are passed over.
-    Of a stretch that holds anything else, of a document whose end never came before the next one began and
-    of one that is too large, one Fault tells; reading goes on at the next `<bml`. How the stream was cut into
-    reads changes nothing, and no byte is looked at more than a few times.
+    Blanks, comments, declarations, processing instructions and DOCTYPEs between documents are skipped. A span
+    with anything else, a document that has not ended before the next one begins, and one that is too large
+    give one Fault each; reading resumes at the next `<bml`. The result does not depend on how the stream is
+    cut into reads, and each byte is examined a few times at most.
 
     Args:
         limit: most bytes of a document, and of a comment between documents.
@@ -52,33 +54,33 @@ class DocumentFramer:
     def __init__(self, limit: int) -> None:
         self._limit = limit
         self._data = bytearray()
-        self._here = 0  # up to here all is understood
+        self._here = 0  # the data before it is parsed
         self._document = -1  # where the open document begins; -1 outside
-        self._hidden = b""  # what began and hides marks: the mark itself, a quote within a tag
+        self._hidden = b""  # the open construct that hides marks: its mark, or a quote within a tag
         self._opened = 0  # where it began
-        self._closing = False  # the tag that is being read is an end tag
-        self._broken = False  # what gave no document has been told of, up to the next good one
+        self._closing = False  # whether the open tag is an end tag
+        self._broken = False  # whether a fault was reported after the last good document
         self._stray = bytearray()
-        self._orphans = 0  # end tags that will come of documents that were given up
+        self._orphans = 0  # end tags to come of documents that were given up
         self._found: list[str | Fault] = []
 
     def feed(self, data: bytes) -> list[str | Fault]:
-        """What `data` completes, in order: texts of documents, each from `<bml` to its end, and Faults."""
+        """Return what `data` completes, in order: documents, each from `<bml` to its end, and Faults."""
         self._data += data
         while self._step():
             pass
         self._give_up()
-        kept = self._document if self._document >= 0 else self._here
-        del self._data[:kept]
-        self._here -= kept
-        self._opened -= kept
+        consumed = self._document if self._document >= 0 else self._here
+        del self._data[:consumed]
+        self._here -= consumed
+        self._opened -= consumed
         if self._document >= 0:
             self._document = 0
         found, self._found = self._found, []
         return found
 
     def _step(self) -> bool:
-        """Understand the next mark, or what closes the last one; False where more data is needed."""
+        """Parse up to the next mark, or the end of the open construct. Return False if data is missing."""
         if not self._hidden:
             return self._to_mark()
         if self._hidden in _CLOSERS:
@@ -117,7 +119,7 @@ class DocumentFramer:
         return True
 
     def _in_tag(self) -> bool:
-        """To the end of a tag of <bml>; `>` in a value is none, `<` means that the tag was never closed."""
+        """Parse to the end of a <bml> tag. A `>` in a value does not end it, a `<` means it is not closed."""
         inside = _IN_VALUE.get(self._hidden, _IN_TAG)
         found = inside.search(self._data, self._here)
         if found is None:
@@ -135,7 +137,7 @@ class DocumentFramer:
         return True
 
     def _past(self, closer: bytes) -> bool:
-        """To the end of a comment and the like; one that is longer than a document may be is given up."""
+        """Parse to the end of a comment or the like. Give up one longer than a document may be."""
         last = self._opened + len(self._hidden) + self._limit
         at = self._data.find(closer, self._here, last)
         if at >= 0:
@@ -144,10 +146,9 @@ class DocumentFramer:
         return self._not_yet(last, len(closer) - 1)
 
     def _not_yet(self, last: int, kept: int) -> bool:
-        """What closes a construct is not there: wait for more, or give the construct up at `last`."""
+        """Wait for the end of a construct, or give the construct up at `last`."""
         if len(self._data) < last:
-            # A closer may have come in half.
-            self._here = max(self._here, len(self._data) - kept)
+            self._here = max(self._here, len(self._data) - kept)  # part of the closer may be there
             return False
         if self._document < 0:
             opener = "<!DOCTYPE" if self._hidden == b"[" else self._hidden.decode()
@@ -177,7 +178,7 @@ class DocumentFramer:
         return True
 
     def _end(self) -> None:
-        """A tag that may end a document is read, up to here."""
+        """Handle a tag that may end a document."""
         self._give_up()
         if self._document < 0:
             if self._orphans:
@@ -204,7 +205,7 @@ class DocumentFramer:
             self._document = -1
 
     def _text(self, end: int) -> None:
-        """What stands before `end` hides nothing; outside a document it should be blank."""
+        """Skip text without marks up to `end`; outside a document it should be blank."""
         if self._document < 0 and not self._broken:
             start = self._here
             if not self._stray:
@@ -223,14 +224,14 @@ class DocumentFramer:
             self._fault(f"wanted <bml>, got {shown!r}")
 
     def _fault(self, text: str, block: str | None = None, *, large: bool = False) -> None:
-        """One message for a stretch, however much is wrong with it."""
+        """Report a fault, once for each span between good documents."""
         self._stray.clear()
         if not self._broken:
             self._found.append(Fault(text, block, large))
         self._broken = True
 
     def _id(self, end: int) -> str | None:
-        """The id in the start tag of the open document, where it can be read before `end`."""
+        """Return the id in the start tag of the open document, if it can be read before `end`."""
         start = self._document
         end = min(end, start + 4096)
         tag = _EDGE.search(self._data, start + 1, end)

@@ -1,4 +1,4 @@
-"""The protocol of message formats on a broker."""
+"""The protocol of message formats on a broker, and the actions that messages ask for."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Protocol
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """One message to the broker."""
+    """A message to the broker."""
 
     topic: str
     body: str
@@ -18,36 +18,36 @@ class Message:
 
 @dataclass(frozen=True, slots=True)
 class Inbound:
-    """One message to the session: a document, or a control message of our own making."""
+    """A message to the session: a document, or a control message."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class Disconnect:
-    """Somebody asks us to go."""
+    """A request to disconnect."""
 
 
 Action = Inbound | Message | Disconnect
 
 
 class MessageFormat(Protocol):
-    """One way to talk over a broker; `topic` is what it reads. It may keep state: one for each session."""
+    """A message format of one session, which may keep state; `topic` is the topic it reads."""
 
     topic: str
 
     def hello(self) -> list[Message]:
-        """What is said when the broker is there."""
+        """Return the messages to send when the broker is connected."""
         ...
 
     def incoming(self, body: bytes) -> list[Action]:
-        """What a message of `topic` asks for; nothing where it is not for us."""
+        """Return the actions that a message of the topic asks for; [] if it is for other clients."""
         ...
 
     def outgoing(self, feedback: str) -> list[Message]:
-        """What is said when the session tells `feedback`."""
+        """Return the messages to send for feedback of the session."""
         ...
 
     def farewell(self) -> list[Message]:
-        """What is said before the session ends."""
+        """Return the messages to send before the session ends."""
         ...

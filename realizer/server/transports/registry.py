@@ -1,4 +1,4 @@
-"""The registry of transports: one row for each way in beside the WebSocket."""
+"""The registry of transports beside the WebSocket."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from realizer.core.registry import Registry
 from realizer.core.settings import Settings
 from realizer.server.transports.transport import Transport
 
-# The name is the setting that asks for it; one of a plug-in has no setting and is always asked for.
+# The name is the setting that requests the transport. One of a plug-in has none and is always requested.
 TRANSPORTS: Registry[Callable[..., Transport | None]] = Registry(
     "realizer.transports",
     {
@@ -23,7 +23,7 @@ TRANSPORTS: Registry[Callable[..., Transport | None]] = Registry(
 
 
 def requested(settings: Settings) -> Iterator[Callable[..., Transport | None]]:
-    """Yield what makes each transport that the settings ask for."""
+    """Yield the factories of the transports that the settings request."""
     names = [name for name in TRANSPORTS if getattr(settings, name, True) is not None]
     for _, make in TRANSPORTS.working(names):
         yield make

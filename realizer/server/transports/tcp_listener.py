@@ -16,17 +16,17 @@ log = logging.getLogger(__name__)
 LONGEST_NAME = 64  # characters of a session's name
 
 
-def session_name(door: str, host: str) -> str:
-    """The name of the session that the clients of an address share."""
-    return (f"{door}-" + re.sub(r"[^A-Za-z0-9._~-]", "-", host))[:LONGEST_NAME]
+def session_name(transport: str, host: str) -> str:
+    """Return the name of the session that the clients of an address share."""
+    return (f"{transport}-" + re.sub(r"[^A-Za-z0-9._~-]", "-", host))[:LONGEST_NAME]
 
 
 class TcpTransport(ABC):
-    """The base of transports that listen on a TCP port; `port` is the one that is open after `start`.
+    """The base of transports that listen on a TCP port; `port` is the open one after `start`.
 
     Args:
         name: of the transport, for the log.
-        most: connections that may be open from one address.
+        most: number of connections that one address may open.
     """
 
     def __init__(self, name: str, host: str, port: int, most: int) -> None:
@@ -34,40 +34,33 @@ class TcpTransport(ABC):
         self._name = name
         self._host = host
         self._most = most
-        self._from: Counter[str] = Counter()  # address -> connections that are open
+        self._from: Counter[str] = Counter()  # address -> number of open connections
         self._server: asyncio.Server | None = None
         self._clients: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
 
     def __len__(self) -> int:
-        """How many clients are connected."""
+        """Return the number of connected clients."""
         return len(self._clients)
 
     @property
-    def where(self) -> str:
+    def address(self) -> str:
         """HOST:PORT."""
         host = f"[{self._host}]" if ":" in self._host else self._host
         return f"{host}:{self.port}"
 
     async def start(self) -> None:
-        """Open.
-
-        Raises:
-            OSError: the address cannot be had.
-        """
         self._server = await asyncio.start_server(self._serve, self._host, self.port)
         self.port = self._server.sockets[0].getsockname()[1]
 
     async def ready(self) -> None:
-        """Return at once: clients can come in after `start`."""
         return
 
     def stop_accepting(self) -> None:
-        """Take no new clients."""
         if self._server is not None:
             self._server.close()
 
     async def close(self) -> None:
-        """Let everybody go."""
+        """Stop listening and abort all open connections."""
         self.stop_accepting()
         for writer in self._clients.values():
             writer.transport.abort()
@@ -76,14 +69,13 @@ class TcpTransport(ABC):
     @property
     @abstractmethod
     def startup_lines(self) -> tuple[str, ...]:
-        """What is printed when it is ready: where it is."""
+        """As of `Transport`."""
 
     @abstractmethod
-    async def _talk(self, host: str, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """Serve the client at an address to its end."""
+    async def _handle(self, host: str, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """Serve the client at an IP address until it leaves."""
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """One client, from its opening to its end."""
         task = asyncio.current_task()
         assert task is not None
         self._clients[task] = writer
@@ -93,15 +85,15 @@ class TcpTransport(ABC):
         try:
             if self._from[host] > self._most:
                 words = f"{self._most} connections from it are open: wanted fewer {raises('max_connections')}"
-                log.warning("%s: %s is not let in: %s", self._name, host, words)
-            elif peer is not None:  # otherwise it has gone again
-                # Nobody says good-bye, least of all a machine that loses its power.
+                log.warning("%s: %s is refused: %s", self._name, host, words)
+            elif peer is not None:  # None: it has already left
+                # The protocols have no heartbeat, and a host that loses power closes nothing.
                 writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-                await self._talk(host, reader, writer)
+                await self._handle(host, reader, writer)
         except OSError:
-            pass  # it is gone
+            pass  # the client has gone
         except Exception:
-            log.exception("%s: %s is let go of: its connection failed", self._name, host)
+            log.exception("%s: %s is disconnected: its connection failed", self._name, host)
         finally:
             writer.transport.abort()
             self._from[host] -= 1

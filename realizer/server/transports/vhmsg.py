@@ -1,10 +1,10 @@
-"""The VHMSG format: vrSpeak to documents, feedback to vrAgentBML."""
+"""The VHMSG message format: documents in vrSpeak, feedback as vrAgentBML."""
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Container
 from dataclasses import dataclass, field
 from urllib.parse import quote, unquote_plus
 from xml.sax.saxutils import quoteattr, unescape
@@ -14,14 +14,21 @@ from realizer.core.settings import raises
 from realizer.server.transports.document_framing import DocumentFramer
 from realizer.server.transports.message_format import Action, Disconnect, Inbound, Message
 
-# What we are called where components of a VHMSG system say who they are.
+# The names by which components of a VHMSG system know the realizer.
 COMPONENT = "renderer"
 NAME = "bml-realizer"
 
 
 @dataclass(eq=False)
 class _Speak:
-    """A vrSpeak that is not over: whom it is for, and what has become of its blocks."""
+    """A vrSpeak that has not ended.
+
+    Attributes:
+        blocks: ids of its blocks that have not ended.
+        planned: ids of its blocks that were accepted.
+        plays: whether any of its behaviours plays.
+        dropped: why the first dropped behaviour was dropped.
+    """
 
     agent: str
     recipient: str
@@ -31,18 +38,18 @@ class _Speak:
     started: bool = False
     interrupted: bool = False
     error: str = ""
-    plays: bool = False  # a behaviour of it
-    dropped: str = ""  # why the first behaviour that went did
+    plays: bool = False
+    dropped: str = ""
 
-    def says(self, verb: str, rest: str = "") -> str:
+    def message(self, verb: str, rest: str = "") -> str:
         return f"{verb} {self.agent} {self.recipient} {self.id} {rest}".rstrip()
 
 
 class Vhmsg:
-    """VHMSG, what SmartBody and the Virtual Human Toolkit talk: vrSpeak in, vrAgentBML and vrSpoke out.
+    """The format of SmartBody and the Virtual Human Toolkit: vrSpeak in, vrAgentBML and vrSpoke out.
 
-    A vrSpeak's documents become blocks of the agent it names; one without an id gets the message's. All
-    components share one topic, so most of what comes in is not for us, and we hear ourselves.
+    The documents of a vrSpeak become blocks of the agent it names; one without an id gets the message's id.
+    All components share one topic, so most messages are for others, and some are our own.
     """
 
     def __init__(self, topic: str, limit: int) -> None:
@@ -55,7 +62,7 @@ class Vhmsg:
 
     def incoming(self, body: bytes) -> list[Action]:
         text = body.decode("utf-8", "replace")
-        # Clients encode the whole; one that does not cannot avoid a blank.
+        # Encoded messages contain no blank; some clients do not encode.
         words = (text if " " in text else unquote_plus(text)).split(maxsplit=4)
         match words:
             case ["vrSpeak", agent, recipient, id, xml]:
@@ -71,28 +78,25 @@ class Vhmsg:
         return []
 
     def _speak(self, agent: str, recipient: str, id: str, xml: str) -> list[Action]:
-        # The XML is an <act> with a <bml> in it, or a <bml> alone: what is around it is for others.
-        found = DocumentFramer(self._limit).feed(xml.encode("utf-8", "replace") + b"\n")
-        documents = [text for text in found if isinstance(text, str)]
+        # The XML is an <act> that contains a <bml>, or only a <bml>.
+        items = DocumentFramer(self._limit).feed(xml.encode("utf-8", "replace") + b"\n")
+        documents = [item for item in items if isinstance(item, str)]
         speak = _Speak(agent, recipient, id, set())
         if not documents:
             faults = [
-                f"{fault.text} {raises('max_document')}" if fault.large else fault.text
-                for fault in found
-                if not isinstance(fault, str) and "<bml" not in fault.text
+                f"{item.text} {raises('max_document')}" if item.large else item.text
+                for item in items
+                if not isinstance(item, str) and "<bml" not in item.text
             ]
             speak.error = faults[0] if faults else "wanted a whole <bml> document"
             return list(self._finish(speak))
         actions: list[Action] = []
         for document in documents:
-            block, text = _named(document, self._free, id, agent)
+            block, text = _named(document, self._speaks, id, agent)
             speak.blocks.add(block)
             self._speaks[block] = speak
             actions.append(Inbound(text))
         return actions
-
-    def _free(self, id: str) -> bool:
-        return id not in self._speaks
 
     def _stop(self, agent: str, id: str) -> list[Action]:
         blocks = [b for b, speak in self._speaks.items() if (speak.agent, speak.id) == (agent, id)]
@@ -112,7 +116,7 @@ class Vhmsg:
                     return self._ended(speak, block)
                 if not speak.started:
                     speak.started = True
-                    return [self._message(speak.says("vrAgentBML", "start"))]
+                    return [self._message(speak.message("vrAgentBML", "start"))]
             case WarningFeedback(id=id, text=text) if id in self._speaks:
                 # A warning on the block itself refuses it, unless its prediction is already out.
                 speak = self._speaks[id]
@@ -120,10 +124,10 @@ class Vhmsg:
                     speak.error = text
                     return self._ended(speak, id)
             case PredictionFeedback(blocks=blocks, behaviours=behaviours):
-                for told in blocks:
-                    if told.global_end is not None and told.id in self._speaks:
-                        self._speaks[told.id].planned.add(told.id)
-                        self._speaks[told.id].plays |= bool(behaviours)
+                for b in blocks:
+                    if b.global_end is not None and (known := self._speaks.get(b.id)) is not None:
+                        known.planned.add(b.id)
+                        known.plays |= bool(behaviours)
             case WarningFeedback(id=id, text=text) if speak := self._speaks.get(id.partition(":")[0]):
                 speak.dropped = speak.dropped or text
         return []
@@ -134,26 +138,22 @@ class Vhmsg:
         return [] if speak.blocks else self._finish(speak)
 
     def _finish(self, speak: _Speak) -> list[Message]:
-        """Its last block has ended, or it never had one. Where nothing of it played, that is an error."""
+        """Return the messages at the end of a vrSpeak; an error if nothing of it has played."""
         if not speak.plays and not speak.interrupted:
             speak.error = speak.error or speak.dropped
         if speak.error:
-            said = " ".join(speak.error.split())
-            return [
-                self._message(speak.says("vrAgentBML", f"end error {said}")),
-                self._message(speak.says("vrSpeakFailed", said)),
-            ]
-        if speak.interrupted:
-            return [self._message(speak.says("vrAgentBML", "end interrupted"))]
-        return [
-            self._message(speak.says("vrAgentBML", "end complete")),
-            self._message(speak.says("vrSpoke")),
-        ]
+            error = " ".join(speak.error.split())
+            ends = [("vrAgentBML", f"end error {error}"), ("vrSpeakFailed", error)]
+        elif speak.interrupted:
+            ends = [("vrAgentBML", "end interrupted")]
+        else:
+            ends = [("vrAgentBML", "end complete"), ("vrSpoke", "")]
+        return [self._message(speak.message(verb, rest)) for verb, rest in ends]
 
     def farewell(self) -> list[Message]:
         speaks = dict.fromkeys(self._speaks.values())
         self._speaks.clear()
-        return [self._message(speak.says("vrAgentBML", "end interrupted")) for speak in speaks]
+        return [self._message(speak.message("vrAgentBML", "end interrupted")) for speak in speaks]
 
     def _message(self, text: str) -> Message:
         scope = self.topic.rpartition("/")[2]
@@ -167,26 +167,25 @@ _CHARACTER = re.compile(r"\scharacterId\s*=")
 _NAME = re.compile(r"[^\w.-]")
 
 
-def _named(document: str, free: Callable[[str], bool], id: str, agent: str) -> tuple[str, str]:
-    """The block id of a document, and the document with that id and a character.
+def _named(document: str, used: Container[str], id: str, agent: str) -> tuple[str, str]:
+    """Return the block id of a document, and the document with that id and a character.
 
-    Its own id where it has one that is free; otherwise the message's, as a block id may be written.
+    The id is the document's own if it has one that is not used, or else derived from the message's.
     """
-    found = _START.match(document)
-    assert found is not None  # the assembler found it by the same mark
-    tag, rest = found[0], document[found.end() :]
+    start = _START.match(document)
+    assert start is not None  # the framer found it by the same mark
+    tag, rest = start[0], document[start.end() :]
     slash = "/" if tag.endswith("/") else ""
     tag = tag.removesuffix("/").rstrip()
-    named = _ID.search(tag)
-    own = unescape((named[1] or named[2] or "") if named else "").strip()
-    block = own
-    if not own or not free(own):
+    attribute = _ID.search(tag)
+    block = unescape((attribute[1] or attribute[2] or "") if attribute else "").strip()
+    if not block or block in used:
         base = _NAME.sub("_", id)
         block, n = base, 1
-        while not free(block):
+        while block in used:
             n += 1
             block = f"{base}-{n}"
-        tag = f'{tag[: named.start()] + tag[named.end() :] if named else tag} id="{block}"'
+        tag = f'{tag[: attribute.start()] + tag[attribute.end() :] if attribute else tag} id="{block}"'
     if not _CHARACTER.search(tag):
         tag += f" characterId={quoteattr(agent)}"
     return block, tag + slash + rest

@@ -1,4 +1,4 @@
-"""One WebSocket connection: admission, session, messages."""
+"""WebSocket connections: admission, session, messages."""
 
 from __future__ import annotations
 
@@ -22,33 +22,28 @@ from realizer.server.http import access
 from realizer.server.http.access import AccessControl, RateLimiter
 from realizer.server.http.jwt_tokens import Grant
 from realizer.server.journal import JournalError
+from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError
-from realizer.server.transports.transport import Sessions
 from realizer.server.transports.websocket.request import address_of, headers_of, session_of, visitor_of
 
 log = logging.getLogger(__name__)
 
-# A client that has not answered the close by then is gone.
-GOODBYE = 2.0  # s
-REASON = 123  # bytes that a close frame has room for behind its code
+GOODBYE = 2.0  # s; a client that has not answered a close frame by then is gone
+REASON = 123  # bytes of a reason in a close frame
 
 
 class WebSocketConnections:
-    """Lets clients into sessions as `guard` says, and reads them as fast as `settings` say."""
+    """The handler of the service's WebSocket connections."""
 
-    def __init__(self, sessions: Sessions, settings: Settings, access: AccessControl) -> None:
+    def __init__(self, sessions: SessionHost, settings: Settings, access: AccessControl) -> None:
         self._sessions = sessions
         self._settings = settings
         self._access = access
         self._checking = asyncio.Lock()
-        self._from: Counter[str] = Counter()  # address -> WebSockets that are open
+        self._from: Counter[str] = Counter()  # address -> number of open WebSockets
 
     def check_room(self, socket: ServerConnection) -> None:
-        """Whether one more may come from its address: nobody can take the room of all others.
-
-        Raises:
-            HubError: there are too many.
-        """
+        """Raise JoinError if too many connections of the client's address are open."""
         most = self._settings.max_connections
         if self._from[address_of(socket)] >= most:
             words = (
@@ -58,11 +53,11 @@ class WebSocketConnections:
             raise JoinError(http.HTTPStatus.TOO_MANY_REQUESTS, words)
 
     async def handle(self, socket: ServerConnection) -> None:
-        """One WebSocket, from its opening to its end."""
+        """Serve one WebSocket until it closes."""
         assert socket.request is not None
         address = address_of(socket)
         try:
-            self.check_room(socket)  # again: many may have been let in at the same moment
+            self.check_room(socket)  # again: others may have connected since the HTTP request
         except JoinError as error:
             await WebSocketWriter(socket).close(1013, str(error))
             return
@@ -71,23 +66,22 @@ class WebSocketConnections:
             if urlsplit(socket.request.path).path == "/check":
                 await self._check(socket)
             else:
-                await self._visit(socket, socket.request)
+                await self._serve(socket, socket.request)
         finally:
             self._from[address] -= 1
             if not self._from[address]:
                 del self._from[address]
 
-    async def _visit(self, socket: ServerConnection, request: Request) -> None:
-        """One visit, to its end; who may not come in is told why."""
+    async def _serve(self, socket: ServerConnection, request: Request) -> None:
         client = WebSocketWriter(socket)
-        greeting = None
+        hello = None
         try:
-            allowed = self._access.request(request.path, headers_of(request), later=True)
-            if allowed is None:
-                greeting, allowed = await self._first_message(socket)
-            visitor = visitor_of(socket, allowed)
+            grant = self._access.request(request.path, headers_of(request), later=True)
+            if grant is None:
+                hello, grant = await self._first_message(socket)
+            visitor = visitor_of(socket, grant)
             name, seen = session_of(request)
-            self._sessions.check(name, visitor)  # who greets is known only now
+            self._sessions.check(name, visitor)  # again: the grant of a hello is known only now
             await self._sessions.restore(name, seen)
             number = self._sessions.join(client, name, seen, visitor)
         except JoinError as error:
@@ -96,12 +90,12 @@ class WebSocketConnections:
         except JournalError as error:
             await client.close(1013, str(error))
             return
-        told = {"connection": number, "session": name, "address": address_of(socket)}
-        log.info("joined", extra=told)
+        fields = {"connection": number, "session": name, "address": address_of(socket)}
+        log.info("joined", extra=fields)
         try:
-            if greeting is not None:
-                self._sessions.receive(number, greeting)
-            async with asyncio.timeout(allowed.seconds_left):
+            if hello is not None:
+                self._sessions.receive(number, hello)
+            async with asyncio.timeout(grant.seconds_left):
                 await self._read(socket, number, client)
         except ConnectionClosed:
             pass
@@ -109,26 +103,26 @@ class WebSocketConnections:
             await client.close(1008, "token: it has expired")
         finally:
             self._sessions.leave(number)
-            log.info("left", extra={**told, "code": socket.close_code})
+            log.info("left", extra={**fields, "code": socket.close_code})
 
     async def _read(self, socket: ServerConnection, number: int, client: WebSocketWriter) -> None:
-        """Hand messages on, no faster than a client may send them: the rest waits in its own buffers."""
+        """Pass on messages, no faster than the rate limit: the others wait in the client's buffers."""
         loop = asyncio.get_running_loop()
-        pace = RateLimiter(self._settings.max_rate)
+        limiter = RateLimiter(self._settings.max_rate)
         async for message in socket:
             if not self._sessions.receive(number, message):
                 return
-            # 0 too: messages that are there already must not hold up everybody else.
-            pause = pace.wait(loop.time())
-            if pace.notice is not None:
-                client.send(ErrorMessage(code="rate", message=pace.notice).text())
+            pause = limiter.wait(loop.time())
+            if limiter.notice is not None:
+                client.send(ErrorMessage(code="rate", message=limiter.notice).text())
+            # Also if it is 0: messages that are buffered already must not delay others.
             await asyncio.sleep(pause)
 
     async def _first_message(self, socket: ServerConnection) -> tuple[str | bytes, Grant]:
-        """The first message of a client that has not brought a token yet, and what its token lets it do.
+        """Return the first message of a client without a token, and the grant of the token in it.
 
         Raises:
-            HubError: 401, it has said nothing, or something else.
+            JoinError: 401, no message came in time, or it has no valid token.
         """
         message: str | bytes = ""
         with contextlib.suppress(ConnectionClosed, TimeoutError):
@@ -137,19 +131,19 @@ class WebSocketConnections:
         return message, self._access.check_hello(message)
 
     async def _reject(self, socket: ServerConnection, client: WebSocketWriter, error: JoinError) -> None:
-        """Say why one who is here already may not stay."""
+        """Send the error and close."""
         self._sessions.metrics.counts["refused"] += 1
         log.info("refused: %s", error, extra={"address": address_of(socket), "status": error.status})
-        unknown = error.status in (http.HTTPStatus.UNAUTHORIZED, http.HTTPStatus.FORBIDDEN)
-        if unknown:
+        forbidden = error.status in (http.HTTPStatus.UNAUTHORIZED, http.HTTPStatus.FORBIDDEN)
+        if forbidden:
             where = "hello.token" if error.status == http.HTTPStatus.UNAUTHORIZED else "hello.session"
-            told = ErrorMessage(code="token", message=str(error), where=where)
+            message = ErrorMessage(code="token", message=str(error), where=where)
             with contextlib.suppress(ConnectionClosed):
-                await socket.send(told.text())
-        await client.close(1008 if unknown else 1013, str(error))
+                await socket.send(message.text())
+        await client.close(1008 if forbidden else 1013, str(error))
 
     async def _check(self, socket: ServerConnection) -> None:
-        """An editor's own WebSocket: a text in, its faults out, one after the other."""
+        """Serve the WebSocket of an editor: send the faults of each text that arrives."""
         from realizer.server.http.page_tools import lint
 
         loop = asyncio.get_running_loop()
@@ -158,14 +152,14 @@ class WebSocketConnections:
                 if isinstance(text, bytes):
                     await socket.close(1003, "wanted text")
                     return
-                # One text at a time, whoever asks: those that play come first.
+                # One text at a time for all editors: sessions come first.
                 async with self._checking:
-                    told = await loop.run_in_executor(None, lint, text, self._settings)
-                await socket.send(told)
+                    faults = await loop.run_in_executor(None, lint, text, self._settings)
+                await socket.send(faults)
 
 
 class WebSocketWriter:
-    """The way out to one WebSocket: what is sent is written at once, or waits in the socket's own buffer."""
+    """The way out to one WebSocket, an `Outbound`: data goes directly to the socket's own buffer."""
 
     def __init__(self, socket: ServerConnection) -> None:
         self._socket = socket
@@ -177,7 +171,7 @@ class WebSocketWriter:
         return 0 if transport is None else transport.get_write_buffer_size()
 
     def send(self, data: str | bytes) -> None:
-        # Without a task that wakes for every frame; a socket that closes is left out.
+        # Past the library's `send`, which needs a task for each message.
         if self._end is None and self._socket.protocol.state is State.OPEN:
             text = isinstance(data, str)
             payload = data.encode() if isinstance(data, str) else data
@@ -188,10 +182,10 @@ class WebSocketWriter:
             self._end = asyncio.get_running_loop().create_task(self.close(code, reason))
 
     async def close(self, code: int, reason: str) -> None:
-        """Let it go, and wait until it is gone; one that does not read will never hear of it.
+        """Close the WebSocket and wait until it is closed. A client that does not read is disconnected.
 
         Args:
-            reason: as much of it is told as there is room for.
+            reason: is cut to what a close frame has room for.
         """
         reason = reason.encode()[:REASON].decode(errors="ignore")
         try:
@@ -203,6 +197,6 @@ class WebSocketWriter:
 
 @lru_cache(maxsize=1024)
 def _head(text: bool, length: int) -> bytes:
-    """What goes before a message of so many bytes."""
-    whole = Frame(Opcode.TEXT if text else Opcode.BINARY, bytes(length)).serialize(mask=False)
-    return whole[: len(whole) - length]
+    """Return the head of a frame of so many bytes."""
+    frame = Frame(Opcode.TEXT if text else Opcode.BINARY, bytes(length)).serialize(mask=False)
+    return frame[: len(frame) - length]

@@ -15,34 +15,34 @@ from realizer.server.runtime.session_registry import JoinError, Visitor
 
 
 def address_of(socket: ServerConnection) -> str:
-    """Without the port; "" where the socket has none, or has none any more."""
+    """Return the IP address of a client; "" if the socket has none, or is closed."""
     try:
         remote = socket.remote_address
-    except (AttributeError, OSError):  # uvloop asks the socket, which is gone where its client has reset it
+    except (AttributeError, OSError):  # uvloop asks the socket, which may be closed
         return ""
     return str(remote[0]) if isinstance(remote, tuple) else ""
 
 
 def headers_of(request: Request) -> dict[str, str]:
-    """By their names in small letters; of several of one name the last."""
+    """Return the headers by lower-case names; of several with one name the last."""
     return {name.lower(): value for name, value in request.headers.raw_items()}
 
 
 def visitor_of(socket: ServerConnection, allowed: Grant | None) -> Visitor:
-    """Who comes; as far as is known where no token has come yet."""
+    """Return the visitor; without a grant its sessions are not known yet."""
     return Visitor(address_of(socket), None if allowed is None else allowed.sessions)
 
 
 def query_of(request: Request) -> dict[str, str]:
-    """Names to values; of several of one name the last."""
+    """Return the query of a request; of several values with one name the last."""
     return dict(parse_qsl(urlsplit(request.path).query, keep_blank_values=True))
 
 
 def session_of(request: Request) -> tuple[str | None, int | None]:
-    """`?session=ID&seen=N`.
+    """Return the session and the number in `?session=ID&seen=N`.
 
     Raises:
-        HubError: 400, `seen` is no number.
+        JoinError: 400, `seen` is not a number.
     """
     query = query_of(request)
     session, seen = query.get("session") or None, query.get("seen")
@@ -54,12 +54,13 @@ def session_of(request: Request) -> tuple[str | None, int | None]:
 
 
 def response_to(answer: HttpResponse) -> Response:
+    """Convert a response for the websockets library."""
     headers = Headers(
         {
             "Content-Type": answer.media_type,
             "Content-Length": str(len(answer.body)),
             "X-Content-Type-Options": "nosniff",
-            # Other pages may import realizer.js and draw our faces, as they may open the WebSocket.
+            # Pages of other origins may import realizer.js and load faces.
             "Access-Control-Allow-Origin": "*",
             "Connection": "close",
             **dict(answer.headers),

@@ -38,24 +38,22 @@ from realizer.server.transports.websocket.request import (
 
 log = logging.getLogger(__name__)
 
-# How often a client is asked whether it is there, and how long it has for the answer.
 PATIENCE: Mapping[str, Any] = {"ping_interval": 20, "ping_timeout": 60}  # s
-# How long one that connects has to say what it wants.
-OPENING = 10.0  # s
+OPENING = 10.0  # s; time for the HTTP request
 
 
 class WebSocketTransport:
-    """Serves `settings.host`; `port` is the one that is open after `start`.
+    """The WebSocket and HTTP server at `settings.host`; `port` is the open one after `start`.
 
     Args:
-        worker: the number of this one among several; then it serves what it is told to `serve_socket`.
+        worker: number of this process among several: then connections come by `serve_socket` only.
     """
 
     def __init__(self, sessions: SessionHost, settings: Settings, *, worker: int | None = None) -> None:
         self.port = settings.port
         self._listens = worker is None
         self._worker = worker or 0
-        self._taking: set[asyncio.Task[Any]] = set()
+        self._tasks: set[asyncio.Task[Any]] = set()
         self._sessions = sessions
         self._settings = settings
         self._access = AccessControl(settings)
@@ -67,12 +65,12 @@ class WebSocketTransport:
 
     @property
     def url(self) -> str:
-        """Where BML goes."""
+        """The address of the WebSocket."""
         return _addresses(self._settings, self.port)[0]
 
     @property
     def page(self) -> str:
-        """The page's address."""
+        """The address of the page."""
         return _addresses(self._settings, self.port)[1]
 
     @property
@@ -80,24 +78,20 @@ class WebSocketTransport:
         return startup_lines(self._settings, self.port) if self._listens else ()
 
     async def start(self) -> None:
-        where: dict[str, Any] = {
-            "host": self._settings.host,
-            "port": self.port,
-            "ssl": self._access.tls(),
-        }
-        if not self._listens:
-            where = {"unix": True, "sock": _unreachable_socket()}
-        where["create_connection"] = self._open
+        options: dict[str, Any] = {"create_connection": self._open, **PATIENCE}
+        if self._listens:
+            options |= {"host": self._settings.host, "port": self.port, "ssl": self._access.tls()}
+        else:
+            options |= {"unix": True, "sock": _unreachable_socket()}
         self._socket = await listen(
             self._connections.handle,
             process_request=self._http,
-            compression=None,  # frames are dense and late is worse than large
+            compression=None,  # frames are dense, and a late one is worse than a large one
             max_size=self._settings.max_message,
             open_timeout=OPENING,
             close_timeout=GOODBYE,
             server_header=None,
-            **PATIENCE,
-            **where,
+            **options,
         )
         if self._listens:
             self.port = next(iter(self._socket.sockets)).getsockname()[1]
@@ -105,9 +99,9 @@ class WebSocketTransport:
     def serve_socket(self, client: socket.socket) -> None:
         """Serve a connection that another process has accepted."""
         loop = asyncio.get_running_loop()
-        taking = loop.create_task(loop.connect_accepted_socket(self._connection, client))
-        self._taking.add(taking)
-        taking.add_done_callback(self._taking.discard)
+        task = loop.create_task(loop.connect_accepted_socket(self._connection, client))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
 
     def _connection(self) -> ServerConnection:
         assert self._socket is not None
@@ -129,27 +123,27 @@ class WebSocketTransport:
     async def close(self) -> None:
         if self._socket is not None:
             self._socket.close(close_connections=False)
-            for one in list(self._opened):
-                # It may never say what it wants. Before TLS is agreed on it has no transport and goes alone.
-                if one.state is State.CONNECTING and hasattr(one, "transport"):
-                    one.transport.abort()
+            for connection in list(self._opened):
+                # Its request may never come. Without a transport, before the TLS handshake, it times out.
+                if connection.state is State.CONNECTING and hasattr(connection, "transport"):
+                    connection.transport.abort()
             for socket in list(self._socket.connections):
-                # After a drain the door is closed already; its connections are closed one by one.
+                # The server was closed above or by `stop_accepting`, without its connections.
                 self._closing.add(asyncio.create_task(socket.close(1001, "the service ends")))
             await self._socket.wait_closed()
 
     async def _http(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Everything but a WebSocket at /ws is answered here."""
+        """Answer requests that are not for a WebSocket, and refuse WebSockets that may not be opened."""
         path = urlsplit(request.path).path
         upgrade = request.headers.get("Upgrade", "").lower() == "websocket"
         if path in ("/ws", "/check") and upgrade:
             try:
-                allowed = self._access.request(request.path, headers_of(request), later=path == "/ws")
+                grant = self._access.request(request.path, headers_of(request), later=path == "/ws")
                 self._connections.check_room(connection)
                 if path == "/check":
                     self._access.check_memory()
                 else:
-                    self._sessions.check(session_of(request)[0], visitor_of(connection, allowed))
+                    self._sessions.check(session_of(request)[0], visitor_of(connection, grant))
             except JoinError as error:
                 return self._refused(connection, error)
             return None
@@ -161,8 +155,8 @@ class WebSocketTransport:
             return response_to(HttpResponse(404, TEXT, f"{wrong}\n".encode()))
         if path == "/metrics":
             try:
-                allowed = self._access.request(request.path, headers_of(request))
-                if allowed is None or allowed.sessions is not None:
+                grant = self._access.request(request.path, headers_of(request))
+                if grant is None or grant.sessions is not None:
                     raise JoinError(http.HTTPStatus.FORBIDDEN, "metrics: wanted a token for all sessions")
             except JoinError as error:
                 return self._refused(connection, error)
@@ -171,11 +165,11 @@ class WebSocketTransport:
         return response_to(await loop.run_in_executor(None, self._site.answer, request.path))
 
     def _wrong_worker(self, request: Request) -> str | None:
-        """Why the worker that a request names is not this one; None where it is, or none is named."""
-        named = query_of(request).get("worker")
-        if named in (None, str(self._worker)):
+        """Return the error if a request names another worker, or None."""
+        worker = query_of(request).get("worker")
+        if worker in (None, str(self._worker)):
             return None
-        return f"worker: wanted a number of 0..{self._settings.workers - 1}, got {named[:80]!r}"
+        return f"worker: wanted a number of 0..{self._settings.workers - 1}, got {worker[:80]!r}"
 
     def _refused(self, connection: ServerConnection, error: JoinError) -> Response:
         self._sessions.metrics.counts["refused"] += 1
@@ -185,26 +179,24 @@ class WebSocketTransport:
 
 
 def _unreachable_socket() -> socket.socket:
-    """A socket to listen on that nobody can reach: the package's server must listen to serve at all."""
-    here = socket.socket(socket.AF_UNIX)
-    # In a container memory may be the only place that can be written.
-    place = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
-    with tempfile.TemporaryDirectory(dir=place) as folder:
-        here.bind(f"{folder}/s")
-    here.setblocking(False)
-    return here
+    """Return a socket that no client can reach: the library's server must listen to serve at all."""
+    listener = socket.socket(socket.AF_UNIX)
+    # In a container nothing else may be writable.
+    parent = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
+    with tempfile.TemporaryDirectory(dir=parent) as folder:
+        listener.bind(f"{folder}/s")
+    listener.setblocking(False)
+    return listener
 
 
 def startup_lines(settings: Settings, port: int) -> tuple[str, ...]:
-    """What a service prints that is open at a port."""
+    """Return the lines that a service prints when its port is open."""
     service, page = _addresses(settings, port)
     return f"listening on {service}", f"page at {page}"
 
 
 def _addresses(settings: Settings, port: int) -> tuple[str, str]:
-    """Where BML goes, and the page's."""
-    host = settings.host
-    if host in ("", "0.0.0.0", "::"):
-        host = "127.0.0.1"
-    where, s = f"[{host}]:{port}" if ":" in host else f"{host}:{port}", "s" if settings.tls_cert else ""
-    return f"ws{s}://{where}/ws", f"http{s}://{where}/"
+    """Return the addresses of the WebSocket and of the page."""
+    host = "127.0.0.1" if settings.host in ("", "0.0.0.0", "::") else settings.host
+    place, s = f"[{host}]:{port}" if ":" in host else f"{host}:{port}", "s" if settings.tls_cert else ""
+    return f"ws{s}://{place}/ws", f"http{s}://{place}/"

@@ -19,12 +19,12 @@ from realizer.core.settings import Settings, raises
 from realizer.server.documents.document_queue import size_error
 from realizer.server.transports.xface.wire import Task
 
-ROOM = 2**10  # bytes of a document that are not its keys
+ROOM = 2**10  # bytes of a document beside its keyframes
 
 
 @dataclass(frozen=True, slots=True)
 class Script:
-    """Documents, and the ids of their blocks."""
+    """BML documents with the ids of their blocks."""
 
     text: str
     blocks: tuple[str, ...]
@@ -34,17 +34,17 @@ Attachment = FAPClip | Script | RealizerError | None
 
 
 class MissingAttachment(RealizerError):
-    """A task without what it should bring."""
+    """A task lacks its attachment."""
 
 
 def prepare(task: Task, settings: Settings) -> FAPClip | Script | None:
-    """What a task brings, understood; this may take a second. None where it brings nothing.
+    """Parse the attachment of a task, which may take a second. Return None if the task needs none.
 
     Args:
-        settings: the folder that LOAD_FAP reads from, and how large a document may be.
+        settings: the folder that LOAD_FAP reads from, and the limit of documents.
 
     Raises:
-        RealizerError: it cannot be understood.
+        RealizerError: the attachment cannot be used.
     """
     match task.name, task.params:
         case "UPLOAD_FAP", (text, *_) if text.strip():

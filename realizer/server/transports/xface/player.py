@@ -1,4 +1,4 @@
-"""The connection to an Xface player, which shows the frames of a session."""
+"""The Xface player transport: a client of a player, which shows the frames of a session."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ import json
 import logging
 
 from realizer.core.settings import Settings
+from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError
-from realizer.server.transports.transport import Sessions
 from realizer.server.transports.xface.player_link import PlayerLink, State
 
 log = logging.getLogger(__name__)
 
 FIRST_RETRY = 0.2  # s
 LAST_RETRY = 10.0  # s
-ATTEMPT = 5.0  # s; to connect, and to be greeted
+ATTEMPT = 5.0  # s; to connect, and for the greeting
 READ = 4096  # bytes
 STUCK = 2**18  # bytes that the player has not read: hundreds of frames
-# The first character's frames, at the service's own rate; nothing of what happens.
+# The frames of the first character, at the rate of the service, and no feedback.
 WANTS = (
     '{"type":"unsubscribe","stream":"feedback"}',
     '{"type":"subscribe","stream":"fap","encoding":"json"}',
@@ -27,12 +27,12 @@ WANTS = (
 
 
 class XfacePlayerTransport:
-    """A client of the player at `settings.xface_player` that comes back whenever the player does.
+    """A client of the player at `settings.xface_player`, which reconnects whenever the connection is lost.
 
-    What it shows is the first face of the session `settings.xface_player_session`, which is made for it.
+    The player shows the first character of the session `settings.xface_player_session`.
     """
 
-    def __init__(self, sessions: Sessions, settings: Settings) -> None:
+    def __init__(self, sessions: SessionHost, settings: Settings) -> None:
         assert settings.xface_player is not None
         host, _, port = settings.xface_player.rpartition(":")
         self._address = (host.strip("[]"), int(port))
@@ -57,7 +57,7 @@ class XfacePlayerTransport:
         await self._up.wait()
 
     def stop_accepting(self) -> None:
-        """What plays is shown to its end."""
+        """Go on: what plays is shown to its end."""
 
     async def close(self) -> None:
         if self._keeper is not None:
@@ -69,11 +69,10 @@ class XfacePlayerTransport:
 
     @property
     def unsent_bytes(self) -> int:
-        """Nothing: of the frames that come, only the newest is kept."""
+        """0: of the frames that arrive, only the last is kept."""
         return 0
 
     def send(self, data: str | bytes) -> None:
-        """A frame, or something that a player cannot show."""
         if isinstance(data, str) and data.startswith("{"):
             message = json.loads(data)
             if message["type"] == "fap":
@@ -83,39 +82,40 @@ class XfacePlayerTransport:
     def disconnect(self, code: int, reason: str) -> None:
         log.warning("xface player: session %s ends: %s", self._settings.xface_player_session, reason)
         if self._writer is not None:
-            self._writer.transport.abort()  # and soon there is another one
+            self._writer.transport.abort()  # `_keep_connected` opens another one
 
     # the player's side ---------------------------------------------------------------------------
 
     async def _keep_connected(self) -> None:
-        """Be connected, until cancelled."""
+        """Connect, and reconnect whenever the connection is lost, until cancelled."""
         name = self._settings.xface_player
-        pause, told = FIRST_RETRY, False
+        pause, logged = FIRST_RETRY, False
         while True:
             try:
                 reader = await self._connect()
-                log.log(logging.WARNING if told else logging.INFO, "xface player: %s shows us", name)
-                pause, told = FIRST_RETRY, False
+                level = logging.WARNING if logged else logging.INFO
+                log.log(level, "xface player: connected to %s", name)
+                pause, logged = FIRST_RETRY, False
                 await self._show(reader)
                 words = f"the player at {name} is gone"
             except JoinError as error:
                 words = str(error)
-            except OSError as error:  # a timeout is one too
+            except OSError as error:  # also TimeoutError
                 words = f"no player at {name} ({error.strerror or str(error) or 'nobody answers'})"
             finally:
                 self._part()
-            if not told:
+            if not logged:
                 log.warning("xface player: %s; looking for it", words)
-                told = True
+                logged = True
             await asyncio.sleep(pause)
             pause = min(2 * pause, LAST_RETRY)
 
     async def _connect(self) -> asyncio.StreamReader:
-        """A connection to a player that has said its greeting."""
+        """Connect to the player and wait for its greeting."""
         async with asyncio.timeout(ATTEMPT):
             reader, self._writer = await asyncio.open_connection(*self._address)
             if self._writer.get_extra_info("sockname") == self._writer.get_extra_info("peername"):
-                raise OSError("nobody answers")  # TCP has met itself on the way
+                raise OSError("nobody answers")  # a TCP self-connect
             self._link.on_connect()
             while self._link.state is State.GREETING:
                 if not (data := await reader.read(READ)):
@@ -124,7 +124,7 @@ class XfacePlayerTransport:
         return reader
 
     async def _show(self, reader: asyncio.StreamReader) -> None:
-        """Frames of the session, until the player is gone."""
+        """Show the frames of the session until the connection is lost."""
         number = self._sessions.join(self, self._settings.xface_player_session)
         self._up.set()
         try:
@@ -137,7 +137,7 @@ class XfacePlayerTransport:
             self._sessions.leave(number)
 
     def _pump(self) -> None:
-        """Send what is due, and come back when something will be."""
+        """Send what is due, and schedule the next call."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
@@ -147,7 +147,7 @@ class XfacePlayerTransport:
         while (task := self._link.due(now)) is not None:
             self._writer.write(task)
         if self._writer.transport.get_write_buffer_size() > STUCK:
-            log.warning("xface player: %s reads nothing and is let go of", self._settings.xface_player)
+            log.warning("xface player: %s reads nothing and is disconnected", self._settings.xface_player)
             self._writer.transport.abort()
         if (at := self._link.next_deadline()) is not None:
             self._timer = self._loop.call_at(at, self._pump)

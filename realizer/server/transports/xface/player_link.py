@@ -15,37 +15,35 @@ from realizer.server.transports.xface.wire import Status, Task, pack_task, read_
 
 log = logging.getLogger(__name__)
 
-# s; a player that says nothing of a task for so long has lost it, and is sent the next one.
-PATIENCE = 2.0
-# Clients of the player number their tasks from here, times their own number.
+PATIENCE = 2.0  # s; after so long without a note the task is taken for lost
+# The tasks of client k have numbers from k times this one.
 NUMBERS = 1_000_000
 _ENDED = (Status.FINISHED, Status.ERROR)
 
 
 class State(Enum):
-    """Where the link is: a task goes out only in READY, and only one at a time."""
+    """The state of the link: a task is sent only in READY or UPLOADED, one at a time."""
 
     CLOSED = "not connected"
-    GREETING = "connected, not greeted yet"
-    READY = "nothing on its way"
-    UPLOADING = "a frame is on its way"
-    UPLOADED = "a frame is there, and not shown"
-    STOPPING = "the stop that shows it is on its way"
+    GREETING = "connected, waiting for the greeting"
+    READY = "no task is pending"
+    UPLOADING = "a frame is being uploaded"
+    UPLOADED = "a frame is uploaded and not shown yet"
+    STOPPING = "the stop that shows it is pending"
 
 
 _WAITING = (State.UPLOADING, State.STOPPING)
 
 
 class PlayerLink:
-    """One player, which shows a frame only when it is told to stop (Paul 2010, 4.2.2).
+    """The protocol of one player, without sockets (Paul 2010, 4.2.2).
 
-    A frame is a FAP file of one, uploaded; then comes STOP_PLAYBACK. Each waits for the note that the one
-    before is done: the player takes two tasks in one read for one. Of frames that come meanwhile the last is
-    what counts.
+    A player shows a frame only at a STOP_PLAYBACK after the upload of a FAP file of one frame. Each task must
+    wait for the note that the one before is finished, because the player takes two tasks in one read for one.
+    Of the frames that arrive meanwhile only the last is shown.
 
     Args:
-        interval: least seconds from one upload to the next. Paul found that the player stops showing anything
-            at shorter ones than 0.25.
+        interval: least seconds between uploads. Paul found that the player shows nothing at less than 0.25.
     """
 
     def __init__(self, interval: float) -> None:
@@ -58,28 +56,28 @@ class PlayerLink:
         self._shown: tuple[int, ...] | None = None
         self._uploaded = float("-inf")
         self._sent = 0.0
-        self._told: set[str] = set()
+        self._logged: set[str] = set()
 
     def on_connect(self) -> None:
-        """A connection stands; the player speaks first."""
+        """Begin a connection; the player speaks first."""
         assert self.state is State.CLOSED, "connected already"
         self._data.clear()
         self._owner = self._count = 0
         self._shown = None  # it may be another player
         self._uploaded = float("-inf")
-        self._told.clear()
+        self._logged.clear()
         self._go(State.GREETING)
 
     def on_disconnect(self) -> None:
-        """The connection is gone."""
+        """End the connection."""
         self._go(State.CLOSED)
 
     def show(self, values: Sequence[int]) -> None:
-        """This frame, 68 whole numbers in each FAP's FAPU, in place of any that was not sent yet."""
+        """Set the frame to show, 68 integers in the FAPs' units, instead of one not sent yet."""
         self._wanted = tuple(values)
 
     def receive(self, data: bytes) -> None:
-        """What the player said."""
+        """Parse data from the player."""
         self._data += data
         for note in read_notes(self._data):
             if note.name == "CONNECTION_OK" and self.state is State.GREETING:
@@ -93,9 +91,9 @@ class PlayerLink:
                 self._log_once("it does not understand a task")
 
     def due(self, now: float) -> bytes | None:
-        """The task to send now, if there is one; it is to be sent whole, by itself."""
+        """Return the task to send now, by itself, or None."""
         if self.state in _WAITING and now >= self._sent + PATIENCE:
-            self._log_once("it says nothing of a task; going on")
+            self._log_once("no note about a task; going on")
             self._ended()
         if self.state is State.UPLOADED:
             self._go(State.STOPPING)
@@ -111,7 +109,7 @@ class PlayerLink:
         return self._task("UPLOAD_FAP", _file(self._wanted))
 
     def next_deadline(self) -> float | None:
-        """When `due` is to be asked again, where nothing else happens; None: not before then."""
+        """Return when to call `due` again if nothing else happens, or None."""
         if self.state in _WAITING:
             return self._sent + PATIENCE
         if self.state is State.READY and self._wanted not in (None, self._shown):
@@ -127,14 +125,14 @@ class PlayerLink:
         return pack_task(Task(name, self._owner, self._number, params))
 
     def _ended(self) -> None:
-        """The task on its way is done, or lost."""
+        """Handle the end of the pending task, or its loss."""
         self._go(State.UPLOADED if self.state is State.UPLOADING else State.READY)
 
-    def _log_once(self, what: str) -> None:
-        """Once for each connection: it may be so of every frame."""
-        if what not in self._told:
-            self._told.add(what)
-            log.warning("xface player: %s", what)
+    def _log_once(self, words: str) -> None:
+        """Log a warning once for each connection, as it may concern every frame."""
+        if words not in self._logged:
+            self._logged.add(words)
+            log.warning("xface player: %s", words)
 
     def _go(self, state: State) -> None:
         log.debug("xface player: %s", state.value)
@@ -142,6 +140,6 @@ class PlayerLink:
 
 
 def _file(values: tuple[int, ...]) -> str:
-    """A FAP file of one frame, with every FAP that is not 0: what the player is not given is neutral."""
+    """Return a FAP file of one frame with the FAPs that are not 0; the player sets the others to neutral."""
     row = np.array([values], np.float32)
     return encode(FAPClip.of(FAPFrames(np.zeros(1), row, row[0] != 0), 25.0, "realizer"))

@@ -12,7 +12,7 @@ UNREAD = Task("")
 
 @dataclass(frozen=True, slots=True)
 class Content:
-    """The bytes that follow a task that announces them."""
+    """The bytes that follow a task and that it announces."""
 
     task: Task
     data: bytes
@@ -20,10 +20,11 @@ class Content:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A stretch of the stream that is no task, and why.
+    """A span of the stream that is no task.
 
     Attributes:
-        task: as much as could be read of one that is too large, half, or has no name that can be one: "".
+        text: why.
+        task: the head of a task that is too large, incomplete, or has an invalid name (then ""); else UNREAD.
     """
 
     text: str
@@ -35,22 +36,22 @@ _START = re.compile(rb"""<task((?:[^<>"']|"[^"<]*"|'[^'<]*')*)>""")
 _END = re.compile(rb"</task\s*>|\0|<task(?=[\s/>])")
 _PASSED = re.compile(rb"(?:[\s\0]|\xef\xbb\xbf|<\?[^<>]{0,200}\?>)+")
 _BOUND = re.compile(rb"\0|<task(?=[\s/>])")
-# A name is looked at once, from its beginning, however long it is.
+# Possessive, so that a long name is examined only once.
 _VALUE = re.compile(r"""(?<![\w:.-])([\w:.-]++)\s*+=\s*(?:"([^"]*)"|'([^']*)')""")
 _PARAM = re.compile(r"<param\s*/>|<param\s*>|</param\s*>")
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]{0,63}")
 LONGEST_TAG = 4096  # bytes
-# The only task that is followed by bytes of a file, and how many there may be.
+# The only task that is followed by the bytes of a file.
 FOLLOWED = "UPLOAD_WAV"
-_SHOWN = 60  # bytes of a stray stretch that its fault shows
+_SHOWN = 60  # bytes of a stray span that its fault quotes
 
 
 class TaskReader:
-    """Finds the tasks of one stream.
+    """A parser of the tasks in one byte stream.
 
-    A task ends at `</task>` or `/>`, with NULs after it or without; how the stream was cut into reads changes
-    nothing. A stretch that holds anything else gives one Fault, and reading goes on after the next NUL or at
-    the next `<task`. No byte is looked at more than a few times.
+    A task ends at `</task>` or `/>`, with or without NULs after it. Any other span gives one Fault; then
+    reading resumes after the next NUL or at the next `<task`. The result does not depend on how the stream is
+    cut into reads, and each byte is examined a few times at most.
 
     Args:
         limit: most bytes of a task, and of the content after it.
@@ -59,13 +60,13 @@ class TaskReader:
     def __init__(self, limit: int) -> None:
         self._limit = limit
         self._data = bytearray()
-        self._looked = 0  # up to here there is no end of the open task
-        self._lost = False  # in a stretch that has been told of
-        self._content: Task | None = None
-        self._size = 0  # bytes of content to come
+        self._looked = 0  # the open task has no end before it
+        self._lost = False  # inside a span whose fault is reported
+        self._content: Task | None = None  # the task whose content follows
+        self._size = 0  # bytes of that content
 
     def feed(self, data: bytes) -> list[Task | Content | Fault]:
-        """What `data` completes, in order."""
+        """Return what `data` completes, in order."""
         self._data += data
         found: list[Task | Content | Fault] = []
         while self._step(found):
@@ -73,7 +74,7 @@ class TaskReader:
         return found
 
     def _step(self, found: list[Task | Content | Fault]) -> bool:
-        """Understand what is next; False where more data is needed."""
+        """Parse the next item. Return False if data is missing."""
         if self._content is not None:
             return self._take_content(found)
         if self._lost:
@@ -111,7 +112,7 @@ class TaskReader:
                 return self._give_up(f"wanted </task>, got {got}: half a task", found, start[1])
             if len(self._data) > self._limit:
                 return self._give_up(self._too_large, found, start[1])
-            self._looked = max(start.end(), len(self._data) - 80)  # an end may have come in half
+            self._looked = max(start.end(), len(self._data) - 80)  # part of an end may be there
             return False
         if end.end() > self._limit:
             return self._give_up(self._too_large, found, start[1])
@@ -149,14 +150,14 @@ class TaskReader:
         return f"wanted a task of at most {self._limit} bytes, got more"
 
     def _give_up(self, text: str, found: list[Task | Content | Fault], tag: bytes = b"") -> bool:
-        """Tell of a fault; `tag` is what stands behind `<task` in the one that it is in."""
+        """Report a fault; `tag` is the rest of the start tag of the task that has it."""
         found.append(Fault(text, _head(tag)))
         self._lost = True
-        self._drop(1)  # at least the mark that was misunderstood
+        self._drop(1)  # at least the mark where parsing failed
         return True
 
     def _skip(self) -> bool:
-        """To the end of what was told of."""
+        """Skip to the end of a span with a fault."""
         bound = _BOUND.search(self._data)
         if bound is None:
             self._drop(max(0, len(self._data) - 5))
@@ -175,20 +176,20 @@ def _values(tag: bytes) -> dict[str, str]:
 
 
 def _head(tag: bytes) -> Task:
-    """What a tag says of its task; its name is "" where it cannot be one."""
+    """Return a task without its params; its name is "" if it is invalid."""
     values = _values(tag)
     name = values.get("name", "")
-    known = name if _NAME.fullmatch(name) else ""
-    return Task(known, _number(values.get("ownerId")), _number(values.get("taskId")))
+    valid = name if _NAME.fullmatch(name) else ""
+    return Task(valid, _number(values.get("ownerId", "")), _number(values.get("taskId", "")))
 
 
-def _number(text: str | None) -> int:
-    """As clients count; what is no number is 0, as in the player there is."""
-    return int(text) if text is not None and text.isascii() and text.isdecimal() and len(text) < 10 else 0
+def _number(text: str) -> int:
+    """Return a number, or 0 if it is none, as Xface's own player does."""
+    return int(text) if text.isascii() and text.isdecimal() and len(text) < 10 else 0
 
 
 def _params(body: str) -> tuple[str, ...]:
-    """What stands in each <param>, as it is; a param may hold XML, also with params of its own."""
+    """Return the content of each <param>, unchanged; it may be XML, also with params of its own."""
     params: list[str] = []
     depth = begin = 0
     for mark in _PARAM.finditer(body):
@@ -208,7 +209,7 @@ def _params(body: str) -> tuple[str, ...]:
 
 
 def _plain(text: str) -> str:
-    """Without the CDATA around all of it."""
+    """Remove a CDATA section around the whole text."""
     inner = text.strip()
     if inner.startswith("<![CDATA[") and inner.endswith("]]>"):
         return inner[9:-3]

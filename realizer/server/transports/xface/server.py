@@ -9,10 +9,10 @@ from collections.abc import Iterable
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
 from realizer.server.http.access import RateLimiter
+from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError
 from realizer.server.transports.message_format import Disconnect, Inbound
 from realizer.server.transports.tcp_listener import TcpTransport, session_name
-from realizer.server.transports.transport import Sessions
 from realizer.server.transports.xface.attachments import Attachment, prepare
 from realizer.server.transports.xface.reader import Content, Fault, TaskReader
 from realizer.server.transports.xface.tasks import ERROR, Answer, TaskRunner
@@ -21,11 +21,11 @@ from realizer.server.transports.xface.wire import Task
 log = logging.getLogger(__name__)
 
 READ = 64 * 1024  # bytes
-# Of one task: minutes of FAP text, and more than plays as one document.
-LIMIT = 4 * 2**20  # bytes
-MAX_CLIENTS = 64  # a player is steered by one or two; each may hold a task that has not come to its end
-# What is understood at once; more of it goes to a thread, so that the frames of others are not late.
-SMALL = 16 * 1024  # characters
+# Bytes of a task: minutes of FAP text, and more than plays as one document.
+LIMIT = 4 * 2**20
+MAX_CLIENTS = 64  # usually one or two; each may hold a task in memory
+# Characters of an attachment that is parsed at once; larger ones are parsed in a thread, to delay no frames.
+SMALL = 16 * 1024
 FEEDBACK = (
     '{"type":"subscribe","stream":"feedback",'
     '"elements":["predictionFeedback","blockProgress","warningFeedback"]}'
@@ -33,13 +33,13 @@ FEEDBACK = (
 
 
 class XfaceTransport(TcpTransport):
-    """Listens on `settings.host` and `settings.xface_port`; `port` is the one that is open after `start`.
+    """The Xface transport at `settings.host` and `settings.xface_port`.
 
-    Each client has its own number, its own loaded file and its own queue, as several have in the player. The
-    clients of one address share a face: that of the session `xface-ADDRESS`, which viewers can join.
+    As in Xface's own player, each client has a number, a loaded file and a queue. The clients of an address
+    share the character of the session `xface-ADDRESS`, which viewers can join.
     """
 
-    def __init__(self, sessions: Sessions, settings: Settings) -> None:
+    def __init__(self, sessions: SessionHost, settings: Settings) -> None:
         assert settings.xface_port is not None
         super().__init__("xface", settings.host, settings.xface_port, settings.max_connections)
         self._settings = settings
@@ -48,50 +48,51 @@ class XfaceTransport(TcpTransport):
 
     @property
     def startup_lines(self) -> tuple[str, ...]:
-        return (f"xface: tasks at {self.where}, session xface-ADDRESS",)
+        return (f"xface: tasks at {self.address}, session xface-ADDRESS",)
 
-    async def _talk(self, host: str, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    async def _handle(self, host: str, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._count += 1
-        seat = _SessionLink(self._sessions, TaskRunner(self._count), writer)
+        link = _SessionLink(self._sessions, TaskRunner(self._count), writer)
         try:
             if len(self) > MAX_CLIENTS:
                 raise JoinError(503, f"{MAX_CLIENTS} clients are connected: wanted fewer")
-            number = self._sessions.join(seat, session_name("xface", host))
+            number = self._sessions.join(link, session_name("xface", host))
         except JoinError as error:
-            log.warning("xface: %s is not let in: %s", host, error)
+            log.warning("xface: %s is refused: %s", host, error)
             writer.write(ERROR)
             await writer.drain()
             writer.close()
             return
-        seat.attach(number)
+        link.attach(number)
         try:
-            await self._read(reader, writer, seat)
+            await self._read(reader, writer, link)
         finally:
             self._sessions.leave(number)
 
     async def _read(
-        self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, seat: _SessionLink
+        self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, link: _SessionLink
     ) -> None:
-        tasks = TaskReader(min(LIMIT, self._settings.max_message))
-        pace, loop = RateLimiter(self._settings.max_rate), asyncio.get_running_loop()
+        parser = TaskReader(min(LIMIT, self._settings.max_message))
+        limiter, loop = RateLimiter(self._settings.max_rate), asyncio.get_running_loop()
         while data := await reader.read(READ):
-            for found in tasks.feed(data):
-                match found:
+            for item in parser.feed(data):
+                match item:
                     case Fault(text, task):
-                        log.info("xface: client %d: %s", seat.tasks.owner, text)
-                        seat.do(seat.tasks.refuse(task))
+                        log.info("xface: client %d: %s", link.tasks.owner, text)
+                        link.do(link.tasks.refuse(task))
                     case Task():
-                        seat.do(seat.tasks.accept(found))
-                        brought = await self._prepared(found)
-                        seat.do(seat.tasks.run(found, brought, asyncio.get_running_loop().time()))
+                        link.do(link.tasks.accept(item))
+                        attachment = await self._prepared(item)
+                        link.do(link.tasks.run(item, attachment, loop.time()))
                     case Content():
-                        pass  # of a task that has been answered
-                if seat.has_left:
+                        pass  # of a task that was refused
+                if link.has_left:
                     return
-                # 0 too: a read full of tasks must not hold up the frames of others, nor pile up notes unread.
-                pause = pace.wait(loop.time())
-                if pace.notice is not None:
-                    log.warning("xface: client %d: %s", seat.tasks.owner, pace.notice)
+                pause = limiter.wait(loop.time())
+                if limiter.notice is not None:
+                    log.warning("xface: client %d: %s", link.tasks.owner, limiter.notice)
+                # Also if it is 0: one read may hold many tasks, which must not delay frames of others, nor
+                # fill the buffer of a client that reads no notes.
                 await asyncio.sleep(pause)
                 await writer.drain()
 
@@ -108,23 +109,23 @@ class XfaceTransport(TcpTransport):
 
 
 class _SessionLink:
-    """One client in its session."""
+    """The connection of one client to its session; an `Outbound`."""
 
-    def __init__(self, sessions: Sessions, desk: TaskRunner, writer: asyncio.StreamWriter) -> None:
-        self.tasks = desk
+    def __init__(self, sessions: SessionHost, tasks: TaskRunner, writer: asyncio.StreamWriter) -> None:
+        self.tasks = tasks
         self.has_left = False
         self._sessions = sessions
         self._writer = writer
         self._number = 0
 
     def attach(self, number: int) -> None:
-        """It has joined its session."""
+        """Subscribe to feedback, and greet the client."""
         self._number = number
         self._sessions.receive(number, FEEDBACK)
         self._writer.write(self.tasks.greeting)
 
     def do(self, answers: Iterable[Answer]) -> None:
-        """Carry out what the desk wants, in order."""
+        """Carry out the answers of the task runner, in order."""
         for answer in answers:
             match answer:
                 case Inbound(text):
@@ -141,9 +142,9 @@ class _SessionLink:
     def send(self, data: str | bytes) -> None:
         if isinstance(data, str):
             loop = asyncio.get_running_loop()
-            # What the desk wants of the session now would come back here before this has been told.
+            # Later, because a message to the session now would call `send` again before this one has ended.
             loop.call_soon(lambda: self.do(self.tasks.on_feedback(data, loop.time())))
 
     def disconnect(self, code: int, reason: str) -> None:
-        log.warning("xface: client %d is let go of: %s", self.tasks.owner, reason)
+        log.warning("xface: client %d is disconnected: %s", self.tasks.owner, reason)
         self._writer.transport.abort()

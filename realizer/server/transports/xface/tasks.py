@@ -22,7 +22,7 @@ log = logging.getLogger(__name__)
 
 Answer = bytes | Inbound | Disconnect
 ERROR = pack_note("ERROR", 0, 0, Status.ERROR)
-# Tasks of the player that ask for what it has and we have not: its meshes, its scripts, its films.
+# Tasks of Xface's own player for its meshes, scripts and films, which have no equivalent here.
 UNABLE = frozenset(
     {
         *("LOAD_WAV", "LOAD_PHO", "LOAD_ANIM", "LOAD_FDP", "UPLOAD_WAV", "UPLOAD_PHO", "UPLOAD_ANIM"),
@@ -36,7 +36,7 @@ ABLE = frozenset(
     }
 )
 _NAMES = tuple(row.name for row in faps()[2:])
-MAX_WAITING = 100  # tasks of a client that wait for what plays
+MAX_WAITING = 100  # queued tasks of a client
 
 
 @dataclass(eq=False, slots=True)
@@ -44,9 +44,11 @@ class _RunningTask:
     """A task whose blocks play, or will.
 
     Attributes:
-        planned, started, blocks_left: those of its blocks that are, that have, that have not ended yet.
-        clip: what plays, where it is no script.
-        began: seconds, when the first of them started.
+        blocks_left: ids of its blocks that have not ended.
+        clip: that it plays; None for a script.
+        planned: ids of its blocks that were accepted.
+        started: whether a block has started.
+        began: when the first block started, in seconds.
     """
 
     task: Task
@@ -58,11 +60,11 @@ class _RunningTask:
 
 
 class TaskRunner:
-    """The player as one client sees it: what it has loaded, what plays of it, and what waits.
+    """The player as one client sees it: its loaded clip, what plays, and what is queued.
 
-    A FAP file plays as a BML block with an id of our own; a pose is held by a `set` message, which lets go of
-    every other FAP: each frame of the player stands alone. What the frame before moved goes to 0 first, as
-    quickly as the rest moves; what is let go of takes its time.
+    A FAP file plays as a BML block with a generated id. A pose is held by a `set` message that releases all
+    other FAPs, since each frame of a player stands alone. The FAPs of the frame before are set to 0 first,
+    because released ones fade slowly.
 
     Args:
         owner: the client's number.
@@ -71,8 +73,8 @@ class TaskRunner:
     def __init__(self, owner: int) -> None:
         self.owner = owner
         self._clip: FAPClip | None = None
-        self._first = 0  # the frame that playing begins with
-        self._moved: dict[str, float] = {}  # names of the FAPs of the pose that is held, all 0
+        self._first = 0  # the frame where playback begins
+        self._moved: dict[str, float] = {}  # names of the FAPs of the held pose -> 0
         self._playing: _RunningTask | None = None
         self._waiting: deque[Task] = deque()
         self._scripts: list[_RunningTask] = []
@@ -80,11 +82,11 @@ class TaskRunner:
 
     @property
     def greeting(self) -> bytes:
-        """What a client waits for before it says anything."""
+        """The first message to a client, which waits for it."""
         return pack_note("CONNECTION_OK", self.owner, 0, Status.UNKNOWN)
 
     def accept(self, task: Task) -> Iterator[Answer]:
-        """What is said as soon as a task has come."""
+        """Yield the answers to a task that has arrived, before it runs."""
         if task.name not in ABLE | UNABLE:
             log.info("xface: wanted a task of the player, got %s", task.name)
             yield from self.refuse(task)
@@ -92,17 +94,17 @@ class TaskRunner:
             yield from _notes(task, Status.QUEUED)
 
     def refuse(self, task: Task) -> Iterator[Answer]:
-        """What is said of a task that is none of the player's, or of which only the head was read."""
+        """Yield the answers to an unknown or unreadable task."""
         if task.name in ABLE | UNABLE:
             yield from _notes(task, Status.ERROR)
         else:
             yield pack_note("ERROR", task.owner, task.id, Status.ERROR)
 
     def run(self, task: Task, attachment: Attachment, now: float) -> Iterator[Answer]:
-        """Do what a task asks, once it has been accepted.
+        """Run an accepted task and yield the answers.
 
         Args:
-            attachment: what `prepare` made of it, or raised.
+            attachment: that `prepare` returned, or its error.
         """
         if isinstance(attachment, RealizerError) or task.name in UNABLE:
             log.info("xface: %s: %s", task.name, attachment or "not something this player does")
@@ -112,14 +114,14 @@ class TaskRunner:
                 and not isinstance(attachment, MissingAttachment)
                 and "FAP" in task.name
             ):
-                yield from _notes(task, Status.FINISHED)  # clients of the player count on it
+                yield from _notes(task, Status.FINISHED)  # clients of Xface's own player rely on it
             return
         match task.name, attachment:
             case (("UPLOAD_FAP" | "LOAD_FAP"), FAPClip()):
                 yield from _notes(task, Status.STARTED)
                 self._clip, self._first = attachment, 0
                 if len(attachment.values) == 1 and self._playing is None:
-                    yield self._show(0)  # the player there is waits for a stop; nobody needs that
+                    yield self._show(0)  # at once; Xface's own player waits for a stop
                 yield from _notes(task, Status.FINISHED)
             case "UPLOAD_SCRIPT", Script(text, blocks):
                 self._scripts.append(_RunningTask(task, set(blocks)))
@@ -130,9 +132,9 @@ class TaskRunner:
                 yield from self._stop(rewind=True)
                 yield from _notes(task, Status.FINISHED)
             case "PAUSE_PLAYBACK", _:
-                one, clip = self._playing, self._clip
-                if one is not None and clip is not None and one.clip is clip and one.started:
-                    passed = int((now - one.began) * clip.fps)
+                running, clip = self._playing, self._clip
+                if running is not None and clip is not None and running.clip is clip and running.started:
+                    passed = int((now - running.began) * clip.fps)
                     self._first = min(self._first + max(passed, 0), len(clip.values) - 1)
                 yield from self._stop(rewind=False)
                 yield from _notes(task, Status.FINISHED)
@@ -145,40 +147,37 @@ class TaskRunner:
                 yield Disconnect()
 
     def on_feedback(self, text: str, now: float) -> Iterator[Answer]:
-        """What is said when the session tells `text`."""
+        """Yield the answers to a message of the session."""
         if not text.startswith("<"):
             return
-        running = [*self._scripts, *([self._playing] if self._playing is not None else [])]
-        if not running:
+        all_running = [*self._scripts, *([self._playing] if self._playing is not None else [])]
+        if not all_running:
             return
         match parse_feedback(text):
             case PredictionFeedback(blocks=blocks):
-                for one in running:
-                    one.planned |= {b.id for b in blocks if b.status != "IN_PREP"} & one.blocks_left
+                for running in all_running:
+                    running.planned |= {b.id for b in blocks if b.status != "IN_PREP"} & running.blocks_left
             case BlockProgress(id=id):
                 block, _, point = id.rpartition(":")
-                for one in (one for one in running if block in one.blocks_left):
-                    yield from self._progress(one, block, point, now)
-            case WarningFeedback(id=block, text=why):
-                for one in (one for one in running if block in one.blocks_left - one.planned):
-                    log.info("xface: %s: %s: %s", one.task.name, block, why)
-                    yield from self._ended(one, block)
+                for running in [r for r in all_running if block in r.blocks_left]:
+                    if point == "start" and not running.started:
+                        running.started, running.began = True, now
+                        yield from _notes(running.task, Status.STARTED)
+                    elif point == "end":
+                        yield from self._ended(running, block)
+            case WarningFeedback(id=block, text=reason):
+                for running in [r for r in all_running if block in r.blocks_left - r.planned]:
+                    log.info("xface: %s: %s: %s", running.task.name, block, reason)
+                    yield from self._ended(running, block)
 
-    def _progress(self, one: _RunningTask, block: str, point: str, now: float) -> Iterator[Answer]:
-        if point == "start" and not one.started:
-            one.started, one.began = True, now
-            yield from _notes(one.task, Status.STARTED)
-        elif point == "end":
-            yield from self._ended(one, block)
-
-    def _ended(self, one: _RunningTask, block: str) -> Iterator[Answer]:
-        """A block has ended, or was refused; with the last one of a task so has the task."""
-        one.blocks_left.discard(block)
-        if one.blocks_left:
+    def _ended(self, running: _RunningTask, block: str) -> Iterator[Answer]:
+        """Handle the end, or the refusal, of a block, and of its task with the last one."""
+        running.blocks_left.discard(block)
+        if running.blocks_left:
             return
-        yield from _notes(one.task, Status.FINISHED if one.started else Status.ERROR)
-        if one is not self._playing:
-            self._scripts.remove(one)
+        yield from _notes(running.task, Status.FINISHED if running.started else Status.ERROR)
+        if running is not self._playing:
+            self._scripts.remove(running)
             return
         self._playing, self._first = None, 0
         while self._waiting and self._playing is None:
@@ -203,7 +202,7 @@ class TaskRunner:
             yield Inbound(document)
 
     def _stop(self, *, rewind: bool) -> Iterator[Answer]:
-        """End what plays and what waits to, and show the frame where playing would begin."""
+        """End all tasks that play or wait, and show the frame where playback would begin."""
         ended = [] if self._playing is None else [self._playing]
         self._playing = None
         if rewind:
@@ -211,12 +210,12 @@ class TaskRunner:
             ended += self._scripts
             self._scripts = []
         if ended:
-            blocks = {block for one in ended for block in one.blocks_left}
+            blocks = {block for running in ended for block in running.blocks_left}
             yield Inbound(json.dumps({"type": "stop", "blocks": sorted(blocks)}))
-        for one in ended:
-            if not one.started:
-                yield from _notes(one.task, Status.STARTED)
-            yield from _notes(one.task, Status.FINISHED)
+        for running in ended:
+            if not running.started:
+                yield from _notes(running.task, Status.STARTED)
+            yield from _notes(running.task, Status.FINISHED)
         waiting, self._waiting = self._waiting, deque()
         for task in waiting:
             yield from _notes(task, Status.FINISHED)
@@ -224,7 +223,7 @@ class TaskRunner:
             yield self._show(self._first)
 
     def _show(self, frame: int) -> Inbound:
-        """Hold one frame of the clip."""
+        """Return a message that holds one frame of the clip."""
         assert self._clip is not None
         values: dict[str, float] = {}
         for row, value in zip(faps(), self._clip.values[frame].tolist(), strict=True):
@@ -236,11 +235,11 @@ class TaskRunner:
 
 
 def _hold_faps(values: dict[str, float]) -> Inbound:
-    """Hold these FAPs by name, and no others, whoever set them."""
+    """Return a message that holds these FAPs by name, and releases all others."""
     return Inbound(json.dumps({"type": "set", "faps": dict.fromkeys(_NAMES) | values}))
 
 
 def _notes(task: Task, status: Status) -> Iterator[bytes]:
-    """A note to the client, where it wants notes."""
+    """Yield a note to the client, if it wants notes."""
     if task.owner:
         yield pack_note(task.name, task.owner, task.id, status)

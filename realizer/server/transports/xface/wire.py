@@ -8,7 +8,7 @@ from enum import IntEnum
 
 
 class Status(IntEnum):
-    """What a note says of a task; of the eight that there are, those that are ever sent."""
+    """The status of a task in a note: those of the protocol's eight that are ever sent."""
 
     UNKNOWN = 0
     QUEUED = 1
@@ -19,7 +19,7 @@ class Status(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What a client asks for. `owner` 0 wants no notes; `id` is of the client's choice."""
+    """A task from a client. With `owner` 0 it gets no notes; the client chooses `id`."""
 
     name: str
     owner: int = 0
@@ -29,7 +29,7 @@ class Task:
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """What the player says of a task."""
+    """A note of the player about a task."""
 
     name: str
     owner: int
@@ -44,18 +44,18 @@ LONGEST_NOTE = 4096  # bytes
 
 
 def pack_note(name: str, owner: int, task: int, status: int) -> bytes:
-    """A note as the player writes it, to the blank; clients compare it with a pattern."""
+    """Return a note exactly as the player writes it: clients match it with a pattern."""
     return f'<notify name="{name}" ownerId="{owner}" taskId="{task}" status="{int(status)}"/>\0\0'.encode()
 
 
 def pack_task(task: Task) -> bytes:
-    """A task as clients of the player write it: its params as they are, one NUL at the end."""
+    """Return a task as clients of the player write it: unescaped params, and a NUL at the end."""
     params = "".join(f"<param>{param}</param>" for param in task.params)
     return f'<task name="{task.name}" ownerId="{task.owner}" taskId="{task.id}">{params}</task>\0'.encode()
 
 
 def read_notes(data: bytearray) -> list[Note]:
-    """The whole notes at the beginning of what a player sent; they are taken out of `data`."""
+    """Return the complete notes of a player, and remove them from `data`."""
     notes: list[Note] = []
     end = 0
     for found in _NOTE.finditer(data):
@@ -63,6 +63,6 @@ def read_notes(data: bytearray) -> list[Note]:
         notes.append(Note(name.decode("utf-8", "replace"), *map(int, numbers)))
         end = found.end()
     del data[:end]
-    if len(data) > LONGEST_NOTE:  # none of it is a note
-        del data[: len(data) - 200]  # but its end may be the beginning of one
+    if len(data) > LONGEST_NOTE:  # not a note; its end may be the beginning of one
+        del data[: len(data) - 200]
     return notes
