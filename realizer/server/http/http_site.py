@@ -1,4 +1,4 @@
-"""HTTP answers on the service's port: page, tools, faces as GLB, health."""
+"""The HTTP site on the service's port: page, tools, faces as GLB, health."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ NOT_BUILT = """The page was not bundled when this package was built.
 Build it where npm is on the PATH: pip install -e . in the checkout, or install a wheel.
 The WebSocket at /ws works without it.
 """
-# The page loads nothing from elsewhere, and may talk to WebSockets only where it came from.
+# The page loads nothing from other hosts, and opens no other connections than WebSockets.
 POLICY = (
     "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; "
     "connect-src 'self' ws: wss:"
@@ -28,7 +28,7 @@ POLICY = (
 
 @dataclass(frozen=True)
 class HttpResponse:
-    """One HTTP answer."""
+    """An HTTP response."""
 
     status: int
     media_type: str
@@ -37,11 +37,11 @@ class HttpResponse:
 
 
 class HttpSite:
-    """Answers GET requests; what is costly is made once.
+    """The answers to GET requests.
 
     Args:
-        health: what `/healthz` tells beside "ok".
-        settings: the service's; its light and background are how the page begins.
+        health: returns what `/healthz` reports beside the status.
+        settings: of the service; the page begins with its light and background.
     """
 
     def __init__(self, health: Callable[[], dict[str, object]], settings: Settings | None = None) -> None:
@@ -50,7 +50,7 @@ class HttpSite:
         self._static = files("realizer.server").joinpath("static")
 
     def answer(self, target: str) -> HttpResponse:
-        """The answer to `GET target`. May block: reading a face takes a moment the first time."""
+        """Return the response to `GET target`. May block while a face is loaded for the first time."""
         path, _, query = target.partition("?")
         path = unquote(path)
         if path == "/healthz":
@@ -64,22 +64,22 @@ class HttpSite:
 
             return HttpResponse(200, JSON, vocabulary())
         if path in ("/feeling.json", "/pose.fap"):
-            return self._desk(path, {name: values[-1] for name, values in parse_qs(query).items()})
+            return self._tool(path, {name: values[-1] for name, values in parse_qs(query).items()})
         if path == "/look.json":
             return self._look(parse_qs(query).get("face", ["default"])[0])
         if path.startswith("/faces/"):
             return self._face(path.removeprefix("/faces/").removesuffix(".glb"))
         return self._file("index.html" if path == "/" else path[1:])
 
-    def _desk(self, path: str, query: dict[str, str]) -> HttpResponse:
+    def _tool(self, path: str, query: dict[str, str]) -> HttpResponse:
         from realizer.server.http import page_tools
 
         try:
             if path == "/feeling.json":
                 return HttpResponse(200, JSON, page_tools.preview_emotion(query.get("of", "")).encode())
             pose = page_tools.export_pose(query.get("set", ""), query.get("face"), self._settings)
-            named = (("Content-Disposition", 'attachment; filename="pose.fap"'),)
-            return HttpResponse(200, "text/x-fap", pose.encode(), named)
+            headers = (("Content-Disposition", 'attachment; filename="pose.fap"'),)
+            return HttpResponse(200, "text/x-fap", pose.encode(), headers)
         except page_tools.ToolError as error:
             return HttpResponse(400, TEXT, f"{error}\n".encode())
 
@@ -98,7 +98,7 @@ class HttpSite:
             return HttpResponse(404, TEXT, f"{error}\n".encode())
 
     def _file(self, name: str) -> HttpResponse:
-        """A file of the bundle; only names in its one folder, so nothing else can be asked for."""
+        """Return a file of the page. Only names in its folder are accepted, so that no path can leave it."""
         names = {f.name for f in self._static.iterdir()} if self._static.is_dir() else set()
         if name in names and not name.startswith("."):
             media_type = mimetypes.guess_type(name)[0] or "application/octet-stream"
@@ -108,9 +108,8 @@ class HttpSite:
             return HttpResponse(200, media_type, self._static.joinpath(name).read_bytes(), headers)
         if name == "index.html":
             return HttpResponse(503, TEXT, NOT_BUILT.encode())
-        return HttpResponse(
-            404, TEXT, f"/{name} is not here; there are / /ws /faces/NAME /healthz\n".encode()
-        )
+        words = f"/{name} is not here; there are / /ws /faces/NAME /healthz\n"
+        return HttpResponse(404, TEXT, words.encode())
 
 
 @functools.cache
@@ -126,22 +125,22 @@ def _examples() -> bytes:
 
 @functools.lru_cache(8)
 def _look(name: str, light: str | None, background: str | None) -> bytes:
-    """How stills are lit and framed and what they add to a face, for whoever draws the mesh stream."""
+    """Return the light, the camera, and the wrinkles and highlights of a face, for viewers of its mesh."""
     from realizer.face.load import load_face
     from realizer.render.cameras import camera_for
     from realizer.render.eye_highlights import EyeHighlights
     from realizer.render.light import preset, presets
     from realizer.render.wrinkles import Wrinkles
 
-    face, chosen = load_face(name), preset(light)
+    face, lights = load_face(name), preset(light)
     camera = camera_for(face)
     look = {
-        "light": chosen.to_json(),
-        "lights": {name: one.to_json() for name, one in presets().items()},
+        "light": lights.to_json(),
+        "lights": {name: lights.to_json() for name, lights in presets().items()},
         "background": background,
         "camera": camera.to_json(),
         "furrows": Wrinkles(face).to_json(),
-        "glints": EyeHighlights(face, chosen, camera.towards).to_json(),
+        "glints": EyeHighlights(face, lights, camera.towards).to_json(),
     }
     return json.dumps(look, separators=(",", ":")).encode()
 

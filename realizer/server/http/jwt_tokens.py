@@ -9,23 +9,23 @@ from typing import Any
 
 from realizer.core.errors import RealizerError
 
-LEEWAY = 10.0  # s; clocks of machines differ
+LEEWAY = 10.0  # s; clocks of hosts differ
 BITS = 2048  # of RSA; shorter keys are broken
 # Elliptic curve -> the one algorithm that signs with it (RFC 7518, 3.4).
 CURVES = {"secp256r1": "ES256", "secp384r1": "ES384", "secp521r1": "ES512"}
 
 
 class TokenError(RealizerError):
-    """A token that lets nobody in; the text says why, and nothing of what is in it."""
+    """A token is not accepted; the text says why, without its content."""
 
 
 @dataclass(frozen=True, slots=True)
 class Grant:
-    """What somebody may do who has come in.
+    """The rights of a connection.
 
     Attributes:
-        sessions: those it may be in; None: any.
-        until: POSIX seconds; None: for ever.
+        sessions: names of the sessions it may join; None: any.
+        until: POSIX time at which it ends, or None.
     """
 
     sessions: frozenset[str] | None = None
@@ -33,19 +33,19 @@ class Grant:
 
     @property
     def seconds_left(self) -> float | None:
-        """Seconds until it ends; None where it does not."""
+        """Seconds until the grant ends, or None."""
         return None if self.until is None else max(0.0, self.until + LEEWAY - time.time())
 
 
 class TokenVerifier:
-    """Reads tokens that are signed with one key, by the algorithm of that key and no other.
+    """A verifier of tokens signed with one key, by the algorithms of that key only.
 
     Args:
         key: a public key in PEM (RSA, an elliptic curve, Ed25519), or a secret (HS256).
-        audience: who they must be for; None: they must name nobody.
+        audience: that tokens must name; None: they must name none.
 
     Raises:
-        RealizerError: no such key, or PyJWT is not installed.
+        RealizerError: the key is not one of these, or PyJWT is not installed.
     """
 
     def __init__(self, key: str, audience: str | None = None) -> None:
@@ -59,10 +59,10 @@ class TokenVerifier:
         self._key, self._algorithms = read
 
     def verify(self, token: str) -> Grant:
-        """What a token lets its bearer do.
+        """Return the grant of a token.
 
         Raises:
-            PassError: nothing.
+            TokenError: the token is not accepted.
         """
         jwt = self._jwt
         try:
@@ -84,18 +84,18 @@ class TokenVerifier:
 
 
 def _sessions(claims: dict[str, Any]) -> frozenset[str] | None:
-    """What the claim `session` binds a token to: a name, or several."""
+    """Return the sessions that the claim `session` names, a string or a list; None without the claim."""
     if "session" not in claims:
         return None
-    named = claims["session"]
-    names = [named] if isinstance(named, str) else named
+    claim = claims["session"]
+    names = [claim] if isinstance(claim, str) else claim
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise TokenError("one whose claim session is no name, and no list of names")
     return frozenset(names)
 
 
 def _public(text: str) -> tuple[Any, Sequence[str]]:
-    """A public key, and the algorithms that may sign with it."""
+    """Return a public key, and the algorithms that may sign with it."""
     try:
         from cryptography.hazmat.primitives.asymmetric import ec, ed25519, rsa
         from cryptography.hazmat.primitives.serialization import load_pem_public_key

@@ -14,7 +14,7 @@ PLANNING = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
 
 
 class Histogram:
-    """How often a number of seconds was at most each of `ends`."""
+    """A histogram of seconds, whose buckets have the upper bounds `ends`."""
 
     def __init__(self, ends: Sequence[float]) -> None:
         self._ends = ends
@@ -26,10 +26,10 @@ class Histogram:
         self._sum += seconds
 
     def lines(self, name: str, labels: str) -> Iterable[str]:
-        """Its samples; `labels` are inside of braces, or ""."""
+        """Yield the samples; `labels` without the braces, or ""."""
         count = 0
-        for end, here in zip((*(f"{end:g}" for end in self._ends), "+Inf"), self._counts, strict=True):
-            count += here
+        for end, n in zip((*(f"{end:g}" for end in self._ends), "+Inf"), self._counts, strict=True):
+            count += n
             inside = ",".join(filter(None, (labels, f'le="{end}"')))
             yield f"{name}_bucket{{{inside}}} {count}"
         outside = f"{{{labels}}}" if labels else ""
@@ -40,13 +40,13 @@ class Histogram:
 class Metrics:
     """The counters of one process.
 
-    Attributes:
-        late: by how many seconds a session was woken after its time; frames are sent then.
-        planning: seconds that a wake took in which a plan was made or changed.
-        counts: name -> how often.
-
     Args:
-        worker: the number of this process, where there are several.
+        worker: number of the process among several, or None.
+
+    Attributes:
+        late: how late sessions were woken to send their frames.
+        planning: how long it took to read and plan documents.
+        counts: name in `COUNTERS` -> count.
     """
 
     def __init__(self, worker: int | None = None) -> None:
@@ -56,32 +56,32 @@ class Metrics:
         self._labels = "" if worker is None else f'worker="{worker}"'
 
     def record_stopped(self) -> None:
-        """One that could not be written."""
+        """Count a recording that could not be written."""
         self.counts["records_stopped"] += 1
 
     def text(self, now: Mapping[str, float], more: Mapping[str, int]) -> str:
-        """All of it.
+        """Return all metrics in the text format.
 
         Args:
-            now: name of `GAUGES` -> its value at this instant.
-            more: name of `COUNTERS` -> what is counted elsewhere, and comes here in the end.
+            now: name in `GAUGES` -> its present value.
+            more: name in `COUNTERS` -> a count to add, of sessions that still run.
         """
         counts = {name: self.counts[name] + more.get(name, 0) for name in COUNTERS}
         lines: list[str] = []
         outside = f"{{{self._labels}}}" if self._labels else ""
         for kind, names, values in (("gauge", GAUGES, now), ("counter", COUNTERS, counts)):
-            for name, says in names.items():
-                whole = f"realizer_{name}" + ("_total" if kind == "counter" else "")
+            for name, description in names.items():
+                full = f"realizer_{name}" + ("_total" if kind == "counter" else "")
                 lines += [
-                    f"# HELP {whole} {says}",
-                    f"# TYPE {whole} {kind}",
-                    f"{whole}{outside} {_number(values[name])}",
+                    f"# HELP {full} {description}",
+                    f"# TYPE {full} {kind}",
+                    f"{full}{outside} {_number(values[name])}",
                 ]
-        for name, says, histogram in (
+        for name, description, histogram in (
             ("realizer_lateness_seconds", "By how much a session was woken too late.", self.late),
             ("realizer_planning_seconds", "How long it took to read and plan a document.", self.planning),
         ):
-            lines += [f"# HELP {name} {says}", f"# TYPE {name} histogram"]
+            lines += [f"# HELP {name} {description}", f"# TYPE {name} histogram"]
             lines += histogram.lines(name, self._labels)
         return "\n".join(lines) + "\n"
 
@@ -91,24 +91,24 @@ _WORKER = re.compile(r'worker="[^"]*",?')
 
 
 def sum_samples(texts: Mapping[int, str]) -> str:
-    """What several workers have counted as what all of them have: each sample is the sum of theirs.
+    """Return the metrics of several workers as one text, in which each sample is the sum of theirs.
 
     Args:
-        texts: number of a worker -> its text. `realizer_worker_sessions` says which there are.
+        texts: number of a worker -> its text. The samples of `realizer_worker_sessions` list the workers.
     """
-    told: dict[str, float | None] = {}  # a comment, or the name and labels of a sample -> its sum
+    sums: dict[str, float | None] = {}  # a comment -> None, or the name and labels of a sample -> its sum
     sessions: dict[int, float] = {}
     for number, text in texts.items():
         for line in text.splitlines():
             if (sample := _SAMPLE.fullmatch(line)) is None:
-                told.setdefault(line)
+                sums.setdefault(line)
                 continue
             name, labels, value = sample[1], _WORKER.sub("", sample[2] or ""), float(sample[3])
             key = f"{name}{{{labels}}}" if labels else name
-            told[key] = (told.get(key) or 0.0) + value
+            sums[key] = (sums.get(key) or 0.0) + value
             if key == "realizer_sessions":
                 sessions[number] = value
-    lines = [key if value is None else f"{key} {_number(value)}" for key, value in told.items()]
+    lines = [key if value is None else f"{key} {_number(value)}" for key, value in sums.items()]
     lines += ["# HELP realizer_worker_sessions Sessions of each worker that has answered."]
     lines += ["# TYPE realizer_worker_sessions gauge"]
     lines += [f'realizer_worker_sessions{{worker="{n}"}} {_number(value)}' for n, value in sessions.items()]
@@ -116,7 +116,7 @@ def sum_samples(texts: Mapping[int, str]) -> str:
 
 
 def _number(value: float) -> str:
-    """To the last digit where it counts, to nine where it measures."""
+    """Return integers exactly, other numbers with nine digits."""
     return str(int(value)) if value == int(value) else f"{value:.9g}"
 
 
@@ -130,8 +130,8 @@ GAUGES = {
 }
 COUNTERS = {
     "messages": "Messages that came in.",
-    "refused": "Connections that were not let in.",
+    "refused": "Connections that were refused.",
     "frames_dropped": "Frames, pictures and sound packets that slow clients did not get.",
-    "failures": "Sessions that a fault of the service ended.",
-    "records_stopped": "Records that could not be written to their end.",
+    "failures": "Sessions that an internal error ended.",
+    "records_stopped": "Recordings that could not be written to their end.",
 }

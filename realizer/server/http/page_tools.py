@@ -14,23 +14,21 @@ from realizer.core.settings import Settings
 if TYPE_CHECKING:
     from realizer.checking.finding import Finding
 
-# A text of this length is checked in a tenth of a second; longer ones have `realizer check`.
-MAX_TEXT = 50_000  # characters
+MAX_TEXT = 50_000  # characters; checking takes a tenth of a second
 MAX_FINDINGS = 100
-# By then whatever was set has settled; 25 frames a second.
-SETTLED = 10.0  # s
+SETTLED = 10.0  # s; by then set values are reached
 FPS = 25.0
 
 
 class ToolError(RealizerError):
-    """What was asked cannot be answered; the text says what was wanted."""
+    """A request that cannot be answered; the text says what was wanted."""
 
 
 def lint(text: str, settings: Settings) -> str:
-    """Faults and advice of BML as JSON: {"faults": [{type, id, text, notes, spots}]}.
+    """Return faults and advice for BML as JSON: {"faults": [{type, id, text, notes, spots}]}.
 
-    A spot is {line, column, length, text, primary}, from 1, in characters; the first primary one is where the
-    fault is. Faults are what `realizer check` tells, advice has the type "ADVICE".
+    A spot is {line, column, length, text, primary}, from 1, in characters; the first primary one is the place
+    of the fault. Faults are those of `realizer check`; advice has the type "ADVICE".
     """
     from bml_schema.source import Source
     from realizer.checking.advice import advice
@@ -38,18 +36,17 @@ def lint(text: str, settings: Settings) -> str:
     from realizer.playback.player import Player
 
     if len(text) > MAX_TEXT:
-        said = f"wanted at most {MAX_TEXT} characters, got {len(text)}: `realizer check` reads more"
-        return json.dumps({"faults": [], "skipped": said})
+        words = f"wanted at most {MAX_TEXT} characters, got {len(text)}: `realizer check` reads more"
+        return json.dumps({"faults": [], "skipped": words})
     source = Source(text)
-    found: list[Finding] = []
+    findings: list[Finding] = []
     player = Player(PlayOptions(idle=False, media=settings.media, expressions=settings.expressions))
     for part in check_document("document", source, text, player):
-        found += part.findings
+        findings += part.findings
         if part.block is not None and part.schedule is not None:
-            found += islice(advice("document", source, part.block, part.schedule, player), MAX_FINDINGS)
-    return json.dumps(
-        {"faults": [_finding_json(finding) for finding in found[:MAX_FINDINGS]]}, ensure_ascii=False
-    )
+            findings += islice(advice("document", source, part.block, part.schedule, player), MAX_FINDINGS)
+    faults = [_finding_json(finding) for finding in findings[:MAX_FINDINGS]]
+    return json.dumps({"faults": faults}, ensure_ascii=False)
 
 
 def _finding_json(finding: Finding) -> dict[str, Any]:
@@ -65,49 +62,49 @@ def _finding_json(finding: Finding) -> dict[str, Any]:
     }
 
 
-def preview_emotion(asked: str) -> str:
-    """A place on the wheel, or a profile, as what it moves.
+def preview_emotion(request: str) -> str:
+    """Return the action units or FAPs of an emotion: a point of the wheel, or a profile.
 
     Args:
-        asked: JSON with the fields of <emotion>: angle and activation, or name; profile.
+        request: JSON with the attributes of <emotion>: angle and activation, or name; profile.
 
     Returns:
         JSON {"values": {"12L": 0..1, or a FAP's name: in its FAPU}, "shares": {archetype: 0..1}}.
 
     Raises:
-        DeskError: not a feeling.
+        ToolError: the request is not an emotion.
     """
     from bml_schema import Emotion
     from realizer.behaviours import emotion
     from realizer.behaviours.kind import PlanningContext
     from realizer.emotions.wheel import blend_weights
 
-    fields = {k: v for k, v in _object(asked).items() if k in ("name", "angle", "activation", "profile")}
+    fields = {k: v for k, v in _object(request).items() if k in ("name", "angle", "activation", "profile")}
     node = Emotion(id="asked", **fields)
     try:
-        wrong = node.fault() or next((fault.text for fault in emotion.check(node, PlanningContext())), "")
-        if wrong:
-            raise ToolError(wrong)
+        error = node.fault() or next((fault.text for fault in emotion.check(node, PlanningContext())), "")
+        if error:
+            raise ToolError(error)
         values = emotion.values_of(node)
-        mixed = blend_weights(node.angle, node.profile or "own") if node.angle is not None else {}
-    except (TypeError, ValueError) as error:
-        raise ToolError(f"feeling: {error}") from None
+        weights = blend_weights(node.angle, node.profile or "own") if node.angle is not None else {}
+    except (TypeError, ValueError) as wrong:
+        raise ToolError(f"feeling: {wrong}") from None
     return json.dumps(
         {
             "values": {target.name: round(float(value), 4) for target, value in values.items()},
-            "shares": {name: round(share, 4) for name, share in mixed.items()},
+            "shares": {name: round(weight, 4) for name, weight in weights.items()},
         }
     )
 
 
-def export_pose(asked: str, face: str | None, settings: Settings) -> str:
-    """The face that a `set` message holds, as a FAP file of one frame.
+def export_pose(message: str, face: str | None, settings: Settings) -> str:
+    """Return the pose that a `set` message makes, as a FAP file of one frame.
 
     Args:
-        asked: the message; face: whose mapping of AUs to FAPs holds, None the service's.
+        face: name of the face whose mapping from AUs to FAPs is used; None: that of the service.
 
     Raises:
-        DeskError: not a `set` message, or no such face.
+        ToolError: the message is not a `set` message, or there is no such face.
     """
     import numpy as np
 
@@ -115,20 +112,20 @@ def export_pose(asked: str, face: str | None, settings: Settings) -> str:
     from realizer.outputs.fap_text import encode
     from realizer.server.session.session import Session
 
-    if _object(asked).get("type") != "set":
+    if _object(message).get("type") != "set":
         raise ToolError("wanted a message of the type set")
-    # The session itself answers, so that the file holds what the page shows, less what moves by itself.
+    # A session handles the message, so that the file has what the page shows, without idle motion.
     session = Session("pose", replace(settings, idle=False), 0.0)
     session.connect(1, 0.0)
     if face is not None:
         session.receive(1, json.dumps({"type": "character", "face": face}), 0.0)
-    session.receive(1, asked, 0.0)
+    session.receive(1, message, 0.0)
     for effect in session.take_effects():
         data = getattr(effect, "data", None)
         if isinstance(data, str) and data.startswith("{"):
-            told = json.loads(data)
-            if told["type"] == "error":
-                raise ToolError(f"{told.get('where', 'set')}: {told['message']}")
+            reply = json.loads(data)
+            if reply["type"] == "error":
+                raise ToolError(f"{reply.get('where', 'set')}: {reply['message']}")
     timeline = session.broadcast.timeline(0, FPS)
     frame = round(SETTLED * FPS)
     frames = timeline.window(frame, frame).faps
@@ -138,9 +135,9 @@ def export_pose(asked: str, face: str | None, settings: Settings) -> str:
 
 def _object(text: str) -> dict[str, Any]:
     try:
-        found = json.loads(text)
+        value = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise ToolError(f"wanted a JSON object: {error}") from None
-    if not isinstance(found, dict):
-        raise ToolError(f"wanted a JSON object, got {type(found).__name__}")
-    return found
+    if not isinstance(value, dict):
+        raise ToolError(f"wanted a JSON object, got {type(value).__name__}")
+    return value

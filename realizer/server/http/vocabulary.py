@@ -17,17 +17,17 @@ PREFIXES = {
     "http://hmi.ewi.utwente.nl/bmlt": "bmlt",
     "urn:bml-realizer:1": "realizer",
 }
-# What `schema_of` does not tell: a constraint is read by the parser itself.
+# Elements without a schema: the parser reads constraints itself.
 RELATIONS = ("synchronize", "before", "after")
 
 
 @functools.cache
 def vocabulary() -> bytes:
-    """All of it; made once.
+    """Return the vocabulary, which is computed once.
 
-    elements: name, namespace, usual prefix, attributes (what is wanted, words), children, sync points.
-    values: {"element attribute": words} where a word is looked up in a table.
-    aus, faps, groups: what the sliders are made of. wheel: places, degrees and 0..7. profiles: {set: names}.
+    elements: name, namespace, usual prefix, attributes (wanted values, words), children, sync points.
+    values: {"element attribute": words} for words that are looked up in a table.
+    aus, faps, groups: for the sliders. wheel: points, in degrees and 0..7. profiles: {set: names}.
     """
     return json.dumps(
         {
@@ -46,28 +46,27 @@ def vocabulary() -> bytes:
 
 
 def _elements() -> list[dict[str, Any]]:
-    behaviours = [local(tag) for tag in VOCABULARY]
-    inside = [*behaviours, "constraint"]
+    parts = [*(local(tag) for tag in VOCABULARY), "constraint"]
     children: dict[str, list[str]] = {
-        local(Block.tag): [*inside, "required"],
-        local(Required.tag): inside,
+        local(Block.tag): [*parts, "required"],
+        local(Required.tag): parts,
         local(Constraint.tag): list(RELATIONS),
         "text": ["sync"],
         **{name: ["sync"] for name in RELATIONS},
     }
     classes: list[type[Any]] = [Block, Required, Constraint, *VOCABULARY.values()]
-    found = {local(cls.tag): _element(cls, children) for cls in classes}
+    elements = {local(cls.tag): _element(cls, children) for cls in classes}
     for cls in classes:
         for kind in schema_of(cls).children:
             for inner in kind.classes:
-                found.setdefault(local(inner.tag), _element(inner, children))
-    plain = {"namespace": CORE, "prefix": "", "syncs": []}
+                elements.setdefault(local(inner.tag), _element(inner, children))
+    core = {"namespace": CORE, "prefix": "", "syncs": [], "about": ""}
     for name in RELATIONS:
         ref = [] if name == "synchronize" else [_attribute("ref", "a sync reference", required=True)]
-        found[name] = {"name": name, **plain, "attributes": ref, "children": children[name], "about": ""}
+        elements[name] = {"name": name, **core, "attributes": ref, "children": children[name]}
     sync = [_attribute("ref", "a sync reference"), _attribute("id", "a name")]
-    found["sync"] = {"name": "sync", **plain, "attributes": sync, "children": [], "about": ""}
-    return list(found.values())
+    elements["sync"] = {"name": "sync", **core, "attributes": sync, "children": []}
+    return list(elements.values())
 
 
 def _element(cls: type[Any], children: dict[str, list[str]]) -> dict[str, Any]:
@@ -143,33 +142,22 @@ def _aus() -> list[dict[str, Any]]:
 def _faps() -> list[dict[str, Any]]:
     from realizer.tables import faps
 
-    return [
-        {
-            "fap": row.fap,
-            "name": row.name,
-            "group": row.group,
-            "unit": row.unit,
-            "least": row.least,
-            "most": row.most,
-        }
-        for row in faps()[2:]
-    ]
+    fields = ("fap", "name", "group", "unit", "least", "most")
+    return [{field: getattr(row, field) for field in fields} for row in faps()[2:]]
 
 
 def _groups() -> dict[str, list[dict[str, Any]]]:
     from realizer.tables.control_groups import au_regions, fap_regions
 
-    found = {"aus": au_regions(), "faps": fap_regions()}
-    return {kind: [{"name": r.name, "members": r.members} for r in rows] for kind, rows in found.items()}
+    regions = {"aus": au_regions(), "faps": fap_regions()}
+    return {kind: [{"name": r.name, "members": r.members} for r in rows] for kind, rows in regions.items()}
 
 
 def _wheel() -> list[dict[str, Any]]:
     from realizer.tables.wheel_words import ring
 
-    return [
-        {"name": p.name, "kind": p.kind, "angle": p.angle, "activation": p.activation}
-        for p in ring("paul").values()
-    ]
+    fields = ("name", "kind", "angle", "activation")
+    return [{field: getattr(point, field) for field in fields} for point in ring("paul").values()]
 
 
 def _profiles() -> dict[str, list[str]]:
