@@ -1,4 +1,4 @@
-"""Clients of the service, for `async with` and plain `with`."""
+"""Clients of the service: asynchronous and synchronous."""
 
 from realizer.client.async_client import Client
 from realizer.client.connection import connect

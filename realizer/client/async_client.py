@@ -17,14 +17,14 @@ from realizer.protocol.messages.common import ANSWERS
 
 
 class Client:
-    """An open connection; made by `connect`. Several tasks may use it at once.
+    """An open connection, which `connect` returns. Several tasks may use it at once.
 
     Args:
         connect: opens another connection to an address of the same service.
 
     Attributes:
-        url: where it is connected to.
-        welcome: what the service said first: session, version, capabilities, limits.
+        url: the address of the connection.
+        welcome: the first message of the service: session, version, capabilities, limits.
     """
 
     def __init__(
@@ -43,12 +43,12 @@ class Client:
 
     @property
     def session(self) -> str:
-        """The session's name, which others may join."""
+        """The name of the session, which other clients may join."""
         return str(self.welcome["session"])
 
     @property
     def errors(self) -> list[dict[str, Any]]:
-        """What the service refused of messages that have no answer."""
+        """Errors about messages that have no answer."""
         return list(self._router.errors)
 
     async def send(self, bml: str) -> None:
@@ -84,46 +84,46 @@ class Client:
             return self._router.answer()
 
     async def subscribe(self, stream: str, **fields: Any) -> dict[str, Any]:
-        """Ask for a stream (fap, au, arkit, mesh, audio, video, schedule); returns what its values mean.
+        """Subscribe to a stream (fap, au, arkit, mesh, audio, video, schedule) and return its description.
 
         Raises:
-            ClientError: there is no such stream, or it cannot be had.
+            ClientError: there is no such stream, or it is not available.
         """
         return await self.ask("subscribe", stream=stream, **fields)
 
     async def state(self) -> dict[str, Any]:
-        """What plays, which action units are up, which layers ask for them."""
+        """Return the state of the session: its blocks, and the action units with their sources."""
         return await self.ask("state")
 
     async def play(self, bml: str) -> BlockProgress:
-        """Send BML and wait for the end of its last block, which is returned.
+        """Send BML, wait for the end of its last block, and return that.
 
         Raises:
             ClientError: the block was refused, or the connection ended.
         """
-        until = await self.send_and_follow(bml)
-        await self.wait_for(lambda: until.is_finished)
-        return until.end()
+        block = await self.send_and_follow(bml)
+        await self.wait_for(lambda: block.is_finished)
+        return block.end()
 
     async def send_and_follow(self, bml: str) -> BlockWaiter:
-        """Send BML and return what its last block does from now on: when it starts, whether it has ended.
+        """Send BML and return a waiter, which follows the start and the end of its last block.
 
         Raises:
-            ClientError: there is nothing in the text, or the connection has ended.
+            ClientError: the text is blank, or the connection has ended.
         """
         if is_blank(bml):
             raise ClientError("wanted <bml>, got nothing", "refused")
         self._router.on_sent(bml)
-        until = BlockWaiter(self._router.last_block)
-        self._router.add_listener(until)
+        block = BlockWaiter(self._router.last_block)
+        self._router.add_listener(block)
         await self._post(bml)
-        return until
+        return block
 
     async def wait_for(self, condition: Callable[[], bool]) -> None:
-        """Wait until a condition holds, which is checked with every message that comes.
+        """Wait until a condition holds. It is checked after each message of the service.
 
         Raises:
-            ClientError: the connection has ended before.
+            ClientError: the connection ended first.
         """
         async with self._news:
             await self._news.wait_for(lambda: condition() or self._ended)
@@ -132,12 +132,12 @@ class Client:
 
     @contextlib.asynccontextmanager
     async def speech(self, id: str, **opening: Any) -> AsyncIterator[Speech]:
-        """A speech that is said while its text comes: `async with client.speech("s") as speech`.
+        """Open a speech whose text is streamed: `async with client.speech("s") as speech`.
 
-        Leaving the block says that nothing follows, and waits for nothing; an exception stops the speech.
+        Leaving the block closes the speech without waiting for its end; an exception stops it.
 
         Args:
-            id: of the block that others can name; the syncs of its text are `ID:ID:sync` there.
+            id: of the speech's block; the syncs of its text are `ID:ID:sync` for other blocks.
             opening: composition, character, language of the message `speech`.
         """
         speech = Speech(id, self.control, self.wait_for, self._check, opening)
@@ -145,61 +145,61 @@ class Client:
         try:
             yield speech
         except BaseException:
-            with contextlib.suppress(Exception):  # the first one counts
+            with contextlib.suppress(Exception):  # keep the first exception
                 await speech.stop()
                 await speech.close()
             raise
         await speech.close()
 
     async def feedback(self) -> AsyncIterator[Feedback]:
-        """Feedback as it comes, until the connection ends; each is given to one iterator."""
+        """Yield feedback as it arrives, until the connection ends; each message to one iterator only."""
         with contextlib.suppress(ClientError):
             while True:
                 await self.wait_for(lambda: bool(self._router.feedback))
                 yield self._router.feedback.popleft()
 
     async def until_end(self, block: str | None = None) -> AsyncIterator[Feedback]:
-        """Feedback up to the end (or the refusal) of a block: by default the last one that was sent."""
-        until = BlockWaiter(block or self._router.last_block)
+        """Yield feedback up to the end, or the refusal, of a block: by default of the last one sent."""
+        waiter = BlockWaiter(block or self._router.last_block)
         async for feedback in self.feedback():
             yield feedback
-            until.on_feedback(feedback)
-            if until.is_finished:
+            waiter.on_feedback(feedback)
+            if waiter.is_finished:
                 return
 
     async def frames(self, stream: str) -> AsyncIterator[Frame]:
-        """Frames of a stream as they come: WireFrame, or a dictionary where the encoding is JSON.
+        """Yield frames of a stream as they arrive: WireFrame, or a dictionary if the encoding is JSON.
 
-        A WireFrame has in `told` what the service has told of its stream when it came. That changes while a
-        mesh runs, when its character gets another face; `vertices` of a mesh goes by it.
+        The attribute `told` of a WireFrame describes its stream at that time. It changes when the character
+        of a mesh gets another face, and `vertices` depends on it.
         """
-        kept = self._router.queue_of(stream)
+        queue = self._router.queue_of(stream)
         with contextlib.suppress(ClientError):
             while True:
-                await self.wait_for(lambda: bool(kept))
-                yield kept.popleft()
+                await self.wait_for(lambda: bool(queue))
+                yield queue.popleft()
 
     async def film(self, path: str | Path, bml: str, *, fps: float = 25, **look: Any) -> BlockProgress:
-        """Play BML and save its last block as a film with sound (.mp4, .webm), as it was drawn live.
+        """Play BML and save its last block as a film with sound (.mp4, .webm), as it is drawn live.
 
-        The service leaves out pictures it has no time for; the one before is shown instead of them.
-        (`realizer realize` draws every one.)
+        The film repeats a picture where the service had no time to draw the next one. (`realizer realize`
+        draws all of them.)
 
         Args:
-            look: size, camera, light, background, character, as `subscribe` takes them for video.
+            look: size, camera, light, background, character, as in `subscribe` for video.
 
         Raises:
-            ClientError: the block was refused, or there are no pictures.
-            FileNotFoundError: the folder is not there; nothing is played.
-            RealizerError: PyAV is not installed, or the suffix is no film's.
+            ClientError: the block was refused, there are no pictures, or the suffix is not that of a film.
+            FileNotFoundError: the folder does not exist; nothing is played.
+            RealizerError: PyAV is not installed.
         """
         from realizer.client.record import record
 
-        # A connection of its own: what this one has subscribed to stays.
+        # Another connection, so that the subscriptions of this one stay as they are.
         return await record(self._connect(_join_url(self.url, self.session)), Path(path), bml, fps, look)
 
     async def close(self) -> None:
-        """Say goodbye."""
+        """Close the connection."""
         await self._socket.close()
         await self._reader
 
@@ -209,7 +209,7 @@ class Client:
         try:
             await self._socket.send(text)
         except ConnectionClosed:
-            await self.wait_for(lambda: False)  # until the reader knows why
+            await self.wait_for(lambda: False)  # raises once the reader knows the reason
 
     async def _read(self) -> None:
         from websockets.exceptions import ConnectionClosed

@@ -1,9 +1,8 @@
-"""Opening of client connections, for `async with` or plain `with`."""
+"""Opening of client connections, for `async with` and `with`."""
 
 from __future__ import annotations
 
 from types import TracebackType
-from typing import Any
 
 from realizer.client.async_client import Client
 from realizer.client.message_router import ClientError
@@ -12,28 +11,27 @@ from realizer.protocol.messages.common import PROTOCOL
 
 
 def connect(url: str, *, token: str | None = None) -> PendingConnection:
-    """`async with connect("ws://127.0.0.1:8765/ws?session=show") as client`, or `with` and no event loop.
+    """Connect: `async with connect("ws://127.0.0.1:8765/ws?session=show") as client`, or `with`.
 
-    Without a session's name it is one of the client's own.
+    Without the name of a session the client gets a new one.
 
     Args:
-        token: what a service that asks for one wants to hear.
+        token: of the service, if it requires one.
 
     Raises:
-        OSError: nobody listens there.
-        ClientError: the service speaks another version of the protocol, wants another token, or refuses what
-            the address says; or it is no such service.
+        OSError: nothing listens at the address.
+        ClientError: the address is not of such a service, which may have another version of the protocol, or
+            it refuses the token or the session.
     """
     return PendingConnection(url, token)
 
 
 class PendingConnection:
-    """What `connect` gives: a Client inside `async with`, a SyncClient inside `with`."""
+    """A connection to be opened: `async with` returns a Client, `with` a SyncClient."""
 
     def __init__(self, url: str, token: str | None = None) -> None:
         self._url = url
         self._token = token
-        self._dial: Any = None
         self._client: Client | None = None
         self._sync_client: SyncClient | None = None
 
@@ -42,16 +40,15 @@ class PendingConnection:
         from websockets.exceptions import InvalidStatus, WebSocketException
 
         try:
-            self._dial = dial(self._url, compression=None, max_size=None, max_queue=None)
-            socket = await self._dial.__aenter__()
+            socket = await dial(self._url, compression=None, max_size=None, max_queue=None)
         except InvalidStatus as refused:
             raise _refusal(refused.response.status_code, bytes(refused.response.body)) from None
         except WebSocketException as error:
             raise ClientError(f"{self._url}: {error}") from None
         self._client = Client(socket, self._url, lambda url: PendingConnection(url, self._token))
-        said = {"version": PROTOCOL} if self._token is None else {"version": PROTOCOL, "token": self._token}
+        token = {} if self._token is None else {"token": self._token}
         try:
-            self._client.welcome = await self._client.ask("hello", **said)
+            self._client.welcome = await self._client.ask("hello", version=PROTOCOL, **token)
         except BaseException:
             await self._client.close()
             raise
@@ -75,6 +72,5 @@ class PendingConnection:
 
 
 def _refusal(status: int, body: bytes) -> ClientError:
-    """Why a service lets nobody in, in its own words."""
-    said = body.decode("utf-8", "replace").strip() or f"the service answers with the status {status}"
-    return ClientError(said, "token" if status in (401, 403) else "connection")
+    text = body.decode("utf-8", "replace").strip() or f"the service answers with the status {status}"
+    return ClientError(text, "token" if status in (401, 403) else "connection")

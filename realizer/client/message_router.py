@@ -1,4 +1,4 @@
-"""A router of the service's messages to those that wait for them; it knows no sockets."""
+"""The router of the service's messages to queues, answers and listeners; it has no sockets."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from realizer.core.errors import RealizerError
 from realizer.protocol.messages.common import ANSWERS
 from realizer.protocol.wire import WireFrame, unpack
 
-# Frames and feedback kept for an iterator that is slower than the service; older ones are dropped.
+# Lengths of the queues for iterators slower than the service; older messages are dropped.
 MAX_FRAMES = 1_000
 MAX_FEEDBACK = 10_000
 _COMMENT = re.compile(r"<!--.*?-->|<\?.*?\?>", re.DOTALL)
@@ -24,10 +24,10 @@ Frame = WireFrame | dict[str, Any]
 
 
 class ClientError(RealizerError):
-    """The service refused something, or the connection ended while something was awaited.
+    """The service refused a message, or the connection has ended.
 
     Attributes:
-        code: as in the message `error`; "refused" of a block, "connection" where it ended.
+        code: as in the message `error`; "refused" for a block, "connection" for the end.
     """
 
     def __init__(self, text: str, code: str = "connection") -> None:
@@ -36,38 +36,34 @@ class ClientError(RealizerError):
 
     @classmethod
     def of(cls, error: dict[str, Any]) -> ClientError:
-        """What a message `error` says."""
+        """Return the exception for a message `error`."""
         return cls(f"{error.get('where', '')}: {error['message']}".removeprefix(": "), error["code"])
 
 
 def is_blank(bml: str) -> bool:
-    """Whether there is nothing in a text that the service would answer."""
+    """Return whether a text contains nothing that the service would answer."""
     return not _COMMENT.sub("", bml).strip()
 
 
 class Listener(Protocol):
-    """Who hears feedback until it is over."""
+    """A listener to all feedback until it is finished; most feedback is of other blocks."""
 
     @property
-    def is_finished(self) -> bool:
-        """Nothing more of what it follows will come."""
-        ...
+    def is_finished(self) -> bool: ...
 
-    def on_feedback(self, feedback: Feedback) -> None:
-        """One message of feedback; most are of others."""
-        ...
+    def on_feedback(self, feedback: Feedback) -> None: ...
 
     def on_error(self, error: dict[str, Any]) -> None:
-        """An error about a message that has no answer; most are of others."""
+        """Handle an error about a message that has no answer."""
         ...
 
 
 class Router:
-    """What has come and nobody has taken yet.
+    """The queues of messages that have arrived, and the pending request.
 
     Attributes:
-        errors: of what was not asked for: control messages without an answer, pictures that ended.
-        last_block: id of the last block that was sent; None where it has none.
+        errors: errors about messages without an answer, and of video streams that ended.
+        last_block: id of the last block that was sent, or None.
     """
 
     def __init__(self) -> None:
@@ -75,16 +71,16 @@ class Router:
         self.frames: dict[str, deque[Frame]] = {}
         self.errors: deque[dict[str, Any]] = deque(maxlen=MAX_FRAMES)
         self.last_block: str | None = None
-        self._asked: str | None = None
+        self._request: str | None = None
         self._answer: dict[str, Any] | None = None
         self._listeners: list[Listener] = []
-        self._told: dict[tuple[str, int], dict[str, Any]] = {}  # stream, index -> what its frames mean
+        self._streams: dict[tuple[str, int], dict[str, Any]] = {}  # stream, index -> its description
 
     def receive(self, message: str | bytes) -> None:
         if isinstance(message, bytes):
             frame = unpack(message)
-            told = self._told.get((frame.stream, frame.character))
-            self.queue_of(frame.stream).append(replace(frame, stream_info=told))
+            description = self._streams.get((frame.stream, frame.character))
+            self.queue_of(frame.stream).append(replace(frame, stream_info=description))
         elif message.startswith("{"):
             reply = json.loads(message)
             if reply["type"] == "schedule" or "values" in reply:
@@ -94,21 +90,21 @@ class Router:
         else:
             feedback = parse_feedback(message)
             self.feedback.append(feedback)
-            for one in self._listeners:
-                one.on_feedback(feedback)
-            self._listeners = [one for one in self._listeners if not one.is_finished]
+            for listener in self._listeners:
+                listener.on_feedback(feedback)
+            self._listeners = [listener for listener in self._listeners if not listener.is_finished]
 
     def on_sent(self, bml: str) -> None:
-        found = _BLOCK_ID.findall(_COMMENT.sub("", bml))
-        self.last_block = unescape(found[-1]) if found else None
+        ids = _BLOCK_ID.findall(_COMMENT.sub("", bml))
+        self.last_block = unescape(ids[-1]) if ids else None
 
     def queue_of(self, stream: str) -> deque[Frame]:
-        """The newest messages of a stream; of `schedule` all, as each says what has changed since another."""
+        """Return the newest messages of a stream; all of `schedule`, as each is the difference to others."""
         return self.frames.setdefault(stream, deque(maxlen=None if stream == "schedule" else MAX_FRAMES))
 
     def expect_answer(self, type: str) -> None:
-        """From now on the next answer to a message of that type is for `answer`."""
-        self._asked, self._answer = type, None
+        """Keep the next answer to a message of that type for `answer`."""
+        self._request, self._answer = type, None
 
     @property
     def has_answer(self) -> bool:
@@ -120,34 +116,34 @@ class Router:
             raise ClientError.of(self._answer)
         return self._answer
 
-    def add_listener(self, follower: Listener) -> None:
-        """Let somebody hear all feedback from now on; whoever iterates gets it all the same."""
-        self._listeners.append(follower)
+    def add_listener(self, listener: Listener) -> None:
+        """Pass all feedback to a listener from now on, beside the queue."""
+        self._listeners.append(listener)
 
     def _reply(self, reply: dict[str, Any]) -> None:
-        asked = self._asked
+        request = self._request
         if reply["type"] in ("subscribed", "changed"):
             key = reply["stream"], reply.get("index", 0)
-            self._told[key] = self._told.get(key, {}) | reply
+            self._streams[key] = self._streams.get(key, {}) | reply
         if reply["type"] == "error":
-            # Where it says nothing of where, it is about text that was no message at all.
-            mine = reply.get("where", f"{asked}").partition(".")[0] in (asked, "type")
+            # Without `where` it is about a text that could not be parsed.
+            is_answer = reply.get("where", f"{request}").partition(".")[0] in (request, "type")
         else:
-            mine = asked is not None and reply["type"] == ANSWERS.get(asked)
-        if mine and asked is not None:
-            self._asked, self._answer = None, reply
+            is_answer = request is not None and reply["type"] == ANSWERS.get(request)
+        if is_answer and request is not None:
+            self._request, self._answer = None, reply
         elif reply["type"] in ("error", "gap"):
             self.errors.append(reply)
-            for one in self._listeners:
-                one.on_error(reply)
+            for listener in self._listeners:
+                listener.on_error(reply)
 
 
 class BlockWaiter:
-    """Whether a block has ended, from its feedback: its end, or the warning that it was refused.
+    """A listener that waits for the end of a block, or the warning that refuses it.
 
     Attributes:
-        start: when it started, seconds on the session clock; None before.
-        last: the feedback that ended it; None before.
+        start: when the block started, seconds on the session clock, or None.
+        last: the feedback that ended it, or None.
     """
 
     def __init__(self, block: str | None) -> None:
@@ -161,23 +157,22 @@ class BlockWaiter:
         return self.last is not None
 
     def on_feedback(self, feedback: Feedback) -> None:
-        """One message of feedback; most are of others."""
         match feedback:
             case BlockProgress(id=id) if id == f"{self.block}:start":
                 self.start = feedback.global_time
             case BlockProgress(id=id) if id == f"{self.block}:end":
                 self.last = self.last or feedback
             case WarningFeedback(id=id) if id == (self.block or "<no id>") and not self._planned:
-                # A warning on the block itself refuses it, unless its prediction is already out.
+                # A warning about the block itself refuses it, unless a prediction has accepted it before.
                 self.last = self.last or feedback
             case PredictionFeedback():
                 self._planned |= any(b.id == self.block and b.global_end is not None for b in feedback.blocks)
 
     def on_error(self, error: dict[str, Any]) -> None:
-        """What is wrong with a block is told in feedback."""
+        """Ignore errors: those of blocks are feedback."""
 
     def end(self) -> BlockProgress:
-        """What told the end.
+        """Return the feedback at the end of the block.
 
         Raises:
             ClientError: the block was refused.

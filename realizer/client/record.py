@@ -1,4 +1,4 @@
-"""Filming of a block over the wire: pictures and sound to a film."""
+"""Recording of a block as a film, from the streams of pictures and sound."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from realizer.core.array_types import Int16, UInt8
 from realizer.protocol.wire import WireFrame
 
 RATE = 48_000  # Hz
-# Pictures on their way from service to encoder: good enough that the film's own encoder decides.
+# The quality of the pictures is better than that of the film's encoder.
 LOOK = {"format": "jpeg", "quality": 95}
 
 
 class Camera(Protocol):
-    """What a recording needs of a connection; a `Client` has it."""
+    """The methods of a `Client` that recording needs."""
 
     @property
     def errors(self) -> list[dict[str, Any]]: ...
@@ -41,10 +41,10 @@ class Camera(Protocol):
 async def record(
     connection: AbstractAsyncContextManager[Camera], path: Path, bml: str, fps: float, look: Mapping[str, Any]
 ) -> BlockProgress:
-    """Play BML and save its last block as a film. Arguments and errors are those of `Client.film`.
+    """Play BML and save its last block as a film. Other arguments and errors are those of `Client.film`.
 
     Args:
-        connection: opens a connection to the session that is used for this alone.
+        connection: to the session, to be opened and used for this only.
     """
     from realizer.core.atomic_files import replacing
     from realizer.outputs.film import FORMATS, encode_film
@@ -67,7 +67,7 @@ async def record(
         await camera.wait_for(lambda: until.is_finished)
         end = until.end()
         assert until.start is not None
-        # The picture of the last instant is still being drawn.
+        # The last picture is still being drawn.
         await camera.wait_for(lambda: bool(camera.errors) or pictures[-1].time >= end.global_time)
         if camera.errors:
             raise ClientError.of(camera.errors[0])
@@ -92,12 +92,12 @@ async def _collect(camera: Camera, stream: str, kept: list[WireFrame]) -> None:
 
 
 def _film_frames(pictures: Sequence[WireFrame], start: float, fps: float, count: int) -> Iterator[UInt8]:
-    """The newest picture at each frame of the film."""
+    """Yield the newest picture at each frame of the film."""
     from PIL import Image
 
     at, decoded, known = 0, -1, np.empty(0, np.uint8)
     for k in range(count):
-        # Frames of the service lie on its own grid: the film takes the nearest one.
+        # The frame grids of the service and the film differ: take the nearest picture.
         time = start + (k + 0.5) / fps
         while at + 1 < len(pictures) and pictures[at + 1].time <= time:
             at += 1
@@ -107,13 +107,13 @@ def _film_frames(pictures: Sequence[WireFrame], start: float, fps: float, count:
 
 
 def _sound(packets: Sequence[WireFrame], start: float, seconds: float) -> Int16:
-    """(n,) int16: each packet at its time; one that says so takes back what was to follow."""
+    """Return (n,) int16: each packet at its time; one with the flag `flush` cancels what was to follow."""
     pcm = np.zeros(round(seconds * RATE), np.int16)
     for packet in packets:
         first = round((packet.time - start) * RATE)
         if packet.flush:
             pcm[max(0, first) :] = 0
         samples = np.frombuffer(packet.payload, "<i2")[max(0, -first) :]
-        there = pcm[max(0, first) :][: len(samples)]
-        there[:] = samples[: len(there)]
+        target = pcm[max(0, first) :][: len(samples)]
+        target[:] = samples[: len(target)]
     return pcm

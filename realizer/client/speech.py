@@ -1,4 +1,4 @@
-"""Streaming speech of a client: text sent as it is produced, with feedback of its syncs."""
+"""Streaming speech of a client: text that is sent as it is produced, and the feedback of its syncs."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from typing import Any
 from bml_schema.feedback import BlockProgress, Feedback, SyncPointProgress, WarningFeedback
 from realizer.client.message_router import ClientError
 
-LONGEST = 20_000  # characters that one message may append
-# What comes sooner behind the last message goes with the next one: nobody reads faster, and a service takes
-# only so many messages a second, behind which a stop would wait.
+LONGEST = 20_000  # characters of one message
+# Text that follows sooner goes with the next message: a service limits the rate of messages, and a stop would
+# wait behind them.
 PAUSE = 0.01  # s
 
 
 class SpeechProgress:
-    """What was told of a speech; knows no sockets.
+    """A listener to the feedback of one speech.
 
     Attributes:
-        points: sync of the text -> when it was said, seconds on the session clock.
-        end: that it has ended; `said` where it was cut off.
-        refused: why it is not said at all.
-        fault: why what was sent is no part of it: one of that id was closed and is still being said.
+        points: sync of the text -> when it was spoken, seconds on the session clock.
+        end: the feedback at its end, or None; it has `said` if the speech was cut off.
+        refused: why the speech was refused, or None.
+        fault: the error about its messages, or None: a closed speech of that id is still being spoken.
     """
 
     def __init__(self, id: str) -> None:
@@ -34,20 +34,15 @@ class SpeechProgress:
         self.fault: dict[str, Any] | None = None
 
     def on_error(self, error: dict[str, Any]) -> None:
-        """An error about a message that has no answer; most are of others."""
         if (error.get("where"), error.get("id")) == ("speech.id", self._id):
             self.fault = error
 
     def check(self) -> None:
-        """
-        Raises:
-            ClientError: what was sent is no part of it.
-        """
+        """Raise ClientError if the service has refused the messages."""
         if self.fault is not None:
             raise ClientError.of(self.fault)
 
     def on_feedback(self, feedback: Feedback) -> None:
-        """One message of feedback; most are of others."""
         match feedback:
             case SyncPointProgress(id=id):
                 block, behaviour, sync = id.split(":", 2)
@@ -59,15 +54,15 @@ class SpeechProgress:
                 self.refused = feedback.text
 
     def has_passed(self, sync: str) -> bool:
-        """Whether that sync has been said, or never will be."""
+        """Return whether a sync was spoken, or never will be."""
         return sync in self.points or self.is_finished
 
     @property
     def is_finished(self) -> bool:
-        return any(known is not None for known in (self.end, self.refused, self.fault))
+        return any(reason is not None for reason in (self.end, self.refused, self.fault))
 
     def point(self, sync: str) -> float:
-        """When a sync was said.
+        """Return when a sync was spoken.
 
         Raises:
             ClientError: it never will be.
@@ -78,7 +73,7 @@ class SpeechProgress:
         return self.points[sync]
 
     def result(self) -> BlockProgress:
-        """Its end.
+        """Return the feedback at the end of the speech.
 
         Raises:
             ClientError: it was refused.
@@ -90,13 +85,13 @@ class SpeechProgress:
 
 
 class Speech:
-    """A speech over an open connection; made by `Client.speech`.
+    """A speech over an open connection, which `Client.speech` returns.
 
     Args:
         control: sends a control message.
-        wait: until something is so.
-        check: raises a ClientError where the connection has ended.
-        opening: fields of its first message.
+        wait: waits until a condition holds.
+        check: raises ClientError if the connection has ended.
+        opening: fields of the first message.
     """
 
     def __init__(
@@ -119,16 +114,16 @@ class Speech:
         self._pausing: asyncio.Task[None] | None = None
 
     async def append(self, text: str) -> None:
-        """Say more: text with <sync id="m"/>, SSML and behaviours in it, each sentence when it is whole.
+        """Append text, which may contain <sync id="m"/>, SSML and behaviours; whole sentences are spoken.
 
-        It is sent at once, or a moment after the last message was.
+        It is sent at once, or a moment after the last message.
 
         Raises:
-            ClientError: it was closed, here or by the service, because the connection that it came by had
-                ended before it was whole. Or this connection has ended.
+            ClientError: the speech was closed, by this client or by the service when another connection that
+                it came by ended; or this connection has ended.
         """
         self.progress.check()
-        self._check()  # what waits for its turn would be lost in silence
+        self._check()  # text that waits to be sent would get lost
         if self._closed:
             raise ClientError(f"the speech {self.id} was closed: nothing can follow", "refused")
         self._unsent += text
@@ -137,7 +132,7 @@ class Speech:
             self._pausing = asyncio.create_task(self._pause())
 
     async def close(self) -> None:
-        """Nothing follows: what is left is said. Once more does nothing.
+        """Close the speech: the rest of the text is spoken. Closing again does nothing.
 
         Raises:
             ClientError: the connection has ended.
@@ -149,24 +144,24 @@ class Speech:
             await self._flush(close=True)
 
     async def stop(self) -> None:
-        """Fall silent at once."""
+        """Stop speaking at once."""
         self._unsent = ""
         await self._control("stop", blocks=[self.id])
 
     async def until(self, sync: str) -> float:
-        """Wait until a sync of the text is said; when that was, seconds on the session clock.
+        """Wait until a sync of the text is spoken, and return when, in seconds on the session clock.
 
         Raises:
-            ClientError: the speech has ended without it, was refused, or the connection has ended.
+            ClientError: the speech ended without it or was refused, or the connection has ended.
         """
         await self._wait(lambda: self.progress.has_passed(sync))
         return self.progress.point(sync)
 
     async def ended(self) -> BlockProgress:
-        """Wait until all is said, or it was cut off: then `said` are the words that were heard.
+        """Wait for the end of the speech; if it was cut off, `said` are the words that were spoken.
 
         Raises:
-            ClientError: it was refused, or the connection has ended.
+            ClientError: the speech was refused, or the connection has ended.
         """
         await self._wait(lambda: self.progress.is_finished)
         return self.progress.result()
@@ -174,14 +169,14 @@ class Speech:
     async def _flush(self, *, close: bool = False) -> None:
         async with self._sending:  # in order: a text may take several messages
             text, self._unsent = self._unsent, ""
-            least = 0 if close else 1  # to append nothing begins a speech too
+            least = 0 if close else 1  # an empty text begins a speech too
             for at in range(0, max(least, len(text)), LONGEST):
                 await self._send(append=text[at : at + LONGEST])
             if close:
                 await self._send(close=True)
 
     async def _pause(self) -> None:
-        """Send what comes, a few times a second; a connection that has ended tells so whoever waits."""
+        """Send appended text after a pause; if the connection ends, the methods that wait raise."""
         await asyncio.sleep(PAUSE)
         with contextlib.suppress(Exception):
             while self._unsent:
@@ -194,10 +189,10 @@ class Speech:
 
 
 class SyncSpeech:
-    """A speech over an open connection without an event loop; made by `SyncClient.speech`. As `Speech`.
+    """A `Speech` for programs without an event loop, which `SyncClient.speech` returns.
 
     Args:
-        do: runs what a Speech does.
+        do: runs a coroutine.
     """
 
     def __init__(self, speech: Speech, do: Callable[[Coroutine[Any, Any, Any]], Any]) -> None:
@@ -209,22 +204,22 @@ class SyncSpeech:
         return self._speech.id
 
     def append(self, text: str) -> None:
-        """Say more. As `Speech.append`."""
+        """Append text, as `Speech.append`."""
         self._do(self._speech.append(text))
 
     def close(self) -> None:
-        """Nothing follows: what is left is said."""
+        """Close the speech: the rest of the text is spoken."""
         self._do(self._speech.close())
 
     def stop(self) -> None:
-        """Fall silent at once."""
+        """Stop speaking at once."""
         self._do(self._speech.stop())
 
     def until(self, sync: str) -> float:
-        """Wait until a sync of the text is said. Returns and raises as `Speech.until`."""
+        """Wait until a sync of the text is spoken, as `Speech.until`."""
         return float(self._do(self._speech.until(sync)))
 
     def ended(self) -> BlockProgress:
-        """Wait until all is said, or it was cut off. Raises as `Speech.ended`."""
+        """Wait for the end of the speech, as `Speech.ended`."""
         end: BlockProgress = self._do(self._speech.ended())
         return end

@@ -18,9 +18,9 @@ T = TypeVar("T")
 
 
 class SyncClient:
-    """An open connection; made by `with connect(...)`. What it does is `Client`'s, which see, errors too.
+    """An open connection, which `with connect(...)` returns; its methods are those of `Client`.
 
-    It reads in its own thread, so that a program that computes for a while is no slow client.
+    It reads in a thread, so that a program that computes for a while is not a slow client.
     """
 
     def __init__(self, opening: AbstractAsyncContextManager[Client]) -> None:
@@ -29,29 +29,29 @@ class SyncClient:
         self._thread.start()
         self._opening = opening
         try:
-            self._client = self._do(_entered(opening))
+            self._client = self._do(_enter(opening))
         except BaseException:
             self._end()
             raise
 
     @property
     def url(self) -> str:
-        """Where it is connected to."""
+        """The address of the connection."""
         return self._client.url
 
     @property
     def welcome(self) -> Mapping[str, Any]:
-        """What the service said first."""
+        """The first message of the service."""
         return self._client.welcome
 
     @property
     def session(self) -> str:
-        """The session's name, which others may join."""
+        """The name of the session, which other clients may join."""
         return self._client.session
 
     @property
     def errors(self) -> list[dict[str, Any]]:
-        """What the service refused of messages that have no answer."""
+        """Errors about messages that have no answer."""
         return self._client.errors
 
     def send(self, bml: str) -> None:
@@ -67,39 +67,39 @@ class SyncClient:
         return self._do(self._client.ask(type, **fields))
 
     def subscribe(self, stream: str, **fields: Any) -> dict[str, Any]:
-        """Ask for a stream; returns what its values mean."""
+        """Subscribe to a stream and return its description."""
         return self._do(self._client.subscribe(stream, **fields))
 
     def state(self) -> dict[str, Any]:
-        """What plays, which action units are up, which layers ask for them."""
+        """Return the state of the session: its blocks, and the action units with their sources."""
         return self._do(self._client.state())
 
     def play(self, bml: str) -> BlockProgress:
-        """Send BML and wait for the end of its last block, which is returned."""
+        """Send BML, wait for the end of its last block, and return that."""
         return self._do(self._client.play(bml))
 
     @contextmanager
     def speech(self, id: str, **opening: Any) -> Iterator[SyncSpeech]:
-        """A speech that is said while its text comes, as `Client.speech` without `async`."""
-        live = self._client.speech(id, **opening)
-        speech = SyncSpeech(self._do(_entered(live)), self._do)
+        """Open a speech whose text is streamed: `with client.speech("s") as speech`."""
+        manager = self._client.speech(id, **opening)
+        speech = SyncSpeech(self._do(_enter(manager)), self._do)
         try:
             yield speech
         except BaseException as error:
-            self._do(_left(live, error))
+            self._do(_exit(manager, error))
             raise
-        self._do(_left(live, None))
+        self._do(_exit(manager, None))
 
     def feedback(self) -> Iterator[Feedback]:
-        """Feedback as it comes, until the connection ends."""
+        """Yield feedback as it arrives, until the connection ends."""
         return self._each(self._client.feedback())
 
     def until_end(self, block: str | None = None) -> Iterator[Feedback]:
-        """Feedback up to the end (or the refusal) of a block: by default the last one that was sent."""
+        """Yield feedback up to the end, or the refusal, of a block: by default of the last one sent."""
         return self._each(self._client.until_end(block))
 
     def frames(self, stream: str) -> Iterator[Frame]:
-        """Frames of a stream as they come, until the connection ends."""
+        """Yield frames of a stream as they arrive, until the connection ends."""
         return self._each(self._client.frames(stream))
 
     def film(self, path: str | Path, bml: str, *, fps: float = 25, **look: Any) -> BlockProgress:
@@ -107,11 +107,11 @@ class SyncClient:
         return self._do(self._client.film(path, bml, fps=fps, **look))
 
     def close(self) -> None:
-        """Say goodbye. Once more does nothing."""
+        """Close the connection. Closing again does nothing."""
         if self._loop.is_closed():
             return
         try:
-            self._do(_left(self._opening, None))
+            self._do(_exit(self._opening, None))
             self._do(self._loop.shutdown_asyncgens())
         finally:
             self._end()
@@ -136,10 +136,10 @@ async def _next(items: AsyncIterator[T]) -> T | None:
     return await anext(items, None)
 
 
-async def _entered(manager: AbstractAsyncContextManager[T]) -> T:
+async def _enter(manager: AbstractAsyncContextManager[T]) -> T:
     return await manager.__aenter__()
 
 
-async def _left(manager: AbstractAsyncContextManager[Any], error: BaseException | None) -> None:
+async def _exit(manager: AbstractAsyncContextManager[Any], error: BaseException | None) -> None:
     trace = None if error is None else error.__traceback__
     await manager.__aexit__(None if error is None else type(error), error, trace)
