@@ -1,1 +1,1 @@
-"""Batch realization: many documents to outputs and a manifest; done work is not repeated."""
+"""Batch realization: outputs and a manifest of many documents; a later run skips what is done."""

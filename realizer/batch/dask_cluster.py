@@ -13,14 +13,14 @@ from realizer.core.errors import RealizerError
 
 log = logging.getLogger(__name__)
 
-AHEAD = 4  # tasks a worker has waiting, so that it never waits for us; their outcomes must fit in memory
-PATIENCE = 20.0  # s to find the scheduler
+AHEAD = 4  # queued tasks a thread, so that no worker is idle; their outcomes must fit in memory
+PATIENCE = 20.0  # s to connect to the scheduler
 
 
 class DaskCluster:
-    """The workers of a scheduler; they need the same realizer, face and files at the same places.
+    """The workers of a Dask scheduler, which need the same realizer, face and files in the same places.
 
-    A task whose worker dies is given to another one by the scheduler itself.
+    The scheduler gives a task whose worker dies to another one.
 
     Args:
         options: how documents are played.
@@ -40,14 +40,13 @@ class DaskCluster:
         self.options = options
         self._address = address
         try:
-            # Its functions have no types.
-            self._dask: Any = distributed
+            self._dask: Any = distributed  # which is not typed
             self._client = self._dask.Client(address, timeout=PATIENCE)
         except (OSError, ValueError) as error:
             raise RealizerError(f"--dask {address}: wanted a Dask scheduler there: {error}") from None
 
     def perform(self, tasks: Iterable[Task]) -> Iterator[Outcome]:
-        """The outcome of each task, as they come.
+        """Yield the outcome of each task as it arrives.
 
         Raises:
             RealizerError: the scheduler is gone.
@@ -63,16 +62,16 @@ class DaskCluster:
 
         threads = sum(self._client.nthreads().values())
         if not threads:
-            log.warning("--dask %s: it has no worker yet, one is waited for", self._address)
+            log.warning("--dask %s: waiting for a worker, it has none yet", self._address)
         completed = self._dask.as_completed(
             [submit(task) for task in islice(source, AHEAD * max(1, threads))]
         )
         for future in completed:
             task = waiting.pop(future)
-            if future.cancelled():  # nobody else does that
+            if future.cancelled():  # only by the loss of the scheduler
                 raise RealizerError(
-                    f"--dask {self._address}: the scheduler went away; the same command plays what is left, "
-                    "where one is there again"
+                    f"--dask {self._address}: the scheduler is gone; the same command plays what is left, "
+                    "once there is one again"
                 )
             error = future.exception()
             outcome = future.result() if error is None else failure(task, f"{type(error).__name__}: {error}")
@@ -82,5 +81,5 @@ class DaskCluster:
             yield outcome
 
     def close(self) -> None:
-        """Leave the scheduler; what still waits there is cancelled."""
+        """Disconnect from the scheduler, which cancels what is queued."""
         self._client.close()

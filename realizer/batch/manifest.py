@@ -1,4 +1,4 @@
-"""The manifest: the result of each document as a JSON line; it survives a crash."""
+"""The manifest: a JSON line with the result of each document, which survives a crash."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ class BusyError(RealizerError):
 
 
 class Manifest:
-    """What is known of the documents of a folder. `with` it open, one process alone may write.
+    """The manifest of a folder of outputs. One process may write it, inside `with manifest.open()`.
 
-    A row is `{"document", "key", "status", "outputs": {suffix: {"file", "bytes", "sha256"}}, ...}`; its
-    status is "done", "refused" (a document or block had nothing to play; outputs show what was left, if
-    anything was) or "failed" (there are none; "error" says why). Nothing in it depends on when, where or in
-    which order it was made.
+    A row is `{"document", "key", "status", "outputs": {suffix: {"file", "bytes", "sha256"}}, ...}`. Its
+    status is "done", "refused" (a document or block could not be played; the outputs show the rest, if there
+    is any) or "failed" (no outputs; "error" says why). Rows do not depend on when, where and in which order
+    they were made.
 
     Args:
-        folder: where the outputs lie.
+        folder: of the outputs.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -42,7 +42,7 @@ class Manifest:
 
     @contextmanager
     def open(self) -> Iterator[Manifest]:
-        """Read what is there, add to it, and write it in order of the documents at the end.
+        """Read the rows, append to them, and sort them by document at the end.
 
         Raises:
             BusyError: another batch writes here.
@@ -51,7 +51,7 @@ class Manifest:
         with _exclusive(self.folder / LOCK):
             self._rows = {row["document"]: row for row in _read(self.path)}
             self._file = self.path.open("a", encoding="utf-8")
-            # A line that a crash cut short is ended, so that the next one stands by itself.
+            # End a line that a crash has cut short.
             if self.path.stat().st_size and not self.path.read_bytes().endswith(b"\n"):
                 self._file.write("\n")
             try:
@@ -61,14 +61,17 @@ class Manifest:
                 write_text(self.path, "".join(_line(self._rows[name]) for name in sorted(self._rows)))
 
     def is_done(self, name: str, key: str) -> Row | None:
-        """The row of a document that need not be played again: same key, not failed, outputs as they were."""
+        """Return the row of a document that need not be played again, or None.
+
+        It has the same key and has not failed, and its outputs are unchanged.
+        """
         row = self._rows.get(name)
         if row is None or row["key"] != key or row["status"] == "failed":
             return None
         return row if all(self._is_unchanged(output) for output in row["outputs"].values()) else None
 
     def add(self, row: Row) -> None:
-        """Keep a row; it is in the file when this returns."""
+        """Add a row; it is in the file when this returns."""
         assert self._file is not None
         self._rows[row["document"]] = row
         self._file.write(_line(row))
@@ -87,7 +90,7 @@ def _line(row: Row) -> str:
 
 
 def _read(path: Path) -> Iterator[Row]:
-    """The rows of a file; what is no row, such as a line that was cut short, is left out."""
+    """Yield the rows of a file, without invalid ones such as a line that was cut short."""
     try:
         lines = path.read_text("utf-8", "replace").splitlines()
     except FileNotFoundError:
@@ -103,10 +106,10 @@ def _read(path: Path) -> Iterator[Row]:
 
 @contextmanager
 def _exclusive(path: Path) -> Iterator[None]:
-    """One process at a time; the lock goes with the process that holds it, however that ends."""
+    """Hold an exclusive lock, which also ends with the process."""
     try:
         import fcntl
-    except ImportError:  # elsewhere than on POSIX nobody watches
+    except ImportError:  # not POSIX: without a lock
         yield
         return
     with path.open("w") as lock:

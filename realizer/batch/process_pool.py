@@ -1,4 +1,7 @@
-"""Execution of tasks by local processes, which are replaced when they die."""
+"""Execution of tasks by local processes, which are replaced when they die.
+
+`concurrent.futures` does not fit: one dead process breaks its whole pool, and a task cannot be ended.
+"""
 
 from __future__ import annotations
 
@@ -15,13 +18,13 @@ from typing import Any
 from realizer.batch.task import Options, Task
 from realizer.batch.worker import Outcome, Worker, failure
 
-TRIES = 3  # a document that ends its process so often is the reason for it
-# A process a core is the rule: libraries that start threads of their own would only be in each other's way.
-ALONE = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+TRIES = 3  # a task whose process has died so often fails
+# There is a process for each core: libraries that start threads as well would only slow each other down.
+SINGLE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 class ProcessPool:
-    """Workers that are started fresh (spawned, not forked), one task at a time each.
+    """A pool of spawned worker processes, which run one task at a time.
 
     Args:
         options: how documents are played.
@@ -35,59 +38,60 @@ class ProcessPool:
 
     @property
     def pids(self) -> tuple[int, ...]:
-        """The processes that are there."""
-        return tuple(member.pid for member in self._workers)
+        """The ids of the running processes."""
+        return tuple(worker.pid for worker in self._workers)
 
     def perform(self, tasks: Iterable[Task]) -> Iterator[Outcome]:
-        """The outcome of each task, as they come. A task whose process dies is given to another one."""
-        source = iter(tasks)
-        again: deque[tuple[Task, int]] = deque()
+        """Yield the outcome of each task as it arrives. A task whose process dies is repeated."""
+        source = ((task, 1) for task in tasks)
+        retries: deque[tuple[Task, int]] = deque()
 
-        def following() -> tuple[Task, int] | None:
-            if again:
-                return again.popleft()
-            task = next(source, None)
-            return None if task is None else (task, 1)
+        def next_work() -> tuple[Task, int] | None:
+            return retries.popleft() if retries else next(source, None)
 
         try:
-            while len(self._workers) < self.count and (work := following()) is not None:
+            while len(self._workers) < self.count and (work := next_work()) is not None:
                 self._workers.append(_WorkerProcess(self.options))
-                self._workers[-1].send(*work)
-            while busy := {member.pipe: member for member in self._workers if member.work is not None}:
+                self._workers[-1].send(work)
+            while busy := {worker.pipe: worker for worker in self._workers if worker.work is not None}:
                 for pipe in wait(list(busy)):
-                    member = busy[pipe]  # type: ignore[index]
-                    task, tried = member.take_back()
-                    outcome = member.answer()
+                    worker = busy[pipe]  # type: ignore[index]
+                    task, tries = work = worker.work
+                    outcome = worker.receive()
                     if outcome is None:
-                        code = member.end()
-                        self._workers[self._workers.index(member)] = member = _WorkerProcess(self.options)
-                        if tried < TRIES:
-                            again.append((task, tried + 1))
+                        code = worker.end()
+                        self._workers[self._workers.index(worker)] = worker = _WorkerProcess(self.options)
+                        if tries < TRIES:
+                            retries.append((task, tries + 1))
                         else:
                             words = f"its process ended {TRIES} times (exit status {code})"
                             outcome = failure(task, words)
-                    if (work := following()) is not None:
-                        member.send(*work)
+                    if (work := next_work()) is not None:
+                        worker.send(work)
                     if outcome is not None:
                         yield outcome
         finally:
             self.close()
 
     def close(self) -> None:
-        """End the workers, also in the middle of a task."""
-        for member in self._workers:
-            member.end()
+        """End the processes, also in the middle of a task."""
+        for worker in self._workers:
+            worker.end()
         self._workers.clear()
 
 
 class _WorkerProcess:
-    """One worker process and what it is at."""
+    """A worker process.
+
+    Attributes:
+        work: its task, and how often that has been tried; None while it is idle.
+    """
 
     def __init__(self, options: Options) -> None:
         context = get_context("spawn")
         self.pipe, theirs = context.Pipe()
         self._process: SpawnProcess = context.Process(target=_serve, args=(theirs, options), daemon=True)
-        before = {name: os.environ.get(name) for name in ALONE}
+        before = {name: os.environ.get(name) for name in SINGLE_THREAD}
         os.environ.update({name: value or "1" for name, value in before.items()})
         try:
             self._process.start()
@@ -103,18 +107,14 @@ class _WorkerProcess:
         assert self._process.pid is not None
         return self._process.pid
 
-    def send(self, task: Task, tried: int) -> None:
-        self.work = task, tried
-        with contextlib.suppress(OSError):  # it is dead; its answer says so
-            self.pipe.send(task)
+    def send(self, work: tuple[Task, int]) -> None:
+        self.work = work
+        with contextlib.suppress(OSError):  # it has died: `receive` returns None
+            self.pipe.send(work[0])
 
-    def take_back(self) -> tuple[Task, int]:
-        assert self.work is not None
-        work, self.work = self.work, None
-        return work
-
-    def answer(self) -> Outcome | None:
-        """None where it died."""
+    def receive(self) -> Outcome | None:
+        """Return the outcome of the task, or None if the process has died."""
+        self.work = None
         try:
             outcome: Outcome = self.pipe.recv()
         except (EOFError, OSError):
@@ -122,7 +122,7 @@ class _WorkerProcess:
         return outcome
 
     def end(self) -> int | None:
-        """Its exit status: it is told to go, and made to where it does not."""
+        """End the process, kill it if that takes too long, and return its exit status."""
         self.pipe.close()
         self._process.join(0 if self.work is not None else 2)
         if self._process.is_alive():
@@ -132,8 +132,8 @@ class _WorkerProcess:
 
 
 def _serve(pipe: Connection[Any, Any], options: Options) -> None:
-    """What a worker does until nobody is at the other end any more."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that asked
+    """Run tasks in a worker process until the pipe is closed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
     worker = Worker(options)
     try:
         while True:

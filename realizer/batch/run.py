@@ -1,4 +1,4 @@
-"""The batch run: documents to outputs and a manifest."""
+"""The batch run: plays documents and writes their outputs and the manifest."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ from realizer.core.atomic_files import write_bytes
 
 
 class Workers(Protocol):
-    """Whoever plays documents: `ProcessPool` or a `DaskCluster`."""
+    """A `ProcessPool` or a `DaskCluster`."""
 
     def perform(self, tasks: Iterable[Task]) -> Iterator[Outcome]:
-        """The outcome of each task, in any order."""
+        """Yield the outcome of each task, in any order."""
         ...
 
     def close(self) -> None:
-        """Let go of the workers."""
+        """End the workers, or disconnect from them."""
         ...
 
 
 def batch(
     documents: Iterable[Document], folder: Path, options: Options, workers: Workers
 ) -> Iterator[tuple[Row, bool]]:
-    """Play what was not played yet; (row of the manifest, whether it was there already) for each document.
+    """Play the documents that have no valid outputs yet. Yield (row of the manifest, whether it was skipped).
 
-    What comes of a document is written first and told of in the manifest then: a crash in between costs that
-    document's time and nothing else.
+    The outputs of a document are written before its row, so that a crash in between only costs the time to
+    play it again.
 
     Raises:
         BusyError: another batch writes to that folder.
-        FaceError: no such face.
+        FaceError: there is no such face.
         OSError: an output cannot be written.
     """
     mark = fingerprint(options)
@@ -60,7 +60,7 @@ def batch(
 
 
 def _tasks(documents: Iterable[Document], mark: str, unread: list[Outcome]) -> Iterator[Task]:
-    """The documents as tasks, read as they are wanted; what cannot be read is one more that failed."""
+    """Yield the documents as tasks, reading them lazily; add those that cannot be read to `unread`."""
     for document in documents:
         try:
             text = document.path.read_bytes()

@@ -1,4 +1,4 @@
-"""A task: a document, its options and the key of its result; same key, same bytes."""
+"""A task: a document and the key of its outputs. Outputs with the same key have the same bytes."""
 
 from __future__ import annotations
 
@@ -13,16 +13,15 @@ import bml_schema
 import realizer
 from realizer.core.options import PlayOptions
 
-# What decides about bytes beside our own files, where it is installed: voices, and what encodes.
-# Parts of our packages that no output is made by.
+# Parts of our packages that do not affect outputs.
 APART = {"static", "web", "_faces", "server", "cli", "batch"}
+# Other packages that do, if they are installed: voices and encoders.
 ENGINES = ("av", "espeakng-loader", "hibari-tts", "numpy", "pillow")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options(PlayOptions):
-    """How all documents of a batch are played and drawn, as `RenderSettings` takes it; `formats` are
-    suffixes."""
+    """How all documents of a batch are played and drawn; see `RenderSettings`. `formats` are suffixes."""
 
     formats: tuple[str, ...]
     voice: str
@@ -33,27 +32,27 @@ class Options(PlayOptions):
 
     @property
     def files(self) -> dict[str, Path]:
-        """The files and folders that are named, by option: what is in them counts, not where they lie."""
-        named = {"media": self.media, "expressions": self.expressions, "mapping": self.mapping}
+        """The files and folders by option: their content is part of the key, not their path."""
+        paths = {"media": self.media, "expressions": self.expressions, "mapping": self.mapping}
         if self.cooccurrence not in ("on", "off"):
-            named["cooccurrence"] = Path(self.cooccurrence)
-        return {option: path for option, path in named.items() if path is not None}
+            paths["cooccurrence"] = Path(self.cooccurrence)
+        return {option: path for option, path in paths.items() if path is not None}
 
     def to_json(self) -> str:
-        """All but the files, as JSON."""
+        """Return all options but the files as JSON."""
         values = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in self.files}
         return json.dumps(values, sort_keys=True)
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One document to play.
+    """A document to play.
 
     Attributes:
         name: of the document.
-        key: of what comes out.
+        key: of its outputs.
         text: the document.
-        fingerprint: of the options, the program and its tables, where the key was made.
+        fingerprint: as `fingerprint` returned it where the task was made.
     """
 
     name: str
@@ -63,12 +62,12 @@ class Task:
 
 
 def fingerprint(options: Options) -> str:
-    """Of everything but the document that decides about the bytes of an output, 64 hexadecimal digits.
+    """Return a digest of all that affects outputs beside the document, 64 hexadecimal digits.
 
-    The options, the files they name, the program with its tables, the face, and the versions of engines.
+    That are the options and their files, the program with its tables, the face, and the versions of engines.
 
     Raises:
-        FaceError: no such face.
+        FaceError: there is no such face.
         OSError: a file cannot be read.
     """
     from realizer.face.load import folder_of
@@ -90,7 +89,7 @@ def fingerprint(options: Options) -> str:
 
 
 def key_of(text: bytes, mark: str) -> str:
-    """The key of a document that is played where the fingerprint is `mark`, 64 hexadecimal digits."""
+    """Return the key of a document for the fingerprint `mark`, 64 hexadecimal digits."""
     return hashlib.sha256(mark.encode() + b"\n" + text).hexdigest()
 
 
@@ -99,7 +98,7 @@ def _inside(path: Path) -> Iterator[Path]:
 
 
 def _add(digest: hashlib._Hash, root: Path, files: Iterator[Path]) -> None:
-    """The names and contents of files, in order of their names below the root."""
+    """Add the names and contents of files, in order of their names below the root."""
     for path in sorted(files):
         content = path.read_bytes()
         digest.update(f"{path.relative_to(root).as_posix()} {len(content)}\n".encode())

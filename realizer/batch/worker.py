@@ -1,4 +1,4 @@
-"""The worker of tasks: outputs and a manifest row for each, the same wherever it runs."""
+"""The worker of tasks, which makes the outputs and the manifest row of each, on any machine the same."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from realizer.speech.utterance import SpeechRequest, Utterance, Voice
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What came of a task.
+    """The outcome of a task.
 
     Attributes:
         row: of the manifest.
@@ -32,18 +32,18 @@ class Outcome:
 
 
 def failure(task: Task, error: str) -> Outcome:
-    """A task without outputs, and why."""
+    """Return the outcome of a task that failed."""
     return Outcome(
         {"document": task.name, "key": task.key, "status": "failed", "error": error, "outputs": {}}
     )
 
 
 class SpeechFailedError(RealizerError):
-    """The voice failed twice. Not a VoiceError, after which a document would be played in silence."""
+    """The voice failed twice. It is no VoiceError, after which a document would be played in silence."""
 
 
 class _Speaker:
-    """A voice that starts when it is needed, and is asked again when its engine died."""
+    """A voice that starts on first use, and repeats a request when its engine has died."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -73,7 +73,7 @@ class _Speaker:
 
 
 class _PersistentRenderer(Renderer):
-    """A renderer that outlives the films it draws: its process takes longer to start than many films."""
+    """A renderer that stays open between films: starting its process takes longer than many films."""
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -82,21 +82,21 @@ class _PersistentRenderer(Renderer):
 
 
 class Worker:
-    """Plays tasks one after the other, with one voice and one drawing process for each size of picture."""
+    """A worker that plays tasks one by one, with one voice and a renderer for each size of picture."""
 
     def __init__(self, options: Options) -> None:
         self.options = options
         self._speaker = _Speaker(options.voice)
         self._renderers: dict[tuple[tuple[int, int], bool], Renderer] = {}
-        self._drawings: dict[str, RenderSettings] = {}
+        self._render_settings: dict[str, RenderSettings] = {}
 
     def perform(self, task: Task) -> Outcome:
-        """Never raises for what is wrong with the document, or while it is played: then the row says so."""
+        """Play a task. Errors of the document, or while it is played, are in the row."""
         try:
             realization = play([task.text], self.options, self._speaker)
             suffixes = self.options.formats if realization.has_content else ()
             files = {
-                f"{task.name}{suffix}": OUTPUTS[suffix].encode(realization, self._drawing(suffix))
+                f"{task.name}{suffix}": OUTPUTS[suffix].encode(realization, self._settings_for(suffix))
                 for suffix in suffixes
             }
         except Exception as error:
@@ -119,28 +119,28 @@ class Worker:
 
     @property
     def voice_pid(self) -> int | None:
-        """The voice's process, where it has one that runs."""
+        """The id of the voice's process, or None."""
         return self._speaker.pid
 
     @property
     def drawing_pids(self) -> tuple[int, ...]:
-        """What draws, and runs."""
+        """The ids of the renderers' processes."""
         return tuple(renderer.pid for renderer in self._renderers.values() if renderer.pid is not None)
 
     def close(self) -> None:
-        """End the voice and what draws."""
+        """Close the voice and the renderers."""
         self._speaker.close()
         for renderer in self._renderers.values():
             renderer.close()
 
-    def _drawing(self, suffix: str) -> RenderSettings:
-        """How that output is drawn, by a process that stays."""
-        if suffix not in self._drawings:
+    def _settings_for(self, suffix: str) -> RenderSettings:
+        """Return the settings of an output, with a renderer that stays open."""
+        if suffix not in self._render_settings:
             o = self.options
-            drawing = RenderSettings(o.size, o.camera, light=o.light, background=o.background)
-            draws = OUTPUTS[suffix].picture_size
-            if draws is not None:
-                size, alpha = draws(drawing)
+            settings = RenderSettings(o.size, o.camera, light=o.light, background=o.background)
+            picture_size = OUTPUTS[suffix].picture_size
+            if picture_size is not None:
+                size, alpha = picture_size(settings)
                 if (size, alpha) not in self._renderers:
                     self._renderers[size, alpha] = _PersistentRenderer(
                         o.face,
@@ -151,28 +151,28 @@ class Worker:
                         alpha=alpha,
                         deformer=o.deformer,
                     )
-                drawing = replace(drawing, renderer=self._renderers[size, alpha])
-            self._drawings[suffix] = drawing
-        return self._drawings[suffix]
+                settings = replace(settings, renderer=self._renderers[size, alpha])
+            self._render_settings[suffix] = settings
+        return self._render_settings[suffix]
 
 
-# One worker a process, and one task at a time in it: where several threads ask, they wait for each other.
-_HERE: list[tuple[Worker, str]] = []
-_TURN = threading.Lock()
+# The worker of this process with its fingerprint. It does one task at a time, for several threads as well.
+_worker: list[tuple[Worker, str]] = []
+_LOCK = threading.Lock()
 
 
 def perform(options: Options, task: Task) -> Outcome:
-    """Do a task in this process, which may be on another machine than the one that made it."""
-    with _TURN:
-        if not _HERE or _HERE[0][0].options != options:
-            for worker, _ in _HERE:
+    """Do a task in this process, which may be on another machine than the one that made the task."""
+    with _LOCK:
+        if not _worker or _worker[0][0].options != options:
+            for worker, _ in _worker:
                 worker.close()
-            _HERE[:] = [(Worker(options), fingerprint(options))]
-        worker, here = _HERE[0]
-        if here != task.fingerprint:
+            _worker[:] = [(Worker(options), fingerprint(options))]
+        worker, mark = _worker[0]
+        if mark != task.fingerprint:
             return failure(
                 task,
                 f"the machine that played it has another realizer, face, voice or file: fingerprint "
-                f"{here[:12]}, wanted {task.fingerprint[:12]}; install the same there",
+                f"{mark[:12]}, wanted {task.fingerprint[:12]}; install the same there",
             )
         return worker.perform(task)
