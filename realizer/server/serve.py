@@ -1,4 +1,4 @@
-"""The service: opens the transports, prints where they are, drains and ends."""
+"""The service: opens the transports, prints their addresses, drains and ends."""
 
 from __future__ import annotations
 
@@ -22,18 +22,17 @@ from realizer.server.transports import registry
 from realizer.server.transports.transport import Transport
 from realizer.server.transports.websocket.server import WebSocketTransport, startup_lines
 
-# How often the drain looks whether everything has ended.
-DRAIN_STEP = 0.05  # s
+DRAIN_STEP = 0.05  # s; how often the drain checks whether everything has ended
 
 
 async def serve(settings: Settings | None = None) -> None:
-    """Serve until SIGINT or SIGTERM; then take no more work, give what plays `settings.drain` s, and end.
+    """Serve until SIGINT or SIGTERM; then refuse documents, wait `settings.drain` s for what plays, and end.
 
-    Prints the lines of each door when it is ready. With `settings.workers` > 1 that many processes serve.
+    Print the addresses of each transport when it is ready. `settings.workers` > 1 starts as many processes.
 
     Raises:
-        OSError: an address cannot be had.
-        RealizerError: something that was asked for is not there, or a worker lacks something.
+        OSError: an address is not available.
+        RealizerError: something that the settings name is missing, or a worker cannot start.
     """
     settings = settings or Settings()
     if settings.log == "json":
@@ -41,10 +40,10 @@ async def serve(settings: Settings | None = None) -> None:
     if settings.workers > 1:
         with _bind_errors(settings):
             workers = await Workers(settings, run_worker).start()
-        asked = _wait_for_signal(signal.SIGINT, signal.SIGTERM)
+        ending = _wait_for_signal(signal.SIGINT, signal.SIGTERM)
         try:
             print(*startup_lines(settings, workers.port), sep="\n", flush=True)
-            await asked
+            await ending
         finally:
             await workers.close()
         return
@@ -55,7 +54,7 @@ async def serve(settings: Settings | None = None) -> None:
 
 @contextlib.contextmanager
 def _bind_errors(settings: Settings) -> Iterator[None]:
-    """A name that no machine has, as what it is."""
+    """Report a host name that does not exist as an error of the setting."""
     try:
         yield
     except socket.gaierror as error:
@@ -64,16 +63,16 @@ def _bind_errors(settings: Settings) -> Iterator[None]:
 
 
 async def work(settings: Settings, number: int, control: socket.socket) -> None:
-    """Serve as worker `number`, what comes through `control`, until SIGTERM or until the parent is gone."""
+    """Serve as a worker the connections that arrive through `control`, until SIGTERM or the parent's end."""
     if settings.log == "json":
         write_json()
     loop = asyncio.get_running_loop()
     try:
         server = await Server(settings, worker=number).start()
-    except (RealizerError, OSError, ValueError) as error:  # the parent says it, once
+    except (RealizerError, OSError, ValueError) as error:  # the parent reports it
         await loop.sock_sendall(control, FAULT + str(error).encode())
         return
-    # Before READY: the parent may ask a worker that is ready to end.
+    # Before READY, because the parent may terminate a worker that is ready.
     ending = _wait_for_signal(signal.SIGTERM)
 
     def take() -> None:
@@ -98,32 +97,32 @@ def run_worker(settings: Settings, number: int, control: socket.socket) -> None:
     run(work(settings, number, control))
 
 
-async def _serve(server: Server, asked: Awaitable[None]) -> None:
+async def _serve(server: Server, ending: Awaitable[None]) -> None:
     disable_automatic_gc()
-    telling = [asyncio.create_task(_print_lines(transport)) for transport in server.transports]
+    printing = [asyncio.create_task(_print_lines(transport)) for transport in server.transports]
     try:
-        await asked
+        await ending
         await server.drain()
     finally:
-        for task in telling:
+        for task in printing:
             task.cancel()
         await server.close()
 
 
 def _wait_for_signal(*signals: signal.Signals) -> asyncio.Future[None]:
-    """Return a future that is done once one of these signals has come; another one ends the process."""
+    """Return a future that is done when one of these signals has come; a second one ends the process."""
     loop = asyncio.get_running_loop()
-    come: asyncio.Future[None] = loop.create_future()
+    received: asyncio.Future[None] = loop.create_future()
 
-    def take() -> None:
+    def handle() -> None:
         for number in signals:
             loop.remove_signal_handler(number)
-        if not come.done():
-            come.set_result(None)
+        if not received.done():
+            received.set_result(None)
 
     for number in signals:
-        loop.add_signal_handler(number, take)
-    return come
+        loop.add_signal_handler(number, handle)
+    return received
 
 
 async def _print_lines(transport: Transport) -> None:
@@ -133,8 +132,8 @@ async def _print_lines(transport: Transport) -> None:
 
 
 def run(service: Coroutine[None, None, None]) -> None:
-    """Run `serve` or `work` in an event loop of its own: uvloop's where it is installed."""
-    _allow_files()
+    """Run `serve` or `work` in a new event loop, that of uvloop if it is installed."""
+    _raise_file_limit()
     try:
         import uvloop
     except ImportError:
@@ -144,8 +143,8 @@ def run(service: Coroutine[None, None, None]) -> None:
             runner.run(service)
 
 
-def _allow_files() -> None:
-    """A WebSocket is an open file: let there be as many as the system allows, which begins with fewer."""
+def _raise_file_limit() -> None:
+    """Raise the limit of open files, of which each WebSocket is one, to the system's maximum."""
     try:
         import resource
     except ImportError:  # Windows has no such limit
@@ -158,12 +157,11 @@ def _allow_files() -> None:
 class Server:
     """The service inside an event loop: `start`, then `close`; or `async with Server(settings) as server`.
 
+    Args:
+        worker: number of this process among several: then connections come by `serve_socket` only.
+
     Attributes:
         transports: the open ones; the WebSocket is the first.
-
-    Args:
-        worker: the number of this one among several; then connections are only those it is told to
-            `serve_socket`.
     """
 
     def __init__(self, settings: Settings | None = None, worker: int | None = None) -> None:
@@ -175,40 +173,39 @@ class Server:
 
     @property
     def port(self) -> int:
-        """Of the WebSocket and the page."""
+        """The port of the WebSocket and the page."""
         return self._web.port
 
     @property
     def url(self) -> str:
-        """Where BML goes."""
+        """The address of the WebSocket."""
         return self._web.url
 
     @property
     def page(self) -> str:
-        """The page's address."""
+        """The address of the page."""
         return self._web.page
 
     async def start(self) -> Server:
-        """Open the doors; `port` is then the one that is open.
+        """Open the transports; `port` is then the open port.
 
         Raises:
-            OSError: an address cannot be had.
+            OSError: an address is not available.
             ValueError: the scene file is not a scene.
-            FaceError: no such face.
-            RealizerError: a door needs something that is not installed.
+            FaceError: there is no such face.
+            RealizerError: a transport needs a package that is not installed.
         """
         await self._sessions.start()
         try:
-            made = (make(self._sessions, self.settings) for make in registry.requested(self.settings))
-            for transport in (self._web, *made):
+            others = (make(self._sessions, self.settings) for make in registry.requested(self.settings))
+            for transport in (self._web, *others):
                 if transport is not None:
                     await transport.start()
                     self.transports.append(transport)
         except BaseException:
             await self.close()
             raise
-        # What large blocks and the stream arkit need is loaded while the first clients come, not while the
-        # event loop waits for it.
+        # In a thread now, not in the event loop when the first large block or arkit client comes.
         asyncio.get_running_loop().run_in_executor(None, _warm_up, self.settings)
         return self
 
@@ -217,7 +214,7 @@ class Server:
         self._web.serve_socket(client)
 
     async def drain(self) -> None:
-        """Take no more connections and documents; wait for what plays, at most `settings.drain` seconds."""
+        """Refuse connections and documents, and wait at most `settings.drain` seconds for what plays."""
         self._sessions.stop_accepting()
         for transport in self.transports:
             transport.stop_accepting()
@@ -227,7 +224,7 @@ class Server:
                     await asyncio.sleep(DRAIN_STEP)
 
     async def close(self) -> None:
-        """End every connection and every engine."""
+        """Close all connections and engines."""
         if self._closed.is_set():
             return
         try:
@@ -237,7 +234,7 @@ class Server:
             self._closed.set()
 
     async def wait_closed(self) -> None:
-        """Wait until somebody calls `close`."""
+        """Wait until `close` has ended."""
         await self._closed.wait()
 
     async def __aenter__(self) -> Server:
@@ -250,6 +247,6 @@ class Server:
 
 
 def _warm_up(settings: Settings) -> None:
-    """Load what is loaded once for all sessions and takes long enough to delay frames."""
+    """Load what all sessions share and what takes so long that it would delay frames."""
     warm_up()
     arkit.warm_up(mapping_of(settings.face, settings.mapping))
