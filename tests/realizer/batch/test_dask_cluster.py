@@ -65,7 +65,7 @@ def by_name(outcomes: list[Outcome]) -> dict[str, Outcome]:
 
 
 @pytest.mark.slow
-def test_a_cluster_gives_what_one_worker_gives_here_though_one_of_its_workers_is_killed(
+def test_cluster_gives_the_outputs_of_one_worker_although_one_is_killed(
     scheduler: str, workers: list[subprocess.Popen[str]], tasks: list[Task], options: Options
 ) -> None:
     here = Worker(options)
@@ -82,7 +82,7 @@ def test_a_cluster_gives_what_one_worker_gives_here_though_one_of_its_workers_is
     assert by_name(got) == expected
 
 
-def test_a_scheduler_that_is_killed_is_told_in_words(tasks: list[Task], options: Options) -> None:
+def test_cluster_names_the_loss_of_its_scheduler(tasks: list[Task], options: Options) -> None:
     scheduler = start("scheduler", "--host", "127.0.0.1", "--port", "0")
 
     def given() -> Iterator[Task]:
@@ -93,19 +93,21 @@ def test_a_scheduler_that_is_killed_is_told_in_words(tasks: list[Task], options:
 
     crew = DaskCluster(options, said(scheduler, "Scheduler at:").split()[-1])
     try:
-        with pytest.raises(RealizerError, match="the scheduler went away"):
+        with pytest.raises(RealizerError, match="the scheduler is gone"):
             list(crew.perform(given()))
     finally:
         crew.close()
 
 
-def test_an_address_without_a_scheduler_is_told(options: Options, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cluster_names_an_address_without_a_scheduler(
+    options: Options, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("realizer.batch.dask_cluster.PATIENCE", 0.2)
     with pytest.raises(RealizerError, match="wanted a Dask scheduler there"):
         DaskCluster(options, "tcp://127.0.0.1:9")
 
 
-def test_who_waits_for_the_first_worker_is_told(
+def test_cluster_warns_that_it_waits_for_a_worker(
     scheduler: str, options: Options, caplog: pytest.LogCaptureFixture
 ) -> None:
     cluster = DaskCluster(options, scheduler)

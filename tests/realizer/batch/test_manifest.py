@@ -18,7 +18,7 @@ def row(name: str, status: str = "done", content: bytes = b"") -> dict[str, Any]
     return {"document": name, "key": f"key of {name}", "status": status, "outputs": outputs}
 
 
-def test_rows_are_in_the_file_at_once_and_in_order_of_documents_at_the_end(tmp_path: Path) -> None:
+def test_manifest_writes_rows_at_once_and_sorts_them_at_the_end(tmp_path: Path) -> None:
     with Manifest(tmp_path).open() as manifest:
         for name in "ba":
             manifest.add(row(name))
@@ -26,7 +26,7 @@ def test_rows_are_in_the_file_at_once_and_in_order_of_documents_at_the_end(tmp_p
     assert [json.loads(line)["document"] for line in manifest.path.read_text().splitlines()] == ["a", "b"]
 
 
-def test_a_line_that_a_crash_cut_short_costs_that_row_alone(tmp_path: Path) -> None:
+def test_manifest_loses_only_the_line_that_a_crash_cut_short(tmp_path: Path) -> None:
     lines = [json.dumps(row(name)) for name in "abc"]
     (tmp_path / NAME).write_text("\n".join(lines)[:-20])
     with Manifest(tmp_path).open() as manifest:
@@ -42,7 +42,7 @@ def test_a_line_that_a_crash_cut_short_costs_that_row_alone(tmp_path: Path) -> N
         ]
 
 
-def test_only_what_is_still_as_it_was_written_is_there(tmp_path: Path) -> None:
+def test_manifest_is_done_only_for_unchanged_outputs(tmp_path: Path) -> None:
     with Manifest(tmp_path).open() as manifest:
         (tmp_path / "a.fap").write_bytes(b"face")
         manifest.add(row("a", content=b"face"))
@@ -54,7 +54,7 @@ def test_only_what_is_still_as_it_was_written_is_there(tmp_path: Path) -> None:
         assert not manifest.is_done("a", "key of a")
 
 
-def test_what_failed_is_tried_again_and_what_was_refused_is_not(tmp_path: Path) -> None:
+def test_manifest_repeats_failed_documents_but_not_refused_ones(tmp_path: Path) -> None:
     with Manifest(tmp_path).open() as manifest:
         manifest.add(row("a", "failed"))
         manifest.add(row("b", "refused"))
@@ -62,7 +62,7 @@ def test_what_failed_is_tried_again_and_what_was_refused_is_not(tmp_path: Path) 
         assert manifest.is_done("b", "key of b")
 
 
-def test_two_batches_do_not_write_to_one_folder(tmp_path: Path) -> None:
+def test_manifest_of_a_folder_is_written_by_one_batch(tmp_path: Path) -> None:
     pytest.importorskip("fcntl")
     with (
         Manifest(tmp_path).open(),

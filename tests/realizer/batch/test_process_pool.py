@@ -26,7 +26,7 @@ def expected(tasks: list[Task], options: Options) -> dict[str, Outcome]:
     return by_name([worker.perform(task) for task in tasks])
 
 
-def test_two_workers_give_what_one_gives_here(
+def test_process_pool_gives_the_outputs_of_one_worker(
     tasks: list[Task], options: Options, expected: dict[str, Outcome]
 ) -> None:
     crew = ProcessPool(options, 2)
@@ -34,7 +34,7 @@ def test_two_workers_give_what_one_gives_here(
     assert crew.pids == ()
 
 
-def test_a_worker_that_is_killed_loses_nothing(
+def test_process_pool_loses_nothing_when_a_worker_is_killed(
     tasks: list[Task], options: Options, expected: dict[str, Outcome]
 ) -> None:
     crew = ProcessPool(options, 1)
@@ -55,7 +55,9 @@ class Deadly(Options):
 
 
 @pytest.mark.slow
-def test_a_document_whose_worker_always_dies_is_given_up(tasks: list[Task], options: Options) -> None:
+def test_process_pool_gives_up_a_document_whose_workers_always_die(
+    tasks: list[Task], options: Options
+) -> None:
     deadly = Deadly(formats=options.formats, voice=options.voice)
     outcomes = list(ProcessPool(deadly, 1).perform(tasks[:1]))
     for outcome in outcomes:
@@ -63,7 +65,7 @@ def test_a_document_whose_worker_always_dies_is_given_up(tasks: list[Task], opti
         assert outcome.row["error"] == f"its process ended {TRIES} times (exit status 3)"
 
 
-def test_workers_end_with_whoever_asked_for_them(tasks: list[Task], options: Options) -> None:
+def test_process_pool_workers_end_with_their_parent(tasks: list[Task], options: Options) -> None:
     crew = ProcessPool(options, 2)
     outcomes = crew.perform(tasks)
     next(outcomes)

@@ -42,7 +42,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
 
-def test_the_same_bytes_whatever_ran_it_and_in_whatever_order(
+def test_batch_gives_the_same_bytes_with_any_workers_in_any_order(
     talks: Path, options: Options, tmp_path: Path
 ) -> None:
     play(talks, tmp_path / "here", options)
@@ -53,7 +53,7 @@ def test_the_same_bytes_whatever_ran_it_and_in_whatever_order(
 
 
 @pytest.mark.espeak
-def test_what_is_heard_is_the_same_whatever_ran_it_and_in_whatever_order(talks: Path, tmp_path: Path) -> None:
+def test_batch_gives_the_same_sound_with_any_workers_in_any_order(talks: Path, tmp_path: Path) -> None:
     """What espeak-ng says depends on what it said before, but for the pains taken with it."""
     aloud = Options(formats=(".fap", ".wav"), voice="espeak")
     for k, words in enumerate(["Oh, hello!", "Who was that?", "Nobody at all."]):
@@ -65,7 +65,7 @@ def test_what_is_heard_is_the_same_whatever_ran_it_and_in_whatever_order(talks: 
     assert len({contents(tmp_path / "here")[f"said{k}.wav"] for k in range(3)}) == 3
 
 
-def test_an_interrupted_batch_goes_on_where_it_was(talks: Path, options: Options, tmp_path: Path) -> None:
+def test_batch_that_was_interrupted_resumes(talks: Path, options: Options, tmp_path: Path) -> None:
     play(talks, tmp_path / "whole", options)
     assert len(play(talks, tmp_path / "cut", options, most=2)) == 2
     again = dict(play(talks, tmp_path / "cut", options))
@@ -73,18 +73,14 @@ def test_an_interrupted_batch_goes_on_where_it_was(talks: Path, options: Options
     assert contents(tmp_path / "cut") == contents(tmp_path / "whole")
 
 
-def test_a_second_run_plays_nothing_and_changes_nothing(
-    talks: Path, options: Options, tmp_path: Path
-) -> None:
+def test_batch_run_again_plays_and_changes_nothing(talks: Path, options: Options, tmp_path: Path) -> None:
     play(talks, tmp_path / "out", options)
     before = contents(tmp_path / "out")
     assert all(known for _, known in play(talks, tmp_path / "out", options))
     assert contents(tmp_path / "out") == before
 
 
-def test_what_has_changed_is_played_again_and_nothing_else(
-    talks: Path, options: Options, tmp_path: Path
-) -> None:
+def test_batch_plays_again_only_what_has_changed(talks: Path, options: Options, tmp_path: Path) -> None:
     play(talks, tmp_path / "out", options)
     (talks / "2.bml").write_text('<bml id="b2"><head id="n" lexeme="SHAKE"/></bml>')
     (tmp_path / "out" / "3.fap").write_text("scribbled over")
@@ -93,7 +89,7 @@ def test_what_has_changed_is_played_again_and_nothing_else(
     assert not any(known for _, known in play(talks, tmp_path / "out", replace(options, seed=7)))
 
 
-def test_a_document_that_cannot_be_read_is_a_row_and_the_others_are_played(
+def test_batch_has_a_row_for_a_document_that_cannot_be_read(
     talks: Path, options: Options, tmp_path: Path
 ) -> None:
     (talks / "gone.bml").symlink_to(tmp_path / "nowhere")

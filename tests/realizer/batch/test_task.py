@@ -29,12 +29,14 @@ OTHER = {
 FILES = {"media", "expressions", "mapping"}
 
 
-def test_every_option_is_looked_at_below() -> None:
+def test_fingerprint_covers_every_option() -> None:
     assert {f.name for f in fields(Options)} == OTHER.keys() | FILES
 
 
 @pytest.mark.parametrize("name", OTHER)
-def test_another_option_is_another_key(name: str, options: Options, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_fingerprint_differs_with_each_option(
+    name: str, options: Options, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from realizer.face.load import list_faces
 
     value = OTHER[name]
@@ -44,7 +46,7 @@ def test_another_option_is_another_key(name: str, options: Options, monkeypatch:
 
 
 @pytest.mark.parametrize("name", sorted(FILES))
-def test_what_is_in_the_files_counts_and_not_where_they_lie(
+def test_fingerprint_depends_on_the_content_of_files_not_their_path(
     name: str, options: Options, tmp_path: Path
 ) -> None:
     marks = []
@@ -56,6 +58,6 @@ def test_what_is_in_the_files_counts_and_not_where_they_lie(
     assert marks[0] != fingerprint(options)
 
 
-def test_another_document_is_another_key() -> None:
+def test_key_of_differs_with_the_document() -> None:
     assert key_of(b"<bml/>", "m") == key_of(b"<bml/>", "m") != key_of(b"<bml />", "m")
     assert key_of(b"<bml/>", "m") != key_of(b"<bml/>", "n")

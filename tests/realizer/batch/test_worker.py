@@ -25,7 +25,7 @@ def worker(options: Options) -> Iterator[Worker]:
     worker.close()
 
 
-def test_a_document_gives_the_bytes_that_it_gives_alone(
+def test_worker_gives_the_bytes_of_a_single_realization(
     worker: Worker, tasks: list[Task], tmp_path: Path
 ) -> None:
     for task in tasks:
@@ -39,7 +39,7 @@ def test_a_document_gives_the_bytes_that_it_gives_alone(
             assert output["sha256"] == hashlib.sha256(content).hexdigest()
 
 
-def test_the_row_says_how_it_went(worker: Worker, tasks: list[Task]) -> None:
+def test_worker_row_has_the_result(worker: Worker, tasks: list[Task]) -> None:
     rows = {task.name: worker.perform(task).row for task in tasks}
     assert {name: row["status"] for name, row in rows.items()} == {
         **dict.fromkeys(["0", "1", "2", "3", "said"], "done"),
@@ -52,21 +52,23 @@ def test_the_row_says_how_it_went(worker: Worker, tasks: list[Task]) -> None:
     assert rows["0"]["dropped"] == []
 
 
-def test_the_row_names_what_was_dropped(worker: Worker, tasks: list[Task]) -> None:
+def test_worker_row_names_dropped_behaviours(worker: Worker, tasks: list[Task]) -> None:
     text = b'<bml id="b"><head id="n" lexeme="NOD"/><faceLexeme id="f" lexeme="NOPE"/></bml>'
     row = worker.perform(replace(tasks[0], text=text)).row
     assert (row["status"], row["dropped"]) == ("done", ["b:f"])
 
 
 @pytest.mark.parametrize("text", [b"", b"\xef\xbb\xbf", b"<!-- later -->", b"<bml/>"])
-def test_where_nothing_was_accepted_nothing_is_written(
+def test_worker_writes_nothing_if_no_block_was_accepted(
     text: bytes, worker: Worker, tasks: list[Task]
 ) -> None:
     outcome = worker.perform(replace(tasks[0], text=text))
     assert (outcome.row["status"], outcome.row["outputs"], outcome.files) == ("refused", {}, {})
 
 
-def test_what_cannot_be_played_is_a_row_with_the_error(tasks: list[Task], options: Options) -> None:
+def test_worker_row_has_the_error_of_a_document_that_cannot_be_played(
+    tasks: list[Task], options: Options
+) -> None:
     outcome = Worker(replace(options, face="nobody")).perform(tasks[0])
     assert outcome.row["status"] == "failed"
     assert "nobody" in outcome.row["error"]
@@ -74,7 +76,9 @@ def test_what_cannot_be_played_is_a_row_with_the_error(tasks: list[Task], option
 
 
 @pytest.mark.espeak
-def test_a_voice_that_is_killed_between_documents_costs_nothing(tasks: list[Task], options: Options) -> None:
+def test_worker_survives_a_voice_that_is_killed_between_documents(
+    tasks: list[Task], options: Options
+) -> None:
     spoken = replace(options, voice="espeak", formats=(".wav",))
     said = next(task for task in tasks if task.name == "said")
     worker = Worker(spoken)
@@ -92,7 +96,7 @@ def test_a_voice_that_is_killed_between_documents_costs_nothing(tasks: list[Task
 
 @pytest.mark.gl("onboard")
 @pytest.mark.slow
-def test_pictures_are_drawn_by_processes_that_stay_and_are_the_same_in_any_order(
+def test_worker_keeps_renderers_that_draw_the_same_in_any_order(
     tasks: list[Task], options: Options, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("av")
@@ -110,7 +114,7 @@ def test_pictures_are_drawn_by_processes_that_stay_and_are_the_same_in_any_order
         backwards.close()
 
 
-def test_a_machine_with_another_program_or_table_is_found_out(tasks: list[Task], options: Options) -> None:
+def test_perform_refuses_a_task_of_another_program_or_table(tasks: list[Task], options: Options) -> None:
     assert perform(options, tasks[0]).row["status"] == "done"
     outcome = perform(options, replace(tasks[0], fingerprint="0" * 64))
     assert outcome.row["status"] == "failed"

@@ -27,7 +27,7 @@ def serving(test) -> None:
     asyncio.run(run())
 
 
-def test_a_block_is_followed_to_its_end() -> None:
+def test_client_follows_a_block_to_its_end() -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:
             await client.send(WAIT.format("b"))
@@ -39,7 +39,7 @@ def test_a_block_is_followed_to_its_end() -> None:
     serving(test)
 
 
-def test_a_refused_block_ends_the_waiting() -> None:
+def test_client_until_end_stops_at_a_refusal() -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:
             await client.send('<bml id="b"><required><head id="n" lexeme="NONE"/></required></bml>')
@@ -50,7 +50,7 @@ def test_a_refused_block_ends_the_waiting() -> None:
     serving(test)
 
 
-def test_what_is_planned_is_followed_and_does_not_mix_with_answers() -> None:
+def test_client_schedules_do_not_mix_with_answers() -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:
             await client.subscribe("schedule")
@@ -67,7 +67,7 @@ def test_what_is_planned_is_followed_and_does_not_mix_with_answers() -> None:
     serving(test)
 
 
-def test_frames_of_two_streams_do_not_mix() -> None:
+def test_client_keeps_the_frames_of_two_streams_apart() -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:
             told = await client.subscribe("fap", fps=50)
@@ -87,7 +87,7 @@ def test_frames_of_two_streams_do_not_mix() -> None:
     serving(test)
 
 
-def test_an_error_of_the_service_is_raised() -> None:
+def test_client_raises_an_error_of_the_service() -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:
             with pytest.raises(ClientError, match="wanted a stream of"):
@@ -97,7 +97,7 @@ def test_an_error_of_the_service_is_raised() -> None:
     serving(test)
 
 
-def test_play_waits_for_the_end_and_says_when_it_was() -> None:
+def test_client_play_returns_the_end_of_the_block() -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:
             end = await client.play(WAIT.format("b"))
@@ -114,7 +114,7 @@ def test_play_waits_for_the_end_and_says_when_it_was() -> None:
 
 
 @pytest.mark.parametrize("nothing", ["", " \n", "<!-- later -->", '<?xml version="1.0"?>'])
-def test_nothing_to_play_is_refused_at_once(nothing: str) -> None:
+def test_client_play_refuses_a_blank_text_at_once(nothing: str) -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:
             with pytest.raises(ClientError, match="wanted <bml>, got nothing"):
@@ -123,7 +123,7 @@ def test_nothing_to_play_is_refused_at_once(nothing: str) -> None:
     serving(test)
 
 
-def test_the_welcome_says_what_there_is_and_the_state_what_plays() -> None:
+def test_client_has_the_welcome_and_the_state() -> None:
     async def test(url: str) -> None:
         async with connect(f"{url}?session=show") as client:
             assert (client.session, client.welcome["version"]) == ("show", 1)
@@ -137,7 +137,7 @@ def test_the_welcome_says_what_there_is_and_the_state_what_plays() -> None:
     serving(test)
 
 
-def test_errors_that_nobody_asked_for_are_kept_and_spoil_no_answer() -> None:
+def test_client_keeps_errors_apart_from_answers() -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:
             await client.control("set", aus={"12": 7})
@@ -149,7 +149,7 @@ def test_errors_that_nobody_asked_for_are_kept_and_spoil_no_answer() -> None:
     serving(test)
 
 
-def test_a_service_of_another_version_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_client_refuses_a_service_of_another_version(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("realizer.client.connection.PROTOCOL", 2)
 
     async def test(url: str) -> None:
@@ -161,7 +161,7 @@ def test_a_service_of_another_version_is_refused(monkeypatch: pytest.MonkeyPatch
     serving(test)
 
 
-def test_a_service_that_asks_for_a_token_gets_it() -> None:
+def test_client_sends_its_token() -> None:
     secret = "a-token-of-many-letters-and-0123456789"
 
     async def run() -> None:
@@ -177,7 +177,7 @@ def test_a_service_that_asks_for_a_token_gets_it() -> None:
     asyncio.run(run())
 
 
-def test_feedback_ends_with_the_connection() -> None:
+def test_client_feedback_ends_with_the_connection() -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:
             await client._socket.close()
@@ -198,7 +198,7 @@ def test_feedback_ends_with_the_connection() -> None:
         lambda client: client.subscribe("fap"),
     ],
 )
-def test_whatever_is_said_over_a_connection_that_has_ended_is_an_error_of_ours(say: Any) -> None:
+def test_client_raises_its_own_error_after_the_end_of_the_connection(say: Any) -> None:
     async def run() -> None:
         settings = Settings(port=0, voice="silent")
         async with asyncio.timeout(LIMIT), Server(settings) as server, connect(server.url) as client:
@@ -210,7 +210,7 @@ def test_whatever_is_said_over_a_connection_that_has_ended_is_an_error_of_ours(s
     asyncio.run(run())
 
 
-def test_what_the_service_refuses_of_an_address_is_told_in_its_words() -> None:
+def test_client_raises_the_refusal_of_an_address() -> None:
     async def test(url: str) -> None:
         for bad, says in (
             (f"{url}?session=a b", "session: wanted 1..64 letters"),
@@ -228,7 +228,7 @@ def test_what_the_service_refuses_of_an_address_is_told_in_its_words() -> None:
     serving(test)
 
 
-def test_a_mesh_is_read_by_the_face_it_has_though_that_changes_while_it_runs() -> None:
+def test_client_reads_a_mesh_by_the_present_face() -> None:
     async def test(url: str) -> None:
         rests = {face: load_face(face) for face in ("ada", "ben")}
         async with connect(url) as client:
@@ -256,7 +256,7 @@ def test_a_mesh_is_read_by_the_face_it_has_though_that_changes_while_it_runs() -
     serving(test)
 
 
-def test_nobody_there_is_an_os_error() -> None:
+def test_client_raises_os_error_where_nothing_listens() -> None:
     async def run() -> None:
         async with Server(Settings(port=0, voice="silent")) as server:
             url = server.url

@@ -23,7 +23,7 @@ def error(where: str | None, code: str = "invalid") -> str:
     return json.dumps(said if where is None else {**said, "where": where})
 
 
-def test_an_answer_is_the_one_of_its_question(mail) -> None:
+def test_router_matches_an_answer_to_its_request(mail) -> None:
     mail.expect_answer("ping")
     mail.receive('{"type":"state"}')
     mail.receive(error("set.aus"))
@@ -35,7 +35,7 @@ def test_an_answer_is_the_one_of_its_question(mail) -> None:
 
 
 @pytest.mark.parametrize("where", ["subscribe.stream", "subscribe", "type", None])
-def test_an_error_about_what_was_asked_is_raised(mail, where) -> None:
+def test_router_raises_the_error_of_a_request(mail, where) -> None:
     mail.expect_answer("subscribe")
     mail.receive(error(where))
     with pytest.raises(ClientError, match="wanted another") as caught:
@@ -45,14 +45,14 @@ def test_an_error_about_what_was_asked_is_raised(mail, where) -> None:
 
 
 @pytest.mark.parametrize("stream", [row.name for row in KINDS.values()])
-def test_frames_are_kept_by_stream_the_newest_ones(mail, stream) -> None:
+def test_router_keeps_the_newest_frames_of_each_stream(mail, stream) -> None:
     for k in range(MAX_FRAMES + 5):
         mail.receive(pack(stream, k, k / 25, np.zeros(2, "<f4").tobytes()))
     ((_, frames),) = mail.frames.items()
     assert [frame.frame for frame in frames] == list(range(5, MAX_FRAMES + 5))
 
 
-def test_a_frame_brings_what_was_told_of_its_stream_when_it_came(mail) -> None:
+def test_router_adds_the_description_of_its_stream_to_a_frame(mail) -> None:
     mesh = {"stream": "mesh", "index": 1, "scale": 2.0, "offset": [0.0, 0.0, 1.0]}
     frame = pack("mesh", 0, 0.0, np.array([1, 2, 3], "<i2").tobytes(), character=1)
     mail.expect_answer("subscribe")
@@ -72,7 +72,7 @@ def test_a_frame_brings_what_was_told_of_its_stream_when_it_came(mail) -> None:
     assert not mail.errors
 
 
-def test_json_frames_and_schedules_are_frames(mail) -> None:
+def test_router_treats_json_frames_and_schedules_as_frames(mail) -> None:
     mail.receive('{"type":"arkit","frame":1,"time":0.04,"values":[0.5]}')
     mail.receive('{"type":"schedule","time":0,"whole":true,"blocks":[]}')
     assert {stream: len(kept) for stream, kept in mail.frames.items()} == {"arkit": 1, "schedule": 1}
@@ -100,7 +100,7 @@ def warning(id: str) -> WarningFeedback:
         ([warning("b:n"), block("b:start", 1.0)], None),
     ],
 )
-def test_a_block_is_over_with_its_end_or_its_refusal(told, last) -> None:
+def test_block_waiter_finishes_with_the_end_or_the_refusal(told, last) -> None:
     until = BlockWaiter("b")
     for feedback in told:
         until.on_feedback(feedback)
@@ -120,6 +120,6 @@ def test_a_block_is_over_with_its_end_or_its_refusal(told, last) -> None:
         ("<bml/>", None),
     ],
 )
-def test_the_last_block_is_the_last_that_is_no_comment(mail, bml, block) -> None:
+def test_router_finds_the_last_block_outside_comments(mail, bml, block) -> None:
     mail.on_sent(bml)
     assert mail.last_block == block

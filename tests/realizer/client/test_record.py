@@ -36,7 +36,7 @@ def serving(test) -> None:
 
 @pytest.mark.gl
 @pytest.mark.slow
-def test_the_film_of_a_block_shows_what_is_drawn_without_a_clock(tmp_path: Path) -> None:
+def test_record_films_what_is_drawn_without_a_clock(tmp_path: Path) -> None:
     av = pytest.importorskip("av", reason="needs the film extra")
     import realizer
     from realizer.render import Renderer
@@ -63,7 +63,7 @@ def test_the_film_of_a_block_shows_what_is_drawn_without_a_clock(tmp_path: Path)
     assert np.abs(pictures[8] - calm).mean() > off + 0.5
 
 
-def test_a_suffix_that_is_no_film_is_refused(tmp_path: Path) -> None:
+def test_record_refuses_a_suffix_that_is_no_film(tmp_path: Path) -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:
             with pytest.raises(ClientError, match=r"wanted a film \(.mp4 or .webm\), got live.gif"):
@@ -72,7 +72,7 @@ def test_a_suffix_that_is_no_film_is_refused(tmp_path: Path) -> None:
     serving(test)
 
 
-def test_a_folder_that_is_not_there_is_said_before_anything_is_played(tmp_path: Path) -> None:
+def test_record_names_a_missing_folder_before_it_plays(tmp_path: Path) -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:
             with pytest.raises(FileNotFoundError, match="nowhere"):
@@ -82,7 +82,7 @@ def test_a_folder_that_is_not_there_is_said_before_anything_is_played(tmp_path: 
     serving(test)
 
 
-def test_sound_stands_at_its_time_and_what_was_taken_back_is_silent() -> None:
+def test_record_places_sound_at_its_time_and_removes_what_was_flushed() -> None:
     packets = [
         unpack(pack("audio", k, 1.0 + k * 0.02, np.full(RATE // 50, k + 1, "<i2").tobytes()))
         for k in range(4)
@@ -93,7 +93,7 @@ def test_sound_stands_at_its_time_and_what_was_taken_back_is_silent() -> None:
     assert [int(pcm[k * step]) for k in range(5)] == [1, 2, 2, 0, 0]
 
 
-def test_a_picture_that_did_not_come_leaves_the_one_before() -> None:
+def test_record_repeats_the_picture_before_a_missing_one() -> None:
     def picture(frame: int, grey: int) -> WireFrame:
         buffer = io.BytesIO()
         Image.new("RGB", (16, 16), (grey,) * 3).save(buffer, "PNG")

@@ -15,7 +15,7 @@ from realizer.server.serve import Server
 from tests.realizer.client.test_async_client import LIMIT, serving
 
 
-def test_syncs_of_the_text_are_awaited_and_the_end_too() -> None:
+def test_speech_waits_for_syncs_and_the_end() -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:
             async with client.speech("s1") as speech:
@@ -34,7 +34,7 @@ def test_syncs_of_the_text_are_awaited_and_the_end_too() -> None:
     serving(test)
 
 
-def test_tokens_that_come_at_once_go_together_and_a_stop_waits_for_none() -> None:
+def test_speech_sends_quick_tokens_together_and_a_stop_at_once() -> None:
     async def test() -> None:
         sent: list[tuple[str, dict[str, object]]] = []
 
@@ -73,7 +73,7 @@ def test_tokens_that_come_at_once_go_together_and_a_stop_waits_for_none() -> Non
     asyncio.run(test())
 
 
-def test_a_speech_is_stopped_and_says_what_was_heard() -> None:
+def test_speech_that_is_stopped_says_what_was_spoken() -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:
             async with client.speech("s1", composition="MERGE") as speech:
@@ -89,7 +89,7 @@ def test_a_speech_is_stopped_and_says_what_was_heard() -> None:
     serving(test)
 
 
-def test_a_speech_that_was_closed_when_its_connection_ended_takes_no_more_from_who_comes_back() -> None:
+def test_speech_closed_with_its_connection_refuses_text_of_the_next_one() -> None:
     async def test(url: str) -> None:
         async with connect(f"{url}?session=show") as client:
             lost = client.speech("s1")
@@ -116,7 +116,7 @@ def test_a_speech_that_was_closed_when_its_connection_ended_takes_no_more_from_w
     serving(test)
 
 
-def test_so_it_is_where_its_process_has_died_and_another_one_goes_on(tmp_path: Path) -> None:
+def test_speech_restored_in_another_process_refuses_more_text_too(tmp_path: Path) -> None:
     settings = Settings(port=0, voice="silent", journal=str(tmp_path / "journal.db"))
 
     async def run() -> None:
@@ -142,7 +142,7 @@ def test_so_it_is_where_its_process_has_died_and_another_one_goes_on(tmp_path: P
     asyncio.run(run())
 
 
-def test_an_exception_stops_the_speech_and_its_id_is_free_again() -> None:
+def test_speech_is_stopped_by_an_exception_and_frees_its_id() -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:
             speeches = []
@@ -163,7 +163,7 @@ def test_an_exception_stops_the_speech_and_its_id_is_free_again() -> None:
     serving(test)
 
 
-def test_a_speech_with_the_id_of_a_block_that_plays_is_refused() -> None:
+def test_speech_with_the_id_of_a_playing_block_is_refused() -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:
             await client.send('<bml id="s1"><wait id="w" duration="60"/></bml>')
@@ -175,7 +175,7 @@ def test_a_speech_with_the_id_of_a_block_that_plays_is_refused() -> None:
     serving(test)
 
 
-def test_the_connection_may_end_while_a_sync_is_awaited() -> None:
+def test_speech_raises_if_the_connection_ends_before_a_sync() -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:
 
@@ -192,7 +192,7 @@ def test_the_connection_may_end_while_a_sync_is_awaited() -> None:
     serving(test)
 
 
-def test_the_plain_client_does_the_same() -> None:
+def test_speech_of_the_sync_client_does_the_same() -> None:
     def plain(url: str) -> None:
         with connect(url) as client:
             with client.speech("s1") as speech:
@@ -220,7 +220,7 @@ def test_the_plain_client_does_the_same() -> None:
     serving(test)
 
 
-def test_a_text_of_any_length_is_appended() -> None:
+def test_speech_appends_a_text_of_any_length() -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:
             async with client.speech("s1") as speech:
@@ -232,7 +232,7 @@ def test_a_text_of_any_length_is_appended() -> None:
     serving(test)
 
 
-def test_only_what_is_said_of_the_speech_itself_is_heard() -> None:
+def test_speech_progress_ignores_feedback_of_other_blocks() -> None:
     heard = SpeechProgress("s")
     for id in ("t.1:t:m", "s.1:n:m", "s:s:m", "s.1:s:stroke:2"):
         heard.on_feedback(SyncPointProgress(id=id, time=0.0, global_time=1.0))

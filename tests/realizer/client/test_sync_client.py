@@ -40,7 +40,7 @@ def url() -> Iterator[str]:
     assert not thread.is_alive()
 
 
-def test_the_plain_client_does_the_same(url) -> None:
+def test_sync_client_does_what_the_async_client_does(url) -> None:
     with connect(url) as client:
         client.send(WAIT.format("b"))
         assert list(client.until_end())[-1].id == "b:end"
@@ -50,7 +50,7 @@ def test_the_plain_client_does_the_same(url) -> None:
             client.subscribe("smell")
 
 
-def test_two_clients_share_a_session(url) -> None:
+def test_sync_client_shares_a_session(url) -> None:
     with connect(f"{url}?session=show") as manager, connect(f"{url}?session=show") as viewer:
         told = viewer.subscribe("arkit", fps=50)
         end = manager.play(WAIT.format("b"))
@@ -67,7 +67,7 @@ def test_two_clients_share_a_session(url) -> None:
         assert manager.errors == []
 
 
-def test_what_is_refused_is_raised_and_the_thread_ends(url) -> None:
+def test_sync_client_raises_a_refusal_and_ends_its_thread(url) -> None:
     with connect(url) as client:
         with pytest.raises(ClientError, match="lexeme"):
             client.play('<bml id="b"><required><head id="n" lexeme="NONE"/></required></bml>')
@@ -75,7 +75,7 @@ def test_what_is_refused_is_raised_and_the_thread_ends(url) -> None:
     assert "realizer client" not in [thread.name for thread in threading.enumerate()]
 
 
-def test_who_says_goodbye_twice_has_said_it_once_and_says_no_more(url) -> None:
+def test_sync_client_close_twice_does_nothing_more(url) -> None:
     with connect(url) as client:
         client.close()
         with pytest.raises(ClientError, match="the connection has ended"):
@@ -85,6 +85,6 @@ def test_who_says_goodbye_twice_has_said_it_once_and_says_no_more(url) -> None:
     client.close()
 
 
-def test_nobody_there_is_an_os_error() -> None:
+def test_sync_client_raises_os_error_where_nothing_listens() -> None:
     with pytest.raises(OSError, match="Connect"), connect("ws://127.0.0.1:9/ws"):
         pass

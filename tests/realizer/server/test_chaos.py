@@ -78,7 +78,7 @@ def unread(engine: EspeakVoice) -> int:
 
 
 @pytest.mark.espeak
-def test_a_voice_that_is_killed_in_a_text_costs_its_sound_and_one_warning(
+def test_chaos_killed_voice_costs_its_sound_and_one_warning(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     async def test(server: Server) -> None:
@@ -117,7 +117,7 @@ def test_a_voice_that_is_killed_in_a_text_costs_its_sound_and_one_warning(
 
 
 @pytest.mark.gl
-def test_a_renderer_that_is_killed_is_started_again_and_pictures_go_on() -> None:
+def test_chaos_killed_renderer_is_started_again() -> None:
     async def picture(client: ClientConnection) -> float:
         while True:
             message = await client.recv()
@@ -182,7 +182,7 @@ def disk(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Disk]:
     subprocess.run(["umount", str(folder)], check=True, capture_output=True)
 
 
-def test_a_full_disk_refuses_what_comes_in_words_and_what_plays_goes_on(disk: Disk) -> None:
+def test_chaos_full_disk_refuses_documents_and_lets_the_rest_play(disk: Disk) -> None:
     large = f"<!--{'x' * 20_000}-->"
 
     async def before(server: Server) -> list[str]:
@@ -234,7 +234,7 @@ async def crowd(server: Server) -> None:
             await one.recv()
 
 
-def test_a_session_that_cannot_be_kept_is_refused_and_the_others_play_on(disk: Disk) -> None:
+def test_chaos_session_that_cannot_be_stored_is_refused(disk: Disk) -> None:
     async def test(server: Server) -> None:
         async with (
             connect(f"{server.url}?session=there", max_queue=None) as client,
@@ -256,7 +256,7 @@ def test_a_session_that_cannot_be_kept_is_refused_and_the_others_play_on(disk: D
 # the clock --------------------------------------------------------------------------------------
 
 
-def test_a_clock_that_is_set_back_and_forth_changes_nothing_of_what_plays(clock: Clock) -> None:
+def test_chaos_clock_set_back_and_forth_changes_nothing(clock: Clock) -> None:
     async def test(server: Server) -> None:
         async with connect(server.url, max_queue=None) as client:
             await client.send('<bml id="b"><head id="n" lexeme="NOD"/><wait id="w" duration="0.9"/></bml>')
@@ -275,7 +275,7 @@ def test_a_clock_that_is_set_back_and_forth_changes_nothing_of_what_plays(clock:
 
 
 @pytest.mark.parametrize("step", [-3600.0, -0.3, 3600.0])
-def test_a_client_that_comes_back_where_clocks_are_other_ones_has_all_feedback_once(
+def test_chaos_client_under_other_clocks_gets_all_feedback_once(
     clock: Clock, kept: Settings, step: float
 ) -> None:
     block = '<bml id="b"><head id="n" lexeme="NOD"/><wait id="w" duration="1.5"/></bml>'
@@ -306,7 +306,7 @@ async def emptied(server: Server, files: int) -> None:
         await asyncio.sleep(0.01)
 
 
-def test_two_thousand_that_come_and_go_leave_nothing_behind() -> None:
+def test_chaos_two_thousand_connections_leave_nothing_behind() -> None:
     async def test(server: Server) -> None:
         await asyncio.to_thread(come_and_go, server.port, 10, 10)
         files = files_open(os.getpid())
@@ -321,7 +321,7 @@ def test_two_thousand_that_come_and_go_leave_nothing_behind() -> None:
     serving(test, max_sessions=50)
 
 
-def test_forty_documents_at_once_while_twenty_sessions_stream_are_all_played_and_told_of() -> None:
+def test_chaos_forty_documents_among_twenty_streams_are_all_played() -> None:
     async def test(server: Server) -> None:
         for told in await at_once(server.port, 20, 40):
             well_told(told, 2)
@@ -329,7 +329,7 @@ def test_forty_documents_at_once_while_twenty_sessions_stream_are_all_played_and
     serving(test)
 
 
-def test_one_who_closes_its_side_only_is_let_go() -> None:
+def test_chaos_client_that_closes_its_side_only_is_disconnected() -> None:
     async def test(server: Server) -> None:
         got = await asyncio.to_thread(half_closed, server.port, "show")
         assert b"b:end" not in got
@@ -341,7 +341,7 @@ def test_one_who_closes_its_side_only_is_let_go() -> None:
     serving(test)
 
 
-def test_those_who_connect_and_say_nothing_or_half_a_word_keep_nobody_waiting(
+def test_chaos_clients_that_send_nothing_or_half_a_word_delay_nobody(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("realizer.server.transports.websocket.server.OPENING", 3600.0)
@@ -361,7 +361,7 @@ def test_those_who_connect_and_say_nothing_or_half_a_word_keep_nobody_waiting(
     serving(test)
 
 
-def test_one_who_floods_with_documents_is_told_and_the_others_notice_nothing() -> None:
+def test_chaos_client_that_floods_is_warned_and_delays_nobody() -> None:
     async def test(server: Server) -> None:
         async with connect(f"{server.url}?session=other") as other:
             raw = await asyncio.to_thread(joined, server.port, "flooded")

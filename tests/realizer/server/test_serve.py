@@ -59,7 +59,7 @@ async def until(socket, last: str) -> list[str | bytes]:
     raise AssertionError(f"the connection ended before {last}")
 
 
-def test_a_document_plays_over_the_wire() -> None:
+def test_serve_plays_a_document() -> None:
     async def test(server: Server) -> None:
         async with connect(server.url) as socket:
             await socket.send(
@@ -92,7 +92,7 @@ def test_a_document_plays_over_the_wire() -> None:
     serving(test)
 
 
-def test_the_mesh_moves_and_fits_the_face_that_is_served() -> None:
+def test_serve_sends_a_mesh_that_moves_and_fits_the_face() -> None:
     async def test(server: Server) -> None:
         async with connect(server.url) as socket:
             await socket.send(json.dumps({"type": "subscribe", "stream": "mesh", "fps": 10}))
@@ -105,7 +105,7 @@ def test_the_mesh_moves_and_fits_the_face_that_is_served() -> None:
     serving(test)
 
 
-def test_a_broken_document_leaves_the_connection_alive() -> None:
+def test_serve_keeps_a_connection_after_a_broken_document() -> None:
     async def test(server: Server) -> None:
         async with connect(server.url) as socket:
             await socket.send("<bml id='x'><oops")
@@ -118,7 +118,7 @@ def test_a_broken_document_leaves_the_connection_alive() -> None:
     serving(test)
 
 
-def test_two_clients_share_a_named_session_and_others_do_not() -> None:
+def test_serve_shares_named_sessions_only() -> None:
     async def test(server: Server) -> None:
         show = f"{server.url}?session=show"
         async with connect(show) as manager, connect(show) as viewer, connect(server.url) as stranger:
@@ -133,7 +133,7 @@ def test_two_clients_share_a_named_session_and_others_do_not() -> None:
     serving(test)
 
 
-def test_a_client_that_leaves_in_the_middle_disturbs_nobody() -> None:
+def test_serve_plays_on_when_another_client_leaves() -> None:
     async def test(server: Server) -> None:
         async with connect(f"{server.url}?session=show") as stays:
             leaves = await connect(f"{server.url}?session=show")
@@ -146,7 +146,7 @@ def test_a_client_that_leaves_in_the_middle_disturbs_nobody() -> None:
     serving(test)
 
 
-def test_a_bad_session_name_is_refused_before_the_handshake() -> None:
+def test_serve_refuses_a_bad_session_name_before_the_handshake() -> None:
     async def test(server: Server) -> None:
         with pytest.raises(InvalidStatus) as caught:
             await connect(f"{server.url}?session=a%20b")
@@ -168,7 +168,7 @@ def fetch(url: str) -> tuple[int, str, bytes]:
             return error.code, error.headers["Content-Type"], error.read()
 
 
-def test_http_is_answered_on_the_same_port() -> None:
+def test_serve_answers_http_on_the_same_port() -> None:
     async def test(server: Server) -> None:
         status, media_type, body = await asyncio.to_thread(fetch, server.page + "healthz")
         assert (status, media_type) == (200, "application/json; charset=utf-8")
@@ -182,7 +182,7 @@ def test_http_is_answered_on_the_same_port() -> None:
     serving(test)
 
 
-def test_an_editor_s_texts_are_checked_one_after_the_other() -> None:
+def test_serve_checks_the_texts_of_an_editor_one_after_the_other() -> None:
     async def test(server: Server) -> None:
         async with connect(server.url.removesuffix("/ws") + "/check") as editor:
             for lexeme in ("NOD", "NIX"):
@@ -196,7 +196,7 @@ def test_an_editor_s_texts_are_checked_one_after_the_other() -> None:
     serving(test)
 
 
-def test_a_drain_lets_what_plays_end_and_takes_no_more() -> None:
+def test_server_drain_waits_for_what_plays_and_refuses_documents() -> None:
     async def test(server: Server) -> None:
         async with connect(server.url) as socket:
             await socket.send('<bml id="b"><wait id="w" duration="0.4"/></bml>')
@@ -216,7 +216,7 @@ def test_a_drain_lets_what_plays_end_and_takes_no_more() -> None:
     serving(test)
 
 
-def test_an_address_in_use_is_an_os_error() -> None:
+def test_server_start_raises_if_the_address_is_in_use() -> None:
     async def test(server: Server) -> None:
         with pytest.raises(OSError, match="in use"):
             await Server(Settings(port=server.port)).start()
@@ -225,13 +225,13 @@ def test_an_address_in_use_is_an_os_error() -> None:
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_a_host_that_is_no_machine_is_named(workers: int) -> None:
+def test_serve_names_a_host_that_does_not_exist(workers: int) -> None:
     settings = Settings(host="nowhere.invalid", port=0, workers=workers)
     with pytest.raises(SettingsError, match=r"setting host: wanted .*, got 'nowhere\.invalid'"):
         asyncio.run(serve(settings))
 
 
-def test_each_open_door_prints_a_line_and_one_that_waits_for_somebody_stops_none() -> None:
+def test_serve_prints_a_line_for_each_transport_that_is_ready() -> None:
     with socket.socket() as nobody:
         nobody.bind(("127.0.0.1", 0))  # bound, but nobody listens
         there = f"127.0.0.1:{nobody.getsockname()[1]}"
@@ -252,7 +252,7 @@ def test_each_open_door_prints_a_line_and_one_that_waits_for_somebody_stops_none
     assert told[1].startswith(f"realizer: xface player: no player at {there} (")
 
 
-def test_a_door_that_needs_something_names_it_in_one_sentence(tmp_path: Path) -> None:
+def test_serve_names_what_a_transport_needs_in_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "stomp.py").write_text("raise ImportError")
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
     with running([*SERVE, "--stomp", "127.0.0.1:61613"], stderr=subprocess.PIPE, env=environment) as serving:
@@ -261,7 +261,7 @@ def test_a_door_that_needs_something_names_it_in_one_sentence(tmp_path: Path) ->
     assert error == "realizer: --stomp needs stomp.py: pip install 'bml-realizer[stomp]'\n"
 
 
-def test_a_session_that_fails_ends_alone(monkeypatch: pytest.MonkeyPatch, caplog) -> None:
+def test_serve_ends_only_the_session_that_fails(monkeypatch: pytest.MonkeyPatch, caplog) -> None:
     real = Session.receive
 
     def broken(session: Session, connection: int, message: str | bytes, now: float) -> None:
@@ -283,7 +283,7 @@ def test_a_session_that_fails_ends_alone(monkeypatch: pytest.MonkeyPatch, caplog
     assert "it failed" in caplog.text
 
 
-def test_a_client_that_keeps_sending_does_not_keep_its_own_blocks_from_playing() -> None:
+def test_serve_plays_the_blocks_of_a_client_that_keeps_sending() -> None:
     async def test(server: Server) -> None:
         async with connect(server.url) as client:
             await client.send('<bml id="b"><wait id="w" duration="0.3"/></bml>')
@@ -301,7 +301,7 @@ def test_a_client_that_keeps_sending_does_not_keep_its_own_blocks_from_playing()
 
 
 @pytest.mark.parametrize("loop", ["asyncio", "uvloop"])
-def test_messages_in_quick_succession_all_play(loop) -> None:
+def test_serve_plays_messages_in_quick_succession(loop) -> None:
     factory = None
     if loop == "uvloop":
         factory = pytest.importorskip("uvloop", reason="needs the fast extra").new_event_loop
@@ -317,7 +317,7 @@ def test_messages_in_quick_succession_all_play(loop) -> None:
     serving(test, factory)
 
 
-def test_a_worker_can_be_ended_before_it_says_that_it_is_ready() -> None:
+def test_worker_can_be_terminated_before_it_is_ready() -> None:
     handlers: list[object] = []
 
     class Control(socket.socket):
@@ -367,14 +367,14 @@ asyncio.run(run())
 """
 
 
-def test_first_arkit_subscription_loads_nothing() -> None:
+def test_server_loads_nothing_for_the_first_arkit_subscription() -> None:
     done = subprocess.run(
         [sys.executable, "-c", FIRST_ARKIT], capture_output=True, text=True, check=True, timeout=LIMIT
     )
     assert json.loads(done.stdout) == [[], 0]
 
 
-def test_workers_end_where_their_address_cannot_be_printed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_serve_ends_its_workers_if_printing_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     closed: list[Settings] = []
 
     class Workers:

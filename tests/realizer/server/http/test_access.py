@@ -36,7 +36,7 @@ def guard(**settings) -> AccessControl:
         ("/ws", {"authorization": f"bearer  {TOKEN} "}),
     ],
 )
-def test_a_token_comes_in_the_address_or_a_header(target: str, headers: dict[str, str]) -> None:
+def test_access_accepts_a_token_in_the_address_or_a_header(target: str, headers: dict[str, str]) -> None:
     assert guard(token=TOKEN).request(target, headers)
 
 
@@ -50,7 +50,7 @@ def test_a_token_comes_in_the_address_or_a_header(target: str, headers: dict[str
     ],
 )
 @pytest.mark.parametrize("later", [True, False])
-def test_a_wrong_token_is_refused_at_once_and_not_repeated(
+def test_access_refuses_a_wrong_token_without_repeating_it(
     target: str, headers: dict[str, str], later: bool
 ) -> None:
     with pytest.raises(JoinError, match="wanted that of this service") as refused:
@@ -60,7 +60,7 @@ def test_a_wrong_token_is_refused_at_once_and_not_repeated(
     assert "another" not in str(refused.value).replace("got another one", "")
 
 
-def test_without_a_token_a_client_may_still_greet_with_it() -> None:
+def test_access_without_a_token_waits_for_a_hello() -> None:
     g = guard(token=TOKEN)
     assert g.request("/ws", {}, later=True) is None
     assert g.check_hello(json.dumps({"type": "hello", "token": TOKEN})) == Grant()
@@ -82,21 +82,21 @@ def test_without_a_token_a_client_may_still_greet_with_it() -> None:
         '{"type": "state", "token": "' + TOKEN + '"}',
     ],
 )
-def test_any_other_first_message_is_no_greeting(message: str | bytes) -> None:
+def test_check_hello_refuses_other_first_messages(message: str | bytes) -> None:
     with pytest.raises(JoinError, match="token: wanted") as refused:
         guard(token=TOKEN).check_hello(message)
     assert refused.value.status == 401
     assert TOKEN not in str(refused.value)
 
 
-def test_a_first_message_that_is_large_is_not_even_read() -> None:
+def test_check_hello_does_not_parse_a_large_message() -> None:
     large = json.dumps({"type": "hello", "token": TOKEN, "session": "x" * MAX_CONTROL})
     with pytest.raises(JoinError, match="a first hello"):
         guard(token=TOKEN).check_hello(large)
 
 
 @pytest.mark.parametrize("both", [{}, {"token": TOKEN}])
-def test_a_signed_token_comes_in_the_same_places(both: dict[str, str]) -> None:
+def test_access_accepts_a_signed_token_in_the_same_places(both: dict[str, str]) -> None:
     g = guard(jwt_key=SECRET, **both)
     signed = jwt.encode({"session": "show"}, SECRET, "HS256")
     bound = Grant(frozenset({"show"}))
@@ -106,7 +106,7 @@ def test_a_signed_token_comes_in_the_same_places(both: dict[str, str]) -> None:
     assert g.check_hello(json.dumps({"type": "hello", "token": signed})) == bound
 
 
-def test_beside_a_key_the_token_of_the_service_opens_everything() -> None:
+def test_access_by_the_service_token_is_unlimited_beside_a_key() -> None:
     g = guard(jwt_key=SECRET, token=TOKEN)
     assert g.request(f"/ws?token={TOKEN}", {}) == Grant()
     with pytest.raises(
@@ -115,7 +115,7 @@ def test_beside_a_key_the_token_of_the_service_opens_everything() -> None:
         g.request("/ws?token=another", {})
 
 
-def test_a_refusal_says_why_a_signed_token_is_not_taken() -> None:
+def test_access_says_why_a_signed_token_is_refused() -> None:
     old = jwt.encode({"exp": 1}, SECRET, "HS256")
     with pytest.raises(JoinError, match=r"REALIZER_JWT_KEY\), got one that has expired") as refused:
         guard(jwt_key=SECRET).request(f"/ws?token={old}", {}, later=True)
@@ -123,7 +123,7 @@ def test_a_refusal_says_why_a_signed_token_is_not_taken() -> None:
     assert old not in str(refused.value)
 
 
-def test_without_a_token_in_the_settings_nobody_is_asked() -> None:
+def test_access_without_a_token_setting_is_open() -> None:
     assert guard().request("/ws?token=anything", {})
 
 
@@ -148,7 +148,7 @@ def test_without_a_token_in_the_settings_nobody_is_asked() -> None:
         ("0.0.0.0", {"origin": "http://["}, (), False),
     ],
 )
-def test_pages_of_elsewhere_stay_out(
+def test_access_refuses_pages_of_other_origins(
     host: str, headers: dict[str, str], origins: tuple[str, ...], welcome: bool
 ) -> None:
     g = guard(host=host, origins=origins)
@@ -160,7 +160,7 @@ def test_pages_of_elsewhere_stay_out(
     assert refused.value.status == 403
 
 
-def test_a_service_that_has_used_its_memory_lets_nobody_in() -> None:
+def test_access_check_memory_refuses_when_memory_is_used_up() -> None:
     guard(max_memory=10**7).check_memory()
     full = guard(max_memory=64)
     with pytest.raises(JoinError, match=r"wanted at most 64 \(REALIZER_MAX_MEMORY sets it\)") as refused:
@@ -168,7 +168,7 @@ def test_a_service_that_has_used_its_memory_lets_nobody_in() -> None:
     assert refused.value.status == 503
 
 
-def test_no_secret_is_in_what_settings_say_of_themselves() -> None:
+def test_access_settings_do_not_show_their_secrets() -> None:
     settings = Settings(
         token=TOKEN, stomp_password=TOKEN, jwt_key=SECRET, journal=f"redis://:{TOKEN}@127.0.0.1:6379/0"
     )
@@ -181,9 +181,7 @@ def test_no_secret_is_in_what_settings_say_of_themselves() -> None:
 
 
 @pytest.mark.parametrize("flaw", ["another key", "no key", "a pass phrase", "no certificate"])
-def test_a_certificate_that_cannot_be_used_is_told_with_its_files_and_nobody_is_asked(
-    flaw: str, tmp_path: Path
-) -> None:
+def test_access_tls_names_the_files_of_a_bad_certificate(flaw: str, tmp_path: Path) -> None:
     cert, key = tmp_path / "cert.pem", tmp_path / "key.pem"
     name = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, "localhost")])
     private, other = ec.generate_private_key(ec.SECP256R1()), ec.generate_private_key(ec.SECP256R1())
@@ -201,7 +199,7 @@ def test_a_certificate_that_cannot_be_used_is_told_with_its_files_and_nobody_is_
         chosen.tls()
 
 
-def test_the_library_below_does_not_log_requests_where_there_is_a_token() -> None:
+def test_access_with_a_token_disables_logging_of_requests() -> None:
     logger = logging.getLogger("websockets.server")
     before = logger.level
     try:
@@ -211,12 +209,12 @@ def test_the_library_below_does_not_log_requests_where_there_is_a_token() -> Non
         logger.setLevel(before)
 
 
-def test_a_client_that_keeps_to_its_rate_never_waits() -> None:
+def test_rate_limiter_never_delays_a_client_within_its_rate() -> None:
     pace = RateLimiter(10)
     assert all(pace.wait(k / 10) == 0.0 for k in range(1000))
 
 
-def test_of_a_flood_it_is_told_once_which_limit_it_met() -> None:
+def test_rate_limiter_notices_a_flood_once() -> None:
     pace = RateLimiter(2)
     told = [pace.wait(0.0) > 0 and pace.notice for _ in range(10)]
     assert told[:4] == [False] * 4
@@ -226,7 +224,7 @@ def test_of_a_flood_it_is_told_once_which_limit_it_met() -> None:
     assert [pace.wait(60.0) > 0 and pace.notice for _ in range(4)][-1] == told[4]  # and again, after a pause
 
 
-def test_a_flood_is_read_at_the_rate_after_a_first_burst() -> None:
+def test_rate_limiter_limits_a_flood_after_a_first_burst() -> None:
     pace, now, read = RateLimiter(10), 0.0, 0
     while now < 60.0:
         now += pace.wait(now)

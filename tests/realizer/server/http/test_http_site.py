@@ -13,23 +13,23 @@ SITE = HttpSite(lambda: {"sessions": 2})
 BUILT = SITE.answer("/").status == 200
 
 
-def test_health_tells_what_the_service_holds() -> None:
+def test_site_reports_health() -> None:
     answer = SITE.answer("/healthz")
     assert json.loads(answer.body) == {"status": "ok", "sessions": 2}
 
 
-def test_the_examples_are_documents_with_titles() -> None:
+def test_site_has_examples_with_titles() -> None:
     rows = json.loads(SITE.answer("/examples.json").body)
     assert len(rows) >= 4
     assert all(row["title"] and "<bml" in row["bml"] for row in rows)
 
 
-def test_the_protocol_is_described() -> None:
+def test_site_describes_the_protocol() -> None:
     answer = SITE.answer("/asyncapi.json")
     assert (answer.status, json.loads(answer.body)["asyncapi"]) == (200, "3.0.0")
 
 
-def test_a_face_is_a_glb_and_an_unknown_one_is_not_found() -> None:
+def test_site_has_faces_as_glb_and_no_unknown_face() -> None:
     answer = SITE.answer("/faces/default")
     assert (answer.status, answer.media_type, answer.body[:4]) == (200, "model/gltf-binary", b"glTF")
     assert SITE.answer("/faces/default.glb").body == answer.body
@@ -38,7 +38,7 @@ def test_a_face_is_a_glb_and_an_unknown_one_is_not_found() -> None:
     assert b"nobody" in missing.body
 
 
-def test_the_light_is_the_one_of_the_stills() -> None:
+def test_site_has_the_light_of_stills() -> None:
     look = json.loads(SITE.answer("/look.json?face=default").body)
     assert {"key", "fill", "rim"} <= set(look["light"])
     assert look["camera"]["fovy"] > 0
@@ -59,7 +59,7 @@ def test_the_light_is_the_one_of_the_stills() -> None:
         ("/realizer.js", "text/javascript"),
     ],
 )
-def test_the_page_is_served_with_its_types(path, media_type) -> None:
+def test_site_serves_the_page_with_its_media_types(path, media_type) -> None:
     answer = SITE.answer(path + "?session=x")
     assert answer.status == 200
     assert answer.media_type.startswith(media_type)
@@ -69,18 +69,18 @@ def test_the_page_is_served_with_its_types(path, media_type) -> None:
 @pytest.mark.parametrize(
     "path", ["/nothing", "/../serve.py", "/%2e%2e/serve.py", "/static/app.js", "/web/package.json", "//"]
 )
-def test_nothing_else_can_be_had(path) -> None:
+def test_site_serves_no_other_files(path) -> None:
     assert SITE.answer(path).status == 404
 
 
-def test_without_a_bundle_the_page_says_how_to_get_one(tmp_path, monkeypatch) -> None:
+def test_site_without_a_bundle_says_how_to_build_it(tmp_path, monkeypatch) -> None:
     site = HttpSite(dict)
     monkeypatch.setattr(site, "_static", tmp_path / "static")
     answer = site.answer("/")
     assert (answer.status, answer.body) == (503, NOT_BUILT.encode())
 
 
-def test_the_page_s_tools_are_answered_and_what_is_wrong_is_said() -> None:
+def test_site_answers_the_tools_of_the_page_and_their_errors() -> None:
     assert json.loads(SITE.answer("/vocabulary.json").body)["elements"]
     shown = SITE.answer("/feeling.json?of=" + quote('{"name": "joy"}'))
     assert json.loads(shown.body)["values"]

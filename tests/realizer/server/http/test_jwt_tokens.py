@@ -43,7 +43,7 @@ def pem(key: Any) -> str:
 
 
 @pytest.mark.parametrize("algorithm", ["RS256", "ES256", "ES384", "EdDSA"])
-def test_a_token_is_taken_that_the_private_key_signed_and_no_other(algorithm: str) -> None:
+def test_verifier_accepts_tokens_of_its_private_key_only(algorithm: str) -> None:
     key, other = keys(algorithm), keys(algorithm)
     reader = TokenVerifier(pem(key))
     assert reader.verify(jwt.encode({"sub": "me"}, key, algorithm)) == Grant()
@@ -51,7 +51,7 @@ def test_a_token_is_taken_that_the_private_key_signed_and_no_other(algorithm: st
         reader.verify(jwt.encode({"sub": "me"}, other, algorithm))
 
 
-def test_a_secret_signs_too() -> None:
+def test_verifier_accepts_a_secret() -> None:
     reader = TokenVerifier(SECRET)
     assert reader.verify(jwt.encode({"exp": LONG}, SECRET, "HS256")) == Grant(None, LONG)
     with pytest.raises(TokenError, match="not signed with it"):
@@ -59,7 +59,7 @@ def test_a_secret_signs_too() -> None:
 
 
 @pytest.mark.parametrize("algorithm", ["HS256", "none", "HS512"])
-def test_a_public_key_is_no_secret_to_sign_with(algorithm: str) -> None:
+def test_verifier_does_not_take_a_public_key_for_a_secret(algorithm: str) -> None:
     """Who knows the public key, as all do, must not be able to sign by another algorithm."""
     key = keys("RS256")
     head = {"alg": algorithm, "typ": "JWT"}
@@ -99,7 +99,7 @@ def _signed(head: dict[str, str], claims: dict[str, Any], secret: str) -> str:
         ({"session": None}, "no name, and no list of names"),
     ],
 )
-def test_claims_that_do_not_hold_are_said_without_what_is_in_them(claims: dict[str, Any], says: str) -> None:
+def test_verifier_names_invalid_claims_without_their_content(claims: dict[str, Any], says: str) -> None:
     token = _signed({"alg": "HS256", "typ": "JWT"}, {"sub": "who-is-it", **claims}, SECRET)
     with pytest.raises(TokenError, match=says) as refused:
         TokenVerifier(SECRET).verify(token)
@@ -115,11 +115,11 @@ def test_claims_that_do_not_hold_are_said_without_what_is_in_them(claims: dict[s
         ({"session": []}, set()),
     ],
 )
-def test_a_token_may_be_bound_to_sessions(claims: dict[str, Any], sessions: set[str] | None) -> None:
+def test_verifier_returns_the_sessions_of_a_token(claims: dict[str, Any], sessions: set[str] | None) -> None:
     assert TokenVerifier(SECRET).verify(jwt.encode(claims, SECRET, "HS256")).sessions == sessions
 
 
-def test_where_an_audience_is_asked_for_a_token_must_be_for_it() -> None:
+def test_verifier_checks_the_audience() -> None:
     reader = TokenVerifier(SECRET, "faces")
     assert reader.verify(jwt.encode({"aud": ["others", "faces"]}, SECRET, "HS256")) == Grant()
     for claims in ({}, {"aud": "others"}):
@@ -127,7 +127,7 @@ def test_where_an_audience_is_asked_for_a_token_must_be_for_it() -> None:
             reader.verify(jwt.encode(claims, SECRET, "HS256"))
 
 
-def test_clocks_may_differ_by_some_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_verifier_tolerates_clocks_that_differ_by_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
     now = int(time.time())
     claims = {"exp": now + 60, "nbf": now + 3}
     until = TokenVerifier(SECRET).verify(jwt.encode(claims, SECRET, "HS256"))
@@ -139,13 +139,13 @@ def test_clocks_may_differ_by_some_seconds(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 @pytest.mark.parametrize("token", ["", ".", "..", "a.b.c", "é" * 100, "\udcff", "x" * 100_000, "\0"])
-def test_what_is_no_token_is_none(token: str) -> None:
+def test_verifier_refuses_what_is_no_token(token: str) -> None:
     for key in (SECRET, pem(keys("EdDSA"))):
         with pytest.raises(TokenError):
             TokenVerifier(key).verify(token)
 
 
-def test_a_key_that_cannot_be_used_is_refused_with_what_was_wanted() -> None:
+def test_verifier_refuses_keys_that_cannot_be_used() -> None:
     weak = rsa.generate_private_key(65537, 1024)
     private = keys("ES256").private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption()).decode()
     odd = pem(ec.generate_private_key(ec.SECP256K1()))
@@ -157,9 +157,7 @@ def test_a_key_that_cannot_be_used_is_refused_with_what_was_wanted() -> None:
 
 
 @pytest.mark.parametrize("without", ["jwt", "cryptography"])
-def test_without_the_package_one_sentence_says_what_to_install(
-    without: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_verifier_without_pyjwt_says_what_to_install(without: str, monkeypatch: pytest.MonkeyPatch) -> None:
     there = builtins.__import__
 
     def find(name: str, *rest: Any, **more: Any) -> Any:

@@ -21,14 +21,14 @@ def samples(text: str) -> dict[tuple[str, str], float]:
     return found
 
 
-def test_every_series_says_what_it_is_once() -> None:
+def test_metrics_describe_each_series_once() -> None:
     text = Metrics().text(dict.fromkeys(GAUGES, 0), {})
     names = re.findall(r"^# TYPE (\S+) (\S+)$", text, re.M)
     assert len(names) == len({name for name, _ in names}) == len(GAUGES) + len(COUNTERS) + 2
     assert re.findall(r"^# HELP (\S+) .+$", text, re.M) == [name for name, _ in names]
 
 
-def test_a_histogram_counts_upwards_to_all() -> None:
+def test_histogram_counts_rise_to_the_total() -> None:
     metrics = Metrics()
     for seconds in (0.0, 0.0005, 0.002, 0.3, 70.0):
         metrics.late.observe(seconds)
@@ -42,7 +42,7 @@ def test_a_histogram_counts_upwards_to_all() -> None:
     assert abs(got["realizer_lateness_seconds_sum", ""] - 70.3025) < 1e-6
 
 
-def test_one_of_several_workers_says_which_it_is() -> None:
+def test_metrics_of_a_worker_have_its_number() -> None:
     metrics = Metrics(worker=1)
     metrics.counts["messages"] += 3
     got = samples(metrics.text(dict.fromkeys(GAUGES, 2), {"messages": 4}))
@@ -51,7 +51,7 @@ def test_one_of_several_workers_says_which_it_is() -> None:
     assert got["realizer_planning_seconds_bucket", 'worker="1",le="+Inf"'] == 0
 
 
-def test_a_count_is_told_to_its_last_digit() -> None:
+def test_metrics_print_counts_to_the_last_digit() -> None:
     metrics = Metrics()
     metrics.counts["messages"] = 123_456_789
     metrics.late.observe(1e9 + 0.25)
@@ -60,7 +60,7 @@ def test_a_count_is_told_to_its_last_digit() -> None:
     assert got["realizer_sessions", ""] == 7_654_321
 
 
-def test_what_all_workers_counted_is_the_sum_of_theirs() -> None:
+def test_sum_samples_adds_the_counts_of_all_workers() -> None:
     texts = {}
     for number in (0, 2):
         metrics = Metrics(worker=number)

@@ -19,7 +19,7 @@ def told(text: str) -> list[dict]:
     return json.loads(lint(text, Settings()))["faults"]
 
 
-def test_a_fault_has_its_place_and_a_sound_text_none() -> None:
+def test_lint_gives_the_place_of_a_fault() -> None:
     text = '<bml id="a">\n  <head id="n" lexeme="NIX"/>\n</bml>'
     (fault,) = told(text)
     (spot,) = fault["spots"]
@@ -29,23 +29,23 @@ def test_a_fault_has_its_place_and_a_sound_text_none() -> None:
     assert told(text.replace("NIX", "NOD")) == []
 
 
-def test_advice_is_told_as_such() -> None:
+def test_lint_marks_advice() -> None:
     (fault,) = told('<bml id="a"><head id="n" lexeme="NOD" start="300"/></bml>')
     assert fault["type"] == "ADVICE"
 
 
 @pytest.mark.parametrize("text", ["", "no markup", "<", "<bml", "\ud800", "<bml id='a'>" * 300])
-def test_any_text_is_answered(text: str) -> None:
+def test_lint_answers_any_text(text: str) -> None:
     assert isinstance(told(text), list)
 
 
-def test_what_is_too_long_to_be_checked_while_it_is_typed_is_said() -> None:
+def test_lint_says_that_a_text_is_too_long() -> None:
     answer = json.loads(lint("x" * (MAX_TEXT + 1), Settings()))
     assert answer["faults"] == []
     assert str(MAX_TEXT) in answer["skipped"]
 
 
-def test_a_place_on_the_wheel_is_action_units_and_a_published_profile_is_faps() -> None:
+def test_preview_emotion_returns_action_units_or_faps() -> None:
     own = json.loads(preview_emotion('{"angle": 45, "activation": 7}'))
     assert own["shares"] == {"fear": 1.0}
     assert own["values"]["20L"] == own["values"]["20R"] > 0.5
@@ -66,12 +66,12 @@ def test_a_place_on_the_wheel_is_action_units_and_a_published_profile_is_faps() 
         ("{}", "wanted one of a name"),
     ],
 )
-def test_what_is_no_feeling_is_refused(asked: str, said: str) -> None:
+def test_preview_emotion_refuses_what_is_no_emotion(asked: str, said: str) -> None:
     with pytest.raises(ToolError, match=said):
         preview_emotion(asked)
 
 
-def test_a_pose_is_a_fap_file_of_one_frame_that_is_read_again() -> None:
+def test_export_pose_returns_a_fap_file_of_one_frame() -> None:
     text = export_pose(
         '{"type": "set", "aus": {"12L": 1}, "faps": {"open_jaw": 300, "53": 20}}', "ben", Settings()
     )
@@ -84,7 +84,7 @@ def test_a_pose_is_a_fap_file_of_one_frame_that_is_read_again() -> None:
     assert row["raise_r_cornerlip_o"] == 0
 
 
-def test_a_pose_of_nothing_is_the_neutral_face() -> None:
+def test_export_pose_of_nothing_is_the_neutral_face() -> None:
     assert not np.any(read_fap(export_pose('{"type": "set"}', None, Settings())).values)
 
 
@@ -97,6 +97,6 @@ def test_a_pose_of_nothing_is_the_neutral_face() -> None:
         ('{"type": "set"}', "nobody", "nobody"),
     ],
 )
-def test_what_is_no_pose_is_refused(asked: str, face: str | None, said: str) -> None:
+def test_export_pose_refuses_other_messages(asked: str, face: str | None, said: str) -> None:
     with pytest.raises(ToolError, match=said):
         export_pose(asked, face, Settings())

@@ -15,7 +15,7 @@ ELEMENTS = {element["name"]: element for element in ALL["elements"]}
 
 
 @pytest.mark.parametrize("tag", VOCABULARY)
-def test_every_behaviour_is_there_and_may_stand_in_a_block(tag: str) -> None:
+def test_vocabulary_has_every_behaviour_as_child_of_a_block(tag: str) -> None:
     name = local(tag)
     assert ELEMENTS[name]["namespace"] == tag[1:].partition("}")[0]
     assert ELEMENTS[name]["syncs"] == list(VOCABULARY[tag].sync_points)
@@ -24,18 +24,18 @@ def test_every_behaviour_is_there_and_may_stand_in_a_block(tag: str) -> None:
     assert name in ELEMENTS["required"]["children"]
 
 
-def test_every_child_that_is_offered_is_told_of() -> None:
+def test_vocabulary_describes_every_child() -> None:
     assert {child for e in ELEMENTS.values() for child in e["children"]} <= ELEMENTS.keys()
 
 
-def test_required_attributes_and_closed_sets_of_words_are_marked() -> None:
+def test_vocabulary_marks_required_attributes_and_closed_sets() -> None:
     gaze = {a["name"]: a for a in ELEMENTS["gaze"]["attributes"]}
     assert gaze["target"]["required"]
     assert not gaze["influence"]["required"]
     assert "UPLEFT" in gaze["offsetDirection"]["words"]
 
 
-def test_words_of_tables_are_given_by_element_and_attribute() -> None:
+def test_vocabulary_lists_words_of_tables_by_element_and_attribute() -> None:
     assert "SMILE" in ALL["values"]["faceLexeme lexeme"]
     assert "NOD" in ALL["values"]["head lexeme"]
     for pair in ALL["values"]:
@@ -43,7 +43,7 @@ def test_words_of_tables_are_given_by_element_and_attribute() -> None:
         assert attribute in {a["name"] for a in ELEMENTS[element]["attributes"]}, pair
 
 
-def test_sliders_and_the_wheel_have_their_rows() -> None:
+def test_vocabulary_has_rows_for_sliders_and_the_wheel() -> None:
     assert [fap["fap"] for fap in ALL["faps"]] == list(range(3, 69))
     assert {au["au"] for au in ALL["aus"]} >= {1, 2, 4, 12, 45}
     for kind, number in (("aus", "au"), ("faps", "fap")):

@@ -50,7 +50,7 @@ def width(picture: bytes) -> int:
 
 
 @pytest.mark.gl
-def test_one_kind_of_picture_too_many_is_refused_and_the_others_are_drawn(
+def test_engines_refuse_one_picture_too_many_and_draw_the_others(
     studio, clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("realizer.server.runtime.engines.RENDERERS", 2)
@@ -73,7 +73,7 @@ def test_one_kind_of_picture_too_many_is_refused_and_the_others_are_drawn(
 
 @pytest.mark.gl
 @pytest.mark.slow
-def test_a_renderer_that_takes_long_to_start_is_not_ended_for_another_one(
+def test_engines_keep_a_renderer_that_takes_long_to_start(
     studio, clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("realizer.server.runtime.engines.RENDERERS", 2)
@@ -92,9 +92,7 @@ def test_a_renderer_that_takes_long_to_start_is_not_ended_for_another_one(
 
 
 @pytest.mark.gl
-def test_a_renderer_that_draws_is_not_ended_for_another_one(
-    studio, clock, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_engines_keep_a_renderer_that_draws(studio, clock, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("realizer.server.runtime.engines.RENDERERS", 1)
     begins = clock.asked = threading.Event()
     drawing = studio.render_pool.submit(studio.draw, order(16))
@@ -106,7 +104,7 @@ def test_a_renderer_that_draws_is_not_ended_for_another_one(
 
 
 @pytest.mark.gl
-def test_a_face_that_is_not_there_is_an_answer(studio) -> None:
+def test_engines_return_the_error_of_an_unknown_face(studio) -> None:
     look = RenderOptions((16, 16), "front", None, None, 80)
     answer = studio.draw(Draw(1, "nobody", np.zeros(68, np.float32), look))
     assert "nobody" in str(answer)

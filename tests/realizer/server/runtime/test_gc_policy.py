@@ -34,7 +34,7 @@ def knot() -> weakref.ref[Knot]:
     return weakref.ref(Knot())
 
 
-def test_they_are_looked_for_when_as_many_have_ended_as_are_there() -> None:
+def test_gc_policy_collects_when_as_many_have_ended_as_are_alive() -> None:
     known, tied = GcPolicy(), knot()
     for ended, alive, looked in (
         (ENDED - 1, 0, False),
@@ -50,7 +50,7 @@ def test_they_are_looked_for_when_as_many_have_ended_as_are_there() -> None:
     assert not known.collect_if_needed(0)
 
 
-def test_they_are_looked_for_when_the_process_has_grown(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_gc_policy_collects_when_the_process_has_grown(monkeypatch: pytest.MonkeyPatch) -> None:
     used = 200e6
     monkeypatch.setattr(gc_policy, "memory", lambda: used)
     known, tied = GcPolicy(), knot()

@@ -84,7 +84,7 @@ def subscribed(host: SessionHost, session: str | None = None) -> tuple[int, Clie
 
 @pytest.mark.parametrize("alone", [True, False])
 @pytest.mark.parametrize("phase", PHASES)
-def test_slow_client_gets_frames_again_once_it_has_read(phase: float, alone: bool) -> None:
+def test_session_host_sends_frames_again_to_a_client_that_has_read(phase: float, alone: bool) -> None:
     async def test(host: SessionHost) -> None:
         _, client = subscribed(host, "s")
         if not alone:
@@ -102,7 +102,7 @@ def test_slow_client_gets_frames_again_once_it_has_read(phase: float, alone: boo
     hosted(test)
 
 
-def test_frames_come_at_their_times() -> None:
+def test_session_host_sends_frames_at_their_times() -> None:
     async def test(host: SessionHost) -> None:
         _, client = subscribed(host)
         await asyncio.sleep(4 + PERIOD / 2)

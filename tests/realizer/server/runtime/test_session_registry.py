@@ -26,21 +26,21 @@ def limited(**most: int) -> SessionRegistry:
     return SessionRegistry(lambda id, now, named: Session(id, settings, now, named=named), settings)
 
 
-def test_a_name_is_shared_and_no_name_is_ones_own(hub) -> None:
+def test_registry_shares_named_sessions_only(hub) -> None:
     shared = hub.open(1, "show", 0.0)
     assert hub.open(2, "show", 0.0) is shared
     assert hub.open(3, None, 0.0) is not shared
     assert hub.session_of(2) is shared
 
 
-def test_an_unnamed_session_is_gone_with_its_connection(hub) -> None:
+def test_registry_ends_an_unnamed_session_with_its_connection(hub) -> None:
     hub.open(1, None, 0.0)
     hub.leave(1, 1.0)
     assert not hub.sessions
     assert hub.session_of(1) is None
 
 
-def test_a_named_session_stays_until_it_is_swept(hub) -> None:
+def test_registry_keeps_a_named_session_until_it_expires(hub) -> None:
     session = hub.open(1, "show", 0.0)
     hub.leave(1, 10.0)
     hub.remove_expired(69.0)
@@ -51,13 +51,13 @@ def test_a_named_session_stays_until_it_is_swept(hub) -> None:
 
 
 @pytest.mark.parametrize("name", ["", "a b", "x" * 65, "../etc", "é"])
-def test_a_bad_name_is_refused_with_what_was_wanted(hub, name) -> None:
+def test_registry_refuses_a_bad_name(hub, name) -> None:
     with pytest.raises(JoinError, match=r"wanted 1\.\.64") as caught:
         hub.open(1, name, 0.0)
     assert caught.value.status == 400
 
 
-def test_too_many_sessions_are_refused_but_joining_is_not(hub) -> None:
+def test_registry_refuses_too_many_sessions_but_not_joining(hub) -> None:
     for k in range(3):
         hub.open(k, f"s{k}", 0.0)
     with pytest.raises(JoinError) as caught:
@@ -66,7 +66,7 @@ def test_too_many_sessions_are_refused_but_joining_is_not(hub) -> None:
     hub.open(10, "s0", 0.0)
 
 
-def test_a_session_that_was_left_makes_room_the_longest_left_first(hub) -> None:
+def test_registry_replaces_the_session_abandoned_the_longest(hub) -> None:
     for k in range(3):
         hub.open(k, f"s{k}", 0.0)
     hub.leave(1, 1.0)
@@ -79,7 +79,7 @@ def test_a_session_that_was_left_makes_room_the_longest_left_first(hub) -> None:
         hub.check("again")
 
 
-def test_hello_into_one_session_too_many_is_an_error_and_leaves_all_as_it_was(hub) -> None:
+def test_registry_refuses_a_hello_into_one_session_too_many(hub) -> None:
     for k in range(3):
         hub.open(k, f"s{k}", 0.0)
     here = hub.open(3, "s0", 0.0)
@@ -89,7 +89,7 @@ def test_hello_into_one_session_too_many_is_an_error_and_leaves_all_as_it_was(hu
     assert hub.session_of(3) is here
 
 
-def test_hello_moves_a_connection_to_the_session_it_names(hub) -> None:
+def test_registry_moves_a_connection_to_the_session_of_its_hello(hub) -> None:
     there = hub.open(1, "show", 0.0)
     here = hub.open(2, None, 0.0)
     here.receive(2, '{"type":"hello","session":"show","seen":0}', 0.5)
@@ -99,7 +99,7 @@ def test_hello_moves_a_connection_to_the_session_it_names(hub) -> None:
     assert '"session":"show"' in effects[0].data
 
 
-def test_one_that_has_moved_hears_nothing_more_of_where_it_was(hub) -> None:
+def test_registry_sends_nothing_of_the_old_session_after_a_move(hub) -> None:
     hub.open(1, "show", 0.0)
     here = hub.open(2, "here", 0.0)
     here.receive(2, '<bml id="b"><wait id="w" duration="1"/></bml>', 0.0)
@@ -112,7 +112,7 @@ def test_one_that_has_moved_hears_nothing_more_of_where_it_was(hub) -> None:
     assert here.feedback_log.newest > 0
 
 
-def test_hello_into_a_session_that_cannot_be_kept_ends_the_connection_with_words() -> None:
+def test_registry_closes_a_connection_whose_new_session_cannot_be_stored() -> None:
     settings = Settings()
 
     def make(id: str, now: float, named: bool) -> Session:
@@ -130,7 +130,7 @@ def test_hello_into_a_session_that_cannot_be_kept_ends_the_connection_with_words
 HERE, THERE = Visitor("10.0.0.1"), Visitor("10.0.0.2")
 
 
-def test_one_address_opens_no_more_than_its_share_and_others_still_come() -> None:
+def test_registry_limits_the_sessions_of_an_address() -> None:
     hub = limited(max_address_sessions=2)
     for k in range(2):
         hub.open(k, f"s{k}", 0.0, visitor=HERE)
@@ -145,7 +145,7 @@ def test_one_address_opens_no_more_than_its_share_and_others_still_come() -> Non
     hub.open(7, "more", 0.0, visitor=HERE)
 
 
-def test_one_who_opens_sessions_and_leaves_ends_its_own_and_nobody_elses() -> None:
+def test_registry_replaces_only_sessions_of_the_same_address() -> None:
     hub = limited(max_address_sessions=2, max_sessions=4)
     hub.open(100, "yours", 0.0, visitor=THERE)
     hub.leave(100, 0.0)
@@ -157,7 +157,7 @@ def test_one_who_opens_sessions_and_leaves_ends_its_own_and_nobody_elses() -> No
     hub.open(102, "new", 60.0, visitor=THERE)
 
 
-def test_a_session_that_ended_counts_no_more() -> None:
+def test_registry_does_not_count_sessions_that_have_ended() -> None:
     hub = limited(max_address_sessions=1)
     for k in range(3):
         hub.open(k, None, 0.0, visitor=HERE)
@@ -172,13 +172,13 @@ def test_a_session_that_ended_counts_no_more() -> None:
     hub.open(5, "show", 70.0, visitor=HERE)
 
 
-def test_what_doors_of_our_own_open_is_no_addresss_share() -> None:
+def test_registry_does_not_limit_other_transports() -> None:
     hub = limited(max_address_sessions=1)
     for k in range(3):
         hub.open(k, f"s{k}", 0.0)
 
 
-def test_a_session_that_was_brought_back_is_opened_by_who_comes_to_it() -> None:
+def test_registry_counts_a_restored_session_for_its_first_client() -> None:
     hub = limited(max_address_sessions=1)
     hub.open(1, "one", 0.0, visitor=HERE)
     hub.sessions["two"] = Session("two", Settings(), 0.0, named=True)
@@ -187,7 +187,7 @@ def test_a_session_that_was_brought_back_is_opened_by_who_comes_to_it() -> None:
     hub.open(2, "two", 0.0, visitor=THERE)
 
 
-def test_hello_counts_what_it_leaves_and_what_it_opens() -> None:
+def test_registry_counts_both_sessions_of_a_move() -> None:
     hub = limited(max_address_sessions=1)
     here = hub.open(1, None, 0.0, visitor=HERE)
     here.receive(1, '{"type":"hello","session":"show"}', 0.5)
@@ -200,7 +200,7 @@ def test_hello_counts_what_it_leaves_and_what_it_opens() -> None:
     assert "REALIZER_MAX_ADDRESS_SESSIONS" in effect.data
 
 
-def test_a_visitor_who_is_bound_to_sessions_comes_into_no_other() -> None:
+def test_registry_restricts_a_visitor_to_its_sessions() -> None:
     hub = limited()
     bound = Visitor("10.0.0.1", frozenset({"show", "stage"}))
     for name in ("other", None):
@@ -219,7 +219,7 @@ def test_a_visitor_who_is_bound_to_sessions_comes_into_no_other() -> None:
     assert there.id == "stage"
 
 
-def test_where_memory_is_used_up_no_session_is_opened_and_those_that_play_are_joined(
+def test_registry_without_memory_opens_no_session_but_lets_join(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pages = tmp_path / "statm"
@@ -243,7 +243,7 @@ MOVES = st.tuples(
 
 
 @given(st.lists(MOVES, max_size=60))
-def test_whatever_they_do_nobody_has_more_than_their_share(
+def test_registry_never_exceeds_the_limit_of_an_address(
     moves: list[tuple[str, int, str | None, str]],
 ) -> None:
     hub = limited(max_sessions=4, max_address_sessions=2)
@@ -291,7 +291,7 @@ def test_whatever_they_do_nobody_has_more_than_their_share(
     assert not hub._opened_count
 
 
-def test_sessions_of_other_doors_are_where_these_doors_are() -> None:
+def test_worker_of_is_the_first_one_for_other_transports() -> None:
     for name in ("asap-127.0.0.1", "xface-127.0.0.1", "stomp-json", "xface-player"):
         assert worker_of(name, 7, Settings()) == 0
     assert {worker_of(f"session-{k}", 7, Settings()) for k in range(100)} == set(range(7))

@@ -18,9 +18,7 @@ def opened(name: str, *, named: bool = True) -> Session:
     return Session(name, Settings(), 0.0, named=named)
 
 
-def test_those_that_are_another_s_are_found_among_many(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_taken_over_finds_lost_sessions_among_many(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(takeovers, "BATCH", 2)
     here, there = (journal_at(str(tmp_path / "journal.db")) for _ in range(2))
     sessions = [opened(f"s{number}") for number in range(5)]
@@ -38,7 +36,7 @@ def test_those_that_are_another_s_are_found_among_many(
     there.close()
 
 
-def test_where_the_journal_cannot_be_read_nobody_is_let_go(
+def test_taken_over_finds_none_if_the_journal_cannot_be_read(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     journal = journal_at(str(tmp_path / "journal.db"))

@@ -55,7 +55,7 @@ def alarms(clock: Clock, *, costs: float = 0.0) -> tuple[TimerWheel[str], list[t
     return TimerWheel(clock, wake), woken
 
 
-def test_each_is_woken_once_at_its_time() -> None:
+def test_timer_wheel_wakes_each_item_once_at_its_time() -> None:
     clock = Clock()
     some, woken = alarms(clock)
     for thing, when in (("b", 2.0), ("a", 1.0), ("c", 3.0)):
@@ -66,7 +66,7 @@ def test_each_is_woken_once_at_its_time() -> None:
     assert [thing for thing, *_ in woken] == ["a", "b", "c"]
 
 
-def test_what_is_set_again_is_woken_at_the_new_time_only() -> None:
+def test_timer_wheel_wakes_a_rescheduled_item_at_its_new_time_only() -> None:
     clock = Clock()
     some, woken = alarms(clock)
     some.schedule("a", 1.0)
@@ -79,7 +79,7 @@ def test_what_is_set_again_is_woken_at_the_new_time_only() -> None:
     assert woken == [("b", 2.0, 2.0), ("a", 3.0, 3.0)]
 
 
-def test_one_that_is_due_is_not_put_off_by_who_sets_it_again() -> None:
+def test_timer_wheel_does_not_postpone_an_item_that_is_due() -> None:
     clock = Clock()
     some, woken = alarms(clock)
     some.schedule("a", 1.0)
@@ -89,7 +89,7 @@ def test_one_that_is_due_is_not_put_off_by_who_sets_it_again() -> None:
     assert woken == [("a", 1.0, 1.5)]
 
 
-def test_what_is_due_within_a_step_needs_one_timer() -> None:
+def test_timer_wheel_needs_one_timer_for_a_step() -> None:
     clock = Clock()
     some, woken = alarms(clock)
     for k in range(100):
@@ -99,7 +99,7 @@ def test_what_is_due_within_a_step_needs_one_timer() -> None:
     assert all(was - wanted <= STEP for _, wanted, was in woken)
 
 
-def test_who_wakes_for_long_lets_the_loop_do_other_things_in_between() -> None:
+def test_timer_wheel_lets_the_loop_run_between_many_items() -> None:
     clock = Clock()
     some, woken = alarms(clock, costs=TURN / 2)
     for k in range(12):
@@ -108,7 +108,7 @@ def test_who_wakes_for_long_lets_the_loop_do_other_things_in_between() -> None:
     assert [thing for thing, *_ in woken] == [str(k) for k in range(12)]
 
 
-def test_a_thing_may_set_itself_again_while_it_is_woken() -> None:
+def test_timer_wheel_item_may_schedule_itself_while_it_is_woken() -> None:
     clock = Clock()
     woken: list[float] = []
 
@@ -122,7 +122,7 @@ def test_a_thing_may_set_itself_again_while_it_is_woken() -> None:
     assert woken == [1.0, 2.0, 3.0, 4.0]
 
 
-def test_one_that_fails_leaves_the_others() -> None:
+def test_timer_wheel_survives_an_item_that_fails() -> None:
     clock = Clock()
     woken: list[str] = []
     clock.loop.set_exception_handler(lambda loop, context: None)
@@ -139,7 +139,7 @@ def test_one_that_fails_leaves_the_others() -> None:
     assert woken == ["a", "b"]
 
 
-def test_after_close_nobody_is_woken() -> None:
+def test_timer_wheel_wakes_nothing_after_close() -> None:
     clock = Clock()
     some, woken = alarms(clock)
     some.schedule("a", 1.0)
@@ -150,7 +150,7 @@ def test_after_close_nobody_is_woken() -> None:
 
 
 @given(st.lists(st.tuples(st.integers(0, 5), st.just(NEVER) | st.floats(0, 10)), max_size=300))
-def test_the_last_time_counts_whatever_was_set_before(steps: list[tuple[int, float]]) -> None:
+def test_timer_wheel_uses_the_last_time_of_each_item(steps: list[tuple[int, float]]) -> None:
     clock = Clock()
     some, woken = alarms(clock)
     last: dict[str, float] = {}

@@ -67,7 +67,7 @@ def asked(*answers: bytes | None, request: bytes = REQUEST) -> tuple[bytes, list
     return got, heard
 
 
-def test_each_worker_is_asked_as_the_client_asked_and_answers_are_one() -> None:
+def test_aggregate_passes_the_request_to_each_worker() -> None:
     got, heard = asked(of(0), of(1))
     assert heard == [REQUEST, REQUEST]
     head, _, body = got.partition(b"\r\n\r\n")
@@ -77,12 +77,12 @@ def test_each_worker_is_asked_as_the_client_asked_and_answers_are_one() -> None:
     assert b"\nrealizer_sessions 3\n" in body
 
 
-def test_what_one_refuses_is_refused() -> None:
+def test_aggregate_returns_the_refusal_of_a_worker() -> None:
     refusal = answer("401 Unauthorized", "token: wanted one")
     assert asked(of(0), refusal)[0] == refusal
 
 
-def test_workers_that_say_nothing_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_aggregate_leaves_out_silent_workers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "PATIENCE", 0.2)
     got, _ = asked(of(0), None)
     assert b'realizer_worker_sessions{worker="0"} 1\n' in got
@@ -90,7 +90,7 @@ def test_workers_that_say_nothing_are_left_out(monkeypatch: pytest.MonkeyPatch) 
     assert asked(b"")[0].startswith(b"HTTP/1.1 503 ")
 
 
-def test_health_is_the_sum_and_says_who_does_not_serve(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_aggregate_sums_health_and_names_silent_workers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "HASTE", 0.2)
     request = REQUEST.replace(b"/metrics", b"/healthz")
 
@@ -109,7 +109,7 @@ def test_health_is_the_sum_and_says_who_does_not_serve(monkeypatch: pytest.Monke
     assert b"Content-Length: %d\r\n" % len(b"no worker answers") in got
 
 
-def test_half_a_request_is_answered_by_nothing() -> None:
+def test_aggregate_ignores_half_a_request() -> None:
     assert asked(of(0), request=b"GET /metrics HTTP/1.1\r\nHost") == (b"", [])
 
 
@@ -129,5 +129,5 @@ def test_half_a_request_is_answered_by_nothing() -> None:
         ("", False),
     ],
 )
-def test_only_a_request_that_names_no_worker_is_for_all(line: str, all_: bool) -> None:
+def test_is_for_all_workers_needs_a_request_without_a_worker(line: str, all_: bool) -> None:
     assert is_for_all_workers(line) is all_

@@ -79,7 +79,7 @@ async def told(client: ClientConnection, what: str) -> str:
     raise AssertionError(f"the connection ended before {what!r}")
 
 
-def test_clients_meet_in_the_session_they_name_whichever_worker_has_it(workers: Workers) -> None:
+def test_workers_bring_clients_of_a_session_together(workers: Workers) -> None:
     url = address(workers)
 
     async def test() -> None:
@@ -92,7 +92,7 @@ def test_clients_meet_in_the_session_they_name_whichever_worker_has_it(workers: 
     played(test())
 
 
-def test_a_session_that_another_worker_has_says_how_it_is_reached(
+def test_workers_say_how_to_reach_a_session_of_another_worker(
     workers: Workers,
 ) -> None:
     url = address(workers)
@@ -108,7 +108,7 @@ def test_a_session_that_another_worker_has_says_how_it_is_reached(
     played(test())
 
 
-def test_each_worker_tells_its_own_numbers_to_who_names_it(workers: Workers) -> None:
+def test_workers_show_the_metrics_of_the_worker_that_is_named(workers: Workers) -> None:
     for number in (0, 1, 1, 0):
         address = f"http://127.0.0.1:{workers.port}/metrics?worker={number}"
         with urllib.request.urlopen(address, timeout=LIMIT) as answer:
@@ -129,7 +129,7 @@ def metrics(workers: Workers, query: str = "", headers: dict[str, str] | None = 
     }
 
 
-def test_one_scrape_tells_the_sum_of_all_workers(workers: Workers) -> None:
+def test_workers_show_the_sum_of_all_metrics(workers: Workers) -> None:
     url = address(workers)
 
     async def test() -> None:
@@ -161,7 +161,7 @@ def test_one_scrape_tells_the_sum_of_all_workers(workers: Workers) -> None:
 
 @pytest.mark.parametrize("named", ["9", "2", "x", "-1", "", "01"])
 @pytest.mark.parametrize("path", ["metrics", "healthz"])
-def test_a_worker_that_there_is_not_is_not_found(workers: Workers, path: str, named: str) -> None:
+def test_workers_do_not_find_an_unknown_worker(workers: Workers, path: str, named: str) -> None:
     with pytest.raises(urllib.error.HTTPError, match="404") as missing:
         urllib.request.urlopen(f"http://127.0.0.1:{workers.port}/{path}?worker={named}", timeout=LIMIT)
     assert missing.value.read().decode() == f"worker: wanted a number of 0..1, got {named!r}\n"
@@ -187,7 +187,7 @@ async def until(workers: Workers, **wanted: object) -> dict[str, object]:
     return told
 
 
-def test_health_is_that_of_all_workers_also_while_one_of_them_hangs(workers: Workers) -> None:
+def test_workers_report_the_health_of_all_while_one_hangs(workers: Workers) -> None:
     url = address(workers)
 
     async def test() -> None:
@@ -209,7 +209,7 @@ def test_health_is_that_of_all_workers_also_while_one_of_them_hangs(workers: Wor
     played(test())
 
 
-def test_one_worker_that_hangs_is_left_out_of_the_sum(
+def test_workers_leave_a_hanging_worker_out_of_the_sum(
     workers: Workers, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(worker_aggregation, "PATIENCE", 0.5)
@@ -224,7 +224,7 @@ def test_one_worker_that_hangs_is_left_out_of_the_sum(
         os.kill(workers.processes[1], signal.SIGCONT)
 
 
-def test_the_sum_is_for_those_who_have_the_token() -> None:
+def test_workers_show_the_sum_only_with_the_token() -> None:
     async def test() -> None:
         there = await Workers(
             Settings(port=0, voice="silent", workers=2, token="Xk-secret-7"), run_worker
@@ -245,7 +245,7 @@ def test_the_sum_is_for_those_who_have_the_token() -> None:
     played(test())
 
 
-def test_a_worker_that_was_killed_is_started_again_while_the_other_plays_on(workers: Workers) -> None:
+def test_workers_restart_one_that_was_killed_while_others_play(workers: Workers) -> None:
     url = address(workers)
 
     async def test() -> None:
@@ -268,7 +268,7 @@ def test_a_worker_that_was_killed_is_started_again_while_the_other_plays_on(work
     played(test())
 
 
-def test_a_client_that_says_nothing_or_half_a_line_keeps_nobody_waiting(workers: Workers) -> None:
+def test_workers_do_not_wait_for_clients_that_send_half_a_line(workers: Workers) -> None:
     url = address(workers)
 
     async def test() -> None:
@@ -286,7 +286,7 @@ def test_a_client_that_says_nothing_or_half_a_line_keeps_nobody_waiting(workers:
     played(test())
 
 
-def test_the_command_serves_with_workers_and_ends_with_what_plays() -> None:
+def test_workers_of_the_command_drain_and_end() -> None:
     with running([*SERVE, "--workers", "2"]) as service:
         assert service.stdout is not None
         url = service.stdout.readline().split()[2]
@@ -305,7 +305,7 @@ def test_the_command_serves_with_workers_and_ends_with_what_plays() -> None:
         assert service.wait(LIMIT) == 0
 
 
-def test_a_worker_that_hangs_does_not_keep_the_service_from_ending(
+def test_workers_that_hang_do_not_keep_the_service_from_ending(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr("realizer.server.runtime.workers.GRACE", 0.2)
@@ -324,7 +324,7 @@ def test_a_worker_that_hangs_does_not_keep_the_service_from_ending(
 
 
 @pytest.mark.slow
-def test_workers_say_as_much_as_the_command_was_asked_to_and_who_they_are() -> None:
+def test_workers_log_at_the_level_of_the_command_with_their_number() -> None:
     command = [sys.executable, "-m", "realizer", "-v", "serve", "--port", "0", "--voice", "silent"]
     command += ["--workers", "2", "--token", "a-token-nobody-knows"]
     with running(command, stderr=subprocess.PIPE) as service:
@@ -339,7 +339,7 @@ def test_workers_say_as_much_as_the_command_was_asked_to_and_who_they_are() -> N
 
 
 @pytest.mark.slow
-def test_what_a_worker_lacks_is_told_once_by_the_command_and_without_a_traceback() -> None:
+def test_workers_report_what_is_missing_once_without_a_traceback() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         command = [*SERVE, "--workers", "2", "--xface-port", str(taken.getsockname()[1])]
         done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT)
@@ -348,6 +348,6 @@ def test_what_a_worker_lacks_is_told_once_by_the_command_and_without_a_traceback
     assert "address already in use" in line
 
 
-def test_an_address_that_is_taken_is_said_before_a_worker_starts() -> None:
+def test_workers_report_an_address_in_use_before_they_start() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(OSError, match="in use"):
         asyncio.run(Workers(Settings(port=taken.getsockname()[1], workers=2), run_worker).start())

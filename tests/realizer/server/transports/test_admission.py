@@ -62,7 +62,7 @@ async def welcomed(url: str, hello: dict[str, Any] | None = None, **options: Any
         return reply
 
 
-def test_a_token_opens_the_door_in_each_of_its_three_places() -> None:
+def test_admission_accepts_a_token_in_each_of_its_three_places() -> None:
     async def test(server: Server) -> None:
         ways: list[dict[str, Any]] = [
             {"url": f"{server.url}?token={TOKEN}"},
@@ -75,7 +75,7 @@ def test_a_token_opens_the_door_in_each_of_its_three_places() -> None:
     serving(test, token=TOKEN)
 
 
-def test_a_wrong_token_is_refused_before_a_session_is_made() -> None:
+def test_admission_refuses_a_wrong_token_before_a_session_is_created() -> None:
     async def test(server: Server) -> None:
         for target in (f"{server.url}?token=x", server.url.replace("/ws", "/check")):
             with pytest.raises(InvalidStatus) as refused:
@@ -96,7 +96,7 @@ def test_a_wrong_token_is_refused_before_a_session_is_made() -> None:
     serving(test, token=TOKEN)
 
 
-def test_a_client_that_says_nothing_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_admission_does_not_wait_for_a_silent_client(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(access, "PATIENCE", 0.05)
 
     async def test(server: Server) -> None:
@@ -106,7 +106,7 @@ def test_a_client_that_says_nothing_is_not_waited_for(monkeypatch: pytest.Monkey
     serving(test, token=TOKEN)
 
 
-def test_a_signed_token_opens_its_sessions_and_no_other() -> None:
+def test_admission_by_a_signed_token_is_for_its_sessions_only() -> None:
     async def test(server: Server) -> None:
         mine, all_ = signed(session=["show"]), signed()
         assert (await welcomed(f"{server.url}?session=show&token={mine}"))["session"] == "show"
@@ -135,7 +135,7 @@ def test_a_signed_token_opens_its_sessions_and_no_other() -> None:
     ("claims", "says"),
     [({"exp": 1}, b"has expired"), ({"nbf": 10**10}, b"not valid yet"), ({"aud": "x"}, b"for somebody else")],
 )
-def test_a_signed_token_that_does_not_hold_is_refused(claims: dict[str, Any], says: bytes) -> None:
+def test_admission_refuses_an_invalid_signed_token(claims: dict[str, Any], says: bytes) -> None:
     async def test(server: Server) -> None:
         with pytest.raises(InvalidStatus) as refused:
             await connect(f"{server.url}?token={signed(**claims)}")
@@ -145,7 +145,7 @@ def test_a_signed_token_that_does_not_hold_is_refused(claims: dict[str, Any], sa
     serving(test, jwt_key=SECRET)
 
 
-def test_one_whose_token_ends_is_let_go_and_the_others_stay(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_admission_ends_with_the_token_of_one_client_only(monkeypatch: pytest.MonkeyPatch) -> None:
     async def test(server: Server) -> None:
         until = int(time.time()) + 1000
         async with connect(f"{server.url}?token={signed()}") as stays:
@@ -163,7 +163,7 @@ def test_one_whose_token_ends_is_let_go_and_the_others_stay(monkeypatch: pytest.
     serving(test, jwt_key=SECRET)
 
 
-def test_metrics_of_all_are_not_for_one_who_has_a_session() -> None:
+def test_admission_to_metrics_is_not_for_the_token_of_a_session() -> None:
     async def test(server: Server) -> None:
         with pytest.raises(urllib.error.HTTPError, match="403"):
             await read(f"{server.page}metrics?token={signed(session='show')}")
@@ -172,7 +172,7 @@ def test_metrics_of_all_are_not_for_one_who_has_a_session() -> None:
     serving(test, jwt_key=SECRET)
 
 
-def test_one_address_opens_no_more_sessions_than_its_share() -> None:
+def test_admission_limits_the_sessions_of_an_address() -> None:
     async def test(server: Server) -> None:
         async with connect(f"{server.url}?session=a"), connect(f"{server.url}?session=b") as socket:
             with pytest.raises(InvalidStatus) as refused:
@@ -191,7 +191,7 @@ def test_one_address_opens_no_more_sessions_than_its_share() -> None:
     serving(test, max_address_sessions=2)
 
 
-def test_where_memory_is_used_up_those_that_play_go_on(
+def test_admission_without_memory_leaves_playing_sessions_alone(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     pages = tmp_path / "statm"
@@ -216,7 +216,7 @@ def test_where_memory_is_used_up_those_that_play_go_on(
 
 
 @pytest.mark.parametrize("seen", ["abc", "-1", "1.5", "9" * 16, "%C2%B2"])
-def test_a_seen_that_is_no_number_is_refused_with_what_was_wanted(seen: str) -> None:
+def test_admission_refuses_a_bad_number_in_seen(seen: str) -> None:
     async def test(server: Server) -> None:
         with pytest.raises(InvalidStatus) as refused:
             await connect(f"{server.url}?session=show&seen={seen}")
@@ -226,7 +226,7 @@ def test_a_seen_that_is_no_number_is_refused_with_what_was_wanted(seen: str) -> 
     serving(test)
 
 
-def test_no_token_is_logged_however_much_is(caplog: pytest.LogCaptureFixture) -> None:
+def test_admission_logs_no_token_at_any_level(caplog: pytest.LogCaptureFixture) -> None:
     async def test(server: Server) -> None:
         quiet = logging.getLogger("websockets.client")
         quiet.setLevel(logging.INFO)  # this side is the client's own
@@ -250,7 +250,7 @@ def test_no_token_is_logged_however_much_is(caplog: pytest.LogCaptureFixture) ->
     assert not [line for line in told if any(secret in line for secret in secrets)]
 
 
-def test_a_page_of_elsewhere_opens_no_socket() -> None:
+def test_admission_refuses_pages_of_other_origins() -> None:
     async def test(server: Server) -> None:
         with pytest.raises(InvalidStatus) as refused:
             await connect(server.url, origin="https://evil.example")  # type: ignore[arg-type]
@@ -262,7 +262,7 @@ def test_a_page_of_elsewhere_opens_no_socket() -> None:
     serving(test, origins=("https://app.example",))
 
 
-def test_a_flood_is_told_and_read_slowly_and_nothing_of_it_is_lost() -> None:
+def test_admission_reads_a_flood_slowly_and_loses_nothing() -> None:
     async def test(server: Server) -> None:
         async with connect(server.url) as socket:
             for k in range(8):
@@ -278,7 +278,7 @@ def test_a_flood_is_told_and_read_slowly_and_nothing_of_it_is_lost() -> None:
     serving(test, max_rate=2)
 
 
-def test_metrics_count_what_happened() -> None:
+def test_admission_metrics_count_what_happened() -> None:
     async def test(server: Server) -> None:
         async with connect(server.url) as socket:
             await socket.send(NOD.format("b"))
@@ -295,7 +295,7 @@ def test_metrics_count_what_happened() -> None:
     serving(test)
 
 
-def test_metrics_are_for_those_who_have_the_token() -> None:
+def test_admission_to_metrics_needs_the_token() -> None:
     async def test(server: Server) -> None:
         with pytest.raises(urllib.error.HTTPError, match="401"):
             await read(f"{server.page}metrics")
@@ -323,7 +323,7 @@ def certificate(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     return cert, key
 
 
-def test_with_a_certificate_everything_speaks_tls(certificate: tuple[Path, Path]) -> None:
+def test_admission_with_a_certificate_uses_tls_for_everything(certificate: tuple[Path, Path]) -> None:
     cert, key = certificate
 
     async def test(server: Server) -> None:
@@ -338,7 +338,7 @@ def test_with_a_certificate_everything_speaks_tls(certificate: tuple[Path, Path]
     serving(test, tls_cert=cert, tls_key=key)
 
 
-def test_a_certificate_without_its_key_is_told_before_a_door_opens(certificate: tuple[Path, Path]) -> None:
+def test_admission_names_a_certificate_without_key_before_it_opens(certificate: tuple[Path, Path]) -> None:
     async def test(server: Server) -> None:
         raise AssertionError("it opened")
 

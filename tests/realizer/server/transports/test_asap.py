@@ -143,7 +143,7 @@ def warnings(feedback: list[Feedback]) -> list[WarningFeedback]:
     return [f for f in feedback if isinstance(f, WarningFeedback)]
 
 
-def test_a_document_plays_and_its_feedback_comes_over_the_call_back() -> None:
+def test_asap_plays_a_document_and_calls_back_with_feedback() -> None:
     async def test(server: Server, bml: int, port: int) -> None:
         async with Client(bml, port) as client:
             client.send('<?xml version="1.0" encoding="UTF-8"?>\r\n' + NOD.format("b"))
@@ -157,7 +157,7 @@ def test_a_document_plays_and_its_feedback_comes_over_the_call_back() -> None:
     serving(test)
 
 
-def test_each_element_of_feedback_ends_with_a_line_feed_and_declares_its_namespace() -> None:
+def test_asap_ends_feedback_with_a_line_feed_and_declares_namespaces() -> None:
     async def test(server: Server, bml: int, port: int) -> None:
         async with Client(bml, port) as client:
             client.send(NOD.format("b"))
@@ -170,7 +170,7 @@ def test_each_element_of_feedback_ends_with_a_line_feed_and_declares_its_namespa
     serving(test)
 
 
-def test_the_faster_event_loop_serves_as_well() -> None:
+def test_asap_works_with_uvloop() -> None:
     uvloop = pytest.importorskip("uvloop", reason="needs the fast extra")
 
     async def test(server: Server, bml: int, port: int) -> None:
@@ -186,7 +186,7 @@ def test_the_faster_event_loop_serves_as_well() -> None:
     serving(test, uvloop.new_event_loop)
 
 
-def test_feedback_waits_for_a_client_that_listens_late() -> None:
+def test_asap_queues_feedback_for_a_client_that_listens_late() -> None:
     async def test(server: Server, bml: int, port: int) -> None:
         early = Client(bml, port)
         await early.connect()
@@ -200,7 +200,7 @@ def test_feedback_waits_for_a_client_that_listens_late() -> None:
     serving(test)
 
 
-def test_documents_of_any_lines_and_cut_anywhere_arrive() -> None:
+def test_asap_accepts_documents_cut_anywhere() -> None:
     async def test(server: Server, bml: int, port: int) -> None:
         async with Client(bml, port) as client:
             one, two, three = (WAIT.format(id, 0) for id in ("ä", "b", "c"))
@@ -229,7 +229,7 @@ def test_documents_of_any_lines_and_cut_anywhere_arrive() -> None:
         ('<bml id="x"><head id="n" lexeme="&nbsp;]]>"/></bml>', "x", ""),
     ],
 )
-def test_a_broken_document_gives_one_plain_warning_and_the_next_one_plays(broken, id: str, says: str) -> None:
+def test_asap_warns_once_of_a_broken_document_and_plays_the_next(broken, id: str, says: str) -> None:
     async def test(server: Server, bml: int, port: int) -> None:
         async with Client(bml, port) as client:
             client.send(broken)
@@ -243,7 +243,7 @@ def test_a_broken_document_gives_one_plain_warning_and_the_next_one_plays(broken
     serving(test, max_document=5000)
 
 
-def test_two_clients_on_different_addresses_have_sessions_of_their_own() -> None:
+def test_asap_gives_each_address_its_own_session() -> None:
     async def test(server: Server, bml: int, port: int) -> None:
         async with Client(bml, port) as one, Client(bml, port, "127.0.0.2") as other:
             one.send(WAIT.format("same", 0.2))
@@ -257,7 +257,7 @@ def test_two_clients_on_different_addresses_have_sessions_of_their_own() -> None
     serving(test)
 
 
-def test_a_second_client_on_one_address_shares_its_session_and_is_called_back_when_it_listens() -> None:
+def test_asap_calls_back_a_second_client_of_an_address_when_it_listens() -> None:
     async def test(server: Server, bml: int, port: int) -> None:
         second = Client(bml, port)
         async with Client(bml, port) as first:
@@ -282,7 +282,7 @@ async def until_alone(server: Server) -> None:
         await asyncio.sleep(0)
 
 
-def test_when_the_bml_connection_closes_the_call_back_closes_too() -> None:
+def test_asap_closes_the_call_back_with_the_bml_connection() -> None:
     async def test(server: Server, bml: int, port: int) -> None:
         async with Client(bml, port) as client:
             await client.called_back.wait()
@@ -295,7 +295,7 @@ def test_when_the_bml_connection_closes_the_call_back_closes_too() -> None:
     serving(test)
 
 
-def test_a_client_that_never_opens_its_feedback_port_leaves_nothing_behind() -> None:
+def test_asap_leaves_nothing_behind_if_the_feedback_port_never_opens() -> None:
     async def test(server: Server, bml: int, port: int) -> None:
         client = Client(bml, port)
         await client.connect()
@@ -310,7 +310,7 @@ def test_a_client_that_never_opens_its_feedback_port_leaves_nothing_behind() -> 
     serving(test)
 
 
-def test_a_lost_call_back_is_made_again_and_what_follows_comes() -> None:
+def test_asap_reopens_a_lost_call_back() -> None:
     async def test(server: Server, bml: int, port: int) -> None:
         async with Client(bml, port) as client:
             await client.called_back.wait()
@@ -323,7 +323,7 @@ def test_a_lost_call_back_is_made_again_and_what_follows_comes() -> None:
     serving(test)
 
 
-def test_ten_mebibytes_of_garbage_cost_one_warning() -> None:
+def test_asap_warns_once_of_ten_mebibytes_of_garbage() -> None:
     async def test(server: Server, bml: int, port: int) -> None:
         async with Client(bml, port) as client:
             garbage = os.urandom(2**20).replace(b"<", b"(")
@@ -336,7 +336,7 @@ def test_ten_mebibytes_of_garbage_cost_one_warning() -> None:
     serving(test)
 
 
-def test_feedback_that_nobody_takes_is_bounded_and_its_loss_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_asap_bounds_queued_feedback_and_reports_the_loss(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(asap, "MAX_QUEUED", 2000)
 
     async def test(server: Server, bml: int, port: int) -> None:
@@ -347,14 +347,14 @@ def test_feedback_that_nobody_takes_is_bounded_and_its_loss_is_told(monkeypatch:
         await client.listen()
         feedback = await client.until("b19:end")
         assert isinstance(feedback[0], WarningFeedback)
-        assert "messages came before anybody listened" in feedback[0].text
+        assert "messages are lost: nothing listened here" in feedback[0].text
         assert len(client.raw) < 3000
         client.leave()
 
     serving(test)
 
 
-def test_a_start_tag_that_clients_cannot_read_is_told_of_instead() -> None:
+def test_asap_replaces_a_start_tag_that_clients_cannot_read() -> None:
     async def test(server: Server, bml: int, port: int) -> None:
         async with Client(bml, port) as client:
             client.send(WAIT.format("y" * 5000, 0) + WAIT.format("b", 0))
@@ -365,7 +365,7 @@ def test_a_start_tag_that_clients_cannot_read_is_told_of_instead() -> None:
     serving(test)
 
 
-def test_a_client_that_stops_reading_is_let_go_of(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_asap_disconnects_a_client_that_stops_reading(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("realizer.server.session.session.STUCK", 1000)
 
     async def test(server: Server, bml: int, port: int) -> None:
@@ -380,7 +380,7 @@ def test_a_client_that_stops_reading_is_let_go_of(monkeypatch: pytest.MonkeyPatc
     serving(test)
 
 
-def test_a_viewer_joins_the_session_of_an_address() -> None:
+def test_asap_session_of_an_address_can_be_joined() -> None:
     async def test(server: Server, bml: int, port: int) -> None:
         async with Client(bml, port) as client, connect(f"{server.url}?session=asap-127.0.0.1") as viewer:
             await viewer.send('{"type":"subscribe","stream":"fap","encoding":"json"}')
@@ -394,7 +394,7 @@ def test_a_viewer_joins_the_session_of_an_address() -> None:
     serving(test)
 
 
-def test_hundreds_of_documents_at_once_all_play() -> None:
+def test_asap_plays_hundreds_of_documents_at_once() -> None:
     async def test(server: Server, bml: int, port: int) -> None:
         async with Client(bml, port) as client:
             client.send("".join(f'<bml id="b{n}"/>' for n in range(300)))
@@ -405,7 +405,7 @@ def test_hundreds_of_documents_at_once_all_play() -> None:
     serving(test)
 
 
-def test_a_client_that_finds_the_service_full_is_let_go_of() -> None:
+def test_asap_disconnects_a_client_if_the_service_is_full() -> None:
     async def test(server: Server, bml: int, port: int) -> None:
         async with connect(server.url):
             client = Client(bml, port)
@@ -420,14 +420,14 @@ def test_a_client_that_finds_the_service_full_is_let_go_of() -> None:
     serving(test, max_sessions=1)
 
 
-def test_one_address_has_no_more_connections_than_its_share(caplog: pytest.LogCaptureFixture) -> None:
+def test_asap_limits_the_connections_of_an_address(caplog: pytest.LogCaptureFixture) -> None:
     async def test(server: Server, bml: int, port: int) -> None:
         async with Client(bml, port) as client:
             more = Client(bml, port)
             await more.connect()
             assert await more.reader.read() == b""
             more.bml.transport.abort()
-            assert "127.0.0.1 is not let in: 1 connections from it are open" in caplog.text
+            assert "127.0.0.1 is refused: 1 connections from it are open" in caplog.text
             assert "REALIZER_MAX_CONNECTIONS" in caplog.text
             async with Client(bml, free_port("127.0.0.2"), "127.0.0.2"):  # another address has its own
                 pass
@@ -437,7 +437,7 @@ def test_one_address_has_no_more_connections_than_its_share(caplog: pytest.LogCa
     serving(test, max_connections=1)
 
 
-def test_a_flood_is_told_and_read_slowly_and_nothing_of_it_is_lost() -> None:
+def test_asap_reads_a_flood_slowly_and_loses_nothing() -> None:
     async def test(server: Server, bml: int, port: int) -> None:
         async with Client(bml, port) as client:
             client.send("".join(f'<bml id="b{n}"/>' for n in range(8)))
@@ -460,7 +460,7 @@ def test_a_flood_is_told_and_read_slowly_and_nothing_of_it_is_lost() -> None:
         ({"max_speech": 3}, '<bml id="b"><speech id="s"><text>Hello</text></speech></bml>'),
     ],
 )
-def test_the_limits_of_the_service_hold_here_too_and_are_named(limit: dict[str, int], document: str) -> None:
+def test_asap_applies_and_names_the_limits_of_the_service(limit: dict[str, int], document: str) -> None:
     async def test(server: Server, bml: int, port: int) -> None:
         async with Client(bml, port) as client:
             client.send(document)
@@ -474,7 +474,7 @@ def test_the_limits_of_the_service_hold_here_too_and_are_named(limit: dict[str, 
     serving(test, **limit)
 
 
-def test_the_door_says_where_it_is_and_a_port_in_use_is_an_os_error() -> None:
+def test_asap_prints_its_address_and_raises_if_it_is_in_use() -> None:
     async def test(server: Server, bml: int, port: int) -> None:
         (door,) = [d for d in server.transports if isinstance(d, AsapTransport)]
         told = f"asap: BML at 127.0.0.1:{bml}, feedback to port {port} of the client, session asap-ADDRESS"
@@ -485,7 +485,7 @@ def test_the_door_says_where_it_is_and_a_port_in_use_is_an_os_error() -> None:
     serving(test)
 
 
-def test_when_the_service_ends_what_plays_ends_and_then_the_connections() -> None:
+def test_asap_drains_before_it_disconnects() -> None:
     async def test(server: Server, bml: int, port: int) -> None:
         async with Client(bml, port) as client:
             client.send(WAIT.format("b", 0.3))

@@ -45,7 +45,7 @@ BETWEEN = {
 @pytest.mark.parametrize("document", WHOLE.values(), ids=WHOLE)
 @pytest.mark.parametrize("between", BETWEEN.values(), ids=BETWEEN)
 @pytest.mark.parametrize("step", [None, 1, 7])
-def test_documents_come_out_as_they_were_sent(document: str, between: str, step: int | None) -> None:
+def test_framer_returns_documents_as_they_were_sent(document: str, between: str, step: int | None) -> None:
     stream = between + document + between + document + "\n"
     assert assemble(stream, step=step) == [document, document]
 
@@ -72,7 +72,7 @@ BROKEN = {
 
 @pytest.mark.parametrize("step", [None, 1, 5])
 @pytest.mark.parametrize(("stretch", "says"), BROKEN.values(), ids=BROKEN)
-def test_a_broken_stretch_is_told_of_once_and_reading_goes_on(
+def test_framer_reports_a_broken_span_once_and_goes_on(
     stretch: str | bytes, says: str, step: int | None
 ) -> None:
     raw = stretch.encode() if isinstance(stretch, str) else stretch
@@ -83,12 +83,12 @@ def test_a_broken_stretch_is_told_of_once_and_reading_goes_on(
     assert documents == [NOD, NOD]
 
 
-def test_the_end_tag_of_a_document_that_was_given_up_is_no_second_fault() -> None:
+def test_framer_reports_no_fault_for_the_end_of_a_document_given_up() -> None:
     found = assemble(f'<bml id="x"> {NOD} </bml> {NOD}')
     assert [type(f) for f in found] == [Fault, str, str]
 
 
-def test_half_a_document_gives_nothing_yet() -> None:
+def test_framer_returns_nothing_for_half_a_document() -> None:
     assembler = DocumentFramer(LIMIT)
     assert assembler.feed(NOD[:-1].encode()) == []
     assert assembler.feed(b">") == [NOD]
@@ -103,7 +103,7 @@ PIECES = [
 
 
 @given(st.lists(st.sampled_from(PIECES), max_size=8), st.lists(st.integers(0, 400), max_size=30))
-def test_how_a_stream_is_cut_changes_nothing(pieces: list[str], cuts: list[int]) -> None:
+def test_framer_does_not_depend_on_how_a_stream_is_cut(pieces: list[str], cuts: list[int]) -> None:
     data = "".join(pieces).encode("latin-1", "replace")
     assembler = DocumentFramer(LIMIT)
     found: list[str | Fault] = []
@@ -116,12 +116,12 @@ def test_how_a_stream_is_cut_changes_nothing(pieces: list[str], cuts: list[int])
 
 
 @given(st.binary(max_size=600))
-def test_bytes_of_any_kind_do_not_keep_the_next_document_away(garbage: bytes) -> None:
+def test_framer_finds_the_next_document_after_any_bytes(garbage: bytes) -> None:
     stream = garbage + b"\n" + NOD.encode() * 20  # one of them ends whatever the garbage began
     assert assemble(stream)[-1] == NOD
 
 
-def test_what_is_kept_is_bounded_by_the_limit() -> None:
+def test_framer_bounds_what_it_stores() -> None:
     assembler = DocumentFramer(1000)
     for junk in (b"x" * 999, b"<bml>" * 200, b"<!--" + b"y" * 900, b'<bml id="b">' + b"z" * 900, b"<" * 999):
         for _ in range(50):
@@ -130,7 +130,7 @@ def test_what_is_kept_is_bounded_by_the_limit() -> None:
 
 
 @pytest.mark.parametrize("inside", ["{}", "<!--{}-->", "<![CDATA[{}]]>", "<?x {}?>", '<wait id="{}"/>'])
-def test_a_document_that_drips_in_is_not_read_again_from_its_start(inside: str) -> None:
+def test_framer_does_not_parse_a_slow_document_again_from_its_start(inside: str) -> None:
     data = f'<bml id="{"v" * 2000}">{inside.format("ab < ]] -- ? " * 200)}</bml>'.encode()
     assembler = DocumentFramer(2**20)
     for n in range(len(data) - 1):

@@ -118,7 +118,7 @@ def serving(
     asyncio.run(run())
 
 
-def test_bml_in_json_plays_and_its_feedback_comes_in_json(broker) -> None:
+def test_stomp_plays_bml_in_json_and_answers_in_json(broker) -> None:
     async def test(server: Server) -> None:
         async with Peer(broker.port, "/topic/bmlFeedback") as peer:
             peer.ask(NOD.format("b"))
@@ -130,7 +130,7 @@ def test_bml_in_json_plays_and_its_feedback_comes_in_json(broker) -> None:
     serving(test, broker.address)
 
 
-def test_bare_bml_plays_over_the_topics_of_asap(broker) -> None:
+def test_stomp_plays_plain_bml_over_the_topics_of_asap(broker) -> None:
     async def test(server: Server) -> None:
         async with Peer(broker.port, "/topic/asap.bml.feedback") as peer:
             peer.send("/topic/asap.bml.request", WAIT.format("é", 0))
@@ -144,7 +144,7 @@ def test_bare_bml_plays_over_the_topics_of_asap(broker) -> None:
     serving(test, broker.address)
 
 
-def test_a_vrspeak_plays_and_is_told_of(broker) -> None:
+def test_stomp_plays_a_vrspeak_and_reports_it(broker) -> None:
     async def test(server: Server) -> None:
         async with Peer(broker.port, "/topic/DEFAULT_SCOPE") as peer:
             act = '<?xml version="1.0"?><act><participant id="Brad"/>{}</act>'
@@ -161,7 +161,7 @@ def test_a_vrspeak_plays_and_is_told_of(broker) -> None:
     serving(test, broker.address)
 
 
-def test_a_vrspoke_of_somebody_else_interrupts(broker) -> None:
+def test_stomp_interrupts_at_the_vrspoke_of_another_component(broker) -> None:
     async def test(server: Server) -> None:
         async with Peer(broker.port, "/topic/DEFAULT_SCOPE") as peer:
             peer.say("vrSpeak Brad ALL m1 " + WAIT.format("b", 60))
@@ -172,7 +172,7 @@ def test_a_vrspoke_of_somebody_else_interrupts(broker) -> None:
     serving(test, broker.address)
 
 
-def test_a_broken_vrspeak_ends_with_an_error_and_the_next_one_plays(broker) -> None:
+def test_stomp_ends_a_broken_vrspeak_with_an_error(broker) -> None:
     async def test(server: Server) -> None:
         async with Peer(broker.port, "/topic/DEFAULT_SCOPE") as peer:
             peer.say('vrSpeak Brad ALL m1 <bml><head id="n"</bml>')
@@ -185,7 +185,7 @@ def test_a_broken_vrspeak_ends_with_an_error_and_the_next_one_plays(broker) -> N
     serving(test, broker.address)
 
 
-def test_dialects_have_sessions_of_their_own_that_viewers_join(broker) -> None:
+def test_stomp_has_a_session_for_each_format(broker) -> None:
     async def test(server: Server) -> None:
         topics = ("/topic/bmlFeedback", "/topic/asap.bml.feedback")
         async with (
@@ -207,7 +207,7 @@ def test_dialects_have_sessions_of_their_own_that_viewers_join(broker) -> None:
     serving(test, broker.address)
 
 
-def test_bad_messages_get_warnings_and_the_next_one_plays(broker) -> None:
+def test_stomp_warns_of_bad_messages_and_plays_the_next(broker) -> None:
     async def test(server: Server) -> None:
         async with Peer(broker.port, "/topic/bmlFeedback") as peer:
             for body in ("nonsense", '{"bml":{"content":"%7B%7D"}}', "x" * 2**20):
@@ -220,7 +220,7 @@ def test_bad_messages_get_warnings_and_the_next_one_plays(broker) -> None:
     serving(test, broker.address)
 
 
-def test_many_messages_at_once_all_play(broker) -> None:
+def test_stomp_plays_many_messages_at_once(broker) -> None:
     async def test(server: Server) -> None:
         async with Peer(broker.port, "/topic/bmlFeedback") as peer:
             for n in range(200):
@@ -232,7 +232,7 @@ def test_many_messages_at_once_all_play(broker) -> None:
     serving(test, broker.address)
 
 
-def test_a_message_that_is_too_large_is_refused_by_name_and_the_next_one_plays(broker) -> None:
+def test_stomp_refuses_a_message_that_is_too_large_and_plays_the_next(broker) -> None:
     async def test(server: Server) -> None:
         async with Peer(broker.port, "/topic/bmlFeedback") as peer:
             peer.send("/topic/bmlRequests", "x" * 500)
@@ -245,7 +245,7 @@ def test_a_message_that_is_too_large_is_refused_by_name_and_the_next_one_plays(b
     serving(test, broker.address, max_message=400)
 
 
-def test_a_flood_is_read_slowly_and_nothing_of_it_is_lost(broker, caplog: pytest.LogCaptureFixture) -> None:
+def test_stomp_reads_a_flood_slowly_and_loses_nothing(broker, caplog: pytest.LogCaptureFixture) -> None:
     async def test(server: Server) -> None:
         async with Peer(broker.port, "/topic/bmlFeedback") as peer:
             for n in range(8):
@@ -258,7 +258,7 @@ def test_a_flood_is_read_slowly_and_nothing_of_it_is_lost(broker, caplog: pytest
     serving(test, broker.address, max_rate=3)
 
 
-def test_topics_are_settings_and_a_dialect_can_be_off(broker) -> None:
+def test_stomp_topics_are_settings_and_may_be_off(broker) -> None:
     settings = {
         "stomp_json_in": "/topic/mine.in",
         "stomp_json_out": "/topic/mine.out",
@@ -282,7 +282,7 @@ def test_topics_are_settings_and_a_dialect_can_be_off(broker) -> None:
     serving(test, broker.address, **settings)
 
 
-def test_a_component_that_is_told_to_go_says_what_it_leaves_and_goes(broker) -> None:
+def test_stomp_leaves_when_a_component_kills_it(broker) -> None:
     async def test(server: Server) -> None:
         async with Peer(broker.port, "/topic/DEFAULT_SCOPE") as peer:
             peer.say("vrSpeak Brad ALL m1 " + WAIT.format("b", 60))
@@ -300,7 +300,7 @@ def test_a_component_that_is_told_to_go_says_what_it_leaves_and_goes(broker) -> 
     serving(test, broker.address)
 
 
-def test_the_end_of_the_service_is_told_to_who_waits(broker) -> None:
+def test_stomp_reports_the_end_of_the_service(broker) -> None:
     async def run() -> None:
         async with asyncio.timeout(LIMIT), Peer(broker.port, "/topic/DEFAULT_SCOPE") as peer:
             async with Server(Settings(port=0, stomp=broker.address, voice="silent")) as server:
@@ -314,11 +314,11 @@ def test_the_end_of_the_service_is_told_to_who_waits(broker) -> None:
 
 async def gone(server: Server) -> None:
     """Wait until the door knows that its broker is away."""
-    while door_of(server)._link is not None:
+    while door_of(server)._broker is not None:
         await asyncio.sleep(0)
 
 
-def test_a_broker_that_dies_and_comes_back_is_found_again(own_broker, caplog) -> None:
+def test_stomp_reconnects_to_a_broker_that_dies(own_broker, caplog) -> None:
     async def test(server: Server) -> None:
         own_broker_port = own_broker.port
         async with Peer(own_broker_port, "/topic/bmlFeedback") as peer:
@@ -349,7 +349,7 @@ def test_a_broker_that_dies_and_comes_back_is_found_again(own_broker, caplog) ->
         serving(test, own_broker.address)
 
 
-def test_a_broker_that_is_not_there_is_told_once_and_waited_for(own_broker, caplog) -> None:
+def test_stomp_logs_once_that_there_is_no_broker_and_waits(own_broker, caplog) -> None:
     async def test(server: Server) -> None:
         async with connect(server.url) as socket:  # the other doors are open already
             await socket.send('{"type":"ping"}')
@@ -368,7 +368,7 @@ def test_a_broker_that_is_not_there_is_told_once_and_waited_for(own_broker, capl
     ]
 
 
-def test_a_broker_that_falls_silent_is_given_up_and_found_again(own_broker, monkeypatch, caplog) -> None:
+def test_stomp_reconnects_if_the_broker_falls_silent(own_broker, monkeypatch, caplog) -> None:
     monkeypatch.setattr("realizer.server.transports.broker.HEARTBEAT", 200)
     monkeypatch.setattr("realizer.server.transports.stomp.ATTEMPT", 1)
 
@@ -389,7 +389,7 @@ def test_a_broker_that_falls_silent_is_given_up_and_found_again(own_broker, monk
     assert f"the broker at {own_broker.address} is gone (it has fallen silent)" in caplog.text
 
 
-def test_a_broker_that_asks_who_is_there_is_told(guarded_broker, caplog) -> None:
+def test_stomp_answers_a_vrallcall(guarded_broker, caplog) -> None:
     async def test(server: Server) -> None:
         async with Peer(guarded_broker.port, "/topic/bmlFeedback", login=("face", "secret")) as peer:
             peer.ask(WAIT.format("b", 0))
@@ -407,7 +407,7 @@ def test_a_broker_that_asks_who_is_there_is_told(guarded_broker, caplog) -> None
     assert "password" in caplog.messages[0]
 
 
-def test_rabbitmq_serves_as_well_and_says_what_it_misses(rabbit, caplog) -> None:
+def test_stomp_works_with_rabbitmq_and_says_what_it_misses(rabbit, caplog) -> None:
     guest = {"stomp_login": "guest", "stomp_password": "guest"}
 
     async def test(server: Server) -> None:
@@ -429,7 +429,7 @@ def test_rabbitmq_serves_as_well_and_says_what_it_misses(rabbit, caplog) -> None
     assert "Virtual host '127.0.0.1' access denied" in caplog.messages[0]
 
 
-def test_a_port_that_says_nothing_is_no_broker(monkeypatch: pytest.MonkeyPatch, caplog) -> None:
+def test_stomp_gives_up_a_port_that_says_nothing(monkeypatch: pytest.MonkeyPatch, caplog) -> None:
     monkeypatch.setattr("realizer.server.transports.stomp.ATTEMPT", 0.2)
 
     async def run() -> None:
@@ -448,7 +448,7 @@ def test_a_port_that_says_nothing_is_no_broker(monkeypatch: pytest.MonkeyPatch, 
     assert "no broker at" in caplog.messages[0]
 
 
-def test_without_stomp_py_a_sentence_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stomp_without_its_package_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "stomp", None)
 
     async def run() -> None:

@@ -51,7 +51,7 @@ ACT = '<?xml version="1.0"?><act><participant id="Brad" role="actor"/>{}</act>'
 
 @pytest.mark.parametrize("encode", [quote, quote_plus, lambda text: text])
 @pytest.mark.parametrize("around", [ACT, "{}"])
-def test_the_bml_of_a_vrspeak_is_found_and_gets_the_agent_as_its_character(encode, around: str) -> None:
+def test_vhmsg_gives_the_agent_to_the_bml_of_a_vrspeak(encode, around: str) -> None:
     text = f"vrSpeak Brad ALL m1 {around.format(TRICKY)}"
     ((document),) = vhmsg().incoming(encode(text).encode())
     assert isinstance(document, Inbound)
@@ -71,25 +71,25 @@ def test_the_bml_of_a_vrspeak_is_found_and_gets_the_agent_as_its_character(encod
         ('<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0"\n>', "m-1", "Brad"),
     ],
 )
-def test_a_block_without_id_gets_the_messages(start: str, id: str, character: str) -> None:
+def test_vhmsg_gives_its_id_to_a_block_without_one(start: str, id: str, character: str) -> None:
     (text,) = spoken(vhmsg(), f'vrSpeak Brad ALL m-1 {start}<wait id="w"/></bml>')
     block = parse(text)
     assert (block.id, block.character_id, len(block.behaviours)) == (id, character, 1)
 
 
-def test_an_empty_element_and_awkward_names_are_written_well() -> None:
+def test_vhmsg_writes_an_empty_element_and_awkward_names() -> None:
     (text,) = spoken(vhmsg(), 'vrSpeak A"&B ALL m:1/2 <bml/>')
     block = parse(text)
     assert (block.id, block.character_id) == ("m_1_2", 'A"&B')
 
 
-def test_ids_that_are_taken_are_made_free() -> None:
+def test_vhmsg_renames_blocks_whose_id_is_used() -> None:
     dialect = vhmsg()
     ids = [parse(spoken(dialect, f'vrSpeak A ALL {m} <bml id="same"/>')[0]).id for m in ("m1", "m2", "m2")]
     assert ids == ["same", "m2", "m2-2"]
 
 
-def test_a_vrspeak_is_told_of_from_start_to_end() -> None:
+def test_vhmsg_reports_a_vrspeak_from_start_to_end() -> None:
     dialect = vhmsg()
     spoken(dialect, "vrSpeak Brad ALL m1 <bml/>")
     assert said(dialect.outgoing(planned("m1"))) == []
@@ -101,7 +101,7 @@ def test_a_vrspeak_is_told_of_from_start_to_end() -> None:
     assert said(dialect.outgoing(progress("m1", "end", "DONE"))) == []
 
 
-def test_several_blocks_of_one_vrspeak_start_once_and_end_with_the_last() -> None:
+def test_vhmsg_starts_several_blocks_once_and_ends_with_the_last() -> None:
     dialect = vhmsg()
     assert len(spoken(dialect, 'vrSpeak Brad ALL m1 <act><bml id="x"/><bml id="y"/></act>')) == 2
     told = [progress("x", "start"), progress("y", "start"), progress("x", "end"), progress("y", "end")]
@@ -110,13 +110,13 @@ def test_several_blocks_of_one_vrspeak_start_once_and_end_with_the_last() -> Non
 
 
 @pytest.mark.parametrize("status", ["INTERRUPTED", "REVOKED"])
-def test_an_interrupted_block_is_told_of_as_such(status: str) -> None:
+def test_vhmsg_reports_an_interrupted_block(status: str) -> None:
     dialect = vhmsg()
     spoken(dialect, "vrSpeak Brad ALL m1 <bml/>")
     assert said(dialect.outgoing(progress("m1", "end", status))) == ["vrAgentBML Brad ALL m1 end interrupted"]
 
 
-def test_a_refused_block_ends_with_its_error() -> None:
+def test_vhmsg_ends_a_refused_block_with_its_error() -> None:
     dialect = vhmsg()
     spoken(dialect, "vrSpeak Brad ALL m1 <bml/>")
     warning = WarningFeedback(id="m1", type="PARSING_FAILURE", text="not\n well-formed")
@@ -126,7 +126,7 @@ def test_a_refused_block_ends_with_its_error() -> None:
     ]
 
 
-def test_a_dropped_behaviour_or_a_late_warning_is_no_error_of_the_block() -> None:
+def test_vhmsg_ignores_a_dropped_behaviour_or_a_late_warning() -> None:
     dialect = vhmsg()
     spoken(dialect, "vrSpeak Brad ALL m1 <bml/>")
     assert dialect.outgoing(WarningFeedback(id="m1:n", type="X", text="").to_xml()) == []
@@ -135,7 +135,7 @@ def test_a_dropped_behaviour_or_a_late_warning_is_no_error_of_the_block() -> Non
     assert said(dialect.outgoing(progress("m1", "end", "DONE")))[0].endswith("end complete")
 
 
-def test_a_vrspeak_of_which_nothing_plays_ends_with_the_reason() -> None:
+def test_vhmsg_ends_with_the_reason_if_nothing_plays() -> None:
     dialect = vhmsg()
     spoken(dialect, "vrSpeak Brad ALL m1 <bml/>")
     dialect.outgoing(WarningFeedback(id="m1:x", type="X", text="id: wanted one, got none").to_xml())
@@ -146,13 +146,13 @@ def test_a_vrspeak_of_which_nothing_plays_ends_with_the_reason() -> None:
 
 
 @pytest.mark.parametrize("xml", ["", "hello", "speech_01.xml", "<act/>", "<bml><head", "<?xml?>"])
-def test_a_vrspeak_without_a_document_ends_with_an_error(xml: str) -> None:
+def test_vhmsg_ends_a_vrspeak_without_a_document_with_an_error(xml: str) -> None:
     first, second = said(vhmsg().incoming(f"vrSpeak Brad ALL m1 {xml}".encode()))
     assert first.startswith("vrAgentBML Brad ALL m1 end error wanted")
     assert second.startswith("vrSpeakFailed Brad ALL m1 wanted")
 
 
-def test_a_vrspoke_of_somebody_else_stops_what_still_plays() -> None:
+def test_vhmsg_stops_what_plays_at_the_vrspoke_of_another_component() -> None:
     dialect = vhmsg()
     spoken(dialect, 'vrSpeak Brad ALL m1 <bml id="x"/>')
     assert dialect.incoming(b"vrSpoke Brad ALL m2") == []
@@ -164,7 +164,7 @@ def test_a_vrspoke_of_somebody_else_stops_what_still_plays() -> None:
     assert dialect.incoming(b"vrSpoke Brad ALL m1") == []
 
 
-def test_components_are_answered_and_may_send_us_away() -> None:
+def test_vhmsg_answers_components_and_leaves_when_killed() -> None:
     dialect = vhmsg()
     here = ["vrComponent renderer bml-realizer"]
     assert said(dialect.hello()) == said(dialect.incoming(b"vrAllCall")) == here
@@ -181,7 +181,7 @@ def test_components_are_answered_and_may_send_us_away() -> None:
         assert dialect.incoming(text.encode()) == []
 
 
-def test_what_is_open_at_the_end_is_told_to_be_interrupted() -> None:
+def test_vhmsg_reports_open_speeches_as_interrupted_at_the_end() -> None:
     dialect = vhmsg()
     spoken(dialect, 'vrSpeak Brad ALL m1 <bml id="x"/><bml id="y"/>')
     assert said(dialect.farewell()) == ["vrAgentBML Brad ALL m1 end interrupted"]

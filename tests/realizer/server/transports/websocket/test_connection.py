@@ -40,14 +40,14 @@ def closed(url: str, *messages: str, **settings: object) -> tuple[list[str], int
     return asyncio.run(run())
 
 
-def test_who_says_something_else_before_its_token_is_told_what_was_wanted() -> None:
+def test_connection_says_what_it_wanted_before_a_token() -> None:
     (error,), code, reason = closed("?session=s", '{"type": "ping"}', token=TOKEN)
     assert (json.loads(error)["code"], json.loads(error)["where"]) == ("token", "hello.token")
     assert code == 1008
     assert reason.startswith("token: wanted")
 
 
-def test_who_comes_to_a_session_that_cannot_be_read_is_told_to_come_again(
+def test_connection_asks_to_come_again_if_a_session_cannot_be_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def broken(self: object, session: str) -> None:
@@ -58,7 +58,7 @@ def test_who_comes_to_a_session_that_cannot_be_read_is_told_to_come_again(
     assert (told, code, reason) == ([], 1013, "the disk does not answer")
 
 
-def test_a_visit_is_logged_from_its_beginning_to_its_end(caplog: pytest.LogCaptureFixture) -> None:
+def test_connection_logs_its_begin_and_end(caplog: pytest.LogCaptureFixture) -> None:
     async def run() -> None:
         here = Settings(port=0, voice="silent")
         async with (
@@ -96,7 +96,7 @@ def between(test: Callable[[WebSocketWriter, ClientConnection], Awaitable[None]]
     asyncio.run(run())
 
 
-def test_messages_of_any_length_come_whole_and_in_order() -> None:
+def test_writer_sends_messages_of_any_length_whole_and_in_order() -> None:
     sent: list[str | bytes] = []
     for length in (0, 1, 125, 126, 127, 65_535, 65_536, 200_000):
         sent += [
@@ -112,7 +112,7 @@ def test_messages_of_any_length_come_whole_and_in_order() -> None:
     between(test)
 
 
-def test_what_the_package_sends_in_between_disturbs_nothing() -> None:
+def test_writer_is_not_disturbed_by_frames_of_the_library() -> None:
     async def test(client: WebSocketWriter, theirs: ClientConnection) -> None:
         client.send("one")
         assert await asyncio.wait_for(await theirs.ping(), LIMIT) >= 0
@@ -122,7 +122,7 @@ def test_what_the_package_sends_in_between_disturbs_nothing() -> None:
     between(test)
 
 
-def test_after_the_end_nothing_more_is_sent() -> None:
+def test_writer_sends_nothing_after_the_end() -> None:
     async def test(client: WebSocketWriter, theirs: ClientConnection) -> None:
         client.send("last")
         client.disconnect(1013, "enough")
@@ -139,7 +139,7 @@ def test_after_the_end_nothing_more_is_sent() -> None:
     between(test)
 
 
-def test_what_is_not_read_waits_and_is_counted() -> None:
+def test_writer_counts_what_is_not_read() -> None:
     async def test(client: WebSocketWriter, theirs: ClientConnection) -> None:
         theirs.transport.pause_reading()
         while client.unsent_bytes < 100_000:
@@ -152,7 +152,7 @@ def test_what_is_not_read_waits_and_is_counted() -> None:
     between(test)
 
 
-def test_of_a_long_reason_is_told_what_there_is_room_for() -> None:
+def test_writer_cuts_a_long_reason() -> None:
     async def test(client: WebSocketWriter, theirs: ClientConnection) -> None:
         client.disconnect(1013, "é" * 100)  # two bytes each, and room for 123
         with pytest.raises(ConnectionClosed) as closed:

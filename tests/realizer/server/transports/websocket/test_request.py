@@ -26,24 +26,24 @@ def request(path: str, **headers: str) -> Request:
         ("?token=x&session=a%20b", "a b", None),
     ],
 )
-def test_a_session_is_named_in_the_address(query: str, session: str | None, seen: int | None) -> None:
+def test_session_of_reads_the_address(query: str, session: str | None, seen: int | None) -> None:
     assert session_of(request(f"/ws{query}")) == (session, seen)
 
 
 @pytest.mark.parametrize("seen", ["", "abc", "-1", "1.5", "9" * 16])
-def test_a_seen_that_is_no_number_is_refused(seen: str) -> None:
+def test_session_of_refuses_a_bad_number_in_seen(seen: str) -> None:
     with pytest.raises(JoinError, match="seen: wanted the number of the last feedback that came") as refused:
         session_of(request(f"/ws?session=show&seen={seen}"))
     assert refused.value.status == 400
 
 
-def test_of_several_of_one_name_the_last_counts_and_of_none_there_is_nothing() -> None:
+def test_headers_of_and_query_of_take_the_last_of_one_name() -> None:
     assert query_of(request("/metrics?worker=1&worker=&x")) == {"worker": "", "x": ""}
     several = Headers([("X-One", "1"), ("x-one", "2"), ("Host", "here")])
     assert headers_of(Request("/", several)) == {"x-one": "2", "host": "here"}
 
 
-def test_an_answer_says_what_it_is_and_closes() -> None:
+def test_response_to_has_type_and_length_and_closes() -> None:
     response = response_to(HttpResponse(404, "text/plain", b"no\n", (("Cache-Control", "no-cache"),)))
     assert (response.status_code, response.reason_phrase, response.body) == (404, "Not Found", b"no\n")
     assert response.headers["Content-Length"] == "3"

@@ -77,7 +77,7 @@ async def plays(socket: ClientConnection, name: str) -> None:
         pass
 
 
-def test_one_who_sends_and_three_who_watch_see_the_same() -> None:
+def test_websocket_shows_one_sender_and_three_viewers_the_same() -> None:
     async def test(server: Server) -> None:
         async with AsyncExitStack() as stack:
             url = f"{server.url}?session=show"
@@ -140,7 +140,7 @@ def test_one_who_sends_and_three_who_watch_see_the_same() -> None:
         (b"", "unsupported", None),
     ],
 )
-def test_what_cannot_be_had_is_one_error_and_the_connection_lives(message, code, where) -> None:
+def test_websocket_answers_unknown_streams_with_one_error(message, code, where) -> None:
     async def test(server: Server) -> None:
         async with connect(server.url) as socket:
             await socket.send(message if isinstance(message, bytes) else json.dumps(message))
@@ -164,7 +164,7 @@ def deaf(server: Server) -> sockets.socket:
     return raw
 
 
-def test_a_viewer_that_never_reads_loses_frames_and_the_others_none() -> None:
+def test_websocket_drops_frames_only_for_a_viewer_that_never_reads() -> None:
     async def test(server: Server) -> None:
         async with connect(f"{server.url}?session=show") as viewer:
             raw = await asyncio.to_thread(deaf, server)
@@ -179,7 +179,7 @@ def test_a_viewer_that_never_reads_loses_frames_and_the_others_none() -> None:
     serving(test)
 
 
-def test_one_who_asks_and_never_reads_is_let_go_and_the_others_play_on() -> None:
+def test_websocket_disconnects_a_client_that_asks_and_never_reads() -> None:
     async def test(server: Server) -> None:
         async with connect(f"{server.url}?session=show") as other:
             raw = await asyncio.to_thread(deaf, server)
@@ -199,7 +199,7 @@ def test_one_who_asks_and_never_reads_is_let_go_and_the_others_play_on() -> None
     serving(test)
 
 
-def test_one_who_connects_too_often_is_told_and_the_others_notice_nothing() -> None:
+def test_websocket_limits_the_connections_of_an_address() -> None:
     async def test(server: Server) -> None:
         async with AsyncExitStack() as stack:
             viewer = await stack.enter_async_context(connect(server.url))
@@ -221,7 +221,7 @@ def test_one_who_connects_too_often_is_told_and_the_others_notice_nothing() -> N
 
 
 @pytest.mark.slow
-def test_one_who_connects_again_and_again_disturbs_nobody() -> None:
+def test_websocket_survives_one_who_reconnects_again_and_again() -> None:
     async def test(server: Server) -> None:
         async with connect(server.url) as viewer:
             await ask(viewer, type="subscribe", stream="fap", fps=25)
@@ -246,7 +246,7 @@ HELD = (
 
 @pytest.mark.gl
 @pytest.mark.slow
-def test_the_stream_shows_what_is_drawn_without_a_clock() -> None:
+def test_websocket_video_shows_what_is_drawn_without_a_clock() -> None:
     import realizer
     from realizer.render import Renderer
 
@@ -273,7 +273,7 @@ def test_the_stream_shows_what_is_drawn_without_a_clock() -> None:
     assert np.abs(shown["webp"] - still).mean() < 2
 
 
-def test_a_message_that_is_too_long_ends_its_own_connection_and_says_why() -> None:
+def test_websocket_closes_a_connection_whose_message_is_too_long() -> None:
     async def test(server: Server) -> None:
         async with connect(server.url) as other, connect(server.url) as socket:
             await socket.send(f"<bml id='b'><!--{'x' * 3000}--></bml>")
@@ -288,7 +288,7 @@ def test_a_message_that_is_too_long_ends_its_own_connection_and_says_why() -> No
 
 
 @pytest.mark.slow
-def test_a_crowd_that_asks_for_everything_at_once_is_answered() -> None:
+def test_websocket_answers_a_crowd_that_asks_for_everything() -> None:
     async def test(server: Server) -> None:
         async def one(number: int) -> None:
             url = f"{server.url}?session=crowd-{number % 4}"
@@ -304,7 +304,7 @@ def test_a_crowd_that_asks_for_everything_at_once_is_answered() -> None:
     serving(test)
 
 
-def test_one_who_asks_and_resets_the_connection_leaves_no_traceback() -> None:
+def test_websocket_leaves_no_traceback_when_a_client_resets() -> None:
     with running(SERVE, stderr=subprocess.PIPE) as service:
         assert service.stdout is not None
         port = urlsplit(service.stdout.readline().split()[2]).port

@@ -18,13 +18,13 @@ FAP = f"2.1 x 25 1\n{MASK}\n0 5\n"
 BML = '<bml id="a"><wait id="w" duration="1"/></bml>'
 
 
-def test_an_upload_is_a_clip() -> None:
+def test_prepare_returns_a_clip_for_an_upload() -> None:
     clip = prepare(Task("UPLOAD_FAP", params=(FAP,)), Settings())
     assert isinstance(clip, FAPClip)
     assert clip.values[0, 2] == 5
 
 
-def test_a_file_on_the_server_is_one_of_the_media_folder(tmp_path: Path) -> None:
+def test_prepare_reads_files_of_the_media_folder(tmp_path: Path) -> None:
     (tmp_path / "x.fap").write_text(FAP)
     assert isinstance(prepare(Task("LOAD_FAP", params=("x.fap",)), Settings(media=tmp_path)), FAPClip)
 
@@ -39,7 +39,7 @@ def test_a_file_on_the_server_is_one_of_the_media_folder(tmp_path: Path) -> None
     ],
 )
 @pytest.mark.parametrize("processor", ["BML", " bml\n"])
-def test_a_script_is_documents_and_the_ids_of_their_blocks(
+def test_prepare_returns_the_documents_and_block_ids_of_a_script(
     text: str, blocks: tuple[str, ...], processor: str
 ) -> None:
     script = prepare(Task("UPLOAD_SCRIPT", params=(text, processor)), Settings())
@@ -48,7 +48,7 @@ def test_a_script_is_documents_and_the_ids_of_their_blocks(
 
 
 @pytest.mark.parametrize("name", ["STOP_PLAYBACK", "RESUME_PLAYBACK", "DANCE"])
-def test_other_tasks_bring_nothing(name: str) -> None:
+def test_prepare_returns_none_for_other_tasks(name: str) -> None:
     assert prepare(Task(name, params=("x",)), Settings()) is None
 
 
@@ -63,13 +63,13 @@ def test_other_tasks_bring_nothing(name: str) -> None:
         (Task("UPLOAD_SCRIPT", params=("x", "BML")), "wanted BML, got"),
     ],
 )
-def test_what_cannot_be_understood_is_said(task: Task, says: str) -> None:
+def test_prepare_says_what_cannot_be_parsed(task: Task, says: str) -> None:
     with pytest.raises(RealizerError, match=re.escape(says)) as raised:
         prepare(task, Settings())
     assert not isinstance(raised.value, MissingAttachment)
 
 
-def test_a_file_that_is_too_long_to_play_is_refused_when_it_comes() -> None:
+def test_prepare_refuses_a_file_that_is_too_long_to_play() -> None:
     text = "\n".join(["2.1 x 25 500", *(f"{MASK}\n{k} {k}" for k in range(500))])
     with pytest.raises(
         RealizerError,
@@ -79,7 +79,7 @@ def test_a_file_that_is_too_long_to_play_is_refused_when_it_comes() -> None:
     assert prepare(Task("UPLOAD_FAP", params=(text,)), Settings())
 
 
-def test_a_script_that_is_too_large_is_refused_before_it_is_read() -> None:
+def test_prepare_refuses_a_script_that_is_too_large_before_parsing() -> None:
     task = Task("UPLOAD_SCRIPT", params=(BML + BML, "BML"))
     with pytest.raises(RealizerError, match=r"at most 50 bytes of BML .* .REALIZER_MAX_DOCUMENT"):
         prepare(task, Settings(max_document=50))
@@ -87,13 +87,13 @@ def test_a_script_that_is_too_large_is_refused_before_it_is_read() -> None:
         prepare(task, Settings(max_elements=3))
 
 
-def test_a_script_may_be_as_large_as_the_settings_let_it() -> None:
+def test_prepare_accepts_a_script_as_large_as_the_settings_permit() -> None:
     large = BML.replace("><wait", f"><!--{'x' * 2**20}--><wait")
     assert prepare(Task("UPLOAD_SCRIPT", params=(large, "BML")), Settings(max_document=2**21))
 
 
 @pytest.mark.parametrize("name", ["UPLOAD_FAP", "LOAD_FAP", "UPLOAD_SCRIPT"])
 @pytest.mark.parametrize("params", [(), ("",), (" \n",)])
-def test_a_task_without_what_it_should_bring_is_told_apart(name: str, params: tuple[str, ...]) -> None:
+def test_prepare_tells_a_missing_attachment_apart(name: str, params: tuple[str, ...]) -> None:
     with pytest.raises(MissingAttachment, match="wanted params, got none, or empty ones"):
         prepare(Task(name, params=params), Settings())

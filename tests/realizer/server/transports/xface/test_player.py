@@ -127,7 +127,7 @@ async def hold(server: Server, text: str, session: str = "xface-player") -> None
             pass
 
 
-def test_the_player_shows_what_the_session_s_face_does() -> None:
+def test_player_shows_the_character_of_the_session() -> None:
     async def test(server: Server, player: Player) -> None:
         await hold(server, '{"type":"set","faps":{"open_jaw":500,"head_yaw":-9000}}')
         await player.until(lambda: {3: 500, 49: -9000} in player.shown)
@@ -139,7 +139,7 @@ def test_the_player_shows_what_the_session_s_face_does() -> None:
     playing(test)
 
 
-def test_blocks_play_on_the_player() -> None:
+def test_player_shows_blocks() -> None:
     async def test(server: Server, player: Player) -> None:
         nod = '<bml id="b"><head id="n" lexeme="NOD" start="0" end="1"/></bml>'
         await hold(server, nod)
@@ -149,7 +149,7 @@ def test_blocks_play_on_the_player() -> None:
     playing(test)
 
 
-def test_it_may_show_another_session() -> None:
+def test_player_shows_another_session_by_its_setting() -> None:
     async def test(server: Server, player: Player) -> None:
         await hold(server, '{"type":"set","faps":{"open_jaw":500}}', "asap-127.0.0.1")
         await player.until(lambda: {3: 500} in player.shown)
@@ -157,7 +157,7 @@ def test_it_may_show_another_session() -> None:
     playing(test, xface_player_session="asap-127.0.0.1")
 
 
-def test_with_paul_s_interval_the_newest_frame_is_shown() -> None:
+def test_player_shows_the_newest_frame_at_the_interval_of_paul() -> None:
     async def test(server: Server, player: Player) -> None:
         for value in range(100, 600, 100):
             await hold(server, f'{{"type":"set","faps":{{"open_jaw":{value}}}}}')
@@ -167,7 +167,7 @@ def test_with_paul_s_interval_the_newest_frame_is_shown() -> None:
     playing(test, xface_player_interval=0.25)
 
 
-def test_the_player_may_be_another_service_of_ours() -> None:
+def test_player_may_be_another_service() -> None:
     async def run() -> None:
         common = {"port": 0, "voice": "silent", "idle": False}
         async with asyncio.timeout(LIMIT), Server(Settings(**common, xface_port=0)) as showing:  # type: ignore[arg-type]
@@ -183,7 +183,7 @@ def test_the_player_may_be_another_service_of_ours() -> None:
     asyncio.run(run())
 
 
-def test_the_door_says_what_it_shows_once_the_player_has_greeted() -> None:
+def test_player_prints_its_line_once_it_is_greeted() -> None:
     async def test(server: Server, player: Player) -> None:
         door = next(door for door in server.transports if isinstance(door, XfacePlayerTransport))
         await door.ready()
@@ -192,7 +192,7 @@ def test_the_door_says_what_it_shows_once_the_player_has_greeted() -> None:
     playing(test)
 
 
-def test_a_player_that_comes_back_is_found_again(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_player_that_comes_back_is_found_again(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(xface_player, "FIRST_RETRY", 0.01)
     monkeypatch.setattr(xface_player, "LAST_RETRY", 0.02)
 
@@ -209,7 +209,7 @@ def test_a_player_that_comes_back_is_found_again(monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.mark.parametrize("lost", ["a session that fails", "a player that reads nothing"])
-def test_the_connection_is_made_anew_after(lost: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_player_reconnects_after(lost: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(xface_player, "FIRST_RETRY", 0.01)
 
     async def test(server: Server, player: Player) -> None:
@@ -227,7 +227,7 @@ def test_the_connection_is_made_anew_after(lost: str, monkeypatch: pytest.Monkey
     playing(test)
 
 
-def test_who_does_not_greet_is_no_player(
+def test_player_without_a_greeting_is_given_up(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(xface_player, "ATTEMPT", 0.05)
@@ -247,7 +247,7 @@ def test_who_does_not_greet_is_no_player(
     )
 
 
-def test_a_player_that_never_answers_holds_nobody_up() -> None:
+def test_player_that_never_answers_delays_nothing() -> None:
     async def test(server: Server, player: Player) -> None:
         player.answers = False
         await hold(server, '{"type":"set","faps":{"open_jaw":500}}')

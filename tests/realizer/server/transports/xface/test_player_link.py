@@ -57,7 +57,7 @@ def shown(link: PlayerLink, now: float) -> dict[int, int]:
     return {fap: int(clip.values[0, fap - 1]) for fap in range(1, 69) if clip.mask[fap - 1]}
 
 
-def test_nothing_is_sent_before_the_player_has_greeted() -> None:
+def test_player_link_sends_nothing_before_the_greeting() -> None:
     link = PlayerLink(0.25)
     link.show(frame(fap3=100))
     assert link.due(0.0) is None
@@ -69,7 +69,7 @@ def test_nothing_is_sent_before_the_player_has_greeted() -> None:
     assert due(link, 0.0) is not None
 
 
-def test_a_frame_is_an_upload_of_one_and_the_stop_that_shows_it(link: PlayerLink) -> None:
+def test_player_link_sends_a_frame_as_an_upload_and_a_stop(link: PlayerLink) -> None:
     link.show(frame(fap3=500, fap48=-4000))
     upload = due(link, 0.0)
     assert upload is not None
@@ -87,14 +87,14 @@ def test_a_frame_is_an_upload_of_one_and_the_stop_that_shows_it(link: PlayerLink
     assert link.state.name == "READY"
 
 
-def test_only_what_is_not_0_is_given_and_never_a_compound_fap(link: PlayerLink) -> None:
+def test_player_link_leaves_out_zeros_and_compound_faps(link: PlayerLink) -> None:
     link.show(frame(fap1=3, fap2=1, fap3=500, fap48=-4000))
     assert shown(link, 0.0) == {3: 500, 48: -4000}
     link.show(frame())
     assert shown(link, 1.0) == {}
 
 
-def test_the_next_frame_waits_for_its_time_and_is_the_newest(link: PlayerLink) -> None:
+def test_player_link_waits_for_the_interval_and_sends_the_newest(link: PlayerLink) -> None:
     link.show(frame(fap3=1))
     assert shown(link, 10.0) == {3: 1}
     link.show(frame(fap3=2))
@@ -104,7 +104,7 @@ def test_the_next_frame_waits_for_its_time_and_is_the_newest(link: PlayerLink) -
     assert shown(link, 10.25) == {3: 3}
 
 
-def test_without_an_interval_only_the_player_is_waited_for() -> None:
+def test_player_link_without_an_interval_waits_for_notes_only() -> None:
     link = PlayerLink(0.0)
     link.on_connect()
     link.receive(pack_note("CONNECTION_OK", 1, 0, 0))
@@ -113,14 +113,14 @@ def test_without_an_interval_only_the_player_is_waited_for() -> None:
         assert shown(link, 5.0) == {3: value}
 
 
-def test_a_face_that_does_not_move_is_not_sent_again(link: PlayerLink) -> None:
+def test_player_link_sends_an_unchanged_face_once(link: PlayerLink) -> None:
     link.show(frame(fap3=1))
     shown(link, 0.0)
     link.show(frame(fap3=1))
     assert (link.due(9.0), link.next_deadline()) == (None, None)
 
 
-def test_a_player_that_says_nothing_of_a_task_is_sent_the_next(link: PlayerLink) -> None:
+def test_player_link_goes_on_after_a_task_without_a_note(link: PlayerLink) -> None:
     link.show(frame(fap3=1))
     assert due(link, 0.0) is not None
     link.show(frame(fap3=2))
@@ -135,7 +135,7 @@ def test_a_player_that_says_nothing_of_a_task_is_sent_the_next(link: PlayerLink)
     assert upload.name == "UPLOAD_FAP"
 
 
-def test_a_task_that_fails_ends_too_and_is_said_once(
+def test_player_link_logs_a_failed_task_once_and_goes_on(
     link: PlayerLink, caplog: pytest.LogCaptureFixture
 ) -> None:
     for time, value in ((0.0, 1), (1.0, 2)):
@@ -149,7 +149,7 @@ def test_a_task_that_fails_ends_too_and_is_said_once(
     assert [record.getMessage() for record in caplog.records] == ["xface player: it cannot do UPLOAD_FAP"]
 
 
-def test_notes_about_tasks_of_the_past_change_nothing(link: PlayerLink) -> None:
+def test_player_link_ignores_notes_about_old_tasks(link: PlayerLink) -> None:
     link.show(frame(fap3=1))
     upload = due(link, 0.0)
     assert upload is not None
@@ -157,7 +157,7 @@ def test_notes_about_tasks_of_the_past_change_nothing(link: PlayerLink) -> None:
     assert link.state is State.UPLOADING
 
 
-def test_another_connection_begins_anew(link: PlayerLink) -> None:
+def test_player_link_begins_anew_with_a_connection(link: PlayerLink) -> None:
     link.show(frame(fap3=1))
     shown(link, 0.0)
     link.on_disconnect()
@@ -169,6 +169,6 @@ def test_another_connection_begins_anew(link: PlayerLink) -> None:
     assert (upload.owner, upload.id) == (8, 8 * NUMBERS + 1)
 
 
-def test_nobody_connects_while_a_connection_stands(link: PlayerLink) -> None:
+def test_player_link_refuses_a_second_connection(link: PlayerLink) -> None:
     with pytest.raises(AssertionError, match="connected already"):
         link.on_connect()

@@ -23,7 +23,7 @@ def found(data: bytes, cut: int = 10_000) -> list[Task | Content | Fault]:
 
 
 @pytest.mark.parametrize("end", [b"", b"\0", b"\0\0", b"\r\n\0"])
-def test_a_task_may_end_with_nothing_or_with_nuls(end: bytes) -> None:
+def test_reader_accepts_tasks_with_and_without_nuls(end: bytes) -> None:
     assert found(2 * (NEXT + end)) == [STOP, STOP]
 
 
@@ -48,7 +48,7 @@ def test_a_task_may_end_with_nothing_or_with_nuls(end: bytes) -> None:
         (b'<task name="A"><param>\xff</param></task>', Task("A", params=("\ufffd",))),
     ],
 )
-def test_tasks_are_written_in_many_ways(text: bytes, task: Task) -> None:
+def test_reader_accepts_tasks_in_many_spellings(text: bytes, task: Task) -> None:
     assert found(text) == [task]
     assert found(text, 1) == [task]
 
@@ -71,14 +71,14 @@ BAD = {
 
 @pytest.mark.parametrize(("data", "says"), BAD.values(), ids=BAD)
 @pytest.mark.parametrize("cut", [1, 7, 10_000])
-def test_what_is_no_task_is_one_fault_and_the_next_task_is_read(data: bytes, says: str, cut: int) -> None:
+def test_reader_reports_one_fault_and_reads_the_next_task(data: bytes, says: str, cut: int) -> None:
     fault, *rest = found(data + b"\0" + NEXT, cut)
     assert isinstance(fault, Fault)
     assert (says if cut > len(data) else says.partition(", got")[0]) in fault.text
     assert rest == [STOP]
 
 
-def test_a_task_that_is_too_large_is_known_by_its_head() -> None:
+def test_reader_returns_the_head_of_a_task_that_is_too_large() -> None:
     head = b'<task name="A" ownerId="1" taskId="7">'
     for cut in (50, 10_000):
         fault, *rest = found(head + b"x" * 3000 + b"</task>\0" + NEXT, cut)
@@ -86,12 +86,12 @@ def test_a_task_that_is_too_large_is_known_by_its_head() -> None:
         assert rest == [STOP]
 
 
-def test_a_task_without_a_name_has_the_ids_it_has() -> None:
+def test_reader_returns_the_ids_of_a_task_without_a_name() -> None:
     (fault,) = found(b'<task name="a b" ownerId="2" taskId="7"/>')
     assert fault == Fault("wanted <task> with the name of a task, got 'a b'", Task("", 2, 7))
 
 
-def test_another_beginning_ends_half_a_task_where_there_is_no_nul() -> None:
+def test_reader_ends_half_a_task_at_the_next_one_without_a_nul() -> None:
     fault, *rest = found(b'<task name="A" taskId="3"><param>1' + NEXT)
     assert fault == Fault("wanted </task>, got another <task: half a task", Task("A", 0, 3))
     assert rest == [STOP]
@@ -99,7 +99,7 @@ def test_another_beginning_ends_half_a_task_where_there_is_no_nul() -> None:
 
 @pytest.mark.parametrize("nul", [b"", b"\0"])
 @pytest.mark.parametrize("cut", [1, 5, 10_000])
-def test_the_bytes_after_an_announced_file_are_its_content_whatever_they_are(nul: bytes, cut: int) -> None:
+def test_reader_returns_any_bytes_after_an_announced_file(nul: bytes, cut: int) -> None:
     head = b'<task name="UPLOAD_WAV" ownerId="1" taskId="3"><param>a.wav</param><param>12</param></task>'
     task, content, after = found(head + nul + b"RIFF<task \0\0" + NEXT, cut)
     assert task == Task("UPLOAD_WAV", 1, 3, ("a.wav", "12"))
@@ -108,7 +108,7 @@ def test_the_bytes_after_an_announced_file_are_its_content_whatever_they_are(nul
 
 
 @pytest.mark.parametrize("size", ["0", "-1", "many", "3000", "9" * 50])
-def test_an_absurd_size_of_a_file_is_a_fault_and_nothing_is_waited_for(size: str) -> None:
+def test_reader_reports_an_absurd_size_and_does_not_wait(size: str) -> None:
     head = f'<task name="UPLOAD_WAV"><param>a.wav</param><param>{size}</param></task>'
     _, fault, after = found(head.encode() + NEXT)
     assert isinstance(fault, Fault)
@@ -116,20 +116,20 @@ def test_an_absurd_size_of_a_file_is_a_fault_and_nothing_is_waited_for(size: str
     assert after == STOP
 
 
-def test_a_tag_of_one_word_that_never_ends_costs_no_more_than_its_length() -> None:
+def test_reader_takes_linear_time_for_a_tag_that_never_ends() -> None:
     # Where each letter began a search of its own this took a minute of processor time.
     everything = found(b"<task " + b"x" * 100_000 + b">" + b"y" * 3000 + b"\0" + NEXT)
     assert everything[-1] == STOP
 
 
 @given(st.binary(max_size=300), st.integers(1, 100))
-def test_any_bytes_are_tasks_or_faults_and_a_nul_sets_it_right(data: bytes, cut: int) -> None:
+def test_reader_turns_any_bytes_into_tasks_or_faults(data: bytes, cut: int) -> None:
     everything = found(data.replace(b"UPLOAD_WAV", b"") + b"\0" + NEXT, cut)
     assert everything[-1] == STOP
 
 
 @given(st.lists(st.sampled_from([NEXT, b"x\0", b"\0", b"<task name='B'/>"]), max_size=8), st.integers(1, 60))
-def test_how_a_stream_is_cut_changes_nothing(parts: list[bytes], cut: int) -> None:
+def test_reader_does_not_depend_on_how_a_stream_is_cut(parts: list[bytes], cut: int) -> None:
     data = b"".join(parts)
 
     def kinds(items: list[Task | Content | Fault]) -> list[object]:

@@ -94,14 +94,14 @@ def serving(test: Callable[[Server, XfaceTransport], Awaitable[None]], **setting
     asyncio.run(run())
 
 
-def test_the_door_says_where_it_is() -> None:
+def test_xface_prints_its_address() -> None:
     async def test(server: Server, door: XfaceTransport) -> None:
         assert door.startup_lines == (f"xface: tasks at 127.0.0.1:{door.port}, session xface-ADDRESS",)
 
     serving(test)
 
 
-def test_the_greeting_is_the_literal_that_clients_compare() -> None:
+def test_xface_sends_the_literal_greeting_that_clients_compare() -> None:
     async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as first, Client(door.port) as second:
             wanted = b'<notify name="CONNECTION_OK" ownerId="1" taskId="0" status="0"/>\0\0'
@@ -132,7 +132,7 @@ async def exchange(port: int, talk: list[tuple[bytes, bytes]]) -> None:
 JAW = MASK.encode()
 
 
-def test_the_player_s_own_client_byte_by_byte() -> None:
+def test_xface_serves_the_player_s_own_client_byte_by_byte() -> None:
     """It ends tasks with one NUL, numbers them from a million for each client, and waits for 3 or 7."""
     upload = (
         b'<task name="UPLOAD_FAP" ownerId="1" taskId="1000001">\n<param>2.1 x 25 2\n%b\n0 5 0\n%b\n1 9 1\n'
@@ -165,7 +165,7 @@ def test_the_player_s_own_client_byte_by_byte() -> None:
     serving(test)
 
 
-def test_the_streaming_client_byte_by_byte() -> None:
+def test_xface_serves_the_streaming_client_byte_by_byte() -> None:
     """It ends tasks with nothing, writes a status into them, and stops so that the frame is shown."""
     upload = (
         b'<task name="UPLOAD_FAP" ownerId="1" taskId="%d"><param>2.1 C:\\Users\\me\\TempFile 25 1\n '
@@ -183,7 +183,7 @@ def test_the_streaming_client_byte_by_byte() -> None:
     serving(test)
 
 
-def test_the_player_s_own_client_uploads_plays_and_stops() -> None:
+def test_xface_uploads_plays_and_stops_for_the_player_s_own_client() -> None:
     async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client:
             client.send(task("UPLOAD_FAP", client.owner, 1000001, fap(1000)))
@@ -198,7 +198,7 @@ def test_the_player_s_own_client_uploads_plays_and_stops() -> None:
     serving(test)
 
 
-def test_playback_that_nobody_stops_is_finished_when_the_file_ends() -> None:
+def test_xface_finishes_playback_when_the_file_ends() -> None:
     async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client:
             client.send(task("UPLOAD_FAP", 1, 1, fap(5)) + task("RESUME_PLAYBACK", 1, 2))
@@ -218,7 +218,7 @@ async def face(server: Server, wanted: Callable[[list[int]], bool], after: Calla
                 return
 
 
-def test_the_streaming_client_without_nuls_moves_the_face_frame_by_frame() -> None:
+def test_xface_moves_the_face_for_the_streaming_client_without_nuls() -> None:
     """Its files have one frame, a fixed Windows path for a name, and no FAP that is 0."""
 
     async def test(server: Server, door: XfaceTransport) -> None:
@@ -243,7 +243,7 @@ def test_the_streaming_client_without_nuls_moves_the_face_frame_by_frame() -> No
     serving(test)
 
 
-def test_a_frame_of_the_next_client_stands_alone() -> None:
+def test_xface_shows_a_frame_of_the_next_client_alone() -> None:
     async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as first:
             await face(
@@ -262,7 +262,7 @@ def test_a_frame_of_the_next_client_stands_alone() -> None:
     serving(test)
 
 
-def test_a_file_that_plays_is_seen_by_viewers() -> None:
+def test_xface_shows_a_file_to_viewers() -> None:
     async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client:
 
@@ -276,7 +276,7 @@ def test_a_file_that_plays_is_seen_by_viewers() -> None:
 
 @pytest.mark.parametrize("end", ["", "\0", "\0\0", "\n\0", "\r\n"])
 @pytest.mark.parametrize("cut", [1, 7, 100, 10_000])
-def test_tasks_come_in_reads_of_any_size_with_any_end(end: str, cut: int) -> None:
+def test_xface_reads_tasks_cut_anywhere_with_any_end(end: str, cut: int) -> None:
     async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client:
             data = "".join(task("UPLOAD_FAP", 1, id, fap(2), end=end) for id in (1, 2, 3)).encode()
@@ -289,7 +289,7 @@ def test_tasks_come_in_reads_of_any_size_with_any_end(end: str, cut: int) -> Non
     serving(test)
 
 
-def test_a_script_of_bml_is_started_and_finished_with_its_blocks() -> None:
+def test_xface_starts_and_finishes_a_script_with_its_blocks() -> None:
     async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client:
             script = SCRIPT.format("a") + SCRIPT.format("b").replace(" id=", ' composition="APPEND" id=', 1)
@@ -299,7 +299,7 @@ def test_a_script_of_bml_is_started_and_finished_with_its_blocks() -> None:
     serving(test)
 
 
-def test_a_script_that_talks_on_is_ended_by_a_stop() -> None:
+def test_xface_ends_a_script_at_a_stop() -> None:
     async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client:
             client.send(
@@ -333,7 +333,7 @@ def test_a_script_that_talks_on_is_ended_by_a_stop() -> None:
         ((), [1, 7]),
     ],
 )
-def test_a_script_that_cannot_be_played_is_an_error(params: tuple[str, ...], statuses: list[int]) -> None:
+def test_xface_reports_a_script_that_cannot_be_played(params: tuple[str, ...], statuses: list[int]) -> None:
     async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client:
             client.send(task("UPLOAD_SCRIPT", 1, 9, *params))
@@ -342,7 +342,7 @@ def test_a_script_that_cannot_be_played_is_an_error(params: tuple[str, ...], sta
     serving(test)
 
 
-def test_a_file_that_is_none_is_an_error_and_finished_as_clients_expect() -> None:
+def test_xface_reports_a_bad_file_and_finishes_as_clients_expect() -> None:
     async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client:
             client.send(task("UPLOAD_FAP", 1, 1, "hello world"))
@@ -355,7 +355,7 @@ def test_a_file_that_is_none_is_an_error_and_finished_as_clients_expect() -> Non
     serving(test)
 
 
-def test_a_file_on_the_server_is_one_of_the_media_folder(tmp_path: Path) -> None:
+def test_xface_loads_files_of_the_media_folder(tmp_path: Path) -> None:
     (tmp_path / "clip.fap").write_text(fap(3))
 
     async def test(server: Server, door: XfaceTransport) -> None:
@@ -368,7 +368,7 @@ def test_a_file_on_the_server_is_one_of_the_media_folder(tmp_path: Path) -> None
     serving(test, media=tmp_path)
 
 
-def test_who_wants_no_notes_gets_none() -> None:
+def test_xface_sends_no_notes_to_owner_0() -> None:
     async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client:
             client.send(task("UPLOAD_FAP", 0, 1, fap(2)) + task("UPLOAD_FAP", 1, 2, fap(2)))
@@ -378,7 +378,7 @@ def test_who_wants_no_notes_gets_none() -> None:
     serving(test)
 
 
-def test_kill_app_ends_the_client_and_not_the_service() -> None:
+def test_xface_kill_app_ends_the_client_and_not_the_service() -> None:
     async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client, Client(door.port) as other:
             client.send(task("KILL_APP", 1, 1))
@@ -408,7 +408,7 @@ BAD = {
 
 
 @pytest.mark.parametrize(("data", "note"), BAD.values(), ids=BAD)
-def test_what_is_no_task_is_one_error_and_the_next_task_counts(
+def test_xface_reports_one_error_and_reads_the_next_task(
     data: bytes, note: tuple[str, int, int, int]
 ) -> None:
     async def test(server: Server, door: XfaceTransport) -> None:
@@ -421,7 +421,7 @@ def test_what_is_no_task_is_one_error_and_the_next_task_counts(
     serving(test)
 
 
-def test_a_task_that_is_too_large_is_an_error_and_others_notice_nothing(
+def test_xface_refuses_a_task_that_is_too_large(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(xface, "LIMIT", 100_000)
@@ -438,7 +438,7 @@ def test_a_task_that_is_too_large_is_an_error_and_others_notice_nothing(
     serving(test)
 
 
-def test_a_million_bytes_of_frames_are_loaded() -> None:
+def test_xface_loads_a_million_bytes_of_frames() -> None:
     async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client:
             client.send(task("UPLOAD_FAP", 1, 5, fap(7000)))
@@ -447,7 +447,7 @@ def test_a_million_bytes_of_frames_are_loaded() -> None:
     serving(test)
 
 
-def test_a_thousand_connections_are_let_in_one_after_the_other() -> None:
+def test_xface_accepts_a_thousand_connections_one_after_the_other() -> None:
     async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as other:
             for _ in range(1000):
@@ -459,7 +459,7 @@ def test_a_thousand_connections_are_let_in_one_after_the_other() -> None:
     serving(test)
 
 
-def test_of_many_connections_at_once_those_beyond_the_limit_are_told_and_the_others_play_on() -> None:
+def test_xface_refuses_connections_beyond_the_limit_at_once() -> None:
     async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as one:
             pairs = [await asyncio.open_connection("127.0.0.1", door.port) for _ in range(300)]
@@ -474,7 +474,7 @@ def test_of_many_connections_at_once_those_beyond_the_limit_are_told_and_the_oth
     serving(test)
 
 
-def test_more_clients_than_there_may_be_are_turned_away(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_xface_limits_the_number_of_clients(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(xface, "MAX_CLIENTS", 2)
 
     async def test(server: Server, door: XfaceTransport) -> None:
@@ -488,7 +488,7 @@ def test_more_clients_than_there_may_be_are_turned_away(monkeypatch: pytest.Monk
     serving(test)
 
 
-def test_a_flood_of_tasks_is_read_slowly_and_nothing_of_it_is_lost(
+def test_xface_reads_a_flood_slowly_and_loses_nothing(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     async def test(server: Server, door: XfaceTransport) -> None:
@@ -501,7 +501,7 @@ def test_a_flood_of_tasks_is_read_slowly_and_nothing_of_it_is_lost(
     serving(test, max_rate=3)
 
 
-def test_one_address_has_no_more_connections_than_its_share() -> None:
+def test_xface_limits_the_connections_of_an_address() -> None:
     async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client:
             reader, writer = await asyncio.open_connection("127.0.0.1", door.port)
@@ -513,7 +513,7 @@ def test_one_address_has_no_more_connections_than_its_share() -> None:
     serving(test, max_connections=1)
 
 
-def test_a_client_that_never_reads_is_not_read_either_and_others_notice_nothing() -> None:
+def test_xface_stops_reading_a_client_that_never_reads() -> None:
     async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as deaf, Client(door.port) as other:
             deaf.reader._transport.pause_reading()  # type: ignore[attr-defined]
@@ -525,7 +525,7 @@ def test_a_client_that_never_reads_is_not_read_either_and_others_notice_nothing(
     serving(test)
 
 
-def test_half_a_file_of_sound_holds_nobody_up_and_a_whole_one_is_passed_over() -> None:
+def test_xface_skips_sound_files_and_waits_for_half_of_one() -> None:
     async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client, Client(door.port) as half:
             half.send(task("UPLOAD_WAV", 2, 1, "a.wav", "1000") + "RIFF")

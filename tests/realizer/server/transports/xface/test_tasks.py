@@ -74,26 +74,26 @@ def notes(name: str, id: int, *statuses: int) -> list[object]:
     return [(name, id, status) for status in statuses]
 
 
-def test_a_file_is_queued_started_and_finished() -> None:
+def test_task_runner_queues_starts_and_finishes_a_file() -> None:
     assert Talk().ask("UPLOAD_FAP", clip(1, 2)) == notes("UPLOAD_FAP", 1, 1, 2, 3)
 
 
-def test_a_file_of_one_frame_is_shown_at_once() -> None:
+def test_task_runner_shows_a_file_of_one_frame_at_once() -> None:
     answers = Talk().ask("UPLOAD_FAP", clip(7))
     assert answers == [*notes("UPLOAD_FAP", 1, 1, 2), {"open_jaw": 7}, ("UPLOAD_FAP", 1, 3)]
 
 
-def test_a_fap_that_the_next_frame_does_not_have_goes_to_0_and_is_let_go_of_then() -> None:
+def test_task_runner_sets_a_missing_fap_to_0_and_then_releases_it() -> None:
     talk = Talk()
     poses = [talk.ask("UPLOAD_FAP", clip(value))[2] for value in (7, 0, 0, 9)]
     assert poses == [{"open_jaw": 7}, {"open_jaw": 0}, {}, {"open_jaw": 9}]
 
 
-def test_a_value_beyond_the_range_is_limited_to_it() -> None:
+def test_task_runner_limits_a_value_to_its_range() -> None:
     assert {"open_jaw": 4320} in Talk().ask("UPLOAD_FAP", clip(9999))
 
 
-def test_playing_begins_and_ends_with_its_block() -> None:
+def test_task_runner_starts_and_finishes_playback_with_its_block() -> None:
     talk = Talk()
     talk.ask("UPLOAD_FAP", clip(1, 2))
     assert talk.ask("RESUME_PLAYBACK") == [("RESUME_PLAYBACK", 2, 1), {}, "document"]
@@ -102,7 +102,7 @@ def test_playing_begins_and_ends_with_its_block() -> None:
     assert talk.tell("xface-1-1:end") == []
 
 
-def test_what_plays_is_finished_by_a_stop_which_shows_the_first_frame() -> None:
+def test_task_runner_stop_finishes_playback_and_shows_the_first_frame() -> None:
     talk = Talk()
     talk.ask("UPLOAD_FAP", clip(1, 2))
     talk.ask("RESUME_PLAYBACK")
@@ -116,7 +116,7 @@ def test_what_plays_is_finished_by_a_stop_which_shows_the_first_frame() -> None:
     ]
 
 
-def test_who_resumes_while_something_plays_waits_for_its_end() -> None:
+def test_task_runner_resume_waits_for_the_end_of_playback() -> None:
     talk = Talk()
     talk.ask("UPLOAD_FAP", clip(1, 2))
     talk.ask("RESUME_PLAYBACK")
@@ -126,7 +126,7 @@ def test_who_resumes_while_something_plays_waits_for_its_end() -> None:
     assert talk.tell("xface-1-2:start") == notes("RESUME_PLAYBACK", 3, 2)
 
 
-def test_who_waits_is_finished_by_a_stop_too() -> None:
+def test_task_runner_stop_finishes_waiting_tasks() -> None:
     talk = Talk()
     talk.ask("UPLOAD_FAP", clip(1, 2))
     talk.ask("RESUME_PLAYBACK")
@@ -139,7 +139,7 @@ def test_who_waits_is_finished_by_a_stop_too() -> None:
     ]
 
 
-def test_a_pause_keeps_the_frame_that_was_reached() -> None:
+def test_task_runner_pause_keeps_the_frame_that_was_reached() -> None:
     talk = Talk()
     talk.ask("UPLOAD_FAP", clip(*range(1, 101)))
     talk.ask("RESUME_PLAYBACK")
@@ -150,7 +150,7 @@ def test_a_pause_keeps_the_frame_that_was_reached() -> None:
     assert {"open_jaw": 1} in talk.ask("REWIND_PLAYBACK")
 
 
-def test_a_pause_after_another_file_came_begins_that_one_at_its_first_frame() -> None:
+def test_task_runner_pause_begins_another_file_at_its_first_frame() -> None:
     talk = Talk()
     talk.ask("UPLOAD_FAP", clip(*range(1, 101)))
     talk.ask("RESUME_PLAYBACK")
@@ -160,21 +160,21 @@ def test_a_pause_after_another_file_came_begins_that_one_at_its_first_frame() ->
     assert {"open_jaw": 500} in talk.ask("PAUSE_PLAYBACK")
 
 
-def test_the_last_frame_is_not_gone_beyond() -> None:
+def test_task_runner_advance_stays_at_the_last_frame() -> None:
     talk = Talk()
     talk.ask("UPLOAD_FAP", clip(1, 2))
     answers = [talk.ask("ADVANCE_FRAME")[-1] for _ in range(3)]
     assert answers == [{"open_jaw": 2}] * 3
 
 
-def test_nothing_loaded_is_an_error_to_play_and_not_to_stop() -> None:
+def test_task_runner_without_a_file_fails_to_play_but_stops() -> None:
     talk = Talk()
     assert talk.ask("RESUME_PLAYBACK") == notes("RESUME_PLAYBACK", 1, 1, 7)
     assert talk.ask("STOP_PLAYBACK") == notes("STOP_PLAYBACK", 2, 1, 3)
     assert talk.ask("ADVANCE_FRAME") == notes("ADVANCE_FRAME", 3, 1)
 
 
-def test_a_script_is_started_with_its_first_block_and_finished_with_its_last() -> None:
+def test_task_runner_starts_and_finishes_a_script_with_its_blocks() -> None:
     talk = Talk()
     assert talk.ask("UPLOAD_SCRIPT", Script("<bml/>", ("a", "b"))) == [("UPLOAD_SCRIPT", 1, 1), "document"]
     assert talk.tell("a:start") == notes("UPLOAD_SCRIPT", 1, 2)
@@ -183,7 +183,7 @@ def test_a_script_is_started_with_its_first_block_and_finished_with_its_last() -
     assert talk.tell("a:end") == notes("UPLOAD_SCRIPT", 1, 3)
 
 
-def test_a_stop_ends_scripts_too_and_a_pause_does_not() -> None:
+def test_task_runner_stop_ends_scripts_but_pause_does_not() -> None:
     talk = Talk()
     talk.ask("UPLOAD_SCRIPT", Script("<bml/>", ("a", "b")))
     talk.tell("a:start")
@@ -200,7 +200,7 @@ def test_a_stop_ends_scripts_too_and_a_pause_does_not() -> None:
     assert talk.tell("b:end") == []
 
 
-def test_a_script_whose_blocks_are_all_refused_is_an_error() -> None:
+def test_task_runner_fails_a_script_whose_blocks_are_all_refused() -> None:
     talk = Talk()
     talk.ask("UPLOAD_SCRIPT", Script("<bml/>", ("a", "b")))
     assert talk.tell("a", warning=True) == []
@@ -216,18 +216,18 @@ def test_a_script_whose_blocks_are_all_refused_is_an_error() -> None:
         ("UPLOAD_SCRIPT", RealizerError("no"), (1, 7)),
     ],
 )
-def test_what_cannot_be_understood_is_answered_as_clients_expect(
+def test_task_runner_answers_bad_attachments_as_clients_expect(
     name: str, brought: RealizerError, statuses: tuple[int, ...]
 ) -> None:
     assert Talk().ask(name, brought) == notes(name, 1, *statuses)
 
 
 @pytest.mark.parametrize("name", sorted(UNABLE))
-def test_what_only_the_player_itself_can_do_is_an_error(name: str) -> None:
+def test_task_runner_fails_tasks_of_xface_s_own_player(name: str) -> None:
     assert Talk().ask(name) == notes(name, 1, 1, 7)
 
 
-def test_an_unknown_task_is_an_error_with_its_ids() -> None:
+def test_task_runner_answers_an_unknown_task_with_its_ids() -> None:
     talk = Talk()
     assert talk._short(talk.desk.accept(Task("DANCE", 1, 5))) == [("ERROR", 5, 7)]
     assert talk._short(talk.desk.refuse(Task("", 1, 5))) == [("ERROR", 5, 7)]
@@ -235,10 +235,10 @@ def test_an_unknown_task_is_an_error_with_its_ids() -> None:
 
 
 @pytest.mark.parametrize("name", sorted(ABLE | UNABLE))
-def test_owner_0_gets_no_notes(name: str) -> None:
+def test_task_runner_sends_no_notes_to_owner_0(name: str) -> None:
     desk, task = TaskRunner(1), Task(name, 0, 5)
     assert not [a for a in (*desk.accept(task), *desk.run(task, None, 0.0)) if isinstance(a, bytes)]
 
 
-def test_kill_app_is_finished_and_the_client_goes() -> None:
+def test_task_runner_kill_app_finishes_and_disconnects() -> None:
     assert Talk().ask("KILL_APP") == [("KILL_APP", 1, 3), "leave"]
