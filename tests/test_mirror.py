@@ -47,10 +47,6 @@ def test_tests_beside_the_packages_are_named_after_a_module(path: Path) -> None:
 
 # Packages with modules that have no tests of their own yet; none may be added.
 OPEN = (
-    "realizer/client",
-    "realizer/server/journal",
-    "realizer/server/runtime",
-    "realizer/server/transports",
 )
 FEW = 2  # statements in functions; a module with so few has nothing to break: values, types, protocols
 

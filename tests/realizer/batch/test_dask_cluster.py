@@ -113,4 +113,4 @@ def test_cluster_warns_that_it_waits_for_a_worker(
     cluster = DaskCluster(options, scheduler)
     assert list(cluster.perform([])) == []
     cluster.close()
-    assert f"--dask {scheduler}: it has no worker yet" in caplog.text
+    assert f"--dask {scheduler}: waiting for a worker, it has none yet" in caplog.text

@@ -149,34 +149,6 @@ def test_client_keeps_errors_apart_from_answers() -> None:
     serving(test)
 
 
-def test_client_refuses_a_service_of_another_version(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("realizer.client.connection.PROTOCOL", 2)
-
-    async def test(url: str) -> None:
-        with pytest.raises(ClientError, match="wanted version 1 of the protocol, got 2") as caught:
-            async with connect(url):
-                pass
-        assert caught.value.code == "version"
-
-    serving(test)
-
-
-def test_client_sends_its_token() -> None:
-    secret = "a-token-of-many-letters-and-0123456789"
-
-    async def run() -> None:
-        settings = Settings(port=0, voice="silent", token=secret)
-        async with asyncio.timeout(LIMIT), Server(settings) as server:
-            async with connect(server.url, token=secret) as client:
-                assert (await client.play(WAIT.format("b"))).id == "b:end"
-            for token in (None, "another"):
-                with pytest.raises(ClientError, match="token"):
-                    async with connect(server.url, token=token):
-                        pass
-
-    asyncio.run(run())
-
-
 def test_client_feedback_ends_with_the_connection() -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:
@@ -210,24 +182,6 @@ def test_client_raises_its_own_error_after_the_end_of_the_connection(say: Any) -
     asyncio.run(run())
 
 
-def test_client_raises_the_refusal_of_an_address() -> None:
-    async def test(url: str) -> None:
-        for bad, says in (
-            (f"{url}?session=a b", "session: wanted 1..64 letters"),
-            (
-                f"{url}?session=a&seen=abc",
-                "seen: wanted the number of the last feedback that came, got 'abc'",
-            ),
-            (url.replace("/ws", "/other"), "wanted a WebSocket at /ws or /check"),
-            (url.replace("ws:", "http:"), "http"),
-        ):
-            with pytest.raises(ClientError, match=says):
-                async with connect(bad.replace(" ", "%20")):
-                    pass
-
-    serving(test)
-
-
 def test_client_reads_a_mesh_by_the_present_face() -> None:
     async def test(url: str) -> None:
         rests = {face: load_face(face) for face in ("ada", "ben")}
@@ -254,14 +208,3 @@ def test_client_reads_a_mesh_by_the_present_face() -> None:
             assert not client.errors
 
     serving(test)
-
-
-def test_client_raises_os_error_where_nothing_listens() -> None:
-    async def run() -> None:
-        async with Server(Settings(port=0, voice="silent")) as server:
-            url = server.url
-        with pytest.raises(OSError, match="Connect"):
-            async with connect(url):
-                pass
-
-    asyncio.run(run())

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-import sys
 from collections.abc import Awaitable, Callable
 from urllib.parse import quote, unquote
 
@@ -14,7 +13,6 @@ import stomp
 from websockets.asyncio.client import connect
 
 from bml_schema.feedback import BlockProgress, Feedback, WarningFeedback, parse_feedback
-from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
 from realizer.server.serve import Server
 from realizer.server.transports.stomp import StompTransport
@@ -446,13 +444,3 @@ def test_stomp_gives_up_a_port_that_says_nothing(monkeypatch: pytest.MonkeyPatch
     with caplog.at_level(logging.WARNING):
         asyncio.run(run())
     assert "no broker at" in caplog.messages[0]
-
-
-def test_stomp_without_its_package_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "stomp", None)
-
-    async def run() -> None:
-        with pytest.raises(RealizerError, match=r"pip install 'bml-realizer\[stomp\]'"):
-            await Server(Settings(port=0, stomp="127.0.0.1:61613", voice="silent")).start()
-
-    asyncio.run(run())
