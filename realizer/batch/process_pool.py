@@ -56,7 +56,8 @@ class ProcessPool:
             while busy := {worker.pipe: worker for worker in self._workers if worker.work is not None}:
                 for pipe in wait(list(busy)):
                     worker = busy[pipe]  # type: ignore[index]
-                    task, tries = work = worker.work
+                    assert worker.work is not None
+                    task, tries = worker.work
                     outcome = worker.receive()
                     if outcome is None:
                         code = worker.end()
