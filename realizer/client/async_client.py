@@ -170,8 +170,8 @@ class Client:
     async def frames(self, stream: str) -> AsyncIterator[Frame]:
         """Yield frames of a stream as they arrive: WireFrame, or a dictionary if the encoding is JSON.
 
-        The attribute `told` of a WireFrame describes its stream at that time. It changes when the character
-        of a mesh gets another face, and `vertices` depends on it.
+        The attribute `stream_info` of a WireFrame describes its stream at that time. It changes when the
+        character of a mesh gets another face, and `vertices` depends on it.
         """
         queue = self._router.queue_of(stream)
         with contextlib.suppress(ClientError):
