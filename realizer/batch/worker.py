@@ -6,7 +6,6 @@ import hashlib
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from types import TracebackType
 from typing import Any
 
 from realizer.batch.task import Options, Task, fingerprint
@@ -75,9 +74,7 @@ class _Speaker:
 class _PersistentRenderer(Renderer):
     """A renderer that stays open between films: starting its process takes longer than many films."""
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         return
 
 

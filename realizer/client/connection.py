@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import TracebackType
-
 from realizer.client.async_client import Client
 from realizer.client.message_router import ClientError
 from realizer.client.sync_client import SyncClient
@@ -54,9 +52,7 @@ class PendingConnection:
             raise
         return self._client
 
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    async def __aexit__(self, *_: object) -> None:
         assert self._client is not None
         await self._client.close()
 
@@ -64,9 +60,7 @@ class PendingConnection:
         self._sync_client = SyncClient(PendingConnection(self._url, self._token))
         return self._sync_client
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         assert self._sync_client is not None
         self._sync_client.close()
 

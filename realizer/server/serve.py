@@ -7,7 +7,6 @@ import contextlib
 import signal
 import socket
 from collections.abc import Awaitable, Coroutine, Iterator
-from types import TracebackType
 
 from realizer.animation import arkit
 from realizer.core.errors import RealizerError
@@ -240,9 +239,7 @@ class Server:
     async def __aenter__(self) -> Server:
         return await self.start()
 
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    async def __aexit__(self, *_: object) -> None:
         await self.close()
 
 

@@ -192,15 +192,3 @@ class Journal(Log, Protocol):
             JournalError: the checkpoint cannot be written; nothing has changed.
         """
         ...
-
-
-class Recorder(Log, Protocol):
-    """A log of sessions for replay."""
-
-    def resume(self, session: str, saved: SavedSession) -> None:
-        """Continue the recording of a session that was taken over. May read a long file.
-
-        Raises:
-            JournalError: the recording cannot be written.
-        """
-        ...

@@ -10,10 +10,10 @@ from realizer.server.journal.entry import (
     Journal,
     JournalError,
     Kind,
-    Recorder,
     SavedSession,
     TakenOver,
 )
+from realizer.server.journal.recordings import RecordingFolder
 
 log = logging.getLogger(__name__)
 
@@ -42,7 +42,7 @@ class JournalWriter:
         self,
         session: str,
         journal: Journal | None = None,
-        recorder: Recorder | None = None,
+        recorder: RecordingFolder | None = None,
         *,
         on_stopped: Callable[[], None] = lambda: None,
         saved: SavedSession | None = None,
@@ -145,7 +145,7 @@ class JournalWriter:
                 self._entries,
             )
 
-    def _record(self, write: Callable[[Recorder], None]) -> None:
+    def _record(self, write: Callable[[RecordingFolder], None]) -> None:
         """Write to the recording. Stop at the first error: a recording with a gap cannot be replayed."""
         if self._recorder is None:
             return

@@ -14,7 +14,7 @@ from realizer.core.settings import Settings
 from realizer.expressions.library import library_of
 from realizer.face.fap_mapping import mapping_of
 from realizer.server.http.metrics import Metrics
-from realizer.server.journal import Journal, JournalError, Recorder, SavedSession, journal_at
+from realizer.server.journal import Journal, JournalError, SavedSession, journal_at
 from realizer.server.journal.journal_writer import JournalWriter
 from realizer.server.journal.recordings import RecordingFolder, recording_head
 from realizer.server.journal.replay import catch_up, restore_session
@@ -43,7 +43,7 @@ class SessionFactory:
         self.ending = False
         self._settings = settings
         self._metrics = metrics
-        self._recorder: Recorder | None = None
+        self._recorder: RecordingFolder | None = None
         self._scene: Mapping[str, Position] | None = None
         self._capabilities: dict[str, Any] = {}
 
