@@ -174,7 +174,7 @@ def test_access_settings_do_not_show_their_secrets() -> None:
     )
     assert TOKEN not in repr(settings)
     assert SECRET not in repr(settings)
-    with pytest.raises(SettingsError, match=r"jwt_key: wanted an existing PEM file .*, got something else"):
+    with pytest.raises(SettingsError, match=r"jwt_key: wanted an existing PEM file, .*, got something else"):
         Settings(jwt_key=SECRET[:31])
     with pytest.raises(SettingsError, match="setting token: wanted a word, got something else"):
         Settings(token=[TOKEN])  # type: ignore[arg-type]
