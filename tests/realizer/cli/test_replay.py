@@ -9,7 +9,7 @@ import pytest
 
 from realizer.core.settings import Settings
 from realizer.server.journal.journal_writer import JournalWriter
-from realizer.server.journal.recordings import RecordingFolder, head
+from realizer.server.journal.recordings import RecordingFolder, recording_head
 from realizer.server.session.session import Session
 from tests.commands import run
 
@@ -21,7 +21,7 @@ NOD = '<bml id="a"><head id="n" lexeme="NOD" start="0.2" end="0.6"/></bml>'
 def record(tmp_path: Path) -> Path:
     """The recording of a session of one second."""
     session = Session("s", SETTINGS, 0.0, named=True, epoch=1e9)
-    session.journal = JournalWriter("s", record=RecordingFolder(tmp_path, head(SETTINGS, None)))
+    session.journal = JournalWriter("s", recorder=RecordingFolder(tmp_path, recording_head(SETTINGS, None)))
     session.journal.begin(1e9)
     session.connect(1, 0.0)
     session.receive(1, NOD, 0.1)
