@@ -79,13 +79,7 @@ class WireFrame:
 
 
 def pack(
-    stream: str,
-    frame: int,
-    time: float,
-    payload: bytes,
-    *,
-    character: int = 0,
-    flush: bool = False,
+    stream: str, frame: int, time: float, payload: bytes, *, character: int = 0, flush: bool = False
 ) -> bytes:
     """Encode a binary message. `frame` counts from the session's start, `time` is seconds on its clock."""
     kind = STREAMS[stream].kind
@@ -102,21 +96,13 @@ def pack_frames(
         times: (n,) seconds.
         rows: (n, k) the payloads.
     """
-    whole = np.empty(
-        len(rows),
-        [
-            ("kind", "u1"),
-            ("version", "u1"),
-            ("flags", "<u2"),
-            ("frame", "<u4"),
-            ("time", "<f8"),
-            ("payload", rows.dtype.newbyteorder("<"), rows.shape[1:]),
-        ],
-    )
-    whole["kind"], whole["version"], whole["flags"] = STREAMS[stream].kind, VERSION, character & 0xFF
-    whole["frame"] = np.arange(first, first + len(rows))
-    whole["time"], whole["payload"] = times, rows
-    return whole.tobytes(), whole.dtype.itemsize
+    header = [("kind", "u1"), ("version", "u1"), ("flags", "<u2"), ("frame", "<u4"), ("time", "<f8")]
+    messages = np.empty(len(rows), [*header, ("payload", rows.dtype.newbyteorder("<"), rows.shape[1:])])
+    messages["kind"], messages["version"] = STREAMS[stream].kind, VERSION
+    messages["flags"] = character & 0xFF
+    messages["frame"] = np.arange(first, first + len(rows))
+    messages["time"], messages["payload"] = times, rows
+    return messages.tobytes(), messages.dtype.itemsize
 
 
 def unpack(message: bytes) -> WireFrame:

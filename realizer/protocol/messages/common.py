@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict
 
@@ -59,6 +59,11 @@ class Message(BaseModel):
     """A request: without unknown fields, NaN, or `true` or "25" in place of numbers."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
+
+
+def examples(*messages: dict[str, Any]) -> ConfigDict:
+    """Return a model configuration with examples for the documentation."""
+    return ConfigDict(json_schema_extra={"examples": list(messages)})
 
 
 class Reply(BaseModel):

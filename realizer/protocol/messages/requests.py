@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import AliasChoices, ConfigDict, Field, field_validator
+from pydantic import AliasChoices, Field, field_validator
 
 from realizer.protocol.messages.common import (
     MAX_FPS,
@@ -15,6 +15,7 @@ from realizer.protocol.messages.common import (
     Picture,
     StreamName,
     Whole,
+    examples,
 )
 
 FeedbackElement = Literal["blockProgress", "syncPointProgress", "predictionFeedback", "warningFeedback"]
@@ -29,9 +30,7 @@ class Hello(Message):
     version of the service, and nothing else changes.
     """
 
-    model_config = ConfigDict(
-        json_schema_extra={"examples": [{"type": "hello", "version": 1, "session": "show", "seen": 12}]}
-    )
+    model_config = examples({"type": "hello", "version": 1, "session": "show", "seen": 12})
 
     type: Literal["hello"]
     version: Whole = Field(PROTOCOL, description="of the client's protocol")
@@ -49,25 +48,10 @@ class Subscribe(Message):
     its own. Every connection gets all feedback until it asks for some of it.
     """
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {"type": "subscribe", "stream": "fap", "encoding": "json", "fps": 25},
-                {
-                    "type": "subscribe",
-                    "stream": "video",
-                    "size": [640, 480],
-                    "format": "webp",
-                    "light": "evening",
-                },
-                {
-                    "type": "subscribe",
-                    "stream": "feedback",
-                    "elements": ["blockProgress"],
-                    "character": "Ada",
-                },
-            ]
-        }
+    model_config = examples(
+        {"type": "subscribe", "stream": "fap", "encoding": "json", "fps": 25},
+        {"type": "subscribe", "stream": "video", "size": [640, 480], "format": "webp", "light": "evening"},
+        {"type": "subscribe", "stream": "feedback", "elements": ["blockProgress"], "character": "Ada"},
     )
 
     type: Literal["subscribe"]
@@ -96,7 +80,7 @@ class Subscribe(Message):
 class Unsubscribe(Message):
     """End a stream."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [{"type": "unsubscribe", "stream": "fap"}]})
+    model_config = examples({"type": "unsubscribe", "stream": "fap"})
 
     type: Literal["unsubscribe"]
     stream: StreamName
@@ -118,11 +102,7 @@ class SceneMessage(Message):
     Objects have the form {name: {x, y, z}}, {name: [x, y, z]} or [{id, x, y, z}].
     """
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [{"type": "scene", "objects": {"cup": {"x": 0.2, "y": -0.1, "z": 0.5}}}]
-        }
-    )
+    model_config = examples({"type": "scene", "objects": {"cup": {"x": 0.2, "y": -0.1, "z": 0.5}}})
 
     type: Literal["scene"]
     objects: dict[str, Point] | None = Field(max_length=10_000)
@@ -131,26 +111,22 @@ class SceneMessage(Message):
     @classmethod
     def _named(cls, value: Any) -> Any:
         if isinstance(value, list) and all(isinstance(o, dict) and ("id" in o or "name" in o) for o in value):
+            names = ("id", "name")
             value = {
-                str(o.get("id", o.get("name"))): {k: v for k, v in o.items() if k not in ("id", "name")}
-                for o in value
+                str(o.get("id", o.get("name"))): {k: v for k, v in o.items() if k not in names} for o in value
             }
-        if isinstance(value, dict):
-            return {
-                name: dict(zip("xyz", point, strict=True))
-                if isinstance(point, list) and len(point) == 3
-                else point
-                for name, point in value.items()
-            }
-        return value
+        if not isinstance(value, dict):
+            return value
+        triples = {
+            name: point for name, point in value.items() if isinstance(point, list) and len(point) == 3
+        }
+        return value | {name: dict(zip("xyz", point, strict=True)) for name, point in triples.items()}
 
 
 class CharacterMessage(Message):
     """Set the face and the voice of a character."""
 
-    model_config = ConfigDict(
-        json_schema_extra={"examples": [{"type": "character", "id": "Ada", "face": "ada", "voice": "silent"}]}
-    )
+    model_config = examples({"type": "character", "id": "Ada", "face": "ada", "voice": "silent"})
 
     type: Literal["character"]
     id: str | None = Field(None, min_length=1, max_length=256, description="default: the first")
@@ -176,12 +152,8 @@ class SetMessage(Message):
     (Paul 2010, 7.4).
     """
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {"type": "set", "emotion": {"name": "joy"}, "aus": {"12L": 0.5}, "faps": {"open_jaw": 200}}
-            ]
-        }
+    model_config = examples(
+        {"type": "set", "emotion": {"name": "joy"}, "aus": {"12L": 0.5}, "faps": {"open_jaw": 200}}
     )
 
     type: Literal["set"]
@@ -204,9 +176,7 @@ class Anticipate(Message):
     It may be sent again whenever the estimate changes; sync points that have not passed follow.
     """
 
-    model_config = ConfigDict(
-        json_schema_extra={"examples": [{"type": "anticipate", "id": "clock", "syncs": {"beat": 12.5}}]}
-    )
+    model_config = examples({"type": "anticipate", "id": "clock", "syncs": {"beat": 12.5}})
 
     type: Literal["anticipate"]
     id: str = Field(min_length=1, max_length=256, pattern=r"^[^\s:]+$")
@@ -218,7 +188,7 @@ class Anticipate(Message):
 class Stop(Message):
     """End blocks gracefully: the listed ones, or all."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [{"type": "stop", "blocks": ["b"]}]})
+    model_config = examples({"type": "stop", "blocks": ["b"]})
 
     type: Literal["stop"]
     blocks: list[str] | None = None
@@ -227,7 +197,7 @@ class Stop(Message):
 class StateQuery(Message):
     """Request `state`."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [{"type": "state"}]})
+    model_config = examples({"type": "state"})
 
     type: Literal["state"]
 
@@ -235,7 +205,7 @@ class StateQuery(Message):
 class Ping(Message):
     """Request `pong`, which contains the time of the session."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [{"type": "ping", "id": 1}]})
+    model_config = examples({"type": "ping", "id": 1})
 
     type: Literal["ping"]
     id: Whole | str | None = None

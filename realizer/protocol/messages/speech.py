@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from pydantic import AliasChoices, ConfigDict, Field, field_validator, model_validator
+from pydantic import AliasChoices, Field, field_validator, model_validator
 
-from realizer.protocol.messages.common import Message
+from realizer.protocol.messages.common import Message, examples
 
 # Longest text of one `speech` message; a speech may have any number of them.
 MAX_APPEND = 20_000  # characters
@@ -42,14 +42,10 @@ class SpeechMessage(Message):
     FLAC, Ogg, MP3 or WebM file), u8 length of the id, the id, sound. Documents name it as a file: `clip:ID`.
     """
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {"type": "speech", "id": "turn", "append": 'Hello <sync id="m"/>there. '},
-                {"type": "speech", "id": "turn", "close": True},
-                {"type": "speech", "clip": "c", "words": [{"start": 0.1, "end": 0.4, "text": "Hello"}]},
-            ]
-        }
+    model_config = examples(
+        {"type": "speech", "id": "turn", "append": 'Hello <sync id="m"/>there. '},
+        {"type": "speech", "id": "turn", "close": True},
+        {"type": "speech", "clip": "c", "words": [{"start": 0.1, "end": 0.4, "text": "Hello"}]},
     )
 
     type: Literal["speech"]

@@ -97,18 +97,6 @@ class FrameRun:
         wake_at: time at which `next_message` or another event is due, on the caller's clock.
     """
 
-    __slots__ = (
-        "_due",
-        "_fps",
-        "_next",
-        "_strip",
-        "_subscription",
-        "_zero",
-        "connection",
-        "until",
-        "wake_at",
-    )
-
     def __init__(
         self, connection: int, subscription: FrameSubscription, strip: PackedFrames, zero: float, until: float
     ) -> None:
