@@ -44,11 +44,8 @@ def direct_values(message: SetMessage, before: Collection[str]) -> dict[str, flo
         FieldError: the message names an unknown AU or FAP.
     """
     rows = faps()
-    values: dict[str, float | None] = {}
-    if message.aus is None:
-        values |= dict.fromkeys(name for name in before if name in AU_NAMES())
-    if message.faps is None:
-        values |= dict.fromkeys(name for name in before if name not in AU_NAMES())
+    released = [name for name in before if (message.aus if name in AU_NAMES() else message.faps) is None]
+    values: dict[str, float | None] = dict.fromkeys(released)
     for name, value in (message.aus or {}).items():
         names = [n for n in (name, f"{name}L", f"{name}R") if n in AU_NAMES()]
         if not names:
@@ -64,22 +61,22 @@ def direct_values(message: SetMessage, before: Collection[str]) -> dict[str, flo
     return values
 
 
-def emotion_values(asked: EmotionFields | None) -> dict[str, float]:
+def emotion_values(fields: EmotionFields | None) -> dict[str, float]:
     """Return the AUs of an emotion: name -> 0..1; {} for None.
 
     Raises:
         FieldError: the emotion is unknown or its values are invalid.
     """
-    if asked is None:
+    if fields is None:
         return {}
-    node = Emotion(id="set", **asked.model_dump())
-    said = node.fault() or next((fault.text for fault in emotion.check(node, PlanningContext())), "")
-    if not said:
+    node = Emotion(id="set", **fields.model_dump())
+    text = node.fault() or next((fault.text for fault in emotion.check(node, PlanningContext())), "")
+    if not text:
         try:
             return {target.name: value for target, value in emotion.values_of(node).items()}
-        except ValueError as off:
-            said = str(off)
-    field, _, rest = said.partition(": ")
-    raise FieldError(
-        *((f"emotion.{field}", rest) if field in EmotionFields.model_fields else ("emotion", said))
-    )
+        except ValueError as error:
+            text = str(error)
+    field, _, rest = text.partition(": ")
+    if field in EmotionFields.model_fields:
+        raise FieldError(f"emotion.{field}", rest)
+    raise FieldError("emotion", text)

@@ -24,7 +24,6 @@ from realizer.server.session.character_faces import CharacterFaces
 from realizer.server.session.control_fields import FieldError, character_index, direct_values, emotion_values
 from realizer.server.session.subscriptions import Subscriptions
 from realizer.server.speech.audio_clips import AudioClips, ClipError
-from realizer.server.speech.speech_streams import SpeechError
 from realizer.server.streams.connection import Connection
 
 
@@ -59,10 +58,9 @@ class ControlHandlers:
         """
         try:
             self._handle(connection, message, t)
-        except (FieldError, SpeechError) as error:
-            where = f"{message.type}.{error.where}"
+        except FieldError as error:
             id = message.id if isinstance(message, SpeechMessage) else None
-            self._error(connection, "invalid", error, where, id)
+            self._error(connection, "invalid", error, f"{message.type}.{error.where}", id)
         except ClipError as error:
             self._error(connection, "clip", error, error.where)
         except FaceError as error:
@@ -103,13 +101,13 @@ class ControlHandlers:
         unread = bool(submission.queue)
         known = submission.stop(wanted, t)
         self._player.stop(t, wanted)
-        strange = [
+        unknown = [
             repr(id[:80])
             for id in message.blocks or ()
             if not (unread or id in known or id in submission.speeches or self._player.blocks.has_seen(id))
         ]
-        if strange:
-            raise FieldError("blocks", f"wanted blocks that play or wait, got {', '.join(strange[:10])}")
+        if unknown:
+            raise FieldError("blocks", f"wanted blocks that play or wait, got {', '.join(unknown[:10])}")
 
     def _speech(self, connection: Connection, message: SpeechMessage, t: float) -> None:
         if message.clip is not None and (message.id is None or _has_annotation(message)):

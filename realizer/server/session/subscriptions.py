@@ -89,11 +89,11 @@ class Subscriptions:
         encoding = message.encoding or encodings[0]
         if encoding not in encodings:
             raise FieldError("encoding", f"wanted {' or '.join(encodings)} for {stream}, got {encoding}")
-        told: dict[str, Any]
+        fields: dict[str, Any]
         if stream == "feedback":
             elements = None if message.elements is None else frozenset(message.elements)
             connection.feedback = FeedbackFilter(elements, message.character)
-            told = {"elements": message.elements}
+            fields = {"elements": message.elements}
         else:
             index = character_index(self._player, message.character)
             key = self._key(message)
@@ -103,9 +103,9 @@ class Subscriptions:
             make = {"schedule": _schedule, "audio": self._audio, "video": self._video}.get(
                 stream, self._frames
             )
-            connection.subscriptions[key], told = make(request)
-        told |= {"stream": stream, "encoding": encoding, "character": message.character}
-        self._reply(connection.id, Subscribed(**told))
+            connection.subscriptions[key], fields = make(request)
+        fields |= {"stream": stream, "encoding": encoding, "character": message.character}
+        self._reply(connection.id, Subscribed(**fields))
 
     def unsubscribe(self, connection: Connection, message: Unsubscribe) -> None:
         """End a subscription. It is no error if there is none."""
@@ -116,38 +116,39 @@ class Subscriptions:
     def announce_face_change(self, index: int) -> None:
         """Send the new scale of a character's meshes to their subscribers."""
         for connection, mesh in self._broadcast.face_changed(index):
-            told = {"stream": "mesh", "character": mesh.name, "index": index, "frame": mesh.next}
-            self._reply(connection, FaceChanged(**told, **self._mesh(index)))
+            fields = {"stream": "mesh", "character": mesh.name, "index": index, "frame": mesh.next}
+            self._reply(connection, FaceChanged(**fields, **self._mesh(index)))
 
-    def views(self, but: Subscription | None = None) -> list[VideoView]:
+    def views(self, without: Subscription | None = None) -> list[VideoView]:
         """Return the views that are drawn, each once, without that of one subscription."""
         subscriptions = [s for c in self._connections.values() for s in c.subscriptions.values()]
-        looking = [s for s in subscriptions if isinstance(s, VideoSubscription) and s is not but]
-        return list({s.view.key: s.view for s in looking}.values())
+        videos = [s for s in subscriptions if isinstance(s, VideoSubscription) and s is not without]
+        return list({s.view.key: s.view for s in videos}.values())
 
     # one method for each kind of stream -----------------------------------------------------------
 
     def _audio(self, request: _Request) -> _Answer:
         message, old = request.message, request.old
-        one = None if message.character is None else request.index
-        made = self._broadcast.subscribe_audio(one, message.rate, request.t)
-        if isinstance(old, AudioSubscription) and old.sound is made.sound:
-            made = old  # do not send again what was sent ahead
-        return made, {"index": request.index, "rate": message.rate, "frame": made.next, "fps": 50.0}
+        index = None if message.character is None else request.index
+        new = self._broadcast.subscribe_audio(index, message.rate, request.t)
+        if isinstance(old, AudioSubscription) and old.sound is new.sound:
+            new = old  # do not send again what was sent ahead
+        return new, {"index": request.index, "rate": message.rate, "frame": new.next, "fps": 50.0}
 
     def _video(self, request: _Request) -> _Answer:
         message, index, fps = request.message, request.index, request.fps
-        made = self._broadcast.subscribe_video(index, fps, self._look(message, index), request.t)
-        views = [view for view in self.views(but=request.old) if view is not made.view]
-        beside = sum(view.options.size[0] * view.options.size[1] * view.timeline.fps for view in views)
-        if (beyond := pixel_rate_error(message.size, fps, self._settings, beside)) is not None:
-            raise FieldError("fps", beyond)
+        options = self._render_options(message, index)
+        new = self._broadcast.subscribe_video(index, fps, options, request.t)
+        others = [view for view in self.views(without=request.old) if view is not new.view]
+        pixel_rate = sum(v.options.size[0] * v.options.size[1] * v.timeline.fps for v in others)
+        if (error := pixel_rate_error(message.size, fps, self._settings, pixel_rate)) is not None:
+            raise FieldError("fps", error)
         if message.view is not None:
-            made.index = _index_of_view(request)
-        return made, {
-            "index": made.index,
+            new.index = _index_of_view(request)
+        return new, {
+            "index": new.index,
             "fps": fps,
-            "frame": made.next,
+            "frame": new.next,
             "size": message.size,
             "view": message.view,
             "face": self._faces.name(index),
@@ -157,43 +158,38 @@ class Subscriptions:
     def _frames(self, request: _Request) -> _Answer:
         message, index, old, fps = request.message, request.index, request.old, request.fps
         stream = message.stream
-        told = self._mesh(index) if stream == "mesh" else {"names": SOURCES[stream].names()}
-        made = self._broadcast.subscribe_frames(
+        fields = self._mesh(index) if stream == "mesh" else {"names": SOURCES[stream].names()}
+        new = self._broadcast.subscribe_frames(
             stream, request.encoding, index, message.character, fps, request.t
         )
-        made.raw = message.asked
-        if isinstance(old, FrameSubscription) and old.timeline is made.timeline:
-            made.next = max(made.next, old.next)  # no frame twice
-        return made, told | {"index": index, "fps": fps, "frame": made.next}
+        new.raw = message.asked
+        if isinstance(old, FrameSubscription) and old.timeline is new.timeline:
+            new.next = max(new.next, old.next)  # no frame twice
+        return new, fields | {"index": index, "fps": fps, "frame": new.next}
 
-    def _look(self, message: Subscribe, index: int) -> RenderOptions:
+    def _render_options(self, message: Subscribe, index: int) -> RenderOptions:
         from realizer.render.cameras import camera_names
         from realizer.render.light import presets
 
-        settings = self._settings
-        largest = settings.max_size
+        settings, largest = self._settings, self._settings.max_size
         if not all(16 <= side <= largest for side in message.size):
-            words = f"wanted sides of 16..{largest} pixels, got {list(message.size)} {raises('max_size')}"
-            raise FieldError("size", words)
+            text = f"wanted sides of 16..{largest} pixels, got {list(message.size)} {raises('max_size')}"
+            raise FieldError("size", text)
         if message.light is not None and message.light not in presets():
             raise FieldError("light", f"wanted one of {', '.join(presets())}, got {message.light!r}")
-        face = self._faces.of(index)
-        if message.camera is not None and message.camera not in camera_names(face):
-            raise FieldError(
-                "camera", f"wanted one of {', '.join(camera_names(face))}, got {message.camera!r}"
-            )
-        behind = message.background or settings.background
-        if message.format == "jpeg" and behind == "transparent":
+        cameras = camera_names(self._faces.of(index))
+        if message.camera is not None and message.camera not in cameras:
+            raise FieldError("camera", f"wanted one of {', '.join(cameras)}, got {message.camera!r}")
+        background = message.background or settings.background
+        if message.format == "jpeg" and background == "transparent":
             if message.background is not None:
-                raise FieldError(
-                    "background", "wanted the format png or webp for what is transparent, got jpeg"
-                )
-            behind = None  # the service's own default: a JPEG has the light's backdrop instead
+                raise FieldError("background", "wanted the format png or webp for transparency, got jpeg")
+            background = None  # the service's own default: a JPEG has the light's backdrop instead
         return RenderOptions(
             size=message.size,
             camera=message.camera or settings.camera,
             light=message.light or settings.light,
-            background=behind,
+            background=background,
             quality=message.quality,
             form=message.format,
         )

@@ -95,8 +95,8 @@ class SpeechStream:
         one = self.unspoken.popleft()
         chunk = self.chunk = replace(self.chunk, number=self.chunk.number + 1, marks=dict(self.marks))
         block = clip_block(one.id, chunk) if isinstance(one, _Clip) else text_block(one, chunk)
-        said = next((node for node in block.behaviours if node.id == self.id), None)
-        self.marks |= dict.fromkeys(getattr(said, "marked", ()), block.id)
+        speech = next((node for node in block.behaviours if node.id == self.id), None)
+        self.marks |= dict.fromkeys(getattr(speech, "marked", ()), block.id)
         self.unplanned.append(block.id)
         if isinstance(one, str) and not is_sentence(one) and (self.unspoken or not self.is_closed):
             self.partial_chunks.add(block.id)

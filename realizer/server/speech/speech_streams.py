@@ -9,6 +9,7 @@ from bml_schema import Block, BlockProgress, Feedback, SyncRef
 from realizer.playback.player import Player
 from realizer.playback.references import references, with_references
 from realizer.protocol.messages.speech import SpeechMessage
+from realizer.server.session.control_fields import FieldError
 from realizer.server.speech.speech_chunks import Chunk
 from realizer.server.speech.speech_stream import SpeechStream
 
@@ -22,14 +23,6 @@ AHEAD = 6
 MOST = 500_000  # waiting characters of one speech; nine hours
 MAX_SPEECHES = 1_000  # of a session
 CUT_OFF = ("INTERRUPTED", "REVOKED")
-
-
-class SpeechError(ValueError):
-    """A message `speech` is invalid; `where` is the field."""
-
-    def __init__(self, where: str, text: str) -> None:
-        super().__init__(text)
-        self.where = where
 
 
 class SpeechStreams:
@@ -54,13 +47,13 @@ class SpeechStreams:
         Messages for a speech that was cut off are ignored; its id is free again after `close`.
 
         Raises:
-            SpeechError: too many speeches or characters wait, or the speech is already closed.
+            FieldError: too many speeches or characters wait, or the speech is already closed.
         """
         assert message.id is not None
         speech = self._speeches.get(message.id)
         if speech is None:
             if len(self._speeches) >= MAX_SPEECHES:
-                raise SpeechError("id", f"wanted at most {MAX_SPEECHES} speeches at a time")
+                raise FieldError("id", f"wanted at most {MAX_SPEECHES} speeches at a time")
             chunk = Chunk(message.id, 0, message.character, message.language)
             speech = SpeechStream(message.id, connection, message.composition, chunk, last_end=t)
             self._speeches[message.id] = speech
@@ -70,12 +63,10 @@ class SpeechStreams:
                 self._forget(message.id)
             return
         elif speech.is_closed:
-            raise SpeechError(
-                "id", f"wanted a speech that is open, {message.id!r} was closed and is being said"
-            )
+            raise FieldError("id", f"wanted an open speech, but {message.id!r} is closed and being spoken")
         text = message.append or ""
         if speech.unspoken_length + len(text) > MOST:
-            raise SpeechError("append", f"wanted at most {MOST} characters that wait to be said, got more")
+            raise FieldError("append", f"wanted at most {MOST} characters that wait to be spoken, got more")
         speech.add(text, message.clip)
         if message.close:
             speech.close()
@@ -102,12 +93,8 @@ class SpeechStreams:
 
     def cancel(self, blocks: Collection[str] | None) -> list[Block]:
         """Return the own blocks of speeches, or of all (None), that `next` has not returned."""
-        held = [
-            s
-            for s in self._speeches.values()
-            if not (s.is_announced or s.is_finished) and (blocks is None or s.id in blocks)
-        ]
-        return [speech.own_block() for speech in held]
+        unannounced = [s for s in self._speeches.values() if not (s.is_announced or s.is_finished)]
+        return [speech.own_block() for speech in unannounced if blocks is None or speech.id in blocks]
 
     @property
     def has_next(self) -> bool:
@@ -118,15 +105,12 @@ class SpeechStreams:
         """Return a chunk's block with its predecessors, any other block with its `ID:ID:m` resolved."""
         speech = self._of(block.id)
         if speech is None or block.id == speech.id:
-            return (
-                with_references(block, self._chunk_reference)
-                if any(map(self._is_speech_sync, references(block)))
-                else block
-            )
-        holder = self._player.blocks.find(speech.id)
+            has_syncs = any(map(self._is_speech_sync, references(block)))
+            return with_references(block, self._chunk_reference) if has_syncs else block
+        own = self._player.blocks.find(speech.id)
         before = [id for id in speech.open_chunks if id != block.id]
-        if holder is not None and holder.is_waiting:
-            before += [wait.block.block.id for wait in holder.dependencies]
+        if own is not None and own.is_waiting:
+            before += [dependency.block.block.id for dependency in own.dependencies]
         return replace(block, append_after=tuple(before))
 
     def is_streaming(self, block: Block) -> bool:
@@ -167,15 +151,14 @@ class SpeechStreams:
             speech.on_done(block)
             speech.last_end = max(speech.last_end, feedback.global_time)
             return feedback, frozenset()
-        left = frozenset(speech.open_chunks)
-        if feedback.status not in CUT_OFF:
+        chunks = frozenset(speech.open_chunks)
+        speech.is_finished = feedback.status in CUT_OFF
+        if speech.is_closed or not speech.is_finished:
             self._forget(speech.id)
-            return feedback, left
-        speech.is_finished = True
-        if speech.is_closed:
-            self._forget(speech.id)
+        if not speech.is_finished:
+            return feedback, chunks
         words = [word for chunk in speech.scheduled for word in self._words(chunk, feedback.global_time)]
-        return replace(feedback, said=" ".join([*speech.words, *words])), left
+        return replace(feedback, said=" ".join([*speech.words, *words])), chunks
 
     @property
     def open_ids(self) -> list[str]:
@@ -239,8 +222,8 @@ class SpeechStreams:
         playing = next((p for p in reversed(self._player.blocks.all()) if p.block.id == chunk), None)
         if playing is None:
             return []
-        heard = playing.words_spoken(t)
-        if heard is not None:
-            return heard.split()
-        order = sorted(playing.speech.values(), key=lambda s: s.start)
-        return [word.text for speaking in order for word in speaking.utterance.words]
+        spoken = playing.words_spoken(t)
+        if spoken is not None:
+            return spoken.split()
+        speeches = sorted(playing.speech.values(), key=lambda s: s.start)
+        return [word.text for speech in speeches for word in speech.utterance.words]

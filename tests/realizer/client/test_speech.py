@@ -104,10 +104,10 @@ def test_speech_closed_with_its_connection_refuses_text_of_the_next_one() -> Non
                 pass  # the service has not seen the other one go
             async with client.speech("s1") as again:
                 await again.append("Eleven. ")
-                with pytest.raises(ClientError, match="'s1' was closed and is being said") as caught:
+                with pytest.raises(ClientError, match="'s1' is closed and being spoken") as caught:
                     await again.ended()
                 assert caught.value.code == "invalid"
-                with pytest.raises(ClientError, match="'s1' was closed and is being said"):
+                with pytest.raises(ClientError, match="'s1' is closed and being spoken"):
                     await again.append("Twelve. ")
             async with client.speech("s2") as other:
                 await other.append("One.")
@@ -133,7 +133,7 @@ def test_speech_restored_in_another_process_refuses_more_text_too(tmp_path: Path
             async with connect(f"{other.url}?session=show&seen=0") as survivor:
                 async with survivor.speech("s1") as again:
                     await again.append("Eleven. ")
-                    with pytest.raises(ClientError, match="'s1' was closed and is being said"):
+                    with pytest.raises(ClientError, match="'s1' is closed and being spoken"):
                         await again.ended()
                 end = [f async for f in survivor.until_end("s1")][-1]
                 assert isinstance(end, BlockProgress)
