@@ -50,12 +50,13 @@ class DocumentQueue:
         """Add a message, or return why it is refused."""
         limits = self._settings
         if len(self._unread) >= limits.max_blocks:
-            words = f"{limits.max_blocks} messages wait to be read: wanted fewer at a time"
-            return Warning(block_id_of(text), "PARSING_FAILURE", f"{words} {raises('max_blocks')}")
-        if (beyond := size_error(text, limits)) is not None:
-            return Warning(block_id_of(text), "PARSING_FAILURE", beyond)
-        found = read(text, VOCABULARY, max_bytes=limits.max_document, max_behaviours=limits.max_behaviours)
-        self._unread.append(found)
+            error = f"{limits.max_blocks} messages wait to be read: wanted fewer at a time"
+            return Warning(block_id_of(text), "PARSING_FAILURE", f"{error} {raises('max_blocks')}")
+        if (too_large := size_error(text, limits)) is not None:
+            return Warning(block_id_of(text), "PARSING_FAILURE", too_large)
+        self._unread.append(
+            read(text, VOCABULARY, max_bytes=limits.max_document, max_behaviours=limits.max_behaviours)
+        )
         self._received += 1
         return None
 
@@ -79,8 +80,8 @@ class DocumentQueue:
                 return Warning("<no id>", "PARSING_FAILURE", "internal error while reading")
             if isinstance(item, Block):
                 number = self._received - len(self._unread) + 1
-                stopped = number <= max(self._all_cancelled, self._cancelled.get(item.id, 0))
-                return CancelledBlock(item) if stopped else item
+                cancelled = number <= max(self._all_cancelled, self._cancelled.get(item.id, 0))
+                return CancelledBlock(item) if cancelled else item
             if item is not None:
                 refused = parse_warning(item)
                 if isinstance(item, BMLSizeError):  # too many behaviours: `put` has counted the bytes
@@ -140,7 +141,7 @@ class Submission:
         if isinstance(item, Warning):
             self.refuse(item, t)
         elif isinstance(item, CancelledBlock):
-            self._prepare(item.block, t, stopped=True)
+            self._prepare(item.block, t, cancelled=True)
         elif item is not None:
             self._prepare(item, t)
         return item is not None
@@ -156,12 +157,12 @@ class Submission:
         """
         self.queue.cancel(blocks)
         for block in self.speeches.cancel(blocks):
-            self._prepare(block, t, stopped=True)
+            self._prepare(block, t, cancelled=True)
         pending = [w for w in self.pending.blocks if blocks is None or w.block.id in blocks]
         self.withdraw(pending, t)
         return {w.block.id for w in pending}
 
-    def _prepare(self, block: Block, t: float, *, stopped: bool = False) -> None:
+    def _prepare(self, block: Block, t: float, *, cancelled: bool = False) -> None:
         """Request the speech of a block and acknowledge it. It is planned when nothing is missing."""
         if (fault := self._limit_error(block)) is not None:
             self.refuse(Warning(block.id, "CANNOT_CREATE_BEHAVIOR", fault), t, block.character_id)
@@ -177,7 +178,7 @@ class Submission:
         except Exception:
             self._internal(block, t)
             return
-        if stopped:
+        if cancelled:
             self.withdraw([pending], t)
         else:
             self._request_speech(pending, requests)
@@ -214,25 +215,25 @@ class Submission:
         self, pending: PendingBlock, lengths: Mapping[str, Mapping[str, float]], t: float
     ) -> None:
         """Request speech again with the lengths that let more of the block fit. The result is final."""
-        requests = self._player.speech_requests(pending.block)
-        again = {b: requests[b] for b in self.tts.unfinished(pending)}
-        again |= {b: replace(requests[b], seconds=times["end"]) for b, times in lengths.items()}
+        whole = self._player.speech_requests(pending.block)
+        requests = {b: whole[b] for b in self.tts.unfinished(pending)}
+        requests |= {b: replace(whole[b], seconds=times["end"]) for b, times in lengths.items()}
         pending.utterances = {b: without_stretch(u) for b, u in pending.utterances.items()}
         pending.waiting_since, pending.final = t, True
-        self._request_speech(pending, again)
+        self._request_speech(pending, requests)
 
     def _request_speech(self, pending: PendingBlock, requests: Mapping[str, SpeechRequest]) -> None:
         """Request speech from the character's voice."""
         voice = self.voices.get(pending.character) or self._settings.voice
-        chosen = {b: replace(request, voice=request.voice or voice) for b, request in requests.items()}
-        self._add_effects(self.tts.request(pending, chosen))
+        with_voice = {b: replace(request, voice=request.voice or voice) for b, request in requests.items()}
+        self._add_effects(self.tts.request(pending, with_voice))
 
-    def withdraw(self, gone: list[PendingBlock], t: float) -> None:
+    def withdraw(self, blocks: list[PendingBlock], t: float) -> None:
         """Remove blocks that are not planned yet."""
-        for pending in gone:
+        for pending in blocks:
             self._player.withdraw(pending.block, t)
             self.speeches.on_refused(pending.block.id)
-        self.pending.remove(gone)
+        self.pending.remove(blocks)
 
     def end(self, blocks: Collection[str], t: float) -> None:
         """End blocks, whether they play already or not."""
@@ -246,8 +247,8 @@ class Submission:
     def _internal(self, block: Block, t: float) -> None:
         """Log a bug with its traceback, and refuse the block."""
         log.exception("session %s: block %s failed", self._name, block.id)
-        text = "internal error while planning this block"
-        self.refuse(Warning(block.id, "EXECUTION_EXCEPTION", text), t, block.character_id)
+        warning = Warning(block.id, "EXECUTION_EXCEPTION", "internal error while planning this block")
+        self.refuse(warning, t, block.character_id)
 
     def refuse(self, warning: Warning, t: float, character: str | None = None) -> None:
         """Publish a warning about a block that is not accepted."""
@@ -257,8 +258,8 @@ class Submission:
 
 def block_id_of(message: str) -> str:
     """Return the block id near the start of an unparsed document, or "<no id>"."""
-    found = _BLOCK_ID.search(message, 0, 4096)
-    return found.group(1) if found else "<no id>"
+    match = _BLOCK_ID.search(message, 0, 4096)
+    return match[1] if match else "<no id>"
 
 
 def size_error(text: str, settings: Settings) -> str | None:

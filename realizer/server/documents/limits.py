@@ -25,24 +25,24 @@ def duration_error(block: Block, schedule: Schedule, settings: Settings) -> str 
     """
     if schedule.duration <= settings.max_duration or external_refs(block):
         return None
-    words = f"wanted a block of at most {settings.max_duration:g} s, got {schedule.duration:.1f}"
-    return f"{words} {raises('max_duration')}"
+    text = f"wanted a block of at most {settings.max_duration:g} s, got {schedule.duration:.1f}"
+    return f"{text} {raises('max_duration')}"
 
 
 def pixel_rate_error(
-    size: tuple[int, int], fps: float, settings: Settings, beside: float = 0.0
+    size: tuple[int, int], fps: float, settings: Settings, others: float = 0.0
 ) -> str | None:
     """Return why pictures of this size are not drawn at this rate, or None.
 
     Args:
-        beside: pixels a second of the session's other pictures; a shared picture counts once.
+        others: pixels a second of the session's other pictures; a shared picture counts once.
     """
     pixels = size[0] * size[1] * fps
-    if pixels + beside <= settings.max_pixels:
+    if pixels + others <= settings.max_pixels:
         return None
-    words = f"wanted at most {settings.max_pixels:g} pixels a second of a session's pictures, got {pixels:g}"
-    more = f" beside {beside:g} of others" if beside else ""
-    return f"{words}, {size[0]}x{size[1]} at {fps:g} fps{more} {raises('max_pixels')}"
+    text = f"wanted at most {settings.max_pixels:g} pixels a second of a session's pictures, got {pixels:g}"
+    more = f" beside {others:g} of others" if others else ""
+    return f"{text}, {size[0]}x{size[1]} at {fps:g} fps{more} {raises('max_pixels')}"
 
 
 def memory_error(settings: Settings) -> str | None:
@@ -62,5 +62,5 @@ def memory() -> int:
         import resource
     except ImportError:  # Windows
         return 0
-    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return most if sys.platform == "darwin" else most * 1024
+    maximum = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return maximum if sys.platform == "darwin" else maximum * 1024

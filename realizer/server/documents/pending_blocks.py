@@ -77,23 +77,17 @@ class PendingBlocks:
         block depends on none: it ends those that `replaced_by` returns. Blocks that must follow this one
         depend on it.
         """
-        named = {ref.block for ref in references(block)} | {*block.append_after, *block.chunk_after}
-        after = {
-            w
-            for w in self.blocks
-            if block.composition != "REPLACE"
-            and (
-                w.block.id in named
-                or w.block.id == block.id
-                or (
-                    w.character == character
-                    and (block.composition == "APPEND" or w.block.composition == "REPLACE")
-                )
-            )
-        }
-        pending = PendingBlock(block, character, now, predecessors=after)
+        ids = {ref.block for ref in references(block)} | {*block.append_after, *block.chunk_after, block.id}
+
+        def is_predecessor(other: PendingBlock) -> bool:
+            in_order = block.composition == "APPEND" or other.block.composition == "REPLACE"
+            return other.block.id in ids or (other.character == character and in_order)
+
+        earlier = self.blocks if block.composition != "REPLACE" else []
+        pending = PendingBlock(block, character, now, predecessors=set(filter(is_predecessor, earlier)))
         for other in self.blocks:
-            if other.block.id in (*block.prepend_before, *block.chunk_before) and other not in after:
+            is_successor = other.block.id in (*block.prepend_before, *block.chunk_before)
+            if is_successor and other not in pending.predecessors:
                 other.predecessors.add(pending)
         self.blocks.append(pending)
         return pending
@@ -110,9 +104,9 @@ class PendingBlocks:
             if w.character == pending.character and w.waiting_since <= pending.waiting_since
         ]
 
-    def remove(self, gone: Iterable[PendingBlock]) -> None:
+    def remove(self, blocks: Iterable[PendingBlock]) -> None:
         """Remove blocks, also from the predecessors of others; answers to their requests are dropped."""
-        removed = set(gone)
+        removed = set(blocks)
         self.blocks = [w for w in self.blocks if w not in removed]
         for pending in self.blocks:
             pending.predecessors -= removed

@@ -145,7 +145,7 @@ class Session:
     def connect(self, connection: int, now: float, seen: int | None = None) -> None:
         """Add a connection. With `seen` it gets all feedback after that one, without it only new feedback."""
         self._forget_deadline()
-        self._connections[connection] = Connection(connection, self.feedback_log.newest + 1)
+        self._connections[connection] = Connection(connection)
         if not self.log_entry(now - self.opened, "join", connection):
             return
         self.empty_since = None
@@ -166,8 +166,7 @@ class Session:
 
     def dropped_count(self, connection: int) -> int:
         """Return how many frames, pictures and packets a client missed because it was slow."""
-        known = self._connections.get(connection)
-        return 0 if known is None else known.dropped
+        return c.dropped if (c := self._connections.get(connection)) else 0
 
     def is_expired(self, now: float) -> bool:
         """Whether the session has had no connection for `settings.keep` seconds."""
@@ -183,13 +182,14 @@ class Session:
 
     def update_backlog(self, connection: int, waiting: int) -> None:
         """Take the number of unsent bytes of a client: a slow one misses frames, a stuck one is closed."""
-        if (known := self._connections.get(connection)) is not None:
-            known.is_slow = waiting > SLOW
-            if known.is_slow:
-                self._forget_deadline()
-            if waiting > STUCK:
-                reason = f"{waiting} bytes wait to be read; come back with the session's name and seen"
-                self._effects.append(Close(connection, 1013, reason))
+        if (client := self._connections.get(connection)) is None:
+            return
+        client.is_slow = waiting > SLOW
+        if client.is_slow:
+            self._forget_deadline()
+        if waiting > STUCK:
+            reason = f"{waiting} bytes wait to be read; reconnect with the session's name and seen"
+            self._effects.append(Close(connection, 1013, reason))
 
     # messages in --------------------------------------------------------------------------------
 
@@ -205,8 +205,8 @@ class Session:
             self._effects += self.broadcast.frames_due(t)[0]
         if self.journal.needs_checkpoint and not self._compact(t):
             return
-        kept = self._dispatch(self._connections[connection], message, t)
-        if not self.closed and self._work(t) and not kept:
+        in_journal = self._dispatch(self._connections[connection], message, t)
+        if not self.closed and self._work(t) and not in_journal:
             self.log_entry(t, "tick")
 
     def _dispatch(self, connection: Connection, message: str | bytes, t: float) -> bool:
@@ -219,22 +219,21 @@ class Session:
                 self.reply(connection.id, control)
                 return False
             return self._receive_control(connection, control, message, t)
-        if self.ending:
-            words: str | None = "the service is ending and takes no more documents"
-        else:
-            words = self._write_journal(t, "text", connection, message)
-        if words is None:
+        ending = "the service is ending and takes no more documents" if self.ending else None
+        refused = ending or self._write_journal(t, "text", connection, message)
+        if refused is None:
             self.submission.enqueue(message, t)
         else:
             # Without a number: the message is not in the journal, and a session that is restored from the
             # journal must number all other feedback in the same way.
-            told = WarningFeedback(id=block_id_of(message), type="CANNOT_CREATE_BEHAVIOR", text=words)
-            self.send_unnumbered(told.to_xml())
-        return words is None
+            warning = WarningFeedback(id=block_id_of(message), type="CANNOT_CREATE_BEHAVIOR", text=refused)
+            for client in self._connections.values():
+                self._send_feedback(client, [warning.to_xml()])
+        return refused is None
 
     def _receive_sound(self, connection: Connection, message: bytes, t: float) -> bool:
-        if (words := self._write_journal(t, "sound", connection, message)) is not None:
-            self.reply(connection.id, ErrorMessage(code="journal", message=words))
+        if (refused := self._write_journal(t, "sound", connection, message)) is not None:
+            self.reply(connection.id, ErrorMessage(code="journal", message=refused))
             return False
         try:
             self.clips.add_chunk(unpack_clip(message))
@@ -249,11 +248,11 @@ class Session:
             known = self.player.characters
             self._handle(connection, control, t)
             for name in self.player.characters:
-                if name not in known:  # the order of characters matters: the first is the default
+                if name not in known:  # their order matters: the first is the default
                     self.log_entry(t, "text", connection.id, json.dumps({"type": "character", "id": name}))
             return False
-        if (words := self._write_journal(t, "text", connection, message)) is not None:
-            self.reply(connection.id, ErrorMessage(code="journal", message=words))
+        if (refused := self._write_journal(t, "text", connection, message)) is not None:
+            self.reply(connection.id, ErrorMessage(code="journal", message=refused))
             return False
         self._handle(connection, control, t)
         return True
@@ -271,8 +270,8 @@ class Session:
 
     def _hello(self, connection: Connection, message: Hello, t: float) -> None:
         if message.version != PROTOCOL:
-            words = f"wanted version {PROTOCOL} of the protocol, got {message.version}"
-            self.reply(connection.id, ErrorMessage(code="version", message=words, where="hello.version"))
+            text = f"wanted version {PROTOCOL} of the protocol, got {message.version}"
+            self.reply(connection.id, ErrorMessage(code="version", message=text, where="hello.version"))
         elif message.session not in (None, self.id):
             assert message.session is not None
             self._effects.append(MoveConnection(connection.id, message.session, message.seen))
@@ -287,7 +286,7 @@ class Session:
             BlockState(id=w.block.id, character=w.block.character_id, status="IN_PREP")
             for w in self.submission.pending.blocks
         ]
-        faces = [
+        characters = [
             CharacterState(face=self.faces.name(index), voice=self.submission.voices.get(index), **face)
             for index, face in enumerate(state["characters"])
         ]
@@ -295,7 +294,7 @@ class Session:
             session=self.id,
             time=t,
             blocks=[*(BlockState(**block) for block in state["blocks"]), *preparing],
-            characters=faces,
+            characters=characters,
             voice=VoiceState(name=self.settings.voice, fault=self.submission.tts.fault),
             connections=len(self._connections),
             dropped=connection.dropped,
@@ -314,7 +313,7 @@ class Session:
             return str(error)
         except JournalError as error:
             log.error("session %s: %s", self.id, error)
-            return f"this could not be kept, so it is not taken: {error}"
+            return f"this could not be written to the journal, so it is refused: {error}"
         return None
 
     def log_entry(self, t: float, kind: Kind, number: int = 0, body: str = "") -> bool:
@@ -460,17 +459,17 @@ class Session:
             self._compact(now - self.opened)
 
     def replay_until(
-        self, t: float, look: Callable[[float], None] = lambda t: None, *, since: float = 0.0
+        self, t: float, before: Callable[[float], None] = lambda t: None, *, since: float = 0.0
     ) -> None:
         """Publish the feedback that is due before `t`, each at its own time, for a replay.
 
         Args:
-            look: called with each of those times, before the feedback is published.
+            before: called with each of those times, before the feedback is published.
             since: the time of feedback that is due immediately.
         """
         while (due := self.player.next_deadline()) is not None and due < t and not self.closed:
             due = max(due, since)
-            look(due)
+            before(due)
             self._publish(due)
 
     def _work(self, t: float, read_documents: bool = True) -> bool:
@@ -478,7 +477,7 @@ class Session:
         self._client_left = False
         self._forget_deadline()
         self._publish(t)
-        if self.broadcast.active or any(one.subscriptions for one in self._connections.values()):
+        if self.broadcast.active or any(c.subscriptions for c in self._connections.values()):
             self.broadcast.set_subscribers(self._connections.values())
             self.broadcast.send_due(t, self._effects)
         if self.submission.pending.blocks:
@@ -542,25 +541,18 @@ class Session:
         """Number the feedback that is due and send it to its subscribers."""
         texts: list[str] = []
         while due := self.player.due(t + EPSILON):
-            for feedback in due:
-                told, ends = self.submission.speeches.process_feedback(feedback)
-                texts.append(self.feedback_log.add(told, t))
-                if ends:
-                    self.submission.end(ends, t)
+            for event in due:
+                feedback, ending_blocks = self.submission.speeches.process_feedback(event)
+                texts.append(self.feedback_log.add(feedback, t))
+                if ending_blocks:
+                    self.submission.end(ending_blocks, t)
         if texts:
             for connection in self._connections.values():
                 self._send_feedback(connection, texts)
 
     def _send_feedback(self, connection: Connection, texts: list[str]) -> None:
-        connection.next_seq = self.feedback_log.newest + 1
-        if (wanted := connection.feedback) is not None:
-            self._effects += [Send(connection.id, text) for text in texts if wanted.accepts(text)]
-
-    def send_unnumbered(self, feedback: str) -> None:
-        """Send feedback without a number to its subscribers. It is not sent again after a reconnect."""
-        for one in self._connections.values():
-            if one.feedback is not None and one.feedback.accepts(feedback):
-                self._effects.append(Send(one.id, feedback))
+        if (filter := connection.feedback) is not None:
+            self._effects += [Send(connection.id, text) for text in texts if filter.accepts(text)]
 
     def send_missed_feedback(self, connection: int, seen: int) -> None:
         """Send the feedback after `seen`, and `gap` first if some of it is not stored or never existed."""
@@ -568,9 +560,7 @@ class Session:
         if seen + 1 < first or seen > self.feedback_log.newest:
             self.reply(connection, Gap(seen=seen, first=first))
             seen = first - 1
-        known = self._connections[connection]
-        known.next_seq = seen + 1
-        self._send_feedback(known, self.feedback_log.since(known.next_seq))
+        self._send_feedback(self._connections[connection], self.feedback_log.since(seen + 1))
 
     def send_welcome(self, connection: int, now: float) -> None:
         """Send `welcome` to a connection."""

@@ -80,7 +80,6 @@ class Connection:
     """One client of a session.
 
     Attributes:
-        next_seq: seq of the next feedback to send.
         feedback: filter of its feedback; None for no feedback.
         is_slow: whether more than SLOW bytes are unsent.
         dropped: number of frames, pictures and sound packets it missed because it was slow.
@@ -88,7 +87,6 @@ class Connection:
     """
 
     id: int
-    next_seq: int
     feedback: FeedbackFilter | None = field(default_factory=FeedbackFilter)
     is_slow: bool = False
     dropped: int = 0

@@ -193,7 +193,7 @@ def test_chaos_full_disk_refuses_documents_and_lets_the_rest_play(disk: Disk) ->
             await client.send(WAIT.format("late", 0.1) + large)
             refused = await until(client, 'id="late"')
             assert "warningFeedback" in refused[-1]
-            assert "this could not be kept, so it is not taken" in refused[-1]
+            assert "this could not be written to the journal, so it is refused" in refused[-1]
             assert re.search("full|space", refused[-1])
             await client.send(json.dumps({"type": "set", "aus": {"12": 1}, "faps": {"x" * 20_000: 1}}))
             while not (message := str(await client.recv())).startswith("{"):
