@@ -412,10 +412,10 @@ class Session:
             return
         self._forget_deadline()
         picture = result if isinstance(result, bytes) else None
-        effects, lookers = self.broadcast.video.on_picture(draw, picture, self._connections.values())
+        effects, viewers = self.broadcast.video.on_picture(draw, picture, self._connections.values())
         self._effects += effects
         if not isinstance(result, bytes):
-            for connection in lookers:
+            for connection in viewers:
                 for key in [k for k in connection.subscriptions if k[0] == "video"]:
                     del connection.subscriptions[key]
                 self.reply(connection.id, ErrorMessage(code="render", message=str(result), where="video"))

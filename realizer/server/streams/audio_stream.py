@@ -38,59 +38,55 @@ class AudioStream:
 
     def span(self) -> tuple[float, float] | None:
         """Return the start of the first speech and the end of the last, in seconds; None without speech."""
-        speaking = self.speeches()
-        if not speaking:
+        speeches = self.speeches()
+        if not speeches:
             return None
-        return min(s.start for s in speaking), max(_end(s) for s in speaking)
+        return min(s.start for s in speeches), max(_end(s) for s in speeches)
 
     def packet(self, number: int) -> bytes | None:
         """Return the PCM of one packet; None in silence."""
         first = number * self._samples
-        mix: Float32 | None = None
-        for speaking in self.speeches():
-            if _end(speaking) * self.rate <= first or speaking.start * self.rate >= first + self._samples:
+        mix = np.zeros(self._samples, np.float32)
+        is_silent = True
+        for speech in self.speeches():
+            if _end(speech) * self.rate <= first or speech.start * self.rate >= first + self._samples:
                 continue
-            offset = round(speaking.start * self.rate)
-            piece = self._pcm(speaking, max(0, first - offset), max(0, first + self._samples - offset))
-            if not len(piece):
-                continue
-            if mix is None:
-                mix = np.zeros(self._samples, np.float32)
+            offset = round(speech.start * self.rate)
+            piece = self._pcm(speech, max(0, first - offset), max(0, first + self._samples - offset))
             at = max(0, offset - first)
             mix[at : at + len(piece)] += piece
-        if mix is None:
-            return None
-        return np.clip(np.rint(mix), -32768, 32767).astype("<i2").tobytes()
+            is_silent &= not len(piece)
+        return None if is_silent else np.clip(np.rint(mix), -32768, 32767).astype("<i2").tobytes()
 
-    def _pcm(self, speaking: ScheduledSpeech, first: int, last: int) -> Float32:
+    def _pcm(self, speech: ScheduledSpeech, first: int, last: int) -> Float32:
         """Return samples first .. last of a speech at the stream's rate; fewer at its end."""
         size = BLOCK * self.rate
-        blocks = [self._block(speaking, n) for n in range(first // size, -(-last // size))]
-        whole = blocks[0] if len(blocks) == 1 else np.concatenate([np.zeros(0, np.float32), *blocks])
+        blocks = [self._block(speech, n) for n in range(first // size, -(-last // size))]
+        joined = blocks[0] if len(blocks) == 1 else np.concatenate([np.zeros(0, np.float32), *blocks])
         begin = first // size * size
-        return whole[first - begin : last - begin]
+        return joined[first - begin : last - begin]
 
-    def _block(self, speaking: ScheduledSpeech, number: int) -> Float32:
+    def _block(self, speech: ScheduledSpeech, number: int) -> Float32:
         """Return `BLOCK` seconds of a speech, so that a long one is mixed only as far as it is heard."""
-        key = (id(speaking), number)
-        known = self._cache.pop(key, None)
-        if known is None or known[0] is not speaking:
-            known = (speaking, self._made(speaking, number * BLOCK))
-        self._cache[key] = known
+        key = (id(speech), number)
+        cached = self._cache.pop(key, None)
+        if cached is None or cached[0] is not speech:
+            cached = (speech, self._render(speech, number * BLOCK))
+        self._cache[key] = cached
         while len(self._cache) > BLOCKS:
             del self._cache[next(iter(self._cache))]
-        return known[1]
+        return cached[1]
 
-    def _made(self, speaking: ScheduledSpeech, second: int) -> Float32:
-        utterance = speaking.utterance
+    def _render(self, speech: ScheduledSpeech, second: int) -> Float32:
+        utterance = speech.utterance
         assert utterance.pcm is not None
         # A second more on either side, so that filters and fades do not begin anew in each block.
         first, rate = max(0, second - 1), utterance.sample_rate
         pcm = utterance.pcm[first * rate : (second + BLOCK + 1) * rate]
         part = replace(utterance, pcm=pcm, duration=len(pcm) / rate)
-        sound = render_utterance(replace(speaking, start=speaking.start + first, utterance=part), self.rate)
+        sound = render_utterance(replace(speech, start=speech.start + first, utterance=part), self.rate)
         return sound[(second - first) * self.rate : (second - first + BLOCK) * self.rate]
 
 
-def _end(speaking: ScheduledSpeech) -> float:
-    return min(speaking.start + speaking.utterance.duration, speaking.until + CUT)
+def _end(speech: ScheduledSpeech) -> float:
+    return min(speech.start + speech.utterance.duration, speech.until + CUT)

@@ -72,12 +72,8 @@ class Fanout:
                 for number in range(s.next, newest + 1):
                     sends.append(Send(connection.id, window.message(s, number)))
             s.next = max(s.next, newest + 1)
-        if (
-            len(self.members) == 1
-            and s.encoding == "binary"
-            and s.stream != "mesh"
-            and not connection.is_slow
-        ):
+        is_packed = s.encoding == "binary" and s.stream != "mesh"
+        if len(self.members) == 1 and is_packed and not connection.is_slow:
             self._packed = window.packed(s)
         window.drop_source()
 
@@ -88,7 +84,7 @@ class FrameRun:
     Args:
         connection: id of the connection.
         subscription: its subscription, which is advanced.
-        strip: the frames.
+        packed: the frames.
         zero: the caller's clock when the session clock was 0.
 
     Attributes:
@@ -98,11 +94,16 @@ class FrameRun:
     """
 
     def __init__(
-        self, connection: int, subscription: FrameSubscription, strip: PackedFrames, zero: float, until: float
+        self,
+        connection: int,
+        subscription: FrameSubscription,
+        packed: PackedFrames,
+        zero: float,
+        until: float,
     ) -> None:
         self.connection = connection
         self._subscription = subscription
-        self._strip = strip
+        self._packed = packed
         self._fps = subscription.timeline.fps
         self._zero = zero
         self._next = subscription.next
@@ -114,12 +115,12 @@ class FrameRun:
         """Return the message of the due frame; None if not exactly one frame and nothing else is due."""
         number, passed = self._next, now + EPSILON
         following = (number + 1) / self._fps + self._zero
-        if not self._due <= passed < min(following, self.until) or number >= self._strip.end:
+        if not self._due <= passed < min(following, self.until) or number >= self._packed.end:
             return None
         self._subscription.next = self._next = number + 1
         self._due = following
         self.wake_at = min(following, self.until)
-        return self._strip[number]
+        return self._packed[number]
 
 
 class Broadcast:
@@ -145,12 +146,12 @@ class Broadcast:
 
     def timeline(self, index: int, fps: float) -> FrameTimeline:
         """Return the frames of one character at one rate."""
-        known = self._timelines.get((index, fps))
-        if known is None:
-            known = self._timelines[index, fps] = FrameTimeline(
+        timeline = self._timelines.get((index, fps))
+        if timeline is None:
+            timeline = self._timelines[index, fps] = FrameTimeline(
                 self.player, index, fps, lambda: self._faces.of(index), lambda: self._faces.mapping(index)
             )
-        return known
+        return timeline
 
     def subscribe_frames(
         self, stream: str, encoding: str, index: int, name: str | None, fps: float, now: float
@@ -164,10 +165,12 @@ class Broadcast:
         sound = self._audio.setdefault((index, rate), AudioStream(self.player, rate, index))
         return AudioSubscription(sound, index or 0, math.ceil((now - EPSILON) / PACKET), self.player.version)
 
-    def subscribe_video(self, index: int, fps: float, look: RenderOptions, now: float) -> VideoSubscription:
+    def subscribe_video(
+        self, index: int, fps: float, options: RenderOptions, now: float
+    ) -> VideoSubscription:
         """Return a subscription to pictures from `now` on."""
         self.active = True  # so that `send_due` runs and removes the view if the subscription is refused
-        return self.video.subscription(self.timeline(index, fps), index, look, now)
+        return self.video.subscription(self.timeline(index, fps), index, options, now)
 
     def face_changed(self, index: int) -> list[tuple[int, FrameSubscription]]:
         """Use a character's new face from the next frame on.
@@ -179,47 +182,44 @@ class Broadcast:
             if character == index:
                 timeline.invalidate()
         self.video.face_changed(index)
-        members = [member for lane in self._fanouts for member in lane.members]
+        members = [member for fanout in self._fanouts for member in fanout.members]
         return [(c.id, s) for c, s in members if s.stream == "mesh" and s.index == index]
 
     def set_subscribers(self, connections: Iterable[Connection]) -> None:
         """Set the connections whose subscriptions are served."""
-        lanes: dict[FrameTimeline, list[tuple[Connection, FrameSubscription]]] = {}
+        frames: dict[FrameTimeline, list[tuple[Connection, FrameSubscription]]] = {}
         self._schedule_subscribers, self._audio_subscribers, self._video_subscribers = [], [], []
         for connection in connections:
             for s in connection.subscriptions.values():
                 if isinstance(s, FrameSubscription):
-                    lanes.setdefault(s.timeline, []).append((connection, s))
+                    frames.setdefault(s.timeline, []).append((connection, s))
                 elif isinstance(s, AudioSubscription):
                     self._audio_subscribers.append((connection, s))
                 elif isinstance(s, ScheduleSubscription):
                     self._schedule_subscribers.append((connection, s))
                 else:
                     self._video_subscribers.append(s)
-        self._fanouts = [Fanout(timeline, members) for timeline, members in lanes.items()]
+        self._fanouts = [Fanout(timeline, members) for timeline, members in frames.items()]
         self.active = bool(
-            lanes or self._schedule_subscribers or self._audio_subscribers or self._video_subscribers
+            frames or self._schedule_subscribers or self._audio_subscribers or self._video_subscribers
         )
 
     def send_due(self, now: float, effects: list[Effect]) -> None:
         """Send all that is due to the subscribers of the last `set_subscribers`."""
-        self._send_schedules(self._schedule_subscribers, now, effects)
-        for connection, sound in self._audio_subscribers:
-            send_packets(connection, sound, now, effects)
+        self._send_schedules(now, effects)
+        for connection, s in self._audio_subscribers:
+            send_packets(connection, s, now, effects)
         effects += self.frames_due(now)[0]
         self.video.due(self._video_subscribers, now, effects)
 
     def frames_due(self, now: float) -> tuple[list[Send], float]:
         """Return the due frames of fap, au, arkit and mesh, and the time of the next one."""
         sends: list[Send] = []
-        soonest = math.inf
-        for lane in self._fanouts:
-            fps = lane.timeline.fps
-            newest = last_frame_at(now, fps)
-            if lane.next <= newest:
-                lane.send(newest, now, sends)
-            soonest = min(soonest, lane.next / fps)
-        return sends, soonest
+        for fanout in self._fanouts:
+            newest = last_frame_at(now, fanout.timeline.fps)
+            if fanout.next <= newest:
+                fanout.send(newest, now, sends)
+        return sends, self.next_frame
 
     def fast_path(self, zero: float, until: float) -> FrameRun | None:
         """Return the packed frames of the only subscriber; None if there are other or more subscribers.
@@ -228,10 +228,10 @@ class Broadcast:
             zero: the caller's clock when the session clock was 0.
             until: time of the next other event, on the caller's clock.
         """
-        if len(self._fanouts) != 1 or (strip := self._fanouts[0].packed) is None:
+        if len(self._fanouts) != 1 or (packed := self._fanouts[0].packed) is None:
             return None
         ((connection, s),) = self._fanouts[0].members
-        return FrameRun(connection.id, s, strip, zero, until)
+        return FrameRun(connection.id, s, packed, zero, until)
 
     @property
     def has_schedule_subscribers(self) -> bool:
@@ -241,39 +241,35 @@ class Broadcast:
     @property
     def next_frame(self) -> float:
         """The time of the next frame; infinity without subscribers."""
-        return min([lane.next / lane.timeline.fps for lane in self._fanouts], default=math.inf)
+        return min([fanout.next / fanout.timeline.fps for fanout in self._fanouts], default=math.inf)
 
     @property
     def next_other(self) -> float:
         """The time of the next packet, picture or schedule; infinity if there is none."""
-        first = [packets_due(s) for _, s in self._audio_subscribers]
-        first.append(self.video.next(self._video_subscribers))
+        times = [packets_due(s) for _, s in self._audio_subscribers]
+        times.append(self.video.next(self._video_subscribers))
         if self._schedule_subscribers:
             changed = self._schedules.has_changes()
-            first += [s.retry_at for _, s in self._schedule_subscribers if s.needs_full_update or changed]
-        return min(first)
+            times += [s.retry_at for _, s in self._schedule_subscribers if s.needs_full_update or changed]
+        return min(times)
 
     # inside -------------------------------------------------------------------------------------
 
-    def _send_schedules(
-        self, looking: list[tuple[Connection, ScheduleSubscription]], now: float, effects: list[Effect]
-    ) -> None:
+    def _send_schedules(self, now: float, effects: list[Effect]) -> None:
         """Send changed blocks to subscribers that know the rest, all blocks to the others."""
-        if not looking:
+        if not self._schedule_subscribers:
             self._schedules.reset()
             return
         changes = self._schedules.changes()
-        for connection, s in looking:
-            news = [text for character, text in changes if s.index in (None, character)]
+        for connection, s in self._schedule_subscribers:
+            changed = [text for character, text in changes if s.index in (None, character)]
             if connection.is_slow:
                 # The full update that is sent later includes these changes.
-                s.needs_full_update = s.needs_full_update or bool(news)
+                s.needs_full_update |= bool(changed)
                 s.retry_at = now + RETRY
-            elif s.needs_full_update:
-                s.needs_full_update, s.retry_at = False, now
-                text = schedule_message(now, self._schedules.full_message(s.index), s.name, whole=True)
-                effects.append(Send(connection.id, text))
-            elif news:
-                effects.append(
-                    Send(connection.id, schedule_message(now, ",".join(news), s.name, whole=False))
-                )
+            elif s.needs_full_update or changed:
+                whole = s.needs_full_update
+                blocks = self._schedules.all_blocks(s.index) if whole else ",".join(changed)
+                if whole:
+                    s.needs_full_update, s.retry_at = False, now
+                effects.append(Send(connection.id, schedule_message(now, blocks, s.name, whole=whole)))

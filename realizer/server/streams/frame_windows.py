@@ -52,7 +52,7 @@ class FrameSource:
     rows: Callable[[AUFrames, FapMapping, bool], Float32 | Int32]
 
 
-def _arkit_rows(frames: AUFrames, mapping: FapMapping, asked: bool) -> Float32:
+def _arkit_rows(frames: AUFrames, mapping: FapMapping, raw: bool) -> Float32:
     shown = arkit(frames, mapping)
     return np.concatenate([shown.weights, shown.head, shown.eyes.reshape(len(shown.times), 4)], axis=1)
 
@@ -60,11 +60,11 @@ def _arkit_rows(frames: AUFrames, mapping: FapMapping, asked: bool) -> Float32:
 SOURCES: Mapping[str, FrameSource] = {
     "fap": FrameSource(
         lambda: [row.name for row in faps()],
-        lambda frames, mapping, asked: to_fap(frames, mapping).integers(),
+        lambda frames, mapping, raw: to_fap(frames, mapping).integers(),
     ),
     "au": FrameSource(
         lambda: list(AU_NAMES()),
-        lambda frames, mapping, asked: frames.before_rules if asked else frames.aus,
+        lambda frames, mapping, raw: frames.before_rules if raw else frames.aus,
     ),
     "arkit": FrameSource(lambda: [*ARKIT_NAMES(), *TURNS], _arkit_rows),
 }
@@ -149,13 +149,13 @@ class FrameWindow:
         """The FAPs of the frames, in FAPU."""
         return to_fap(self.aus, self._mapping)
 
-    def rows(self, stream: str, asked: bool = False) -> Float32 | Int32:
+    def rows(self, stream: str, raw: bool = False) -> Float32 | Int32:
         """Return the (n, k) values of fap, au or arkit, as on the wire.
 
         Args:
-            asked: whether AUs are wanted as they are before the rules of co-occurrence.
+            raw: whether AUs are wanted as they are before the rules of co-occurrence.
         """
-        return SOURCES[stream].rows(self.aus, self._mapping, asked)
+        return SOURCES[stream].rows(self.aus, self._mapping, raw)
 
     @cached_property
     def poses(self) -> Float32:

@@ -26,7 +26,7 @@ class Snapshot:
         text: the whole block as JSON, computed on first use.
     """
 
-    playing: ActiveBlock
+    block: ActiveBlock
     others: tuple[str, ...]
     schedules: list[Schedule | None] = field(default_factory=list)
     state: State | None = None
@@ -36,8 +36,8 @@ class Snapshot:
 class ScheduleStream:
     """The changes of blocks since the last look, encoded once for all subscribers."""
 
-    def __init__(self, cast: BlockStore) -> None:
-        self._cast = cast
+    def __init__(self, store: BlockStore) -> None:
+        self._store = store
         self._snapshots: dict[int, Snapshot] = {}
 
     def reset(self) -> None:
@@ -47,9 +47,8 @@ class ScheduleStream:
     def has_changes(self) -> bool:
         """Whether `changes` would return something."""
         schedules = self._schedules()
-        return any(p.number not in self._snapshots for p in self._cast.active()) or any(
-            seen.state is not seen.playing.state or self._has_moved(seen, schedules)
-            for seen in self._snapshots.values()
+        return any(block.number not in self._snapshots for block in self._store.active()) or any(
+            s.state is not s.block.state or _has_moved(s, schedules) for s in self._snapshots.values()
         )
 
     def changes(self) -> list[tuple[int, str]]:
@@ -58,48 +57,47 @@ class ScheduleStream:
         If the times of a block have not changed, the JSON has only its state, start and end. A block that has
         ended is returned once more and then forgotten.
         """
-        for playing in self._cast.active():
-            if playing.number not in self._snapshots:
-                named = {ref.block for ref in references(playing.block) if ref.block is not None}
-                self._snapshots[playing.number] = Snapshot(playing, tuple(named - {playing.block.id}))
-        found: list[tuple[int, str]] = []
+        for block in self._store.active():
+            if block.number not in self._snapshots:
+                others = {ref.block for ref in references(block.block)} - {None, block.block.id}
+                self._snapshots[block.number] = Snapshot(block, tuple(filter(None, others)))
+        changes: list[tuple[int, str]] = []
         schedules = self._schedules()
-        for number, seen in list(self._snapshots.items()):
-            moved = self._has_moved(seen, schedules)
-            if moved or seen.state is not seen.playing.state:
-                seen.text, seen.state = None, seen.playing.state
-                seen.schedules = [seen.playing.schedule, *map(schedules, seen.others)]
-                text = self._text(seen) if moved else _json(self._chart(seen).head())
-                found.append((seen.playing.character, text))
-            if seen.playing.is_done:
+        for number, snapshot in list(self._snapshots.items()):
+            block, moved = snapshot.block, _has_moved(snapshot, schedules)
+            if moved or snapshot.state is not block.state:
+                snapshot.text, snapshot.state = None, block.state
+                snapshot.schedules = [block.schedule, *map(schedules, snapshot.others)]
+                text = self._text(snapshot) if moved else _json(self._chart(snapshot).head())
+                changes.append((block.character, text))
+            if block.is_done:
                 del self._snapshots[number]
-        return found
+        return changes
 
-    def full_message(self, character: int | None) -> str:
+    def all_blocks(self, character: int | None) -> str:
         """Return all blocks of one character or all as of the last `changes`, separated by commas."""
-        wanted = (s for s in self._snapshots.values() if character in (None, s.playing.character))
-        return ",".join(self._text(seen) for seen in wanted)
-
-    def _has_moved(self, seen: Snapshot, schedules: Callable[[str], Schedule | None]) -> bool:
-        """Whether the block or one that it refers to has a new schedule."""
-        now = [seen.playing.schedule, *map(schedules, seen.others)]
-        return len(now) != len(seen.schedules) or any(
-            a is not b for a, b in zip(now, seen.schedules, strict=True)
-        )
+        snapshots = (s for s in self._snapshots.values() if character in (None, s.block.character))
+        return ",".join(map(self._text, snapshots))
 
     def _schedules(self) -> Callable[[str], Schedule | None]:
         """Return a function from the id of a block to its present schedule."""
-        newest = {playing.block.id: playing.schedule for playing in self._cast.all()}
+        newest = {block.block.id: block.schedule for block in self._store.all()}
 
-        return lambda id: newest[id] if id in newest else self._cast.schedule_of(id)
+        return lambda id: newest[id] if id in newest else self._store.schedule_of(id)
 
-    def _text(self, seen: Snapshot) -> str:
-        if seen.text is None:
-            seen.text = _json(self._chart(seen).to_json())
-        return seen.text
+    def _text(self, snapshot: Snapshot) -> str:
+        if snapshot.text is None:
+            snapshot.text = _json(self._chart(snapshot).to_json())
+        return snapshot.text
 
-    def _chart(self, seen: Snapshot) -> BlockChart:
-        return chart_of(seen.playing, self._cast.schedule_of)
+    def _chart(self, snapshot: Snapshot) -> BlockChart:
+        return chart_of(snapshot.block, self._store.schedule_of)
+
+
+def _has_moved(snapshot: Snapshot, schedules: Callable[[str], Schedule | None]) -> bool:
+    """Whether a block or one that it refers to has a new schedule."""
+    now = [snapshot.block.schedule, *map(schedules, snapshot.others)]
+    return list(map(id, now)) != list(map(id, snapshot.schedules))
 
 
 def schedule_message(time: float, blocks: str, character: str | None, *, whole: bool) -> str:

@@ -24,11 +24,11 @@ class VideoStream:
         self._draws = 0
 
     def subscription(
-        self, timeline: FrameTimeline, index: int, look: RenderOptions, now: float
+        self, timeline: FrameTimeline, index: int, options: RenderOptions, now: float
     ) -> VideoSubscription:
         """Return a subscription to a view of one character from `now` on."""
         first = first_frame_at(now, timeline.fps)
-        view = VideoView(timeline, index, self._faces.name(index), look, first)
+        view = VideoView(timeline, index, self._faces.name(index), options, first)
         return VideoSubscription(self._views.setdefault(view.key, view), first, index)
 
     def face_changed(self, index: int) -> None:
@@ -72,20 +72,18 @@ class VideoStream:
             return [], []
         view.busy = None
         effects: list[Effect] = []
-        lookers = []
+        viewers = []
         for connection in connections:
-            for subscription in connection.subscriptions.values():
-                if not isinstance(subscription, VideoSubscription) or subscription.view is not view:
+            for s in connection.subscriptions.values():
+                if not isinstance(s, VideoSubscription) or s.view is not view:
                     continue
-                lookers.append(connection)
-                if picture is None or view.drawing < subscription.next:
+                viewers.append(connection)
+                if picture is None or view.drawing < s.next:
                     continue
-                connection.dropped += view.drawing - subscription.next
-                subscription.next = view.drawing + 1
-                if connection.is_slow:
-                    connection.dropped += 1
-                    continue
-                time = view.drawing / view.timeline.fps
-                data = pack("video", view.drawing, time, picture, character=subscription.index)
-                effects.append(Send(connection.id, data))
-        return effects, lookers
+                connection.dropped += view.drawing - s.next + connection.is_slow
+                s.next = view.drawing + 1
+                if not connection.is_slow:
+                    time = view.drawing / view.timeline.fps
+                    data = pack("video", view.drawing, time, picture, character=s.index)
+                    effects.append(Send(connection.id, data))
+        return effects, viewers
