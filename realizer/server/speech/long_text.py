@@ -40,11 +40,11 @@ class LongText:
 
     def __init__(self, request: SpeechRequest) -> None:
         self.ready_until = 0.0
-        self._say = request
+        self._request = request
         # An iterator, because splitting a long text takes a while too.
         self._parts = _parts(request.ssml)
-        self._coming = next(self._parts, None)
-        self._asked: str | None = None
+        self._next = next(self._parts, None)
+        self._current = ""  # the part that `next` returned last
         self._characters = 0  # of the finished parts
         self._joined: list[tuple[float, Utterance]] = []
         self._words: list[Word] = []
@@ -56,16 +56,17 @@ class LongText:
 
     def next(self) -> SpeechRequest | None:
         """Return the request of the next part; None after the last."""
-        if self._coming is None:
+        if self._next is None:
             return None
-        self._asked, self._coming = self._coming, next(self._parts, None)
-        names = {name for name, _ in _marks(self._asked)}
-        return replace(self._say, ssml=self._asked, marks=tuple(m for m in self._say.marks if m in names))
+        self._current, self._next = self._next, next(self._parts, None)
+        names = {name for name, _ in _marks(self._current)}
+        marks = tuple(mark for mark in self._request.marks if mark in names)
+        return replace(self._request, ssml=self._current, marks=marks)
 
     @property
     def is_complete(self) -> bool:
         """Whether `next` has returned the last part."""
-        return self._coming is None
+        return self._next is None
 
     def add_part(self, part: Utterance, soonest: float = 0.0) -> Utterance:
         """Append the synthesized part that `next` returned last.
@@ -77,11 +78,10 @@ class LongText:
         Returns:
             The whole utterance; its end and the marks of missing parts are estimated.
         """
-        assert self._asked is not None
-        if self._coming is not None and not is_sentence(self._asked):
+        if self._next is not None and not is_sentence(self._current):
             part = trim_final_pause(part)
         start = max(self.ready_until, soonest) if self._joined else 0.0
-        self._sound(part, start)
+        self._append_sound(part, start)
         if self._rate:
             # Parts begin at whole samples.
             start = round(start * self._rate) / self._rate
@@ -90,13 +90,13 @@ class LongText:
         self._phonemes += [replace(p, start=p.start + start, end=p.end + start) for p in part.phonemes]
         self._marks |= {name: time + start for name, time in part.marks.items()}
         self.ready_until = start + part.duration
-        self._characters += len(TAG.sub("", self._asked))
-        guessed, left = self._estimate()
+        self._characters += len(TAG.sub("", self._current))
+        missing_marks, missing_duration = self._estimate()
         return Utterance(
-            duration=self.ready_until + left,
+            duration=self.ready_until + missing_duration,
             words=tuple(self._words),
             phonemes=tuple(self._phonemes),
-            marks={**guessed, **self._marks},
+            marks={**missing_marks, **self._marks},
             sample_rate=self._rate,
             pcm=self._room[: self._length] if self._rate else None,
             warnings=tuple(dict.fromkeys(text for _, one in self._joined for text in one.warnings)),
@@ -104,7 +104,7 @@ class LongText:
             sections=tuple(self._joined),
         )
 
-    def _sound(self, part: Utterance, start: float) -> None:
+    def _append_sound(self, part: Utterance, start: float) -> None:
         """Append the sound of a part, after silence if it comes late."""
         if part.pcm is None or not part.sample_rate:
             return
@@ -125,25 +125,21 @@ class LongText:
         """Return the marks and the duration of the missing parts."""
         spoken = sum(part.duration for _, part in self._joined)
         pace = (spoken + WEIGHT / PACE) / (self._characters + WEIGHT)  # s a character
-        if self._coming is None:
+        if self._next is None:
             return {}, 0.0
-        text, there = self._say.ssml, self._characters
-        marks = {
-            name: self.ready_until + (before - there) * pace
-            for name, before in _marks(text)
-            if before >= there
-        }
-        return marks, max(0, len(TAG.sub("", text)) - there) * pace
+        text, done = self._request.ssml, self._characters
+        marks = {name: self.ready_until + (at - done) * pace for name, at in _marks(text) if at >= done}
+        return marks, max(0, len(TAG.sub("", text)) - done) * pace
 
 
 def _parts(text: str) -> Iterator[str]:
     """Yield the first clause, then parts of several clauses."""
-    part, wanted = "", 1
+    part, length = "", 1
     for piece in _pieces(text):
         part += piece
-        if len(part) >= wanted:
+        if len(part) >= length:
             yield part
-            part, wanted = "", PART
+            part, length = "", PART
     if part:
         yield part
 
@@ -153,16 +149,12 @@ def _pieces(text: str) -> Iterator[str]:
     clauses = SentenceSplitter()
     for at in range(0, len(text), CHUNK):
         for piece in clauses.feed(text[at : at + CHUNK], close=at + CHUNK >= len(text)):
-            around = ELEMENT.fullmatch(piece) if len(piece) > PART else None
-            if around is None or around[2] not in MANNERS or around[2] in _names(around[3]):
+            element = ELEMENT.fullmatch(piece) if len(piece) > PART else None
+            nested = {tag[2] for tag in TAG.finditer(element[3])} if element else set()
+            if element is None or element[2] not in MANNERS - nested:
                 yield piece
-                continue
-            for inside in _parts(around[3]):
-                yield f"{around[1]}{inside}{around[4]}"
-
-
-def _names(text: str) -> set[str]:
-    return {tag[2] for tag in TAG.finditer(text)}
+            else:
+                yield from (f"{element[1]}{part}{element[4]}" for part in _parts(element[3]))
 
 
 def _marks(text: str) -> Iterator[tuple[str, int]]:
@@ -171,8 +163,8 @@ def _marks(text: str) -> Iterator[tuple[str, int]]:
     for tag in TAG.finditer(text):
         length += tag.start() - last
         last = tag.end()
-        if named := NAMED.match(tag[0]):
-            yield unescape(named[1] if named[1] is not None else named[2], QUOTES), length
+        if mark := NAMED.match(tag[0]):
+            yield unescape(mark[1] if mark[1] is not None else mark[2], QUOTES), length
 
 
 def trim_final_pause(part: Utterance) -> Utterance:

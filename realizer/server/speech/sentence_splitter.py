@@ -49,14 +49,14 @@ class SentenceSplitter:
 
 def is_sentence(piece: str) -> bool:
     """Whether a piece ends like a sentence."""
-    said = TAG.sub("", piece).rstrip()
-    return bool(_ending().search(said)) and not _abbreviated(said)
+    text = TAG.sub("", piece).rstrip()
+    return bool(_ending().search(text)) and not _abbreviated(text)
 
 
 def _end(text: str, *, first: bool, closed: bool) -> int | None:
     """Return the length of the first piece of a text; None while it is incomplete."""
-    facts = _facts()
-    limit = facts["first"] if first else facts["longest"]
+    rules = _rules()
+    limit = rules["first"] if first else rules["longest"]
     at = depth = length = 0
     blank: int | None = None  # behind the last white space outside of elements
     ended = False  # whether a sentence ends here
@@ -85,7 +85,7 @@ def _end(text: str, *, first: bool, closed: bool) -> int | None:
                     continue
                 if not follows and kind == "sentence" and end < len(text):
                     break  # a tag follows directly: decide behind it
-                if not (follows.isspace() or sign[0][-1] in facts["alone"] + facts["wide"]):
+                if not (follows.isspace() or sign[0][-1] in rules["alone"] + rules["wide"]):
                     continue
                 if kind == "sentence" or length + stop >= limit:
                     return at + stop
@@ -94,7 +94,7 @@ def _end(text: str, *, first: bool, closed: bool) -> int | None:
             ended = bool(_ending().search(run)) and not _abbreviated(text[:end])
             if (paragraph := re.search(r"\n\s*\n", run)) and text[: at + paragraph.start()].strip():
                 return at + paragraph.end()
-            if blank is not None and length + len(run) > facts["most"]:
+            if blank is not None and length + len(run) > rules["most"]:
                 return blank
         length += len(run)
         at = end
@@ -103,29 +103,27 @@ def _end(text: str, *, first: bool, closed: bool) -> int | None:
 
 def _abbreviated(text: str) -> bool:
     """Whether the full stop at the end belongs to an abbreviation, an initial or a list number."""
-    found = re.search(r"([^\W_][\w.]*)\.$", text)
-    if found is None:
+    match = re.search(r"([^\W_][\w.]*)\.$", text)
+    if match is None:
         return False
-    word = found[1].lower()
-    alone = not TAG.sub("", text[: found.start()]).strip()
-    return (
-        word in _facts()["abbreviations"] or (len(word) == 1 and word.isalpha()) or (alone and word.isdigit())
-    )
+    word = match[1].lower()
+    if word.isdigit():
+        return not TAG.sub("", text[: match.start()]).strip()
+    return word in _rules()["abbreviations"] or (len(word) == 1 and word.isalpha())
 
 
 @cache
 def _signs() -> re.Pattern[str]:
-    facts = _facts()
-    signs, marks, closing = (re.escape(facts[name]) for name in ("signs", "marks", "closing"))
+    signs, marks, closing = (re.escape(_rules()[name]) for name in ("signs", "marks", "closing"))
     return re.compile(f"(?P<sentence>[{signs}]+[{closing}]*)|(?P<clause>[{marks}][{closing}]*)")
 
 
 @cache
 def _ending() -> re.Pattern[str]:
-    facts = _facts()
-    return re.compile(f"[{re.escape(facts['signs'])}][{re.escape(facts['closing'])}]*$")
+    signs, closing = (re.escape(_rules()[name]) for name in ("signs", "closing"))
+    return re.compile(f"[{signs}][{closing}]*$")
 
 
 @cache
-def _facts() -> dict[str, Any]:
+def _rules() -> dict[str, Any]:
     return tables.read_toml(tables.text_of("clauses.toml"), "clauses.toml")

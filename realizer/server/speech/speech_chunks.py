@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from xml.sax.saxutils import escape, quoteattr, unescape
@@ -48,9 +48,9 @@ class Chunk:
 
     def document(self, inside: str) -> str:
         """Return the XML of the block with its content."""
-        declared = "".join(f" xmlns:{prefix}={quoteattr(name)}" for prefix, name in PREFIXES.items())
-        who = "" if self.character is None else f" characterId={quoteattr(self.character)}"
-        return f'<bml xmlns="{CORE}"{declared} id="{self.block}"{who}>{inside}</bml>'
+        namespaces = "".join(f" xmlns:{prefix}={quoteattr(name)}" for prefix, name in PREFIXES.items())
+        character = "" if self.character is None else f" characterId={quoteattr(self.character)}"
+        return f'<bml xmlns="{CORE}"{namespaces} id="{self.block}"{character}>{inside}</bml>'
 
 
 def text_block(text: str, chunk: Chunk) -> Block:
@@ -61,15 +61,15 @@ def text_block(text: str, chunk: Chunk) -> Block:
     in earlier chunks. Text that is no XML or has invalid syncs is spoken without its tags. An incomplete tag
     at the end is removed.
     """
-    work = _Text(chunk)
-    work.read(sanitized(text))
-    found = list(read(chunk.document(work.inside()), VOCABULARY))
-    block = found[0] if len(found) == 1 and isinstance(found[0], Block) else None
-    if block is not None and (not work.spoken or any(node.id == chunk.speech for node in block.behaviours)):
+    parser = _Text(chunk)
+    parser.read(sanitized(text))
+    items = list(read(chunk.document(parser.content()), VOCABULARY))
+    block = items[0] if len(items) == 1 and isinstance(items[0], Block) else None
+    if block is not None and (not parser.spoken or any(node.id == chunk.speech for node in block.behaviours)):
         return block
     plain = _Text(chunk)
     plain.say(TAG.sub(" ", sanitized(text)))
-    (spoken,) = read(chunk.document(plain.inside()), VOCABULARY)
+    (spoken,) = read(chunk.document(plain.content()), VOCABULARY)
     assert isinstance(spoken, Block)
     if block is None:
         return spoken
@@ -81,8 +81,8 @@ def text_block(text: str, chunk: Chunk) -> Block:
 def clip_block(clip: str, chunk: Chunk) -> Block:
     """Return the block that plays a clip as speech."""
     sound = f"<bmlt:audiofile fileName={quoteattr('clip:' + clip)}/>"
-    said = f'<description priority="1" type="audio/x-clip">{sound}</description>'
-    (block,) = read(chunk.document(f'<speech id="{chunk.speech}">{said}</speech>'), VOCABULARY)
+    description = f'<description priority="1" type="audio/x-clip">{sound}</description>'
+    (block,) = read(chunk.document(f'<speech id="{chunk.speech}">{description}</speech>'), VOCABULARY)
     assert isinstance(block, Block)
     return block
 
@@ -108,60 +108,61 @@ class _Text:
             if tag[1]:
                 self._markup(tag, name)
             elif name in _behaviours() or name in BESIDE:
-                at = tag.end() if tag[4] else _closed(text, tag)
+                at = tag.end() if tag[4] else _element_end(text, tag)
                 self._behave(tag, text[tag.end() : at], name)
             elif name in SYNCS:
                 values = dict(ATTRIBUTE.findall(tag[3]))
-                named = next((values[key] for key in ("id", "name", "mark") if key in values), None)
-                if named is not None:
-                    self._mark(unescape(named[1:-1], QUOTES), _written(values, {"ref"}))
+                name = next((values[key] for key in ("id", "name", "mark") if key in values), "")
+                if name:
+                    ref = f" ref={values['ref']}" if "ref" in values else ""
+                    self._mark(unescape(name[1:-1], QUOTES), ref)
             else:
                 self._markup(tag, name)
         rest = text[at:]
-        if (broken := BROKEN.search(rest)) and _known(broken[1]):
+        if (broken := BROKEN.search(rest)) and broken[1] in {*SPOKEN, *EMPTY, *BESIDE, *_behaviours()}:
             rest = rest[: broken.start()]
         self.say(rest)
 
     def say(self, text: str) -> None:
         """Add plain text, in which & and < need not be escaped."""
         self.spoken |= any(map(str.isalnum, text))
-        written = escape(unescape(text, QUOTES))
-        self.core.append(written)
-        self.ssml.append(written)
+        escaped = escape(unescape(text, QUOTES))
+        self.core.append(escaped)
+        self.ssml.append(escaped)
 
-    def inside(self) -> str:
+    def content(self) -> str:
         """Return the content of the block."""
         if not self.spoken and not self.marked:
             return "".join(self.behaviours)
         language = self.chunk.language
-        spoken_in = "" if language is None else f" xml:lang={quoteattr(language)}"
-        said = f"<text{spoken_in}>{''.join(self.core)}</text>"
+        lang = "" if language is None else f" xml:lang={quoteattr(language)}"
+        speech = f"<text{lang}>{''.join(self.core)}</text>"
         ssml = "".join(self.ssml)
         if re.search(r"<(?!mark\b)", ssml):
-            speak = f'<speak xmlns=""{spoken_in}>{ssml}</speak>'
-            said += f'<description priority="1" type="application/ssml+xml">{speak}</description>'
-        return f'<speech id="{self.chunk.speech}">{said}</speech>' + "".join(self.behaviours)
+            speak = f'<speak xmlns=""{lang}>{ssml}</speak>'
+            speech += f'<description priority="1" type="application/ssml+xml">{speak}</description>'
+        return f'<speech id="{self.chunk.speech}">{speech}</speech>' + "".join(self.behaviours)
 
-    def _mark(self, name: str, more: str = "") -> None:
+    def _mark(self, name: str, attributes: str = "") -> None:
         self.marked = True
-        self.core.append(f"<sync id={quoteattr(name)}{more}/>")
+        self.core.append(f"<sync id={quoteattr(name)}{attributes}/>")
         self.ssml.append(f"<mark name={quoteattr(name)}/>")
 
     def _markup(self, tag: re.Match[str], name: str) -> None:
         """Add an SSML tag without its prefix; unknown tags are left out."""
-        if name in SPOKEN or name in EMPTY:
+        if name in {*SPOKEN, *EMPTY}:
             self.ssml.append(f"<{tag[1]}{name}{tag[3]}{tag[4]}>")
 
     def _behave(self, tag: re.Match[str], inner: str, name: str) -> None:
-        values = {key: self._referring(value) for key, value in ATTRIBUTE.findall(tag[3])}
+        values = {key: self._resolve(value) for key, value in ATTRIBUTE.findall(tag[3])}
         if name not in BESIDE:
             values.setdefault("id", f'"b{len(self.behaviours) + 1}"')
             if not values.keys() & _behaviours()[name]:
-                values["start"] = f'"{self._here()}"'
+                values["start"] = f'"{self._reference_here()}"'
         head = f"<{tag[2]}" + "".join(f" {key}={value}" for key, value in values.items())
-        self.behaviours.append(f"{head}{tag[4]}>{self._referring(inner)}")
+        self.behaviours.append(f"{head}{tag[4]}>{self._resolve(inner)}")
 
-    def _here(self) -> str:
+    def _reference_here(self) -> str:
         """Return a reference to this place in the text."""
         if not self.spoken:
             return "0"
@@ -169,22 +170,18 @@ class _Text:
         self._mark(name)
         return f"{self.chunk.speech}:{name}"
 
-    def _referring(self, value: str) -> str:
+    def _resolve(self, value: str) -> str:
         """Add the block to references to syncs of earlier chunks."""
         speech = re.escape(self.chunk.speech)
 
-        def place(found: re.Match[str]) -> str:
-            block = self.chunk.marks.get(found[1])
-            return found[0] if block is None else f"{block}:{found[0]}"
+        def with_block(match: re.Match[str]) -> str:
+            block = self.chunk.marks.get(match[1])
+            return match[0] if block is None else f"{block}:{match[0]}"
 
-        return re.sub(rf"(?<![\w:.-]){speech}:([\w.-]+)", place, value)
-
-
-def _written(values: Mapping[str, str], names: Iterable[str]) -> str:
-    return "".join(f" {key}={values[key]}" for key in names if key in values)
+        return re.sub(rf"(?<![\w:.-]){speech}:([\w.-]+)", with_block, value)
 
 
-def _closed(text: str, tag: re.Match[str]) -> int:
+def _element_end(text: str, tag: re.Match[str]) -> int:
     """Return the position behind an element's end tag; the end of the text if there is none."""
     depth = 1
     for other in TAG.finditer(text, tag.end()):
@@ -199,7 +196,3 @@ def _closed(text: str, tag: re.Match[str]) -> int:
 def _behaviours() -> Mapping[str, frozenset[str]]:
     """Return the sync points of behaviours, by the elements' names."""
     return {tag.rpartition("}")[2]: frozenset(node.sync_points) for tag, node in VOCABULARY.items()}
-
-
-def _known(name: str) -> bool:
-    return name in SPOKEN or name in EMPTY or name in BESIDE or name in _behaviours()
