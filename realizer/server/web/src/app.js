@@ -34,7 +34,7 @@ const wheel = new Wheel(at("wheel"), pose, (message) => log.error(message));
 const alive = new Set(); // ids of blocks that were accepted and have not ended
 let plays = 0;
 let face = null;
-let faces = []; // names of those that the service has
+let faces = []; // names of the service's faces
 let faults = [];
 
 // the connection ------------------------------------------------------------------------------
@@ -128,12 +128,12 @@ async function showFace(message) {
   }
 }
 
-// A button for each face there is: the character gets it, and whoever looks is told.
+// A button for each face: it sets the character's face for all viewers.
 function showFaces({ face }) {
   choose(at("faces"), faces, face, (name) => link.ask({ type: "character", face: name }));
 }
 
-// A button for each light there is; the one that is pressed is told by its table.
+// A button for each light; the colours of the pressed one come from its table.
 function showLights() {
   const { lights, light } = stage.look;
   const own = Object.keys(lights).find((name) => JSON.stringify(lights[name]) === JSON.stringify(light));
@@ -212,7 +212,7 @@ addEventListener("keydown", (event) => {
   event.stopPropagation();
 }, true);
 
-// The example that stands in the editor as it came.
+// Load the example into the editor unchanged.
 function mark() {
   for (const card of at("gallery").children) card.ariaPressed = String(card.value === editor.text);
 }
@@ -310,7 +310,7 @@ async function vocabulary() {
   showVoices(known.voices);
   const unit = new Map(known.aus.map(({ au, name }) => [String(au), name]));
   const param = new Map(known.faps.map((row) => [row.name, row]));
-  // A track is full where a FAP moves by half of its unit; eyes and head by half of what they can.
+  // A track is full at half a unit of a FAP; for eyes and head at half of their range.
   const reach = (name) => (param.get(name)?.unit === "angle_unit" ? 50_000 : 512);
   timeline.kinds = {
     au: new Tracks(() => 1, (number) => `${number} ${unit.get(number) ?? ""}`, (name) => name.replace(/[LR]$/, "")),
@@ -329,5 +329,5 @@ for (const [what, load] of Object.entries({ examples, vocabulary })) load().catc
 link.connect();
 requestAnimationFrame(draw);
 
-// For whoever tests the page: what has been shown.
+// For tests of the page: what has been shown.
 globalThis.realizerPage = { stage, sound, link, clock, editor, timeline, pose, recorder };

@@ -1,12 +1,12 @@
-// Texts in, their faults out, as `realizer check` finds them: one question at a time, over a WebSocket of its own.
+// Checks texts as `realizer check` does: one request at a time, over its own WebSocket.
 
 export class Checker {
   constructor() {
     this.socket = null;
-    this.waiting = []; // {resolve, reject}, in the order they were asked
+    this.waiting = []; // {resolve, reject}, in the order of requests
   }
 
-  // The faults of a text; rejects where the service cannot be asked.
+  // Return the faults of a text; reject if the service cannot be reached.
   async ask(text) {
     const socket = await this.open();
     return new Promise((resolve, reject) => {

@@ -1,4 +1,4 @@
-// What may stand at the cursor of a BML document: elements, attributes, words, ids and their sync points.
+// Completions at the cursor of a BML document: elements, attributes, words, ids and their sync points.
 
 const STROKES = /^(start|ready|strokeStart|stroke(:\d+)?|strokeEnd|attackPeak|relax|end)$/;
 const TAG = /<([\w.-]+:)?([\w.-]+)((?:\s+[\w:.-]+\s*=\s*(?:"[^"]*"|'[^']*'))*)\s*(\/?)>|<\/[\w:.-]+\s*>|<!--[\s\S]*?-->/g;
@@ -24,7 +24,7 @@ export function completer(vocabulary) {
   };
 }
 
-// Whether the tag, as far as it is typed, ends inside a quoted value.
+// Whether the incomplete tag ends inside a quoted value.
 function insideValue(tag) {
   let quote = null;
   for (const c of tag) {
@@ -59,7 +59,7 @@ function opening(text, before, open, elements) {
       type: "type",
       detail: element.syncs.length ? "behaviour" : "",
       info: element.about || undefined,
-      boost: 50 - k, // as the vocabulary has them: the standard's first
+      boost: 50 - k, // in the order of the vocabulary: the standard's first
       apply: (view, option, from, to) => {
         const insert = `${option.label}${parent === undefined ? "" : " "}`;
         const changes = [{ from, to, insert }];
@@ -77,7 +77,7 @@ function opening(text, before, open, elements) {
   return { from: open + 1, options, validFor: /^[\w:.-]*$/ };
 }
 
-// The prefix that a document has for an element's namespace; core extensions are read without one too.
+// The document's prefix for an element's namespace; core extensions are read without one too.
 function prefixIn(text, { namespace }) {
   const escaped = namespace.replace(/[.*+?^${}()|[\]\\/]/g, "\\$&");
   return text.match(new RegExp(`xmlns:([\\w.-]+)\\s*=\\s*["']${escaped}["']`))?.[1];
@@ -113,7 +113,7 @@ function values(text, open, element, attribute, typed, pos, vocabulary) {
   return null;
 }
 
-// "id:sync" of every behaviour of the document but the one that begins at `open`.
+// "id:sync" of every behaviour of the document except the one that begins at `open`.
 function syncPoints(text, open, vocabulary) {
   const elements = new Map(vocabulary.elements.map((element) => [element.name, element]));
   const found = [];

@@ -1,8 +1,8 @@
-// Elements of the page: found by id, or made.
+// Elements of the page, found by id or created.
 
 export const at = (id) => document.getElementById(id);
 
-// make("li.point", { title: "..." }, "text", child): attributes as properties where there is one.
+// make("li.point", { title: "..." }, "text", child): attributes become properties if they exist.
 export function make(what, properties = {}, ...children) {
   const [tag, ...classes] = what.split(".");
   const element = document.createElement(tag);
@@ -15,7 +15,7 @@ export function make(what, properties = {}, ...children) {
   return element;
 }
 
-// Buttons of which one is pressed.
+// A group of buttons of which one is pressed.
 export function choose(place, names, pressed, take, title = (name) => name[0].toUpperCase() + name.slice(1)) {
   const buttons = names.map((name) => {
     const button = make("button", { type: "button", textContent: title(name), ariaPressed: String(name === pressed) });
@@ -29,7 +29,7 @@ export function choose(place, names, pressed, take, title = (name) => name[0].to
   place.hidden = buttons.length < 2;
 }
 
-// A tab strip as WAI-ARIA has it: one tab stop, arrow keys between tabs.
+// A tab strip after WAI-ARIA: one tab stop, arrow keys between tabs.
 export function tabs(strip, shown) {
   const all = [...strip.querySelectorAll('[role="tab"]')];
   const show = (tab) => {

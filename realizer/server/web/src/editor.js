@@ -10,7 +10,7 @@ import { drawSelection, EditorView, highlightActiveLine, highlightActiveLineGutt
 import { tags } from "@lezer/highlight";
 import { completer } from "./complete.js";
 
-const PAUSE = 300; // ms after the last key before the service is asked
+const PAUSE = 300; // ms between the last key and a check
 
 const colours = HighlightStyle.define([
   { tag: tags.tagName, color: "var(--code-tag)" },
@@ -22,7 +22,7 @@ const colours = HighlightStyle.define([
 ]);
 
 export class Editor {
-  // changed(faults): after each check; null where the service could not be asked.
+  // changed(faults): after each check; null if the service could not be reached.
   constructor(parent, checker, changed) {
     this.completion = new Compartment();
     const lint = async (view) => {
@@ -33,7 +33,7 @@ export class Editor {
       }
       try {
         const faults = await checker.ask(text);
-        // What was typed since then is asked about next.
+        // Check again what was typed in the meantime.
         if (view.state.sliceDoc() === text) changed(faults);
         return faults.flatMap((fault) => diagnostics(view.state.doc, fault));
       } catch {
@@ -73,7 +73,7 @@ export class Editor {
     forceLinting(this.view);
   }
 
-  // Put the cursor on a fault's place.
+  // Put the cursor on the place of a fault.
   show(fault) {
     const [first] = diagnostics(this.view.state.doc, fault);
     if (!first) return;
@@ -82,13 +82,13 @@ export class Editor {
   }
 }
 
-// A mark for each place; those that only help to understand it are hints.
+// A mark for each place of a fault; places that only explain it are hints.
 function diagnostics(doc, fault) {
   const serious = fault.type === "ADVICE" ? "warning" : "error";
   const spots = fault.spots.length ? fault.spots : [{ line: 1, column: 1, length: 1, text: "", primary: true }];
   return spots.map((spot) => {
     const line = doc.line(Math.min(Math.max(1, spot.line), doc.lines));
-    // Columns count characters, CodeMirror counts UTF-16 units.
+    // Our columns count characters, CodeMirror's count UTF-16 units.
     const characters = [...line.text];
     const from = line.from + characters.slice(0, spot.column - 1).join("").length;
     const to = from + characters.slice(spot.column - 1, spot.column - 1 + Math.max(1, spot.length)).join("").length;

@@ -1,9 +1,9 @@
-// What the stills add to a face: furrows where its skin is pushed together, and the lights on its eyes.
+// Details of the rendered stills: furrows where skin is pushed together, and highlights on the eyes.
 import { BufferAttribute, BufferGeometry, Mesh, MeshBasicMaterial, Vector3 } from "three";
 
 const smooth = (x) => x * x * (3 - 2 * x);
 
-// Strips on the skin, drawn by the head's own material: `tone` darkens what the light made of it.
+// Strips on the skin, drawn with the head's own material: `tone` darkens its lit colour.
 export class Furrows {
   constructor(table, head, material) {
     this.table = table;
@@ -24,7 +24,7 @@ export class Furrows {
     this.mesh.visible = false;
   }
 
-  // Each point's share of its three vertices' values.
+  // The weight of each point for the values of its three vertices.
   mix(from, to) {
     const read = ["getX", "getY", "getZ"];
     this.table.points.forEach(([a, b, c, u, v], i) => {
@@ -55,7 +55,7 @@ export class Furrows {
   }
 }
 
-// A white cap on each eye, towards the key light and whoever looks; the eye turns under it, lids hide it.
+// A white cap on each eye, towards the key light and the camera; the eye turns below it, lids hide it.
 export class Glints {
   constructor({ corners, eyes }) {
     this.corners = corners;

@@ -1,4 +1,4 @@
-// The light of the stills as a shader: the same terms as realizer/render/light.py, a fragment at a time.
+// The light of the rendered stills as a shader: the same terms as realizer/render/light.py, per fragment.
 import { Vector3 } from "three";
 
 export function lightUniforms(look, shade) {
@@ -12,7 +12,7 @@ export function lightUniforms(look, shade) {
   return uniforms;
 }
 
-// The backdrop of the stills, as realizer/render/backdrop.py draws it: its smooth step in five stops.
+// The backdrop of the rendered stills, as in realizer/render/backdrop.py: its smooth step in five stops.
 export const REACH = [0.675, 0.75]; // of width and height, from the middle to the edge's colour
 export const MIDDLE = [0.5, 0.444];
 
@@ -74,7 +74,7 @@ void main() {
   vec3 light = lamp(n, key_direction, key_colour, key_wrap) + lamp(n, fill_direction, fill_colour, fill_wrap) + edge;
   vec3 colour = exposure * (v_albedo * (light * reach + ambient) + shine * reach);
   vec3 shoulder = 1.0 - (1.0 - knee) * exp(-(colour - knee) / (1.0 - knee));
-  // A furrow takes away part of the picture's brightness, the ridge beside it (tone below 0) adds some.
+  // A furrow reduces the picture's brightness, the ridge beside it (tone below 0) increases it.
   vec3 furrow = 1.0 - max(v_tone, 0.0) * furrow_shade + max(-v_tone, 0.0);
   gl_FragColor = vec4(min(srgb(mix(colour, shoulder, step(knee, colour))) * furrow, 1.0), 1.0);
 }`;

@@ -1,4 +1,4 @@
-// The feedback log: one line a message, newest at the bottom, each once; what is not wanted is hidden.
+// The feedback log: one line per message, the newest at the bottom; filtered lines are hidden.
 import { make } from "./dom.js";
 
 const MOST = 600; // lines

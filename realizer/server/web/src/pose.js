@@ -1,4 +1,4 @@
-// What the tools hold on the face: an emotion, action units, FAPs. Changes go out once a drawn frame.
+// The values that the tools hold on the face: an emotion, action units, FAPs. Changes are sent once per drawn frame.
 
 export class Pose extends EventTarget {
   constructor(send) {
@@ -14,7 +14,7 @@ export class Pose extends EventTarget {
     return !this.emotion && !this.aus.size && !this.faps.size;
   }
 
-  // Hold values, or (null) let go of them: {emotion, aus: {name: value}, faps: {name: value}}.
+  // Hold values, or release them with null: {emotion, aus: {name: value}, faps: {name: value}}.
   set({ emotion, aus = {}, faps = {} }) {
     for (const [kept, given] of [[this.aus, aus], [this.faps, faps]]) {
       for (const [name, value] of Object.entries(given)) value === null ? kept.delete(name) : kept.set(name, value);
@@ -36,12 +36,12 @@ export class Pose extends EventTarget {
     this.set({ emotion: null, aus: none(this.aus), faps: none(this.faps) });
   }
 
-  // All of it as one message, for a session that does not know it.
+  // All values as one message, for a new session.
   get message() {
     return { type: "set", emotion: this.emotion, aus: Object.fromEntries(this.aus), faps: Object.fromEntries(this.faps) };
   }
 
-  // As a FAP file, made by the service; rejects with its words.
+  // All values as a FAP file, made by the service; reject with its error text.
   async file(face) {
     const query = new URLSearchParams({ set: JSON.stringify(this.message), ...(face ? { face } : {}) });
     const answer = await fetch(`pose.fap?${query}`);

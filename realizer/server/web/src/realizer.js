@@ -1,5 +1,5 @@
 /**
- * A BML realizer in a web page: BML out; feedback, frames and sound in. One file, nothing else is needed.
+ * A client of the BML realizer for web pages: it sends BML and receives feedback, frames and sound.
  *
  *   import { Realizer, Clock, Sound } from "http://127.0.0.1:8765/realizer.js";
  *
@@ -13,10 +13,10 @@
  *
  *   const clock = new Clock();
  *   const sound = new Sound(clock);
- *   button.onclick = () => sound.start(); // browsers want a gesture
+ *   button.onclick = () => sound.start(); // browsers require a gesture
  *   await realizer.subscribe("audio", { rate: sound.rate }, (p) => sound.packet(p.time, p.values(), p.forget));
  *   realizer.subscribe("arkit", {}, (frame) => clock.heard(frame.time, performance.now() / 1000));
- *   // what is to be seen now: sound.playhead() ?? clock.playhead(performance.now() / 1000), in session time
+ *   // the session time to show now: sound.playhead() ?? clock.playhead(performance.now() / 1000)
  *
  * What the messages are: asyncapi.json beside this file.
  */
@@ -43,7 +43,7 @@ const COMMENT = /<!--[^]*?-->|<\?[^]*?\?>/g;
 const nothing = () => {};
 const keyOf = ({ stream, character, view }) => JSON.stringify([stream, character ?? "", view ?? ""]);
 
-/** Why the service did not follow; `code` and `where` as its message `error` has them. */
+/** Why the service refused a message; `code` and `where` are those of the message `error`. */
 export class RealizerError extends Error {
   constructor(message, code = "connection", where = null) {
     super(message);
@@ -54,15 +54,15 @@ export class RealizerError extends Error {
 }
 
 /**
- * One connection, which comes back by itself, with the feedback it missed and the streams it had.
+ * A connection that is restored automatically, with the feedback it missed and its streams.
  *
- * Told by handlers, as a WebSocket's:
- *   onopen()                    connected, at first and again
- *   onlost()                    the connection is gone; another one is tried
+ * Handlers, as of a WebSocket:
+ *   onopen()                    connected or reconnected
+ *   onlost()                    disconnected; a new connection is tried
  *   onfeedback(element, seq)    BML feedback, as an XML element
  *   onreply(message)            every JSON message that is not a frame: welcome, subscribed, state, error, ...
- *   onframe(frame)              every frame of every stream, see `frameOf`; its `told` is what `subscribed`, or
- *                               `changed` since, told of its stream: of a mesh the face, scale and offset
+ *   onframe(frame)              every frame of every stream, see `frameOf`; its `told` has the fields of the last
+ *                               `subscribed` or `changed` of its stream, such as face, scale and offset of a mesh
  */
 export class Realizer {
   onopen = nothing;
@@ -72,20 +72,20 @@ export class Realizer {
   onframe = nothing;
   /** seq of the newest feedback; null before the first. */
   seen = null;
-  /** The WebSocket of now. */
+  /** The current WebSocket. */
   socket = null;
   #tries = 0;
   #closed = false;
-  #asked = []; // { message, resolve, reject } of questions without an answer yet
-  #streams = new Map(); // stream, character and view -> { message, take, told: what its frames mean }
-  #unsent = []; // what is to be played when the connection is there
+  #asked = []; // { message, resolve, reject } of requests without an answer
+  #streams = new Map(); // stream, character and view -> { message, take, told: fields of `subscribed` }
+  #unsent = []; // documents to send once the connection is open
   #awaited = new Map(); // block id -> [{ planned, resolve, reject }]
 
   /**
    * @param {object} [options]
-   * @param {string} [options.url] of the service's WebSocket; that which serves this file
-   * @param {string} [options.token] what the service asks for, where it does
-   * @param {string} [options.session] which to join or make; one of its own that outlives a lost connection
+   * @param {string} [options.url] of the service's WebSocket; default: the service of this file
+   * @param {string} [options.token] the access token, if the service requires one
+   * @param {string} [options.session] name of the session to join or create; default: a new, random name
    */
   constructor({ url, session, token } = {}) {
     this.url = new URL(url ?? new URL("ws", import.meta.url));
@@ -94,12 +94,12 @@ export class Realizer {
     this.session = session ?? `page-${crypto.getRandomValues(new Uint32Array(2)).join("-")}`;
   }
 
-  /** Whether messages can be sent now. */
+  /** Whether the connection is open. */
   get open() {
     return this.socket?.readyState === WebSocket.OPEN;
   }
 
-  /** Connect, and stay so until `close`. What is asked before the connection is there is sent then. */
+  /** Connect, and reconnect until `close`. Requests made before the connection is open are sent then. */
   connect() {
     this.#closed = false;
     const url = new URL(this.url);
@@ -122,7 +122,7 @@ export class Realizer {
     };
   }
 
-  /** End the connection; whoever still waits for something is told. */
+  /** Close the connection; pending promises are rejected. */
   close() {
     this.#closed = true;
     this.socket?.close();
@@ -133,15 +133,15 @@ export class Realizer {
     this.#awaited.clear();
   }
 
-  /** Send BML, one or more documents. It is lost where the connection is not open. */
+  /** Send BML, one or more documents. It is lost if the connection is not open. */
   send(text) {
     if (this.open) this.socket.send(text);
   }
 
   /**
    * Send a control message, such as { type: "state" }.
-   * @returns {Promise<object|null>} the answer; null at once for messages that have none. Rejects with a
-   *   RealizerError where the service answers with one; it may be left alone: `onreply` gets it too.
+   * @returns {Promise<object|null>} the answer; null immediately for messages without one. Rejects with a
+   *   RealizerError if the answer is an error; this need not be handled, as `onreply` gets it too.
    */
   ask(message) {
     this.#post(message);
@@ -152,11 +152,11 @@ export class Realizer {
   }
 
   /**
-   * Get a stream: fap, au, arkit, mesh, audio, video, schedule or feedback. It comes back with the connection.
+   * Subscribe to fap, au, arkit, mesh, audio, video, schedule or feedback, also after a reconnect.
    * @param {string} stream
-   * @param {object} [options] encoding, fps, character, ... as the message `subscribe` has them
-   * @param {function} [take] called with every frame of it
-   * @returns {Promise<object>} `subscribed`: what its values mean
+   * @param {object} [options] encoding, fps, character, ... of the message `subscribe`
+   * @param {function} [take] called with every frame
+   * @returns {Promise<object>} the message `subscribed`, which describes the values
    */
   subscribe(stream, options = {}, take = nothing) {
     const message = { type: "subscribe", stream, ...options };
@@ -169,19 +169,19 @@ export class Realizer {
     return answer;
   }
 
-  /** End a stream; `view` is that of a video that was given one. */
+  /** End a stream; `view` is the name of a video's view. */
   unsubscribe(stream, character, view) {
     this.#streams.delete(keyOf({ stream, character, view }));
     this.#post({ type: "unsubscribe", stream, character, view });
   }
 
   /**
-   * Send BML, as soon as the connection is there, and wait for the end of its last block.
-   * @returns {Promise<Element>} the feedback that told it; rejects where the block is refused
+   * Send BML as soon as the connection is open, and wait for the end of its last block.
+   * @returns {Promise<Element>} the feedback of the end; rejects if the block is refused
    */
   play(text) {
     const bare = text.replace(COMMENT, "");
-    // The service answers every text but one in which there is nothing.
+    // The service answers every text except an empty one.
     if (!bare.trim()) return Promise.reject(new RealizerError("wanted <bml>, got nothing", "refused"));
     const ids = [...bare.matchAll(BLOCK)];
     const end = this.ended(ids.length ? ids.at(-1)[1] : "<no id>");
@@ -208,7 +208,7 @@ export class Realizer {
     if (!data.startsWith("{")) return this.#feedback(data);
     const message = JSON.parse(data);
     if (message.type === "schedule" || Array.isArray(message.values)) return this.#frame(jsonFrameOf(message));
-    // Another life of the session: its numbers start again.
+    // A new session of the same name: its numbers start again.
     if (message.type === "gap") this.seen = null;
     if (message.type === "subscribed" || message.type === "changed") {
       const stream = this.#streams.get(keyOf(message));
@@ -220,7 +220,7 @@ export class Realizer {
 
   #frame(frame) {
     for (const { message, take, told } of this.#streams.values()) {
-      // JSON names the character as the subscription did, binary frames say its index.
+      // JSON frames name the character like the subscription, binary frames have its index.
       const own = frame.kind === undefined ? message.character : told.index;
       if (message.stream !== frame.stream || own !== frame.character) continue;
       frame.told = told;
@@ -253,7 +253,7 @@ export class Realizer {
     } else if (element.localName === "blockProgress" && id.endsWith(":end")) {
       this.#settle(id.slice(0, -4), (one) => one.resolve(element));
     } else if (element.localName === "warningFeedback" && this.#awaited.get(id)?.some((one) => !one.planned)) {
-      // A warning on the block itself refuses it, unless its prediction is already out.
+      // A warning about the block itself refuses it, unless its prediction was already sent.
       this.#settle(id, (one) => one.reject(new RealizerError(element.textContent, "refused", id)));
     }
     this.onfeedback(element, seq);
@@ -266,10 +266,10 @@ export class Realizer {
 }
 
 /**
- * A binary message taken apart.
- * @returns {object} stream, kind, character (its index, as `subscribed` told), frame (its number), time (seconds
- *   on the session clock), forget (of sound: all from this time on is void), values(): a typed array; of a
- *   picture its file's bytes
+ * Decode a binary message.
+ * @returns {object} stream, kind, character (its index in `subscribed`), frame (its number), time (seconds
+ *   on the session clock), forget (sound: discard everything from this time on), values(): a typed array;
+ *   for a picture the bytes of its file
  */
 export function frameOf(buffer) {
   const view = new DataView(buffer);
@@ -291,23 +291,23 @@ function jsonFrameOf(message) {
   return { stream: message.type, ...message, forget: false, values: () => message.values ?? [] };
 }
 
-/** How much older what is shown is than what has come, in seconds: room for packets that are late. */
+/** Delay of what is shown behind the newest data, in seconds, so that late packets are not missed. */
 export const DELAY = 0.1;
 const MEMORY = 5; // s
 
-/** The session's clock as seen from here: the frame that came soonest after its time tells the offset. */
+/** An estimate of the session clock: the frame with the least delay determines the offset. */
 export class Clock {
   constructor() {
     this.reset();
   }
 
-  /** Forget all, as after a new connection. */
+  /** Start again, as after a new connection. */
   reset() {
     this.offsets = [];
     this.offset = null;
   }
 
-  /** A frame of session time `time` came at `here` (both in seconds, here on any clock of yours). */
+  /** Note that a frame of session time `time` arrived at `here`, both in seconds, on any local clock. */
   heard(time, here) {
     const offset = here - time;
     while (this.offsets.length && this.offsets[0].here < here - MEMORY) this.offsets.shift();
@@ -316,7 +316,7 @@ export class Clock {
     this.offset = this.offsets[0].offset;
   }
 
-  /** The session time that should be seen and heard at `here`; null before the first frame. */
+  /** The session time to show and play at `here`; null before the first frame. */
   playhead(here) {
     return this.offset === null ? null : here - this.offset - DELAY;
   }
@@ -324,9 +324,9 @@ export class Clock {
 
 const DRIFT = 0.02; // s; the anchor moves only in silence, and only by more than this
 
-/** 20 ms packets to gapless sound. While it runs, the audio clock is the master of what is shown. */
+/** Plays 20 ms packets without gaps. While it runs, the audio clock determines what is shown. */
 export class Sound {
-  /** Samples a second, to ask for in `subscribe`. */
+  /** Samples a second, for `subscribe`. */
   rate = 22050;
   /** Whether it was started and not muted. */
   on = false;
@@ -338,9 +338,9 @@ export class Sound {
     this.playing = new Map(); // source -> session time
   }
 
-  /** Browsers allow sound only after a gesture: call it from one. */
+  /** Start sound. Browsers allow it only after a gesture: call it from one. */
   start() {
-    // A context at the packets' own rate: each packet resampled by itself would click at its ends.
+    // A context at the packets' own rate: resampling each packet separately would click at its ends.
     this.context ??= new AudioContext({ sampleRate: this.rate, latencyHint: "interactive" });
     this.context.resume();
     this.on = true;
@@ -353,25 +353,25 @@ export class Sound {
     this.context?.suspend();
   }
 
-  /** Forget all, as after a new connection. */
+  /** Start again, as after a new connection. */
   reset() {
     this.forget(-Infinity);
     this.anchor = null;
   }
 
-  /** Whether it can be heard now. */
+  /** Whether sound can be heard now. */
   get running() {
     return this.on && this.context?.state === "running";
   }
 
-  /** A packet of the stream `audio`. */
+  /** Play a packet of the stream `audio`. */
   packet(time, samples, forget) {
     if (forget) this.forget(time);
     if (!this.running || !samples.length) return;
     this.align();
     if (this.anchor === null) return;
     const start = this.anchor + time;
-    if (start < this.context.currentTime) return; // too late to be heard
+    if (start < this.context.currentTime) return; // too late to play
     const buffer = this.context.createBuffer(1, samples.length, this.rate);
     const channel = buffer.getChannelData(0);
     for (let i = 0; i < samples.length; i++) channel[i] = samples[i] / 32768;
@@ -382,7 +382,7 @@ export class Sound {
     this.playing.set(source, time);
   }
 
-  /** Take back what would sound from a session time on. */
+  /** Cancel the sound from a session time on. */
   forget(time) {
     for (const [source, start] of this.playing) {
       if (start < time) continue;
@@ -391,7 +391,7 @@ export class Sound {
     }
   }
 
-  /** The session time that is heard now; null where sound is off: then the Clock counts. */
+  /** The session time that is audible now; null if sound is off: then use the Clock. */
   playhead() {
     if (!this.running) return null;
     this.align();
@@ -403,7 +403,7 @@ export class Sound {
     if (target === null || this.playing.size) return;
     const anchor = this.context.currentTime - target;
     if (this.anchor !== null && Math.abs(anchor - this.anchor) < DRIFT) return;
-    // On the sample grid, so that packets join without a seam.
+    // On the sample grid, so that packets join without a click.
     this.anchor = Math.round(anchor * this.rate) / this.rate;
   }
 }

@@ -1,4 +1,4 @@
-// What is seen and heard into a film: the face over its backdrop, and the sound, by the browser's own recorder.
+// Records the face over its backdrop and the sound to a film, with the browser's own recorder.
 
 const TYPES = ["video/mp4;codecs=avc1.42E01E,mp4a.40.2", "video/webm;codecs=vp9,opus", "video/webm;codecs=vp8,opus", "video/webm"];
 const RATE = 30; // frames a second
@@ -15,14 +15,14 @@ export class Recorder {
     return this.recorder !== null;
   }
 
-  // Sides are even, as encoders want them.
+  // Sides are even, as encoders require.
   start() {
     const { canvas } = this.stage;
     Object.assign(this.canvas, { width: canvas.width & ~1, height: canvas.height & ~1 });
     const stream = this.canvas.captureStream(RATE);
     if (this.sound.context) {
       this.heard = this.sound.context.createMediaStreamDestination();
-      // A film begins with its first sound: silence is one.
+      // A film begins with its first sound, and silence counts as sound.
       this.silence = new ConstantSourceNode(this.sound.context, { offset: 0 });
       this.silence.connect(this.heard);
       this.silence.start();
@@ -36,7 +36,7 @@ export class Recorder {
     this.began = performance.now();
   }
 
-  // The film, and the end of its name.
+  // Return the film and its suffix.
   async stop() {
     const { recorder } = this;
     const stopped = new Promise((done) => (recorder.onstop = done));
@@ -53,14 +53,14 @@ export class Recorder {
     return (performance.now() - this.began) / 1000;
   }
 
-  // Right after the stage has drawn: later its picture is gone.
+  // Call it right after the stage has drawn; later the picture is gone.
   draw() {
     const { pen, canvas, stage } = this;
     stage.paintBackdrop(pen, canvas.width, canvas.height);
     pen.drawImage(stage.canvas, 0, 0, canvas.width, canvas.height);
   }
 
-  // A sound packet also goes into the film, when it is heard.
+  // Add a sound packet to the film, at its time.
   packet(time, samples) {
     const { context, anchor, rate } = this.sound;
     if (!this.heard || anchor === null || !samples.length || anchor + time < context.currentTime) return;

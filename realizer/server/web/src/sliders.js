@@ -1,10 +1,10 @@
-// Sliders for every action unit, a side each, and for every FAP; they show what the pose holds.
+// Sliders for every action unit and side, and for every FAP; they show the values that the pose holds.
 import { make } from "./dom.js";
 
-const NEAR = 1024; // FAPU: what a slider reaches; the number beside it takes all that the table allows
-const ANGLES = 100_000; // 1e-5 rad: as far as eyes and head turn
+const NEAR = 1024; // FAPU: range of a slider; the number beside it accepts the whole range of the table
+const ANGLES = 100_000; // 1e-5 rad: range of eyes and head
 
-// Rows under headings, and a field that finds them.
+// Rows under headings, and a search field.
 class Sliders {
   constructor(panel, search, pose) {
     Object.assign(this, { panel, pose, rows: [] });
@@ -45,7 +45,7 @@ function slider(label, low, high, step, changed) {
   return input;
 }
 
-// A slider shows how far it is from its neutral place.
+// A slider that shows its distance from neutral.
 function show(input, value) {
   if (Number(input.value) !== value) input.value = value;
   const [low, high] = [Number(input.min), Number(input.max)];
@@ -65,7 +65,7 @@ export class ActionUnits extends Sliders {
     return make("legend.sides", {}, make("span", {}, name), make("span.side", {}, "right"), make("span.side", {}, "left"));
   }
 
-  // Both sides move together until they are parted.
+  // Both sides move together until the user separates them.
   row({ au, name, sides }) {
     const { pose } = this;
     const names = sides ? [`${au}R`, `${au}L`] : [String(au)];

@@ -1,10 +1,10 @@
-// The face in WebGL: rest mesh from the GLB, vertices from the stream, the light of the stills.
+// The face in WebGL: rest mesh from the GLB, vertices from the stream, light of the rendered stills.
 import { BufferAttribute, BufferGeometry, DoubleSide, Mesh, PerspectiveCamera, Scene, ShaderMaterial, Spherical, Vector3, WebGLRenderer } from "three";
 import { readGlb } from "./glb.js";
 import { Furrows, Glints } from "./figure.js";
 import { backdrop, fragment, lightUniforms, MIDDLE, REACH, stops, vertex } from "./light.js";
 
-const KEPT = 20; // s of frames, to look back at
+const KEPT = 20; // s of frames, for looking back
 // The width of the head over the height of the front camera's picture: narrower pictures step back.
 const HEAD = 0.66;
 const RANGE = { yaw: 1.6, pitch: 0.7 }; // rad
@@ -12,27 +12,27 @@ const RANGE = { yaw: 1.6, pitch: 0.7 }; // rad
 export class Stage {
   constructor(canvas) {
     this.canvas = canvas;
-    // Where a processor draws (no GPU), smoothing costs more than all the rest.
+    // Without a GPU, smoothing costs more than everything else.
     this.renderer = new WebGLRenderer({ canvas, antialias: !drawnInSoftware(), alpha: true });
     this.scene = new Scene();
     this.camera = new PerspectiveCamera(12, 1, 0.1, 10);
     this.material = new ShaderMaterial({ vertexShader: vertex, fragmentShader: fragment, side: DoubleSide });
     this.frames = [];
     this.shownFrames = 0;
-    this.light = null; // a preset's name; null is the service's own
+    this.light = null; // name of a preset; null: the service's default
     this.want = { yaw: 0, pitch: 0, zoom: 1 };
     this.view = { yaw: 0, pitch: 0, zoom: 1 };
     this.turn();
   }
 
-  // Show a face by name; stream positions are int16 x scale + offset.
+  // Show a face by name; positions in the stream are int16 x scale + offset.
   async load(name, scale, offset) {
     const path = encodeURIComponent((this.awaited = name));
     const [look, glb] = await Promise.all([
       fetch(`look.json?face=${path}`).then((answer) => checked(answer).json()),
       fetch(`faces/${path}`).then((answer) => checked(answer).arrayBuffer()),
     ]);
-    if (this.awaited !== name) return; // another one has been asked for meanwhile
+    if (this.awaited !== name) return; // another face was requested in the meantime
     const { attributes, indices } = readGlb(glb);
     const geometry = new BufferGeometry();
     const put = (as, { array, size, normalized }) => geometry.setAttribute(as, new BufferAttribute(array, size, normalized));
@@ -53,12 +53,12 @@ export class Stage {
     this.shine(this.light);
   }
 
-  // Light the face as a preset says, and put that one's backdrop behind it.
+  // Light the face by a preset, and draw its backdrop.
   shine(name) {
     this.light = name;
     if (!this.look) return;
     this.lit = this.look.lights[name] ?? this.look.light;
-    // In place: three.js keeps the objects that a program began with.
+    // In place: three.js keeps the objects of a program's first use.
     for (const [uniform, { value }] of Object.entries(lightUniforms(this.lit, this.look.furrows.shade))) {
       this.material.uniforms[uniform] ??= {};
       this.material.uniforms[uniform].value = value;
@@ -66,7 +66,7 @@ export class Stage {
     this.canvas.parentElement.style.background = this.look.background ?? backdrop(this.lit);
   }
 
-  // The same on a canvas of its own, for a film.
+  // Draw the backdrop on another canvas, for a film.
   paintBackdrop(pen, width, height) {
     pen.fillStyle = this.look?.background ?? "#000";
     if (this.lit && !this.look.background) {
@@ -83,7 +83,7 @@ export class Stage {
     this.frames = [];
   }
 
-  // Vertices of the face of that name.
+  // Add vertices of the face of that name.
   add(time, values, face) {
     const late = this.frames.at(-1);
     if (late && time <= late.time) return;
@@ -91,7 +91,7 @@ export class Stage {
     while (this.frames[0].time < time - KEPT) this.frames.shift();
   }
 
-  // The session time of the first frame that is remembered.
+  // The session time of the oldest frame in memory.
   get oldest() {
     return this.frames[0]?.time ?? Infinity;
   }
@@ -107,14 +107,14 @@ export class Stage {
     this.renderer.render(this.scene, this.camera);
   }
 
-  // Vertices at `playhead`, between the two frames around it.
+  // Vertices at `playhead`, interpolated between two frames.
   pose(playhead) {
     if (!this.frames.length) return;
     const first = Math.max(0, this.frames.findLastIndex(({ time }) => time <= playhead));
     const a = this.frames[first];
     const b = this.frames[first + 1] ?? a;
     const position = this.mesh.geometry.attributes.position;
-    if (a.face !== this.name) return; // which is still being loaded
+    if (a.face !== this.name) return; // the face is still being loaded
     const t = b.time > a.time ? Math.min(1, Math.max(0, (playhead - a.time) / (b.time - a.time))) : 0;
     if (this.shown === a.values && this.shownAt === t) return;
     this.shown = a.values;
@@ -155,7 +155,7 @@ export class Stage {
     camera.updateProjectionMatrix();
   }
 
-  // Orbit by drag, wheel and keys.
+  // Orbit by dragging, wheel and keys.
   turn() {
     const { canvas, want } = this;
     const limit = () => {

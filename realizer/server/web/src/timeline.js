@@ -1,17 +1,17 @@
-// What plays over time: each behaviour as it was scheduled and as it happened, curves of AUs or FAPs, the playhead.
+// The timeline: each behaviour as scheduled and as it happened, curves of AUs or FAPs, the playhead.
 import { at, make } from "./dom.js";
 
-const IDLE = 8; // s shown where no block is
+const IDLE = 8; // s shown without a block
 const AFTER = 0.6; // s shown after a block's end
 const LEAST = 2; // s
-const CURVES = 0.25; // s between looks at which curves move most
-const BLOCKS = 12; // that are remembered
+const CURVES = 0.25; // s between choices of the curves that move most
+const BLOCKS = 12; // in memory
 const OVER = /DONE|INTERRUPTED|FAILED|REVOKED/;
 const STEP = 0.1; // s of an arrow key
-const POINTS = 10; // px between lines of the ruler, at least times its words
+const POINTS = 10; // px between lines of the ruler, at least, times the length of its labels
 
 export class Timeline {
-  // scrubbed(time): where the past is looked at; null is now. oldest(): how far back that goes.
+  // scrubbed(time): a past time is shown; null is now. oldest(): the oldest time that can be shown.
   constructor(panel, scrubbed, oldest) {
     Object.assign(this, { panel, scrubbed, oldest, blocks: new Map(), current: null, kinds: {}, shownKind: null, scrub: null, now: null });
     this.ruler = make("div.ruler", { ariaHidden: "true" });
@@ -35,7 +35,7 @@ export class Timeline {
     this.look(null);
   }
 
-  // What is known of a block; its id may be used again when it has ended.
+  // The record of a block; its id may be used again after its end.
   block(id, again) {
     const known = this.blocks.get(id);
     if (known && !(again && known.over)) return known;
@@ -46,7 +46,7 @@ export class Timeline {
     return block;
   }
 
-  // A message of the stream `schedule`: blocks whole, or only their state.
+  // Take a message of the stream `schedule`: whole blocks, or only their states.
   plan({ blocks }) {
     for (const one of blocks) {
       const block = this.block(one.block, Boolean(one.behaviours) && !OVER.test(one.state));
@@ -59,7 +59,7 @@ export class Timeline {
     }
   }
 
-  // Feedback: what happened, and when.
+  // Take feedback: what happened, and when.
   feedback(element) {
     const time = Number(element.getAttribute("globalTime"));
     const [id, behaviour, ...sync] = (element.getAttribute("id") ?? "").split(":");
@@ -74,7 +74,7 @@ export class Timeline {
     }
   }
 
-  // Which curves are shown: "au" or "fap".
+  // Choose the curves: "au" or "fap".
   show(kind) {
     this.shownKind = kind;
     this.looked = -Infinity;
@@ -93,7 +93,7 @@ export class Timeline {
     this.now = now;
     let current = null;
     for (const block of this.blocks.values()) if (block.lines.length && block.start !== null && block.start <= now && (!current || block.start >= current.start)) current = block;
-    // A block that is over stays to be looked at, for as long as its face is remembered.
+    // A block that has ended stays visible as long as its frames are in memory.
     if (current && (current.ended ?? current.end ?? Infinity) < this.oldest()) current = null;
     if (current !== this.current) {
       this.current = current;
@@ -155,7 +155,7 @@ export class Timeline {
     this.rule(from, to);
   }
 
-  // What is not over yet grows.
+  // Running blocks grow.
   mark(from, to) {
     for (const fill of this.lines.querySelectorAll("[data-from]")) {
       const start = Number(fill.dataset.from);
@@ -171,7 +171,7 @@ export class Timeline {
     const step = [0.1, 0.2, 0.5, 1, 2, 5, 10, 30, 60, 300, 1200].find((s) => (to - from) / s <= room) ?? 3600;
     const marks = [];
     for (let k = Math.ceil((from - zero) / step); k * step <= to - zero; k++) {
-      if (!k && !this.current) continue; // the playhead says so itself
+      if (!k && !this.current) continue; // the playhead shows this time
       const mark = make("span", {}, `${Number((k * step).toFixed(1))} s`);
       mark.style.left = `${(100 * (k * step + zero - from)) / (to - from)}%`;
       marks.push(mark);
@@ -195,7 +195,7 @@ export class Timeline {
     event.preventDefault();
   }
 
-  // Look at the face as it was at a time; null, or later than now: at now.
+  // Show the face at a past time; null or a later time: now.
   look(time) {
     this.scrub = time === null || time >= this.now ? null : Math.max(time, this.oldest());
     this.looked = -Infinity;

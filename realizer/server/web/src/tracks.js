@@ -1,9 +1,9 @@
-// What a stream of frames said lately, and the columns of it that move most, drawn as curves.
+// The recent values of a stream of frames, and the columns that move most, drawn as curves.
 import { make } from "./dom.js";
 
 const KEPT = 32; // s
 const MOST = 6; // tracks
-const SOME = 0.05; // of a column's reach: what moves less is not shown
+const SOME = 0.05; // of a column's range: smaller movements are not shown
 
 export class Tracks {
   // reach(name): the value that fills a track.
@@ -32,7 +32,7 @@ export class Tracks {
     while (this.frames[0].time < time - KEPT) this.frames.shift();
   }
 
-  // Rows for what moves in a span of time, most first; kept where they are the same as before.
+  // Rows for the columns that move in a span of time, most first; unchanged rows are reused.
   rows(from, to) {
     const within = this.frames.filter(({ time }) => time >= from && time <= to);
     const moved = [...this.groups ?? []].map(([group, columns]) => {
@@ -55,7 +55,7 @@ export class Tracks {
     return this.made;
   }
 
-  // The curves from..to, and in figures what they are at a time.
+  // Draw the curves from..to, and their values at a time.
   draw({ columns, canvas, value }, from, to, time, colours) {
     const here = this.frame(time);
     const digits = this.reaches[columns[0]] > 1 ? 0 : 2;

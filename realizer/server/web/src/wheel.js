@@ -1,4 +1,4 @@
-// The wheel of emotions: a click is an angle and an activation, and the face shows what is there.
+// The wheel of emotions: a click chooses an angle and an activation, and the face shows that emotion.
 import { at, make } from "./dom.js";
 
 const RINGS = [1, 3, 5, 7]; // activations
@@ -21,7 +21,7 @@ const place = (angle, activation) => {
 };
 
 export class Wheel {
-  // told(message): where a place cannot be shown.
+  // told(message): a place that cannot be shown.
   constructor(panel, pose, told) {
     Object.assign(this, { panel, pose, told, place: null, asked: 0, mine: new Set() });
     at("profiles").onchange = () => this.profilesChanged();
@@ -95,7 +95,7 @@ export class Wheel {
     this.show();
   }
 
-  // Which profiles there are to choose from; ours mix by place alone.
+  // The profiles to choose from; ours are mixed by place only.
   profilesChanged() {
     const own = at("profiles").value === "own";
     const names = own ? [] : this.profiles[at("profiles").value];
@@ -121,7 +121,7 @@ export class Wheel {
     this.mark();
   }
 
-  // Ask what it moves, then hold that; only the newest question counts.
+  // Request the values of a place, then hold them; only the newest request counts.
   async shows(asked) {
     const profile = at("profiles").value;
     const number = ++this.asked;
@@ -134,7 +134,7 @@ export class Wheel {
     const told = parts.length ? parts.join(", ") : asked.name ?? "neutral";
     at("feels").textContent = `${told}${asked.activation === undefined ? "" : `, activation ${asked.activation.toFixed(1)}`}`;
     at("moves").replaceChildren(...Object.entries(merged(values)).map(([name, value]) => make("li", {}, make("b", {}, name), String(value))));
-    // Action units and FAPs that were set by hand stay as they are; those of the last profile go.
+    // Values set by hand stay; those of the last profile are released.
     const gone = Object.fromEntries([...this.mine].map((name) => [name, null]));
     this.mine = new Set(profile === "own" ? [] : Object.keys(values));
     this.setting = true;
@@ -143,7 +143,7 @@ export class Wheel {
     this.mark();
   }
 
-  // Somebody else's pose: the hand goes.
+  // Another client's pose: remove the hand.
   follow() {
     if (this.setting || !this.pose.empty) return;
     this.asked++;
@@ -168,7 +168,7 @@ export class Wheel {
   }
 }
 
-// "12L" and "12R" of one value are "AU 12"; FAPs are named.
+// "12L" and "12R" of one value become "AU 12"; FAPs have names.
 function merged(values) {
   const found = {};
   for (const [name, value] of Object.entries(values)) {
