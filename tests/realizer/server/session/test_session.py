@@ -512,12 +512,12 @@ def test_session_numbers_frames_and_feedback_in_any_order_of_events(actions) -> 
 def test_hand_over_closes_all_connections() -> None:
     class Taken(SqliteJournal):
         def add(self, session: str, entry: Entry) -> None:
-            raise TakenOver("another process has it")
+            raise TakenOver(session)
 
     driver = Driver(named=True)
     driver.session.journal = JournalWriter("test", Taken(":memory:"))
     driver.join(2)
-    assert driver.closed == [Close(k, 1012, "another process has it") for k in (1, 2)]
+    assert driver.closed == [Close(k, 1012, "session test is another process's now") for k in (1, 2)]
 
 
 def test_disconnect_ends_the_open_speech_of_the_client() -> None:
