@@ -50,7 +50,7 @@ def _end_of(
 def _tie(
     picture: Picture, marks: Picture, link: Link, here: tuple[float, float], there: tuple[float, float] | None
 ) -> None:
-    """A curve from the point that is referred to, with a dot, to the one that follows it, with an arrow."""
+    """Draw a curve with a dot at the point that is referred to and an arrow at the one that follows it."""
     if there is None:
         return
     begin, end = _edges(there, here)
@@ -123,14 +123,14 @@ def _pin(marks: Picture, x: float, top: float, link: Link) -> None:
 def _edges(
     first: tuple[float, float], last: tuple[float, float]
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """The ends of a line between two rows: at the edges of their bars that face each other."""
+    """Return the ends of a line between two rows: at the edges of their bars that face each other."""
     if first[1] < last[1]:
         return (first[0], first[1] + ABOVE + BAR + 3), (last[0], last[1] + ABOVE - 3)
     return (first[0], first[1] + ABOVE - 3), (last[0], last[1] + ABOVE + BAR + 3)
 
 
 def _curve(begin: tuple[float, float], end: tuple[float, float]) -> tuple[tuple[float, float], ...]:
-    """A curve that leaves and comes upright."""
+    """Return a curve that is upright at both ends."""
     (x0, y0), (x1, y1) = begin, end
     if abs(x0 - x1) < 0.5:
         return (begin, end)
@@ -146,7 +146,7 @@ def _curve(begin: tuple[float, float], end: tuple[float, float]) -> tuple[tuple[
 
 
 def _dashes(begin: tuple[float, float], end: tuple[float, float], colour: str, tip: str) -> list[Path]:
-    """A dashed line."""
+    """Return a dashed line."""
     (x0, y0), (x1, y1) = begin, end
     count = max(1, round(math.hypot(x1 - x0, y1 - y0) / 6))
     step = ((x1 - x0) / count, (y1 - y0) / count)

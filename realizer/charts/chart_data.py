@@ -15,7 +15,7 @@ from realizer.scheduling.timing import Schedule, Timing, Warning
 
 
 def charts_of(cast: BlockStore, schedules: Iterable[Schedule]) -> list[BlockChart]:
-    """The blocks of a player, one for each schedule that its `submit` gave."""
+    """Return the charts of a player's blocks, one for each schedule that `submit` returned."""
     playing = {id(p.first_schedule): p for p in cast.all()}
     out = []
     for schedule in schedules:
@@ -125,7 +125,7 @@ def _element(place: Place | None) -> str | None:
 
 
 def _cut(playing: ActiveBlock, id: str) -> Dropped:
-    """Return the behaviours that ended before they began."""
+    """Return a behaviour that was cut off before it began."""
     place, state = playing.block.places.get(id), playing.state.value
     when = "" if playing.stopped_at is None else f" at {playing.stopped_at:.3f} s"
     # A block that waited is without it by now.
@@ -140,7 +140,7 @@ def _cut(playing: ActiveBlock, id: str) -> Dropped:
 
 
 def _refused(schedule: Schedule) -> BlockChart:
-    """A block that failed."""
+    """Return the chart of a block that failed."""
     gone = tuple(Dropped(w.id, None, None, w.type, w.text) for w in schedule.warnings)
     return BlockChart(
         schedule.block,

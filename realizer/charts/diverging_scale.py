@@ -28,7 +28,7 @@ SCALE = (
 
 
 def colour_of(stretch: float) -> str:
-    """The colour of a gap that is `stretch` times its preferred length; 0 and inf have the ends' colours."""
+    """Return the colour of a gap that is `stretch` times its preferred length; 0 and inf are the ends."""
     place = -1.0 if stretch <= 0 else min(1.0, max(-1.0, math.log(stretch) / math.log(3.0)))
     for (low, first), (high, last) in itertools.pairwise(SCALE):
         if place <= high:
@@ -39,6 +39,6 @@ def colour_of(stretch: float) -> str:
 
 
 def on(colour: str) -> str:
-    """Ink that is readable on a colour."""
+    """Return ink that is readable on a colour."""
     red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
     return INK if 0.299 * red + 0.587 * green + 0.114 * blue > 128 else "#ffffff"

@@ -41,7 +41,7 @@ class Link:
 
     @property
     def binds(self) -> bool:
-        """Whether an order fixes the point where it is."""
+        """Whether an order keeps the point from moving."""
         return self.slack is not None and self.slack < BINDS
 
     @property
@@ -64,7 +64,7 @@ class Link:
 def links_of(
     block: Block, schedule: Schedule, outside: Callable[[SyncRef], float | None]
 ) -> dict[str, list[Link]]:
-    """Behaviour id -> its links.
+    """Return behaviour id -> its links.
 
     Args:
         outside: a reference into another block, its offset included -> seconds from this block's start.
@@ -139,7 +139,7 @@ class _Links:
         return (None if own else ref.block), ref.behaviour, _sync(ref)
 
     def _time(self, ref: SyncRef) -> float | None:
-        """Seconds from block start, the offset included."""
+        """Return the seconds from block start, the offset included."""
         if ref.block not in (None, self.block.id):
             return self.outside(ref)
         if ref.behaviour in (None, "bml"):

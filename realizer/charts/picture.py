@@ -40,7 +40,7 @@ QUIET = ("IN_PREP", "LURKING", "IN_EXEC", "DONE")  # states that a chart need no
 
 
 def timeline(blocks: Sequence[BlockChart]) -> Picture:
-    """The picture of blocks that share a clock."""
+    """Return the picture of blocks that share a clock."""
     scale = scale_of(blocks)
     names = ", ".join(block.block for block in blocks)
     picture = Picture(scale.width, title=f"Timeline of {names or 'nothing'}", paper=PAPER)
@@ -71,13 +71,13 @@ def _block(
     y = top + HEAD
     ground = len(picture.shapes)
     tied = _linked_points(block)
-    said = ""
+    current = ""
     for group, line in sorted(((_group(line), line) for line in block.rows), key=lambda row: _rank(row[0])):
-        if group != said:
-            if said:
+        if group != current:
+            if current:
                 picture.add(Path(((8, y), (scale.right, y)), GRID, 1.0))
             picture.add(Text(12, y + 22, group, 10, FAINT))
-            said = group
+            current = group
         places[block.block, line.id] = (line, start, y)
         draw_row(bars, scale, line, start, y, frozenset(tied.get(line.id, ())))
         y += HEIGHT
@@ -132,7 +132,7 @@ def _grid(scale: Scale, bottom: float) -> list[Shape]:
 
 
 def _linked_points(block: BlockChart) -> dict[str, set[str]]:
-    """Behaviour -> its points that take part in a link."""
+    """Return behaviour -> its points that take part in a link."""
     tied: dict[str, set[str]] = {}
     for line in block.rows:
         for link in line.links:

@@ -17,7 +17,7 @@ MOST = 64_000_000
 
 
 def png(picture: Picture) -> bytes:
-    """PNG bytes, twice the picture's size where that is not too large.
+    """Return PNG bytes, twice the picture's size unless that is too large.
 
     Raises:
         RealizerError: the picture is too large at its own size; as SVG it is not.

@@ -29,7 +29,7 @@ def draw_row(
     Args:
         start: of its block, seconds on the session clock.
         top: of the row, in pixels.
-        tied: its points that something is tied to, or that are tied: named before others.
+        tied: its points that take part in a link: named before others.
     """
     _name(picture, line.id, _about(line), top, INK, FAINT)
     bar = top + ABOVE
@@ -105,7 +105,7 @@ def _tip(line: BehaviourRow, gap: Gap) -> str:
 
 
 def _percent(picture: Picture, gap: Gap, left: float, right: float, bar: float) -> None:
-    """Return the text of a gap's length; if stretched, as a ratio to its preferred length."""
+    """Draw the length of a gap and, if it is stretched, the ratio to its preferred length."""
     ink = on(colour(gap))
     seconds = f"{gap.actual:.2f} s"
     stretched = gap.stretch is not None and not gap.rigid and abs(gap.stretch - 1) >= 0.005
@@ -117,7 +117,7 @@ def _percent(picture: Picture, gap: Gap, left: float, right: float, bar: float) 
 
 
 def _say(picture: Picture, scale: Scale, line: BehaviourRow, start: float, bar: float) -> None:
-    """The words, each at its time; where they do not fit, as a line from point to point."""
+    """Draw the words, each at its time, or as a line from point to point if they do not fit."""
     spans = [(scale.x(start + w.start), scale.x(start + w.end), w.text) for w in line.words]
     if all(width_of(text, 10.5) <= max(right - left, 12) + 3 for left, right, text in spans):
         for left, right, text in spans:
@@ -125,15 +125,15 @@ def _say(picture: Picture, scale: Scale, line: BehaviourRow, start: float, bar: 
         return
     for begin, end in zip(line.points[:-1], line.points[1:], strict=True):
         left, right = scale.x(start + begin.time), scale.x(start + end.time)
-        said = " ".join(w.text for w in line.words if begin.time - SAME <= w.start < end.time - SAME)
-        if text := cut(said, SMALL, right - left - 6):
+        spoken = " ".join(w.text for w in line.words if begin.time - SAME <= w.start < end.time - SAME)
+        if text := cut(spoken, SMALL, right - left - 6):
             picture.add(Text(left + 4, bar + 12.5, text, SMALL, INK))
 
 
 def _names(
     picture: Picture, names: Sequence[str], xs: Sequence[float], y: float, tied: frozenset[str], edge: float
 ) -> None:
-    """Names under their ticks, as many as fit: tied points first, then the ends, then the rest."""
+    """Draw names under their ticks, as many as fit: linked points first, then the ends, then the rest."""
     order = sorted(range(len(names)), key=lambda k: (names[k] not in tied, 0 < k < len(names) - 1, k))
     taken: list[tuple[float, float]] = []
     for k in order:

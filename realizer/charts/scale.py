@@ -42,7 +42,7 @@ class Scale:
         return min(max(self.left + (time - self.first) * self.second, self.left), self.right)
 
     def ticks(self) -> Iterator[tuple[float, str]]:
-        """Round times and their words."""
+        """Yield round times and their labels."""
         step = next(s for s in _steps() if s * self.second >= APART)
         digits = max(0, -math.floor(math.log10(step) + 1e-9))
         for number in range(math.ceil(self.first / step - 1e-9), math.floor(self.last / step + 1e-9) + 1):
@@ -59,13 +59,13 @@ def scale_of(blocks: Iterable[BlockChart]) -> Scale:
 
 
 def last_of(block: BlockChart) -> float:
-    """When a block ends, as if one that was not started began at 0."""
+    """Return when a block ends, as if a block that has not started began at 0."""
     ends = [line.points[-1].time for line in block.rows]
     return (block.start or 0.0) + max(ends, default=0.0)
 
 
 def _steps() -> Iterator[float]:
-    """0.01, 0.02, 0.05, 0.1, ..."""
+    """Yield 0.01, 0.02, 0.05, 0.1, ..."""
     power = -2
     while True:
         yield from (base * 10.0**power for base in (1, 2, 5))

@@ -74,7 +74,7 @@ class Picture:
 
 
 def hatch(x: float, y: float, width: float, height: float, colour: str, step: float = 5.0) -> list[Path]:
-    """Lines that rise to the right, inside of a rectangle."""
+    """Return lines that rise to the right, inside of a rectangle."""
     lines = []
     at = x - height + step / 2
     while at < x + width:
@@ -89,7 +89,7 @@ def hatch(x: float, y: float, width: float, height: float, colour: str, step: fl
 
 @cache
 def font(size: float, plain: bool = True) -> FreeTypeFont | ImageFont:
-    """The font that text is drawn and measured with: Pillow's own, which is the same everywhere.
+    """Return the font that text is drawn and measured with: Pillow's own, the same everywhere.
 
     Args:
         plain: the text is ASCII. Pillow's font has little else; for the rest one of the machine is taken,
@@ -117,7 +117,7 @@ def width_of(text: str, size: float) -> float:
 
 
 def cut(text: str, size: float, room: float) -> str:
-    """As much of a text as fits, with dots where some is missing; "" where not even one letter does."""
+    """Return as much of a text as fits, with dots if some is missing; "" if not even one letter fits."""
     if width_of(text, size) <= room:
         return text
     low, high = 0, len(text)
@@ -131,7 +131,7 @@ def cut(text: str, size: float, room: float) -> str:
 
 
 def cut_inside(text: str, size: float, room: float) -> str:
-    """As `cut`, but the end stays: of names that is where they differ."""
+    """Return as much of a text as fits like `cut`, but with its end: names differ there."""
     if width_of(text, size) <= room:
         return text
     kept = text[-5:]
@@ -139,7 +139,7 @@ def cut_inside(text: str, size: float, room: float) -> str:
 
 
 def fold(text: str, size: float, room: float, most: int) -> Sequence[str]:
-    """A text in lines of at most `room` pixels, broken at blanks; the last of `most` lines is cut."""
+    """Return a text in lines of at most `room` pixels, broken at blanks; the last of `most` is cut."""
     words = text.split()
     lines: list[str] = []
     while words and len(lines) < most - 1:

@@ -27,41 +27,42 @@ def _shape(shape: Shape) -> str:
     match shape:
         case Box():
             name = "rect"
-            given = f'x="{_number(shape.x)}" y="{_number(shape.y)}"'
-            given += f' width="{_number(shape.width)}" height="{_number(shape.height)}"'
-            given += f' fill="{shape.fill or "none"}"'
+            attributes = f'x="{_number(shape.x)}" y="{_number(shape.y)}"'
+            attributes += f' width="{_number(shape.width)}" height="{_number(shape.height)}"'
+            attributes += f' fill="{shape.fill or "none"}"'
             if shape.stroke:
-                given += f' stroke="{shape.stroke}"'
+                attributes += f' stroke="{shape.stroke}"'
             if shape.radius:
-                given += f' rx="{_number(shape.radius)}"'
+                attributes += f' rx="{_number(shape.radius)}"'
         case Path():
             points = " ".join(f"{_number(x)},{_number(y)}" for x, y in shape.points)
             name = "polygon" if shape.fill else "polyline"
-            given = f'points="{points}" fill="{shape.fill or "none"}"'
+            attributes = f'points="{points}" fill="{shape.fill or "none"}"'
             if shape.colour:
-                given += f' stroke="{shape.colour}" stroke-width="{_number(shape.width)}"'
+                attributes += f' stroke="{shape.colour}" stroke-width="{_number(shape.width)}"'
         case Text():
             return _text(shape)
     if shape.tip:
-        return f"<{name} {given}><title>{escape(_printable(shape.tip))}</title></{name}>"
-    return f"<{name} {given}/>"
+        return f"<{name} {attributes}><title>{escape(_printable(shape.tip))}</title></{name}>"
+    return f"<{name} {attributes}/>"
 
 
 def _text(text: Text) -> str:
-    given = f'x="{_number(text.x)}" y="{_number(text.y)}" font-size="{_number(text.size)}"'
-    given += f' fill="{text.colour}"'
+    attributes = f'x="{_number(text.x)}" y="{_number(text.y)}" font-size="{_number(text.size)}"'
+    attributes += f' fill="{text.colour}"'
     if text.anchor != "start":
-        given += f' text-anchor="{text.anchor}"'
+        attributes += f' text-anchor="{text.anchor}"'
     if text.halo:
-        given += f' stroke="{text.halo}" stroke-width="3" stroke-linejoin="round" paint-order="stroke"'
+        attributes += f' stroke="{text.halo}" stroke-width="3" stroke-linejoin="round" paint-order="stroke"'
     # Only where the width was measured and not estimated.
     if text.text.isascii() and len(text.text) > 1:
-        given += f' textLength="{_number(width_of(text.text, text.size))}" lengthAdjust="spacingAndGlyphs"'
-    return f"<text {given}>{escape(_printable(text.text))}</text>"
+        attributes += f' textLength="{_number(width_of(text.text, text.size))}"'
+        attributes += ' lengthAdjust="spacingAndGlyphs"'
+    return f"<text {attributes}>{escape(_printable(text.text))}</text>"
 
 
 def _printable(text: str) -> str:
-    """Without the characters that XML cannot hold."""
+    """Return text without the characters that XML cannot hold."""
     return "".join(c if c >= " " and not "\ud800" <= c <= "\udfff" and c < "\ufffe" else " " for c in text)
 
 

@@ -36,8 +36,8 @@ class Gap(NamedTuple):
     """A gap between two neighbouring sync points, in seconds.
 
     Attributes:
-        preferred, least, most, stiffness: as of the Timing; None in what was cut off, `most` also where there
-            is none. A rigid gap is exactly its preferred length, and has no stiffness.
+        preferred, least, most, stiffness: as in the Timing; None after an interruption, `most` also if there
+            is no maximum. A rigid gap has exactly its preferred length and no stiffness.
     """
 
     begin: str
@@ -155,7 +155,7 @@ class BlockChart:
         return sum(gap.cost for line in self.rows for gap in line.gaps)
 
     def head(self) -> dict[str, Any]:
-        """Return the behaviour and its state as plain data."""
+        """Return the block's name and state as plain data."""
         return {
             "block": self.block,
             "character": self.character,

@@ -44,7 +44,7 @@ def basis_from(
     parts: Mapping[str, tuple[int, int]],
     fapu: Fapu,
 ) -> dict[str, Any]:
-    """The displacement basis.
+    """Read the displacement basis.
 
     Returns:
         moving: (first, last + 1), the vertices that any FAP but the head's moves.
@@ -105,7 +105,7 @@ def basis_from(
 
 
 def pack(rows: Mapping[int, Any], threshold: float = 2e-3) -> dict[str, Any]:
-    """The stored form of fields: row number -> (n, 3) becomes row, start, vertex, move.
+    """Return the stored form of fields: row number -> (n, 3) becomes row, start, vertex, move.
 
     Movements below the threshold (relative to the feature point's) are left out, because they are invisible.
     """

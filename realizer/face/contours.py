@@ -34,7 +34,7 @@ class Contours:
 
 
 def contours_of(points: Mapping[str, Float32], fapu: Fapu) -> Contours:
-    """The contours of a face: a lip gives way by a share of its own thickness."""
+    """Return the contours of a face: a lip gives way by a share of its own thickness."""
     table = faps()
     most = []
     for inner, outer in CONTOURS.items():
@@ -47,10 +47,10 @@ def contours_of(points: Mapping[str, Float32], fapu: Fapu) -> Contours:
 
 
 def couple_lips(contours: Contours, rows: Float32) -> Float32:
-    """The rows with what one contour drags of the other.
+    """Return the rows with the movement that one contour drags from the other.
 
-    A lip is one body: where one contour would leave the other by more than the lip gives way, the one that
-    smaller request follows. A request for one contour alone is reached exactly.
+    A lip is one body: where one contour would leave the other by more than the lip gives way, the contour
+    with the smaller request follows. A request for one contour alone is reached exactly.
 
     Args:
         rows: (n, 68) FAPU.

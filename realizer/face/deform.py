@@ -23,13 +23,13 @@ DRIVEN = [OPEN_JAW, TONGUE_ROLL, 47, 48, 49]
 
 
 def deform(face: Face, poses: Any) -> Float32:
-    """The face's vertices in poses.
+    """Return the face's vertices in poses.
 
     FAPs move every face. Where a face has a model of action units, its displacements are added to those of
     the FAPs; rigid parts turn, and lids slide over the eyeballs, in the same way for both.
 
     Args:
-        poses: (n, len(face.takes)): FAP values in FAPU, column = FAP - 1 (FAPs 1 and 2 are not looked at),
+        poses: (n, len(face.inputs)): FAP values in FAPU, column = FAP - 1 (FAPs 1 and 2 are not looked at),
             then intensities 0..1 of the model's inputs. `animation.pose` makes them. Or (n, 68)
             FAPs alone.
 
@@ -69,7 +69,7 @@ def deform(face: Face, poses: Any) -> Float32:
 
 
 def complete_poses(poses: Any, inputs: tuple[str, ...]) -> Float32:
-    """(n, len(takes)) float32, with nothing added to FAPs that come alone.
+    """Return poses (n, len(inputs)) float32, with zeros added to FAPs alone.
 
     Raises:
         ValueError: another shape.
@@ -111,7 +111,7 @@ def _weights(basis: Any, rows: Float32) -> Float32:
 
 
 def rotations(pitch: Float32, yaw: Float32, roll: Float32) -> Float32:
-    """(n, 3, 3) from radians: positive pitch looks down, yaw to the character's left, roll leans right."""
+    """Return rotations (n, 3, 3) of radians: pitch looks down, yaw to the character's left, roll right."""
     (a, b, c), (d, e, f) = np.cos([pitch, yaw, roll]), np.sin([pitch, yaw, roll])
     zero, one = np.zeros_like(a), np.ones_like(a)
 

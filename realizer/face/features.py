@@ -44,7 +44,7 @@ class Point:
 
 
 def read_features(path: Path) -> dict[str, Point]:
-    """The points of a features.csv by name.
+    """Read the points of a features.csv by name.
 
     Raises:
         FaceError: no such file, a bad row, or a point that is missing or there twice.
@@ -77,7 +77,7 @@ def write_features(path: Path, points: Mapping[str, Point]) -> None:
 
 
 def fapu_of(points: Mapping[str, Float32], where: Path | str = "face") -> Fapu:
-    """The face's distances, measured between feature points (ISO/IEC 14496-2 annex C).
+    """Return the face's distances between feature points (ISO/IEC 14496-2 annex C).
 
     Raises:
         FaceError: a distance that is not positive: the points are exchanged or not in metres.

@@ -14,7 +14,7 @@ from realizer.face.surface import face_scale, normals
 
 
 def to_glb(face: Face) -> bytes:
-    """The face's rest mesh as GLB.
+    """Return the face's rest mesh as GLB.
 
     One primitive with POSITION, NORMAL, COLOR_0 (linear, as glTF asks), _OCCLUSION and _GLOSS. The mesh's
     `extras` hold what a client needs for streamed vertices: scale and offset, parts (name -> first and last
@@ -70,7 +70,7 @@ def to_glb(face: Face) -> bytes:
 
 
 def _parts(face: Face) -> dict[str, Any]:
-    """name -> vertex range and the triangle range that uses it (a part's triangles stand together)."""
+    """Return name -> its range of vertices and of triangles (a part's triangles are adjacent)."""
     lowest = face.triangles.min(axis=1)
     out = {}
     for name, (first, last) in face.parts.items():

@@ -26,7 +26,7 @@ class GlbFile:
     def add(
         self, array: Any, *, target: int | None = None, normalised: bool = False, bounds: bool = False
     ) -> int:
-        """The number of a new accessor with the rows of an array, uint8, uint16, uint32 or float32.
+        """Add the rows of an array (uint8, uint16, uint32 or float32); return the accessor's number.
 
         Args:
             target: ARRAY_BUFFER of vertices, ELEMENT_ARRAY_BUFFER of triangles, None of anything else.
@@ -57,7 +57,7 @@ class GlbFile:
         return self._accessor(accessor, raw, bounds)
 
     def animation(self, name: str, clock: int, keys: Iterable[tuple[int, str, Any]]) -> dict[str, Any]:
-        """An animation of nodes, linear between its keys.
+        """Return an animation of nodes, linear between its keys.
 
         Args:
             clock: the accessor with the keys' times.
@@ -71,7 +71,7 @@ class GlbFile:
         return {"name": name, "channels": channels, "samplers": samplers}
 
     def bytes_of(self, document: dict[str, Any]) -> bytes:
-        """The file: the document with these accessors, and their data."""
+        """Return the file: the document with these accessors, and their data."""
         whole = {
             **document,
             "accessors": self._accessors,

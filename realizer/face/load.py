@@ -61,7 +61,7 @@ class FaceInfo:
 def load_face(
     name: str = "default", directory: Path | str | None = None, deformer: str | None = None
 ) -> Face:
-    """The face of that name.
+    """Load the face of that name.
 
     Args:
         name: a folder with faces in it, or "default".
@@ -83,7 +83,7 @@ def load_face(
 def input_names(
     name: str = "default", directory: Path | str | None = None, deformer: str | None = None
 ) -> tuple[str, ...]:
-    """`Face.inputs` of the face of that name, without loading it. Arguments and errors as `load_face`."""
+    """Return `Face.inputs` of a face without loading it. Arguments and errors as `load_face`."""
     return _model_inputs(_model(folder_of(name, directory), _deformer_override(deformer)))
 
 
@@ -100,7 +100,7 @@ def list_faces(directory: Path | str | None = None) -> tuple[FaceInfo, ...]:
 
 
 def face_folders(directory: Path | str | None = None) -> dict[str, Path]:
-    """Every folder with a face.toml, by name, damaged or not; the first place that has a name wins."""
+    """Return every folder with a face.toml, by name, damaged or not; the first place with a name wins."""
     found: dict[str, Path] = {}
     for place in _places(directory):
         for folder in place.iterdir() if place.is_dir() else ():
@@ -110,7 +110,7 @@ def face_folders(directory: Path | str | None = None) -> dict[str, Path]:
 
 
 def folder_of(name: str, directory: Path | str | None = None) -> Path:
-    """The folder of a face.
+    """Return the folder of a face.
 
     Raises:
         FaceError: none of that name.
@@ -182,10 +182,10 @@ def _deformer_override(deformer: str | None) -> str | None:
 
 @lru_cache(maxsize=16)
 def _model(folder: Path, deformer: str | None) -> Model | None:
-    """The model a face is moved by, with those of its units that are drawn; None: by FAPs alone."""
+    """Return the model of a face with the units that are drawn, or None if FAPs alone move it."""
     path = folder / "face.toml"
-    said = read_head(folder).get("deformer", DEFORMERS[0])
-    chosen = said if isinstance(said, dict) else {"name": said}
+    entry = read_head(folder).get("deformer", DEFORMERS[0])
+    chosen = entry if isinstance(entry, dict) else {"name": entry}
     if chosen.get("name") not in DEFORMERS:
         raise FaceError(f"{path}: deformer: wanted {' or '.join(DEFORMERS)}, got {chosen.get('name')!r}")
     if (deformer or chosen["name"]) == "mpeg4":
@@ -222,7 +222,7 @@ def _model_inputs(model: Model | None) -> tuple[str, ...]:
 
 @lru_cache(maxsize=16)
 def load_folder(folder: Path, deformer: str | None) -> Face:
-    """The face in that folder. Errors as `load_face`, without its advice."""
+    """Load the face in that folder. Errors as `load_face`, without its advice."""
     head = read_head(folder)
     model = _model(folder, deformer)
     mesh = read_arrays(folder / "mesh.npz", MESH)
@@ -257,5 +257,5 @@ def load_folder(folder: Path, deformer: str | None) -> Face:
 
 
 def _unit(stored: Any) -> Float32:
-    """Bytes 0..255 as 0..1."""
+    """Return bytes 0..255 as 0..1."""
     return (np.asarray(stored, np.float32) / 255).astype(np.float32)

@@ -20,7 +20,7 @@ Parts = Mapping[str, tuple[int, int]]
 
 
 def value_faults(mesh: Mapping[str, Any]) -> list[str]:
-    """Values that no mesh.npz may hold; each names its array."""
+    """Return the faults of values in a mesh.npz; each names its array."""
     vertices, triangles, n = mesh["vertices"], mesh["triangles"], len(mesh["vertices"])
     faults = []
     for name, array in (("vertices", vertices), ("triangles", triangles), ("colours", mesh["colours"])):
@@ -45,7 +45,7 @@ def value_faults(mesh: Mapping[str, Any]) -> list[str]:
 
 
 def range_faults(parts: Mapping[str, Any], n: int | None) -> list[str]:
-    """Parts of face.toml that are missing, or no ranges of the mesh's n vertices (None: not known)."""
+    """Return the faults of the parts in face.toml: missing, or no ranges of n vertices (None: unknown)."""
     faults = [f"parts: wanted {name!r}, got none" for name in NEEDED if name not in parts]
     for name, ends in parts.items():
         whole = isinstance(ends, list) and len(ends) == 2 and all(isinstance(end, int) for end in ends)
@@ -91,7 +91,7 @@ def _turned(triangles: Int32) -> list[str]:
 
 
 def _holes(vertices: Float64, triangles: Int32, eyes: list[Any], mouth: Any) -> list[str]:
-    """Rims of the skin beside the bust's end, the lids and the inside of the mouth."""
+    """Return the rims of the skin beside the bust's end, the lids and the inside of the mouth."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 

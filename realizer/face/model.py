@@ -1,4 +1,4 @@
-"""The face value: what a face folder is loaded into."""
+"""The value of a face that is loaded from a folder."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Fapu:
     mw0: float
 
     def metres(self, unit: str) -> float:
-        """Metres of one unit of MNS, MW, ENS, ES or IRISD; radians of one angle_unit; 0 for none."""
+        """Return metres of one unit of MNS, MW, ENS, ES or IRISD; radians of an angle_unit; 0 for none."""
         if unit in ("none", "angle_unit"):
             return {"none": 0.0, "angle_unit": 1e-5}[unit]
         return float(getattr(self, unit.lower() + "0")) / 1024
@@ -53,7 +53,7 @@ class Face:
         cameras: extra camera presets by name.
         inputs: the columns of a pose, a row from which `face.deform` makes vertices: the 68 FAPs,
             then the inputs of the model (`au.columns`).
-        model: the action units that are moved by functions of the place; None: FAPs move all there is.
+        model: the action units that displace by functions of the place; None if FAPs move everything.
     """
 
     name: str

@@ -13,7 +13,7 @@ from realizer.core.errors import FaceError
 
 
 def read_arrays(path: Path, wanted: dict[str, int]) -> dict[str, Any]:
-    """The arrays of an .npz file.
+    """Read the arrays of an .npz file.
 
     Args:
         wanted: name -> number of dimensions.

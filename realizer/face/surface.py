@@ -14,7 +14,7 @@ ROOM = 0.15  # m around the neutral mesh for all that the head's turns and the j
 
 
 def normals(face: Face, vertices: Any) -> Float32:
-    """Unit normals of (n, n_vertices, 3) vertices, float32; zero where a vertex has no triangle."""
+    """Return unit normals of vertices (n, n_vertices, 3), float32; zero for a vertex without triangles."""
     vertices = np.asarray(vertices, np.float32)
     corners, (i, j, k) = _corners(face)
     out: Float32 = np.empty_like(vertices)
@@ -34,7 +34,7 @@ def normals(face: Face, vertices: Any) -> Float32:
 
 
 def face_scale(face: Face) -> tuple[float, Float32]:
-    """Scale and offset (3,) of a streamed mesh: vertex = integer x scale + offset, metres."""
+    """Return scale and offset (3,) of a streamed mesh: vertex = integer x scale + offset, metres."""
     low, high = face.bounds
     scale = float((high - low).max() + 2 * ROOM) / 65535
     return scale, ((low + high) / 2).astype(np.float32)
@@ -52,7 +52,7 @@ def quantise(face: Face, vertices: Any) -> Int16:
 
 @lru_cache(maxsize=16)
 def _corners(face: Face) -> tuple[Any, Any]:
-    """(n_vertices, n_triangles) sparse, 1 where the triangle has the vertex; the triangles' three columns."""
+    """Return the sparse incidence (n_vertices, n_triangles), and the triangles' three columns."""
     from scipy.sparse import csr_matrix
 
     m = len(face.triangles)

@@ -31,7 +31,7 @@ Read = TypeVar("Read")
 
 
 def check_face(name: str = "default", directory: Path | str | None = None) -> tuple[str, ...]:
-    """Every fault of a face folder, one sentence each; empty when it is sound."""
+    """Return every fault of a face folder, one sentence each; empty if the folder is sound."""
     try:
         folder = folder_of(name, directory)
     except FaceError as error:
@@ -80,7 +80,7 @@ def check_face(name: str = "default", directory: Path | str | None = None) -> tu
 
 
 def _read_mapping(folder: Path) -> None:
-    """Its own words for action units, if it has any."""
+    """Read the face's own mapping of action units, if it has one."""
     if own := own_file(folder):
         read_mapping(own)
 
@@ -148,7 +148,7 @@ def _point_faults(folder: Path, points: dict[str, Point], vertices: Any, triangl
 
 
 def _stored_faults(folder: Path, stored: dict[str, Any], n: int) -> list[str]:
-    """Fields made for another mesh, or cut short."""
+    """Return the faults of fields that were made for another mesh, or truncated."""
     path, faults = folder / "fields.npz", []
     again = "build or import the face again"
     if len(stored["head"]) != n:
@@ -185,7 +185,7 @@ def _stored_faults(folder: Path, stored: dict[str, Any], n: int) -> list[str]:
 
 
 def _zone_faults(folder: Path, skin: Any) -> list[str]:
-    """Faults of the face's own zones, if it has any."""
+    """Return the faults of the face's own zones, if it has any."""
     from realizer.facebuild.mpeg4.parameters import FILE, read_setup
 
     path = folder / FILE
@@ -201,7 +201,7 @@ def _zone_faults(folder: Path, skin: Any) -> list[str]:
 
 
 def _model_faults(path: Path) -> list[str]:
-    """Faults of a model of action units."""
+    """Return the faults of a model of action units."""
     from realizer.face.au.file import read_model
     from realizer.face.au.units import units
 
@@ -215,7 +215,7 @@ def _model_faults(path: Path) -> list[str]:
 
 
 def _shape_faults(folder: Path) -> list[str]:
-    """Faults of the face's own shapes, if it has any."""
+    """Return the faults of the face's own shapes, if it has any."""
     from realizer.facebuild.au.measure import read_shapes
 
     path = folder / "au_shapes.npz"

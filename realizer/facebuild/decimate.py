@@ -16,7 +16,7 @@ FLAT = 0.06  # least area of a triangle, in squares of its longest edge
 
 
 def decimate(vertices: Float64, triangles: Int32, tolerance: Float64) -> tuple[Any, Int32]:
-    """Edges pulled together into one end, the least missed first (quadrics: Garland & Heckbert 1997).
+    """Collapse edges in the order of their errors (quadrics: Garland & Heckbert 1997).
 
     Args:
         vertices: (n, 3) metres; triangles: (m, 3).
@@ -109,7 +109,7 @@ class _Surface:
         return None
 
     def _allowed(self, v: int, u: int) -> bool:
-        """No fold, no sliver, no hole: the two share two neighbours, and no triangle turns over."""
+        """Return whether a collapse makes no fold, sliver or hole: two shared neighbours, nothing flipped."""
         if len(self._near(v) & self._near(u)) != (1 if v in self.rim else 2):
             return False
         if v in self.rim and len(self.rim[v] | self.rim[u]) < 4:

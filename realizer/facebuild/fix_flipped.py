@@ -28,7 +28,7 @@ JAW = (JAW_COS + 1, JAW_SIN + 1, JAW_DROP + 1)
 
 
 def flipped_triangles(rest: Float64, now: Float64, triangles: Int32, cosine: float = 0.0) -> Bool:
-    """(m,) which triangles face away from where they faced at rest: turned past the angle of this cosine."""
+    """Return which triangles (m,) have turned past the angle of this cosine since rest."""
     before, after = triangle_normals(rest, triangles), triangle_normals(now, triangles)
     sizes = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
     away: Bool = np.asarray((before * after).sum(axis=1) < cosine * sizes)
@@ -42,7 +42,7 @@ def soften_flips(
     plays: Sequence[tuple[Float64, Any, float]],
     fixed: Collection[int],
 ) -> Float64:
-    """The fields, softened alike around the triangles that they turn over, until they turn none over.
+    """Return the fields, softened together around the triangles that they flip, until none is flipped.
 
     Args:
         fields: (g, n, 3) metres per metre of FAP; at: (n, 3) metres; triangles: (m, 3).
@@ -83,7 +83,7 @@ def without_flips(
     pivot: Float64,
     twin: Int32,
 ) -> dict[int, Float64]:
-    """Fields of FAPs that turn no triangle over; feature points keep their moves.
+    """Return fields of FAPs that flip no triangle; feature points keep their movement.
 
     Each is played as far as a face must bear, with the contour of the lips that it drags along or that goes
     with it, and with all that the action unit asks for that asks most of it.
@@ -125,28 +125,28 @@ def without_flips(
 
 
 def _groups(fields: Mapping[int, Float64]) -> list[tuple[list[int], list[int]]]:
-    """FAPs that are played, with the rows that are softened alike: a FAP with its twin, all lips, the jaw."""
+    """Return FAPs to play, each with the rows to soften together: a FAP and its twin, all lips, the jaw."""
     table = faps()
     left = [n for n in sorted(fields) if n <= FAPS and n not in LIPS]
     pairs = sorted({tuple(sorted({n, table[n - 1].mirror})) for n in left})
     jaw = [([OPEN_JAW], [n for n in JAW if n in fields])]
     lips = sorted(LIPS & set(fields))
     groups = [*jaw, *((list(pair), list(pair)) for pair in pairs), (lips, lips)]
-    return [(asked, mended) for asked, mended in groups if mended]
+    return [(requested, mended) for requested, mended in groups if mended]
 
 
 def _played(numbers: Sequence[int], contours: Contours) -> list[tuple[Float32, float]]:
-    """FAP values (68,) that every one of the FAPs must bear, each with the cosine of the turn that counts."""
+    """Return FAP values (68,) that each of the FAPs must support, with the cosine of the turn that counts."""
     table, out = faps(), []
     partner = {**CONTOURS, **{outer: inner for inner, outer in CONTOURS.items()}}
     for number in numbers:
         for sign in (1, -1) if table[number - 1].least < 0 else (1,):
-            asked = np.zeros((3, FAPS), np.float32)
-            asked[:2, number - 1] = sign * required_range(number, sign)
-            asked[1, partner.get(number, number) - 1] = asked[0, number - 1]
+            requested = np.zeros((3, FAPS), np.float32)
+            requested[:2, number - 1] = sign * required_range(number, sign)
+            requested[1, partner.get(number, number) - 1] = requested[0, number - 1]
             for fap, value in accompanying_faps(number, sign).items():
-                asked[2, fap - 1] = value
-            alone, paired, accompanied = couple_lips(contours, asked)
+                requested[2, fap - 1] = value
+            alone, paired, accompanied = couple_lips(contours, requested)
             out += [(alone, 0.0), (paired, 0.0), (accompanied, ROLLED)]
     return out
 
@@ -162,7 +162,7 @@ def _metres(values: Float32, fapu: Fapu, chin: Float64) -> Float64:
 
 
 def symmetrize(fields: Mapping[int, Float64], twin: Int32) -> dict[int, Float64]:
-    """The fields as even as a face is: each the mean of itself and its twin's mirror image."""
+    """Return symmetric fields: each is the mean of itself and its twin's mirror image."""
     table, flip = faps(), np.array([-1.0, 1.0, 1.0])
     out = {}
     for number, field in fields.items():

@@ -32,7 +32,7 @@ class Part:
     fields: dict[int, Float64] = field(default_factory=dict)
 
     def subset(self, index: Any, triangles: Int32) -> Part:
-        """The part with these of its vertices only, (k,) indices, and other triangles over them."""
+        """Return the part with only these of its vertices, (k,) indices, and other triangles over them."""
         patch = self.patch and Submesh(self.patch.mix[index], self.patch.offset[index], triangles)
         light = None if self.occlusion is None else self.occlusion[index]
         fields = {number: moves[index] for number, moves in self.fields.items()}
@@ -49,13 +49,13 @@ class Part:
 
 
 def smooth(x: Any, low: Any, high: Any) -> Any:
-    """0 below low, 1 above high, smooth between (Perlin's cubic); falls where high < low."""
+    """Return 0 below low, 1 above high, smooth between (Perlin's cubic); falls where high < low."""
     t = np.clip((np.asarray(x, float) - low) / (high - low), 0, 1)
     return t * t * (3 - 2 * t)
 
 
 def grid(rows: int, columns: int, closed: bool = False) -> Int32:
-    """Triangles of a sheet of rows x columns vertices (row-major); closed joins last column and first."""
+    """Return the triangles of a sheet of rows x columns vertices; `closed` joins last column and first."""
     last = columns if closed else columns - 1
     r, c = np.meshgrid(np.arange(rows - 1), np.arange(last), indexing="ij")
     a = (r * columns + c).ravel()
@@ -70,7 +70,7 @@ SEGMENTS = 26
 
 
 def eyeball(name: str, centre: Float64, radius: float, look: dict[str, list[float]], inward: float) -> Part:
-    """A ball with pupil, iris, dark ring and white, finest where the eye looks; its pole looks forward.
+    """Return a ball with pupil, iris, dark ring and white, finest at its pole, which looks forward.
 
     Args:
         radius: metres.
@@ -141,7 +141,7 @@ WARM = np.array([1.0, 0.78, 0.64])  # what light is left behind the teeth has be
 
 
 def teeth(name: str, front: Float64, width: float, depth: float, colours: dict[str, list[float]]) -> Part:
-    """An arch of twelve teeth with gums, seen from outside and from the tongue.
+    """Return an arch of twelve teeth with gums, closed towards the lips and towards the tongue.
 
     Args:
         front: (3,) the biting edge between the two middle teeth.

@@ -28,7 +28,7 @@ class Submesh:
 
     @classmethod
     def of_quads(cls, quads: Int32, n_base: int) -> Submesh:
-        """The patch of some quads of the base mesh; quads with three corners have the last repeated."""
+        """Make a submesh of some quads of the base mesh; quads with three corners have the last repeated."""
         triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
         triangles = triangles[(triangles[:, 0] != triangles[:, 2]) & (triangles[:, 1] != triangles[:, 2])]
         used, inverse = np.unique(triangles, return_inverse=True)
@@ -39,7 +39,7 @@ class Submesh:
         return int(self.mix.shape[0])
 
     def positions(self, base: Float64) -> Float64:
-        """(n, 3) metres."""
+        """Return the positions of the vertices, (n, 3) metres."""
         return np.asarray(self.mix @ base) + self.offset
 
     def mixed(self, mix: sp.csr_matrix, triangles: Any) -> Submesh:
@@ -53,7 +53,7 @@ class Submesh:
         return self.mixed(sp.csr_matrix(pick), inverse.reshape(-1, 3))
 
     def moved(self, offset: Float64) -> Submesh:
-        """The patch with `offset` (n, 3) added."""
+        """Return the submesh with `offset` (n, 3) added."""
         return replace(self, offset=self.offset + offset)
 
     def clipped(self, height: Float64) -> tuple[Submesh, sp.csr_matrix]:
@@ -88,7 +88,7 @@ class Submesh:
         return self.mixed(mix, inverse.reshape(-1, 3)), mix
 
     def threaded(self, loops: list[list[int]]) -> Submesh:
-        """A vertex more on every edge of closed loops of vertices, on a smooth curve through them.
+        """Return the surface with a vertex more on every edge of closed loops, on smooth curves through them.
 
         Four points make each (Dyn, Levin and Gregory 1987); loops that share a vertex or an edge do not go.
         """

@@ -39,7 +39,7 @@ def channels(background: str | None) -> int:
 
 
 def backdrop(size: tuple[int, int], light: Light, background: str | None = None) -> UInt8:
-    """(h, w, 4) uint8: one colour, nothing, or a soft gradient, lighter behind the head."""
+    """Return (h, w, 4) uint8: one colour, nothing, or a soft gradient, lighter behind the head."""
     width, height = size
     if background is not None:
         plain = (0, 0, 0, 0) if background == TRANSPARENT else (*bytes.fromhex(background[1:]), 255)
@@ -57,8 +57,9 @@ def backdrop(size: tuple[int, int], light: Light, background: str | None = None)
 
 
 def over(pixels: UInt8, behind: UInt8, out: UInt8) -> UInt8:
-    """(h, w, 4) premultiplied pixels over (h, w, 4) opaque ones, as (h, w, 3); over nothing, where `out` has
-    four channels, as colours that are no longer premultiplied.
+    """Lay premultiplied pixels (h, w, 4) over opaque ones (h, w, 4), into `out` (h, w, 3).
+
+    Where `out` has four channels there is nothing behind, and colours are no longer premultiplied.
 
     1.0 ms at 512x512, where drawing the backdrop with MSAA took 11.
     """

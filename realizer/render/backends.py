@@ -22,7 +22,7 @@ class Drawer(Protocol):
     """The interface of canvases."""
 
     def draw(self, vertices: Float32, normals: Float32, out: UInt8 | None = None) -> UInt8:
-        """(h, w, 3) uint8, (h, w, 4) where transparent, of (n, 3) vertices and unit normals."""
+        """Return (h, w, 3) uint8, (h, w, 4) where transparent, of (n, 3) vertices and unit normals."""
 
     def close(self) -> None:
         """Release the canvas's resources."""
@@ -36,14 +36,14 @@ def open_canvas(
     background: str | None = None,
     backend: str = "auto",
 ) -> tuple[str, Drawer]:
-    """The way that was taken, and its canvas.
+    """Return the name of the backend that works, and its canvas.
 
     Args:
         background: as `realizer.render.backdrop.backdrop` takes it.
-        backend: one of WAYS; "auto" selects the faster one here, or the other if that is missing.
+        backend: one of BACKENDS; "auto" selects the faster one here, or the other if that is missing.
 
     Raises:
-        RenderError: no such way, or it is missing here; the text says what to install.
+        RenderError: unknown backend, or it is missing here; the text says what to install.
     """
     if backend not in BACKENDS:
         raise RenderError(f"drawing: wanted one of {', '.join(BACKENDS)}, got {backend!r}")

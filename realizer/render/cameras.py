@@ -73,11 +73,11 @@ class Camera:
         return pose
 
     def project(self, points: Any, size: tuple[int, int]) -> Float64:
-        """(n, 2) pixels, x to the right and y down from the top left corner, of (n, 3) points in metres."""
+        """Return pixels (n, 2), x to the right and y down from the top left corner, of points (n, 3)."""
         return self.see(points, size)[0]
 
     def see(self, points: Any, size: tuple[int, int]) -> tuple[Float64, Float64]:
-        """(n, 2) pixels as `project`, and (n,) metres straight ahead, of (n, 3) points in metres."""
+        """Return pixels (n, 2) as `project`, and metres straight ahead (n,), of points (n, 3) in metres."""
         width, height = size
         right, up, back = (
             self.pose[:3, :3].T @ (np.asarray(points, np.float64) - self.position).reshape(-1, 3).T
@@ -86,7 +86,7 @@ class Camera:
         return np.stack([width / 2 - scale * right / back, height / 2 + scale * up / back], axis=1), -back
 
     def to_json(self) -> dict[str, Any]:
-        """Plain numbers for the page; `fovy` in degrees, vertical, as WebGL libraries take it."""
+        """Return plain numbers for the page; `fovy` in degrees, vertical, as WebGL libraries take it."""
         return {
             "name": self.name,
             "position": [round(float(x), 6) for x in self.position],
@@ -99,12 +99,12 @@ class Camera:
 
 
 def camera_names(face: Face) -> tuple[str, ...]:
-    """The presets of every face, then the face's own."""
+    """Return the presets of every face, then the face's own."""
     return (*PRESETS, *(name for name in face.cameras if name not in PRESETS))
 
 
 def camera_for(face: Face, name: str = "front") -> Camera:
-    """The camera of that name for this face.
+    """Return the camera of that name for this face.
 
     Raises:
         RenderError: no such camera; the text lists the known ones.
@@ -140,7 +140,7 @@ def camera_for(face: Face, name: str = "front") -> Camera:
 
 
 def _sideways(face: Face, right: Float64, yaw: float) -> float:
-    """Metres along `right` of the picture's middle: half-way between the outermost points above the chin.
+    """Return metres along `right` of the middle: half-way between the outermost points above the chin.
 
     From the front that is the nose's plane, whatever the hair.
     """

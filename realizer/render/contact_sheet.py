@@ -45,7 +45,7 @@ def sheet(
     notes: Sequence[Sequence[str]] | None = None,
     columns: int | None = None,
 ) -> UInt8:
-    """(h, w, 3) uint8: the pictures in rows, a title under each, and its notes in small lines.
+    """Return (h, w, 3) uint8: the pictures in rows, each with a title and notes in small lines below.
 
     Args:
         pictures: (h, w, 3) uint8 each, all of one size; at least one.
@@ -57,14 +57,14 @@ def sheet(
         ValueError: no pictures.
     """
     notes = notes if notes is not None else [()] * len(pictures)
-    cells = [Cell((p,), title, said) for p, title, said in zip(pictures, titles, notes, strict=True)]
+    cells = [Cell((p,), title, lines) for p, title, lines in zip(pictures, titles, notes, strict=True)]
     form = _Form(cells)
     columns = columns or columns_for(len(cells), form.width, form.height)
     return _page([Group("", cells, columns)], form, columns, None)
 
 
 def album(groups: Sequence[Group], legend: UInt8 | None = None, caption: str = "") -> UInt8:
-    """(h, w, 3) uint8: each group's heading and below it its cells in rows; an even number of columns.
+    """Return (h, w, 3) uint8: each group's heading and below it its cells in rows; an even column count.
 
     Args:
         groups: their cells all have as many pictures, of one size; at least one cell.
@@ -81,7 +81,7 @@ def album(groups: Sequence[Group], legend: UInt8 | None = None, caption: str = "
 
 
 def columns_for(count: int, width: int, height: int) -> int:
-    """Columns that make the whole about 3:2."""
+    """Return the number of columns that make the whole about 3:2."""
     best: float = (1.5 * count * height / width) ** 0.5
     return min(count, max(1, round(best)))
 

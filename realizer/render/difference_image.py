@@ -19,7 +19,7 @@ COLOURS = np.array([[78, 28, 128], [196, 40, 104], [246, 128, 48], [255, 238, 17
 
 
 def ramp(amount: Float32) -> Float32:
-    """(..., 3) sRGB 0..255 of differences 0..1, of which 1 is `FULL` and more."""
+    """Return colours (..., 3), sRGB 0..255, of differences 0..1, of which 1 is `FULL` and more."""
     places = np.linspace(0, 1, len(COLOURS))
     return np.stack([np.interp(amount, places, COLOURS[:, k]) for k in range(3)], axis=-1).astype(np.float32)
 
@@ -37,7 +37,7 @@ def faint(neutral: UInt8) -> Float32:
 
 
 def difference(picture: UInt8, neutral: UInt8, below: Float32) -> UInt8:
-    """(h, w, 3): where two (h, w, 3) pictures differ, by the channel that differs most, over `faint`'s."""
+    """Return (h, w, 3) of where two (h, w, 3) pictures differ, by the largest channel, over `below`."""
     apart = np.abs(picture.astype(np.int16) - neutral).max(axis=2) / np.float32(255)
     colour = ramp(np.minimum(apart / FULL, 1))
     shows = np.clip((apart - LEAST) / (2 * LEAST), 0, 1)[..., None]
@@ -46,7 +46,7 @@ def difference(picture: UInt8, neutral: UInt8, below: Float32) -> UInt8:
 
 
 def flatten(pixels: UInt8, behind: Any) -> UInt8:
-    """(h, w, 3) of (h, w, 4) pixels that are not premultiplied, over one colour, three of 0..255."""
+    """Return (h, w, 3) of (h, w, 4) pixels that are not premultiplied, over one colour of 0..255."""
     share = pixels[..., 3:] / np.float32(255)
     mixed = pixels[..., :3] * share + np.asarray(behind, np.float32) * (1 - share)
     out: UInt8 = np.rint(mixed).astype(np.uint8)

@@ -23,7 +23,7 @@ PATIENCE = 60.0  # s; the longest answer, a first start that compiles, takes abo
 
 
 class DrawingProcess:
-    """One drawing process; it opens its canvas while its owner continues."""
+    """A drawing process, which opens its canvas while its owner continues."""
 
     def __init__(self, order: Open) -> None:
         from realizer.render.backdrop import channels
@@ -102,7 +102,7 @@ def _end(
     opened: threading.Event,
     memory: Path,
 ) -> None:
-    """Hang up, and insist where that does not help; what has opened nothing has nothing to close."""
+    """Close the pipes and kill the process if it does not end."""
     orders.close()
     answers.close()
     try:
@@ -114,13 +114,13 @@ def _end(
 
 
 def available(backend: str | None = None) -> str | None:
-    """Return None if pictures can be drawn that way, or a sentence that says what to install."""
+    """Return None if the backend can draw here, or a sentence that says what to install."""
     return available_backend(backend)[1]
 
 
 @cache
 def available_backend(backend: str | None = None) -> tuple[str, str | None]:
-    """Return the way pictures are drawn here, and None; or "" and what to install. Cached."""
+    """Return the backend that draws here and None, or "" and what to install. Cached."""
     done = subprocess.run(
         [*_command(), "--check", backend or os.environ.get(DRAW) or "auto"],
         env=_environment(),
@@ -129,10 +129,10 @@ def available_backend(backend: str | None = None) -> tuple[str, str | None]:
         timeout=120,
         check=False,
     )
-    said = (done.stdout.strip() or done.stderr.strip()).splitlines()
+    lines = (done.stdout.strip() or done.stderr.strip()).splitlines()
     if done.returncode == 0:
-        return said[-1], None
-    return "", said[-1] if said else f"the drawing process ended (exit status {done.returncode})"
+        return lines[-1], None
+    return "", lines[-1] if lines else f"the drawing process ended (exit status {done.returncode})"
 
 
 def _command() -> list[str]:
@@ -140,7 +140,7 @@ def _command() -> list[str]:
 
 
 def _environment() -> dict[str, str]:
-    """Ours, with our package first, and one thread for linear algebra: 0.8 ms a frame instead of 7.5."""
+    """Return our environment with our package first and one thread for linear algebra (9 times faster)."""
     ours = str(Path(__file__).parents[2])
     paths = [ours, *filter(None, [os.environ.get("PYTHONPATH")])]
     threads = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}

@@ -55,7 +55,7 @@ class EyeHighlights:
         }
 
     def __call__(self, vertices: Float32) -> Float32:
-        """(n, 3) float32 metres, of the head's (n_vertices, 3)."""
+        """Return the caps' points (n, 3) float32 metres, for the head's vertices (n_vertices, 3)."""
         caps = [ball.centre(vertices) + self._directions * ball.radius * LIFT for ball in self._eyes]
         return np.concatenate([np.zeros((0, 3), np.float32), *caps]).astype(np.float32)
 

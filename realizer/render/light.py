@@ -68,7 +68,7 @@ class Light:
     backdrop_edge: Triple  # sRGB 0..1, in the corners
 
     def to_json(self) -> dict[str, Any]:
-        """The table as plain numbers; lamp directions have length 1."""
+        """Return the table as plain numbers; lamp directions have length 1."""
         table = asdict(self)
         for name in LAMPS:
             table[name]["direction"] = [round(float(x), 6) for x in unit(table[name]["direction"])]
@@ -77,7 +77,7 @@ class Light:
 
 @cache
 def presets() -> Mapping[str, Light]:
-    """The lights of `realizer/tables/lights.toml`, by name."""
+    """Return the lights of `realizer/tables/lights.toml`, by name."""
     from realizer.tables import read_toml, text_of
 
     table = read_toml(text_of("lights.toml"), "lights.toml")
@@ -138,7 +138,7 @@ class Shader:
         self._curve = _curve(light.knee)
 
     def __call__(self, normals: Float32) -> Float32:
-        """(n_vertices, 3) float32 sRGB 0..1 from (n_vertices, 3) unit normals."""
+        """Return sRGB 0..1 (n_vertices, 3) float32 of unit normals (n_vertices, 3)."""
         terms = self._slopes @ normals.T
         terms += self._offsets
         key, fill, rim, ambient, (facing_camera, facing_half) = np.split(terms, (3, 6, 9, 12))
@@ -161,21 +161,21 @@ BRIGHTEST = 4.0  # linear light at the end of the curve; beyond it all is white
 
 
 def unit(vector: Any) -> Float32:
-    """The vector at length 1, float32."""
+    """Return the vector at length 1, float32."""
     v = np.asarray(vector, np.float64)
     return (v / np.linalg.norm(v)).astype(np.float32)
 
 
 @cache
 def _curve(knee: float) -> Float32:
-    """Shoulder and sRGB in one table over 0..BRIGHTEST; 1.2e-4 a step, finer than 8 bits even near black."""
+    """Return shoulder and sRGB in one table over 0..BRIGHTEST; a step of 1.2e-4 is finer than 8 bits."""
     x = np.linspace(0, BRIGHTEST, 32768)
     shoulder = np.where(x < knee, x, 1 - (1 - knee) * np.exp(-(x - knee) / (1 - knee)))
     return srgb(shoulder.astype(np.float32))
 
 
 def _affine(lamp: Lamp) -> tuple[Float32, Float32]:
-    """(3, 3) and (3,): colour * (n.l + wrap) / (1 + wrap) as slope and offset, a column a channel."""
+    """Return colour * (n.l + wrap) / (1 + wrap) as slope (3, 3) and offset (3,), a column a channel."""
     wrap = np.asarray(lamp.wrap)
     scale = np.asarray(lamp.colour) / (1 + wrap)
     return np.outer(unit(lamp.direction), scale).astype(np.float32), (scale * wrap).astype(np.float32)

@@ -34,7 +34,7 @@ class OpenGLCanvas:
         light: Light,
         background: str | None = None,
     ) -> None:
-        """Opens a GL context; `background` as `backdrop` takes it.
+        """Open a GL context; `background` as `backdrop` takes it.
 
         Raises:
             RenderError: no pyrender or no GL; the text says what to install.
@@ -62,7 +62,7 @@ class OpenGLCanvas:
         self._offscreen.render(self._scene, self._flags)  # uploads the buffers that `draw` overwrites
 
     def draw(self, vertices: Float32, normals: Float32, out: UInt8 | None = None) -> UInt8:
-        """(h, w, 3 or 4) uint8, row 0 at the top, of (n, 3) vertices and unit normals; into `out`."""
+        """Return (h, w, 3 or 4) uint8, row 0 at the top, of (n, 3) vertices and unit normals; into `out`."""
         from OpenGL import GL
 
         self._figure.pose(vertices, normals)
@@ -95,7 +95,7 @@ def _pyrender() -> Any:
 
 
 def _open(pyrender: Any, size: tuple[int, int]) -> Any:
-    """An offscreen renderer that reads colours only; on the first EGL device that works."""
+    """Return an offscreen renderer that reads colours only, on the first EGL device that works."""
 
     class Colours(pyrender.Renderer):  # type: ignore[misc]
         """Leaves out the depth read-back, half the cost of a small picture."""

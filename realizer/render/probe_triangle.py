@@ -8,7 +8,7 @@ from realizer.face.model import Face, Fapu
 
 
 def triangle() -> Face:
-    """A face of three vertices from chin to hairline that knows no FAP."""
+    """Return a face of three vertices from chin to hairline that knows no FAP."""
     vertices = np.array([[-0.08, -0.12, 0], [0.08, -0.12, 0], [0, 0.06, 0]], np.float32)
     return Face(
         name="triangle",

@@ -17,7 +17,7 @@ from realizer.face.model import Face
 
 @dataclass(frozen=True)
 class Open:
-    """The first message: what to draw, and the file of the shared memory. The answer names the way chosen."""
+    """The first message: what to draw, and the file of the shared memory. The answer names the backend."""
 
     face: str | Face
     size: tuple[int, int]
@@ -72,7 +72,7 @@ class Pixels:
 
     @staticmethod
     def create(slots: int, size: tuple[int, int], channels: int = 3) -> str:
-        """Path of a new file of the right length, in memory where the system has such a folder."""
+        """Return the path of a new file of the right length, in memory if the system has such a folder."""
         folder = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
         handle, path = tempfile.mkstemp(prefix="realizer-", dir=folder)
         with os.fdopen(handle, "wb") as file:
@@ -81,5 +81,5 @@ class Pixels:
 
 
 def connection(descriptor: int, *, writes: bool) -> Connection:
-    """A message pipe over its own copy of a descriptor."""
+    """Return a message pipe over its own copy of a descriptor."""
     return Connection(os.dup(descriptor), readable=not writes, writable=writes)

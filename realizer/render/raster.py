@@ -27,7 +27,7 @@ class Raster:
     """Memory for pictures of one size, drawn again and again; one thread at a time."""
 
     def __init__(self, size: tuple[int, int], *, smooth: bool = True) -> None:
-        """Nothing is compiled yet.
+        """Reserve the memory; nothing is compiled.
 
         Args:
             size: width, height in pixels.
@@ -46,7 +46,7 @@ class Raster:
         self._pool = ThreadPoolExecutor(bands)
 
     def __call__(self, points: Any, nearness: Float32, triangles: Int32, colours: Float32) -> UInt8:
-        """(h, w, 4) uint8, premultiplied, row 0 at the top; valid until the next call.
+        """Return (h, w, 4) uint8, premultiplied, row 0 at the top; valid until the next call.
 
         Args:
             points: (n, 2) pixels, x to the right and y down from the top left corner.
@@ -71,7 +71,7 @@ class Raster:
         return self._picture.view(np.uint8).reshape(*self._picture.shape, 4)
 
     def over(self, behind: UInt8, out: UInt8) -> UInt8:
-        """The last picture over (h, w, 4) opaque pixels, into (h, w, 3); as `realizer.render.backdrop.over`.
+        """Lay the last picture over (h, w, 4) opaque pixels, into (h, w, 3); as `backdrop.over`.
 
         Makes nothing on the way, and shares the rows among the threads.
         """
@@ -222,7 +222,7 @@ def _fill(
 
 
 def _mean(keys: Any, picture: Any) -> None:
-    """Return the mean of each pixel's samples, one or four, all four bytes at once; clears the samples."""
+    """Write the mean of each pixel's samples, one or four, all four bytes at once; clear the samples."""
     height, width = picture.shape
     nothing = np.uint64(0)
     if keys.shape[2] == 1:
@@ -249,7 +249,7 @@ def _mean(keys: Any, picture: Any) -> None:
 
 
 def _lay(picture: Any, behind: Any, out: Any) -> None:
-    """Premultiplied pixels over opaque ones."""
+    """Lay premultiplied pixels over opaque ones."""
     height, width = picture.shape
     for y in range(height):
         for x in range(width):

@@ -40,7 +40,7 @@ class Renderer:
         backend: str | None = None,
         deformer: str | None = None,
     ) -> None:
-        """Nothing starts yet.
+        """Prepare; nothing is started.
 
         Args:
             face: name of a face folder, or a Face (then it is sent over).
@@ -72,7 +72,7 @@ class Renderer:
             self._started()
 
     def draw(self, poses: Float32) -> UInt8:
-        """(n, h, w, 3) uint8, (n, h, w, 4) where transparent, row 0 at the top, of (n, k) poses.
+        """Return (n, h, w, 3) uint8, (n, h, w, 4) where transparent, row 0 at the top, of (n, k) poses.
 
         Args:
             poses: as `face.deform` takes them: a column for each of `Face.inputs`, or (n, 68) FAPs alone.
@@ -91,7 +91,7 @@ class Renderer:
         return pixels
 
     def frames(self, poses: Float32) -> Iterator[UInt8]:
-        """Each picture of (n, k) poses, (h, w, 3) uint8; the next ones are drawn while you use this one.
+        """Yield the picture of each of (n, k) poses, (h, w, 3) uint8; the next ones are drawn meanwhile.
 
         A picture is valid until the next one is requested. Exhaust the iterator, or close it, before
         you ask this renderer for anything else. Errors as `draw`.
@@ -124,7 +124,7 @@ class Renderer:
                     process.receive()
 
     def encoded(self, pose: Float32, form: str = "jpeg", quality: int = 85) -> bytes:
-        """The bytes of a picture of one pose, (k,).
+        """Return the bytes of a picture of one pose, (k,).
 
         Args:
             form: "jpeg", "png" or "webp"; the latter two are transparent where the background is.

@@ -54,7 +54,7 @@ SOLID = ("skin", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue"
 
 
 def _visible_triangles(face: Face) -> Int32:
-    """The triangles, those of sheets both ways round: culling what faces away saves a quarter."""
+    """Return the triangles, those of sheets both ways round: culling back faces saves a quarter."""
     solid = np.zeros(len(face.vertices), bool)
     for name in SOLID:
         solid[slice(*face.parts.get(name, (0, 0)))] = True

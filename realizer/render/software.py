@@ -26,7 +26,7 @@ class SoftwareCanvas:
         *,
         smooth: bool = True,
     ) -> None:
-        """Nothing is drawn yet.
+        """Prepare; nothing is drawn.
 
         Args:
             background: as `backdrop` takes it.
@@ -40,7 +40,7 @@ class SoftwareCanvas:
         self._raster = Raster(size, smooth=smooth)
 
     def draw(self, vertices: Float32, normals: Float32, out: UInt8 | None = None) -> UInt8:
-        """(h, w, 3 or 4) uint8, row 0 at the top, of (n, 3) vertices and unit normals; into `out` if given.
+        """Return (h, w, 3 or 4) uint8, row 0 at the top, of (n, 3) vertices and normals; into `out` if given.
 
         Raises:
             RenderError: no numba.

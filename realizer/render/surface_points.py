@@ -12,7 +12,7 @@ from realizer.face.model import Face
 def locate_on_skin(
     face: Face, places: Float64, right: Float64, towards: Float64, longest: float
 ) -> tuple[Int32, Float64] | None:
-    """The triangle of skin at each place and the share of each corner: (n, 3) vertices, (n, 3) weights.
+    """Return the triangle of skin at each place, (n, 3) vertices, and the shares of its corners, (n, 3).
 
     Args:
         places: (n, 2) metres, along `right` and up.

@@ -57,7 +57,7 @@ class FaceDrawer:
 
 
 def shapes(face: Face, rows: Float32) -> Iterator[tuple[Float32, Float32]]:
-    """Vertices and normals, (n_vertices, 3) each, of each of (n, k) poses."""
+    """Yield vertices and normals, (n_vertices, 3) each, of each of (n, k) poses."""
     from realizer.face.deform import deform
     from realizer.face.surface import normals
 
@@ -67,7 +67,7 @@ def shapes(face: Face, rows: Float32) -> Iterator[tuple[Float32, Float32]]:
 
 
 def encode(pixels: UInt8, form: str, quality: int) -> bytes:
-    """A file of (h, w, 3 or 4) uint8; a JPEG leaves out the fourth. simplejpeg is twice as fast as Pillow."""
+    """Return a file of (h, w, 3 or 4) uint8; a JPEG has three. simplejpeg is twice as fast as Pillow."""
     if form == "jpeg":
         pixels = np.ascontiguousarray(pixels[..., :3])
         try:
@@ -125,7 +125,7 @@ def serve(orders: Connection, answers: Connection) -> None:
 
 
 def check(backend: str) -> int:
-    """Draw one triangle; print the chosen way, or return 3 and print what is missing."""
+    """Draw one triangle; print the backend, or return 3 and print what is missing."""
     from realizer.core.errors import RenderError
     from realizer.render.probe_triangle import triangle
 

@@ -1,7 +1,7 @@
 """Wrinkles: strips of skin that darken as the skin under them is compressed.
 
-Compression is measured on the shape itself, by two feature points that approach, so furrows follow any
-moves a face: FAPs, action units or shapes.
+Compression is measured on the shape itself, by two feature points that approach each other, so furrows
+appear whatever moves a face: FAPs, action units or shapes.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ SHADE = np.array([0.82, 1.03, 1.10], np.float32)
 
 @dataclass(frozen=True)
 class _Drive:
-    """Return how close two vertices have come: 0 at `start`, 1 at `full` (relative change of distance)."""
+    """A measure of how close two vertices are: 0 at `start`, 1 at `full` (relative change of distance)."""
 
     a: int
     b: int
@@ -98,7 +98,7 @@ class Wrinkles:
         }
 
     def __call__(self, vertices: Float32, normals: Float32, colours: Float32) -> tuple[Float32, Float32]:
-        """(count, 3) points in metres and (count, 3) sRGB 0..1, of the head's vertices, normals and colours.
+        """Return points (count, 3) in metres and sRGB 0..1 (count, 3), of the head's vertices and colours.
 
         A face without furrows gives points without extent, which cost nothing to draw.
         """
@@ -185,7 +185,7 @@ def _strip(face: Face, line: dict[str, Any], drives: dict[str, Any], side: int, 
 
 
 def _through(along: Float64, knots: Float64, where: Float64) -> Float64:
-    """The curve through (k, 2) knots at `along`, at (n,) places: a cubic that bulges nowhere between them.
+    """Return the curve through knots (k, 2) at `along`, at places (n,): a monotone cubic.
 
     Slopes after Fritsch and Butland 1984, those at the ends by three points, limited to the first chord's
     turn. Written out here: SciPy's takes a third of a second to import, and a film begins with it.
@@ -228,7 +228,7 @@ def _profile(depth: float, lit: float) -> Float64:
 
 
 def _taper(t: Float64, meets: bool) -> Float64:
-    """Furrows begin and end gently; those of the forehead meet their mirror image in the middle."""
+    """Return how strong a furrow is along it; those of the forehead meet in the middle."""
     start = np.clip(t / 0.3, 0, 1)
     end = np.clip((1 - t) / 0.3, 0, 1) if not meets else np.ones_like(t)
     ease = start * end
@@ -250,7 +250,7 @@ def _twin(face: Face, name: str) -> str:
 
 
 def _grid(rows: int, turned: bool) -> Int32:
-    """Triangles of a strip of `rows` x len(ACROSS) points."""
+    """Return the triangles of a strip of `rows` x len(ACROSS) points."""
     width = len(ACROSS)
     corner = (np.arange(rows - 1)[:, None] * width + np.arange(width - 1)).ravel()
     a, b, c, d = corner, corner + 1, corner + width, corner + width + 1

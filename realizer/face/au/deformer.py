@@ -28,7 +28,7 @@ LID_POINTS = {"L": ("3.1", "3.3"), "R": ("3.2", "3.4")}
 
 
 def columns(model: Model) -> tuple[str, ...]:
-    """The columns of a pose beside the FAPs: units that move the face, by side; lips; mixing order.
+    """Return the columns of a pose beside the FAPs: units by side, lips, mixing order.
 
     "1L", "1R", ... "17", ...; units that differ in time alone (blink and wink are closed eyes) have columns
     of their own, the strongest shows. "lips" is how far speech has the lips: FAPs move them then.
@@ -40,12 +40,12 @@ def columns(model: Model) -> tuple[str, ...]:
 
 
 def _orderly(model: Model) -> list[int]:
-    """The units that can follow one another in any order: closed eyes take the lids after all others."""
+    """Return the units that can follow one another in any order; closed eyes come after all others."""
     return [au for au in sorted(model.units) if au != CLOSE]
 
 
 def _units(model: Model) -> list[tuple[tuple[int, str], tuple[str, ...]]]:
-    """(unit, side) -> the names of the columns that show it; ascending."""
+    """Return (unit, side) -> the names of the columns that show it, ascending."""
     sided = {row.au: row.sides for row in action_units()}
     return [
         ((au, side), tuple(f"{name}{side}" for name in units()[au].names))
@@ -57,10 +57,10 @@ def _units(model: Model) -> list[tuple[tuple[int, str], tuple[str, ...]]]:
 class Moves:
     """The displacements of a face's model as matrices, made once.
 
-    Displacement units are mixed additively, each of the neutral place, or where a pose asks for it
-    successively (Wojdel 2005, 5.1); but for two things that either would get wrong: jaw and lips open as far
-    as the widest of 25, 26 and 27 (`mixers.opened`), and what closes the eyes takes the lids from all others,
-    as far as it does.
+    Displacement units are mixed additively, each at the neutral place, or successively if a pose says so
+    (Wojdel 2005, 5.1). There are two exceptions, which both mixers would get wrong: jaw and lips open as far
+    as the widest of 25, 26 and 27 (`limit_opening`), and a unit that closes the eyes takes the lids from all
+    others.
 
     Attributes:
         moving: the vertices that units move.
@@ -105,7 +105,7 @@ class Moves:
         self._lids, self._owned = _shares(face, self.moving)
 
     def intensities(self, pose: Float32) -> Float32:
-        """(n, units) of the (n, columns) part of poses that follows the FAPs, opened as far as the widest.
+        """Return intensities (n, units) of the part of poses that follows the FAPs, opening limited.
 
         Full intensity is `ActionUnit.strength`, because some units were measured at mild intensity.
         """
@@ -114,13 +114,13 @@ class Moves:
         return shown
 
     def closed(self, shown: Float32) -> Float32:
-        """(n, 2) how far the left and the right eye are closed."""
+        """Return how far the left and the right eye are closed, (n, 2)."""
         out = np.zeros((len(shown), 2), np.float32)
         out[:, self._sides] = np.minimum(shown[:, self._closing], 1)
         return out
 
     def lids(self, shown: Float32) -> Bool:
-        """(n,) whether a unit moves the lids."""
+        """Return whether a unit moves the lids, (n,)."""
         return np.asarray(shown[:, self._lid_columns].any(axis=1))
 
     def __call__(self, shown: Float32, lips: Float32, mixing: Float32, vertices: Float32) -> None:
@@ -150,7 +150,7 @@ class Moves:
                 self._turn_jaw(float(angle), frame)
 
     def _succeeding(self, shown: Float32, ranks: Float32) -> Float32:
-        """(n_moving, 3) what units move one after the other, the highest rank first, closed eyes left out."""
+        """Return what units move one after the other, (n_moving, 3), by rank, without closed eyes."""
         values = {}
         for k in np.argsort(-ranks, kind="stable"):
             au, left, right = self._aus[k]
@@ -179,7 +179,7 @@ def moves_of(face: Face) -> Moves | None:
 
 
 def _displacements(face: Face, model: Model, names: list[tuple[int, str]]) -> Float64:
-    """(units, n_vertices, 3) metres with full intensity."""
+    """Return the displacements with full intensity, (units, n_vertices, 3) metres."""
     at = face.vertices.astype(np.float64)
     mine = skin(face)
     upper = shares(face, model.mouth)
@@ -205,7 +205,7 @@ def _meeting(face: Face, moves: Float64, side: str) -> float:
 
 
 def _shares(face: Face, moving: slice) -> tuple[tuple[Any, Float32], tuple[Any, Float32]]:
-    """Vertices of the lids and their share in each side's, (k,) and (2, k); those of speech, (k,) and (k,).
+    """Return vertices of the lids and their shares, (k,) and (2, k), and those of speech, (k,) and (k,).
 
     Which vertices FAPs of the lids and of the mouth move says where lids and mouth are: each with the part of
     the way that its feature point goes.

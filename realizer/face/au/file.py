@@ -125,7 +125,7 @@ class _Reader:
         return found
 
     def numbers(self, within: Any, key: str, count: int) -> Float64:
-        """`count` numbers; one without a list for 0."""
+        """Return `count` numbers; a number without a list if `count` is 0."""
         found = within.get(key.rpartition(".")[2])
         what = f"a list of {count} numbers" if count else "a number"
         try:

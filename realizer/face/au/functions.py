@@ -19,13 +19,13 @@ LOWER = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))
 
 
 def cubic_terms(at: Float64) -> Float64:
-    """(n, 6): xx, yy, zz, xy, xz, yz of (n, 3) coordinates."""
+    """Return xx, yy, zz, xy, xz, yz (n, 6) of coordinates (n, 3)."""
     x, y, z = at.T
     return np.stack([x * x, y * y, z * z, x * y, x * z, y * z], 1)
 
 
 def density(parameters: Any, at: Float64) -> tuple[Float64, Float64]:
-    """The sum of Gaussians (equations 4.6 and 4.7).
+    """Return the sum of Gaussians (equations 4.6 and 4.7).
 
     Args:
         parameters: (k, 10): height, centre, root of B (B = root root^T, its lower triangle by rows).
@@ -49,7 +49,7 @@ def density(parameters: Any, at: Float64) -> tuple[Float64, Float64]:
 
 
 def height(parameters: Any, at: Float64) -> Float64:
-    """(n,) the density alone; arguments as `density`."""
+    """Return the density alone, (n,); arguments as `density`."""
     total = np.zeros(len(at))
     for one in np.asarray(parameters, np.float64):
         total += one[0] * _bell(one, at)[3]
@@ -57,7 +57,7 @@ def height(parameters: Any, at: Float64) -> Float64:
 
 
 def _bell(one: Float64, at: Float64) -> tuple[Float64, Float64, Float64, Float64]:
-    """Root of B, (3, 3); the way from the centre, (n, 3), and in widths; the Gaussian of height 1, (n,)."""
+    """Return the root of B, (3, 3); the way from the centre, (n, 3), and in widths; the Gaussian, (n,)."""
     root = np.zeros((3, 3))
     for value, place in zip(one[4:], LOWER, strict=True):
         root[place] = value
@@ -68,7 +68,7 @@ def _bell(one: Float64, at: Float64) -> tuple[Float64, Float64, Float64, Float64
 
 
 def angle(parameters: Any, at: Float64) -> tuple[Float64, Float64]:
-    """A cubic polynomial of the place: quadratic form times linear form, both again, a constant (4.4, 4.5).
+    """Return a cubic polynomial of the place: quadratic times linear form, both, a constant (4.4, 4.5).
 
     Returns:
         (n,) radians and (n, 19) its derivatives.
@@ -83,7 +83,7 @@ def angle(parameters: Any, at: Float64) -> tuple[Float64, Float64]:
 
 
 def heading(alpha: Any, beta: Any, at: Float64) -> Float64:
-    """(n, 3) unit vectors by the angles of places (n, 3): `angle` and `direction` without derivatives."""
+    """Return unit vectors (n, 3) at places (n, 3): `angle` and `direction` without derivatives."""
     squares = cubic_terms(at)
     a, b = (_cubic(np.asarray(p, np.float64), squares, at)[2] for p in (alpha, beta))
     level = np.cos(b)
@@ -91,13 +91,13 @@ def heading(alpha: Any, beta: Any, at: Float64) -> Float64:
 
 
 def _cubic(p: Float64, squares: Float64, at: Float64) -> tuple[Float64, Float64, Float64]:
-    """The forms that are multiplied, and the whole polynomial, (n,) each."""
+    """Return the forms that are multiplied, and the whole polynomial, (n,) each."""
     form, line = squares @ p[:6], at @ p[6:9]
     return form, line, form * line + squares @ p[9:15] + at @ p[15:18] + p[18]
 
 
 def direction(alpha: Float64, beta: Float64) -> tuple[Float64, Float64, Float64]:
-    """Unit vectors (n, 3) by their two angles (equation 4.3), and their derivatives by alpha and by beta."""
+    """Return unit vectors (n, 3) of two angles (equation 4.3), and their derivatives by alpha and by beta."""
     (ca, sa), (cb, sb) = (np.cos(alpha), np.sin(alpha)), (np.cos(beta), np.sin(beta))
     zero = np.zeros_like(ca)
     return (

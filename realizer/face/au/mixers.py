@@ -19,7 +19,7 @@ Thing = Literal["face", "left eye", "right eye", "jaw", "fixed"]
 
 
 def additive(model: Model, at: Float64, values: Mapping[int, float]) -> Float64:
-    """Displacement units, each of the neutral place, summed: their order does not matter.
+    """Return the sum of displacement units, each at the neutral place: their order does not matter.
 
     Args:
         at: (n, 3) metres.
@@ -34,9 +34,9 @@ def additive(model: Model, at: Float64, values: Mapping[int, float]) -> Float64:
 def successive(
     model: Model, at: Float64, values: Mapping[int, float], upper: Float64 | None = None
 ) -> Float64:
-    """Displacement units, each of the place where the one before left it: their order matters.
+    """Return places moved by one displacement unit after the other: their order matters.
 
-    `succession.Succession` does it for a whole face, frame by frame.
+    `successive_mixer.Succession` does it for a whole face, frame by frame.
 
     Args:
         at: (n, 3) metres.
@@ -70,7 +70,7 @@ def limit_opening(gaps: Any, values: Any) -> Any:
 
 
 def mix(model: Model, at: Float64, values: Mapping[int, float], thing: Thing = "face") -> Float64:
-    """The places of an object's points under several action units, by her rules.
+    """Return the places of an object's points under several action units, by Wojdel's rules.
 
     Single object and sub-object units are added up, of the neutral places; those that open the mouth as far
     as the widest of them does. Turns cannot be: they follow one
@@ -105,7 +105,7 @@ def mix(model: Model, at: Float64, values: Mapping[int, float], thing: Thing = "
 
 
 def _turns(model: Model, values: Mapping[int, float], kind: str) -> list[int]:
-    """The turns among the units, tilts first, turns to a side last: as FAPs 48 to 50 turn."""
+    """Return the turns among the units, tilts first, turns to a side last: as FAPs 48 to 50 turn."""
     known = units()
     mine = [au for au in values if au in model.degrees and known[au].kind == kind and values[au]]
     return sorted(mine, key=lambda au: "zxy".index(known[au].turn[1]))

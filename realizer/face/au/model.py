@@ -31,15 +31,15 @@ class Motion:
     beta: Float64
 
     def density(self, at: Float64) -> Float64:
-        """(n,) metres that points (n, 3), metres, are moved with full intensity."""
+        """Return the length (n,) of the displacement of points (n, 3) with full intensity, metres."""
         return height(self.gaussians, (at - self.origin) / CENTIMETRE)
 
     def direction(self, at: Float64) -> Float64:
-        """(n, 3) unit vectors they are moved along."""
+        """Return the unit vectors (n, 3) that points are moved along."""
         return heading(self.alpha, self.beta, (at - self.origin) / CENTIMETRE)
 
     def __call__(self, at: Float64) -> Float64:
-        """(n, 3) metres: equation 4.1 with full intensity."""
+        """Return the displacement (n, 3) with full intensity, metres (equation 4.1)."""
         far, moves = self.density(at), np.zeros(at.shape)
         # Far off, polynomials are large and mean nothing; the density is nought there.
         near = np.flatnonzero(np.abs(far) > 1e-7)
@@ -62,14 +62,14 @@ class Mouth:
     slope: Float64
 
     def above(self, at: Float64) -> Float64:
-        """(n,) metres that points (n, 3) lie above it."""
+        """Return how far points (n, 3) lie above the plane, (n,) metres."""
         across = np.abs(at[:, 0])
         y, z, slope = (np.interp(across, self.x, line) for line in (self.y, self.z, self.slope))
         # Deep in the mouth and on the bulge of the cheeks, the plane continues level.
         return np.asarray(at[:, 1] - y - slope * np.clip(at[:, 2] - z, -BENT, BENT))
 
     def upper(self, at: Float64) -> Float64:
-        """(n,) 1 above, 0 below; beyond the corners the halves fade over, or the cheek would tear."""
+        """Return 1 above and 0 below, (n,); beyond the corners the halves fade, or the cheek would tear."""
         fade = np.maximum(np.abs(at[:, 0]) - self.x[-1], 0) + 1e-9
         share = np.clip(self.above(at) / fade / 2 + 0.5, 0, 1)
         return np.asarray(share * share * (3 - 2 * share))
@@ -89,7 +89,7 @@ class UnitModel:
     jaw_degrees: float = 0.0
 
     def displacement(self, at: Float64, mouth: Mouth, upper: Float64 | None = None) -> Float64:
-        """(n, 3) metres that points (n, 3) of the face are moved with full intensity.
+        """Return the displacement (n, 3) of points (n, 3) of the face with full intensity, metres.
 
         Args:
             upper: (n,) share in the upper half, if the mesh's topology shows it.
@@ -118,7 +118,7 @@ class HeadTurn:
     tilt: float
 
     def density(self, at: Float64) -> Float64:
-        """(n,) 0..1: how far points turn with the head."""
+        """Return how far points turn with the head, (n,) 0..1."""
         share = np.clip((at[:, 1] + self.tilt * at[:, 2] - self.end) / (self.top - self.end), 0, 1)
         return np.asarray(share * share * (3 - 2 * share))
 
@@ -146,7 +146,7 @@ class Model:
     degrees: Mapping[int, float] = field(default_factory=dict)
 
     def displacement(self, au: int, at: Float64, side: str = "", upper: Float64 | None = None) -> Float64:
-        """(n, 3) metres that a displacement unit moves points (n, 3) of the face with full intensity.
+        """Return how far a displacement unit moves points (n, 3) with full intensity, (n, 3) metres.
 
         Args:
             side: "L" or "R" for one side alone, as the character has it.
@@ -158,26 +158,26 @@ class Model:
         return np.asarray(moves * half(at, side)[:, None])
 
     def gap(self, au: int) -> float:
-        """Metres by which a displacement unit parts the lips in the middle, with full intensity."""
+        """Return how far a displacement unit parts the lips in the middle with full intensity, metres."""
         between = np.array([[0.0, self.mouth.y[0], self.mouth.z[0]]])
         upper, lower = (self.displacement(au, between, upper=np.array([half]))[0, 1] for half in (1.0, 0.0))
         return float(upper - lower)
 
 
 def half(at: Float64, side: str) -> Float64:
-    """(n,) 0..1: how far points (n, 3) belong to the character's side "L" or "R"; the two make 1."""
+    """Return how far points (n, 3) belong to the character's side "L" or "R", (n,); the sum of both is 1."""
     share = np.clip((at[:, 0] * (1 if side == "L" else -1) / SIDES + 1) / 2, 0, 1)
     return np.asarray(share * share * (3 - 2 * share))
 
 
 def rotation(axis: tuple[float, float, float], radians: float) -> Float64:
-    """(3, 3) right-handed turn about a unit vector."""
+    """Return a right-handed rotation (3, 3) about a unit vector."""
     x, y, z = axis
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]], np.float64)
     return np.asarray(np.eye(3) + np.sin(radians) * cross + (1 - np.cos(radians)) * cross @ cross)
 
 
 def turned(at: Float64, axis: tuple[float, float, float], radians: float, pivot: object) -> Float64:
-    """Points (n, 3) turned right-handed about an axis through the pivot."""
+    """Return points (n, 3) turned right-handed about an axis through the pivot."""
     centre = np.asarray(pivot, np.float64)
     return np.asarray((at - centre) @ rotation(axis, radians).T + centre)

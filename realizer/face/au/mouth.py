@@ -19,7 +19,7 @@ DEEP = 0.020  # m behind the lips; further back there is no telling the halves o
 
 
 def halves(face: Face) -> tuple[Int32, Bool]:
-    """Vertices about the mouth, and which of them belong to the upper half.
+    """Return vertices about the mouth, and which of them belong to the upper half.
 
     A vertex belongs to the lip that is nearer along the surface: lips that touch are far apart that way.
 
@@ -38,7 +38,7 @@ def halves(face: Face) -> tuple[Int32, Bool]:
 
 
 def shares(face: Face, mouth: Mouth) -> Float64:
-    """(n,) how far each of a face's vertices belongs to the upper half: on the lips by its topology."""
+    """Return the share of each vertex in the upper half, (n,): on the lips by the mesh's topology."""
     at = face.vertices.astype(np.float64)
     share = mouth.upper(at)
     index, upper = halves(face)
@@ -48,7 +48,7 @@ def shares(face: Face, mouth: Mouth) -> Float64:
 
 
 def fit_mouth(face: Face) -> Mouth:
-    """The plane through the corners of the mouth, bent so that the lips' vertices fall on their own sides.
+    """Return the plane through the mouth's corners, bent until the lips' vertices are on their own sides.
 
     Raises:
         FaceError: feature points of the mouth that do not go from the middle to the left corner.

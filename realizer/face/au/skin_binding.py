@@ -17,7 +17,7 @@ AROUND = 16  # number of nearest triangles to look at
 
 
 def skin(face: Face) -> Bool:
-    """(n,) the vertices that units move themselves; what has grown on the skin goes with that."""
+    """Return which vertices (n,) units move directly; what grows on the skin follows it."""
     mine = np.zeros(len(face.vertices), bool)
     for part in MOVED:
         if part in face.parts:
@@ -26,12 +26,12 @@ def skin(face: Face) -> Bool:
 
 
 def attached_parts(face: Face) -> list[tuple[int, int, Int32, Float64]]:
-    """The parts that grow on the skin: first and last vertex, and what `skin_roots` says of them."""
+    """Return the parts that grow on the skin: first and last vertex, and their `skin_roots`."""
     return [(*face.parts[part], *skin_roots(face, part)) for part in GROWN if part in face.parts]
 
 
 def skin_roots(face: Face, part: str) -> tuple[Int32, Float64]:
-    """Three vertices of skin for each vertex of the part, (n, 3), and their shares, (n, 3).
+    """Return three vertices of skin for each vertex of the part, (n, 3), and their shares, (n, 3).
 
     What stands off, such as a lash's tip, follows the nearest vertex of the part that is on the skin.
     """
@@ -55,12 +55,12 @@ def skin_roots(face: Face, part: str) -> tuple[Int32, Float64]:
     share = np.clip(shares(corners[hit], place), 0, 1)
     # Parts far from the skin are bound to their nearest place on it as well.
     edges = half_edges(part_triangles(face.triangles, face.parts[part]))
-    grown = np.flatnonzero(off < NEAR)
+    attached = np.flatnonzero(off < NEAR)
     root = each.copy()
-    if len(grown) and len(edges):
+    if len(attached) and len(edges):
         graph = edge_graph(at, edges)
         away, _, source = dijkstra(
-            graph, directed=False, indices=grown, min_only=True, return_predecessors=True
+            graph, directed=False, indices=attached, min_only=True, return_predecessors=True
         )
         root[np.isfinite(away)] = source[np.isfinite(away)]
     return skin[hit[root]], np.asarray(share[root] / share[root].sum(axis=1)[:, None])

@@ -21,8 +21,8 @@ FURTHEST = 1.3
 class Succession:
     """The successive mixer (Wojdel 2005, 5.1): each unit moves the places where those before it left them.
 
-    A place that none of them has moved is moved as on the neutral face, and how is known beforehand; only
-    Where units overlap, their functions are evaluated again at every call.
+    Places that no unit has moved yet are displaced as on the neutral face, which is computed once. Where
+    units overlap, their functions are evaluated again at every call.
     """
 
     def __init__(self, face: Face, model: Model) -> None:
@@ -34,7 +34,7 @@ class Succession:
         self._still: dict[int, tuple[Float64, float]] = {}
 
     def __call__(self, values: Mapping[int, tuple[float, float]]) -> Float64:
-        """Units follow one another as in the mapping.
+        """Apply units one after the other in the order of the mapping.
 
         Args:
             values: action unit -> intensities 0..1 on the left and on the right.
@@ -60,7 +60,7 @@ class Succession:
         return out
 
     def _neutral(self, au: int) -> tuple[Float64, float]:
-        """(k, 3) metres that a unit moves the neutral face by, and how far it may move any place."""
+        """Return a unit's displacement of the neutral face, (k, 3), and its limit for any place, metres."""
         if au not in self._still:
             moves = self._model.displacement(au, self._at, upper=self._upper)
             moves[np.abs(moves).max(axis=1) < LEAST] = 0

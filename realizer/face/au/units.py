@@ -44,6 +44,6 @@ class Unit:
 
 @cache
 def units() -> dict[int, Unit]:
-    """Number -> unit, ascending."""
+    """Return number -> unit, ascending."""
     path = Path(__file__).with_name("units.csv")
     return {row.au: row for row in read_csv(path.read_text("utf-8"), Unit, path.name)}

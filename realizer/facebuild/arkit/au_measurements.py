@@ -15,7 +15,7 @@ OPEN = 0.3  # baked light below this: inside the head, or the inner side of a li
 
 
 def measure_units(face: Face, surface: Surface) -> dict[int, UnitMeasurement]:
-    """Each displacement unit that the shapes make, on the left half of the skin.
+    """Return each displacement unit that the shapes make, on the left half of the skin.
 
     Raises:
         FaceError: a mouth whose points do not go from the middle to the left corner.

@@ -61,7 +61,7 @@ class ShapedSkin:
         self.eyes = float(self.place["3.5"][0] - self.place["3.6"][0])
         # 1 on the lips, which FAP 3 leaves to their own FAPs, falling to 0 at the chin.
         reach = 0.95 * float(np.linalg.norm(self.place["8.2"] - self.place["2.1"]))
-        self.held = np.asarray(smooth(mouth.away, reach, 0.0015))
+        self.lip_share = np.asarray(smooth(mouth.away, reach, 0.0015))
 
     def move(self, *names: str) -> Float64 | None:
         """Return the sum of shapes, or None if one is missing."""
@@ -97,41 +97,41 @@ class ShapedSkin:
         return field / along
 
 
-def shape_fields(grown: ShapedSkin) -> dict[int, Float64]:
-    """FAP -> (n, 3) field on the skin, of every FAP that the head's shapes serve."""
-    found = _brows(grown) | _cheeks(grown) | _lids(grown) | _chin(grown) | _pushed(grown)
-    found |= _corners(grown, found)
-    found |= _upper_lip(grown, found) | _lower_lip(grown)
+def shape_fields(shaped: ShapedSkin) -> dict[int, Float64]:
+    """Return FAP -> field (n, 3) on the skin, for every FAP that the head's shapes serve."""
+    found = _brows(shaped) | _cheeks(shaped) | _lids(shaped) | _chin(shaped) | _pushed(shaped)
+    found |= _corners(shaped, found)
+    found |= _upper_lip(shaped, found) | _lower_lip(shaped)
     return {fap: field for fap, field in found.items() if field is not None}
 
 
-def _upper_lip(grown: ShapedSkin, made: Mapping[int, Float64 | None]) -> dict[int, Float64 | None]:
-    """The upper lip's FAPs from the shape that bares the upper teeth."""
-    move = grown.move("mouthUpperUpLeft", "mouthUpperUpRight")
+def _upper_lip(shaped: ShapedSkin, made: Mapping[int, Float64 | None]) -> dict[int, Float64 | None]:
+    """Return the fields of the upper lip, from the shape that bares the upper teeth."""
+    move = shaped.move("mouthUpperUpLeft", "mouthUpperUpRight")
     if move is None:
         return {}
     # Nose and cheeks have FAPs of their own.
-    move = grown.without(move, made, (41, 42, 61, 62, 63, 17))
-    near = smooth(grown.mouth.away, 0.030, 0.0) * grown.mouth.upper
-    return _line(grown, UPPER, move, near)
+    move = shaped.without(move, made, (41, 42, 61, 62, 63, 17))
+    near = smooth(shaped.mouth.away, 0.030, 0.0) * shaped.mouth.upper
+    return _line(shaped, UPPER, move, near)
 
 
-def _lower_lip(grown: ShapedSkin) -> dict[int, Float64 | None]:
+def _lower_lip(shaped: ShapedSkin) -> dict[int, Float64 | None]:
     """Return the fields of the lower lip: its share of an opening mouth; the rest belongs to FAP 3."""
-    move = grown.move("jawOpen")
+    move = shaped.move("jawOpen")
     if move is None:
         return {}
-    return _line(grown, LOWER, move, grown.held * (1 - grown.mouth.upper))
+    return _line(shaped, LOWER, move, shaped.lip_share * (1 - shaped.mouth.upper))
 
 
 def _line(
-    grown: ShapedSkin, line: Mapping[int, tuple[str, int, int]], move: Float64, near: Float64
+    shaped: ShapedSkin, line: Mapping[int, tuple[str, int, int]], move: Float64, near: Float64
 ) -> dict[int, Float64 | None]:
-    """A shape parted among the points of a lip."""
-    mouth, height = grown.mouth, np.zeros((2, 5))
+    """Return a shape divided among the points of a lip."""
+    mouth, height = shaped.mouth, np.zeros((2, 5))
     way = np.array(WAYS[faps()[min(line) - 1].direction])
     for name, knot, outer in line.values():
-        height[outer, knot] = -float(move[grown.vertex[name]] @ way)
+        height[outer, knot] = -float(move[shaped.vertex[name]] @ way)
     most = height.max()
     if most <= 0:
         return {}
@@ -140,23 +140,23 @@ def _line(
     local = (1 - mouth.outer) * (height[0] @ mouth.knots) + mouth.outer * (height[1] @ mouth.knots)
     profile = -move / local[:, None] * near[:, None]
     return {
-        fap: grown.exact(
+        fap: shaped.exact(
             fap, profile * ((mouth.outer if outer else 1 - mouth.outer) * mouth.knots[knot])[:, None]
         )
         for fap, (_, knot, outer) in line.items()
     }
 
 
-def _corners(grown: ShapedSkin, made: Mapping[int, Float64 | None]) -> dict[int, Float64 | None]:
-    """The corners' FAPs: a smile and a stretch, mixed so that the corner goes straight up or straight out."""
+def _corners(shaped: ShapedSkin, made: Mapping[int, Float64 | None]) -> dict[int, Float64 | None]:
+    """Return the fields of the corners: a smile and a stretch, mixed to move a corner straight up or out."""
     out: dict[int, Float64 | None] = {}
     for side, rows in CORNERS.items():
-        smile, wide = (grown.move(f"mouth{stem}{WORDS[side]}") for stem in ("Smile", "Stretch"))
+        smile, wide = (shaped.move(f"mouth{stem}{WORDS[side]}") for stem in ("Smile", "Stretch"))
         if smile is None or wide is None:
             continue
-        smile, wide = (grown.without(shape, made, (41 if side > 0 else 42,)) for shape in (smile, wide))
+        smile, wide = (shaped.without(shape, made, (41 if side > 0 else 42,)) for shape in (smile, wide))
         for across, upward, name, outer in rows:
-            vertex = grown.vertex[name]
+            vertex = shaped.vertex[name]
             pull = np.array(
                 [[smile[vertex, 0] * side, wide[vertex, 0] * side], [smile[vertex, 1], wide[vertex, 1]]]
             )
@@ -164,48 +164,48 @@ def _corners(grown: ShapedSkin, made: Mapping[int, Float64 | None]) -> dict[int,
             if size.min() < 1e-4 or abs(np.linalg.det(pull / size)) < 0.2:
                 continue  # both pull the same way
             mixes = np.linalg.solve(pull, np.eye(2))
-            share = (grown.mouth.outer if outer else 1 - grown.mouth.outer) * grown.mouth.knots[
+            share = (shaped.mouth.outer if outer else 1 - shaped.mouth.outer) * shaped.mouth.knots[
                 4 if side > 0 else 0
             ]
             for fap, mix in ((across, mixes[:, 0]), (upward, mixes[:, 1])):
-                out[fap] = grown.exact(fap, (smile * mix[0] + wide * mix[1]) * share[:, None])
+                out[fap] = shaped.exact(fap, (smile * mix[0] + wide * mix[1]) * share[:, None])
     return out
 
 
-def _pushed(grown: ShapedSkin) -> dict[int, Float64 | None]:
-    """FAPs 16 and 17: how far a funnel brings each lip forwards."""
-    move = grown.move("mouthFunnel")
+def _pushed(shaped: ShapedSkin) -> dict[int, Float64 | None]:
+    """Return the fields of FAPs 16 and 17: the forward movement of each lip in a funnel."""
+    move = shaped.move("mouthFunnel")
     if move is None:
         return {}
-    bow = (1 + np.cos(np.pi * np.clip(grown.mouth.along, -1, 1))) / 2
+    bow = (1 + np.cos(np.pi * np.clip(shaped.mouth.along, -1, 1))) / 2
     ahead = np.clip(move[:, 2:], 0, None) * bow[:, None] * [0, 0, 1.0]
-    upper = grown.mouth.upper[:, None]
-    return {16: grown.exact(16, ahead * (1 - upper)), 17: grown.exact(17, ahead * upper)}
+    upper = shaped.mouth.upper[:, None]
+    return {16: shaped.exact(16, ahead * (1 - upper)), 17: shaped.exact(17, ahead * upper)}
 
 
-def _calm(grown: ShapedSkin) -> Float64:
-    """(n, 1) 0 on the lids' edges, which follow no brow and no cheek, 1 elsewhere."""
-    shut = np.zeros(len(grown.skin))
+def _calm(shaped: ShapedSkin) -> Float64:
+    """Return 0 on the edges of the lids, which follow no brow and no cheek, 1 elsewhere, (n, 1)."""
+    shut = np.zeros(len(shaped.skin))
     for word in WORDS.values():
-        blink = grown.move(f"eyeBlink{word}")
+        blink = shaped.move(f"eyeBlink{word}")
         if blink is not None:
             size = np.linalg.norm(blink, axis=1)
             shut = np.maximum(shut, size / max(float(size.max()), 1e-12))
     return np.asarray(1 - smooth(shut, 0.08, 0.6))[:, None]
 
 
-def _brows(grown: ShapedSkin) -> dict[int, Float64 | None]:
-    move = grown.move("browInnerUp", "browOuterUpLeft", "browOuterUpRight")
+def _brows(shaped: ShapedSkin) -> dict[int, Float64 | None]:
+    move = shaped.move("browInnerUp", "browOuterUpLeft", "browOuterUpRight")
     if move is None:
         return {}
-    move = grown.smoothed(move * _calm(grown), 1)
+    move = shaped.smoothed(move * _calm(shaped), 1)
     out: dict[int, Float64 | None] = {}
     for side, line in BROWS.items():
-        x = grown.skin[:, 0] * side
-        stations = np.abs([grown.place[name][0] for _, name in line])
+        x = shaped.skin[:, 0] * side
+        stations = np.abs([shaped.place[name][0] for _, name in line])
         if (np.diff(stations) <= 0).any():
             continue
-        height = np.array([move[grown.vertex[name], 1] for _, name in line])
+        height = np.array([move[shaped.vertex[name], 1] for _, name in line])
         height = np.maximum(height, FLOOR * height.max())
         if height.max() <= 0:
             continue
@@ -213,59 +213,59 @@ def _brows(grown: ShapedSkin) -> dict[int, Float64 | None]:
         shares = (1 - ramps[0], ramps[0] - ramps[1], ramps[1])
         local = sum(share * tall for share, tall in zip(shares, height, strict=True))
         # The two sides share the middle: together they lift it once.
-        half = smooth(x, -0.2 * grown.eyes, 0.2 * grown.eyes)
+        half = smooth(x, -0.2 * shaped.eyes, 0.2 * shaped.eyes)
         for (fap, _), share in zip(line, shares, strict=True):
-            out[fap] = grown.exact(fap, move * (half * share / local)[:, None])
+            out[fap] = shaped.exact(fap, move * (half * share / local)[:, None])
     return out
 
 
-def _cheeks(grown: ShapedSkin) -> dict[int, Float64 | None]:
+def _cheeks(shaped: ShapedSkin) -> dict[int, Float64 | None]:
     out: dict[int, Float64 | None] = {}
-    free = np.asarray(smooth(grown.mouth.away, 0.0, 0.012))[:, None]
-    puff = grown.move("cheekPuff")
+    free = np.asarray(smooth(shaped.mouth.away, 0.0, 0.012))[:, None]
+    puff = shaped.move("cheekPuff")
     for side, puffed, lifted in ((1, 39, 41), (-1, 40, 42)):
         if puff is not None:
-            half = smooth(grown.skin[:, 0] * side, -0.008, 0.008)
-            far = smooth(grown.mouth.away, 0.0, 0.032)
-            out[puffed] = grown.exact(puffed, puff * (half * far)[:, None], BLOWN)
-        squint = grown.move(f"cheekSquint{WORDS[side]}")
+            half = smooth(shaped.skin[:, 0] * side, -0.008, 0.008)
+            far = smooth(shaped.mouth.away, 0.0, 0.032)
+            out[puffed] = shaped.exact(puffed, puff * (half * far)[:, None], BLOWN)
+        squint = shaped.move(f"cheekSquint{WORDS[side]}")
         if squint is not None:
-            out[lifted] = grown.exact(lifted, grown.smoothed(squint * free * _calm(grown), 1))
+            out[lifted] = shaped.exact(lifted, shaped.smoothed(squint * free * _calm(shaped), 1))
     return out
 
 
-def _chin(grown: ShapedSkin) -> dict[int, Float64 | None]:
-    """FAP 18 from the shrug of the lower lip, without the lip."""
-    move = grown.move("mouthShrugLower")
+def _chin(shaped: ShapedSkin) -> dict[int, Float64 | None]:
+    """Return the field of FAP 18, from the shrug of the lower lip without the lip."""
+    move = shaped.move("mouthShrugLower")
     if move is None:
         return {}
-    free = smooth(grown.mouth.away, 0.001, 0.010) * (1 - grown.mouth.upper)
-    return {18: grown.exact(18, grown.smoothed(move * free[:, None], 1))}
+    free = smooth(shaped.mouth.away, 0.001, 0.010) * (1 - shaped.mouth.upper)
+    return {18: shaped.exact(18, shaped.smoothed(move * free[:, None], 1))}
 
 
-def _lids(grown: ShapedSkin) -> dict[int, Float64 | None]:
+def _lids(shaped: ShapedSkin) -> dict[int, Float64 | None]:
     """Return FAPs 19 to 22 from the blink; both lids together close the opening at every place."""
     out: dict[int, Float64 | None] = {}
     for side, top, bottom in ((1, 19, 21), (-1, 20, 22)):
-        move = grown.move(f"eyeBlink{WORDS[side]}")
+        move = shaped.move(f"eyeBlink{WORDS[side]}")
         if move is None:
             continue
-        up = grown.upper_lid[side]
-        x = grown.skin[:, 0] * side
+        up = shaped.upper_lid[side]
+        x = shaped.skin[:, 0] * side
         falls, rises = -move[:, 1] * up, move[:, 1] * (1 - up)
         moved = np.linalg.norm(move, axis=1) > 0.1 * np.linalg.norm(move, axis=1).max()
         places = np.linspace(x[moved].min(), x[moved].max(), BINS)
         fall, rise = _most(x, falls, places), _most(x, rises, places)
         gap = np.interp(x, places, fall + rise) / np.maximum(np.interp(x, places, fall), 1e-6)
-        out[top] = grown.exact(top, move * (up * np.clip(gap, 1, 3))[:, None])
-        middle = abs(float(grown.place["3.3"][0]))
+        out[top] = shaped.exact(top, move * (up * np.clip(gap, 1, 3))[:, None])
+        middle = abs(float(shaped.place["3.3"][0]))
         open_ = np.interp(x, places, fall + rise) / max(float(np.interp(middle, places, fall + rise)), 1e-9)
-        out[bottom] = grown.exact(bottom, grown.zones[bottom] * np.clip(open_, 0, 1.2)[:, None])
+        out[bottom] = shaped.exact(bottom, shaped.zones[bottom] * np.clip(open_, 0, 1.2)[:, None])
     return out
 
 
 def _most(x: Float64, amount: Any, places: Float64) -> Float64:
-    """The largest amount near each place, smooth from place to place."""
+    """Return the largest amount near each place, smoothed from place to place."""
     step = places[1] - places[0]
     near = np.abs(x[:, None] - places) < 0.75 * step
     most = np.where(near, amount[:, None], 0).max(axis=0)

@@ -115,7 +115,7 @@ class Gltf:
         return items[index]
 
     def accessor(self, index: Any) -> Float64:
-        """An accessor's values, (count, width) float64, normalised ones as -1..1 or 0..1.
+        """Return an accessor's values, (count, width) float64; normalised ones as -1..1 or 0..1.
 
         Raises:
             FaceError: it, its view or its bytes are not there.
@@ -188,7 +188,7 @@ class Gltf:
         return self._buffers[index]
 
     def _fetch(self, uri: str) -> bytes:
-        """The bytes behind a URI: data, or a file beside this one; never the network."""
+        """Return the bytes behind a URI: data, or a file beside this one; never the network."""
         if uri.startswith("data:"):
             try:
                 return base64.b64decode(uri.partition(",")[2], validate=False)

@@ -216,9 +216,9 @@ def _write_fields(
     with np.load(folder / "fields.npz") as file:
         stored: dict[str, Any] = {name: file[name] for name in file.files}
     rows = unpack(stored, len(at))
-    grown = _shaped_skin(surface, ranges, points, rows)
-    made = shape_fields(grown)
-    words = _jaw(grown, surface, ranges, rows, stored, points, made)
+    shaped = _shaped_skin(surface, ranges, points, rows)
+    made = shape_fields(shaped)
+    words = _jaw(shaped, surface, ranges, rows, stored, points, made)
     for fap, field in made.items():
         rows[fap] = with_brows(at, ranges, field, rows[fap])
     if head.painted:
@@ -253,25 +253,26 @@ def _shaped_skin(
 
 
 def _jaw(
-    grown: ShapedSkin, surface: Surface, ranges: dict[str, tuple[int, int]], rows: dict[int, Float64],
+    shaped: ShapedSkin, surface: Surface, ranges: dict[str, tuple[int, int]], rows: dict[int, Float64],
     stored: dict[str, Any], points: dict[str, Point], made: dict[int, Float64],
 ) -> tuple[str, ...]:  # fmt: skip
-    """Rows of the opening, thrust and shift of the jaw where the head has shapes for them."""
+    """Replace the rows of the jaw's opening, thrust and shift where the head has shapes for them."""
     first, last = ranges["skin"]
     chin = points["2.1"].vertex
     words: tuple[str, ...] = ()
-    opening = grown.move("jawOpen")
+    opening = shaped.move("jawOpen")
     if opening is not None:
         whole, usual = surface.move("jawOpen"), np.asarray(stored["jaw_pivot"], float)
         # Teeth go whole with the bone; skin is dragged along by less.
         bone = slice(*ranges.get("lower_teeth", (0, 0)))
         bone = bone if np.abs(whole[bone]).max(initial=0) > 0.004 else slice(first, last)
-        pivot, told = joint_of(surface.vertices[bone], whole[bone], usual, grown.eyes)
-        words = (f"the jaw turns about {np.round(pivot, 3).tolist()}" + ("" if told else ", by proportions"),)
+        pivot, found = joint_of(surface.vertices[bone], whole[bone], usual, shaped.eyes)
+        how = "" if found else ", by proportions"
+        words = (f"the jaw turns about {np.round(pivot, 3).tolist()}{how}",)
         stored["jaw_pivot"] = pivot
         # Without its part of the lips the shape is what FAP 3 asks for.
         opens = np.zeros(len(surface.vertices))
-        opens[first:last] = drag_of(grown.skin, opening, pivot, chin - first) * (1 - grown.held)
+        opens[first:last] = drag_of(shaped.skin, opening, pivot, chin - first) * (1 - shaped.lip_share)
         opens[first:last] /= max(float(opens[chin]), 1e-6)
         opens = np.clip(opens, 0, 1)
         for part in ("lower_teeth", "tongue"):
@@ -279,20 +280,20 @@ def _jaw(
                 opens[slice(*ranges[part])] = 1
         opens = with_brows(surface.vertices, ranges, opens[first:last, None], opens[:, None])[:, 0]
         rows |= opening_rows(surface.vertices, pivot, opens)
-    thrust = grown.move("jawForward")
-    aside = grown.move("jawRight", "jawLeft")
+    thrust = shaped.move("jawForward")
+    aside = shaped.move("jawRight", "jawLeft")
     for fap, shape in (
         (14, None if thrust is None else thrust * [0, 0, 1]),
-        (15, None if aside is None else (grown.moves["jawRight"] - grown.moves["jawLeft"]) * [1.0, 0, 0]),
+        (15, None if aside is None else (shaped.moves["jawRight"] - shaped.moves["jawLeft"]) * [1.0, 0, 0]),
     ):
-        field = None if shape is None else grown.exact(fap, shape)
+        field = None if shape is None else shaped.exact(fap, shape)
         if field is not None:
             made[fap] = field
     return words
 
 
 def _gaze_rows(surface: Surface, ranges: dict[str, tuple[int, int]]) -> dict[int, Float64]:
-    """Rows of FAPs 23 to 26, metres a radian, of eyes that are no balls: the shapes that look about."""
+    """Return the rows of FAPs 23 to 26, metres a radian, for painted eyes: the shapes that look around."""
     rows = {}
     for part, word, yaw, pitch, left in (
         ("left_eye", "Left", 23, 25, "Out"), ("right_eye", "Right", 24, 26, "In"),

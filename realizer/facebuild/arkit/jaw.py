@@ -37,12 +37,12 @@ def joint_of(at: Float64, move: Float64, usual: Float64, eyes: float) -> tuple[F
     if abs(np.linalg.det(turn)) < 1e-6:
         return usual, False
     place = np.array([usual[0], *np.linalg.solve(turn, [-dy, -dz])])
-    told = bool(s > 0 and np.linalg.norm(place - usual) < FAR * eyes)
-    return (place, True) if told else (usual, False)
+    plausible = bool(s > 0 and np.linalg.norm(place - usual) < FAR * eyes)
+    return (place, True) if plausible else (usual, False)
 
 
 def drag_of(at: Float64, move: Float64, pivot: Float64, chin: int) -> Float64:
-    """(n,) 0..1, how far each vertex goes along when the jaw opens as far as the shape has it.
+    """Return how far each vertex follows the jaw when it opens as in the shape, (n,) 0..1.
 
     Args:
         move: (n, 3), the opening; chin: the vertex that goes all the way.

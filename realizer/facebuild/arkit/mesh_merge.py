@@ -40,7 +40,7 @@ class Surface:
         return self.moves.get(name, np.zeros_like(self.vertices))
 
     def subset(self, vertices: Any) -> Surface:
-        """The surface of some vertices, in the order given, and the triangles that they alone make."""
+        """Return the surface of the given vertices, in their order, with the triangles between them."""
         index = np.asarray(vertices)
         place = np.full(len(self.vertices), -1)
         place[index] = np.arange(len(index))
@@ -57,7 +57,7 @@ class Surface:
 
 
 def merge_pieces(pieces: Sequence[Piece]) -> Surface:
-    """The pieces as one surface; pieces that one looks through are left out."""
+    """Return the pieces as one surface, without transparent pieces."""
     pieces = [piece for piece in pieces if not piece.glass]
     counts = np.cumsum([0] + [len(piece.vertices) for piece in pieces])
     total = int(counts[-1])
@@ -81,10 +81,10 @@ def merge_pieces(pieces: Sequence[Piece]) -> Surface:
 
 
 def _welded(surface: Surface) -> Surface:
-    """Vertices on one place that move alike are one: files double them along every seam of a texture."""
+    """Merge vertices at one place that move alike: files double them along every seam of a texture."""
     size = float(np.ptp(surface.vertices, axis=0).max()) or 1.0
-    told = [surface.vertices, *surface.moves.values()]
-    key = np.rint(np.concatenate(told, axis=1) / (size * SAME)).astype(np.int64)
+    columns = [surface.vertices, *surface.moves.values()]
+    key = np.rint(np.concatenate(columns, axis=1) / (size * SAME)).astype(np.int64)
     _, first, group = np.unique(key, axis=0, return_index=True, return_inverse=True)
     group = group.ravel()
     corners = group[surface.triangles]
@@ -108,7 +108,7 @@ def _welded(surface: Surface) -> Surface:
 
 
 def components(triangles: Int32, n: int) -> Int32:
-    """(n,) number of the connected piece that each vertex belongs to."""
+    """Return the number of the connected piece of each vertex, (n,)."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 

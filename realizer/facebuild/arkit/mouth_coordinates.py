@@ -42,7 +42,7 @@ class Mouth:
 
 
 def mouth_of(skin: Float64, triangles: Int32, points: Mapping[str, Triple], upper: Int32) -> Mouth:
-    """Coordinates of the skin's vertices.
+    """Return the coordinates of the skin's vertices.
 
     Args:
         skin: (n, 3) metres; triangles: (m, 3) of the skin; upper: vertices above the slit.
@@ -66,7 +66,7 @@ def mouth_of(skin: Float64, triangles: Int32, points: Mapping[str, Triple], uppe
 
 
 def _ways(graph: Any, at: Float64, place: Mapping[str, Float64], contours: Any) -> tuple[Float64, Int32]:
-    """(n,) metres over the skin to the contours, and the vertex of theirs that is nearest."""
+    """Return the distance (n,) over the skin to the contours in metres, and their nearest vertex."""
     from scipy.sparse.csgraph import dijkstra
     from scipy.spatial import cKDTree
 
@@ -83,6 +83,6 @@ def _ways(graph: Any, at: Float64, place: Mapping[str, Float64], contours: Any) 
 
 
 def _along(at: Float64, place: Mapping[str, Float64], contours: Any) -> Float64:
-    """(n,) the contours' five points at -1, -0.5, 0, 0.5 and 1, and evenly between them."""
+    """Return the place along the lips, (n,): -1, -0.5, 0, 0.5 and 1 at the contours' five points."""
     x = np.mean([[place[name][0] for name in contour] for contour in contours], axis=0)
     return np.asarray(np.interp(at[:, 0], x, [-1, -0.5, 0, 0.5, 1]))

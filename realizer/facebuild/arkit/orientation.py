@@ -94,7 +94,7 @@ def pose_of(surface: Surface) -> Pose:
 
 
 def oriented(surface: Surface, pose: Pose) -> Surface:
-    """The surface in metres, origin between the eyes, +x the character's left, +y up, +z forward."""
+    """Return the surface in metres, origin between the eyes, +x the character's left, +y up, +z forward."""
     moves = {name: move @ pose.turn.T * pose.scale for name, move in surface.moves.items()}
     if pose.swapped:
         moves = {other_side(name): move for name, move in moves.items()}

@@ -77,7 +77,7 @@ def sort_parts(surface: Surface) -> HeadParts:
     """
     n = len(surface.vertices)
     label = components(surface.triangles, n)
-    said = [part_of(names) for names in surface.names]
+    named = [part_of(names) for names in surface.names]
     total = np.sum([np.linalg.norm(move, axis=1) for move in surface.moves.values()], axis=0)
     moved = np.bincount(label, total)
     if not moved.any():
@@ -89,7 +89,7 @@ def sort_parts(surface: Surface) -> HeadParts:
     for k in range(label.max() + 1):
         mine = np.flatnonzero(label == k)
         # A piece with several materials takes the part of most of its surface.
-        votes = np.bincount([names.index(said[p]) for p in surface.piece[mine]], minlength=len(names))
+        votes = np.bincount([names.index(named[p]) for p in surface.piece[mine]], minlength=len(names))
         part = names[int(np.argmax(votes))]
         if part in ("", "skin"):
             part = "skin" if k == main else _by_shape(surface, mine, part)
@@ -119,13 +119,13 @@ def sort_parts(surface: Surface) -> HeadParts:
     return HeadParts(parts, painted, tuple(words), tuple(unsure))
 
 
-def _by_shape(surface: Surface, mine: Any, said: str) -> str:
+def _by_shape(surface: Surface, mine: Any, named: str) -> str:
     """Return the part of a piece whose names say nothing."""
     at = surface.vertices[mine]
     middle = (at.min(axis=0) + at.max(axis=0)) / 2
     if is_ball(at) and abs(middle[1]) < AT_EYE and 0.015 < abs(middle[0]) < 0.055 and middle[2] > -0.05:
         return "eye"
-    if said == "skin":
+    if named == "skin":
         return "skin"
     mouth = _place(surface, "mouth")
     if mouth is not None:
@@ -146,7 +146,7 @@ def is_ball(at: Float64) -> bool:
 
 
 def ball_behind(at: Float64) -> tuple[Float64, float]:
-    """Centre and radius of the ball that would lie behind an eye (n, 3) that is part of the skin."""
+    """Return centre and radius of the ball behind an eye (n, 3) that is part of the skin."""
     middle = np.asarray((at.min(axis=0) + at.max(axis=0)) / 2)
     return np.array([middle[0], middle[1], at[:, 2].max() - EYEBALL]), EYEBALL
 
@@ -170,7 +170,7 @@ def _eyes(surface: Surface, mine: Any) -> dict[str, Any]:
 
 
 def _painted(surface: Surface, parts: dict[str, Any]) -> dict[str, Any]:
-    """The skin's vertices that look about: eyes that hang together with the face."""
+    """Return the vertices of the skin that look around: eyes that are part of the face's mesh."""
     out: dict[str, Any] = {}
     skin = np.zeros(len(surface.vertices), bool)
     skin[parts["skin"]] = True
@@ -188,7 +188,7 @@ def _painted(surface: Surface, parts: dict[str, Any]) -> dict[str, Any]:
 
 
 def _teeth(surface: Surface, mine: Any) -> tuple[Any, Any, list[str]]:
-    """Upper and lower teeth: the lower ones go with the jaw."""
+    """Return upper teeth, lower teeth, which move with the jaw, and doubts."""
     if not len(mine):
         return mine, mine, []
     drop = np.linalg.norm(surface.move("jawOpen")[mine], axis=1)
@@ -213,7 +213,7 @@ def _teeth(surface: Surface, mine: Any) -> tuple[Any, Any, list[str]]:
 
 
 def _bust(surface: Surface) -> Bool:
-    """(n,) what belongs to head and shoulders; hands and feet do not."""
+    """Return which vertices belong to head and shoulders, (n,); hands and feet do not."""
     at = surface.vertices
     keep: Bool = (at[:, 1] > FLOOR) & (np.abs(at[:, 0]) < ASIDE)
     return keep

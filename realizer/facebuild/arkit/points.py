@@ -27,7 +27,7 @@ BACK = 0.35  # a metre farther back weighs as much as so much farther from the o
 def points_of(
     surface: Surface, ranges: Mapping[str, tuple[int, int]], painted: bool = False
 ) -> tuple[dict[str, Point], tuple[str, ...]]:
-    """The feature points, and those that are guesses.
+    """Return the feature points, and the names of those that are guesses.
 
     The form decides most points (`mpeg4.find_points`); where the lips meet and at the edges of the lids the
     shapes decide: what moves with the upper lip is upper lip, however close the lower one lies.
@@ -64,7 +64,7 @@ def _size(surface: Surface, *names: str) -> Any:
 
 
 def _slit(skin: Surface, points: Mapping[str, Point], first: int) -> dict[str, int]:
-    """The inner contours of the lips: of what each lip's shape moves, where the two touch, in front."""
+    """Return the inner contours of the lips: where the regions of the two lips' shapes touch, in front."""
     from scipy.spatial import cKDTree
 
     up = _size(skin, "mouthUpperUpLeft", "mouthUpperUpRight")

@@ -40,7 +40,7 @@ class Piece:
 
 
 def read_pieces(gltf: Gltf) -> list[Piece]:
-    """Every piece of surface of the file's scene.
+    """Return every piece of surface of the file's scene.
 
     Raises:
         FaceError: an index or an array that is not there.
@@ -61,7 +61,7 @@ def read_pieces(gltf: Gltf) -> list[Piece]:
 
 
 def _worlds(gltf: Gltf) -> Iterator[tuple[int, Float64]]:
-    """Number and (4, 4) matrix of each node of the scene."""
+    """Yield number and matrix (4, 4) of each node of the scene."""
     scenes = gltf.list("scenes")
     nodes = gltf.list("nodes")
     if scenes:
@@ -159,7 +159,7 @@ def _triangles(corners: Any, mode: int) -> Any:
 
 
 def _target_names(gltf: Gltf, mesh: dict[str, Any], primitive: dict[str, Any]) -> list[str]:
-    """Names of a primitive's morph targets.
+    """Return the names of a primitive's morph targets.
 
     glTF has no place of its own for them: most tools write mesh.extras.targetNames, some the primitive's
     extras, and some name the accessors.
@@ -207,14 +207,14 @@ def _skinned(
 def _colours(
     gltf: Gltf, material: dict[str, Any], attributes: dict[str, Any], n: int
 ) -> tuple[Float64, bool, float]:
-    """(n, 3) sRGB 0..255 of texture, factor and vertex colours; whether a picture was there; mean alpha."""
+    """Return sRGB 0..255 (n, 3) of texture, factor and vertex colours, if there is a texture, mean alpha."""
     look = material.get("pbrMetallicRoughness", {})
     factor = np.array(look.get("baseColorFactor", (1, 1, 1, 1)), float)
     light, alpha, textured = np.tile(factor[:3], (n, 1)), np.full(n, factor[3]), False
     if "COLOR_0" in attributes:
-        given = gltf.accessor(attributes["COLOR_0"])
-        light = light * given[:, :3]
-        alpha = alpha * (given[:, 3] if given.shape[1] > 3 else 1)
+        vertex_colours = gltf.accessor(attributes["COLOR_0"])
+        light = light * vertex_colours[:, :3]
+        alpha = alpha * (vertex_colours[:, 3] if vertex_colours.shape[1] > 3 else 1)
     texture = look.get("baseColorTexture")
     if texture:
         shift = texture.get("extensions", {}).get("KHR_texture_transform", {})
@@ -236,7 +236,7 @@ def _shifted(uv: Float64, shift: dict[str, Any]) -> Float64:
 
 
 def sample(pixels: Any, uv: Float64) -> Float64:
-    """(n, 4) of a picture at texture coordinates (n, 2), between the four nearest pixels; it repeats."""
+    """Return the colours (n, 4) of a repeating picture at texture coordinates (n, 2), interpolated."""
     height, width = pixels.shape[:2]
     x, y = uv[:, 0] * width - 0.5, uv[:, 1] * height - 0.5
     left, top = np.floor(x).astype(int), np.floor(y).astype(int)

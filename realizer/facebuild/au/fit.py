@@ -110,12 +110,12 @@ def fit_models(
 
 
 def table(model: Model, measured: Mapping[int, UnitMeasurement]) -> tuple[Row, ...]:
-    """Her table 4.3 for the units that both have."""
+    """Return Wojdel's table 4.3 for the units that both have."""
     return tuple(_row(model.units[au], one, model.mouth) for au, one in measured.items() if au in model.units)
 
 
 def table_text(rows: tuple[Row, ...]) -> str:
-    """The table as she prints it, in millimetres."""
+    """Return the table as Wojdel prints it, in millimetres."""
     lines = ["AU        n       d   d_max       e   e_max  e/d_max  e_max/d_max"]
     for row in rows:
         lengths = "".join(f"{1000 * value:8.3f}" for value in (row.d, row.d_max, row.e, row.e_max))
@@ -202,7 +202,7 @@ def _motion(origin: Float64, found: FitResult, size: float) -> Motion:
 
 
 def _head(face: Face) -> HeadTurn:
-    """The smooth step that comes nearest to how the face's own vertices follow its head."""
+    """Return the smooth step that comes nearest to how the face's own vertices follow its head."""
     from scipy.optimize import least_squares
 
     weight = np.asarray(face.basis["head"], np.float64).ravel()

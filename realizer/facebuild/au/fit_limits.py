@@ -39,7 +39,7 @@ class WatchedPlaces:
         self.at, self.upper, self.plane = at, upper, plane
 
     def of(self, half: str) -> Float64:
-        """The places (k, 3) that a half's motion has any part in: "whole", "upper" or "lower"."""
+        """Return the places (k, 3) that the motion of "whole", "upper" or "lower" has any part in."""
         if half == "whole":
             return self.at
         most, least = np.maximum(self.upper, self.plane), np.minimum(self.upper, self.plane)
@@ -47,7 +47,7 @@ class WatchedPlaces:
 
 
 def watched_places(face: Face, mouth: Mouth, between: bool = False) -> WatchedPlaces:
-    """Every vertex that units move, mirrored onto the left.
+    """Return every vertex that units move, mirrored onto the left.
 
     Args:
         between: the middles of the skin's triangles and of their edges too.
@@ -89,7 +89,7 @@ def overshoot(gaussians: Float64, at: Float64) -> tuple[Float64, Float64]:
 
 
 def runaways(face: Face, model: Model, measured: Mapping[int, UnitMeasurement]) -> tuple[str, ...]:
-    """A sentence for each unit that moves a vertex of the face further than `FURTHEST` times d_max."""
+    """Return a sentence for each unit that moves a vertex of the face further than `FURTHEST` times d_max."""
     places = watched_places(face, model.mouth)
     out = []
     for au, one in measured.items():

@@ -53,7 +53,7 @@ class Landmark:
 
 
 def read_measurements(path: Path) -> dict[int, UnitMeasurement]:
-    """Measurements from a CSV file: a row a landmark and action unit (au,x,y,z,dx,dy,dz in metres).
+    """Read measurements from a CSV file: a row a landmark and action unit (au,x,y,z,dx,dy,dz in metres).
 
     Landmarks of one side are enough (Wojdel 2005, 4.2.1): the action units are even.
 
@@ -87,7 +87,7 @@ def read_measurements(path: Path) -> dict[int, UnitMeasurement]:
 
 
 def read_shapes(path: Path) -> dict[int, UnitMeasurement]:
-    """Measurements from a face's own shapes, as `write_shapes` left them.
+    """Read measurements from a face's own shapes, as `write_shapes` stores them.
 
     Raises:
         FaceError: no such file, or arrays that do not fit together.

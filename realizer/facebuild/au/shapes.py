@@ -32,7 +32,7 @@ AROUND = 32  # number of nearest triangles to look at
 def measure_shapes(
     face: Face, folder: Path, data: Path, wanted: Iterable[Unit] | None = None
 ) -> dict[int, UnitMeasurement]:
-    """Each displacement unit's shape on the left half (x >= 0) of a face's skin.
+    """Return the shape of each displacement unit on the left half (x >= 0) of a face's skin.
 
     Args:
         face: built from the data.

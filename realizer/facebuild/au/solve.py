@@ -34,7 +34,7 @@ class Free:
 
 
 def mirrored_angles() -> tuple[Free, Free]:
-    """Mirror symmetric angles: alpha is a right angle plus an odd function of x, beta is even in x."""
+    """Return mirror symmetric angles: alpha is a right angle plus an odd function of x, beta even in x."""
     alpha = np.zeros((ANGLE, 7))
     start = np.zeros(ANGLE)
     for column, row in enumerate((0, 1, 2, 5, 12, 13, 15)):  # xx, yy, zz, yz times x; xy, xz; x
@@ -47,7 +47,7 @@ def mirrored_angles() -> tuple[Free, Free]:
 
 
 def mirrored_gaussians(layout: str) -> Free:
-    """Kinds of Gaussians: `p` is a pair, one a side; `c` is central: "pc" are three Gaussians."""
+    """Return the parameters of Gaussians: `p` is a pair, one a side; `c` is central: "pc" are three."""
     blocks = []
     for kind in layout:
         if kind == "p":
@@ -96,7 +96,7 @@ class FitResult:
 
 
 def least(residual: Callable[[Any], tuple[Float64, Float64]], start: Float64, evaluations: int) -> Float64:
-    """The parameters that make the squares of the residual least; `residual` gives it and its derivatives.
+    """Return the parameters of least squares; `residual` returns the residual and its derivatives.
 
     Levenberg's and Marquardt's method on the normal equations, damped as Nielsen (1999) says: with some fifty
     parameters and thousands of residuals many times quicker than one that factors the derivatives.
@@ -135,7 +135,7 @@ def least(residual: Callable[[Any], tuple[Float64, Float64]], start: Float64, ev
 
 
 def lengths(miss: Float64, weight: Float64) -> Float64:
-    """Weights (n,) under which the sum of squares has the same slope as the weighted sum of lengths."""
+    """Return weights (n,) whose sum of squares has the same slope as the weighted sum of lengths."""
     return np.asarray(np.sqrt(weight / np.sqrt((miss**2).sum(axis=1) + SOFT**2)))
 
 
@@ -203,7 +203,7 @@ class Fit:
         return x, float((residual(x)[0] ** 2).sum())
 
     def joint(self, layout: str, bells: Float64, angles: Float64) -> FitResult:
-        """Both functions polished together: the least weighted sum of the lengths of the misses."""
+        """Polish both functions together: minimise the weighted sum of the lengths of the misses."""
         form = mirrored_gaussians(layout)
         split = len(bells)
         x = np.concatenate([bells, angles])
@@ -248,7 +248,7 @@ class Fit:
         return FitResult(layout, best[:split], best[split:], cost)
 
     def published(self) -> FitResult:
-        """The best of one or two Gaussians."""
+        """Return the best fit of one or two Gaussians."""
         ways = self.directions()
         ways = [ways[0], *(one for one in ways[1:] if one[1] > ways[0][1] * 1.02)][:2]
         found = [
@@ -260,7 +260,7 @@ class Fit:
         return min(found, key=lambda one: one.cost)
 
     def extended(self, published: FitResult) -> FitResult:
-        """The best of up to four Gaussians: some added where most is missing, or four from the start."""
+        """Return the best fit of up to four Gaussians, added where most is missing or four from the start."""
         found = [self.joint(layout, self.densities(layout)[0], published.angles) for layout in EXTENDED]
         grown = published
         while len(grown.gaussians) < MOST:
@@ -271,7 +271,7 @@ class Fit:
         return min([*found, grown], key=lambda one: one.cost)
 
     def _grown(self, found: FitResult, most: int) -> Iterator[tuple[str, Float64, Float64]]:
-        """Starts with one more Gaussian, or one more on each side, at the point that lacks most."""
+        """Yield starts with one more Gaussian, or one more on each side, at the point that lacks most."""
         way = self._way(found.angles, self.at)[0]
         lack = np.einsum("ij,ij->i", self.moves, way) - density(found.gaussians, self.at)[0]
         worst = int(np.argmax(self.weight * np.abs(lack)))
@@ -283,7 +283,7 @@ class Fit:
             yield found.layout + ("p" if pair else "c"), np.append(found.bells, more), found.angles
 
     def _way(self, x: Float64, at: Float64) -> tuple[Float64, Float64]:
-        """Directions (n, 3) and their derivatives (n, 3, 20) by the free parameters."""
+        """Return directions (n, 3) and their derivatives (n, 3, 20) by the free parameters."""
         alpha, by_alpha = angle(self.alpha(x[:7]), at)
         beta, by_beta = angle(self.beta(x[7:]), at)
         way, turned, raised = direction(alpha, beta)

@@ -80,7 +80,7 @@ def _mark(folder: Path) -> tuple[str, ...]:
 
 
 def setup_of(folder: Path) -> Setup:
-    """The parameters of a face folder: what its mpeg4.toml says, or else computed from mesh and points.
+    """Return the parameters of a face folder: its mpeg4.toml, or computed from mesh and points.
 
     Raises:
         FaceError: a file is missing or broken, or the points are.
@@ -159,7 +159,7 @@ def _head(folder: Path) -> tuple[Float64, Any, dict[str, tuple[int, int]]]:
 def _softened(
     fields: Mapping[int, Float64], setup: Setup, at: Float64, triangles: Any, skin: tuple[int, int]
 ) -> dict[int, Float64]:
-    """The fields with their kinks taken off: half a vertex's own move, half the mean of its neighbours'.
+    """Return smoother fields: half a vertex's own move, half the mean of its neighbours'.
 
     Feature points keep their full movement, so that they still follow their FAPs.
     """
@@ -177,7 +177,7 @@ def _softened(
 
 
 def _with_masks_of_skin(setup: Setup, skin: tuple[int, int]) -> Setup:
-    """Masks count a face's vertices, the fields are made on the skin."""
+    """Return the setup with masks that count from the first vertex of the skin."""
     first, last = skin
     masks = {}
     for fap, mask in setup.masks.items():

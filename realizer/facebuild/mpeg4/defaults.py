@@ -49,7 +49,7 @@ def _table() -> tuple[_Default, ...]:
 def default_setup(
     vertices: Float64, triangles: Int32, points: Mapping[str, Triple], skin: tuple[int, int]
 ) -> Setup:
-    """Parameters computed from the feature points and the skin's mesh.
+    """Return the parameters computed from the feature points and the skin's mesh.
 
     Args:
         vertices: (n, 3) metres; triangles: (m, 3); points: feature point -> metres.
@@ -102,7 +102,7 @@ def _place(points: Mapping[str, Triple], name: str) -> Float64:
 def split_sides(
     vertices: Float64, triangles: Int32, points: Mapping[str, Triple], skin: tuple[int, int]
 ) -> dict[str, Int32]:
-    """Which vertices of the skin belong to the upper and the lower lip and lids, by the way over the skin.
+    """Return the skin's vertices that belong to upper and lower lip and lids, by distance over the skin.
 
     Returns:
         upper_lip, lower_lip, upper_lid_left, lower_lid_left, upper_lid_right, lower_lid_right -> vertices.
@@ -119,7 +119,7 @@ def split_sides(
 
 
 def _graph(vertices: Float64, triangles: Int32, skin: tuple[int, int]) -> Any:
-    """(skin, skin) sparse: the lengths of the mesh's edges; vertices on one place are one."""
+    """Return the lengths of the skin's edges, sparse; vertices at one place are joined."""
     at = vertices[slice(*skin)]
     # Seams double vertices (one for each side's texture): a hair's length joins them.
     _, place = np.unique(np.round(at, 6), axis=0, return_inverse=True)
@@ -130,7 +130,7 @@ def _graph(vertices: Float64, triangles: Int32, skin: tuple[int, int]) -> Any:
 
 
 def _ways(graph: Any, at: Float64, places: list[Float64]) -> Float64:
-    """(skin,) metres over the skin to the nearest of the places."""
+    """Return the distance (skin,) over the skin in metres to the nearest of the places."""
     from scipy.sparse.csgraph import dijkstra
 
     sources = [int(np.argmin(np.linalg.norm(at - place, axis=1))) for place in places]

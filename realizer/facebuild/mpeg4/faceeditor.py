@@ -37,7 +37,7 @@ LARGEST = 16 * 2**20  # bytes
 
 
 def read_faceeditor(path: Path) -> Setup:
-    """The parameters of a FaceEditor file, in its own coordinates (`fitted` brings them to a face's).
+    """Read the parameters of a FaceEditor file, in its own coordinates; `fitted` converts them to a face's.
 
     Raises:
         FaceError: no such file, not XML, or an element or attribute that is missing, unknown or no number.
@@ -121,7 +121,7 @@ def write_faceeditor(path: Path, setup: Setup) -> tuple[str, ...]:
         zone = setup.zones[fap]
         if zone.slide or zone.radial:
             lost.append(f"FAP {fap}: slide and radial: all vertices move straight in FaceEditor")
-        tag, size, rest = _told(zone)
+        tag, size, rest = _element_of(zone)
         x, y, z = zone.scale
         shape = {"size": size, "scalex": x, "scaley": y, "scalez": z}
         use = {"use-vertex-mask": zone.use_mask, "invert-vertex-mask": zone.invert_mask}
@@ -137,7 +137,7 @@ def write_faceeditor(path: Path, setup: Setup) -> tuple[str, ...]:
 
 
 def fitted(setup: Setup, points: Mapping[str, Triple]) -> Setup:
-    """The setup moved and sized to another face's coordinates, by the feature points that both have.
+    """Return the setup moved and scaled to another face's coordinates, by the points that both have.
 
     FaceEditor's axes are ours, but its x may count to the other side, and its unit is the model's own. Masks
     stay: they fit the mesh that they were made on, or one whose vertices have the same numbers.
@@ -177,8 +177,8 @@ def fitted(setup: Setup, points: Mapping[str, Triple]) -> Setup:
     return replace(setup, zones=zones, points={name: moved(place) for name, place in setup.points.items()})
 
 
-def _told(zone: Zone) -> tuple[str, float, dict[str, float]]:
-    """Element, size and the attributes of the falloff."""
+def _element_of(zone: Zone) -> tuple[str, float, dict[str, float]]:
+    """Return element, size and the attributes of the falloff."""
     if zone.falloff in ("ease", "linear"):
         return "ease-deformer", zone.size, {"ease": zone.ease if zone.falloff == "ease" else 0.0}
     if zone.falloff == "cosine":

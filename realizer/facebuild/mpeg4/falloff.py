@@ -13,12 +13,12 @@ SAMPLES = 2001
 
 
 def linear(distance: Any) -> Float64:
-    """1 - d."""
+    """Return 1 - d."""
     return np.asarray(1 - np.clip(distance, 0, 1), np.float64)
 
 
 def ease(distance: Any, amount: float) -> Float64:
-    """1 - d^p (Paul 2010, 4.3.3): p = 1 + e/100 where e <= 0, 1 + e/20 above.
+    """Return 1 - d^p (Paul 2010, 4.3.3): p = 1 + e/100 where e <= 0, 1 + e/20 above.
 
     Args:
         amount: e, from -100 (less influence) over 0 (linear) to 100 (more).
@@ -28,12 +28,12 @@ def ease(distance: Any, amount: float) -> Float64:
 
 
 def cosine(distance: Any) -> Float64:
-    """The raised cosine that Paul 2010 (8.2) names: level in the middle and at the edge."""
+    """Return the raised cosine that Paul 2010 (8.2) names: level in the middle and at the edge."""
     return np.asarray((1 + np.cos(np.pi * np.clip(distance, 0, 1))) / 2, np.float64)
 
 
 def smooth_curve(distance: Any, centre: float, side: float) -> Float64:
-    """A Bezier curve (Paul 2010, 4.3.4): level over `centre` of the zone, and past the edge by `side`.
+    """Return a Bezier curve (Paul 2010, 4.3.4): level over `centre` of the zone, `side` past its edge.
 
     The cubic runs from (0, 1) by (centre, 1) and (1, 0) to (1 + side, 0), so that 0 and 0 is the straight
     line, and side makes the zone larger by that share of its size. (His figure draws it; the text gives no

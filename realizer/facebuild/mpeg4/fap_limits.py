@@ -17,7 +17,7 @@ ON_JAW = {5, 10, 11, 12, 13, 52, 57, 58, 59, 60}  # what goes down with it: the 
 
 @cache
 def usual_range(fap: int, sign: int) -> float:
-    """The most that is usual of a FAP alone in a direction (its own unit, positive).
+    """Return the largest usual value of a FAP alone in a direction (its own unit, positive).
 
     A lower lip hangs on its jaw: what an action unit asks for as far as it opens the jaw does not count.
     """
@@ -52,8 +52,8 @@ def _face_range(fap: int) -> float:
 
 
 def _unit_value(fap: int, sign: int, au: str) -> float:
-    asked = sign * _units()[au].get(fap, 0.0)
-    return asked - _units()[au].get(OPEN_JAW, 0.0) if fap in ON_JAW and sign < 0 else asked
+    requested = sign * _units()[au].get(fap, 0.0)
+    return requested - _units()[au].get(OPEN_JAW, 0.0) if fap in ON_JAW and sign < 0 else requested
 
 
 @cache

@@ -41,7 +41,7 @@ def _pairs() -> tuple[_Pair, ...]:
 
 
 def zone_fields(setup: Setup, vertices: Float64) -> dict[int, Float64]:
-    """FAP -> (n, 3) field of every FAP that has a zone.
+    """Return FAP -> field (n, 3), for every FAP that has a zone.
 
     Raises:
         FaceError: a zone whose feature point is missing, whose mask is out of range, or that moves nothing
@@ -128,7 +128,7 @@ def _between(setup: Setup, pair: _Pair, at: Float64) -> Float64:
 
 
 def _groups(near: Mapping[int, set[int]]) -> list[list[int]]:
-    """Sets of zones that are joined by neighbours, of two and more."""
+    """Return the sets of two or more zones that neighbours join."""
     left, groups = set(near), []
     while left:
         group, todo = set(), [min(left)]
@@ -144,7 +144,7 @@ def _groups(near: Mapping[int, set[int]]) -> list[list[int]]:
 
 
 def _directed(setup: Setup, zone: Zone, at: Float64, weight: Float64) -> Float64:
-    """The field: the weight along the FAP's way, bent as the zone says, exactly 1 at the feature point."""
+    """Return the field: the weight along the FAP's way, bent as the zone says, 1 at the feature point."""
     row = faps()[zone.fap - 1]
     way = np.array(WAYS[row.direction])
     move = np.broadcast_to(way + zone.slide * np.array([0, 0, 1.0]), at.shape)

@@ -42,7 +42,7 @@ def find_anchors(head: HeadGeometry) -> dict[str, Float64]:
 
 
 def profile_line(head: HeadGeometry) -> tuple[Float64, Float64]:
-    """Heights, and how far forward the skin reaches in the middle of the face at each; NaN: no skin."""
+    """Return heights, and how far forward the middle of the face reaches at each; NaN without skin."""
     at, tri = head.skin, head.triangles
     near = at[tri[(np.abs(at[tri, 0]) < 0.6).all(axis=1) & (at[tri, 2] > -0.4).all(axis=1)]]
     heights = np.linspace(-2.2, 1.0, SLICES)
@@ -110,7 +110,7 @@ def _profile(head: HeadGeometry) -> dict[str, Float64]:
 
 
 def _opening(head: HeadGeometry, centre: Float64, side: str) -> dict[str, Float64]:
-    """The corners and edges of the gap between the lids, from the front."""
+    """Return the corners and edges of the gap between the lids, seen from the front."""
     size = 1.25 * head.radius
     x = centre[0] + np.linspace(-size, size, GRID)
     y = centre[1] + np.linspace(-size, size, GRID)
@@ -170,7 +170,7 @@ def _opening(head: HeadGeometry, centre: Float64, side: str) -> dict[str, Float6
 
 
 def _corners(head: HeadGeometry, found: dict[str, Float64]) -> dict[str, Float64]:
-    """The mouth's corners: the ends of where skin touches skin."""
+    """Return the mouth's corners: the ends of where skin touches skin."""
     from scipy.spatial import cKDTree
 
     if "slit" not in found:
@@ -205,7 +205,7 @@ def _corners(head: HeadGeometry, found: dict[str, Float64]) -> dict[str, Float64
 
 
 def _outline(head: HeadGeometry) -> dict[str, Float64]:
-    """The ears, and the top and the back of the skull."""
+    """Return the ears, and the top and the back of the skull."""
     at, out = head.skin, {}
     above = at[at[:, 1] > -1.3]
     top, back = above[np.argmax(above[:, 1])], above[np.argmin(above[:, 2])]

@@ -42,7 +42,7 @@ class _Template:
 
 @cache
 def _template() -> tuple[dict[str, Float64], dict[str, Float64]]:
-    """Feature points, and anchors, of the template; eye distances from between the eyes."""
+    """Return feature points and anchors of the template, in eye distances from between the eyes."""
     text = files(__package__).joinpath("template.csv").read_text("utf-8")
     rows = {row.name: np.array([row.x, row.y, row.z]) for row in read_csv(text, _Template, "template.csv")}
     points = {name: place for name, place in rows.items() if name[0].isdigit()}
@@ -52,7 +52,7 @@ def _template() -> tuple[dict[str, Float64], dict[str, Float64]]:
 def head_of(
     vertices: Float64, triangles: Int32, parts: Mapping[str, tuple[int, int]]
 ) -> tuple[HeadGeometry, Float64, float]:
-    """The head in its own measure, and its origin (3,) and unit in metres."""
+    """Return the head in its own measure, its origin (3,), and its unit in metres."""
     at = np.asarray(vertices, np.float64)
     (left, radius), (right, other) = balls(at, parts)
     unit = float(left[0] - right[0])
@@ -74,7 +74,7 @@ def head_of(
 def find_points(
     vertices: Float64, triangles: Int32, parts: Mapping[str, tuple[int, int]]
 ) -> tuple[dict[str, Point], tuple[str, ...]]:
-    """The feature points of a head.
+    """Find the feature points of a head.
 
     Args:
         vertices: (n, 3) metres, +x the character's left, +y up, +z forward; triangles: (m, 3).
@@ -121,7 +121,7 @@ def _settled(
     name: str, place: Float64, vertices: Float64, parts: Mapping[str, tuple[int, int]],
     head: HeadGeometry, origin: Float64, unit: float,
 ) -> tuple[int, tuple[float, float, float], float]:  # fmt: skip
-    """The vertex of a point, the point itself, and how far it had to go; metres."""
+    """Return the vertex of a point, the point itself, and its distance from the skin in metres."""
     at = np.asarray(vertices, np.float64)
 
     def nearest(part: str) -> int:
@@ -156,7 +156,7 @@ def _settled(
 
 
 def _on_brow(brows: Float64, place: Float64, origin: Float64, unit: float) -> Float64:
-    """The place moved to the height of the brow, and not beyond its ends."""
+    """Return the place moved to the height of the brow, between its ends."""
     mine = brows[(brows[:, 0] > origin[0]) == (place[0] > origin[0])]
     if not len(mine):
         return place

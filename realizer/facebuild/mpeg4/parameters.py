@@ -23,7 +23,7 @@ LISTED = ("scale", "pivot")
 
 
 def read_setup(path: Path) -> Setup:
-    """The parameters that the file says.
+    """Read the parameters from a file.
 
     Raises:
         FaceError: no such file, not TOML, an unknown key, or a value of the wrong kind or out of range.
@@ -152,7 +152,7 @@ def _triple(where: str, value: Any) -> tuple[float, float, float]:
 
 
 def _expanded(where: str, ranges: Any) -> Int32:
-    """`"3-5 9"` is 3, 4, 5, 9."""
+    """Return the vertices of ranges: `"3-5 9"` is 3, 4, 5, 9."""
     vertices: list[int] = []
     try:
         for word in str(ranges).split():

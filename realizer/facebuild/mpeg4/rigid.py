@@ -40,7 +40,7 @@ def jaw_pivot(points: Mapping[str, Triple]) -> Float64:
 def jaw_rows(
     at: Float64, points: Mapping[str, Triple], parts: Parts, lower: Int32, pivot: Float64
 ) -> dict[int, Float64]:
-    """Rows of the opening, thrust and shift of the jaw; of FAP 3 the lips are left alone.
+    """Return the rows of the jaw's opening, thrust and shift; FAP 3 does not move the lips.
 
     Args:
         lower: vertices of the skin below the mouth's slit.
@@ -93,14 +93,14 @@ def opening_rows(at: Float64, pivot: Float64, share: Any) -> dict[int, Float64]:
 
 
 def skin_only(n: int, parts: Parts) -> Float64:
-    """(n,) 1 on the skin, 0 elsewhere."""
+    """Return 1 on the skin, 0 elsewhere, (n,)."""
     out = np.zeros(n)
     out[slice(*parts["skin"])] = 1
     return out
 
 
 def _to_lips(at: Float64, place: Mapping[str, Float64]) -> tuple[Float64, Float64]:
-    """Metres to the contours of the lips, and how much a corner is the nearest part of them (0..1)."""
+    """Return the distance to the contours of the lips in metres, and how near a corner is to it, 0..1."""
     best, corner = np.full(len(at), np.inf), np.zeros(len(at))
     for first, last in pairwise(LIP_POINTS):
         if first == "2.4" and last == "8.3":
@@ -152,7 +152,7 @@ def tongue_bends(at: Float64, along: Float64, inside: Any) -> tuple[Float64, Flo
 
 
 def balls(at: Float64, parts: Parts) -> list[tuple[Float64, float]]:
-    """Centre and radius of the balls that fit the eyeballs best, left and right."""
+    """Return centre and radius of the balls that fit the eyeballs best, left and right."""
     return [fit_ball(at[slice(*parts[name])]) for name in ("left_eye", "right_eye")]
 
 
@@ -177,8 +177,10 @@ def pupil_rows(
 
 
 def head_weight(at: Float64, points: Mapping[str, Triple], parts: Parts) -> Float64:
-    """(n,) how far each vertex turns with the head: 1 above the jaw, 0 below the neck; all that is no skin
-    and no clothing turns whole."""
+    """Return how far each vertex turns with the head, (n,): 1 above the jaw, 0 below the neck.
+
+    All parts but skin and clothes turn whole.
+    """
     left, right, chin = (np.array(points[name]) for name in ("3.5", "3.6", "2.1"))
     eyes = float(left[0] - right[0])
     level = at[:, 1] + NECK_TILT * at[:, 2]
@@ -193,7 +195,7 @@ def head_weight(at: Float64, points: Mapping[str, Triple], parts: Parts) -> Floa
 def sliding(
     rows: Mapping[int, Float64], at: Float64, parts: Parts, eyes: list[tuple[Float64, float]]
 ) -> tuple[Any, Any, Any]:
-    """Vertices of skin and lashes that lids move over a ball, which ball, and their least distance."""
+    """Return vertices of skin and lashes that slide over a ball, which ball, and their least distance."""
     index, side, radius = [], [], []
     ours = skin_only(len(at), parts) > 0
     if "lashes" in parts:

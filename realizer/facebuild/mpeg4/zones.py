@@ -73,7 +73,7 @@ class Zone:
         return np.asarray(self.size * np.array(self.scale))
 
     def influence(self, distance: Any) -> Float64:
-        """The influence (n,) at distances (n,), in radii from the middle."""
+        """Return the influence (n,) at distances (n,), in radii from the middle."""
         if self.falloff == "ease":
             return falloff.ease(distance, self.ease)
         if self.falloff == "smooth":
@@ -108,7 +108,7 @@ class Setup:
 
 
 def synchronised(setup: Setup, vertices: Float64 | None = None, margin: float = 5e-4) -> Setup:
-    """The setup with each synced FAP's zone, and its mask, copied to the other side.
+    """Return the setup with each synchronised FAP's zone, and its mask, copied to the other side.
 
     Of a pair the FAP with the lower number (the left side) is the one that is copied.
 
@@ -130,7 +130,7 @@ def synchronised(setup: Setup, vertices: Float64 | None = None, margin: float = 
 
 
 def mirror_mask(mask: Int32, vertices: Float64, margin: float, fap: int) -> Int32:
-    """The vertices on the other side of those in the mask, ascending.
+    """Return the mirror images of a mask's vertices, ascending.
 
     Raises:
         FaceError: one has no twin within the margin.

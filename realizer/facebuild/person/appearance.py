@@ -28,7 +28,7 @@ class Appearance:
 
 
 def appearance_of(table: Mapping[str, Any]) -> Appearance:
-    """The plain look with the figures that a recipe's [look] changes.
+    """Return the plain look with the changes of a recipe's [look].
 
     Raises:
         FaceError: no such figure, or not a number.

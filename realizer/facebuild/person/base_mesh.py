@@ -41,27 +41,27 @@ class Ground:
         return np.asarray(self.at[self.points[name]])
 
     def fapu(self) -> Fapu:
-        """The person's distances; pupils stand before the middle of the lids."""
+        """Return the person's distances; pupils stand before the middle of the lids."""
         places = {name: np.asarray(self.at[vertex], np.float32) for name, vertex in self.points.items()}
         for name, high, low in (("3.5", "3.1", "3.3"), ("3.6", "3.2", "3.4")):
             places[name] = np.asarray((places[high] + places[low]) / 2, np.float32)
         return fapu_of(places)
 
     def smoothed(self, field: Float64, times: int = 1) -> Float64:
-        """A field on the body with its kinks softened."""
+        """Return a field of the body with its kinks softened."""
         for _ in range(times):
             field = np.asarray(self.average @ field)
         return field
 
     def ellipsoid(self, centre: Any, radii: Any, plateau: float = 0.0) -> Float64:
-        """Influence (n,) of an ellipsoid: 1 at the centre, 0 outside (Paul 2010, 4.3.3)."""
+        """Return the influence (n,) of an ellipsoid: 1 at the centre, 0 outside (Paul 2010, 4.3.3)."""
         away = np.linalg.norm((self.at - np.asarray(centre)) / np.asarray(radii), axis=1)
         away = np.clip((away - plateau) / (1 - plateau), 0, 1)
         return np.where(self.body, (1 + np.cos(np.pi * away)) / 2, 0.0)
 
 
 def scaled(field: Float64, vertex: int, direction: Any) -> Float64:
-    """The field with a move of exactly 1 along the direction at the vertex."""
+    """Return the field scaled to a move of exactly 1 along the direction at the vertex."""
     here = float(field[vertex] @ np.asarray(direction))
     if abs(here) < 1e-9:
         raise ValueError(f"a field that leaves its feature point's vertex {vertex} still cannot be scaled")

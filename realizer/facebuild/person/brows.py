@@ -32,7 +32,7 @@ def brow(
     colour: Any,
     look: Appearance,
 ) -> Part:
-    """A brow: a sheet on the skin, its hairs drawn into it, its edges of the skin's own colour.
+    """Return a brow: a sheet on the skin with hairs drawn on it, its edges in the skin's colour.
 
     Args:
         tints: (n, 3) sRGB, the skin's.
@@ -85,7 +85,7 @@ def brow(
 
 
 def _spread(skin: Submesh, tints: Float64) -> Float64:
-    """The skin's tints on the base mesh's vertices, those of single vertices alone."""
+    """Return the skin's tints on the base mesh's vertices, where a vertex is in the skin as it is."""
     out = np.zeros((skin.mix.shape[1], 3))
     single = np.diff(skin.mix.indptr) == 1
     out[skin.mix.indices[skin.mix.indptr[:-1][single]]] = tints[single]
@@ -93,7 +93,7 @@ def _spread(skin: Submesh, tints: Float64) -> Float64:
 
 
 def _laid(skin: Submesh, base: Float64, flat: Float64) -> Submesh:
-    """Vertices over places (n, 2) in the front view, on the skin's foremost triangle there."""
+    """Return a submesh over places (n, 2) in the front view, on the skin's foremost triangle there."""
     at = skin.positions(base)
     low, high = flat.min(axis=0) - 0.01, flat.max(axis=0) + 0.01
     inside = ((at[:, :2] > low) & (at[:, :2] < high)).all(axis=1) & (at[:, 2] > -0.03)
@@ -119,7 +119,7 @@ def _cross(a: Float64, b: Float64) -> Float64:
 
 
 def lashes(base: Float64, lid: Lid, centre: Float64, skin: Any, colour: Any, look: Appearance) -> Part:
-    """Lashes: tapered fins that stand on the lids' edges, longest in the outer half, lighter at their tips.
+    """Return lashes: tapered fins on the lids' edges, longest in the outer half, lighter at their tips.
 
     A lash leans on its lid: where the edge falls further than the fold above it, the tip turns down.
 
@@ -158,15 +158,15 @@ def lashes(base: Float64, lid: Lid, centre: Float64, skin: Any, colour: Any, loo
             wide = along * (0.00026 if upper else 0.00014)
             j = int(np.clip(np.searchsorted(run, t) - 1, 0, len(margin) - 2))
             share = float((t - run[j]) / (run[j + 1] - run[j]))
-            grown = {margin[j]: 1 - share, margin[j + 1]: share}
+            rooted = {margin[j]: 1 - share, margin[j + 1]: share}
             fold = lid.rings[3][int(np.argmin(np.linalg.norm(base[lid.rings[3]] - root, axis=1)))]
             middle = root + first * long * 0.5
             tip = middle + last * long * 0.5
             n = len(rows)
-            put(grown, root - wide, 0.0)
-            put(grown, root + wide, 0.0)
+            put(rooted, root - wide, 0.0)
+            put(rooted, root + wide, 0.0)
             for place, width, curl, fade in ((middle, 0.75, 0.5, 0.10), (tip, 0.0, 1.0, 0.45)):
-                bent = grown | {fold: -CURL * curl * (1 if upper else 0)}
+                bent = rooted | {fold: -CURL * curl * (1 if upper else 0)}
                 bent = {i: s * (1 + CURL * curl) if i != fold and upper else s for i, s in bent.items()}
                 put(bent, place - wide * width, fade if upper else fade + 0.3)
                 if width:

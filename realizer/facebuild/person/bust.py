@@ -34,7 +34,7 @@ TONGUE = np.array([0, -0.0085, -0.0055])  # m that the tongue rests lower and fu
 
 
 def assemble(person: Person, lips: Lips, lids: list[Lid], recipe: Recipe) -> list[Part]:
-    """The parts in the order that a face's vertices have, with baked occlusion."""
+    """Return the parts in the order of a face's vertices, with baked occlusion."""
     ground, look = person.ground, recipe.colours
     at, n = ground.at, len(ground.at)
     points = {name: ground.point(name) for name in ground.points}
@@ -137,7 +137,7 @@ def _tongue(person: Person, recipe: Recipe) -> Part:
 
 
 def _bake(made: list[Part]) -> None:
-    """Occlusion of every part that has none."""
+    """Bake the occlusion of every part that has none."""
     count = np.cumsum([0] + [len(part.vertices) for part in made])
     vertices = np.concatenate([part.vertices for part in made])
     ups = np.concatenate([vertex_normals(part.vertices, part.triangles) for part in made])

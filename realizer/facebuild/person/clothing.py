@@ -20,7 +20,7 @@ POINT = 0.045  # m from the middle that a pointed collar reaches its full height
 
 
 def under_collar(at: Float64, chin: Float64, face: float, low: float = 0.0, point: float = 0.0) -> Float64:
-    """Metres of points below the neckline.
+    """Return how far points lie below the neckline, in metres.
 
     Args:
         chin: (3,) metres; face: metres from hairline to chin.
@@ -32,7 +32,7 @@ def under_collar(at: Float64, chin: Float64, face: float, low: float = 0.0, poin
 
 
 def shirt(skin: Submesh, base: Float64, low: Float64, colour: list[float]) -> Part:
-    """A shirt: the body below the neckline, lifted off. `low`: (n,) metres of its vertices below that."""
+    """Return a shirt: the body below the neckline, lifted. `low`: (n,) metres of its vertices below that."""
     some = (low > -0.03)[skin.triangles].any(axis=1)
     low = low[np.unique(skin.triangles[some])]
     piece = skin.with_triangles(some)

@@ -76,7 +76,7 @@ def write_face(
 def _mend(
     rows: dict[int, Float64], made: list[Part], skin: list[int], points: dict[str, Point], person: Person
 ) -> None:
-    """No triangle of the skin turns over: not those of the base mesh, nor those that it was cut into."""
+    """Mend triangles of the skin that turn over: those of the base mesh, and those that it was cut into."""
     mine = next(part for part in made if part.name == "skin")
     first, last = skin
     twin = mirror_twins(mine.vertices, PAIRED)
@@ -92,7 +92,7 @@ def _mend(
 
 
 def _hang_on_jaw(rows: dict[int, Float64], mine: slice, vertices: Float64, pivot: Float64) -> None:
-    """The lower teeth turn, thrust and shift with the jaw bone."""
+    """Make the lower teeth turn, thrust and shift with the jaw bone."""
     for number, row in opening_rows(vertices, pivot, 1.0).items():
         rows[number][mine] = row
     rows[14][mine] = [0, 0, 1]
@@ -100,7 +100,7 @@ def _hang_on_jaw(rows: dict[int, Float64], mine: slice, vertices: Float64, pivot
 
 
 def _points(person: Person, vertices: Float64, base: Any, ranges: dict[str, list[int]]) -> dict[str, Point]:
-    """The 84 feature points with their vertices."""
+    """Return the 84 feature points with their vertices."""
     out = {}
     skin, tongue = slice(*ranges["skin"]), slice(*ranges["tongue"])
     for name, number in person.ground.points.items():

@@ -38,7 +38,7 @@ def face_fields(ground: Ground, jaw_pivot: Float64) -> tuple[dict[int, Float64],
 
 
 def _untangled(ground: Ground, fields: dict[int, Float64], pivot: Float64) -> dict[int, Float64]:
-    """The fields without triangles of the skin that turn over."""
+    """Return the fields without triangles of the skin that turn over."""
     quads = ground.mesh.quads["body"]
     near = quads[(ground.at[quads, 1] > LOWEST).all(axis=1)]
     triangles = np.concatenate([near[:, [0, 1, 2]], near[:, [0, 2, 3]]]).astype(np.int32)
@@ -48,7 +48,7 @@ def _untangled(ground: Ground, fields: dict[int, Float64], pivot: Float64) -> di
 
 
 def _mirrored(ground: Ground, fields: dict[int, Float64]) -> dict[int, Float64]:
-    """The fields as even as a face is: each the mean of itself and its twin's mirror image."""
+    """Return symmetric fields: each is the mean of itself and its twin's mirror image."""
     return symmetrize(fields, ground.mesh.mirror())
 
 
@@ -122,7 +122,7 @@ def _brows(ground: Ground) -> dict[int, Float64]:
 
 
 def _stations(x: Float64, across: Float64) -> tuple[Float64, Float64, Float64]:
-    """(n,) each: how much of a side's inner, middle and outer brow a place at x has; 1 at its own station.
+    """Return the shares (n,) of a side's inner, middle and outer brow at x; 1 at its own station.
 
     A bent strip, not a chain of straight ones: the curve through the stations has no corner anywhere, and at
     the other side's inner end it is still.
@@ -153,7 +153,7 @@ def _soften(
 
 
 def _halves(ground: Ground, shape: Float64) -> dict[int, Float64]:
-    """A shape's left (1) and right (-1) half, joined smoothly at the middle."""
+    """Return a shape's left (1) and right (-1) half, joined smoothly at the middle."""
     return {side: shape * smooth(ground.at[:, 0] * side, -0.008, 0.008)[:, None] for side in (1, -1)}
 
 
@@ -222,7 +222,7 @@ def _ears(ground: Ground) -> dict[int, Float64]:
 
 
 def _along_tongue(ground: Ground) -> Float64:
-    """(n,) 0 at the tongue's back, 1 at its tip; -1 on all that is no tongue."""
+    """Return 0 at the tongue's back, 1 at its tip, -1 elsewhere, (n,)."""
     mine = np.unique(ground.mesh.quads["helper-tongue"])
     depth = ground.at[mine, 2]
     along = np.full(len(ground.at), -1.0)

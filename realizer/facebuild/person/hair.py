@@ -49,7 +49,7 @@ class Style:
 
 
 def style_of(table: Mapping[str, Any]) -> Style:
-    """The style that a recipe's [hair] names, with the figures it changes.
+    """Return the style that a recipe's [hair] names, with its changes.
 
     Raises:
         FaceError: no such style, or no such figure.
@@ -75,7 +75,7 @@ def scalp_of(skin: Submesh, base: Float64, points: Mapping[str, Float64], style:
 
 
 def shadow(scalp: Scalp, style: Style, at: Float64) -> Float64:
-    """(n,) how much of the hair's colour the skin has: whole under the hair, none a little before it."""
+    """Return the share (n,) of the hair's colour in the skin: whole under the hair, none beside it."""
     low = smooth(scalp.height(style.top, at) - at[:, 1], -0.004, 0.016)
     return np.asarray(style.cover * 0.8 * smooth(scalp.high(at), -0.007, 0.010) * low)
 
@@ -192,7 +192,7 @@ def _closed(rows: int, columns: int, keep: Any) -> Any:
 
 
 def _ways(pole: Float64, turn: Float64, angle: Any) -> Float64:
-    """Unit vectors at so many radians from the pole, turned about it."""
+    """Return unit vectors at an angle (radians) from the pole, turned about it."""
     aside = np.cross([0, 0, 1.0] if abs(pole[2]) < 0.7 else [0, 1.0, 0], pole)
     aside /= np.linalg.norm(aside)
     ahead = np.cross(pole, aside)
@@ -202,7 +202,7 @@ def _ways(pole: Float64, turn: Float64, angle: Any) -> Float64:
 
 
 def _columns(scalp: Scalp, pole: Float64, count: int) -> tuple[Float64, Float64]:
-    """Turns about the pole, evenly spread along the hairline, and the angle from the pole to it."""
+    """Return turns about the pole, spread evenly along the hairline, and the angles from the pole to it."""
     turn = np.linspace(0, 2 * np.pi, 240, endpoint=False)
     angle = np.radians(np.arange(2, 172, 1.5))
     ways = np.stack([_ways(pole, turn, a) for a in angle])
@@ -231,7 +231,7 @@ def _beginnings(scalp: Scalp, style: Style, pole: Float64, turn: Float64, edge: 
 
 
 def _locks(rng: Any, n: int) -> Float64:
-    """(n,) -1..1 around the head: locks a few columns wide."""
+    """Return the brightness of locks a few columns wide around the head, (n,) -1..1."""
     raw = rng.uniform(-1, 1, n)
     soft = raw + 0.5 * (np.roll(raw, 1) + np.roll(raw, -1))
     return np.asarray(soft / np.abs(soft).max())
@@ -266,7 +266,7 @@ def _fall(scalp: Scalp, style: Style, at: Float64, drop: Float64, rng: Any) -> t
 
 
 def _bun(centre: Float64, radii: Float64, colour: Any, style: Style) -> Part:
-    """A ball of hair, wound around."""
+    """Return a ball of wound hair."""
     rows, columns = 9, 16
     polar = np.linspace(0.02, np.pi - 0.02, rows)[:, None]
     turn = np.linspace(0, 2 * np.pi, columns, endpoint=False)[None]

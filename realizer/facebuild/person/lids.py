@@ -52,7 +52,7 @@ class Lid:
         self.x, self.high, self.low = x, high, low
 
     def followers(self, ground: Ground) -> tuple[dict[int, int], list[tuple[int, list[int], int]]]:
-        """The vertices that follow each vertex of the edge.
+        """Return the vertices that follow each vertex of the edge.
 
         Returns:
             vertex of a ring -> the edge's vertex that it lies behind; and of the lids' lining, inwards:
@@ -88,13 +88,13 @@ class Lid:
         return turned[: cut + 1], [inner, *turned[: cut - 1 : -1]]
 
     def gap(self, x: Float64) -> Float64:
-        """Metres between the lids at x, 0 beyond the corners."""
+        """Return the distance between the lids at x in metres, 0 beyond the corners."""
         return np.asarray(
             np.interp(x * self.side, self.x, np.maximum(self.high - self.low, 0), left=0, right=0)
         )
 
     def gap_of(self, at: Float64, upper: bool) -> Float64:
-        """Metres from each vertex of the upper (lower) edge straight to the other edge."""
+        """Return the distance from each vertex of the upper (lower) edge straight to the other edge."""
         mine, other = (self.upper, self.lower) if upper else (self.lower, self.upper)
         x, order = at[other, 0] * self.side, np.argsort(at[other, 0] * self.side, kind="stable")
         there = np.interp(at[mine, 0] * self.side, x[order], at[other, 1][order])
@@ -103,12 +103,12 @@ class Lid:
         return np.asarray(out)
 
     def middle(self, x: Float64) -> Float64:
-        """Height half-way between the lids at x."""
+        """Return the height half-way between the lids at x."""
         return np.asarray(np.interp(x * self.side, self.x, (self.high + self.low) / 2))
 
 
 def lid_fields(ground: Ground) -> dict[int, Float64]:
-    """Fields of FAPs 19-22, and what 27 and 28 do to the lids; `deform` pushes them over the balls."""
+    """Return fields of FAPs 19-22, and of the lids under 27 and 28; `deform` pushes them over the balls."""
     out = {}
     for side, numbers, names in ((1, (19, 21), ("3.1", "3.3")), (-1, (20, 22), ("3.2", "3.4"))):
         lid = Lid(ground, side)
@@ -158,7 +158,7 @@ def lid_fields(ground: Ground) -> dict[int, Float64]:
 def _edged(
     weight: Float64, edge: Float64, lid: Lid, ringed: dict[int, int], lining: list[tuple[int, list[int], int]]
 ) -> Float64:
-    """The weight with the lid's edge, its front and its lining moving as one: a lid has a thickness."""
+    """Return the weight with the lid's edge, front and lining moving as one, because a lid is thick."""
     out = weight.copy()
     out[lid.rings[0]] = edge[lid.rings[0]]
     for vertex in lid.rings[1]:

@@ -41,7 +41,7 @@ _STRETCH = _stretch()
 
 
 def spline_basis(u: Any) -> Float64:
-    """(5, n): cardinal splines over the knots u = -1, -0.5, 0, 0.5, 1; 1 at their own knot, 0 at the others.
+    """Return cardinal splines (5, n) over the knots u = -1, -0.5, 0, 0.5, 1; each is 1 at its own knot only.
 
     The weights sum to 1 everywhere, so a lip whose FAPs are equal does not bend into a w.
     """
@@ -149,7 +149,7 @@ class Lips:
         return inside
 
     def _around(self, ground: Ground, on_ring: Any, inside: Bool) -> None:
-        """Every other vertex takes after the nearest place on the red's border."""
+        """Give every other vertex the coordinates of the nearest place on the red's border."""
         from scipy.spatial import cKDTree
 
         at = ground.at
@@ -167,7 +167,7 @@ class Lips:
 
 
 def close_lips(ground: Ground) -> Float64:
-    """The base mesh with its lips just closed, (n, 3): each goes half the way to where they meet."""
+    """Return the base mesh with its lips just closed, (n, 3): each lip moves half the way."""
     lips = Lips(ground)
     at = ground.at.copy()
     for k, share in ((0, 1.0), (1, 1.0), (2, 0.55), (3, 0.25), (4, 0.10)):
@@ -184,7 +184,7 @@ def close_lips(ground: Ground) -> Float64:
 
 
 def lip_fields(ground: Ground, lips: Lips) -> dict[int, Float64]:
-    """Fields of FAPs 4-13, 16-18 and 51-60."""
+    """Return the fields of FAPs 4-13, 16-18 and 51-60."""
     at, points = ground.at, ground.points
     knots = spline_basis(lips.u)
     in_front = ground.body & (at[:, 2] > -0.03)
@@ -226,7 +226,7 @@ def lip_fields(ground: Ground, lips: Lips) -> dict[int, Float64]:
 def _corners(
     ground: Ground, lips: Lips, left: Float64, right: Float64, inner: Float64, outer: Float64
 ) -> dict[int, Float64]:
-    """FAPs 6, 7, 12, 13 (inner) and 53, 54, 59, 60 (outer): splines on the lips, CC0 shapes in the cheeks."""
+    """Return FAPs 6, 7, 12, 13, 53, 54, 59, 60: splines on the lips, CC0 shapes in the cheeks."""
     at, points, out = ground.at, ground.points, {}
     in_front = ground.body & (at[:, 2] > -0.06)
     # From the lips outwards the spline hands over to the shape of the cheek.

@@ -67,7 +67,7 @@ class Edges(dict[frozenset[int], list[frozenset[int]]]):
 
 
 def walk(edges: Edges, first: int, second: int) -> list[int]:
-    """The edge loop that starts with these two vertices, each vertex once, as far as they have four edges.
+    """Return the edge loop that starts with two vertices, as long as its vertices have four edges.
 
     Raises:
         ValueError: the two do not share an edge.
@@ -105,7 +105,7 @@ def target_names(data: Path) -> frozenset[str]:
 
 
 def read_base(data: Path) -> BaseMesh:
-    """The base mesh below `data` (the folder that holds `mpfb2`).
+    """Read the base mesh below `data` (the folder that holds `mpfb2`).
 
     Raises:
         FaceError: no such file.

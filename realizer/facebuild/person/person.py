@@ -52,7 +52,7 @@ class Person:
     arch: tuple[float, float]
 
     def turns(self) -> Float64:
-        """(n,) how far each base vertex turns with the head: 1 above jaw and nape, 0 below the neck."""
+        """Return how far each base vertex turns with the head, (n,): 1 above the jaw, 0 below the neck."""
         at, chin = self.ground.at, self.ground.point("2.1")
         top = chin[1] + NECK_TILT * chin[2] - NECK_TOP * self.face
         level = at[:, 1] + NECK_TILT * at[:, 2]
@@ -60,7 +60,7 @@ class Person:
 
 
 def person_of(data: Path, targets: Mapping[str, float]) -> Person:
-    """The person that weighted shape targets make of the base mesh."""
+    """Make a person of the base mesh and weighted shape targets."""
     mesh = makehuman.read_base(data)
     at = identity(mesh, data, targets)
     points = _landmarks(mesh, at)
@@ -88,7 +88,7 @@ def person_of(data: Path, targets: Mapping[str, float]) -> Person:
 
 
 def identity(mesh: makehuman.BaseMesh, data: Path, targets: Mapping[str, float]) -> Float64:
-    """The base mesh mixed to a person, (n, 3) metres: origin between the eyes, both sides alike."""
+    """Return the base mesh mixed to a person, (n, 3) metres: symmetric, origin between the eyes."""
     at = mesh.vertices.copy()
     for target, weight in targets.items():
         for side in ("l-", "r-") if "*" in target else ("",):
@@ -99,7 +99,7 @@ def identity(mesh: makehuman.BaseMesh, data: Path, targets: Mapping[str, float])
 
 
 def _relaxed(ground: Ground) -> Float64:
-    """The base mesh with smooth corners of the mouth, (n, 3): shape targets bunch vertices there."""
+    """Return the base mesh (n, 3) with smooth corners of the mouth: shape targets bunch vertices there."""
     at = ground.at
     near = np.maximum(*(ground.ellipsoid(ground.point(name), CORNER) for name in ("2.4", "2.5")))[:, None]
     for _ in range(RELAXED):
@@ -117,7 +117,7 @@ def _joint(mesh: makehuman.BaseMesh, at: Float64, name: str) -> Float64:
 
 
 def _landmarks(mesh: makehuman.BaseMesh, at: Float64) -> dict[str, int]:
-    """Feature point -> base vertex; those on the tongue are found."""
+    """Return feature point -> base vertex; those on the tongue are located."""
     path = Path(__file__).with_name("hm08_landmarks.csv")
     points = {
         row.feature_point: row.vertex for row in read_csv(path.read_text("utf-8"), _Landmark, path.name)

@@ -41,7 +41,7 @@ class Recipe:
 
 
 def read_recipe(path: Path, data: Path) -> Recipe:
-    """The recipe in a file.
+    """Read a recipe from a file.
 
     Args:
         data: the folder of shape targets that its names are looked up in.

@@ -61,11 +61,11 @@ class Scalp:
         self._skin = cKDTree(self.at)
 
     def degrees(self, at: Float64) -> Float64:
-        """Degrees of places about the head, from the front, 0..180."""
+        """Return the direction of places about the head in degrees from the front, 0..180."""
         return np.asarray(np.degrees(np.arctan2(np.abs(at[:, 0]), at[:, 2] - self._axis)))
 
     def high(self, at: Float64) -> Float64:
-        """Metres (about) of places above the hairline; negative where the face is."""
+        """Return about how far places are above the hairline, metres; negative in the face."""
         degrees = self.degrees(at)
 
         def line(where: Any) -> Any:
@@ -76,7 +76,7 @@ class Scalp:
         return np.asarray(np.minimum(height, self.off_ear(at)))
 
     def off_ear(self, at: Float64) -> Float64:
-        """Metres (about) of places from the bald spot around an ear; negative in it."""
+        """Return about how far places are from the bald spot around an ear, metres; negative in it."""
         y, z, tall, wide = self._ear
         # The ear leans back: its ellipse does too.
         lean = at[:, 1] - y
@@ -84,7 +84,7 @@ class Scalp:
         return np.where(np.abs(at[:, 0]) > EARS_FROM, (around - 1) * wide, np.inf)
 
     def height(self, line: Any, at: Float64) -> Float64:
-        """(n,) metres above the eyes of a line (degrees, metres on the head it was drawn on) over places."""
+        """Return the height (n,) above the eyes of a line (degrees, metres on its own head) over places."""
         return np.asarray(self._stretched(self.degrees(at), np.array(line, float).T))
 
     def _stretched(self, degrees: Any, line: Float64) -> Any:
@@ -109,5 +109,5 @@ class Scalp:
         return np.asarray((each * share).sum(axis=1)), np.asarray(ups)
 
     def nearest(self, at: Float64) -> Any:
-        """(n,) the skin's vertex that is nearest to each place."""
+        """Return the skin's vertex that is nearest to each place, (n,)."""
         return self._skin.query(at)[1]

@@ -17,7 +17,7 @@ from realizer.facebuild.person.lips import Lips
 def paint_skin(
     ground: Ground, lips: Lips, rings: list[list[list[int]]], colours: Mapping[str, Any], look: Appearance
 ) -> tuple[Float64, Float64]:
-    """Colours (n, 3) sRGB 0..255 and gloss (n,) of the base mesh's body, but for the red of the lips.
+    """Return colours (n, 3) sRGB 0..255 and gloss (n,) of the body without the red of the lips.
 
     Args:
         rings: left and right eye's rings around the opening, from the edge outwards.
@@ -72,7 +72,7 @@ def paint_skin(
 
 
 def _beard(ground: Ground, lips: Lips) -> Float64:
-    """(n,) where a beard grows: upper lip, chin and jaw, up to the ears."""
+    """Return where a beard grows, (n,): upper lip, chin and jaw, up to the ears."""
     at = ground.at
     under_nose, corner, lobe, chin = (ground.point(k) for k in ("9.15", "8.3", "10.7", "2.1"))
     aside = np.abs(at[:, 0])
@@ -87,7 +87,7 @@ def _beard(ground: Ground, lips: Lips) -> Float64:
 
 
 def _mottle(ground: Ground, look: Appearance) -> Float64:
-    """(n,) how much lighter or darker than its surroundings the skin is: freckles and age."""
+    """Return how much lighter or darker than its surroundings the skin is, (n,): freckles and age."""
     rng = np.random.default_rng(5)
     fine = rng.uniform(-1, 1, len(ground.at))
     cheeks = sum(ground.ellipsoid(ground.point(k), (0.034, 0.024, 0.04)) for k in ("5.3", "5.4", "9.3"))
@@ -189,7 +189,7 @@ def occlusion(
 
 
 def _cover(vertices: Float64, triangles: Int32, cell: float) -> Float64:
-    """Points on the triangles, closer together than a depth cell."""
+    """Return points on the triangles, closer together than a depth cell."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     longest = np.max(
         [np.linalg.norm(b - a, axis=1), np.linalg.norm(c - b, axis=1), np.linalg.norm(a - c, axis=1)], axis=0
