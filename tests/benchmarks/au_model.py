@@ -23,7 +23,6 @@ from realizer.animation.axis import au, axis
 from realizer.animation.frames import AUFrames
 from realizer.animation.pose import poses
 from realizer.face.au.file import read_model
-from realizer.face.au.mixers import mix
 from realizer.face.au.model import Model
 from realizer.face.deform import deform
 from realizer.face.load import folder_of, load_face
@@ -31,6 +30,7 @@ from realizer.face.model import Face
 from realizer.face.surface import normals
 from realizer.facebuild.au.fit import table, table_text
 from realizer.facebuild.au.measure import UnitMeasurement, read_shapes
+from tests.au_mixers import mix
 
 SHOWN = (1, 4, 6, 9, 10, 12, 15, 18, 27, 43)
 HERS = 0.120

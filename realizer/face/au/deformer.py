@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Bool, Float32, Float64
-from realizer.face.au.mixers import OPENING, limit_opening
 from realizer.face.au.model import Model, rotation
 from realizer.face.au.mouth import shares
 from realizer.face.au.skin_binding import attached_parts, skin
@@ -18,6 +17,8 @@ from realizer.face.basis import FAPS, JAW_SIN
 from realizer.face.model import Face
 from realizer.tables import action_units, faps
 
+# The units that open the mouth, the widest first. Each holds the narrower ones.
+OPENING = (27, 26, 25)
 JAW = ("lower_teeth", "tongue")
 CLOSE = 43  # the unit that closes the eyes
 LIDS = (5, 6, 7, 9, CLOSE)  # what moves the lids
@@ -224,3 +225,24 @@ def _shares(face: Face, moving: slice) -> tuple[tuple[Any, Float32], tuple[Any, 
     owned = np.minimum(whole, 1) * (own @ reach) / np.maximum(whole, 1e-12)
     near, lips = np.flatnonzero(lids.any(axis=0)), np.flatnonzero(owned)
     return (near, lids[:, near].astype(np.float32)), (lips, owned[lips].astype(np.float32))
+
+
+def limit_opening(gaps: Any, values: Any) -> Any:
+    """Return the share of each unit at which the mouth opens as far as the widest one alone opens it.
+
+    A stretched mouth is a dropped jaw and parted lips already (27@26, 27@25, 26@25 in her appendix C): added
+    up they would open it twice.
+
+    Args:
+        gaps: (k,) metres between the lips with full intensity (`Model.gap`), of `OPENING`.
+        values: (k, n) intensities 0..1.
+
+    Returns:
+        (k, n) intensities, of the same type.
+    """
+    out, open_ = np.array(values), np.zeros(values.shape[1:], np.float64)
+    for row, gap, value in zip(out, gaps, values, strict=True):
+        if gap > 0:
+            row[...] = np.maximum(value - open_ / gap, 0)
+            open_ = np.maximum(open_, gap * value)
+    return out

@@ -175,9 +175,3 @@ def rotation(axis: tuple[float, float, float], radians: float) -> Float64:
     x, y, z = axis
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]], np.float64)
     return np.asarray(np.eye(3) + np.sin(radians) * cross + (1 - np.cos(radians)) * cross @ cross)
-
-
-def turned(at: Float64, axis: tuple[float, float, float], radians: float, pivot: object) -> Float64:
-    """Return points (n, 3) turned right-handed about an axis through the pivot."""
-    centre = np.asarray(pivot, np.float64)
-    return np.asarray((at - centre) @ rotation(axis, radians).T + centre)

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from realizer.core.errors import FaceError
-from realizer.face.au.mixers import limit_opening, mix
+from realizer.face.au.deformer import limit_opening
 from realizer.face.deform import deform
 from realizer.face.load import input_names, list_faces, load_face
 from realizer.face.model import Face
+from tests.au_mixers import mix
 
 FOLDER = next(info.path for info in list_faces() if info.name == load_face().name)
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from realizer.face.au.mixers import successive
 from realizer.face.au.model import Model
 from realizer.face.au.mouth import shares
 from realizer.face.au.skin_binding import attached_parts, skin
 from realizer.face.au.successive_mixer import Succession
 from realizer.face.load import load_face
 from realizer.face.model import Face
+from tests.au_mixers import successive
 from tests.shipped import FACES
 
 

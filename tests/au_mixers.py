@@ -1,18 +1,16 @@
-"""The additive and the successive mixer of action units (Wojdel 2005, 5.1)."""
+"""The mixers of action units as Wojdel 2005 (5.1) describes them, to compare deformers with."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from realizer.core.array_types import Float64
-from realizer.face.au.model import Model, turned
+from realizer.face.au.deformer import OPENING, limit_opening
+from realizer.face.au.model import Model, rotation
 from realizer.face.au.units import units
-
-# The units that open the mouth, the widest first. Each holds the narrower ones.
-OPENING = (27, 26, 25)
 
 # The parts of a face. "fixed" moves with the head alone: upper teeth, clothes.
 Thing = Literal["face", "left eye", "right eye", "jaw", "fixed"]
@@ -46,27 +44,6 @@ def successive(
     for au, value in values.items():
         at = at + value * model.displacement(au, at, upper=upper)
     return np.asarray(at)
-
-
-def limit_opening(gaps: Any, values: Any) -> Any:
-    """Return the share of each unit at which the mouth opens as far as the widest one alone opens it.
-
-    A stretched mouth is a dropped jaw and parted lips already (27@26, 27@25, 26@25 in her appendix C): added
-    up they would open it twice.
-
-    Args:
-        gaps: (k,) metres between the lips with full intensity (`Model.gap`), of `OPENING`.
-        values: (k, n) intensities 0..1.
-
-    Returns:
-        (k, n) intensities, of the same type.
-    """
-    out, open_ = np.array(values), np.zeros(values.shape[1:], np.float64)
-    for row, gap, value in zip(out, gaps, values, strict=True):
-        if gap > 0:
-            row[...] = np.maximum(value - open_ / gap, 0)
-            open_ = np.maximum(open_, gap * value)
-    return out
 
 
 def mix(model: Model, at: Float64, values: Mapping[int, float], thing: Thing = "face") -> Float64:
@@ -109,3 +86,9 @@ def _turns(model: Model, values: Mapping[int, float], kind: str) -> list[int]:
     known = units()
     mine = [au for au in values if au in model.degrees and known[au].kind == kind and values[au]]
     return sorted(mine, key=lambda au: "zxy".index(known[au].turn[1]))
+
+
+def turned(at: Float64, axis: tuple[float, float, float], radians: float, pivot: object) -> Float64:
+    """Return points (n, 3) turned right-handed about an axis through the pivot."""
+    centre = np.asarray(pivot, np.float64)
+    return np.asarray((at - centre) @ rotation(axis, radians).T + centre)

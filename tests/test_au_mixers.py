@@ -1,12 +1,12 @@
-"""Which action units are added up and which follow one another (Wojdel 2005, 5.1)."""
+"""Tests of the mixers of action units that deformers are compared with."""
 
 import numpy as np
 import pytest
 
 from realizer.face.au.file import read_model
-from realizer.face.au.mixers import additive, mix, successive
 from realizer.face.au.model import Model
 from realizer.face.load import list_faces, load_face
+from tests.au_mixers import additive, mix, successive
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +26,7 @@ def part(name: str) -> np.ndarray:
     return load_face().vertices[first:last].astype(np.float64)
 
 
-def test_the_additive_mixer_does_not_care_for_the_order(model: Model, skin: np.ndarray) -> None:
+def test_additive_does_not_depend_on_the_order(model: Model, skin: np.ndarray) -> None:
     one, other = additive(model, skin, {12: 1, 25: 0.7}), additive(model, skin, {25: 0.7, 12: 1})
     assert one == pytest.approx(other, abs=1e-15)
     assert one - skin == pytest.approx(
@@ -34,22 +34,22 @@ def test_the_additive_mixer_does_not_care_for_the_order(model: Model, skin: np.n
     )
 
 
-def test_the_successive_mixer_does(model: Model, skin: np.ndarray) -> None:
+def test_successive_depends_on_the_order(model: Model, skin: np.ndarray) -> None:
     one, other = successive(model, skin, {12: 1, 27: 1}), successive(model, skin, {27: 1, 12: 1})
     assert np.abs(one - other).max() > 0.001
 
 
-def test_displacements_on_the_face_are_added(model: Model, skin: np.ndarray) -> None:
+def test_mix_adds_displacements_of_the_face(model: Model, skin: np.ndarray) -> None:
     values = {1: 0.5, 12: 1.0, 25: 0.8}
     assert mix(model, skin, values) == pytest.approx(additive(model, skin, values), abs=1e-12)
 
 
-def test_nothing_moves_nothing(model: Model, skin: np.ndarray) -> None:
+def test_mix_of_nothing_moves_nothing(model: Model, skin: np.ndarray) -> None:
     assert (mix(model, skin, {}) == skin).all()
     assert mix(model, skin, {12: 0.0, 51: 0.0}) == pytest.approx(skin, abs=1e-15)
 
 
-def test_a_head_turns_as_one_rigid_body_above_the_neck(model: Model) -> None:
+def test_mix_turns_a_head_as_one_rigid_body(model: Model) -> None:
     """Eyes, upper teeth and brows keep their distances; a linear displacement would not."""
     points = np.concatenate([part("left_eye"), part("upper_teeth"), part("brows")])
     turned = mix(model, points, {51: 1.0, 54: 0.5}, "fixed")
@@ -63,7 +63,7 @@ def test_a_head_turns_as_one_rigid_body_above_the_neck(model: Model) -> None:
     ("au", "axis", "sign"),
     [(51, 0, 1), (52, 0, -1), (53, 1, 1), (54, 1, -1), (61, 0, 1), (62, 0, -1), (63, 1, 1), (64, 1, -1)],
 )
-def test_each_turn_goes_where_its_name_says(model: Model, au: int, axis: int, sign: int) -> None:
+def test_mix_turns_eyes_in_the_direction_of_their_unit(model: Model, au: int, axis: int, sign: int) -> None:
     """Left is the character's, +x; the front of the eyeball shows it."""
     ball = part("left_eye")
     front = ball[np.argmax(ball[:, 2])][None]
@@ -72,12 +72,12 @@ def test_each_turn_goes_where_its_name_says(model: Model, au: int, axis: int, si
 
 
 @pytest.mark.parametrize(("au", "sign"), [(55, 1), (56, -1)])
-def test_a_head_tilts_to_its_side(model: Model, skin: np.ndarray, au: int, sign: int) -> None:
+def test_mix_tilts_a_head_to_its_side(model: Model, skin: np.ndarray, au: int, sign: int) -> None:
     top = skin[np.argmax(skin[:, 1])][None]
     assert sign * (mix(model, top, {au: 1.0}) - top)[0, 0] > 0.05
 
 
-def test_half_the_intensity_is_half_the_angle(model: Model) -> None:
+def test_mix_turns_by_half_the_angle_at_half_the_intensity(model: Model) -> None:
     """Equation 4.2: where a point goes is not linear in the intensity."""
     ball = part("right_eye")
     half, whole = (mix(model, ball, {61: value}, "right eye") for value in (0.5, 1.0))
@@ -85,7 +85,7 @@ def test_half_the_intensity_is_half_the_angle(model: Model) -> None:
     assert np.abs((half - ball) * 2 - (whole - ball)).max() > 1e-4
 
 
-def test_eyes_look_first_and_the_head_turns_with_them(model: Model) -> None:
+def test_mix_turns_the_head_with_eyes_that_look(model: Model) -> None:
     ball = part("left_eye")
     looks = mix(model, ball, {61: 1.0}, "left eye")
     assert mix(model, ball, {51: 1.0, 61: 1.0}, "left eye") == pytest.approx(
@@ -93,7 +93,7 @@ def test_eyes_look_first_and_the_head_turns_with_them(model: Model) -> None:
     )
 
 
-def test_the_lower_teeth_go_with_the_jaw_and_only_with_it(model: Model) -> None:
+def test_mix_moves_the_lower_teeth_with_the_jaw_only(model: Model) -> None:
     teeth = part("lower_teeth")
     dropped = mix(model, teeth, {27: 1.0}, "jaw") - teeth
     assert (dropped[:, 1] < -0.008).all()
@@ -101,7 +101,7 @@ def test_the_lower_teeth_go_with_the_jaw_and_only_with_it(model: Model) -> None:
     assert (mix(model, part("upper_teeth"), {27: 1.0}, "fixed") == part("upper_teeth")).all()
 
 
-def test_the_chin_of_an_open_jaw_stays_on_the_turning_head(model: Model) -> None:
+def test_mix_keeps_the_chin_of_an_open_jaw_on_a_turning_head(model: Model) -> None:
     chin = np.asarray(load_face().points["2.1"], np.float64)[None]
     opened = mix(model, chin, {27: 1.0})
     both = mix(model, chin, {27: 1.0, 51: 1.0})
