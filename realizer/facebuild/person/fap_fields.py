@@ -34,10 +34,11 @@ def face_fields(ground: Ground, jaw_pivot: Float64) -> tuple[dict[int, Float64],
     fields |= _nose(ground, lips)
     fields |= _ears(ground)
     fields |= _tongue(ground)
-    return _untangled(ground, _mirrored(ground, fields), jaw_pivot), lips
+    fields = symmetrize(fields, ground.mesh.mirror())
+    return _without_flips(ground, fields, jaw_pivot), lips
 
 
-def _untangled(ground: Ground, fields: dict[int, Float64], pivot: Float64) -> dict[int, Float64]:
+def _without_flips(ground: Ground, fields: dict[int, Float64], pivot: Float64) -> dict[int, Float64]:
     """Return the fields without triangles of the skin that turn over."""
     quads = ground.mesh.quads["body"]
     near = quads[(ground.at[quads, 1] > LOWEST).all(axis=1)]
@@ -45,11 +46,6 @@ def _untangled(ground: Ground, fields: dict[int, Float64], pivot: Float64) -> di
     return without_flips(
         fields, ground.at, triangles, ground.points, ground.fapu(), pivot, ground.mesh.mirror()
     )
-
-
-def _mirrored(ground: Ground, fields: dict[int, Float64]) -> dict[int, Float64]:
-    """Return symmetric fields: each is the mean of itself and its twin's mirror image."""
-    return symmetrize(fields, ground.mesh.mirror())
 
 
 def _jaw(ground: Ground, lips: Lips, pivot: Float64) -> dict[int, Float64]:
