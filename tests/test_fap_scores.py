@@ -36,22 +36,22 @@ def spoiled(change: dict[int, object]) -> dict[tuple[int, int], FapScore]:
     return {(t.fap, t.sign): t for t in score_faps(worse)}
 
 
-def test_127_displacements_are_measured(truths: tuple[FapScore, ...]) -> None:
+def test_score_faps_measures_127_displacements(truths: tuple[FapScore, ...]) -> None:
     assert len(truths) == 127
     assert {t.fap for t in truths} == set(range(3, 69))
 
 
-def test_every_face_is_truer_than_every_face_that_paul_measured(truths: tuple[FapScore, ...]) -> None:
+def test_mean_score_of_each_face_is_above_paul_s(truths: tuple[FapScore, ...]) -> None:
     assert mean_score(truths) > max(PEERS.values())
     assert min(t.score for t in truths) >= 1
 
 
-def test_every_feature_point_goes_where_it_is_asked_to(truths: tuple[FapScore, ...]) -> None:
+def test_score_faps_finds_no_error_on_shipped_faces(truths: tuple[FapScore, ...]) -> None:
     assert all(t.error < 0.02 for t in truths)
     assert all(t.mirror < 0.01 and t.others < 0.05 for t in truths)
 
 
-def test_weights_and_scores_give_back_what_paul_reports_of_his_own_face() -> None:
+def test_mean_score_gives_back_paul_s_own_figures() -> None:
     # Table 4.3: FaceEditor lacks pupils, tongue, head and pulled ears; 13 displacements got a 2.
     missing = {29, 30, *range(43, 51), 67, 68}
     odd = {(4, 1)} | {(fap, sign) for fap in (12, 13, 59, 60, 61, 62) for sign in (1, -1)}
@@ -68,7 +68,7 @@ def test_weights_and_scores_give_back_what_paul_reports_of_his_own_face() -> Non
     assert mean_score(tuple(t for t in his if t.fap not in missing)) == pytest.approx(2.88, abs=0.005)
 
 
-def test_a_fap_that_moves_too_far_or_backwards_is_found() -> None:
+def test_score_faps_finds_wrong_lengths_and_directions() -> None:
     found = spoiled({31: lambda field: field * 1.1, 33: lambda field: -field})
     assert found[31, 1].error == pytest.approx(0.1, abs=0.001)
     assert found[31, 1].score == 2
@@ -77,7 +77,7 @@ def test_a_fap_that_moves_too_far_or_backwards_is_found() -> None:
     assert found[32, 1].mirror == pytest.approx(0.1, abs=0.001)
 
 
-def test_a_lip_that_takes_the_other_along_is_found() -> None:
+def test_score_faps_finds_a_lip_that_drags_the_other() -> None:
     face = load_face()
     both = face.basis["fields"].toarray()[:, 3]
     found = spoiled({5: lambda field: field - 0.4 * both})
@@ -85,7 +85,7 @@ def test_a_lip_that_takes_the_other_along_is_found() -> None:
     assert found[5, 1].score < 2
 
 
-def test_a_spike_is_rough() -> None:
+def test_score_faps_calls_a_spike_rough() -> None:
     face = load_face()
     vertex = face.feature_points["4.1"] - face.basis["moving"][0]
 
@@ -97,7 +97,7 @@ def test_a_spike_is_rough() -> None:
     assert spoiled({31: spike})[31, 1].rough > 0.9
 
 
-def test_a_field_far_too_strong_turns_skin_over() -> None:
+def test_score_faps_finds_flipped_skin() -> None:
     face = load_face()
     sharp = np.zeros((face.basis["moving"][1] - face.basis["moving"][0], 3), np.float32)
     vertex = face.feature_points["5.1"] - face.basis["moving"][0]

@@ -22,18 +22,18 @@ def rows(values: dict[int, float]) -> np.ndarray:
     return out
 
 
-def test_contours_are_the_inner_and_outer_lip_points_in_one_unit_and_direction() -> None:
+def test_contours_pair_inner_and_outer_lip_points() -> None:
     for inner, outer in CONTOURS.items():
         a, b = faps()[inner - 1], faps()[outer - 1]
         assert (a.unit, a.direction, a.name + "_o") == (b.unit, b.direction, b.name)
 
 
-def test_small_differences_are_left_alone(kept) -> None:
+def test_couple_lips_leaves_small_differences(kept) -> None:
     asked = rows({4: 60, 51: -30, 12: 40})
     assert couple_lips(kept, asked) is asked
 
 
-def test_a_contour_asked_for_alone_is_reached_and_drags_the_other(kept) -> None:
+def test_couple_lips_drags_the_other_contour(kept) -> None:
     for inner, outer in CONTOURS.items():
         for one, other in ((inner, outer), (outer, inner)):
             for value in (1000.0, -1000.0):
@@ -42,12 +42,12 @@ def test_a_contour_asked_for_alone_is_reached_and_drags_the_other(kept) -> None:
                 assert 0 < got[other - 1] / value < 1
 
 
-def test_contours_asked_for_alike_stay_alike(kept) -> None:
+def test_couple_lips_keeps_equal_requests(kept) -> None:
     asked = rows({4: 900, 51: 900, 6: -500, 53: -500})
     assert np.array_equal(couple_lips(kept, asked), asked)
 
 
-def test_contours_asked_apart_meet_half_way(kept) -> None:
+def test_couple_lips_meets_opposite_requests_half_way(kept) -> None:
     got = couple_lips(kept, rows({5: 800, 52: -800}))[0]
     assert got[4] == pytest.approx(-got[51])
     assert got[4] - got[51] == pytest.approx(kept.apart[1], rel=1e-4)

@@ -62,23 +62,23 @@ def both(row: Fap) -> list[float]:
     return [usual(row)] if row.least == 0 else [usual(row), -usual(row)]
 
 
-def test_there_is_a_default_face() -> None:
+def test_load_face_has_a_default() -> None:
     assert load_face().name in FOLDERS
 
 
-def test_neutral_faps_leave_the_mesh_still(face: Face) -> None:
+def test_deform_keeps_the_neutral_mesh(face: Face) -> None:
     assert np.array_equal(deform(face, np.zeros((3, 68)))[1], face.vertices)
 
 
 @pytest.mark.parametrize("row", STRAIGHT, ids=lambda row: row.name)
-def test_fap_moves_its_feature_point_by_value_times_fapu(face: Face, row: Fap) -> None:
+def test_deform_moves_a_feature_point_by_value_times_fapu(face: Face, row: Fap) -> None:
     for value in both(row):
         move = moved(face, {row.fap: value})[face.feature_points[row.feature_point]]
         asked = value * face.fapu.metres(row.unit)
         assert move @ np.array(WAYS[row.direction]) == pytest.approx(asked, rel=0.02)
 
 
-def test_open_jaw_lowers_the_chin_by_value_times_fapu_and_leaves_the_lips(face: Face) -> None:
+def test_deform_lowers_the_chin_by_open_jaw_without_the_lips(face: Face) -> None:
     for value in (150, 600, 1500):
         move = moved(face, {3: value})
         asked = value * face.fapu.metres("MNS")
@@ -87,7 +87,7 @@ def test_open_jaw_lowers_the_chin_by_value_times_fapu_and_leaves_the_lips(face: 
             assert np.linalg.norm(move[face.feature_points[name]]) < 0.05 * asked, name
 
 
-def test_open_jaw_takes_lower_teeth_and_tongue_and_not_the_upper_teeth(face: Face) -> None:
+def test_deform_moves_lower_teeth_and_tongue_by_open_jaw(face: Face) -> None:
     move = np.linalg.norm(moved(face, {3: 800}), axis=1)
     for part in ("lower_teeth", "tongue"):
         assert move[slice(*face.parts[part])].min() > 0.0005
@@ -102,7 +102,7 @@ def test_open_jaw_takes_lower_teeth_and_tongue_and_not_the_upper_teeth(face: Fac
 @pytest.mark.parametrize(
     ("fap", "value", "way"), [(14, 300, (0, 0, 1)), (15, 200, (-1, 0, 0)), (15, -200, (-1, 0, 0))]
 )
-def test_thrust_and_shift_carry_the_lower_teeth_and_the_tongue_and_nothing_of_the_upper(
+def test_deform_moves_lower_teeth_and_tongue_by_thrust(
     face: Face, fap: int, value: int, way: tuple[int, int, int]
 ) -> None:
     move = moved(face, {fap: value})
@@ -112,7 +112,7 @@ def test_thrust_and_shift_carry_the_lower_teeth_and_the_tongue_and_nothing_of_th
     assert np.abs(move[slice(*face.parts["upper_teeth"])]).max() == 0
 
 
-def test_the_jaw_turns_about_its_joint_before_it_slides(face: Face) -> None:
+def test_jaw_pose_turns_before_it_slides(face: Face) -> None:
     first, last = face.parts["lower_teeth"]
     before = face.vertices[first:last].astype(float)
     after = before + moved(face, {3: 400})[first:last]
@@ -141,9 +141,7 @@ def outside(face: Face, at: np.ndarray, cover: str) -> np.ndarray:
 
 @pytest.mark.parametrize("fap", [48, 49, 50])
 @pytest.mark.parametrize("cover", ["shirt", "hair"])
-def test_skin_that_is_covered_stays_so_when_the_head_turns_by_30_degrees(
-    face: Face, cover: str, fap: int
-) -> None:
+def test_deform_keeps_covered_skin_covered_on_a_turned_head(face: Face, cover: str, fap: int) -> None:
     rest = outside(face, face.vertices.astype(float), cover)
     covered = np.isfinite(rest) & (rest < -0.0005)
     assert covered.any()
@@ -155,7 +153,7 @@ def test_skin_that_is_covered_stays_so_when_the_head_turns_by_30_degrees(
 @pytest.mark.parametrize(
     ("side", "part", "yaw", "pitch"), [(0, "left_eye", 23, 25), (1, "right_eye", 24, 26)]
 )
-def test_eyeballs_turn_by_the_angle(face: Face, side: int, part: str, yaw: int, pitch: int) -> None:
+def test_deform_turns_eyeballs_by_the_angle(face: Face, side: int, part: str, yaw: int, pitch: int) -> None:
     _, centre = face.basis["eyes"][side]
     pupil = face.feature_points["3.5" if side == 0 else "3.6"]
     for fap, way in ((yaw, (1, 0)), (pitch, (0, -1))):
@@ -169,7 +167,7 @@ def test_eyeballs_turn_by_the_angle(face: Face, side: int, part: str, yaw: int, 
 
 
 @pytest.mark.parametrize(("fap", "part"), [(29, "left_eye"), (30, "right_eye")])
-def test_pupils_widen_by_value_times_fapu(face: Face, fap: int, part: str) -> None:
+def test_deform_widens_pupils_by_value_times_fapu(face: Face, fap: int, part: str) -> None:
     first, last = face.parts[part]
     eye = 0 if part == "left_eye" else 1
     _, centre = face.basis["eyes"][eye]
@@ -182,7 +180,7 @@ def test_pupils_widen_by_value_times_fapu(face: Face, fap: int, part: str) -> No
         assert grown == pytest.approx(value * face.fapu.metres("IRISD"), rel=0.05)
 
 
-def test_the_head_turns_by_the_angle_about_its_point_and_the_bust_stays(face: Face) -> None:
+def test_deform_turns_the_head_by_the_angle_without_the_bust(face: Face) -> None:
     tip, pivot = face.feature_points["9.3"], face.points["7.1"]
     before = face.vertices[tip] - pivot
     for fap, plane, sign in ((48, (2, 1), -1), (49, (2, 0), 1), (50, (1, 0), -1)):
@@ -196,7 +194,7 @@ def test_the_head_turns_by_the_angle_about_its_point_and_the_bust_stays(face: Fa
             assert np.abs(after[low] - face.vertices[low]).max() < 1e-6
 
 
-def test_tongue_roll_lifts_both_borders_by_the_angle(face: Face) -> None:
+def test_deform_lifts_both_borders_by_tongue_roll(face: Face) -> None:
     after = deform(face, rows({47: 60000}))[0]
     for name in ("6.3", "6.4"):
         vertex = face.feature_points[name]
@@ -205,7 +203,7 @@ def test_tongue_roll_lifts_both_borders_by_the_angle(face: Face) -> None:
 
 
 @pytest.mark.parametrize("row", LOW_LEVEL, ids=lambda row: row.name)
-def test_mirrored_faps_mirror(face: Face, row: Fap) -> None:
+def test_deform_mirrors_mirrored_faps(face: Face, row: Fap) -> None:
     from scipy.spatial import cKDTree
 
     value = usual(row)
@@ -224,7 +222,7 @@ def test_mirrored_faps_mirror(face: Face, row: Fap) -> None:
 @pytest.mark.parametrize(
     "row", [r for r in LOW_LEVEL if r.feature_point in UPPER + LOWER], ids=lambda r: r.name
 )
-def test_the_opposite_lip_stays(face: Face, row: Fap) -> None:
+def test_deform_leaves_the_opposite_lip(face: Face, row: Fap) -> None:
     opposite = LOWER if row.feature_point in UPPER else UPPER
     move = np.linalg.norm(moved(face, {row.fap: usual(row)}), axis=1)
     asked = usual(row) * face.fapu.metres(row.unit)
@@ -235,14 +233,14 @@ def test_the_opposite_lip_stays(face: Face, row: Fap) -> None:
 @pytest.mark.parametrize(
     ("fap", "others"), [(19, "3.3 3.1"), (20, "3.4 3.2"), (21, "3.1 3.3"), (22, "3.2 3.4")]
 )
-def test_the_opposite_lid_stays(face: Face, fap: int, others: str) -> None:
+def test_deform_leaves_the_opposite_lid(face: Face, fap: int, others: str) -> None:
     opposite, _ = others.split()
     move = moved(face, {fap: 300})
     assert np.linalg.norm(move[face.feature_points[opposite]]) < 0.05 * 300 * face.fapu.metres("IRISD")
 
 
 @pytest.mark.parametrize("upper", [1024, 700, 512])
-def test_lids_meet_when_their_faps_add_up_to_the_aperture(face: Face, upper: int) -> None:
+def test_deform_closes_lids_whose_faps_add_up_to_the_aperture(face: Face, upper: int) -> None:
     closed = deform(face, rows({19: upper, 20: upper, 21: 1024 - upper, 22: 1024 - upper}))[0]
     for high, low in (("3.1", "3.3"), ("3.2", "3.4")):
         gap = closed[face.feature_points[high]] - closed[face.feature_points[low]]
@@ -250,7 +248,7 @@ def test_lids_meet_when_their_faps_add_up_to_the_aperture(face: Face, upper: int
         assert np.linalg.norm(gap) < 0.0015
 
 
-def test_eyeballs_never_poke_through_the_lids_of_a_blink(face: Face) -> None:
+def test_deform_keeps_eyeballs_behind_the_lids_of_a_blink(face: Face) -> None:
     for share in np.linspace(0.1, 1, 8):
         upper, lower = 700 * share, 324 * share
         at = deform(face, rows({19: upper, 20: upper, 21: lower, 22: lower}))[0]
@@ -261,7 +259,7 @@ def test_eyeballs_never_poke_through_the_lids_of_a_blink(face: Face) -> None:
 
 
 @pytest.mark.parametrize("row", LOW_LEVEL, ids=lambda row: row.name)
-def test_no_triangle_of_the_skin_flips_at_usual_values(face: Face, row: Fap) -> None:
+def test_deform_flips_no_triangle_at_usual_values(face: Face, row: Fap) -> None:
     first, last = face.parts["skin"]
     mine = face.triangles[(face.triangles < last).all(axis=1)]
     inside = np.asarray(face.occlusion)[mine].max(axis=1) < 0.30  # behind the lips, in the sockets
@@ -282,7 +280,7 @@ def test_no_triangle_of_the_skin_flips_at_usual_values(face: Face, row: Fap) -> 
     assert first == 0
 
 
-def test_equal_lip_faps_move_a_lip_as_one_without_a_w(face: Face) -> None:
+def test_deform_moves_a_lip_evenly_by_equal_faps(face: Face) -> None:
     move = moved(face, dict.fromkeys((5, 10, 11, 52, 57, 58), -300))[:, 1]
     inner = [move[face.feature_points[name]] for name in ("2.8", "2.3", "2.9")]
     assert np.ptp(inner) < 0.02 * abs(inner[1])
@@ -290,7 +288,7 @@ def test_equal_lip_faps_move_a_lip_as_one_without_a_w(face: Face) -> None:
     assert move[skin].min() > 1.04 * inner[1]  # nothing between the points sinks below them
 
 
-def test_batches_equal_single_frames(face: Face) -> None:
+def test_deform_of_batches_equals_single_frames(face: Face) -> None:
     rng = np.random.default_rng(7)
     table = np.array([[row.least, row.most] for row in faps()])
     frames = (rng.uniform(-0.2, 0.2, (9, 68)) * np.abs(table).max(axis=1)).astype(np.float32)
@@ -300,6 +298,6 @@ def test_batches_equal_single_frames(face: Face) -> None:
 
 
 @pytest.mark.parametrize("bad", [np.zeros(68), np.zeros((2, 67)), np.full((1, 68), np.nan)])
-def test_wrong_rows_are_refused(bad: np.ndarray) -> None:
+def test_deform_refuses_wrong_rows(bad: np.ndarray) -> None:
     with pytest.raises(ValueError, match="poses: wanted"):
         deform(load_face(), bad)

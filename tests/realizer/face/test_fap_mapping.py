@@ -31,13 +31,13 @@ def most(mapping: FapMapping, au: int, fap: int) -> list[float]:
     return [row.fap_to for row in mapping.rows if (row.au, row.fap) == (au, fap)]
 
 
-def test_a_face_without_a_file_has_the_table() -> None:
+def test_mapping_of_a_face_without_a_file_is_the_table() -> None:
     assert mapping_of("default").rows == standard().rows
     assert mapping_of("default") is mapping_of("default")
 
 
 @pytest.mark.parametrize("form", ["txt", "csv"])
-def test_a_faces_own_file_goes_before_the_table_and_the_users_before_both(own: Path, form: str) -> None:
+def test_mapping_of_prefers_the_user_s_file_then_the_face_s(own: Path, form: str) -> None:
     if form == "txt":
         words = "26\n3 0 1 0 111\n27\n3 0 1 0 222\n"
     else:
@@ -51,14 +51,14 @@ def test_a_faces_own_file_goes_before_the_table_and_the_users_before_both(own: P
     assert both.sources == ("au_to_fap.csv", str(own / f"au_to_fap.{form}"), str(own / "mine"))
 
 
-def test_a_face_has_one_file(own: Path) -> None:
+def test_mapping_of_refuses_two_files(own: Path) -> None:
     for form in ("txt", "csv"):
         (own / f"au_to_fap.{form}").write_text("26\n", "utf-8")
     with pytest.raises(FaceError, match=r"own: wanted one of au_to_fap.txt and au_to_fap.csv, got both"):
         mapping_of("own")
 
 
-def test_a_bad_file_is_named_with_its_line(own: Path) -> None:
+def test_mapping_of_names_the_line_of_a_fault(own: Path) -> None:
     (own / "au_to_fap.txt").write_text("26\n3 0 1 0 jaw\n", "utf-8")
     with pytest.raises(FaceError, match=r"own/au_to_fap.txt, line 2: FAP-end"):
         mapping_of("own")
@@ -67,7 +67,7 @@ def test_a_bad_file_is_named_with_its_line(own: Path) -> None:
         mapping_of("default", own / "au_to_fap.txt")
 
 
-def test_a_face_that_is_not_there_is_said() -> None:
+def test_mapping_of_refuses_an_unknown_face() -> None:
     with pytest.raises(FaceError, match="'nobody': no such folder"):
         mapping_of("nobody")
 
@@ -75,7 +75,7 @@ def test_a_face_that_is_not_there_is_said() -> None:
 SMILE = '<bml id="b"><faceLexeme id="s" lexeme="RAISE_MOUTH_CORNERS" amount="1" start="0" end="2"/></bml>'
 
 
-def test_a_users_mapping_reaches_what_is_realized(tmp_path: Path) -> None:
+def test_mapping_of_a_user_reaches_what_is_realized(tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("12\n61 0 1 0 50\n62 0 1 0 50\n", "utf-8")
     plain = realize(SMILE, idle=False, voice="silent")
     mine = realize(SMILE, idle=False, voice="silent", mapping=tmp_path / "mine.txt")
@@ -86,7 +86,7 @@ def test_a_users_mapping_reaches_what_is_realized(tmp_path: Path) -> None:
     assert mine.poses[:, names.index("stretch_l_nose")].max() == pytest.approx(50)
 
 
-def test_a_session_shows_characters_by_their_faces_and_the_users_mapping(own: Path) -> None:
+def test_mapping_of_a_user_reaches_every_character_of_a_session(own: Path) -> None:
     (own / "au_to_fap.txt").write_text("26\n3 0 1 0 111\n", "utf-8")
     (own / "mine.txt").write_text("27\n3 0 1 0 333\n", "utf-8")
     session = Session("s", Settings(mapping=own / "mine.txt"), 0.0)
@@ -95,6 +95,6 @@ def test_a_session_shows_characters_by_their_faces_and_the_users_mapping(own: Pa
     assert (most(session.faces.mapping(0), 26, 3), most(session.faces.mapping(0), 27, 3)) == ([111], [333])
 
 
-def test_a_setting_names_a_file_that_is_there() -> None:
+def test_mapping_setting_needs_an_existing_file() -> None:
     with pytest.raises(SettingsError, match="mapping: wanted an existing file"):
         Settings.read({}, environment={"REALIZER_MAPPING": "nowhere.txt"})

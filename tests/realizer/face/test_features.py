@@ -20,7 +20,7 @@ def face(request: pytest.FixtureRequest) -> Face:
     return load_face(request.param)
 
 
-def test_all_84_feature_points_are_there(face: Face) -> None:
+def test_features_are_84_points(face: Face) -> None:
     assert sorted(face.points) == sorted(NAMES)
     assert len(NAMES) == 84
 

@@ -20,7 +20,7 @@ def face(request: pytest.FixtureRequest) -> Face:
     return load_face(request.param)
 
 
-def test_the_glb_holds_mesh_colours_and_parts(face: Face) -> None:
+def test_to_glb_holds_mesh_colours_and_parts(face: Face) -> None:
     glb = to_glb(face)
     magic, version, length = struct.unpack_from("<III", glb)
     assert (magic, version, length) == (0x46546C67, 2, len(glb))

@@ -23,7 +23,7 @@ def read(tmp_path, file: GlbFile) -> Gltf:
     return Gltf(path)
 
 
-def test_every_kind_of_array_comes_back(tmp_path):
+def test_glb_file_stores_every_kind_of_array(tmp_path):
     file = GlbFile()
     numbers = {name: file.add(array) for name, array in ARRAYS.items()}
     found = read(tmp_path, file)
@@ -33,7 +33,7 @@ def test_every_kind_of_array_comes_back(tmp_path):
 
 
 @pytest.mark.parametrize("rows", [[], [3], [0, 99], [65535, 69999]])
-def test_of_a_sparse_array_only_the_rows_that_are_not_zero_are_stored(tmp_path, rows):
+def test_glb_file_stores_only_the_rows_of_a_sparse_array(tmp_path, rows):
     array = np.zeros((70000, 3), np.float32)
     array[rows] = (1, 0, -2)
     file = GlbFile()

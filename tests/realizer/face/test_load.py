@@ -38,37 +38,37 @@ def faults(copy: Path) -> str:
 
 
 @pytest.mark.parametrize("name", FACES)
-def test_every_face_is_sound_and_says_its_licence(name: str) -> None:
+def test_list_faces_are_sound_and_have_a_licence(name: str) -> None:
     assert check_face(name) == ()
     info = next(info for info in list_faces() if info.name == name)
     assert info.licence
     assert info.source
 
 
-def test_the_default_face_has_a_name_of_its_own() -> None:
+def test_load_face_default_has_a_name_of_its_own() -> None:
     assert check_face() == ()
     assert load_face("default") is load_face(load_face().name)
 
 
-def test_a_directory_comes_before_the_faces_that_came_along(copy: Path) -> None:
+def test_load_face_prefers_a_given_directory(copy: Path) -> None:
     assert load_face("broken", copy.parent).vertices.shape == load_face().vertices.shape
     assert "broken" in [info.name for info in list_faces(copy.parent)]
 
 
-def test_the_variable_names_a_directory(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_load_face_reads_the_variable(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("REALIZER_FACES", str(copy.parent))
     assert load_face("broken").name == load_face().name
 
 
 @pytest.mark.parametrize("name", ["nobody", "", "../ada", "a/b"])
-def test_an_unknown_face_is_refused_and_the_known_are_listed(name: str) -> None:
+def test_load_face_lists_the_known_faces_for_an_unknown_one(name: str) -> None:
     with pytest.raises(FaceError):
         load_face(name)
     assert len(check_face(name)) == 1
 
 
 @pytest.mark.parametrize("file", ["face.toml", "mesh.npz", "features.csv", "fields.npz"])
-def test_a_missing_file_is_named(copy: Path, file: str) -> None:
+def test_load_face_names_a_missing_file(copy: Path, file: str) -> None:
     (copy / file).unlink()
     assert file in faults(copy)
     with pytest.raises(FaceError, match=file):
@@ -76,12 +76,12 @@ def test_a_missing_file_is_named(copy: Path, file: str) -> None:
 
 
 @pytest.mark.parametrize("file", ["mesh.npz", "fields.npz"])
-def test_a_file_of_something_else_is_named(copy: Path, file: str) -> None:
+def test_load_face_names_a_file_of_another_kind(copy: Path, file: str) -> None:
     (copy / file).write_bytes(b"not an archive")
     assert file in faults(copy)
 
 
-def test_a_feature_point_off_the_mesh_is_named(copy: Path) -> None:
+def test_load_face_names_a_feature_point_off_the_mesh(copy: Path) -> None:
     path = copy / "features.csv"
     lines = path.read_text("utf-8").splitlines()
     at = next(i for i, line in enumerate(lines) if line.startswith("5.1,"))
@@ -92,13 +92,13 @@ def test_a_feature_point_off_the_mesh_is_named(copy: Path) -> None:
     assert "off its vertex" in faults(copy)
 
 
-def test_a_missing_feature_point_is_named(copy: Path) -> None:
+def test_load_face_names_a_missing_feature_point(copy: Path) -> None:
     path = copy / "features.csv"
     path.write_text("\n".join(r for r in path.read_text("utf-8").splitlines() if not r.startswith("4.3,")))
     assert "4.3" in faults(copy)
 
 
-def test_an_index_out_of_range_is_named(copy: Path) -> None:
+def test_load_face_names_an_index_out_of_range(copy: Path) -> None:
     with np.load(copy / "fields.npz") as file:
         vertex = file["vertex"].copy()
     vertex[0] = 10**6
@@ -106,7 +106,7 @@ def test_an_index_out_of_range_is_named(copy: Path) -> None:
     assert "fields.npz: vertex" in faults(copy)
 
 
-def test_nan_vertices_are_named(copy: Path) -> None:
+def test_load_face_names_nan_vertices(copy: Path) -> None:
     with np.load(copy / "mesh.npz") as file:
         vertices = file["vertices"].copy()
     vertices[17, 1] = np.nan
@@ -114,27 +114,27 @@ def test_nan_vertices_are_named(copy: Path) -> None:
     assert "not finite, the first is 17" in faults(copy)
 
 
-def test_holes_in_the_skin_are_named(copy: Path) -> None:
+def test_check_face_names_holes_in_the_skin(copy: Path) -> None:
     face = load_face()
     cheek = face.feature_points["5.1"]
     rewrite(copy / "mesh.npz", triangles=face.triangles[(face.triangles != cheek).all(axis=1)])
     assert "holes" in faults(copy)
 
 
-def test_a_wrong_part_is_named(copy: Path) -> None:
+def test_load_face_names_a_wrong_part(copy: Path) -> None:
     path = copy / "face.toml"
     path.write_text(path.read_text("utf-8").replace("tongue =", "tung ="), "utf-8")
     assert "'tongue'" in faults(copy)
 
 
-def test_parts_cover_the_mesh_without_overlap(face: Face) -> None:
+def test_load_face_has_parts_that_cover_the_mesh(face: Face) -> None:
     ranges = sorted(face.parts.values())
     assert ranges[0][0] == 0
     assert ranges[-1][1] == len(face.vertices)
     assert all(a[1] == b[0] for a, b in pairwise(ranges))
 
 
-def test_teeth_and_tongue_hide_behind_closed_lips(face: Face) -> None:
+def test_load_face_hides_teeth_and_tongue_behind_the_lips(face: Face) -> None:
     from scipy.spatial import cKDTree
 
     skin = face.vertices[slice(*face.parts["skin"])]
@@ -146,6 +146,6 @@ def test_teeth_and_tongue_hide_behind_closed_lips(face: Face) -> None:
         assert all(front[i, 2].max() > at[2] for i, at in zip(near, inside, strict=True) if i)
 
 
-def test_the_lips_are_closed_at_rest(face: Face) -> None:
+def test_load_face_has_closed_lips_at_rest(face: Face) -> None:
     gap = face.points["2.2"] - face.points["2.3"]
     assert abs(gap[1]) < 0.0005

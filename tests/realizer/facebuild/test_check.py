@@ -184,7 +184,7 @@ BROKEN: dict[str, tuple[Callable[[Path], object], tuple[str, ...]]] = {
 
 
 @pytest.mark.parametrize("name", BROKEN)
-def test_a_fault_names_its_file_and_what_to_change(folder: Path, name: str) -> None:
+def test_check_face_names_the_file_and_the_remedy(folder: Path, name: str) -> None:
     spoil, words = BROKEN[name]
     spoil(folder)
     told = "\n".join(faults(folder))
@@ -192,7 +192,7 @@ def test_a_fault_names_its_file_and_what_to_change(folder: Path, name: str) -> N
         assert word in told, told
 
 
-def test_one_fault_hides_no_other(folder: Path) -> None:
+def test_check_face_lists_every_fault(folder: Path) -> None:
     for name in ("an unknown key", "colours above 255", "fields of another mesh", "a model with NaN"):
         BROKEN[name][0](folder)
     (folder / "features.csv").unlink()
@@ -202,7 +202,7 @@ def test_one_fault_hides_no_other(folder: Path) -> None:
         assert any(file in fault for fault in told), file
 
 
-def test_a_point_on_no_surface_is_named(folder: Path) -> None:
+def test_check_face_names_a_point_on_no_surface(folder: Path) -> None:
     path = folder / "mesh.npz"
     cheek = load_face("ada").feature_points["5.1"]
     rewrite(path, triangles=lambda a: a[(a != cheek).all(axis=1)])
@@ -213,7 +213,7 @@ def test_a_point_on_no_surface_is_named(folder: Path) -> None:
     assert "open edges at vertex" in told
 
 
-def test_loading_says_the_first_fault_and_how_to_see_all(folder: Path) -> None:
+def test_load_face_names_the_first_fault_and_the_check(folder: Path) -> None:
     (folder / "mesh.npz").unlink()
     with pytest.raises(FaceError, match=r"mesh\.npz.*run realizer faces check broken"):
         load_face("broken", folder.parent)
@@ -244,25 +244,25 @@ UNUSABLE: dict[str, tuple[Callable[[Path], object], str]] = {
 
 
 @pytest.mark.parametrize("name", UNUSABLE)
-def test_a_face_that_cannot_be_drawn_is_refused_in_words_when_it_is_loaded(folder: Path, name: str) -> None:
+def test_load_face_refuses_what_cannot_be_drawn(folder: Path, name: str) -> None:
     spoil, words = UNUSABLE[name]
     spoil(folder)
     with pytest.raises(FaceError, match=words):
         load_face("broken", folder.parent)
 
 
-def test_a_model_with_an_unknown_unit_does_not_draw_a_face(folder: Path) -> None:
+def test_load_face_refuses_a_model_with_an_unknown_unit(folder: Path) -> None:
     edit(folder / "au_extended.toml", "[degrees]", "[degrees]\nAU99 = 3.0")
     with pytest.raises(FaceError, match=r"au_extended\.toml: \[AU99\]: there is no such unit"):
         load_face("broken", folder.parent, "au")
 
 
-def test_a_fault_that_the_check_found_does_not_say_to_check(folder: Path) -> None:
+def test_check_command_does_not_advise_to_check(folder: Path) -> None:
     BROKEN["a deformer that there is not"][0](folder)
     assert not any("run realizer faces check" in fault for fault in faults(folder))
 
 
-def test_a_damaged_face_hides_no_other_from_the_list(folder: Path) -> None:
+def test_list_faces_leaves_out_damaged_faces_alone(folder: Path) -> None:
     (folder / "face.toml").write_text("name = 3\n")
     ran = CliRunner(env={"REALIZER_FACES": str(folder.parent)})
     listed = ran.invoke(faces, ["list"])
@@ -274,7 +274,7 @@ def test_a_damaged_face_hides_no_other_from_the_list(folder: Path) -> None:
     assert 'face.toml: wanted name = "...", got 3' in checked.output
 
 
-def test_a_folder_that_an_import_wrote_is_checked_by_its_path(folder: Path) -> None:
+def test_check_command_takes_the_path_of_an_import(folder: Path) -> None:
     (folder / "mesh.npz").unlink()
     checked = CliRunner().invoke(faces, ["check", str(folder)], standalone_mode=False)
     assert checked.return_value == 1
@@ -283,7 +283,7 @@ def test_a_folder_that_an_import_wrote_is_checked_by_its_path(folder: Path) -> N
         load_face(str(folder))
 
 
-def test_without_a_name_every_face_is_checked(folder: Path) -> None:
+def test_check_command_without_a_name_checks_every_face(folder: Path) -> None:
     (folder / "mesh.npz").unlink()
     ran = CliRunner(env={"REALIZER_FACES": str(folder.parent)}).invoke(
         faces, ["check"], standalone_mode=False

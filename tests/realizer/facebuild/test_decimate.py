@@ -23,7 +23,7 @@ def area(at: np.ndarray, triangles: np.ndarray) -> float:
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 
 
-def test_a_flat_sheet_needs_few_vertices_and_keeps_its_outline() -> None:
+def test_decimate_keeps_the_outline_of_a_flat_sheet() -> None:
     at, triangles = sheet(0)
     kept, left = decimate(at, triangles, np.full(len(at), 0.001))
     assert len(kept) < len(at) / 4
@@ -32,7 +32,7 @@ def test_a_flat_sheet_needs_few_vertices_and_keeps_its_outline() -> None:
     assert (np.cross(b - a, c - a)[:, 2] > 0).all()
 
 
-def test_what_has_no_tolerance_stays() -> None:
+def test_decimate_keeps_vertices_without_tolerance() -> None:
     at, triangles = sheet(0)
     tolerance = np.where(at[:, 1] > 0, 0.001, 0)
     kept, _ = decimate(at, triangles, tolerance)
@@ -41,7 +41,7 @@ def test_what_has_no_tolerance_stays() -> None:
 
 
 @pytest.mark.parametrize("tolerance", [0.0005, 0.002])
-def test_a_bent_sheet_changes_by_no_more_than_it_may(tolerance: float) -> None:
+def test_decimate_changes_a_bent_sheet_by_the_tolerance(tolerance: float) -> None:
     at, triangles = sheet(0.02)
     kept, left = decimate(at, triangles, np.full(len(at), tolerance))
     assert len(kept) < len(at)
@@ -49,7 +49,7 @@ def test_a_bent_sheet_changes_by_no_more_than_it_may(tolerance: float) -> None:
     assert np.abs(middle[:, 2] - 0.02 * np.cos(middle[:, 0] * 15)).max() < 2.5 * tolerance
 
 
-def test_no_hole_comes_and_each_edge_has_two_sides() -> None:
+def test_decimate_makes_no_holes() -> None:
     at, triangles = sheet(0.02)
     kept, left = decimate(at, triangles, np.full(len(at), 0.002))
     edges = np.sort(np.concatenate([left[:, [0, 1]], left[:, [1, 2]], left[:, [2, 0]]]), axis=1)

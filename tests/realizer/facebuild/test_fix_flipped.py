@@ -24,7 +24,7 @@ def mended(fields: list[Float64], plays: list[tuple[Float64, Any, float]], fixed
     return soften_flips(np.stack(fields), AT, TRIANGLES, plays, fixed)
 
 
-def test_a_narrow_bump_that_is_pushed_through_its_neighbours_is_widened() -> None:
+def test_soften_flips_widens_a_bump_pushed_through_its_sides() -> None:
     field = bump(1.6)
     assert flipped_triangles(AT, AT + 2.5 * field, TRIANGLES).any()
     (wide,) = mended([field], [(np.array([2.5]), 0.0, 0.0)], [MIDDLE])
@@ -32,19 +32,19 @@ def test_a_narrow_bump_that_is_pushed_through_its_neighbours_is_widened() -> Non
     assert np.array_equal(wide[MIDDLE], field[MIDDLE])
 
 
-def test_a_field_that_turns_nothing_over_stays_as_it_is() -> None:
+def test_soften_flips_leaves_a_field_that_flips_nothing() -> None:
     field = bump(6)
     plays = [(np.array([way]), 0.0, 0.0) for way in (2.0, -2.0)]
     assert np.array_equal(mended([field], plays, [])[0], field)
 
 
-def test_what_moves_along_counts() -> None:
+def test_soften_flips_counts_accompanying_movement() -> None:
     field = bump(1.6)
     together = [(np.array([2.5]), 2.5 * (bump(7) - field), 0.0)]
     assert np.array_equal(mended([field], together, [MIDDLE])[0], field)
 
 
-def test_fields_that_add_up_to_one_still_do_when_one_of_them_is_mended() -> None:
+def test_soften_flips_keeps_sums_of_fields() -> None:
     field = bump(1.6)
     rest = [1.0, 0, 0] - field
     one, other = mended([field, rest], [(np.array([2.5, 0.0]), 0.0, 0.0)], [MIDDLE])

@@ -38,7 +38,7 @@ def test_teeth_are_closed_towards_the_tongue(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [info.name for info in list_faces()])
-def test_an_open_mouth_is_dark_red_from_the_side_and_not_black(name: str) -> None:
+def test_parts_of_an_open_mouth_are_dark_red_not_black(name: str) -> None:
     face = load_face(name)
     shape = opened(face)
     camera = camera_for(face, "three-quarter")
@@ -55,7 +55,7 @@ def test_an_open_mouth_is_dark_red_from_the_side_and_not_black(name: str) -> Non
 
 
 @pytest.mark.parametrize("name", [info.name for info in list_faces()])
-def test_the_tongue_sinks_less_than_the_jaw_and_stays_behind_the_teeth(name: str) -> None:
+def test_tongue_sinks_less_than_the_jaw_and_stays_behind(name: str) -> None:
     face = load_face(name)
     shape = opened(face)
     fall = face.vertices[:, 1] - shape[:, 1]

@@ -41,11 +41,11 @@ def part(face: Face, vertices: np.ndarray, name: str) -> np.ndarray:
     return vertices[slice(*face.parts[name])]
 
 
-def test_at_rest_the_face_is_neutral_to_the_last_bit(face: Face) -> None:
+def test_moves_at_rest_keep_the_neutral_face(face: Face) -> None:
     assert (deform(face, np.zeros((2, len(face.inputs)))) == face.vertices).all()
 
 
-def test_a_pose_is_the_faps_then_each_unit_by_side_then_the_lips_and_the_mixing(face: Face) -> None:
+def test_columns_are_faps_units_lips_and_mixing(face: Face) -> None:
     assert face.inputs[:68] == load_face(deformer="mpeg4").inputs
     assert {"12L", "12R", "17", "45L", "46R"} <= set(face.inputs[68:])
     mixing = face.inputs.index("lips")
@@ -55,7 +55,7 @@ def test_a_pose_is_the_faps_then_each_unit_by_side_then_the_lips_and_the_mixing(
     assert input_names(deformer="au") == face.inputs
 
 
-def test_units_give_what_the_mixers_give(face: Face) -> None:
+def test_moves_equal_the_reference_mixer(face: Face) -> None:
     values = {1: 0.6, 12: 0.9, 27: 0.5}
     made = shown(face, **{f"au{au}": value for au, value in values.items()})
     neutral = face.vertices.astype(np.float64)
@@ -70,14 +70,14 @@ def test_units_give_what_the_mixers_give(face: Face) -> None:
         assert part(face, made, name) == pytest.approx(wanted, abs=5e-5), name
 
 
-def test_faps_alone_move_it_as_they_move_any_face(face: Face) -> None:
+def test_moves_leave_faps_alone(face: Face) -> None:
     rows = np.zeros((1, 68), np.float32)
     rows[0, [2, 11, 22, 30, 48]] = 400, 200, 20000, 150, 30000
     other = load_face(deformer="mpeg4")
     assert np.array_equal(deform(face, rows), deform(other, rows))
 
 
-def test_a_turned_head_carries_what_units_do(face: Face) -> None:
+def test_moves_turn_with_the_head(face: Face) -> None:
     """Mixed successively: the smile first, then the turn of all of it."""
     turned = shown(face, head_yaw=30000)
     both = shown(face, au12=1, head_yaw=30000)
@@ -88,7 +88,7 @@ def test_a_turned_head_carries_what_units_do(face: Face) -> None:
     assert np.linalg.norm(after - before) > 0.1 * np.linalg.norm(before)
 
 
-def test_lashes_and_brows_stay_on_the_skin_they_grow_on(face: Face) -> None:
+def test_moves_keep_lashes_and_brows_on_the_skin(face: Face) -> None:
     """Half closed and closed, raised and lowered, nothing comes loose by more than 1.5 millimetres."""
     from scipy.spatial import cKDTree
 
@@ -101,14 +101,14 @@ def test_lashes_and_brows_stay_on_the_skin_they_grow_on(face: Face) -> None:
             assert (after - before).max() < 0.0015, (values, name)
 
 
-def test_a_smile_on_the_left_leaves_the_right_alone(face: Face) -> None:
+def test_moves_of_one_side_leave_the_other(face: Face) -> None:
     moved = shown(face, au12L=1) - face.vertices
     left, right = (face.feature_points[key] for key in ("8.3", "8.4"))
     assert np.linalg.norm(moved[left]) > 0.008
     assert np.linalg.norm(moved[right]) < 1e-6
 
 
-def test_units_follow_one_another_where_a_pose_asks_for_it(face: Face) -> None:
+def test_moves_are_successive_if_a_pose_says_so(face: Face) -> None:
     """By rank, and as they are numbered where ranks do not tell them apart; what is rigid does not care."""
     summed = shown(face, au12=1, au25=1)
     chained = shown(face, au12=1, au25=1, successive=1)
@@ -122,25 +122,25 @@ def test_units_follow_one_another_where_a_pose_asks_for_it(face: Face) -> None:
         assert np.array_equal(part(face, chained, name), part(face, summed, name)), name
 
 
-def test_one_unit_alone_is_the_same_either_way_and_ranks_alone_change_nothing(face: Face) -> None:
+def test_moves_of_one_unit_are_the_same_for_both_mixers(face: Face) -> None:
     smile = shown(face, au12=0.7)
     assert shown(face, au12=0.7, successive=1) == pytest.approx(smile, abs=2e-5)
     both = shown(face, au12=1, au25=1)
     assert np.array_equal(both, shown(face, au12=1, au25=1, **{"rank 25": 1}))
 
 
-def test_half_way_to_the_other_mixer_is_half_way_between_the_faces(face: Face) -> None:
+def test_moves_between_the_mixers_are_interpolated(face: Face) -> None:
     ends = [shown(face, au12=1, au25=1, successive=share) for share in (0, 1)]
     assert shown(face, au12=1, au25=1, successive=0.5) == pytest.approx(np.mean(ends, axis=0), abs=1e-6)
 
 
-def test_closed_lids_meet_however_units_are_mixed(face: Face) -> None:
+def test_moves_close_the_lids_with_either_mixer(face: Face) -> None:
     made = shown(face, au43=1, au4=1, au6=1, au7=1, successive=1)
     apart = made[face.feature_points["3.1"], 1] - made[face.feature_points["3.3"], 1]
     assert -0.0003 < apart < 0.002
 
 
-def test_closed_eyes_cover_their_balls(face: Face) -> None:
+def test_moves_cover_the_balls_of_closed_eyes(face: Face) -> None:
     made = shown(face, au43=1)
     lid, basis = face.basis["lid"], face.basis
     centres = np.stack([centre for _, centre in basis["eyes"]])[basis["lid_eye"]]
@@ -148,7 +148,7 @@ def test_closed_eyes_cover_their_balls(face: Face) -> None:
     assert (away > basis["lid_radius"] - 2e-5).all()
 
 
-def test_closed_lids_meet_and_do_not_pass_each_other(face: Face) -> None:
+def test_moves_close_lids_without_crossing(face: Face) -> None:
     made = shown(face, au43=1)
     for upper, lower in (("3.1", "3.3"), ("3.2", "3.4")):
         apart = made[face.feature_points[upper], 1] - made[face.feature_points[lower], 1]
@@ -160,20 +160,20 @@ def test_closed_lids_meet_and_do_not_pass_each_other(face: Face) -> None:
     [{"au5": 1.0}, {"au7": 1.0}, {"au6": 1.0, "au7": 1.0}, {"close_t_l_eyelid": 470.0}],
     ids=["wide", "tightened", "squinting", "looking down"],
 )
-def test_closed_lids_stay_where_they_meet_whatever_else_asks(face: Face, also: dict[str, float]) -> None:
+def test_moves_keep_closed_lids_closed(face: Face, also: dict[str, float]) -> None:
     closed, other = shown(face, au43=1), shown(face, au43=1, **also)
     for point in ("3.1", "3.3"):
         vertex = face.feature_points[point]
         assert np.linalg.norm(other[vertex] - closed[vertex]) < 0.0008, point
 
 
-def test_blink_and_wink_close_the_eye_as_its_unit_does(face: Face) -> None:
+def test_moves_of_blink_and_wink_close_the_eye(face: Face) -> None:
     closed = shown(face, au43L=1)
     assert np.array_equal(shown(face, au45L=1), closed)
     assert np.array_equal(shown(face, au46L=1, au45L=0.5, au43L=1), closed)
 
 
-def test_an_open_jaw_parts_the_lips_everywhere_between_the_corners(face: Face) -> None:
+def test_moves_of_an_open_jaw_part_the_whole_lips(face: Face) -> None:
     """The lips' two sides are told apart by the mesh, so that no vertex stays behind on the wrong one."""
     from realizer.face.au.mouth import halves
 
@@ -186,7 +186,7 @@ def test_an_open_jaw_parts_the_lips_everywhere_between_the_corners(face: Face) -
     assert fall[lips].max() < -0.012
 
 
-def test_the_mouth_opens_as_far_as_the_widest_unit_opens_it(face: Face) -> None:
+def test_limit_opening_opens_as_far_as_the_widest_unit(face: Face) -> None:
     wide = shown(face, au27=1)
     for also in ({"au26": 1.0}, {"au25": 1.0}, {"au25": 0.7, "au26": 0.9}):
         assert shown(face, au27=1, **also) == pytest.approx(wide, abs=1e-6)
@@ -196,7 +196,7 @@ def test_the_mouth_opens_as_far_as_the_widest_unit_opens_it(face: Face) -> None:
     assert gaps @ limit_opening(gaps, values) == pytest.approx((gaps[:, None] * values).max(axis=0))
 
 
-def test_speech_has_the_lips_and_leaves_brows_cheeks_and_part_of_the_corners(face: Face) -> None:
+def test_moves_leave_the_lips_to_speech(face: Face) -> None:
     values = {"au1": 1.0, "au6": 1.0, "au12": 1.0, "au27": 1.0}
     silent = shown(face, **values) - face.vertices
     speaking = shown(face, **values, lips=1) - face.vertices
@@ -209,7 +209,7 @@ def test_speech_has_the_lips_and_leaves_brows_cheeks_and_part_of_the_corners(fac
     assert np.abs(silent[teeth]).max() > 0.01
 
 
-def test_values_of_another_shape_or_not_finite_are_refused(face: Face) -> None:
+def test_deform_refuses_wrong_shapes_and_infinity(face: Face) -> None:
     with pytest.raises(ValueError, match=r"wanted \(n, 68\) or \(n, "):
         deform(face, np.zeros((1, 3)))
     with pytest.raises(ValueError, match="finite"):
@@ -226,9 +226,7 @@ def say(folder: Path, words: str) -> None:
     (folder / "face.toml").write_text(f"{words}\n" + head)
 
 
-def test_a_face_names_its_deformer_and_a_caller_may_choose_the_other(
-    mine: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_load_face_selects_the_deformer(mine: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def units(deformer: str | None = None) -> bool:
         return load_face("mine", mine.parent, deformer).model is not None
 
@@ -237,13 +235,13 @@ def test_a_face_names_its_deformer_and_a_caller_may_choose_the_other(
     assert (units(), units("mpeg4")) == (True, False)
 
 
-def test_a_face_may_be_drawn_by_its_model_without_being_asked(mine: Path) -> None:
+def test_load_face_uses_the_model_that_face_toml_names(mine: Path) -> None:
     say(mine, 'deformer = "au"')
     assert load_face("mine", mine.parent).model is not None
     assert load_face("mine", mine.parent, "mpeg4").model is None
 
 
-def test_a_face_may_leave_some_of_its_units_to_the_faps(mine: Path) -> None:
+def test_load_face_may_leave_units_to_the_faps(mine: Path) -> None:
     say(mine, 'deformer = { name = "au", model = "au_published.toml", aus = [1, 2, 12] }')
     face = load_face("mine", mine.parent)
     assert face.inputs[68:75] == ("1L", "1R", "2L", "2R", "12L", "12R", "lips")
@@ -261,13 +259,13 @@ def test_a_face_may_leave_some_of_its_units_to_the_faps(mine: Path) -> None:
         ('deformer = { name = "au", aus = [1, 51] }', r"got \[1, 51\]"),
     ],
 )
-def test_a_deformer_that_cannot_be_used_is_said(mine: Path, words: str, says: str) -> None:
+def test_load_face_refuses_an_unusable_deformer(mine: Path, words: str, says: str) -> None:
     say(mine, words)
     with pytest.raises(FaceError, match=says):
         load_face("mine", mine.parent)
 
 
-def test_a_face_without_a_model_says_how_to_make_one(mine: Path) -> None:
+def test_load_face_explains_how_to_make_a_model(mine: Path) -> None:
     (mine / "au_extended.toml").unlink()
     assert load_face("mine", mine.parent).model is None
     with pytest.raises(FaceError, match="realizer faces fit mine"):

@@ -15,7 +15,7 @@ from tests.shipped import FACES, FOLDERS
 
 @pytest.mark.parametrize("form", ["published", "extended"])
 @pytest.mark.parametrize("name", FACES)
-def test_a_model_is_the_same_when_read_again(name: str, form: str, tmp_path: Path) -> None:
+def test_read_model_returns_what_write_model_wrote(name: str, form: str, tmp_path: Path) -> None:
     model = read_model(FOLDERS[name] / f"au_{form}.toml")
     write_model(tmp_path / "model.toml", model)
     again = read_model(tmp_path / "model.toml")
@@ -40,7 +40,7 @@ def test_a_model_is_the_same_when_read_again(name: str, form: str, tmp_path: Pat
         ("tilt = ", "tilt = nan #", "neck.tilt: wanted a number"),
     ],
 )
-def test_a_broken_model_is_refused_with_its_place(old: str, new: str, words: str, tmp_path: Path) -> None:
+def test_read_model_names_the_place_of_a_fault(old: str, new: str, words: str, tmp_path: Path) -> None:
     text = (FOLDERS[load_face().name] / "au_published.toml").read_text()
     assert old in text
     path = tmp_path / "broken.toml"

@@ -34,11 +34,11 @@ def model(name: str, form: str) -> Model:
     return read_model(FOLDERS[name] / f"au_{form}.toml")
 
 
-def test_every_face_has_both_models() -> None:
+def test_models_of_both_forms_are_shipped() -> None:
     assert all((path / f"au_{form}.toml").is_file() for path in FOLDERS.values() for form in FORMS)
 
 
-def test_all_her_32_units_are_there_and_each_moves_something(name: str, model: Model) -> None:
+def test_model_has_32_units_that_move(name: str, model: Model) -> None:
     assert len(model.units) == 22
     assert len(model.degrees) == 10
     assert {*model.units, *model.degrees} == set(units())
@@ -48,12 +48,12 @@ def test_all_her_32_units_are_there_and_each_moves_something(name: str, model: M
         assert 0.001 < far < 0.06, f"AU{au}"
 
 
-def test_the_published_form_has_one_or_two_bells_the_extended_up_to_four(model: Model, form: str) -> None:
+def test_model_forms_have_their_number_of_gaussians(model: Model, form: str) -> None:
     counts = {len(motion.gaussians) for unit in model.units.values() for motion in unit.motions.values()}
     assert max(counts) == {"published": 2, "extended": 4}[form]
 
 
-def test_the_mean_miss_is_under_the_aim(name: str, model: Model, form: str) -> None:
+def test_model_fits_the_measurements(name: str, model: Model, form: str) -> None:
     rows = table(model, read_shapes(FOLDERS[name] / "au_shapes.npz"))
     mean, worst = AIMS[form]
     assert len(rows) == 22
@@ -61,7 +61,7 @@ def test_the_mean_miss_is_under_the_aim(name: str, model: Model, form: str) -> N
     assert max(row.ratio for row in rows) < worst, table_text(rows)
 
 
-def test_nothing_moves_that_should_keep_still(name: str, model: Model) -> None:
+def test_model_keeps_still_what_no_unit_moves(name: str, model: Model) -> None:
     """Between the eyes AU12 leaves all as it is, and AU1 the mouth: the bells end."""
     points = load_face(name).points
     brow, corner = (np.asarray(points[key], np.float64)[None] for key in ("4.1", "8.3"))
@@ -70,21 +70,21 @@ def test_nothing_moves_that_should_keep_still(name: str, model: Model) -> None:
     assert np.linalg.norm(model.displacement(43, corner)) < 0.0005
 
 
-def test_both_sides_move_as_mirror_images(name: str, model: Model) -> None:
+def test_model_displaces_both_sides_alike(name: str, model: Model) -> None:
     skin, flip = skin_of(load_face(name))[::5], np.array([-1.0, 1, 1])
     for au in model.units:
         here, there = model.displacement(au, skin), model.displacement(au, skin * flip)
         assert here * flip == pytest.approx(there, abs=1e-8)
 
 
-def test_one_side_alone_and_the_other_make_both(name: str, model: Model) -> None:
+def test_model_sides_add_up_to_the_whole(name: str, model: Model) -> None:
     skin = skin_of(load_face(name))
     left, right = (model.displacement(12, skin, side) for side in "LR")
     assert left + right == pytest.approx(model.displacement(12, skin), abs=1e-12)
     assert not left[skin[:, 0] < -0.01].any()
 
 
-def test_a_mouth_opens_along_its_line(name: str, model: Model) -> None:
+def test_model_opens_the_mouth_along_its_line(name: str, model: Model) -> None:
     points = load_face(name).points
     upper, lower = (np.asarray(points[key], np.float64)[None] for key in ("2.2", "2.3"))
     step = np.array([0, 3e-4, 0])
@@ -94,7 +94,7 @@ def test_a_mouth_opens_along_its_line(name: str, model: Model) -> None:
 
 
 @pytest.mark.parametrize("size", [280, *(pytest.param(size, marks=pytest.mark.slow) for size in (454, 1762))])
-def test_the_same_model_drives_a_mesh_of_another_topology(name: str, model: Model, size: int) -> None:
+def test_model_drives_a_mesh_of_another_topology(name: str, model: Model, size: int) -> None:
     """Her figure 4.3: each unit on a coarser mesh takes a vertex where it was measured to go there."""
     measured = read_shapes(FOLDERS[name] / "au_shapes.npz")
     face = load_face(name)

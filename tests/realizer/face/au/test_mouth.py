@@ -10,7 +10,7 @@ from realizer.face.au.mouth import LOWER, UPPER, fit_mouth, halves
 from realizer.face.load import load_face
 
 
-def test_the_lips_feature_points_fall_on_their_own_sides() -> None:
+def test_fit_mouth_puts_feature_points_on_their_own_sides() -> None:
     face = load_face()
     index, upper = halves(face)
     side = dict(zip(index.tolist(), upper.tolist(), strict=True))
@@ -18,7 +18,7 @@ def test_the_lips_feature_points_fall_on_their_own_sides() -> None:
     assert not any(side[face.feature_points[name]] for name in LOWER)
 
 
-def test_the_plane_tells_the_lips_apart_nearly_as_well_as_the_topology() -> None:
+def test_fit_mouth_separates_the_lips_like_the_topology() -> None:
     face = load_face()
     mouth = fit_mouth(face)
     index, upper = halves(face)
@@ -30,7 +30,7 @@ def test_the_plane_tells_the_lips_apart_nearly_as_well_as_the_topology() -> None
     assert np.abs(mouth.above(at[wrong & inner])).max() < 0.0015
 
 
-def test_beyond_the_corners_the_halves_fade_over() -> None:
+def test_shares_fade_beyond_the_corners() -> None:
     mouth = fit_mouth(load_face())
     x, y, z = mouth.x[-1] + 0.01, mouth.y[-1], mouth.z[-1]
     steps = np.array([[x, y + d, z] for d in np.linspace(-0.012, 0.012, 25)])
@@ -41,7 +41,7 @@ def test_beyond_the_corners_the_halves_fade_over() -> None:
     assert np.diff(share).max() < 0.12
 
 
-def test_feature_points_in_the_wrong_order_are_told() -> None:
+def test_fit_mouth_refuses_points_in_the_wrong_order() -> None:
     face = load_face()
     points = dict(face.points)
     points["2.4"], points["2.5"] = points["2.5"], points["2.4"]

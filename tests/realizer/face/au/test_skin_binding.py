@@ -27,7 +27,7 @@ def hairy() -> Face:
     )
 
 
-def test_a_root_is_the_place_below_and_a_tip_goes_with_its_root() -> None:
+def test_skin_roots_are_below_and_tips_follow_them() -> None:
     face = hairy()
     corners, share = skin_roots(face, "lashes")
     assert share.sum(axis=1) == pytest.approx(1)
@@ -40,7 +40,7 @@ def test_a_root_is_the_place_below_and_a_tip_goes_with_its_root() -> None:
 
 @pytest.mark.parametrize("name", FACES)
 @pytest.mark.parametrize("unit", ["1", "2", "4"])
-def test_brows_bend_with_the_skin_without_steps(name: str, unit: str) -> None:
+def test_skin_roots_bend_brows_without_steps(name: str, unit: str) -> None:
     face = load_face(name, deformer="au")
     row = np.zeros((1, len(face.inputs)), np.float32)
     row[0, [face.inputs.index(f"{unit}{side}") for side in "LR"]] = 1

@@ -24,7 +24,7 @@ def model(face: Face) -> Model:
 
 
 @pytest.mark.parametrize("order", [(12, 25), (25, 12), (1, 4, 7), (20, 1, 25, 5)])
-def test_it_is_the_mixer_of_the_model(face: Face, order: tuple[int, ...]) -> None:
+def test_succession_equals_the_reference_mixer(face: Face, order: tuple[int, ...]) -> None:
     made = Succession(face, model(face))(dict.fromkeys(order, (0.8, 0.8)))
     mine, at = skin(face), face.vertices.astype(np.float64)
     upper = shares(face, model(face).mouth)[mine]
@@ -33,14 +33,14 @@ def test_it_is_the_mixer_of_the_model(face: Face, order: tuple[int, ...]) -> Non
     assert made[mine] == pytest.approx(wanted, abs=1e-5 * len(order) * 2)
 
 
-def test_only_what_units_move_moves(face: Face) -> None:
+def test_succession_moves_only_what_units_move(face: Face) -> None:
     made = Succession(face, model(face))({12: (1, 1), 27: (1, 1)})
     for part in ("left_eye", "upper_teeth", "lower_teeth", "tongue", "shirt"):
         if part in face.parts:
             assert not made[slice(*face.parts[part])].any(), part
 
 
-def test_brows_and_lashes_go_with_the_skin_they_grow_on(face: Face) -> None:
+def test_succession_moves_brows_and_lashes_with_the_skin(face: Face) -> None:
     made = Succession(face, model(face))({4: (1, 1), 1: (1, 1), 7: (1, 1)})
     parts = attached_parts(face)
     assert len(parts) == 2
@@ -49,14 +49,14 @@ def test_brows_and_lashes_go_with_the_skin_they_grow_on(face: Face) -> None:
     assert np.abs(made[slice(*face.parts["brows"])]).max() > 0.001
 
 
-def test_a_side_alone_leaves_the_other_alone(face: Face) -> None:
+def test_succession_of_one_side_leaves_the_other(face: Face) -> None:
     made = Succession(face, model(face))({6: (1, 0), 12: (1, 0)})
     left, right = (face.feature_points[point] for point in ("8.3", "8.4"))
     assert np.linalg.norm(made[left]) > 0.004
     assert np.linalg.norm(made[right]) < 1e-5
 
 
-def test_no_face_runs_away_with_everything_at_once(face: Face) -> None:
+def test_succession_of_all_units_stays_near_the_face(face: Face) -> None:
     """Off the skin, functions were fitted to nothing: there a unit may not move a place by all they say."""
     units = [au for au in sorted(model(face).units) if au not in (25, 26, 43)]
     chain = Succession(face, model(face))
@@ -65,6 +65,6 @@ def test_no_face_runs_away_with_everything_at_once(face: Face) -> None:
     assert np.linalg.norm(made - summed, axis=1).max() < 0.01
 
 
-def test_nothing_moves_nothing(face: Face) -> None:
+def test_succession_of_nothing_moves_nothing(face: Face) -> None:
     assert not Succession(face, model(face))({}).any()
     assert not Succession(face, model(face))({12: (0, 0)}).any()

@@ -7,7 +7,7 @@ import numpy as np
 from realizer.face.au.units import Unit, units
 
 
-def test_the_table_of_units_is_hers() -> None:
+def test_units_are_wojdel_s() -> None:
     table = units()
     assert len(table) == 32
     assert [unit.au for unit in table.values() if unit.kind == "eyes"] == [61, 62, 63, 64]
@@ -19,13 +19,13 @@ def test_the_table_of_units_is_hers() -> None:
         assert (np.linalg.norm(unit.axis) == 1) == (unit.kind != "displacement")
 
 
-def test_a_unit_s_mixture_are_the_weights_of_face_units() -> None:
+def test_unit_mixture_has_the_weights_of_face_units() -> None:
     unit = Unit(99, "displacement", False, "", "98 97", "browDown:0.5 eyeBlink:1")
     assert unit.mixture == {"browDown": 0.5, "eyeBlink": 1.0}
     assert unit.names == (99, 98, 97)
     assert unit.axis == (0.0, 0.0, 0.0)
 
 
-def test_a_unit_s_axis_has_the_sign_and_the_letter_of_its_turn() -> None:
+def test_unit_axis_has_sign_and_letter_of_its_turn() -> None:
     assert Unit(99, "head", False, "-z", "", "").axis == (0.0, 0.0, -1.0)
     assert Unit(99, "head", False, "+y", "", "").axis == (0.0, 1.0, 0.0)

@@ -36,7 +36,7 @@ def written(path: Path, document: dict[str, Any], data: bytes) -> Path:
     return path
 
 
-def test_foreign_names_are_told_with_the_nearest_known(write_head: Callable[..., Path]) -> None:
+def test_import_suggests_the_nearest_known_names(write_head: Callable[..., Path]) -> None:
     assert canonical("viseme_aa") is None
     assert "mouthSmileLeft" in nearest("mouthSmileLeftt")
     path = write_head(spell=lambda n: f"{n}{n}", only=("jawOpen", "mouthSmileLeft"))
@@ -44,19 +44,19 @@ def test_foreign_names_are_told_with_the_nearest_known(write_head: Callable[...,
         inspect_head(path)
 
 
-def test_a_head_without_shapes_is_refused(write_head: Callable[..., Path]) -> None:
+def test_import_refuses_a_head_without_shapes(write_head: Callable[..., Path]) -> None:
     with pytest.raises(FaceError, match="found none; export the head with its shape keys"):
         inspect_head(write_head(only=()))
 
 
-def test_missing_shapes_are_told_with_what_does_not_work(write_head: Callable[..., Path]) -> None:
+def test_import_reports_missing_shapes_and_their_effect(write_head: Callable[..., Path]) -> None:
     report = inspect_head(write_head(only=("jawOpen", "eyeBlinkLeft", "eyeBlinkRight", "mouthSmileLeft")))
     assert any(line.startswith("browInnerUp: ") for line in report.missing)
     assert not any("jawOpen" in line for line in report.missing)
 
 
 @pytest.mark.parametrize("length", [0, 3, 11, 19, 40, 5000])
-def test_a_truncated_file_is_refused(ada_glb: Path, tmp_path: Path, length: int) -> None:
+def test_gltf_refuses_a_truncated_file(ada_glb: Path, tmp_path: Path, length: int) -> None:
     path = tmp_path / "cut.glb"
     path.write_bytes(ada_glb.read_bytes()[:length])
     with pytest.raises(FaceError, match=r"cut\.glb"):
@@ -74,7 +74,7 @@ def test_a_truncated_file_is_refused(ada_glb: Path, tmp_path: Path, length: int)
     lambda d: d["buffers"][0].update(uri="http://example.org/head.bin"),
     lambda d: d["buffers"][0].update(uri="../head.bin"),
 ])  # fmt: skip
-def test_a_broken_document_is_refused_with_the_file(
+def test_gltf_refuses_a_broken_document_by_its_file(
     ada_glb: Path, tmp_path: Path, spoil: Callable[[dict[str, Any]], Any]
 ) -> None:
     document, data = split(ada_glb)
@@ -102,7 +102,7 @@ SPOILT: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
 
 
 @pytest.mark.parametrize("name", SPOILT)
-def test_places_that_are_none_are_refused_as_such(ada_glb: Path, tmp_path: Path, name: str) -> None:
+def test_gltf_refuses_places_that_are_not_finite(ada_glb: Path, tmp_path: Path, name: str) -> None:
     document, data = split(ada_glb)
     spoil, words = SPOILT[name]
     spoil(document)
@@ -110,13 +110,13 @@ def test_places_that_are_none_are_refused_as_such(ada_glb: Path, tmp_path: Path,
         inspect_head(written(tmp_path / "odd.glb", document, data))
 
 
-def test_a_name_that_is_a_number_is_a_name(ada_glb: Path, tmp_path: Path) -> None:
+def test_gltf_takes_a_number_as_a_name(ada_glb: Path, tmp_path: Path) -> None:
     document, data = split(ada_glb)
     document["meshes"][0]["name"] = 3
     assert inspect_head(written(tmp_path / "odd.glb", document, data)).lines
 
 
-def test_a_gltf_with_its_data_inside_or_beside_is_read(ada_glb: Path, tmp_path: Path) -> None:
+def test_gltf_reads_data_inside_and_beside_the_document(ada_glb: Path, tmp_path: Path) -> None:
     document, data = split(ada_glb)
     path = tmp_path / "head.gltf"
     for uri in ("head.bin", "data:application/octet-stream;base64," + base64.b64encode(data).decode()):
@@ -126,7 +126,7 @@ def test_a_gltf_with_its_data_inside_or_beside_is_read(ada_glb: Path, tmp_path: 
         assert inspect_head(path).found == inspect_head(ada_glb).found
 
 
-def test_the_command_says_what_an_import_would_find(ada_glb: Path, tmp_path: Path) -> None:
+def test_import_command_reports_without_writing(ada_glb: Path, tmp_path: Path) -> None:
     ran = CliRunner().invoke(faces, ["check", str(ada_glb)], standalone_mode=False)
     assert ran.return_value == 0
     assert "found: " in ran.output

@@ -31,7 +31,7 @@ def brought(ada_glb: Path, place: Path) -> tuple[Face, Report]:
     return load_face("again", place), report
 
 
-def test_a_head_comes_back_with_its_size_and_parts(brought: tuple[Face, Report]) -> None:
+def test_import_head_keeps_size_and_parts(brought: tuple[Face, Report]) -> None:
     face, report = brought
     first = load_face("ada")
     assert set(face.parts) == set(first.parts)
@@ -41,7 +41,7 @@ def test_a_head_comes_back_with_its_size_and_parts(brought: tuple[Face, Report])
     assert report.missing == ()
 
 
-def test_its_action_units_can_be_fitted(brought: tuple[Face, Report], place: Path) -> None:
+def test_import_head_measures_action_units(brought: tuple[Face, Report], place: Path) -> None:
     measured = read_shapes(place / "again" / "au_shapes.npz")
     assert {1, 2, 4, 5, 6, 9, 12, 15, 16, 17, 20, 26, 43} <= set(measured)
     assert all(one.moves.any() and (one.at[:, 0] > -1e-6).all() for one in measured.values())
@@ -54,7 +54,7 @@ LINEAR = [row for row in faps()[2:] if row.direction in ("up", "down", "left", "
 @pytest.mark.parametrize(
     "row", [row for row in LINEAR if row.unit != "angle_unit"], ids=lambda row: str(row.fap)
 )
-def test_every_point_goes_as_far_as_before(brought: tuple[Face, Report], row: Fap) -> None:
+def test_import_head_keeps_the_movement_of_every_point(brought: tuple[Face, Report], row: Fap) -> None:
     asked = np.zeros((1, 68), np.float32)
     asked[0, row.fap - 1] = 150
     axis = 1 if row.direction in ("up", "down") else 0
@@ -99,7 +99,7 @@ def egg_with_painted_eyes(new_glb: type) -> bytes:
 
 
 @pytest.mark.slow
-def test_an_egg_with_few_shapes_and_painted_eyes_becomes_a_face(new_glb: type, tmp_path: Path) -> None:
+def test_import_head_takes_few_shapes_and_painted_eyes(new_glb: type, tmp_path: Path) -> None:
     path = tmp_path / "egg.glb"
     path.write_bytes(egg_with_painted_eyes(new_glb))
     report = import_head(path, tmp_path / "egg")

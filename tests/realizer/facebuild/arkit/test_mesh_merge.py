@@ -20,27 +20,27 @@ def piece(aside: float = 0, glass: bool = False, **moves: float) -> Piece:
     )
 
 
-def test_joined_pieces_share_the_vertices_of_their_seam() -> None:
+def test_merge_pieces_shares_the_vertices_of_a_seam() -> None:
     surface = merge_pieces([piece(), piece(1)])
     assert len(surface.vertices) == 6
     assert len(surface.triangles) == 4
     assert set(surface.piece.tolist()) == {0, 1}
 
 
-def test_joined_pieces_keep_a_seam_that_opens() -> None:
+def test_merge_pieces_keeps_a_seam_that_opens() -> None:
     surface = merge_pieces([piece(jawOpen=0.0), piece(1, jawOpen=-0.5)])
     assert len(surface.vertices) == 8
     assert sorted(surface.move("jawOpen")[:, 1].tolist()) == [-0.5] * 4 + [0] * 4
     assert not surface.move("eyeBlinkLeft").any()
 
 
-def test_joined_pieces_have_arkit_s_names_and_no_glass() -> None:
+def test_merge_pieces_uses_arkit_names_and_drops_glass() -> None:
     surface = merge_pieces([piece(Mouth_Smile_L=1.0, hat=1.0), piece(5, glass=True)])
     assert list(surface.moves) == ["mouthSmileLeft"]
     assert len(surface.vertices) == 4
 
 
-def test_chosen_vertices_keep_the_triangles_that_they_alone_make() -> None:
+def test_surface_subset_keeps_triangles_between_its_vertices() -> None:
     whole = merge_pieces([piece(jawOpen=1.0)])
     surface = whole.subset(whole.triangles[0][::-1])
     assert surface.triangles.tolist() == [[2, 1, 0]]

@@ -21,7 +21,7 @@ WAYS = {
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize(("scale", "unit"), [(1.0, "metres"), (10.0, "decimetres"), (100.0, "centimetres")])
-def test_unit_and_facing_are_told_by_the_shapes(
+def test_pose_of_finds_unit_and_direction_by_the_shapes(
     write_head: Callable[..., Path], way: str, scale: float, unit: str
 ) -> None:
     found = inspect_head(write_head(scale=scale, turn=WAYS[way], sparse=scale > 1)).found
@@ -29,7 +29,7 @@ def test_unit_and_facing_are_told_by_the_shapes(
     assert not any("exchanged" in line for line in found)
 
 
-def test_a_viewers_left_and_right_are_exchanged(write_head: Callable[..., Path]) -> None:
+def test_pose_of_exchanges_the_viewer_s_left_and_right(write_head: Callable[..., Path]) -> None:
     other = {"Left": "Right", "Right": "Left"}
     path = write_head(spell=lambda n: next((n[: -len(k)] + other[k] for k in other if n.endswith(k)), n))
     assert any("exchanged" in line for line in inspect_head(path).found)

@@ -15,7 +15,7 @@ from realizer.facebuild.arkit.gltf import Gltf
 from realizer.facebuild.arkit.scene import read_pieces
 
 
-def test_quantised_places_in_a_scaled_and_turned_node_are_read(
+def test_read_pieces_decodes_quantised_places_in_a_turned_node(
     new_glb: Callable[[], Any], tmp_path: Path
 ) -> None:
     face = load_face("ada")
@@ -34,9 +34,7 @@ def test_quantised_places_in_a_scaled_and_turned_node_are_read(
     assert np.abs(piece.vertices - wanted).max() < 2 * step
 
 
-def test_a_skeleton_puts_the_vertices_where_its_joints_are(
-    new_glb: Callable[[], Any], tmp_path: Path
-) -> None:
+def test_read_pieces_poses_vertices_by_their_skeleton(new_glb: Callable[[], Any], tmp_path: Path) -> None:
     glb = new_glb()
     at = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]])
     glb.mesh("head", at, np.array([[0, 1, 2]]), None, {"jawOpen": np.tile([0, 0, 1.0], (3, 1))})
@@ -54,7 +52,7 @@ def test_a_skeleton_puts_the_vertices_where_its_joints_are(
     assert piece.moves["jawOpen"] == pytest.approx(np.tile([0, 0, 1.0], (3, 1)))
 
 
-def test_a_texture_becomes_the_vertices_colours(new_glb: Callable[[], Any], tmp_path: Path) -> None:
+def test_read_pieces_turns_a_texture_into_colours(new_glb: Callable[[], Any], tmp_path: Path) -> None:
     glb = new_glb()
     glb.mesh("head", np.eye(3), np.array([[0, 1, 2]]), None, {}, "skin")
     pixels = np.zeros((4, 4, 3), np.uint8)

@@ -42,7 +42,7 @@ def landmarks(model: Model, aus: tuple[int, ...], count: int = 120) -> str:
     return HEAD + "\n".join(lines) + "\n"
 
 
-def test_a_unit_that_her_form_can_show_is_found_again_from_landmarks(known: Model, tmp_path: Path) -> None:
+def test_fit_models_recovers_a_published_unit(known: Model, tmp_path: Path) -> None:
     path = tmp_path / "landmarks.csv"
     path.write_text(landmarks(known, (1, 15)))
     measured = read_measurements(path)
@@ -57,7 +57,7 @@ def test_a_unit_that_her_form_can_show_is_found_again_from_landmarks(known: Mode
     assert model.displacement(15, corner) == pytest.approx(known.displacement(15, corner), abs=5e-4)
 
 
-def test_the_table_is_hers(known: Model) -> None:
+def test_table_text_prints_wojdel_s_columns(known: Model) -> None:
     measured = read_shapes(next(i.path for i in list_faces() if i.name == load_face().name) / "au_shapes.npz")
     rows = table(known, measured)
     text = table_text(rows)
@@ -70,7 +70,7 @@ def test_the_table_is_hers(known: Model) -> None:
 
 
 @pytest.mark.slow
-def test_more_gaussians_come_nearer() -> None:
+def test_fit_models_come_nearer_with_more_gaussians() -> None:
     folder = next(info.path for info in list_faces() if info.name == load_face().name)
     shapes = read_shapes(folder / "au_shapes.npz")
     models = fit_models(load_face(), {1: shapes[1]})
@@ -80,7 +80,7 @@ def test_more_gaussians_come_nearer() -> None:
 
 
 @pytest.mark.slow
-def test_the_command_fits_landmarks_and_prints_the_table(known: Model, tmp_path: Path) -> None:
+def test_fit_command_fits_landmarks_and_prints_the_table(known: Model, tmp_path: Path) -> None:
     (tmp_path / "landmarks.csv").write_text(landmarks(known, (2,)))
     command = [sys.executable, "-m", "realizer", "faces", "fit", "default", "--from", "landmarks.csv"]
     done = subprocess.run(
@@ -114,7 +114,7 @@ def fitted(known: Model, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path
         (["--form", "both"], ["au_published.toml", "au_extended.toml"]),
     ],
 )
-def test_the_command_writes_a_file_for_each_form(
+def test_fit_command_writes_a_file_for_each_form(
     fitted: tuple[Path, dict[str, Model]],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -138,7 +138,7 @@ def test_the_command_writes_a_file_for_each_form(
 
 
 @pytest.mark.parametrize("output", ["mine.toml", "nowhere"])
-def test_two_forms_want_a_folder_that_is_there(tmp_path: Path, output: str) -> None:
+def test_fit_command_needs_a_folder_for_two_forms(tmp_path: Path, output: str) -> None:
     from click.testing import CliRunner
 
     from realizer.cli.fit import fit
@@ -148,7 +148,7 @@ def test_two_forms_want_a_folder_that_is_there(tmp_path: Path, output: str) -> N
     assert "wanted a folder" in done.output
 
 
-def test_a_face_without_shapes_says_what_to_give(tmp_path: Path) -> None:
+def test_fit_command_asks_for_data_without_shapes(tmp_path: Path) -> None:
     from click.testing import CliRunner
 
     from realizer.cli.fit import fit
@@ -164,6 +164,6 @@ def test_a_face_without_shapes_says_what_to_give(tmp_path: Path) -> None:
     assert not (tmp_path / "model.toml").exists()
 
 
-def test_an_unknown_form_is_refused() -> None:
+def test_fit_models_refuses_an_unknown_form() -> None:
     with pytest.raises(FaceError, match="published, extended"):
         fit_models(load_face(), {}, ("secret",))

@@ -33,14 +33,14 @@ def face() -> Face:
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("name", FITTED)
-def test_no_vertex_of_a_face_runs_away(name: str, form: str) -> None:
+def test_runaways_are_none_on_shipped_faces(name: str, form: str) -> None:
     model = read_model(FITTED[name] / f"au_{form}.toml")
     assert runaways(load_face(name), model, read_shapes(FITTED[name] / "au_shapes.npz")) == ()
 
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("name", FITTED)
-def test_nor_does_any_place_near_the_face(name: str, form: str) -> None:
+def test_furthest_is_limited_between_the_vertices_too(name: str, form: str) -> None:
     """On a mesh of another topology vertices lie between and just off those of this one."""
     face, model = load_face(name), read_model(FITTED[name] / f"au_{form}.toml")
     first, last = face.parts["skin"]
@@ -56,7 +56,7 @@ def test_nor_does_any_place_near_the_face(name: str, form: str) -> None:
 
 
 @pytest.mark.slow
-def test_places_that_nobody_measured_are_held_too(face: Face) -> None:
+def test_fit_models_limits_places_without_landmarks(face: Face) -> None:
     """A few landmarks in a row leave all else open; no vertex takes more than is allowed all the same."""
     x = np.linspace(0.005, 0.03, 8)
     at = np.stack([x, np.full(8, -0.055), np.full(8, 0.02)], axis=1)
@@ -66,14 +66,14 @@ def test_places_that_nobody_measured_are_held_too(face: Face) -> None:
         assert runaways(face, model, measured) == ()
 
 
-def test_a_runaway_is_told_with_its_unit_and_place(face: Face) -> None:
+def test_runaways_name_unit_and_place(face: Face) -> None:
     model, measured = read_model(FOLDER / "au_published.toml"), read_shapes(FOLDER / "au_shapes.npz")
     (found,) = runaways(face, torn(model), measured)
     assert found.startswith("AU1 moves the place ")
     assert "nothing was measured to move more than" in found
 
 
-def test_a_density_costs_from_where_it_goes_too_far() -> None:
+def test_overshoot_costs_only_what_is_too_far() -> None:
     miss, slopes = overshoot(BELL, np.array([[0, 0, 0], [3.0, 0, 0]]))
     assert miss.shape == (1,)
     assert slopes.shape == (1, 10)
@@ -90,7 +90,7 @@ def test_a_density_costs_from_where_it_goes_too_far() -> None:
             assert (more - miss)[0] / 1e-6 == pytest.approx(slopes[0, column], abs=1e-3)
 
 
-def test_what_is_watched_is_each_vertex_once_on_the_left(face: Face) -> None:
+def test_watched_places_are_each_vertex_once_on_the_left(face: Face) -> None:
     model = read_model(FOLDER / "au_published.toml")
     places = watched_places(face, model.mouth)
     assert (places.at[:, 0] >= 0).all()
@@ -104,7 +104,7 @@ def test_what_is_watched_is_each_vertex_once_on_the_left(face: Face) -> None:
     assert len(places.of("upper")) + len(places.of("lower")) >= len(places.of("whole")) == len(places.at)
 
 
-def test_the_command_writes_nothing_that_tears_the_face(
+def test_fit_command_writes_no_model_that_tears_the_face(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     from realizer.cli.fit import fit
@@ -126,7 +126,7 @@ def torn(model: Model) -> Model:
     return replace(model, units={**model.units, 1: replace(unit, motions=motions)})
 
 
-def test_a_torn_model_stays_torn_as_a_file(face: Face, tmp_path: Path) -> None:
+def test_runaways_are_found_in_a_model_from_a_file(face: Face, tmp_path: Path) -> None:
     """What is held is the fit, not the reading: a model that was edited by hand is taken as it is."""
     write_model(tmp_path / "torn.toml", torn(read_model(FOLDER / "au_published.toml")))
     measured = read_shapes(FOLDER / "au_shapes.npz")

@@ -26,7 +26,7 @@ HEAD = "# source: made for tests\n# units: metres\n# licence: MIT\nau,x,y,z,dx,d
         ("au,x,y,z,dx,dy,dz\n", "source"),
     ],
 )
-def test_bad_measurements_are_refused_with_their_place(text: str, words: str, tmp_path: Path) -> None:
+def test_read_measurements_names_the_place_of_a_fault(text: str, words: str, tmp_path: Path) -> None:
     path = tmp_path / "landmarks.csv"
     path.write_text(text)
     with pytest.raises(FaceError, match=words) as caught:
@@ -34,7 +34,7 @@ def test_bad_measurements_are_refused_with_their_place(text: str, words: str, tm
     assert "landmarks.csv" in str(caught.value)
 
 
-def test_shapes_are_the_same_when_read_again(tmp_path: Path) -> None:
+def test_read_shapes_returns_what_write_shapes_wrote(tmp_path: Path) -> None:
     folder = next(info.path for info in list_faces() if info.name == load_face().name)
     measured = read_shapes(folder / "au_shapes.npz")
     write_shapes(tmp_path / "again.npz", measured)
@@ -47,7 +47,7 @@ def test_shapes_are_the_same_when_read_again(tmp_path: Path) -> None:
         read_shapes(tmp_path / "none.npz")
 
 
-def test_measured_landmarks_are_gathered_by_unit(tmp_path: Path) -> None:
+def test_read_measurements_gathers_landmarks_by_unit(tmp_path: Path) -> None:
     path = tmp_path / "landmarks.csv"
     path.write_text(HEAD + "".join(f"{au},0.1,0.2,{k},0,{au},0\n" for k in range(8) for au in (12, 4)))
     found = read_measurements(path)

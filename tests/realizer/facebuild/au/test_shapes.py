@@ -15,20 +15,20 @@ SHAPED = [info.path for info in list_faces() if (info.path / "au_shapes.npz").is
 FOLDER = next(info.path for info in list_faces() if info.name == load_face().name)
 
 
-def test_a_folder_without_the_data_is_refused(tmp_path: Path) -> None:
+def test_measure_shapes_refuses_a_folder_without_the_data(tmp_path: Path) -> None:
     with pytest.raises(FaceError, match="wanted the unpacked wheel"):
         measure_shapes(load_face(), FOLDER, tmp_path)
 
 
 @pytest.mark.skipif("REALIZER_HEAD_DATA" not in os.environ, reason="wants the unpacked CC0 head data")
-def test_the_stored_shapes_are_what_the_data_say() -> None:
+def test_measure_shapes_gives_the_stored_shapes() -> None:
     made = measure_shapes(load_face(), FOLDER, Path(os.environ["REALIZER_HEAD_DATA"]))
     for au, stored in read_shapes(FOLDER / "au_shapes.npz").items():
         assert stored.moves == pytest.approx(made[au].moves, abs=1e-5)
 
 
 @pytest.mark.parametrize("folder", SHAPED, ids=lambda folder: folder.name)
-def test_the_stored_shapes_go_where_their_units_names_say(folder: Path) -> None:
+def test_stored_shapes_move_as_their_units_are_named(folder: Path) -> None:
     """Brows up for 1 and 2, down for 4; corners up for 12, down for 15; lids down for 43; jaw down for 27."""
     measured = read_shapes(folder / "au_shapes.npz")
     ways = {1: 1, 2: 1, 4: -1, 5: 1, 6: 1, 10: 1, 12: 1, 15: -1, 16: -1, 27: -1, 43: -1}
@@ -39,7 +39,7 @@ def test_the_stored_shapes_go_where_their_units_names_say(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("folder", SHAPED, ids=lambda folder: folder.name)
-def test_the_stored_shapes_are_those_of_the_mesh_that_is_there(folder: Path) -> None:
+def test_stored_shapes_are_of_the_present_mesh(folder: Path) -> None:
     """Every vertex of the left half of the skin, lips and their corners too, was measured."""
     face = load_face(folder.name)
     skin = face.vertices[slice(*face.parts["skin"])].astype(float)
@@ -50,7 +50,7 @@ def test_the_stored_shapes_are_those_of_the_mesh_that_is_there(folder: Path) -> 
 
 
 @pytest.mark.parametrize("folder", SHAPED, ids=lambda folder: folder.name)
-def test_no_lip_is_left_behind_by_its_neighbours(folder: Path) -> None:
+def test_stored_shapes_move_a_lip_with_its_neighbours(folder: Path) -> None:
     """A vertex that the builder added between two moves as they do: the jaw takes the whole lower lip."""
     face = load_face(folder.name)
     one = read_shapes(folder / "au_shapes.npz")[27]
@@ -69,7 +69,7 @@ def test_no_lip_is_left_behind_by_its_neighbours(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("folder", SHAPED, ids=lambda folder: folder.name)
-def test_pressed_lips_do_not_smile(folder: Path) -> None:
+def test_stored_shapes_of_pressed_lips_do_not_smile(folder: Path) -> None:
     face = load_face(folder.name)
     one = read_shapes(folder / "au_shapes.npz")[24]
     corner = np.linalg.norm(one.at - face.points["8.3"], axis=1).argmin()
@@ -78,7 +78,7 @@ def test_pressed_lips_do_not_smile(folder: Path) -> None:
 
 
 @pytest.mark.skipif("REALIZER_HEAD_DATA" not in os.environ, reason="wants the unpacked CC0 head data")
-def test_a_mesh_of_another_builder_is_refused() -> None:
+def test_measure_shapes_refuses_the_mesh_of_another_builder() -> None:
     import dataclasses
 
     face = load_face(deformer="mpeg4")

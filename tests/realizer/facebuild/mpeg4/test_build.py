@@ -40,18 +40,18 @@ def face_of(folder: Path) -> Face:
     return load_face(folder.name, folder.parent)
 
 
-def test_a_head_without_shapes_becomes_a_sound_face(plain: Path) -> None:
+def test_apply_zones_makes_a_sound_face(plain: Path) -> None:
     assert check_face(plain.name, plain.parent) == ()
 
 
-def test_its_faps_are_true(plain: Path) -> None:
+def test_apply_zones_makes_true_faps(plain: Path) -> None:
     truths = score_faps(face_of(plain))
     assert mean_score(truths) > 2.8
     assert min(t.score for t in truths) >= 2
     assert all(t.error < 0.02 and t.mirror < 0.01 and t.others < 0.05 for t in truths)
 
 
-def test_equal_lip_faps_move_a_lip_as_one_without_a_w(plain: Path) -> None:
+def test_apply_zones_moves_a_lip_evenly_by_equal_faps(plain: Path) -> None:
     face = face_of(plain)
     row = np.zeros((1, 68), np.float32)
     row[0, [fap - 1 for fap in (5, 10, 11, 52, 57, 58)]] = -300
@@ -61,7 +61,7 @@ def test_equal_lip_faps_move_a_lip_as_one_without_a_w(plain: Path) -> None:
     assert move[slice(*face.parts["skin"])].min() > 1.04 * points[1]
 
 
-def test_lids_close_over_the_eyes(plain: Path) -> None:
+def test_apply_zones_closes_the_lids_over_the_eyes(plain: Path) -> None:
     face = face_of(plain)
     row = np.zeros((1, 68), np.float32)
     row[0, [18, 19, 20, 21]] = [700, 700, 324, 324]
@@ -74,13 +74,13 @@ def test_lids_close_over_the_eyes(plain: Path) -> None:
         assert np.linalg.norm(at[lids] - centre, axis=1).min() > radius - 0.0003
 
 
-def test_two_builds_give_the_same_bytes(plain: Path, tmp_path: Path) -> None:
+def test_apply_zones_twice_gives_the_same_bytes(plain: Path, tmp_path: Path) -> None:
     again = copy(tmp_path)
     apply_zones(again, setup_of(again))
     assert (again / "fields.npz").read_bytes() == (plain / "fields.npz").read_bytes()
 
 
-def test_a_face_may_take_some_faps_from_zones_and_keep_its_own(tmp_path: Path) -> None:
+def test_apply_zones_to_some_faps_keeps_the_others(tmp_path: Path) -> None:
     folder = copy(tmp_path, fields=True)
     own = load_face()
     apply_zones(folder, setup_of(folder), only={31, 32})
@@ -91,7 +91,7 @@ def test_a_face_may_take_some_faps_from_zones_and_keep_its_own(tmp_path: Path) -
     assert check_face(folder.name, folder.parent) == ()
 
 
-def test_the_folder_s_own_parameters_count(tmp_path: Path) -> None:
+def test_setup_of_reads_the_folder_s_own_parameters(tmp_path: Path) -> None:
     folder = copy(tmp_path)
     setup = setup_of(folder)
     write_setup(folder / "mpeg4.toml", setup)
@@ -105,13 +105,13 @@ def test_the_folder_s_own_parameters_count(tmp_path: Path) -> None:
     assert changed.zones[33].falloff == "cosine"
 
 
-def test_a_fap_without_a_zone_is_refused(tmp_path: Path) -> None:
+def test_apply_zones_refuses_a_fap_without_a_zone(tmp_path: Path) -> None:
     folder = copy(tmp_path, fields=True)
     with pytest.raises(FaceError, match="no zone for FAP 3; add one"):
         apply_zones(folder, setup_of(folder), only={3})
 
 
-def test_the_command_makes_another_face_of_a_head(tmp_path: Path) -> None:
+def test_zones_command_makes_another_face(tmp_path: Path) -> None:
     folder = tmp_path / "zoe"
     ran = CliRunner().invoke(faces, ["zones", "default", "-o", str(folder), "--fap", "31", "--fap", "32"])
     assert ran.exit_code == 0, ran.output

@@ -53,7 +53,7 @@ def same(one: Setup, two: Setup) -> bool:
     return masks and rest
 
 
-def test_a_file_says_what_its_parameters_are(tmp_path: Path) -> None:
+def test_read_faceeditor_returns_the_parameters(tmp_path: Path) -> None:
     setup = read_faceeditor(written(tmp_path, FILE))
     lid, brow = setup.zones[22], setup.zones[31]
     assert (lid.falloff, lid.ease, lid.size, lid.scale, lid.use_mask) == ("ease", 30, 1.3, (1, 0.8, 2), True)
@@ -64,7 +64,7 @@ def test_a_file_says_what_its_parameters_are(tmp_path: Path) -> None:
     assert setup.points["2.1"] == (0.0, -10.0, 1.2)
 
 
-def test_what_is_read_is_written_and_read_again_the_same(tmp_path: Path) -> None:
+def test_write_faceeditor_round_trips(tmp_path: Path) -> None:
     setup = read_faceeditor(written(tmp_path, FILE))
     assert write_faceeditor(tmp_path / "again.xml", setup) == ()
     again = read_faceeditor(tmp_path / "again.xml")
@@ -73,7 +73,7 @@ def test_what_is_read_is_written_and_read_again_the_same(tmp_path: Path) -> None
     assert (tmp_path / "again.xml").read_bytes() == (tmp_path / "third.xml").read_bytes()
 
 
-def test_a_raised_cosine_becomes_a_bezier_curve_that_nobody_can_tell_from_it(tmp_path: Path) -> None:
+def test_write_faceeditor_approximates_a_raised_cosine(tmp_path: Path) -> None:
     zone = Zone(31, "cosine", 0.02)
     write_faceeditor(tmp_path / "a.xml", Setup({"4.1": (0, 0, 0)}, {31: zone}))
     back = read_faceeditor(tmp_path / "a.xml").zones[31]
@@ -82,14 +82,14 @@ def test_a_raised_cosine_becomes_a_bezier_curve_that_nobody_can_tell_from_it(tmp
     assert np.abs(off).max() < 0.01
 
 
-def test_what_the_format_cannot_say_is_told(tmp_path: Path) -> None:
+def test_write_faceeditor_returns_what_is_lost(tmp_path: Path) -> None:
     setup = Setup({"9.1": (0, 0, 0)}, {61: Zone(61, "cosine", 0.01, radial=0.5)})
     (lost,) = write_faceeditor(tmp_path / "a.xml", setup)
     assert lost.startswith("FAP 61: slide and radial")
 
 
 @pytest.mark.parametrize(("size", "flip"), [(100, 1), (0.37, -1)])
-def test_another_unit_and_a_mirrored_x_are_fitted_to_the_face(size: float, flip: int) -> None:
+def test_fitted_converts_units_and_a_mirrored_axis(size: float, flip: int) -> None:
     ours = setup_of(folder_of("default"))
     there = [100.0, -3.0, 7.0]
     theirs = dataclasses.replace(
@@ -106,7 +106,7 @@ def test_another_unit_and_a_mirrored_x_are_fitted_to_the_face(size: float, flip:
     assert back.zones[31].size == pytest.approx(ours.zones[31].size)
 
 
-def test_a_face_made_by_way_of_the_xml_is_as_true(tmp_path: Path) -> None:
+def test_read_faceeditor_makes_a_face_as_true(tmp_path: Path) -> None:
     xml = tmp_path / "zones.xml"
     for arguments in (
         ["zones", "default", "-o", str(tmp_path / "one"), "--xml", str(xml)],
@@ -136,7 +136,7 @@ def test_a_face_made_by_way_of_the_xml_is_as_true(tmp_path: Path) -> None:
         ("<!ELEMENT vertex-mask (#PCDATA)>", '<!ENTITY a "aa">', "no entities"),
     ],
 )
-def test_a_broken_file_says_what_is_wrong(tmp_path: Path, old: str, new: str, message: str) -> None:
+def test_read_faceeditor_names_what_is_wrong(tmp_path: Path, old: str, new: str, message: str) -> None:
     assert old in FILE
     with pytest.raises(FaceError) as raised:
         read_faceeditor(written(tmp_path, FILE.replace(old, new, 1)))
@@ -144,7 +144,7 @@ def test_a_broken_file_says_what_is_wrong(tmp_path: Path, old: str, new: str, me
     assert "face.xml" in str(raised.value)
 
 
-def test_a_missing_file_and_too_few_points_are_told(tmp_path: Path) -> None:
+def test_fitted_needs_a_file_and_common_points(tmp_path: Path) -> None:
     with pytest.raises(FaceError, match=r"none\.xml: No such file"):
         read_faceeditor(tmp_path / "none.xml")
     with pytest.raises(FaceError, match="at least three feature points"):

@@ -9,7 +9,7 @@ D = np.linspace(0, 1, 101)
 
 
 @pytest.mark.parametrize("curve", [linear, cosine, lambda d: ease(d, 40), lambda d: smooth_curve(d, 0.5, 0)])
-def test_every_curve_falls_from_1_in_the_middle_to_0_at_the_edge(curve) -> None:  # type: ignore[no-untyped-def]
+def test_falloff_runs_from_1_in_the_middle_to_0_at_the_edge(curve) -> None:  # type: ignore[no-untyped-def]
     values = curve(D)
     assert values[0] == pytest.approx(1)
     assert values[-1] == pytest.approx(0, abs=1e-9)
@@ -22,16 +22,16 @@ def test_ease_is_one_less_the_distance_to_a_power(amount: float, power: float) -
     assert np.allclose(ease(D, amount), 1 - D**power)
 
 
-def test_positive_ease_means_more_influence() -> None:
+def test_ease_above_0_means_more_influence() -> None:
     assert (ease(D, 60)[1:-1] > linear(D)[1:-1]).all()
     assert (ease(D, -60)[1:-1] < linear(D)[1:-1]).all()
 
 
-def test_unsmoothed_the_bezier_curve_is_the_straight_line() -> None:
+def test_smooth_curve_without_smoothing_is_a_straight_line() -> None:
     assert np.allclose(smooth_curve(D, 0, 0), linear(D), atol=1e-6)
 
 
-def test_smoothing_levels_the_middle_and_widens_the_edge() -> None:
+def test_smooth_curve_levels_the_middle_and_widens_the_edge() -> None:
     level = smooth_curve(np.array([0, 0.01]), 0.5, 0)
     assert 1 - level[1] < 0.001
     past = smooth_curve(np.array([1.0, 1.49, 1.51]), 0, 0.5)

@@ -28,7 +28,7 @@ def setup(*zones: Zone, joined: bool = True, masks: dict[int, np.ndarray] | None
     return Setup(BROWS, {zone.fap: zone for zone in zones}, masks or {}, joined=joined)
 
 
-def test_a_lone_zone_is_an_ellipsoid_around_its_feature_point() -> None:
+def test_zone_fields_of_a_lone_zone_are_an_ellipsoid() -> None:
     field = zone_fields(setup(Zone(31, "linear", 0.008, (1, 0.5, 1))), SHEET)[31]
     assert field[at(0.010, 0)] == pytest.approx([0, 1, 0])
     assert field[at(0.014, 0), 1] == pytest.approx(0.5)
@@ -45,13 +45,13 @@ def brows(size: float, joined: bool) -> np.ndarray:
     return sum(fields[fap][row, 1] for fap in (31, 33, 35))
 
 
-def test_a_plain_sum_of_wide_zones_makes_a_w_and_joined_ones_do_not() -> None:
+def test_zone_fields_make_no_w_if_they_are_joined() -> None:
     assert np.ptp(brows(0.016, joined=False)) > 0.3
     assert np.ptp(brows(0.016, joined=True)) < 1e-9
 
 
 @pytest.mark.parametrize("size", [0.006, 0.011, 0.025])
-def test_joined_or_not_small_or_large_a_point_goes_exactly_as_far_as_it_is_asked(size: float) -> None:
+def test_zone_fields_move_each_feature_point_exactly(size: float) -> None:
     fields = zone_fields(setup(*(Zone(fap, "cosine", size) for fap in (31, 33, 35))), SHEET)
     for fap, name in ((31, "4.1"), (33, "4.3"), (35, "4.5")):
         for other, field in fields.items():
@@ -59,7 +59,7 @@ def test_joined_or_not_small_or_large_a_point_goes_exactly_as_far_as_it_is_asked
             assert field[at(*BROWS[name][:2]), 1] == pytest.approx(wanted, abs=1e-6)
 
 
-def test_a_mask_lists_what_moves_and_can_be_turned_around() -> None:
+def test_zone_fields_obey_masks_and_inverted_masks() -> None:
     upper = np.flatnonzero(SHEET[:, 1] >= 0).astype(np.int32)
     zone = Zone(31, "cosine", 0.010, use_mask=True)
     field = zone_fields(setup(zone, masks={31: upper}), SHEET)[31]
@@ -71,7 +71,7 @@ def test_a_mask_lists_what_moves_and_can_be_turned_around() -> None:
     assert turned[at(0.010, -0.003), 1] > 0.5
 
 
-def test_skin_may_slide_back_and_move_away_from_a_pivot() -> None:
+def test_zone_fields_slide_and_move_away_from_a_pivot() -> None:
     slid = zone_fields(setup(Zone(31, "cosine", 0.01, slide=-0.5)), SHEET)[31]
     assert slid[at(0.010, 0)] == pytest.approx([0, 1, -0.5])
     spread = zone_fields(setup(Zone(31, "cosine", 0.01, radial=1, pivot=(0.010, -0.010, 0.0))), SHEET)[31]
@@ -80,7 +80,7 @@ def test_skin_may_slide_back_and_move_away_from_a_pivot() -> None:
     assert spread[at(0.006, 0), 0] < -0.1
 
 
-def test_bad_zones_say_what_to_change() -> None:
+def test_zone_fields_name_what_is_wrong_with_a_zone() -> None:
     with pytest.raises(FaceError, match=r"falloff: wanted one of ease, smooth, cosine, linear, got 'cubic'"):
         Zone(31, "cubic", 0.01)  # type: ignore[arg-type]
     with pytest.raises(FaceError, match="wanted a size and scales above 0"):
@@ -106,7 +106,7 @@ def test_bad_zones_say_what_to_change() -> None:
         synchronised(dataclasses.replace(wanted, synced=frozenset({31})), lopsided)
 
 
-def test_what_is_synced_is_copied_to_the_other_side_with_its_mask() -> None:
+def test_synchronised_copies_zones_with_their_masks() -> None:
     right = np.flatnonzero(SHEET[:, 0] > 0.008).astype(np.int32)
     zone = Zone(31, "ease", 0.010, ease=30, use_mask=True, pivot=(0.01, 0, 0), radial=0.5)
     both = synchronised(dataclasses.replace(setup(zone, masks={31: right}), synced=frozenset({31})), SHEET)

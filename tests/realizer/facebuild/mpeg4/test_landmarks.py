@@ -27,7 +27,7 @@ BENT: dict[str, Callable[[np.ndarray], np.ndarray]] = {
 
 @pytest.mark.parametrize("name", FACES)
 @pytest.mark.parametrize("bent", BENT)
-def test_points_are_found_on_every_face_and_on_bent_ones(name: str, bent: str) -> None:
+def test_find_points_on_every_face_and_on_bent_ones(name: str, bent: str) -> None:
     face = load_face(name)
     at = BENT[bent](face.vertices.astype(float))
     unit = np.ptp(at[face.parts["skin"][0] : face.parts["skin"][1], 0]) / 0.17
@@ -42,7 +42,7 @@ def test_points_are_found_on_every_face_and_on_bent_ones(name: str, bent: str) -
 
 
 @pytest.mark.parametrize("name", FACES)
-def test_the_points_that_lips_and_lids_move_by_are_sure(name: str) -> None:
+def test_find_points_is_sure_of_lips_and_lids(name: str) -> None:
     face = load_face(name)
     found, guesses = find_points(face.vertices.astype(float), face.triangles, face.parts)
     assert not {"2.2", "2.3", "8.1", "8.2", "3.1", "3.2", "3.3", "3.4", "9.3"} & set(guesses)
@@ -50,7 +50,7 @@ def test_the_points_that_lips_and_lids_move_by_are_sure(name: str) -> None:
         assert found[above].y >= found[below].y - 3e-4
 
 
-def test_a_bare_mesh_becomes_a_face_and_the_guesses_are_told(tmp_path: Path) -> None:
+def test_zones_command_marks_a_bare_mesh_and_lists_guesses(tmp_path: Path) -> None:
     bare = tmp_path / "bare"
     bare.mkdir()
     for file in ("face.toml", "mesh.npz"):
@@ -63,7 +63,7 @@ def test_a_bare_mesh_becomes_a_face_and_the_guesses_are_told(tmp_path: Path) -> 
     assert mean_score(score_faps(load_face("made", tmp_path))) > 2.7
 
 
-def test_a_head_that_looks_away_is_refused() -> None:
+def test_find_points_refuses_a_head_that_looks_away() -> None:
     face = load_face()
     turned = face.vertices.astype(float) * [-1, 1, -1]
     with pytest.raises(FaceError, match="wanted the left one at the larger x"):

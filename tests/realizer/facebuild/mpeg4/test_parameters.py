@@ -12,7 +12,7 @@ from realizer.facebuild.mpeg4.build import setup_of
 from realizer.facebuild.mpeg4.parameters import read_setup, write_setup
 
 
-def test_parameters_survive_the_file(tmp_path: Path) -> None:
+def test_read_setup_returns_what_write_setup_wrote(tmp_path: Path) -> None:
     setup = setup_of(folder_of("default"))
     write_setup(tmp_path / "one.toml", setup, points=True)
     again = read_setup(tmp_path / "one.toml")
@@ -40,7 +40,7 @@ def test_parameters_survive_the_file(tmp_path: Path) -> None:
         ("a = ", "Invalid value"),
     ],
 )
-def test_a_bad_file_says_what_is_wrong(tmp_path: Path, text: str, message: str) -> None:
+def test_read_setup_names_what_is_wrong(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "mpeg4.toml"
     path.write_text(text)
     with pytest.raises(FaceError) as raised:

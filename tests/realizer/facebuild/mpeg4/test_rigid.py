@@ -16,21 +16,21 @@ def face() -> Face:
     return load_face()
 
 
-def test_eyeballs_are_fitted_as_balls(balls: tuple[Face, np.ndarray]) -> None:
+def test_balls_have_the_eyeballs_centre_and_radius(balls: tuple[Face, np.ndarray]) -> None:
     (left, radius), (right, _) = balls_of(balls[0].vertices.astype(float), balls[0].parts)
     assert left == pytest.approx([0.032, 0, -0.015], abs=1e-6)
     assert right == pytest.approx([-0.032, 0, -0.015], abs=1e-6)
     assert radius == pytest.approx(0.013, abs=1e-6)
 
 
-def test_the_jaw_turns_about_a_place_before_the_ears(face: Face) -> None:
+def test_jaw_pivot_lies_before_the_ears(face: Face) -> None:
     x, y, z = jaw_pivot({name: tuple(at) for name, at in face.points.items()})
     assert abs(x) < 1e-4
     assert face.points["2.1"][1] < y < face.points["3.5"][1]
     assert face.points["10.5"][2] < z < face.points["3.5"][2]
 
 
-def test_a_pupil_grows_by_a_metre_for_each_metre(balls: tuple[Face, np.ndarray]) -> None:
+def test_pupil_rows_widen_by_a_metre_for_each_metre(balls: tuple[Face, np.ndarray]) -> None:
     face, _ = balls
     at, eyes = face.vertices.astype(float), balls_of(face.vertices.astype(float), face.parts)
     rows = pupil_rows(at, face.colours, face.parts, eyes)
@@ -41,7 +41,7 @@ def test_a_pupil_grows_by_a_metre_for_each_metre(balls: tuple[Face, np.ndarray])
     assert np.hypot(*rows[29][mine, :2].T).max() == pytest.approx(0.5, rel=0.2)
 
 
-def test_the_head_turns_whole_above_and_not_below(face: Face) -> None:
+def test_head_weight_is_whole_above_and_none_below(face: Face) -> None:
     at = face.vertices.astype(float)
     weight = head_weight(at, {name: tuple(p) for name, p in face.points.items()}, face.parts)
     assert (weight[slice(*face.parts["hair"])] == 1).all()
@@ -50,7 +50,7 @@ def test_the_head_turns_whole_above_and_not_below(face: Face) -> None:
     assert (weight[skin & (at[:, 1] < at[skin, 1].min() + 0.01)] < 0.05).all()
 
 
-def test_the_tongue_s_tip_obeys_its_faps_exactly(face: Face) -> None:
+def test_tongue_rows_move_the_tip_exactly(face: Face) -> None:
     at, points = face.vertices.astype(float), {name: tuple(p) for name, p in face.points.items()}
     rows = tongue_rows(at, points, face.parts)
     assert {43, 44, 45, 46} < set(rows)

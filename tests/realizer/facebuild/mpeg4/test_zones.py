@@ -12,7 +12,7 @@ from realizer.facebuild.mpeg4.zones import FALLOFFS, Setup, Zone, mirror_mask, s
 
 
 @pytest.mark.parametrize("falloff", FALLOFFS)
-def test_a_zone_s_influence_is_1_in_the_middle_and_0_at_the_edge(falloff: str) -> None:
+def test_zone_influence_is_1_in_the_middle_and_0_at_the_edge(falloff: str) -> None:
     zone = Zone(31, falloff, 0.01)  # type: ignore[arg-type]
     found = zone.influence(np.linspace(0, 1, 9))
     assert found[[0, -1]] == pytest.approx([1, 0], abs=1e-9)
@@ -20,11 +20,11 @@ def test_a_zone_s_influence_is_1_in_the_middle_and_0_at_the_edge(falloff: str) -
     assert not zone.influence(np.array([1.5])).any()
 
 
-def test_a_zone_s_radii_are_its_size_by_its_scale() -> None:
+def test_zone_radii_are_size_times_scale() -> None:
     assert Zone(31, "linear", 0.02, (1, 0.5, 2)).radii == pytest.approx([0.02, 0.01, 0.04])
 
 
-def test_a_mirrored_zone_has_its_pivot_on_the_other_side() -> None:
+def test_zone_mirrored_has_its_pivot_on_the_other_side() -> None:
     zone = Zone(31, "ease", 0.02, ease=30, radial=1, pivot=(0.01, 0.02, 0.03))
     assert zone.mirrored(32) == replace(zone, fap=32, pivot=(-0.01, 0.02, 0.03))
 
@@ -39,19 +39,19 @@ def test_a_mirrored_zone_has_its_pivot_on_the_other_side() -> None:
         ({"pivot": (0, float("inf"), 0)}, "wanted finite numbers"),
     ],
 )
-def test_a_zone_out_of_range_is_refused(wrong: dict[str, object], words: str) -> None:
+def test_zone_refuses_values_out_of_range(wrong: dict[str, object], words: str) -> None:
     with pytest.raises(FaceError, match=words):
         replace(Zone(31, "linear", 0.01), **wrong)
 
 
-def test_synchronised_zones_are_those_of_the_left_side() -> None:
+def test_synchronised_copies_the_left_side() -> None:
     left, right = Zone(31, "linear", 0.01), Zone(32, "cosine", 0.03)
     setup = Setup({}, {31: left, 32: right})
     assert synchronised(setup).zones[32] == right
     assert synchronised(replace(setup, synced=frozenset({31, 32}))).zones[32] == left.mirrored(32)
 
 
-def test_a_mirrored_mask_needs_a_twin_of_each_vertex() -> None:
+def test_mirror_mask_needs_a_twin_of_each_vertex() -> None:
     at = np.array([[1, 0, 0], [-1, 0, 0], [2, 5, 0.0]])
     assert mirror_mask(np.array([0], np.int32), at, 1e-3, 31).tolist() == [1]
     with pytest.raises(FaceError, match="has no twin"):

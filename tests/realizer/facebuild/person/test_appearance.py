@@ -6,7 +6,7 @@ from realizer.core.errors import FaceError
 from realizer.facebuild.person.appearance import appearance_of
 
 
-def test_what_a_recipe_does_not_say_is_plain() -> None:
+def test_appearance_of_an_empty_table_is_plain() -> None:
     plain, own = appearance_of({}), appearance_of({"stubble": 0.7})
     assert (plain.stubble, own.stubble) == (0.0, 0.7)
     assert own.lips == plain.lips
@@ -20,6 +20,6 @@ def test_what_a_recipe_does_not_say_is_plain() -> None:
         ({"age": True}, "age"),
     ],
 )
-def test_what_is_no_figure_is_refused(table: dict[str, object], says: str) -> None:
+def test_appearance_of_refuses_what_is_no_figure(table: dict[str, object], says: str) -> None:
     with pytest.raises(FaceError, match=says):
         appearance_of(table)

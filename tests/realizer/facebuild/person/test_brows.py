@@ -36,7 +36,7 @@ def test_brows_rise_with_the_skin(face: Face) -> None:
     assert part(face, "brows", moved)[:, 1].mean() == pytest.approx(asked, rel=0.4)
 
 
-def test_closed_lids_take_the_lashes_down(face: Face) -> None:
+def test_lashes_fall_with_closed_lids(face: Face) -> None:
     row = np.zeros((1, 68), np.float32)
     row[0, 18:20] = 1024
     moved = part(face, "lashes", deform(face, row)[0] - face.vertices)

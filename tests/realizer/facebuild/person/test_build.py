@@ -9,7 +9,7 @@ from realizer.facebuild.person.build import build_face
 from realizer.facebuild.person.makehuman import OBJ
 
 
-def test_the_builder_says_what_it_misses(tmp_path: Path) -> None:
+def test_build_face_names_missing_data_and_recipes(tmp_path: Path) -> None:
     with pytest.raises(FaceError, match="wanted the unpacked wheel"):
         build_face("x", tmp_path, tmp_path / "x")
     (tmp_path / OBJ).parent.mkdir(parents=True)

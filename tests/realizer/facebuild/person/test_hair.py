@@ -36,7 +36,7 @@ def scalp(head: tuple, style: Style) -> Scalp:
 
 
 @pytest.mark.parametrize("name", STYLES)
-def test_every_style_grows_on_a_head(head: tuple, name: str) -> None:
+def test_hair_of_every_style_is_a_sound_mesh(head: tuple, name: str) -> None:
     style = style_of({"style": name})
     for part in hair(scalp(head, style), style, LOOK):
         assert part.name == "hair"
@@ -50,7 +50,7 @@ def test_every_style_grows_on_a_head(head: tuple, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", STYLES)
-def test_brows_eyes_and_mouth_stay_free(head: tuple, name: str) -> None:
+def test_hair_leaves_brows_eyes_and_mouth_free(head: tuple, name: str) -> None:
     style = style_of({"style": name})
     at = np.concatenate([part.vertices for part in hair(scalp(head, style), style, LOOK)])
     before = at[(at[:, 2] > 0) & (at[:, 1] < head[2]["11.1"][1] - 0.02)]
@@ -69,7 +69,7 @@ def test_hair_lies_on_the_skull_and_hides_it(head: tuple, name: str) -> None:
     assert vertex_normals(part.vertices, part.triangles)[np.argmax(part.vertices[:, 1]), 1] > 0.3
 
 
-def test_hanging_hair_reaches_as_far_down_as_its_style_says(head: tuple) -> None:
+def test_hair_hangs_as_far_down_as_its_style_says(head: tuple) -> None:
     low = {}
     for name in ("short", "bob", "long"):
         style = style_of({"style": name})
@@ -77,7 +77,7 @@ def test_hanging_hair_reaches_as_far_down_as_its_style_says(head: tuple) -> None
     assert low["short"] > low["bob"] + 0.02 > low["long"] + 0.05
 
 
-def test_a_recipe_changes_single_figures(head: tuple) -> None:
+def test_style_of_changes_single_figures(head: tuple) -> None:
     style = style_of({"style": "short", "grey": 0.9, "sides": 0.2})
     assert (style.grey, style.sides) == (0.9, 0.2)
     plain = style_of({"style": "short"})
@@ -90,12 +90,12 @@ def test_a_recipe_changes_single_figures(head: tuple) -> None:
 @pytest.mark.parametrize(
     ("table", "says"), [({"style": "mohican"}, "wanted one of bun"), ({"styl": "bun"}, "got 'styl'")]
 )
-def test_an_unknown_style_or_figure_is_refused(table: dict[str, str], says: str) -> None:
+def test_style_of_refuses_unknown_styles_and_figures(table: dict[str, str], says: str) -> None:
     with pytest.raises(FaceError, match=says):
         style_of(table)
 
 
-def test_the_skin_has_the_roots_shadow_under_hair_alone(head: tuple) -> None:
+def test_shadow_lies_under_hair_alone(head: tuple) -> None:
     style = style_of({"style": "short"})
     mine = scalp(head, style)
     places = np.array([head[2][name] for name in ("11.4", "9.3", "4.1", "2.1")])
@@ -105,6 +105,6 @@ def test_the_skin_has_the_roots_shadow_under_hair_alone(head: tuple) -> None:
     assert (shadow(mine, style_of({"style": "rim"}), places[:1]) == 0).all()
 
 
-def test_every_figure_is_in_the_table_of_plain_hair() -> None:
+def test_style_has_every_figure_of_the_table() -> None:
     table = read_toml(text_of("hair.toml"), "hair.toml")
     assert {field.name for field in fields(Style)} == {*table["plain"], "line"}

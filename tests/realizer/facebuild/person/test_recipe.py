@@ -41,7 +41,7 @@ def faults(text: str, data: Path) -> list[str]:
     return [line.removeprefix(f"{path}: ") for line in lines]
 
 
-def test_a_recipe_is_read_as_it_is_written(data: Path) -> None:
+def test_read_recipe_keeps_what_is_written(data: Path) -> None:
     path = data / "recipe.toml"
     path.write_text(GOOD, "utf-8")
     recipe = read_recipe(path, data)
@@ -70,23 +70,23 @@ def test_a_recipe_is_read_as_it_is_written(data: Path) -> None:
         ("says = 'Eve'", "says = 'Eve'\nhair = {colour = 3}", "got 'colour'"),
     ],
 )  # fmt: skip
-def test_a_fault_is_said_with_its_key_and_what_was_wanted(old: str, new: str, fault: str, data: Path) -> None:
+def test_read_recipe_names_the_key_of_a_fault(old: str, new: str, fault: str, data: Path) -> None:
     (line,) = faults(GOOD.replace(old, new, 1), data)
     assert fault in line
 
 
-def test_all_faults_are_said_at_once(data: Path) -> None:
+def test_read_recipe_lists_all_faults(data: Path) -> None:
     lines = faults(GOOD.replace("= 0.5", "= -1").replace("lips = [1, 2.5, 255]", ""), data)
     assert len(lines) == 2
 
 
-def test_a_file_that_is_not_toml_is_named(data: Path) -> None:
+def test_read_recipe_names_a_file_that_is_no_toml(data: Path) -> None:
     (line,) = faults("says", data)
     assert "Expected" in line
 
 
 @pytest.mark.parametrize("info", list_faces(), ids=lambda info: info.name)
-def test_every_recipe_that_ships_names_all_that_it_must(info: object, data: Path) -> None:
+def test_read_recipe_accepts_every_shipped_recipe(info: object, data: Path) -> None:
     # Its targets are in the data, which do not ship; all else is sound.
     path = info.path / "recipe.toml"  # type: ignore[attr-defined]
     for name in (line.split('"')[1] for line in path.read_text("utf-8").splitlines() if line.startswith('"')):

@@ -8,7 +8,7 @@ import pytest
 from realizer.facebuild.person.skin_colours import LIT, paint_mouth
 
 
-def test_the_lining_of_the_mouth_is_darker_to_the_back_and_leaves_the_skin_alone() -> None:
+def test_paint_mouth_darkens_to_the_back_and_leaves_the_skin() -> None:
     deep = np.array([0.0, 0.01, 0.03, 0.08, 0.0])
     share = np.array([1.0, 1, 1, 1, 0])
     out, gloss, light = np.full((5, 3), 50.0), np.full(5, 0.2), np.full(5, 0.25)
