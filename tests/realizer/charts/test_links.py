@@ -8,7 +8,7 @@ BLOCK = """<bml id="b"><wait id="w" start="1" duration="1"/><wait id="v" {} dura
 
 
 def of(block, behaviour):
-    return next(line for line in block.lines if line.id == behaviour).links
+    return next(line for line in block.rows if line.id == behaviour).links
 
 
 def test_an_attribute_is_a_link_to_its_point(lines) -> None:
@@ -42,7 +42,7 @@ def test_synchronize_ties_all_its_points_to_the_first(lines) -> None:
     (link,) = of(block, "v")
     assert (link.kind, link.target, link.constraint) == ("synchronize", "w:end", "c")
     assert link.offset == pytest.approx(-0.3)
-    start = next(p.time for line in block.lines for p in line.points if line.id == "v")
+    start = next(p.time for line in block.rows for p in line.points if line.id == "v")
     assert start == pytest.approx(2.0 + link.offset)
 
 
