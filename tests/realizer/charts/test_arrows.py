@@ -23,7 +23,7 @@ def paths(picture, colour: str) -> list[Path]:
 
 
 @pytest.mark.parametrize("offset", ["", "+0.5", "-0.25"])
-def test_a_curve_leads_from_the_point_that_is_named_to_the_one_that_follows(lines, offset: str) -> None:
+def test_draw_links_curves_to_the_point_that_follows(lines, offset: str) -> None:
     picture, scale, by_id = drawn(lines, TIED.format(f'stroke="w:end{offset}"', ""))
     (curve,) = paths(picture, LINK)
     stroke = next(p.time for p in by_id["n"].points if p.name == "stroke")
@@ -33,7 +33,7 @@ def test_a_curve_leads_from_the_point_that_is_named_to_the_one_that_follows(line
     assert (offset in texts) or not offset
 
 
-def test_a_point_at_a_time_has_a_pin(lines) -> None:
+def test_draw_links_pins_a_point_at_a_time(lines) -> None:
     picture, scale, _ = drawn(lines, TIED.format('start="0.5"', ""))
     tips = [s.points[0][0] for s in picture.shapes if isinstance(s, Path) and s.fill == HELD and s.tip]
     assert sorted(tips) == pytest.approx([scale.x(0.5), scale.x(1.0)])
@@ -46,7 +46,7 @@ def test_a_point_at_a_time_has_a_pin(lines) -> None:
         ('<after ref="w:start"><sync ref="n:start"/></after>', 1.0),
     ],
 )
-def test_room_is_hatched_from_the_point_to_where_the_order_binds(lines, said: str, bound: float) -> None:
+def test_draw_links_hatches_the_slack(lines, said: str, bound: float) -> None:
     document = TIED.format('start="1.6"', f"<constraint>{said}</constraint>")
     picture, scale, _ = drawn(lines, document)
     (strip,) = [s for s in picture.shapes if isinstance(s, Box) and s.tip.endswith("s left")]
@@ -56,7 +56,7 @@ def test_room_is_hatched_from_the_point_to_where_the_order_binds(lines, said: st
     assert paths(picture, ROOM)
 
 
-def test_an_order_that_binds_has_a_colour_of_its_own(lines) -> None:
+def test_draw_links_colours_an_order_that_binds(lines) -> None:
     said = '<constraint><after ref="w:end"><sync ref="n:start"/></after></constraint>'
     picture, _, _ = drawn(lines, TIED.format("", said))
     assert all(line.tip.endswith("binds") for line in paths(picture, TIGHT))
@@ -64,7 +64,7 @@ def test_an_order_that_binds_has_a_colour_of_its_own(lines) -> None:
     assert not paths(picture, ROOM)
 
 
-def test_what_is_tied_to_a_block_that_is_not_in_the_picture_says_to_what(lines) -> None:
+def test_draw_links_names_a_block_outside_the_picture(lines) -> None:
     blocks = lines(
         '<bml id="a"><wait id="x" duration="1"/></bml>',
         '<bml id="b"><wait id="w" start="a:x:end" duration="1"/></bml>',

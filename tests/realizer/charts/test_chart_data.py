@@ -20,7 +20,7 @@ TALK = """<bml id="b">
 </bml>"""
 
 
-def test_points_have_their_time_on_both_clocks(lines) -> None:
+def test_chart_points_have_times_on_both_clocks(lines) -> None:
     first, second = lines(
         '<bml id="a"><wait id="w" duration="2"/></bml>',
         '<bml id="b" composition="APPEND"><head id="n" lexeme="NOD" start="0.5"/></bml>',
@@ -30,7 +30,7 @@ def test_points_have_their_time_on_both_clocks(lines) -> None:
     assert second.rows[0].points[0] == ("start", 0.5, 2.5)
 
 
-def test_gaps_say_how_far_they_are_from_what_they_would_like(lines) -> None:
+def test_chart_gaps_have_actual_and_preferred_lengths(lines) -> None:
     (block,) = lines(TALK)
     nod = block.rows[1]
     assert [(g.begin, g.end) for g in nod.gaps] == [
@@ -45,7 +45,7 @@ def test_gaps_say_how_far_they_are_from_what_they_would_like(lines) -> None:
     assert (free.required, nod.required) == (True, False)
 
 
-def test_the_costs_of_gaps_add_up_to_what_the_scheduler_paid() -> None:
+def test_chart_costs_add_up_to_the_scheduler_s() -> None:
     player = Player(PlayOptions(idle=False))
     block = parse('<bml id="b"><head id="n" lexeme="NOD" start="0" end="4"/></bml>', VOCABULARY)
     schedule = player.submit(block, 0.0)
@@ -53,14 +53,14 @@ def test_the_costs_of_gaps_add_up_to_what_the_scheduler_paid() -> None:
     assert charts_of(player.blocks, [schedule])[0].cost == pytest.approx(schedule.cost)
 
 
-def test_speech_is_rigid_and_has_its_words(lines) -> None:
+def test_chart_of_speech_is_rigid_and_has_words(lines) -> None:
     speech = lines(TALK.replace("<text>", "<text>Well, "))[0].rows[0]
     assert [w.text for w in speech.words] == ["Well", "Hello", "there"]
     assert all(g.rigid and g.actual == pytest.approx(g.preferred) and g.cost == 0 for g in speech.gaps)
     assert speech.points[1].time == pytest.approx(speech.words[2].start)
 
 
-def test_what_was_dropped_is_told_with_its_element_its_line_and_its_warning(lines) -> None:
+def test_chart_of_dropped_behaviours_has_element_and_line(lines) -> None:
     (block,) = lines(
         """<bml id="b">
         <faceLexeme id="f" lexeme="NOPE"/>
@@ -81,7 +81,7 @@ def test_what_was_dropped_is_told_with_its_element_its_line_and_its_warning(line
     assert "at least" in found["early"].text
 
 
-def test_a_constraint_that_is_not_kept_is_told_too(lines) -> None:
+def test_chart_lists_a_constraint_that_does_not_hold(lines) -> None:
     (block,) = lines(
         """<bml id="b"><wait id="w" start="0" duration="1"/><wait id="v" start="2" duration="1"/>
         <constraint id="c"><before ref="w:start"><sync ref="v:start"/></before></constraint></bml>"""
@@ -90,13 +90,13 @@ def test_a_constraint_that_is_not_kept_is_told_too(lines) -> None:
     assert [line.id for line in block.rows] == ["w", "v"]
 
 
-def test_a_refused_block_has_only_its_reason(lines) -> None:
+def test_chart_of_a_refused_block_has_only_its_reason(lines) -> None:
     (block,) = lines('<bml id="b"><required><head id="n" lexeme="NOD" end="0.01"/></required></bml>')
     assert (block.state, block.rows) == ("FAILED", ())
     assert [d.type for d in block.dropped] == ["IMPOSSIBLE_TO_SCHEDULE"]
 
 
-def test_a_preplanned_block_has_no_start_and_its_json_no_infinity(lines) -> None:
+def test_chart_of_a_preplanned_block_has_no_start(lines) -> None:
     (block,) = lines(
         '<bml id="b" xmlns:bmla="http://www.asap-project.org/bmla" bmla:preplan="true">'
         '<head id="n" lexeme="NOD"/></bml>'
@@ -107,7 +107,7 @@ def test_a_preplanned_block_has_no_start_and_its_json_no_infinity(lines) -> None
     json.dumps(block.detail(), allow_nan=False)
 
 
-def test_what_was_ended_before_it_began_is_told_as_cut_off(lines) -> None:
+def test_chart_lists_behaviours_that_ended_before_they_began(lines) -> None:
     ended, new = lines(
         '<bml id="a"><head id="n" lexeme="NOD" start="1"/></bml>',
         '<bml id="b" composition="REPLACE"><wait id="w" duration="1"/></bml>',
@@ -117,7 +117,7 @@ def test_what_was_ended_before_it_began_is_told_as_cut_off(lines) -> None:
     assert new.state == "LURKING"
 
 
-def test_what_a_preplanned_block_would_have_played_is_told_as_cut_off_when_it_is_revoked() -> None:
+def test_chart_of_a_revoked_block_lists_its_behaviours_as_cut_off() -> None:
     player = Player(PlayOptions(idle=False))
     preplan = 'xmlns:bmla="http://www.asap-project.org/bmla" bmla:preplan="true"'
     block = parse(f'<bml id="a" {preplan}><head id="n" lexeme="NOD"/></bml>', VOCABULARY)
@@ -128,7 +128,7 @@ def test_what_a_preplanned_block_would_have_played_is_told_as_cut_off_when_it_is
     assert [(d.id, d.element, d.type) for d in line.dropped] == [("n", "head", "REVOKED")]
 
 
-def test_a_behaviour_that_is_cut_off_keeps_what_has_passed() -> None:
+def test_chart_of_a_behaviour_cut_off_keeps_what_has_passed() -> None:
     player = Player(PlayOptions(idle=False))
     block = parse('<bml id="b"><gaze id="g" target="x" start="0" end="4"/></bml>', VOCABULARY)
     schedule = player.submit(block, 0.0)

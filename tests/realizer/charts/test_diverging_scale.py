@@ -27,7 +27,7 @@ def luminance(colour: str) -> float:
 
 @pytest.mark.parametrize("sight", SIGHT.values(), ids=SIGHT)
 @pytest.mark.parametrize("stretch", [1.5, 2.0, 3.0])
-def test_longer_and_shorter_are_told_apart_with_every_kind_of_sight(sight, stretch: float) -> None:
+def test_colour_of_is_distinct_for_every_colour_vision(sight, stretch: float) -> None:
     longer, shorter, neither = (
         np.clip(sight @ linear(colour_of(s)), 0, 1) ** (1 / 2.2) for s in (stretch, 1 / stretch, 1.0)
     )
@@ -36,19 +36,19 @@ def test_longer_and_shorter_are_told_apart_with_every_kind_of_sight(sight, stret
     assert np.linalg.norm(shorter - neither) > 0.1
 
 
-def test_the_farther_from_what_is_preferred_the_darker() -> None:
+def test_colour_of_darkens_away_from_the_preferred_length() -> None:
     for side in (STRETCHES[5:], STRETCHES[5::-1]):
         lights = [luminance(colour_of(s)) for s in side]
         assert lights == sorted(lights, reverse=True)
 
 
-def test_beyond_three_times_and_a_third_the_colour_stays() -> None:
+def test_colour_of_is_constant_beyond_three_times() -> None:
     assert colour_of(3.0) == colour_of(50.0) == colour_of(float("inf"))
     assert colour_of(1 / 3) == colour_of(0.01) == colour_of(0.0)
 
 
 @pytest.mark.parametrize("stretch", STRETCHES)
-def test_text_on_a_colour_can_be_read(stretch: float) -> None:
+def test_on_gives_readable_ink(stretch: float) -> None:
     colour = colour_of(stretch)
     dark, light = sorted((luminance(colour), luminance(on(colour))))
     assert (light + 0.05) / (dark + 0.05) >= 4.5

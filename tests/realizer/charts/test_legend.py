@@ -28,7 +28,7 @@ from realizer.charts.shapes import Picture, Text
         ),
     ],
 )
-def test_only_marks_that_the_picture_has_are_explained(lines, body: str, marks: set[str]) -> None:
+def test_legend_explains_only_marks_that_the_picture_has(lines, body: str, marks: set[str]) -> None:
     blocks = lines(f'<bml id="b">{body}</bml>')
     picture = Picture(1200)
     end = draw(picture, scale_of(blocks), 0.0, blocks)

@@ -11,20 +11,20 @@ def of(block, behaviour):
     return next(line for line in block.rows if line.id == behaviour).links
 
 
-def test_an_attribute_is_a_link_to_its_point(lines) -> None:
+def test_links_of_an_attribute_name_its_point(lines) -> None:
     (block,) = lines(BLOCK.format('start="w:end+0.5"', ""))
     (link,) = of(block, "v")
     assert (link.sync, link.kind, link.target, link.offset) == ("start", "attribute", "w:end", 0.5)
     assert (link.slack, link.binds, link.line) == (None, False, 1)
 
 
-def test_a_number_is_a_link_to_the_start_of_the_block(lines) -> None:
+def test_links_of_a_number_name_the_block_s_start(lines) -> None:
     (block,) = lines(BLOCK.format("", ""))
     (link,) = of(block, "w")
     assert (link.sync, link.target, link.offset) == ("start", None, 1.0)
 
 
-def test_a_sync_in_speech_that_says_a_time_is_a_link(lines) -> None:
+def test_links_of_a_timed_sync_in_speech(lines) -> None:
     (block,) = lines(
         '<bml id="b"><wait id="w" start="3" duration="1"/>'
         '<speech id="s"><text>now <sync id="t" ref="w:start"/> then</text></speech></bml>'
@@ -33,7 +33,7 @@ def test_a_sync_in_speech_that_says_a_time_is_a_link(lines) -> None:
     assert (link.sync, link.kind, link.target) == ("t", "text", "w:start")
 
 
-def test_synchronize_ties_all_its_points_to_the_first(lines) -> None:
+def test_links_of_synchronize_tie_all_points_to_the_first(lines) -> None:
     said = (
         '<constraint id="c"><synchronize>'
         '<sync ref="w:end+0.2"/><sync ref="v:start+0.5"/></synchronize></constraint>'
@@ -46,7 +46,7 @@ def test_synchronize_ties_all_its_points_to_the_first(lines) -> None:
     assert start == pytest.approx(2.0 + link.offset)
 
 
-def test_synchronize_with_a_number_is_told_of_the_point_not_of_the_number(lines) -> None:
+def test_links_of_synchronize_with_a_number_are_the_point_s(lines) -> None:
     said = '<constraint><synchronize><sync ref="3"/><sync ref="v:start"/></synchronize></constraint>'
     (block,) = lines(BLOCK.format("", said))
     (link,) = of(block, "v")
@@ -63,14 +63,14 @@ def test_synchronize_with_a_number_is_told_of_the_point_not_of_the_number(lines)
         ('<before ref="7"><sync ref="v:end"/></before>', 6.0),
     ],
 )
-def test_before_and_after_say_how_much_room_is_left(lines, said: str, slack: float) -> None:
+def test_links_of_before_and_after_have_slack(lines, said: str, slack: float) -> None:
     (block,) = lines(BLOCK.format("", f"<constraint>{said}</constraint>"))
     (link,) = of(block, "v")
     assert link.slack == pytest.approx(slack, abs=1e-9)
     assert link.binds == (slack == 0.0)
 
 
-def test_what_is_said_of_another_block_is_told_of_the_own_point(lines) -> None:
+def test_links_to_another_block_are_the_own_point_s(lines) -> None:
     _, block = lines(
         '<bml id="a"><wait id="x" duration="3"/></bml>',
         '<bml id="b"><wait id="w" start="1" duration="1"/>'

@@ -58,14 +58,14 @@ def check(picture: Picture) -> None:
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
-def test_the_examples_can_be_read(lines, path: Path) -> None:
+def test_timeline_of_the_examples_is_readable(lines, path: Path) -> None:
     blocks = lines(path.read_text())
     picture = timeline(blocks)
     check(picture)
     assert {line.id for block in blocks for line in block.rows} <= set(texts(picture))
 
 
-def test_behaviours_of_a_kind_stand_together_speech_first(lines) -> None:
+def test_timeline_groups_behaviours_by_kind(lines) -> None:
     picture = timeline(lines(CLASHES))
     check(picture)
     ids = [t.text for t in sorted((s for s in picture.shapes if isinstance(s, Text)), key=lambda t: t.y)]
@@ -73,13 +73,13 @@ def test_behaviours_of_a_kind_stand_together_speech_first(lines) -> None:
     assert {"speech", "head", "other"} <= set(ids)
 
 
-def test_what_was_dropped_is_there_with_its_reason(lines) -> None:
+def test_timeline_shows_dropped_behaviours_with_reasons(lines) -> None:
     shown = texts(timeline(lines(CLASHES)))
     assert {"f", "g", "cannot create behavior", "impossible to schedule", "dropped, and why"} <= set(shown)
     assert any(text.startswith("g cannot be placed: g:ready = 1") for text in shown)
 
 
-def test_gaps_have_the_colour_of_their_stretch_and_stand_at_their_time(lines) -> None:
+def test_timeline_colours_gaps_at_their_time(lines) -> None:
     blocks = lines(
         '<bml id="b"><head id="n" lexeme="NOD" start="0" end="3"/>'
         '<speech id="s"><text>Hello <sync id="t"/> there</text></speech></bml>'
@@ -95,7 +95,7 @@ def test_gaps_have_the_colour_of_their_stretch_and_stand_at_their_time(lines) ->
             assert boxes[round(scale.x(point.time), 3), fill] == pytest.approx(gap.actual * scale.second)
 
 
-def test_words_are_shown_at_their_time_where_they_fit(lines) -> None:
+def test_timeline_shows_words_at_their_time(lines) -> None:
     blocks = lines(CLASHES)
     picture, scale = timeline(blocks), scale_of(blocks)
     for word in blocks[0].rows[0].words:
@@ -103,7 +103,7 @@ def test_words_are_shown_at_their_time_where_they_fit(lines) -> None:
         assert shown.x == pytest.approx(scale.x((word.start + word.end) / 2))
 
 
-def test_words_that_do_not_fit_are_cut_between_their_points(lines) -> None:
+def test_timeline_cuts_words_that_do_not_fit(lines) -> None:
     blocks = lines(
         '<bml id="b"><speech id="s"><text>One two three four five six seven <sync id="t"/> eight</text>'
         '</speech><wait id="w" duration="60"/></bml>'
@@ -113,7 +113,7 @@ def test_words_that_do_not_fit_are_cut_between_their_points(lines) -> None:
     assert any(text.startswith("One two") for text in texts(picture))
 
 
-def test_a_crowd_can_be_read(lines) -> None:
+def test_timeline_of_a_crowd_is_readable(lines) -> None:
     rows = "".join(
         f'<faceLexeme id="a_very_long_identifier_of_a_behaviour_{i}" lexeme="SMILE" '
         f'start="{0.3 * i:.1f}" attackPeak="{0.3 * i + 0.02 * i:.2f}"/>'
@@ -125,7 +125,7 @@ def test_a_crowd_can_be_read(lines) -> None:
     assert len(set(names)) == 40
 
 
-def test_blocks_stand_under_each_other_on_one_clock(lines) -> None:
+def test_timeline_puts_blocks_below_each_other_on_one_clock(lines) -> None:
     blocks = lines(
         '<bml id="first"><wait id="w" duration="2"/></bml>',
         '<bml id="second" composition="APPEND"><wait id="v" start="first:w:start+2.5" duration="1"/></bml>',
@@ -140,7 +140,7 @@ def test_blocks_stand_under_each_other_on_one_clock(lines) -> None:
     assert {"pending", "failed", "not started: 1.00 s long"} <= set(at)
 
 
-def test_nothing_gives_a_picture_too() -> None:
+def test_timeline_of_nothing_is_a_picture() -> None:
     picture = timeline([])
     assert picture.title == "Timeline of nothing"
     assert picture.height > 0

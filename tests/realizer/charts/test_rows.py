@@ -24,29 +24,29 @@ def row(*gaps: Gap, tied: frozenset[str] = frozenset()) -> list[str]:
     return texts(picture)
 
 
-def test_a_gap_says_its_length_and_how_much_of_the_preferred_it_is() -> None:
+def test_draw_row_writes_length_and_ratio_of_a_gap() -> None:
     assert "1.50 s, 150%" in row(Gap("start", "end", 1.5, 1.0, 0.0, 1.0))
     assert "1.00 s" in row(Gap("start", "end", 1.0, 1.0, 0.0, 1.0))
     assert "1.50 s" in row(Gap("start", "end", 1.5))
 
 
-def test_a_short_gap_says_less_and_a_very_short_one_nothing() -> None:
+def test_draw_row_writes_less_in_short_gaps() -> None:
     assert "150%" in row(Gap("start", "end", 0.15, 0.1, 0.0, 1.0))
     assert not any("%" in text for text in row(Gap("start", "end", 0.03, 0.02, 0.0, 1.0)))
 
 
-def test_a_row_says_what_it_is() -> None:
+def test_draw_row_writes_name_and_element() -> None:
     assert {"n", "head, line 3, required"} <= set(row(Gap("start", "end", 1.0, 1.0, 0.0, 1.0)))
 
 
-def test_of_names_that_do_not_fit_beside_each_other_the_tied_one_stays() -> None:
+def test_draw_row_keeps_the_linked_name_if_names_collide() -> None:
     gaps = [Gap("strokeStart", "stroke", 0.02), Gap("stroke", "strokeEnd", 0.02)]
     shown = row(*gaps, tied=frozenset({"stroke"}))
     assert "stroke" in shown
     assert "strokeEnd" in row(Gap("start", "strokeEnd", 2.0), Gap("strokeEnd", "end", 2.0))
 
 
-def test_a_reason_is_folded_and_its_place_is_not_said_twice() -> None:
+def test_draw_dropped_folds_the_reason_without_its_place() -> None:
     gone = Dropped("f", "faceLexeme", 7, "CANNOT_CREATE_BEHAVIOR", "line 7, /bml/x[1]: " + "why not? " * 100)
     picture = Picture(1200)
     height = height_of(gone, SCALE)

@@ -12,7 +12,7 @@ from realizer.charts.scale import APART, WIDEST, Scale, scale_of
 
 
 @given(st.floats(0, 1e4), st.floats(0.1, 4000))
-def test_ticks_are_round_apart_and_inside(first: float, length: float) -> None:
+def test_scale_ticks_are_round_apart_and_inside(first: float, length: float) -> None:
     scale = Scale(first, first + length, 1200.0)
     times = [time for time, _ in scale.ticks()]
     assert times == sorted(times)
@@ -21,14 +21,14 @@ def test_ticks_are_round_apart_and_inside(first: float, length: float) -> None:
     assert all(float(words) == pytest.approx(t, abs=1e-6) for t, words in scale.ticks())
 
 
-def test_what_is_beyond_the_picture_stands_at_its_edge() -> None:
+def test_scale_limits_times_to_the_picture() -> None:
     scale = Scale(0.0, 2.0, 1200.0)
     assert scale.x(-5) == scale.x(0.0) == scale.left
     assert scale.x(5) == scale.x(2.0) == scale.right
     assert scale.x(1.0) == (scale.left + scale.right) / 2
 
 
-def test_a_longer_block_has_a_wider_picture_up_to_a_limit(lines) -> None:
+def test_scale_of_a_longer_block_is_wider_up_to_a_limit(lines) -> None:
     widths = [
         scale_of(lines(f'<bml id="b"><wait id="w" duration="{seconds}"/></bml>')).width
         for seconds in (1, 10, 30, 500)
@@ -36,5 +36,5 @@ def test_a_longer_block_has_a_wider_picture_up_to_a_limit(lines) -> None:
     assert widths[0] == widths[1] < widths[2] < widths[3] == WIDEST
 
 
-def test_nothing_has_a_scale_too() -> None:
+def test_scale_of_nothing_is_valid() -> None:
     assert list(scale_of([]).ticks())

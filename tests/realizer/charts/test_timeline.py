@@ -33,22 +33,22 @@ BLOCK = BlockChart(
 )
 
 
-def test_a_gap_costs_what_the_scheduler_pays_for_it() -> None:
+def test_gap_costs_what_the_scheduler_pays() -> None:
     assert (GAP.stretch, GAP.cost) == (1.5, 1.0)
 
 
 @pytest.mark.parametrize(
     "gap", [Gap("start", "end", 1.5), Gap("start", "end", 1.5, 1.5, 1.5, rigid=True, most=1.5)]
 )
-def test_what_has_no_stiffness_costs_nothing(gap: Gap) -> None:
+def test_gap_without_stiffness_costs_nothing(gap: Gap) -> None:
     assert gap.cost == 0.0
 
 
-def test_nothing_is_so_many_times_a_length_of_nothing() -> None:
+def test_gap_without_preferred_length_has_no_stretch() -> None:
     assert Gap("start", "end", 0.2, 0.0, 0.0, 1.0).stretch is None
 
 
-def test_a_block_as_the_stream_tells_it() -> None:
+def test_block_chart_to_json_is_what_the_stream_sends() -> None:
     told = json.loads(json.dumps(BLOCK.to_json(), allow_nan=False))
     assert {key: told[key] for key in ("block", "character", "state", "start", "end", "cost")} == {
         "block": "b",
@@ -79,12 +79,12 @@ def test_a_block_as_the_stream_tells_it() -> None:
     assert told["dropped"][0]["text"] == told["warnings"][0]["text"] == "no such lexeme"
 
 
-def test_its_head_says_what_it_does_now_and_nothing_of_its_behaviours() -> None:
+def test_block_chart_head_leaves_out_the_behaviours() -> None:
     assert BLOCK.head().keys() == {"block", "character", "state", "start", "end"}
     assert BLOCK.head().items() <= BLOCK.to_json().items()
 
 
-def test_detail_is_by_behaviour() -> None:
+def test_block_chart_detail_is_by_behaviour() -> None:
     detail = BLOCK.detail()
     assert detail["gaps"] == {"n": BLOCK.to_json()["behaviours"][0]["gaps"]}
     assert [link["offset"] for link in detail["links"]["n"]] == [0.5]

@@ -10,7 +10,7 @@ from realizer.render.cameras import camera_for
 from realizer.render.light import preset
 
 
-def test_a_graphics_card_is_used_first_and_without_one_the_processor(tmp_path):
+def test_open_canvas_prefers_a_graphics_card(tmp_path):
     assert backends._order(tmp_path) == ("onboard", "gl")
     (tmp_path / "dri").mkdir()
     (tmp_path / "dri" / "renderD128").touch()
@@ -19,7 +19,7 @@ def test_a_graphics_card_is_used_first_and_without_one_the_processor(tmp_path):
 
 @pytest.mark.gl("onboard")
 @pytest.mark.parametrize("way", ["auto", "onboard"])
-def test_a_canvas_comes_with_the_way_that_was_taken(balls, way):
+def test_open_canvas_returns_the_backend_s_name(balls, way):
     face, normals = balls
     taken, canvas = backends.open_canvas(face, (32, 24), camera_for(face), preset(), backend=way)
     assert taken in ("gl", "onboard")
@@ -28,13 +28,13 @@ def test_a_canvas_comes_with_the_way_that_was_taken(balls, way):
     canvas.close()
 
 
-def test_another_way_is_refused_with_the_known_ones(balls):
+def test_open_canvas_lists_the_known_backends(balls):
     face, _ = balls
     with pytest.raises(RenderError, match="wanted one of auto, gl, onboard, got 'vulkan'"):
         backends.open_canvas(face, (32, 24), camera_for(face), preset(), backend="vulkan")
 
 
-def test_where_no_way_is_there_the_sentence_names_both(balls, monkeypatch):
+def test_open_canvas_names_both_backends_if_none_works(balls, monkeypatch):
     face, _ = balls
 
     def missing(*_):

@@ -15,7 +15,7 @@ SIZES = [(512, 512), (640, 480), (300, 500)]
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_front_puts_hairline_to_chin_in_the_middle_half_with_its_centre_at_47_percent(balls, size):
+def test_front_camera_puts_hairline_to_chin_in_the_middle_half(balls, size):
     face, _ = balls
     (x, hairline), (_, chin) = camera_for(face).project([face.points["11.1"], face.points["2.1"]], size)
     assert (chin - hairline) / size[1] == pytest.approx(0.5)
@@ -24,7 +24,7 @@ def test_front_puts_hairline_to_chin_in_the_middle_half_with_its_centre_at_47_pe
 
 
 @pytest.mark.parametrize("name", PRESETS)
-def test_every_preset_puts_hairline_and_chin_where_it_says(balls, name):
+def test_camera_presets_put_hairline_and_chin_as_framed(balls, name):
     face, _ = balls
     places = (
         camera_for(face, name).project([face.points["11.1"], face.points["2.1"]], (400, 1000))[:, 1] / 1000
@@ -33,7 +33,7 @@ def test_every_preset_puts_hairline_and_chin_where_it_says(balls, name):
 
 
 @pytest.mark.parametrize("name", PRESETS)
-def test_the_whole_head_is_between_near_and_far(balls, name):
+def test_camera_for_has_the_head_between_near_and_far(balls, name):
     face, _ = balls
     camera = camera_for(face, name)
     depths = (camera.position - face.vertices) @ camera.towards
@@ -41,7 +41,7 @@ def test_the_whole_head_is_between_near_and_far(balls, name):
     assert depths.max() < camera.far
 
 
-def test_three_quarter_and_profile_show_the_right_cheek_turned_away_from_the_left(balls):
+def test_camera_presets_from_aside_show_the_right_cheek(balls):
     """The nose points to the picture's right: the camera stands at the character's right."""
     face, _ = balls
     for name in ("three-quarter", "profile"):
@@ -49,25 +49,25 @@ def test_three_quarter_and_profile_show_the_right_cheek_turned_away_from_the_lef
         assert nose > back + 30
 
 
-def test_the_character_s_left_is_on_the_picture_s_right(balls):
+def test_camera_shows_the_character_s_left_on_the_right(balls):
     face, _ = balls
     left, right = camera_for(face).project([[0.03, 0, 0], [-0.03, 0, 0]], (512, 512))[:, 0]
     assert left > right
 
 
-def test_a_face_may_bring_its_own_camera(balls):
+def test_camera_for_takes_a_face_s_own_camera(balls):
     face, _ = balls
     face = replace(face, cameras={"hero": {"yaw": 20, "distance": 1.2}})
     assert "hero" in camera_names(face)
     assert camera_for(face, "hero").position[0] > 0.3
 
 
-def test_an_unknown_camera_lists_the_known_ones(balls):
+def test_camera_for_lists_the_known_cameras_for_an_unknown_one(balls):
     with pytest.raises(RenderError, match=r"front, three-quarter, profile, close, got 'top'"):
         camera_for(balls[0], "top")
 
 
-def test_the_page_s_camera_sees_the_same(balls):
+def test_camera_to_json_gives_the_same_view(balls):
     """Rebuilt from the JSON the way a WebGL library does it."""
     face, _ = balls
     camera = camera_for(face, "three-quarter")

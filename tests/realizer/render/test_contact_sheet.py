@@ -13,7 +13,7 @@ def plain(value, size=(60, 80)):
 
 
 @pytest.mark.parametrize("count", [1, 2, 5, 24])
-def test_every_picture_is_on_the_sheet_once(count):
+def test_sheet_shows_every_picture_once(count):
     colours = [40 + 9 * k for k in range(count)]
     pixels = sheet([plain(c) for c in colours], [f"{k}" for k in range(count)])
     for colour in colours:
@@ -21,30 +21,30 @@ def test_every_picture_is_on_the_sheet_once(count):
         assert (pixels == colour).all(2).sum() < 60 * 80 + 200
 
 
-def test_a_sheet_is_about_as_wide_as_a_screen():
+def test_sheet_is_about_as_wide_as_a_screen():
     height, width = sheet([plain(99, (256, 256))] * 24, ["0.00 s"] * 24).shape[:2]
     assert 1 < width / height < 2
 
 
-def test_titles_and_notes_are_written_below_their_picture():
+def test_sheet_writes_titles_and_notes_below_pictures():
     bare = sheet([plain(99)], [""])
     written = sheet([plain(99)], ["0.50 s"], [["nod:stroke"]])
     assert (bare[68:] == PAPER).all()
     assert (written[68:] != PAPER).any(2).sum() > 50
 
 
-def test_a_long_note_stays_in_its_column():
+def test_sheet_keeps_a_long_note_in_its_column():
     pixels = sheet([plain(99)] * 2, ["a", "b"], [["w" * 200], []], columns=2)
     assert (pixels[68:, 86:92] == PAPER).all()
 
 
-def test_too_many_notes_end_in_a_count():
+def test_sheet_ends_too_many_notes_in_a_count():
     few = sheet([plain(99)], ["a"], [[f"n{k}" for k in range(4)]])
     many = sheet([plain(99)], ["a"], [[f"n{k}" for k in range(40)]])
     assert few.shape == many.shape
     assert not np.array_equal(few, many)
 
 
-def test_no_pictures_is_an_error():
+def test_sheet_refuses_no_pictures():
     with pytest.raises(ValueError, match="at least one"):
         sheet([], [])

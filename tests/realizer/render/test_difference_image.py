@@ -16,21 +16,21 @@ def neutral():
     return pixels
 
 
-def test_where_nothing_differs_the_neutral_is_a_quarter_as_strong_as_it_was(neutral):
+def test_difference_of_equal_pictures_is_the_faint_neutral(neutral):
     flat = flatten(neutral, (90, 90, 90))
     out = difference(flat, flat, faint(neutral))
     assert out[120, 120] == pytest.approx(PAPER * 0.75 + np.array([200, 160, 140]) * 0.25, abs=2)
     assert out[2, 2] == pytest.approx(PAPER, abs=1)
 
 
-def test_the_neutral_is_blurred_and_its_background_is_left_out(neutral):
+def test_faint_blurs_the_neutral_without_background(neutral):
     below = faint(neutral)
     steps = np.abs(np.diff(below[120, :, 0]))
     assert steps.max() < 0.5 * (below[120, 120, 0] - below[120, 2, 0])
     assert below[5, 5] == pytest.approx(PAPER, abs=1)
 
 
-def test_more_difference_is_lighter_and_stands_where_it_is(neutral):
+def test_difference_is_lighter_where_it_is_larger(neutral):
     flat = flatten(neutral, (90, 90, 90))
     brightness = []
     for apart in (0.05, 0.12, 0.2, FULL, 2 * FULL):
@@ -43,7 +43,7 @@ def test_more_difference_is_lighter_and_stands_where_it_is(neutral):
     assert brightness[3] == brightness[4]
 
 
-def test_darker_counts_as_much_as_brighter(neutral):
+def test_difference_counts_darker_as_brighter(neutral):
     flat = np.full((8, 8, 3), 128, np.uint8)
     below = np.zeros((8, 8, 3), np.float32)
     assert np.array_equal(
@@ -51,12 +51,12 @@ def test_darker_counts_as_much_as_brighter(neutral):
     )
 
 
-def test_the_scale_rises_in_brightness_for_who_sees_no_hues():
+def test_ramp_rises_in_brightness():
     light = ramp(np.linspace(0, 1, 50, dtype=np.float32)) @ [0.30, 0.59, 0.11]
     assert (np.diff(light) > 0).all()
 
 
-def test_a_picture_without_background_gets_the_one_it_is_given(neutral):
+def test_flatten_fills_the_background(neutral):
     neutral[120, 120, 3] = 128
     flat = flatten(neutral, (0, 100, 0))
     assert flat[2, 2].tolist() == [0, 100, 0]

@@ -13,7 +13,7 @@ from realizer.render.light import preset, unit
 FRONT = np.array([0, 0, 1], np.float32)
 
 
-def test_each_eye_has_a_cap_between_the_key_and_who_looks(balls):
+def test_eye_highlights_lie_between_key_and_camera(balls):
     face, _ = balls
     points = EyeHighlights(face, preset(), FRONT)(face.vertices)
     assert len(points) == 22
@@ -25,7 +25,7 @@ def test_each_eye_has_a_cap_between_the_key_and_who_looks(balls):
         assert out[0] < 0  # the key stands at the character's right
 
 
-def test_it_follows_the_eye_that_moves_and_the_page_can_tell_where(balls):
+def test_eye_highlights_follow_the_eye_also_on_the_page(balls):
     face, _ = balls
     glints = EyeHighlights(face, preset(), FRONT)
     moved = face.vertices + np.array([0.01, -0.02, 0.005], np.float32)

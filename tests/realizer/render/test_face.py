@@ -53,13 +53,13 @@ def patch(picture, corners) -> np.ndarray:
     return picture[top : bottom + 1, left : right + 1].astype(float)
 
 
-def test_hairline_and_chin_are_where_the_rule_says(face):
+def test_face_has_hairline_and_chin_as_framed(face):
     (_, hairline), (_, chin) = place(face, "11.1", "2.1") / SIZE[1]
     assert chin - hairline == pytest.approx(0.5, abs=0.015)
     assert (chin + hairline) / 2 == pytest.approx(0.47, abs=0.015)
 
 
-def test_the_picture_shows_what_the_rule_says(renderer, face):
+def test_face_picture_is_framed_as_projected(renderer, face):
     """Skin starts below the hairline; below the chin the neck is in shade: both seen, not computed."""
     picture = renderer.draw(row())[0].astype(int)
     column = picture[:, 126:131].mean(1)
@@ -69,14 +69,14 @@ def test_the_picture_shows_what_the_rule_says(renderer, face):
     assert not warm[: round(hairline) - 16].any() or column[: round(hairline) - 16].sum(1).max() < 420
 
 
-def test_the_picture_is_not_blank_and_not_burnt(renderer):
+def test_face_picture_is_not_blank_and_not_burnt(renderer):
     picture = renderer.draw(row())[0]
     assert picture.std() > 30
     assert (picture.min(2) > 250).mean() < 0.002
     assert (picture.max(2) < 8).mean() < 0.01
 
 
-def test_skin_is_warm_on_both_cheeks_and_brighter_on_the_key_s(renderer, face):
+def test_face_skin_is_warm_and_brighter_towards_the_key(renderer, face):
     picture = renderer.draw(row())[0].astype(float)
     cheeks = {}
     for side, point in (("left", "5.1"), ("right", "5.2")):
@@ -87,14 +87,14 @@ def test_skin_is_warm_on_both_cheeks_and_brighter_on_the_key_s(renderer, face):
     assert cheeks["right"].sum() > cheeks["left"].sum()
 
 
-def test_an_open_mouth_is_darker_than_a_closed_one(renderer, face):
+def test_face_mouth_is_darker_open_than_closed(renderer, face):
     closed, opened = renderer.draw(np.concatenate([row(), row_of(OPEN)]))
     hole = place(face, "2.2", "2.3", "2.6", "2.7", rows=row_of(OPEN))
     assert np.ptp(hole[:, 1]) > 8
     assert patch(opened, hole).mean() < patch(closed, hole).mean() - 15
 
 
-def test_closed_lids_hide_the_eyes_and_their_glints(renderer, face):
+def test_face_lids_hide_the_eyes_and_their_glints(renderer, face):
     opened, closed = renderer.draw(np.concatenate([row(), row(fap19=1024, fap20=1024)]))
     for corners in (("3.7", "3.11", "3.1", "3.3"), ("3.8", "3.12", "3.2", "3.4")):
         box = place(face, *corners)
@@ -102,7 +102,7 @@ def test_closed_lids_hide_the_eyes_and_their_glints(renderer, face):
         assert patch(closed, box).min(2).max() < 190
 
 
-def test_every_eye_has_a_glint_in_the_iris(face):
+def test_face_eyes_have_a_glint_in_the_iris(face):
     with Renderer("default", (1024, 1024)) as renderer:
         picture = renderer.draw(row())[0]
     for point in ("3.5", "3.6"):
@@ -112,7 +112,7 @@ def test_every_eye_has_a_glint_in_the_iris(face):
         assert eye.max(2).min() < 60  # beside the dark pupil
 
 
-def test_a_head_turned_to_its_left_looks_to_the_picture_s_right(renderer, face):
+def test_face_turned_to_its_left_looks_to_the_right(renderer, face):
     straight, turned = renderer.draw(np.concatenate([row(), row(fap49=30000)]))
     nose = place(face, "9.3", rows=row(fap49=30000))[0] - place(face, "9.3")[0]
     assert nose[0] > 5
@@ -122,7 +122,7 @@ def test_a_head_turned_to_its_left_looks_to_the_picture_s_right(renderer, face):
 @pytest.mark.parametrize(
     "camera", ["three-quarter", pytest.param("profile", marks=pytest.mark.slow), "close"]
 )
-def test_every_camera_shows_the_head(camera):
+def test_face_is_shown_by_every_camera(camera):
     with Renderer("default", (128, 128), camera) as renderer:
         (picture,) = renderer.draw(row())
     warm = picture[..., 0].astype(int) - picture[..., 2] > 35

@@ -61,18 +61,18 @@ directions = st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: np.linalg.norm(
     occlusion=st.floats(0, 1),
     gloss=st.sampled_from([0.0, 0.2, 0.7, 1.0]),
 )
-def test_one_matrix_product_is_the_published_formula(normal, colour, occlusion, gloss):
+def test_shader_equals_the_published_formula(normal, colour, occlusion, gloss):
     assert shade(normal, colour, occlusion, gloss) == pytest.approx(
         formula(normal, colour, occlusion, gloss), abs=1.5 / 255
     )
 
 
-def test_the_side_towards_the_key_is_brighter():
+def test_shader_brightens_the_side_towards_the_key():
     key = preset().key.direction
     assert (shade(key) > shade((-key[0], key[1], key[2]))).all()
 
 
-def test_the_shaded_side_keeps_colour():
+def test_shader_keeps_colour_on_the_shaded_side():
     """Not a grey zombie: away from the key, skin is still warm and well above black."""
     red, green, blue = shade((0.9, -0.2, 0.4))
     assert red > green > blue
@@ -81,38 +81,38 @@ def test_the_shaded_side_keeps_colour():
 
 @pytest.mark.parametrize("light", list(presets()))
 @pytest.mark.parametrize("colour", [(206, 158, 132), (240, 205, 185), (90, 58, 42)])
-def test_no_skin_is_burnt_out(colour, light):
+def test_shader_burns_out_no_skin(colour, light):
     around = [(x, y, 1.0) for x in np.linspace(-1, 1, 9) for y in np.linspace(-1, 1, 9)]
     brightest = np.max([shade(n, colour, light=light) for n in around], axis=0)
     assert brightest[0] < 0.985
     assert brightest[2] < brightest[0] - 0.02
 
 
-def test_a_glossy_eye_has_a_highlight_and_dull_skin_has_none():
+def test_shader_highlights_glossy_eyes_and_no_dull_skin():
     half = unit(unit(preset().key.direction) + FRONT)
     aside = unit(half + np.array([0.5, 0, 0], np.float32))
     assert shade(half, (40, 30, 25), gloss=1.0).min() > shade(aside, (40, 30, 25), gloss=1.0).max() + 0.4
     assert shade(half, (40, 30, 25)).max() - shade(aside, (40, 30, 25)).min() < 0.2
 
 
-def test_a_hidden_corner_is_darker():
+def test_shader_darkens_hidden_corners():
     assert (shade(FRONT, occlusion=0.2) < shade(FRONT, occlusion=1.0) - 0.1).all()
 
 
-def test_the_page_gets_every_coefficient_as_plain_numbers():
+def test_light_to_json_has_every_coefficient():
     table = json.loads(json.dumps(preset().to_json()))
     assert set(table) == set(preset().__dataclass_fields__)
     for lamp in ("key", "fill", "rim"):
         assert np.linalg.norm(table[lamp]["direction"]) == pytest.approx(1, abs=1e-5)
 
 
-def test_there_are_three_lights_and_another_name_lists_them():
+def test_preset_lists_the_three_lights_for_another_name():
     assert list(presets()) == ["portrait", "daylight", "evening"]
     with pytest.raises(RenderError, match="wanted one of portrait, daylight, evening, got 'noon'"):
         preset("noon")
 
 
-def test_daylight_is_even_and_evening_is_not():
+def test_presets_daylight_is_even_and_evening_is_not():
     """Cheek to cheek: what the key's side has over the other."""
     contrast = {
         name: shade((-0.7, 0, 0.7), light=name).mean() / shade((0.7, 0, 0.7), light=name).mean()
@@ -121,7 +121,7 @@ def test_daylight_is_even_and_evening_is_not():
     assert 0.97 < contrast["daylight"] < contrast["portrait"] < contrast["evening"]
 
 
-def test_a_variable_names_the_light_of_who_names_none(monkeypatch):
+def test_preset_reads_the_variable(monkeypatch):
     monkeypatch.setenv("REALIZER_LIGHT", "evening")
     assert preset() == preset("evening") != preset("portrait")
     monkeypatch.delenv("REALIZER_LIGHT")

@@ -30,7 +30,7 @@ def skin(picture):
     return picture[..., 0].astype(int) > picture[..., 2].astype(int) + 15
 
 
-def test_the_silhouette_is_the_projected_egg(canvas, balls):
+def test_opengl_canvas_draws_the_projected_silhouette(canvas, balls):
     face, normals = balls
     picture = canvas.draw(face.vertices, normals)
     assert picture.shape == (240, 320, 3)
@@ -42,14 +42,14 @@ def test_the_silhouette_is_the_projected_egg(canvas, balls):
     assert columns.max() == pytest.approx(outline[:, 0].max(), abs=2)
 
 
-def test_the_eyes_are_white_and_stand_where_they_project(canvas, balls):
+def test_opengl_canvas_draws_the_eyes_where_they_project(canvas, balls):
     face, normals = balls
     picture = canvas.draw(face.vertices, normals)
     for x, y in camera_for(face).project([[0.032, 0, 0], [-0.032, 0, 0]], SIZE).round().astype(int):
         assert picture[y, x].min() > 170
 
 
-def test_new_vertices_move_the_picture_and_old_ones_bring_it_back(canvas, balls):
+def test_opengl_canvas_follows_the_vertices(canvas, balls):
     face, normals = balls
     still = canvas.draw(face.vertices, normals)
     moved = canvas.draw(face.vertices + np.float32([0.02, 0, 0]), normals)
@@ -59,7 +59,7 @@ def test_new_vertices_move_the_picture_and_old_ones_bring_it_back(canvas, balls)
     assert np.array_equal(canvas.draw(face.vertices, normals), still)
 
 
-def test_the_key_stands_at_the_picture_s_upper_left(canvas, balls):
+def test_opengl_canvas_is_lit_from_the_upper_left(canvas, balls):
     face, normals = balls
     picture = canvas.draw(face.vertices, normals).astype(float).sum(2)
     where = skin(canvas.draw(face.vertices, normals))
@@ -71,7 +71,7 @@ def test_the_key_stands_at_the_picture_s_upper_left(canvas, balls):
     assert brightness[left & upper].mean() > brightness[left & ~upper].mean() + 20
 
 
-def test_edges_are_smooth(canvas, balls):
+def test_opengl_canvas_smooths_edges(canvas, balls):
     """MSAA x4: along the outline there are tones between skin and backdrop."""
     face, normals = balls
     picture = canvas.draw(face.vertices, normals)
@@ -82,7 +82,7 @@ def test_edges_are_smooth(canvas, balls):
     assert not np.array_equal(between, picture)
 
 
-def test_the_backdrop_is_a_soft_neutral_gradient(canvas, balls):
+def test_opengl_canvas_has_a_soft_neutral_backdrop(canvas, balls):
     face, normals = balls
     picture = canvas.draw(face.vertices, normals).astype(int)
     corner, beside = picture[2, 2], picture[90, 40]
@@ -91,7 +91,7 @@ def test_the_backdrop_is_a_soft_neutral_gradient(canvas, balls):
     assert np.abs(np.diff(picture[:, 3].sum(1))).max() < 30
 
 
-def test_odd_sizes_are_not_sheared(balls):
+def test_opengl_canvas_does_not_shear_odd_sizes(balls):
     """Rows of 3 x 101 bytes are no multiple of four, GL's default row alignment."""
     face, normals = balls
     canvas = OpenGLCanvas(face, (101, 77), camera_for(face), preset())
@@ -101,7 +101,7 @@ def test_odd_sizes_are_not_sheared(balls):
     assert columns.mean() == pytest.approx(50, abs=1)
 
 
-def test_draw_fills_the_given_memory(canvas, balls):
+def test_opengl_canvas_draws_into_the_given_memory(canvas, balls):
     face, normals = balls
     out = np.zeros((240, 320, 3), np.uint8)
     assert canvas.draw(face.vertices, normals, out) is out

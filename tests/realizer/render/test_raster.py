@@ -26,29 +26,29 @@ def draw(corners, colours, nearness=1.0, size=SIZE, smooth=True):
 BIG = [(5.0, 5.0), (5.0, 35.0), (55.0, 20.0)]  # counter-clockwise, seen with y up
 
 
-def test_a_triangle_covers_its_area():
+def test_raster_covers_the_area_of_a_triangle():
     picture = draw([BIG], RED)
     assert picture[..., 3].sum() / 255 == pytest.approx(50 * 30 / 2, rel=0.01)
     assert picture[20, 20].tolist() == [255, 0, 0, 255]
     assert picture[2, 2].tolist() == [0, 0, 0, 0]
 
 
-def test_seen_from_behind_it_is_not_there():
+def test_raster_leaves_out_triangles_seen_from_behind():
     assert not draw([BIG[::-1]], RED).any()
 
 
-def test_edges_are_smooth_where_asked():
+def test_raster_smooths_edges_on_demand():
     assert set(np.unique(draw([BIG], RED, smooth=False)[..., 3])) == {0, 255}
     assert len(np.unique(draw([BIG], RED)[..., 3])) == 5
 
 
-def test_the_nearer_one_hides_the_farther_in_either_order():
+def test_raster_hides_the_farther_in_either_order():
     pair = [BIG, BIG]
     for near, colours in (((1.0, 2.0), (BLUE, RED)), ((2.0, 1.0), (RED, BLUE))):
         assert draw(pair, colours, near)[20, 20].tolist() == [255, 0, 0, 255]
 
 
-def test_triangles_that_share_an_edge_leave_no_gap_and_no_seam():
+def test_raster_leaves_no_gap_at_a_shared_edge():
     """A fan of thin triangles about one point: every sample inside belongs to one of them."""
     turn = np.linspace(0, 2 * np.pi, 48)
     rim = np.stack([30.3 + 18.1 * np.cos(turn), 20.7 - 18.1 * np.sin(turn)], axis=1)
@@ -59,7 +59,7 @@ def test_triangles_that_share_an_edge_leave_no_gap_and_no_seam():
     assert (picture[inside] == (255, 0, 0, 255)).all()
 
 
-def test_colours_run_evenly_from_corner_to_corner():
+def test_raster_interpolates_colours():
     raster = Raster((101, 50))
     points = np.array([[0.0, -60.0], [0.0, 110.0], [101.0, 25.0]])
     tones = np.array([[0, 0, 0], [0, 0, 0], [1, 1, 1]], np.float32)
@@ -67,18 +67,18 @@ def test_colours_run_evenly_from_corner_to_corner():
     assert picture[25, :95, 1].astype(int) == pytest.approx(255 * (np.arange(95) + 0.5) / 101, abs=1.5)
 
 
-def test_what_reaches_over_the_picture_is_cut_at_its_edges():
+def test_raster_cuts_triangles_at_the_picture_s_edges():
     huge = [(-500.0, -400.0), (-500.0, 900.0), (900.0, 20.0)]
     assert (draw([huge], BLUE) == (0, 0, 255, 255)).all()
     assert not draw([[(100.0, 5.0), (100.0, 35.0), (150.0, 20.0)]], BLUE).any()
 
 
-def test_what_is_no_number_is_left_out_and_the_rest_is_drawn():
+def test_raster_leaves_out_what_is_not_a_number():
     broken = [(5.0, np.nan), (5.0, 35.0), (55.0, 20.0)]
     assert np.array_equal(draw([broken, BIG], RED), draw([BIG], RED))
 
 
-def test_a_picture_says_nothing_of_the_one_before():
+def test_raster_forgets_the_picture_before():
     raster = Raster(SIZE)
     points, near = np.array(BIG), np.ones(3, np.float32)
     triangles = np.array([[0, 1, 2]], np.int32)
@@ -87,7 +87,7 @@ def test_a_picture_says_nothing_of_the_one_before():
     assert np.array_equal(raster(points, near, triangles, np.ones((3, 3), np.float32)), first)
 
 
-def test_a_picture_over_a_backdrop_is_what_numpy_makes_of_it():
+def test_raster_over_equals_backdrop_over():
     from realizer.render.backdrop import over
 
     raster = Raster(SIZE)
@@ -99,6 +99,6 @@ def test_a_picture_over_a_backdrop_is_what_numpy_makes_of_it():
     assert np.array_equal(raster.over(behind, np.empty((40, 60, 3), np.uint8)), wanted)
 
 
-def test_what_is_behind_the_lens_is_not_drawn_before_all_others():
+def test_raster_leaves_out_what_is_behind_the_lens():
     picture = draw([BIG, BIG], (RED, BLUE), (np.nan, 1.0))
     assert picture[20, 20].tolist() == [0, 0, 255, 255]

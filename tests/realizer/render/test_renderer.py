@@ -37,7 +37,7 @@ def renderer() -> Iterator[Renderer]:
 
 
 @pytest.mark.gl
-def test_a_long_call_gives_every_picture_in_order(renderer):
+def test_renderer_draws_many_pictures_in_order(renderer):
     """More rows than the shared memory holds: each slot is drawn several times."""
     pictures = renderer.draw(rows(41))
     assert pictures.shape == (41, 80, 96, 3)
@@ -48,12 +48,12 @@ def test_a_long_call_gives_every_picture_in_order(renderer):
 
 
 @pytest.mark.gl
-def test_no_rows_give_no_pictures(renderer):
+def test_renderer_draws_nothing_for_no_rows(renderer):
     assert renderer.draw(np.zeros((0, 68), np.float32)).shape == (0, 80, 96, 3)
 
 
 @pytest.mark.gl
-def test_jpeg_is_the_same_picture(renderer):
+def test_renderer_encodes_the_same_picture_as_jpeg(renderer):
     (picture,) = renderer.draw(rows(1))
     encoded = np.asarray(Image.open(io.BytesIO(renderer.encoded(rows(1)[0], quality=95))))
     assert encoded.shape == (80, 96, 3)
@@ -63,7 +63,7 @@ def test_jpeg_is_the_same_picture(renderer):
 
 @pytest.mark.gl
 @pytest.mark.parametrize("left_after", [1, 8, 9, 30])
-def test_pictures_that_nobody_takes_do_not_mix_with_the_next_call(renderer, left_after):
+def test_renderer_drops_pictures_that_nobody_takes(renderer, left_after):
     pictures = renderer.frames(rows(41))
     for _ in range(left_after):
         next(pictures)
@@ -75,7 +75,7 @@ def test_pictures_that_nobody_takes_do_not_mix_with_the_next_call(renderer, left
 
 @pytest.mark.gl
 @pytest.mark.parametrize("call", ["draw", pytest.param("jpeg", marks=pytest.mark.slow)])
-def test_a_killed_process_is_an_error_once_and_replaced_at_the_next_call(call):
+def test_renderer_replaces_a_killed_process_after_one_error(call):
     with Renderer("default", SIZE) as renderer:
         first = renderer.draw(rows(1))
         killed = renderer.pid
@@ -87,7 +87,7 @@ def test_a_killed_process_is_an_error_once_and_replaced_at_the_next_call(call):
 
 
 @pytest.mark.gl
-def test_calls_from_two_threads_do_not_mix(renderer):
+def test_renderer_serves_two_threads_one_after_the_other(renderer):
     wanted = renderer.draw(rows(6))
     got: dict[int, np.ndarray] = {}
 
@@ -105,7 +105,7 @@ def test_calls_from_two_threads_do_not_mix(renderer):
 
 
 @pytest.mark.gl
-def test_close_ends_the_process_and_leaves_no_memory_behind():
+def test_renderer_close_ends_the_process_and_frees_its_memory():
     shared = Path("/dev/shm")
     renderer = Renderer("default", SIZE)
     assert renderer.pid is None
@@ -119,7 +119,7 @@ def test_close_ends_the_process_and_leaves_no_memory_behind():
 
 
 @pytest.mark.gl
-def test_a_process_that_was_started_before_is_the_one_that_draws(renderer):
+def test_renderer_draws_with_the_process_that_start_made(renderer):
     with Renderer("default", SIZE) as early:
         early.start()
         started = early.pid
@@ -128,7 +128,7 @@ def test_a_process_that_was_started_before_is_the_one_that_draws(renderer):
         assert early.pid == started
 
 
-def test_a_process_that_was_started_for_nothing_leaves_nothing_behind():
+def test_renderer_start_without_a_picture_leaves_nothing():
     with Renderer("default", (97, 83)) as renderer:
         renderer.start()
         pid = renderer.pid
@@ -139,7 +139,7 @@ def test_a_process_that_was_started_for_nothing_leaves_nothing_behind():
 
 
 @pytest.mark.gl
-def test_the_process_dies_with_its_owner():
+def test_renderer_process_dies_with_its_owner():
     """The owner is killed, so it can tidy nothing; its drawing process sees the pipe close."""
     code = (
         "import sys, numpy as np\n"
@@ -176,27 +176,27 @@ def test_the_process_dies_with_its_owner():
     ("face", "camera", "says"),
     [("default", "top", "camera: wanted one of front"), ("nobody", "front", "nobody")],
 )
-def test_what_cannot_be_drawn_says_why(face, camera, says):
+def test_renderer_explains_what_cannot_be_drawn(face, camera, says):
     with Renderer(face, SIZE, camera) as renderer, pytest.raises(RealizerError, match=says):
         renderer.draw(rows(1))
 
 
 @pytest.mark.parametrize("shape", [(68,), (2, 67), (1, 2, 68)])
-def test_rows_of_another_shape_are_refused_before_anything_starts(shape):
+def test_renderer_refuses_wrong_rows_before_it_starts(shape):
     renderer = Renderer("default", SIZE)
     with pytest.raises(ValueError, match=r"poses: wanted \(n, 68\), got"):
         renderer.draw(np.zeros(shape, np.float32))
     assert renderer.pid is None
 
 
-def test_a_size_of_nothing_is_refused():
+def test_renderer_refuses_an_empty_size():
     with pytest.raises(ValueError, match=r"size: wanted 1\.\.8192 pixels each way, got 0x10"):
         Renderer("default", (0, 10))
 
 
 @pytest.mark.gl
 @pytest.mark.parametrize("form", ["jpeg", "png", "webp"])
-def test_a_picture_is_written_in_every_form(renderer, form):
+def test_renderer_encodes_every_form(renderer, form):
     (picture,) = renderer.draw(rows(1))
     written = Image.open(io.BytesIO(renderer.encoded(rows(1)[0], form, 95)))
     assert written.format == form.upper()
@@ -205,7 +205,7 @@ def test_a_picture_is_written_in_every_form(renderer, form):
 
 @pytest.mark.gl
 @pytest.mark.parametrize("way", ["gl", "onboard"])
-def test_a_transparent_picture_is_the_opaque_one_without_its_backdrop(way):
+def test_renderer_draws_transparent_pictures(way):
     if missing := available(way):
         pytest.skip(missing)
     with Renderer("default", SIZE, background="#000000", backend=way) as renderer:
@@ -221,7 +221,7 @@ def test_a_transparent_picture_is_the_opaque_one_without_its_backdrop(way):
 
 
 @pytest.mark.gl
-def test_another_light_is_another_picture(renderer):
+def test_renderer_draws_another_light(renderer):
     with Renderer("default", SIZE, light="evening") as evening:
         assert evening.draw(rows(1)).mean() < renderer.draw(rows(1)).mean() - 15
     with Renderer("default", SIZE, light="noon") as noon, pytest.raises(RenderError, match="light: wanted"):

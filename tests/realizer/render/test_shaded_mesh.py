@@ -9,7 +9,7 @@ from realizer.render.light import Shader, preset
 from realizer.render.shaded_mesh import ShadedMesh
 
 
-def test_the_head_is_lit_and_stands_where_it_is_told(balls):
+def test_shaded_mesh_has_the_lit_head_at_its_vertices(balls):
     face, ups = balls
     camera = camera_for(face)
     figure = ShadedMesh(face, camera, preset())
@@ -21,7 +21,7 @@ def test_the_head_is_lit_and_stands_where_it_is_told(balls):
     assert figure.triangles.max() < len(figure.points) == len(figure.colours)
 
 
-def test_glints_ride_on_the_eyes(balls):
+def test_shaded_mesh_moves_glints_with_the_eyes(balls):
     face, ups = balls
     figure = ShadedMesh(face, camera_for(face), preset())
     before = figure.points[len(face.vertices) :].copy()

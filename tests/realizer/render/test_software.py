@@ -34,7 +34,7 @@ def pose(face, **faps):
 @pytest.mark.gl("gl")
 @pytest.mark.parametrize("camera", ["front", "three-quarter", "profile", "close"])
 @pytest.mark.parametrize("light", ["portrait", "evening"])
-def test_both_ways_draw_the_same_picture(face, camera, light):
+def test_software_canvas_draws_the_picture_of_opengl(face, camera, light):
     from realizer.render.opengl import OpenGLCanvas
 
     eye, lamp = camera_for(face, camera), preset(light)
@@ -54,7 +54,7 @@ def test_both_ways_draw_the_same_picture(face, camera, light):
         card.close()
 
 
-def test_the_chin_and_the_pupils_stand_where_the_camera_projects_them(face):
+def test_software_canvas_draws_points_where_they_project(face):
     camera = camera_for(face)
     picture = SoftwareCanvas(face, SIZE, camera, preset()).draw(*pose(face)).astype(int)
     for point in ("3.5", "3.6"):
@@ -65,13 +65,13 @@ def test_the_chin_and_the_pupils_stand_where_the_camera_projects_them(face):
     assert red > blue + 30
 
 
-def test_one_sample_a_pixel_is_the_same_picture_with_rough_edges(face):
+def test_software_canvas_without_smoothing_has_rough_edges(face):
     fine = SoftwareCanvas(face, SIZE, camera_for(face), preset()).draw(*pose(face)).astype(int)
     plain = SoftwareCanvas(face, SIZE, camera_for(face), preset(), smooth=False).draw(*pose(face)).astype(int)
     assert 0.05 < np.abs(fine - plain).mean() < 2.5
 
 
-def test_draw_fills_the_given_memory(face):
+def test_software_canvas_draws_into_the_given_memory(face):
     canvas = SoftwareCanvas(face, (64, 48), camera_for(face), preset())
     out = np.zeros((48, 64, 3), np.uint8)
     assert canvas.draw(*pose(face), out) is out
@@ -79,7 +79,7 @@ def test_draw_fills_the_given_memory(face):
     canvas.close()
 
 
-def test_vertices_behind_the_lens_are_left_out(face):
+def test_software_canvas_leaves_out_vertices_behind_the_lens(face):
     vertices, ups = pose(face)
     behind = vertices + np.float32([0, 0, 9])
     picture = SoftwareCanvas(face, (64, 48), camera_for(face), preset()).draw(behind, ups)

@@ -31,26 +31,26 @@ def check(tmp_path: Path, site: str, way: str = "auto", **env: str) -> subproces
     )
 
 
-def test_with_neither_way_the_sentence_names_the_extra(tmp_path):
+def test_worker_names_the_extra_without_any_backend(tmp_path):
     done = check(tmp_path, "import sys; sys.modules['pyrender'] = sys.modules['numba'] = None")
     assert done.returncode == 3
     assert "pip install 'bml-realizer[render]'" in done.stdout
 
 
 @pytest.mark.gl("gl")
-def test_without_numba_opengl_draws(tmp_path):
+def test_worker_draws_by_opengl_without_numba(tmp_path):
     done = check(tmp_path, "import sys; sys.modules['numba'] = None")
     assert (done.returncode, done.stdout.strip()) == (0, "gl"), done.stderr
 
 
 @pytest.mark.gl("onboard")
-def test_without_pyrender_the_processor_draws(tmp_path):
+def test_worker_draws_by_the_processor_without_pyrender(tmp_path):
     done = check(tmp_path, "import sys; sys.modules['pyrender'] = None")
     assert (done.returncode, done.stdout.strip()) == (0, "onboard"), done.stderr
 
 
 @pytest.mark.gl("onboard")
-def test_where_no_folder_can_be_written_the_loops_are_compiled_all_the_same(tmp_path):
+def test_worker_compiles_the_loops_without_a_writable_folder(tmp_path):
     """Numba keeps machine code beside the source or in the user's cache, and refuses where neither is."""
     site = "import numba.core.caching as c\nc.CacheImpl._locator_classes = []\n"
     done = check(tmp_path, site, "onboard")
@@ -58,7 +58,7 @@ def test_where_no_folder_can_be_written_the_loops_are_compiled_all_the_same(tmp_
 
 
 @pytest.mark.gl("gl")
-def test_without_gl_the_sentence_names_the_packages(tmp_path):
+def test_worker_names_the_packages_without_gl(tmp_path):
     """A machine whose loader finds no libEGL and no libGL."""
     hide = (
         "import ctypes, ctypes.util\n"
@@ -77,7 +77,7 @@ def test_without_gl_the_sentence_names_the_packages(tmp_path):
 
 
 @pytest.mark.gl
-def test_jpeg_without_simplejpeg_is_written_by_pillow(tmp_path):
+def test_encode_writes_jpeg_by_pillow_without_simplejpeg(tmp_path):
     code = (
         "import sys; sys.modules['simplejpeg'] = None\n"
         "import numpy as np\n"
@@ -89,6 +89,6 @@ def test_jpeg_without_simplejpeg_is_written_by_pillow(tmp_path):
     assert np.asarray(Image.open(io.BytesIO(done.stdout))).shape == (20, 30, 3)
 
 
-def test_a_picture_is_not_drawn_before_a_face_is_opened() -> None:
+def test_answer_refuses_pictures_before_open() -> None:
     with pytest.raises(RealizerError, match="wanted Open first, got Draw"):
         answer(None, Draw(np.zeros((1, 68), np.float32), 0))

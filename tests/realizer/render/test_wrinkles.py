@@ -57,18 +57,18 @@ def seen(points, tone, low, high, side=None):
 
 
 @pytest.mark.parametrize("values", [{}, SPEECH, BLINK, {49: 9000}, {23: 5000}])
-def test_a_face_at_rest_that_speaks_blinks_or_turns_is_smooth(face, wrinkles, values):
+def test_wrinkles_are_none_at_rest_speech_blink_and_turn(face, wrinkles, values):
     _, tone = darker(face, wrinkles, values)
     assert np.abs(tone).max() < 0.06
 
 
-def test_raised_brows_furrow_the_forehead_and_nothing_else(face, wrinkles):
+def test_wrinkles_of_raised_brows_are_on_the_forehead(face, wrinkles):
     points, tone = darker(face, wrinkles, RAISED)
     assert seen(points, tone, 0.025, 0.09) > 0.12
     assert seen(points, tone, -0.2, 0.01) < 0.02
 
 
-def test_a_frown_furrows_between_the_brows(face, wrinkles):
+def test_wrinkles_of_a_frown_are_between_the_brows(face, wrinkles):
     points, tone = darker(face, wrinkles, FROWN)
     strong = points[tone > 0.1]
     assert len(strong)
@@ -76,7 +76,7 @@ def test_a_frown_furrows_between_the_brows(face, wrinkles):
     assert strong[:, 1].min() > -0.01
 
 
-def test_lifted_cheeks_fold_beside_the_nose_and_one_folds_its_own_side(face, wrinkles):
+def test_wrinkles_of_lifted_cheeks_are_beside_the_nose(face, wrinkles):
     both, one = darker(face, wrinkles, CHEEKS), darker(face, wrinkles, LEFT_CHEEK)
     for side in (1, -1):
         assert seen(*both, -0.08, -0.02, side) > 0.08
@@ -84,7 +84,7 @@ def test_lifted_cheeks_fold_beside_the_nose_and_one_folds_its_own_side(face, wri
     assert seen(*one, -0.08, -0.02, -1) < 0.02
 
 
-def test_more_is_deeper(face, wrinkles):
+def test_wrinkles_deepen_with_the_movement(face, wrinkles):
     tones = [
         darker(face, wrinkles, {fap: part * value for fap, value in RAISED.items()})[1].max()
         for part in (0, 0.4, 0.7, 1)
@@ -93,7 +93,7 @@ def test_more_is_deeper(face, wrinkles):
     assert tones[0] == 0 < tones[1]
 
 
-def test_strips_lie_on_the_skin_and_end_in_its_colour(face, wrinkles):
+def test_wrinkles_lie_on_the_skin_and_end_in_its_colour(face, wrinkles):
     vertices, ups = pose(face, RAISED)
     points, _ = darker(face, wrinkles, RAISED)
     first, last = face.parts["skin"]
@@ -107,7 +107,7 @@ def test_strips_lie_on_the_skin_and_end_in_its_colour(face, wrinkles):
     assert np.abs(tone.reshape(-1, 7)[:, [0, -1]]).max() < 1e-6
 
 
-def test_strips_are_seen_from_outside(face, wrinkles):
+def test_wrinkles_face_outwards(face, wrinkles):
     vertices, ups = pose(face, {**RAISED, **FROWN, **CHEEKS})
     points, _ = wrinkles(vertices, ups, np.full((len(vertices), 3), 0.5, np.float32))
     a, b, c = (points[wrinkles.triangles[:, k]] for k in range(3))
@@ -115,20 +115,20 @@ def test_strips_are_seen_from_outside(face, wrinkles):
     assert (outward > 0).mean() > 0.97
 
 
-def test_a_face_without_the_feature_points_has_no_furrows(balls):
+def test_wrinkles_need_feature_points(balls):
     face, ups = balls
     bare = Wrinkles(face)
     points, colours = bare(face.vertices, ups, np.ones_like(face.vertices))
     assert bare.count == len(points) == len(colours) == len(bare.triangles) == 0
 
 
-def test_a_mesh_too_coarse_to_move_like_skin_stays_smooth(face):
+def test_wrinkles_are_left_out_on_a_coarse_mesh(face):
     """The same head seen as if its eyes stood close together: its triangles are long beside its furrows."""
     small = dataclasses.replace(face, fapu=dataclasses.replace(face.fapu, es0=face.fapu.es0 / 6))
     assert Wrinkles(small).count < Wrinkles(face).count / 4
 
 
-def test_furrows_as_numbers_make_the_same_points_and_tones(face, wrinkles):
+def test_wrinkles_to_json_make_the_same_points_and_tones(face, wrinkles):
     """As a page does it."""
     table = json.loads(json.dumps(wrinkles.to_json()))
     vertices, ups = pose(face, {**RAISED, **FROWN})
@@ -149,7 +149,7 @@ def test_furrows_as_numbers_make_the_same_points_and_tones(face, wrinkles):
     assert shown == pytest.approx(colours, abs=1e-3)
 
 
-def test_a_furrows_curve_is_the_monotone_cubic_through_its_knots():
+def test_wrinkles_follow_the_monotone_cubic_through_knots():
     from scipy.interpolate import PchipInterpolator
 
     from realizer.render.wrinkles import _through
