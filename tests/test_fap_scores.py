@@ -1,4 +1,4 @@
-"""The measure of a face's displacements finds what is wrong, and says how much."""
+"""Tests of the scores of FAPs, which find what is wrong with a face and how much."""
 
 import dataclasses
 from functools import cache

@@ -1,4 +1,4 @@
-"""Links: lines that end at the points they tie, and the room that orders leave."""
+"""Tests of the arrows of a chart."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is read off blocks that play: points, gaps, words, and what was dropped."""
+"""Tests of the chart data of blocks that play."""
 
 from __future__ import annotations
 

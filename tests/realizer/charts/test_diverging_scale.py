@@ -1,4 +1,4 @@
-"""The colours of gaps: told apart by everybody, and text on them can be read."""
+"""Tests of the colours of gaps."""
 
 from __future__ import annotations
 

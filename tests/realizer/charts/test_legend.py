@@ -1,4 +1,4 @@
-"""The legend explains what is in the picture, and nothing else."""
+"""Tests of the legend."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What ties sync points, and how much room before and after leave."""
+"""Tests of links between sync points."""
 
 from __future__ import annotations
 

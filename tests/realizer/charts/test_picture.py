@@ -1,4 +1,4 @@
-"""The picture as a whole: everything of the blocks is in it, inside its edges, and can be read."""
+"""Tests of the whole chart."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""PNG: the same shapes, drawn."""
+"""Tests of charts as PNG."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rows: numbers in gaps, names under ticks, reasons beside what was dropped."""
+"""Tests of the rows of a chart."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Time from left to right: round times on the axis, apart from each other."""
+"""Tests of the time axis."""
 
 from __future__ import annotations
 

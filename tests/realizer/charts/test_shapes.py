@@ -1,4 +1,4 @@
-"""Text is measured and cut to its room; hatching stays inside."""
+"""Tests of measuring and cutting text, and hatching."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""SVG: well-formed whatever the text, with the shapes in their order and text above all."""
+"""Tests of charts as SVG."""
 
 from __future__ import annotations
 

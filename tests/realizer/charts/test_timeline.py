@@ -1,4 +1,4 @@
-"""The values of a timeline, and their JSON."""
+"""Tests of the values of a chart and their JSON."""
 
 from __future__ import annotations
 

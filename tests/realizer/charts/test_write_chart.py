@@ -1,4 +1,4 @@
-"""A picture goes where it is wanted, as its suffix says."""
+"""Tests of writing charts to files."""
 
 from __future__ import annotations
 

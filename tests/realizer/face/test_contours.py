@@ -1,4 +1,4 @@
-"""A lip's two contours go together: one drags the other, and what is asked for alone is reached."""
+"""Tests of the coupling of the two contours of the lips."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What MPEG-4 says of each FAP, on every face folder."""
+"""Tests of the deformer, by the standard's definition of each FAP on every face."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The mapping in force: the table, then the face's own file, then the user's."""
+"""Tests of the mapping that applies to a face: the table, the face's file, the user's file."""
 
 from __future__ import annotations
 

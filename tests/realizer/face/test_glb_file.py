@@ -1,4 +1,4 @@
-"""GLB files: what goes in is what a reader finds."""
+"""Tests of the GLB writer."""
 
 from __future__ import annotations
 

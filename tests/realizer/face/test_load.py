@@ -1,4 +1,4 @@
-"""Face folders: sound ones load, broken ones say which file and what to change."""
+"""Tests of the loader of face folders."""
 
 import shutil
 from itertools import pairwise

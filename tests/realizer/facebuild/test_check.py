@@ -1,4 +1,4 @@
-"""A broken face folder: each fault names its file and what to change, and one does not hide another."""
+"""Tests of the check of a face folder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Surfaces lose vertices that nobody misses, and keep their shape, their rims and their two sides alike."""
+"""Tests of the decimation of meshes."""
 
 import numpy as np
 import pytest

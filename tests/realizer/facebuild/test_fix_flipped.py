@@ -1,4 +1,4 @@
-"""Fields that turn triangles over are stiffened until none does; feature points keep their moves."""
+"""Tests of the removal of triangle flips."""
 
 from typing import Any
 

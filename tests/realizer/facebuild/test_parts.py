@@ -1,4 +1,4 @@
-"""What an open mouth shows: teeth from both sides, a tongue, and a lining that is red, not black."""
+"""Tests of generated eyes, teeth and tongue, also as an open mouth shows them."""
 
 import numpy as np
 import pytest

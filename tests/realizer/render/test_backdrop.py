@@ -1,4 +1,4 @@
-"""The gradient behind the head, and pixels laid over it."""
+"""Tests of the backdrop and compositing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which way is taken: by what the machine has."""
+"""Tests of the selection of a backend."""
 
 from __future__ import annotations
 

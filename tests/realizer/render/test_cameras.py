@@ -1,4 +1,4 @@
-"""Cameras by where they put hairline and chin."""
+"""Tests of cameras."""
 
 from __future__ import annotations
 

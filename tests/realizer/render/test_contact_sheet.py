@@ -1,4 +1,4 @@
-"""Contact sheets: every picture is there, captions below."""
+"""Tests of contact sheets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Difference images: what changed shows, what did not is the neutral face, faint."""
+"""Tests of difference images."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What drawing is like on this machine, asked of a new process."""
+"""Tests of the check of what this machine can draw with."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The lights on the eyes: where they stand, and what a page is told of them."""
+"""Tests of the highlights on the eyes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures of the default face, by landmarks."""
+"""Tests of pictures of the default face, by landmarks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Light by its laws: brighter towards the key, nothing burnt, and a table a page can be handed."""
+"""Tests of lights and the shader."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures of a head of balls, by silhouette; the GL context lives in this process here."""
+"""Tests of the OpenGL backend, whose context lives in this process here."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Triangles by their area, their order and their edges."""
+"""Tests of the triangle rasterizer."""
 
 from __future__ import annotations
 

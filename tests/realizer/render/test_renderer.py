@@ -1,4 +1,4 @@
-"""The drawing process: what it draws, and what happens when it dies."""
+"""Tests of the renderer and its drawing process."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is drawn of a head, whoever draws it."""
+"""Tests of the shaded mesh of a frame."""
 
 from __future__ import annotations
 

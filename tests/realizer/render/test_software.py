@@ -1,4 +1,4 @@
-"""Pictures without OpenGL: as OpenGL draws them, but for the samples along edges."""
+"""Tests of the software backend."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Places on a ball: found where they are, or not at all."""
+"""Tests of locating points on the skin."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Furrows: where the skin is pushed together, nowhere else, on the skin, alike on both sides."""
+"""Tests of wrinkles."""
 
 from __future__ import annotations
 

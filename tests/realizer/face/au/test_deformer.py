@@ -1,4 +1,4 @@
-"""A face drawn by its action unit model: the same as the mixers, with FAPs, gaze and speech on top."""
+"""Tests of the deformer by action units, together with FAPs, gaze and speech."""
 
 import shutil
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Density and direction functions: their laws, and derivatives that are theirs."""
+"""Tests of density and direction functions and their derivatives."""
 
 import numpy as np
 import pytest

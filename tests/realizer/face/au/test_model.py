@@ -1,4 +1,4 @@
-"""The models that ship with faces: how near they come, on which meshes, and as text."""
+"""Tests of the models of action units that faces ship with."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The two halves of a face: told apart by its topology, and by a plane."""
+"""Tests of the division of a face at the mouth."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Documents in, faces out, by both deformers: each shows the same, each its own way."""
+"""Tests of documents played by both deformers."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def faces() -> dict[str, Face]:
     ],
     ids=["smile", "smile-left", "frown", "open", "stretch", "brows-up", "brows-down", "closed", "wide"],
 )
-def test_both_take_a_landmark_the_same_way(
+def test_deformers_move_a_landmark_the_same_way(
     faces: dict[str, Face], inner: str, points: tuple[str, ...]
 ) -> None:
     moved = {}
@@ -80,7 +80,7 @@ def test_both_take_a_landmark_the_same_way(
 
 
 @pytest.mark.parametrize("extra", ["", lexeme("SMILE"), lexeme("OPEN_MOUTH")], ids=["", "smile", "open"])
-def test_a_face_of_units_speaks_as_one_of_faps(faces: dict[str, Face], extra: str) -> None:
+def test_deformers_speak_alike(faces: dict[str, Face], extra: str) -> None:
     gaps = {}
     for name, face in faces.items():
         played = play(SPEECH + extra.replace('end="1.4"', 'end="9"').replace('relax="1"', 'relax="8"'), name)
@@ -101,7 +101,7 @@ def test_a_face_of_units_speaks_as_one_of_faps(faces: dict[str, Face], extra: st
     ],
     ids=["gaze", "nod", "eyes"],
 )
-def test_gaze_and_head_turn_by_both_to_the_last_bit(faces: dict[str, Face], inner: str) -> None:
+def test_deformers_turn_gaze_and_head_equally(faces: dict[str, Face], inner: str) -> None:
     made = [
         deform(face, play(inner, name, scene={"cup": (0.4, -0.1, 0.6)}).poses) for name, face in faces.items()
     ]
@@ -109,7 +109,7 @@ def test_gaze_and_head_turn_by_both_to_the_last_bit(faces: dict[str, Face], inne
     assert np.abs(made[0] - made[0][0]).max() > 0.002
 
 
-def test_fap_streams_and_files_do_not_know_who_draws() -> None:
+def test_deformers_do_not_change_fap_streams_and_files() -> None:
     one, other = (play(lexeme("SMILE") + SPEECH, name) for name in BOTH)
     assert np.array_equal(one.faps.values, other.faps.values)
     assert json.dumps(one.to_json()) == json.dumps(other.to_json())
@@ -117,7 +117,7 @@ def test_fap_streams_and_files_do_not_know_who_draws() -> None:
     assert other.poses.shape[1] > 68
 
 
-def test_meshes_of_a_session_are_those_of_a_film(faces: dict[str, Face]) -> None:
+def test_deformers_give_sessions_the_meshes_of_films(faces: dict[str, Face]) -> None:
     from realizer.face.surface import quantise
 
     face = faces["au"]
@@ -130,7 +130,7 @@ def test_meshes_of_a_session_are_those_of_a_film(faces: dict[str, Face]) -> None
     assert not np.array_equal(meshes[0], meshes[-1])
 
 
-def test_a_session_draws_as_the_service_was_told(faces: dict[str, Face]) -> None:
+def test_deformer_of_a_session_is_the_service_s_setting(faces: dict[str, Face]) -> None:
     session = Session("s", Settings(deformer="au"), 0.0)
     assert session.faces.of(0).inputs == faces["au"].inputs
     assert Session("s", Settings(), 0.0).faces.of(0).inputs == faces["mpeg4"].inputs
@@ -150,7 +150,7 @@ def renderers() -> Iterator[dict[str, Renderer]]:
     [facs(12), facs(43), lexeme("RAISE_BROWS"), facs(26)],
     ids=["smile", "closed", "brows", "jaw"],
 )
-def test_both_change_the_picture_at_the_same_place(renderers: dict[str, Renderer], inner: str) -> None:
+def test_deformers_change_the_picture_at_the_same_place(renderers: dict[str, Renderer], inner: str) -> None:
     places = []
     for name, renderer in renderers.items():
         still, shown = renderer.draw(play(inner, name).poses[[0, PEAK]]).astype(float).sum(axis=3)
@@ -163,7 +163,7 @@ def test_both_change_the_picture_at_the_same_place(renderers: dict[str, Renderer
 
 @pytest.mark.gl
 @pytest.mark.slow
-def test_a_still_is_drawn_by_the_deformer_that_was_asked_for(tmp_path: Path) -> None:
+def test_deformer_option_draws_a_still(tmp_path: Path) -> None:
     (tmp_path / "x.bml").write_text(f'<bml id="b">{facs(12)}</bml>')
     pictures = []
     for name in BOTH:
@@ -175,7 +175,7 @@ def test_a_still_is_drawn_by_the_deformer_that_was_asked_for(tmp_path: Path) -> 
     assert pictures[0] != pictures[1]
 
 
-def test_the_deformer_is_a_setting() -> None:
+def test_deformer_is_a_setting() -> None:
     assert Settings.read(environment={"REALIZER_DEFORMER": "au"}).deformer == "au"
     assert Settings().deformer is None
     with pytest.raises(SettingsError, match="deformer: wanted mpeg4 or au, got 'bones'"):

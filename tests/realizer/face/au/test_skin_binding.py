@@ -1,4 +1,4 @@
-"""Where brows and lashes grow: on the skin, along the part where it stands off."""
+"""Tests of binding brows and lashes to the skin."""
 
 from __future__ import annotations
 

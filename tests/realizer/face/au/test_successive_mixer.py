@@ -1,4 +1,4 @@
-"""The successive mixer of a whole face: as defined, within bounds, with what has grown on the skin."""
+"""Tests of the successive mixer of a whole face."""
 
 import numpy as np
 import pytest

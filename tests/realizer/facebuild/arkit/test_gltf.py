@@ -1,4 +1,4 @@
-"""Odd files: read as they are meant, or refused with what to change."""
+"""Tests of the glTF reader, mostly with broken and unusual files."""
 
 from __future__ import annotations
 

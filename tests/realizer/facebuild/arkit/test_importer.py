@@ -1,4 +1,4 @@
-"""A shipped face goes out as GLB with ARKit's shapes and comes back: it measures and moves the same."""
+"""Tests of the import of a GLB head, mostly of a shipped face with ARKit's shapes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fitting: a model that is known is found again from landmarks, and bad measurements get a message."""
+"""Tests of the fit of a model of action units to landmarks."""
 
 import shutil
 import subprocess

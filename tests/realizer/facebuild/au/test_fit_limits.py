@@ -1,4 +1,4 @@
-"""Fits are held: no vertex of a face goes much further than the furthest landmark, seen or not."""
+"""Tests of the limits of fitted action units."""
 
 from __future__ import annotations
 

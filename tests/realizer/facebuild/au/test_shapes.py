@@ -1,4 +1,4 @@
-"""Measuring a face by the shapes of the data it was built from: what is wrong is told by its file."""
+"""Tests of measuring action units by the shapes of the data that a face was built from."""
 
 import os
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A head that brings no shapes gets a face from its zones, and a face may take some FAPs from zones."""
+"""Tests of the build of a face's fields from zones."""
 
 import shutil
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""FaceEditor's files are read, written, and read again as they were."""
+"""Tests of reading and writing FaceEditor's files."""
 
 import dataclasses
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The curves from a zone's middle to its edge."""
+"""Tests of the curves from a zone's middle to its edge."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What is usual of a FAP comes from what action units ask of it."""
+"""Tests of the usual and the required ranges of FAPs."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Zones move what they should, neighbours share it, and masks keep the rest still."""
+"""Tests of the fields of zones."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""Feature points are found on heads that nobody has marked."""
+"""Tests of the automatic placement of feature points."""
 
 import shutil
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""A recipe's look: figures over plain ones, refused where unknown."""
+"""Tests of the [look] section of a recipe."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Brows and lashes: soft at their edges, on the skin, and going along with it."""
+"""Tests of brows and lashes, on shipped faces."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The builder: from data that are missing it builds nothing, and says so."""
+"""Tests of the builder of a face folder from a recipe."""
 
 from pathlib import Path
 

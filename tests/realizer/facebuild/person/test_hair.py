@@ -1,4 +1,4 @@
-"""Hair: styles are figures, lie on the scalp, leave the face free and hang where they should."""
+"""Tests of hair."""
 
 from dataclasses import fields, replace
 

@@ -1,4 +1,4 @@
-"""Recipes: what is wrong with one is said with file and key, all at once."""
+"""Tests of the reader of recipes."""
 
 from pathlib import Path
 
