@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from realizer.speech.base_voice import BaseVoice
 from realizer.speech.letter_to_sound import GENERIC, letters_to_phonemes, syllable_facts, vowel_units
 from realizer.speech.ssml import Mark, read_script
-from realizer.speech.utterance import STRETCH, Phoneme, SpeechRequest, Utterance, Word
+from realizer.speech.utterance import STRETCH, SpeechRequest, Utterance, Word, tile
 from realizer.speech.words import Pause, Token, WordToken, tokens
 from realizer.tables.phonemes import vowels
 
@@ -43,7 +43,7 @@ def _layout(items: Sequence[Token], language: str, rate: float, warnings: tuple[
     facts = syllable_facts()
     now = facts["edge"]
     words: list[Word] = []
-    phonemes = [Phoneme(0.0, now, "")]
+    starts: list[tuple[float, str, int]] = [(0.0, "", 0)]
     marks: dict[str, float] = {}
     waiting: list[str] = []  # marks before the next word
     for item in items:
@@ -55,52 +55,37 @@ def _layout(items: Sequence[Token], language: str, rate: float, warnings: tuple[
                 marks.update(dict.fromkeys(waiting, now))
                 waiting = []
             length = item.seconds or facts["unit"] / rate
-            phonemes.append(Phoneme(now, now + length, ""))
+            starts.append((now, "", 0))
         else:
             marks.update(dict.fromkeys(waiting, now))
             waiting = []
             length = vowel_units(item.text, language) * facts["unit"] / (rate * item.rate)
             words.append(Word(now, now + length, item.text))
-            phonemes += _phonemes(item, language, now, length, facts["consonant"])
+            starts += _phonemes(item, language, now, length, facts["consonant"])
         now += length
     spoken_end = words[-1].end if words else now
     marks.update(dict.fromkeys(waiting, spoken_end))
-    phonemes.append(Phoneme(now, now + facts["closing"], ""))
+    starts.append((now, "", 0))
     return Utterance(
         duration=now + facts["closing"],
         words=tuple(words),
-        phonemes=_joined(phonemes),
+        phonemes=tile(starts, now + facts["closing"]),
         marks=marks,
         stretch=STRETCH,
         warnings=warnings,
     )
 
 
-def _phonemes(word: WordToken, language: str, start: float, length: float, consonant: float) -> list[Phoneme]:
+def _phonemes(
+    word: WordToken, language: str, start: float, length: float, consonant: float
+) -> Iterator[tuple[float, str, int]]:
+    """Yield (start, IPA, stress) of the phonemes of a word."""
     ipa = letters_to_phonemes(word.text, language) or ("",)
     vowel = [not sound or sound[0] in vowels() for sound in ipa]  # an unknown sound counts as a vowel
     times = [1.0 if is_vowel else consonant for is_vowel in vowel]
     share = length / sum(times)
     stressed = vowel.index(True) if any(vowel) else None
-    phonemes = []
     for k, (sound, time) in enumerate(zip(ipa, times, strict=True)):
         # Short words are mostly unstressed; in longer ones the stress is assumed on the first vowel.
-        stress = 1 if k == stressed and len(word.text) > 3 else 0
-        phonemes.append(Phoneme(start, start + time * share, sound, stress))
+        yield start, sound, 1 if k == stressed and len(word.text) > 3 else 0
         start += time * share
-    return phonemes
-
-
-def _joined(phonemes: list[Phoneme]) -> tuple[Phoneme, ...]:
-    """Join adjacent pauses, and make each phoneme end exactly where the next one begins."""
-    joined: list[Phoneme] = []
-    for phoneme in phonemes:
-        before = joined[-1] if joined else None
-        if before is not None:
-            begin = before.start if not phoneme.ipa and not before.ipa else phoneme.start
-            joined[-1] = Phoneme(before.start, phoneme.start, before.ipa, before.stress)
-            if begin == before.start:
-                joined.pop()
-            phoneme = Phoneme(begin, phoneme.end, phoneme.ipa, phoneme.stress)
-        joined.append(phoneme)
-    return tuple(joined)

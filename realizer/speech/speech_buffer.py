@@ -9,7 +9,7 @@ import numpy as np
 
 from realizer.core.array_types import Int16
 from realizer.speech.hibari.times import Sound
-from realizer.speech.utterance import Phoneme
+from realizer.speech.utterance import Phoneme, tile
 from realizer.speech.words import PlacedMark
 
 FADE = 0.004  # s, where a sound is cut
@@ -36,27 +36,16 @@ class SpeechBuffer:
         self.length += len(pcm)
 
     def sounds(self, rate: int) -> tuple[Phoneme, ...]:
-        """Return phonemes and pauses, which cover the sound without gaps.
-
-        Args:
-            rate: Hz.
-        """
-        if not self.length:
-            return ()
-        found: list[tuple[int, str, int]] = []
-        at = 0
-        for sound in [*self.phonemes, Sound("", 0, self.length, self.length, 0)]:
-            if sound.start > at:
-                found.append((at, "", 0))
+        """Return phonemes and pauses, which cover the sound without gaps; `rate` is in Hz."""
+        starts: list[tuple[float, str, int]] = []
+        end = 0
+        for sound in self.phonemes:
+            if sound.start > end:
+                starts.append((end, "", 0))
             if sound.end > sound.start:
-                found.append((sound.start, sound.ipa, sound.stress))
-            at = sound.end
-        joined = [f for k, f in enumerate(found) if f[1] or not k or found[k - 1][1]]
-        ends = [start for start, _, _ in joined[1:]] + [self.length]
-        return tuple(
-            Phoneme(start / rate, end / rate, ipa, stress)
-            for (start, ipa, stress), end in zip(joined, ends, strict=True)
-        )
+                starts.append((sound.start, sound.ipa, sound.stress))
+            end = sound.end
+        return tile([*starts, (end, "", 0)], self.length, rate)
 
     def marks(self, placed: Sequence[PlacedMark]) -> dict[str, int]:
         """Return the sample of each mark: the start of the next word, or the last end before a <break>."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -107,6 +107,26 @@ class Utterance:
     warnings: tuple[str, ...] = field(default=())
     stretch: tuple[float, float] = (1.0, 1.0)
     sections: tuple[tuple[float, Utterance], ...] = ()
+
+
+def tile(starts: Iterable[tuple[float, str, int]], end: float, rate: float = 1.0) -> tuple[Phoneme, ...]:
+    """Return phonemes without gaps, each until the next starts; adjacent pauses are joined.
+
+    Args:
+        starts: (time, IPA, stress) in order; IPA is "" for a pause.
+        end: of the last phoneme.
+        rate: units of the times in a second.
+    """
+    kept: list[tuple[float, str, int]] = []
+    for start in starts:
+        if start[1] or not kept or kept[-1][1]:
+            kept.append(start)
+    ends = [*(time for time, _, _ in kept[1:]), end]
+    return tuple(
+        Phoneme(time / rate, until / rate, ipa, stress)
+        for (time, ipa, stress), until in zip(kept, ends, strict=False)
+        if until > time
+    )
 
 
 class Voice(Protocol):

@@ -111,7 +111,8 @@ def _plan(demand: PiecewiseMatrix, live: tuple[int, ...], given: tuple[int, ...]
     moved |= {lid for pair in eyes for lid in pair}
     faps = [*asking.faps.tolist(), *sorted(moved - {*asking.faps.tolist()})]
     row = {fap: k for k, fap in enumerate(faps)}
-    own, least, most = (limit[faps][:, None] for limit in _limits())
+    limits = ((row.speech_owns, row.least, row.most) for row in tables.faps())
+    own, least, most = np.array(list(limits), np.float32)[faps].T[:, :, None]
     return _Plan(
         asking=asking,
         faps=np.array(faps, np.intp),
@@ -140,14 +141,3 @@ def _combinations() -> tuple[tuple[int, int, int, float], ...]:
         (column[f"{row.au}{row.side}"], column[f"{row.other}{row.side}"], row.fap - 1, row.value)
         for row in tables.au_combinations()
     )
-
-
-@cache
-def _limits() -> tuple[Float32, Float32, Float32]:
-    """Return the part of each FAP that speech owns, its least and its greatest value, (68,) each."""
-    rows = tables.faps()
-    own, least, most = (
-        np.array([getattr(row, name) for row in rows], np.float32)
-        for name in ("speech_owns", "least", "most")
-    )
-    return own, least, most

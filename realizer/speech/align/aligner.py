@@ -65,16 +65,9 @@ def align(
 def align_request(
     sound: Float32, rate: int, request: SpeechRequest, aligner: Aligner | None, voice: Voice | None
 ) -> tuple[Alignment, Utterance]:
-    """Align a recording with a request, and return a voice's utterance of the request too.
+    """Align a recording (n,), -1..1, and return a voice's utterance of the request too; see `align`.
 
-    Args:
-        sound: (n,) -1..1.
-        rate: Hz.
-        request: its voice, rate and duration are ignored.
-        aligner, voice: as in `align`.
-
-    Raises:
-        AlignError, VoiceError: as `align`.
+    The voice, rate and duration of the request are ignored.
     """
     heard, duration = to_aligner(sound, rate), len(sound) / rate
     if reason := _unusable_reason(aligner, voice):

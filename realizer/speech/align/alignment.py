@@ -60,8 +60,7 @@ def build(
         duration: of the recording.
         spans: (n, 2) times of the words.
         sounds: phonemes in order, and the word of each.
-        each: confidence of each word.
-        confidence: of the whole.
+        each, confidence: of each word, and of the whole.
     """
     spans = np.clip(np.maximum.accumulate(np.nan_to_num(spans).ravel()), 0.0, duration).reshape(-1, 2)
     words = tuple(

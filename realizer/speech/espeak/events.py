@@ -9,7 +9,7 @@ from functools import lru_cache
 from realizer.core.array_types import Int16
 from realizer.speech.espeak.document import Document
 from realizer.speech.espeak.protocol import END, MARK, PHONEME, WORD, Event
-from realizer.speech.utterance import Phoneme, Word
+from realizer.speech.utterance import Phoneme, Word, tile
 from realizer.speech.word_boundaries import boundaries, is_vowel, strip_marks
 
 STRESS = {"ˈ": 1, "ˌ": 2}
@@ -195,20 +195,9 @@ def _with_closures(begins: Sequence[int], sounds: Sequence[str], pcm: Int16, rat
 
 
 def _phonemes(begins: Sequence[int], sounds: Sequence[str], end: int, rate: int) -> tuple[Phoneme, ...]:
-    found: list[tuple[int, str, int]] = [(0, "", 0)] if not begins or begins[0] > 0 else []
-    for sample, until, sound in zip(begins, [*begins[1:], end], sounds, strict=False):
-        if until <= sample:
-            continue
-        ipa, stress = _plain(sound)
-        if not ipa and found and not found[-1][1]:
-            continue  # two pauses are one
-        found.append((sample, ipa, stress))
-    ends = [sample for sample, _, _ in found[1:]] + [end]
-    return tuple(
-        Phoneme(sample / rate, until / rate, ipa, stress)
-        for (sample, ipa, stress), until in zip(found, ends, strict=True)
-        if until > sample
-    )
+    spans = zip(begins, [*begins[1:], end], sounds, strict=False)
+    starts = [(sample, *_plain(sound)) for sample, until, sound in spans if until > sample]
+    return tile(starts if begins and begins[0] == 0 else [(0, "", 0), *starts], end, rate)
 
 
 # There are only a few hundred different sounds.

@@ -129,11 +129,8 @@ class HibariVoice(EngineVoice):
     ) -> None:
         """Synthesize a run and append it to `track`.
 
-        Args:
-            pace: rate of the request.
-            rate: Hz.
-            joined: whether it follows the run before without a pause.
-            goes_on: whether the run after follows without a pause.
+        `joined` and `goes_on` are whether it follows the run before, and precedes the run after, without a
+        pause.
         """
         track.add(np.zeros(round(run.pause * rate), np.int16))
         heard: list[Sound] = []
