@@ -11,10 +11,10 @@ import numpy as np
 from realizer import tables
 from realizer.animation.axis import AU_NAMES, au, axis, mask_channel, region
 from realizer.animation.channel import Channel, Layer
-from realizer.animation.curves import Samples, in_order, sample, samples, weights
+from realizer.animation.curves import Samples, sample, samples, weights
 from realizer.animation.frames import AUFrames
 from realizer.animation.idle.motion import Idle
-from realizer.core.array_types import Float32, Float64, Index
+from realizer.core.array_types import Float32, Float64
 from realizer.tables.cooccurrence import Rules
 
 # Layers that replace those below them, bottom up.
@@ -44,13 +44,11 @@ def blend(
 
     Args:
         channels: in any order; on the clock of `times`.
-        times: (n,) seconds, any order.
+        times: (n,) seconds, not falling.
         rules: co-occurrence rules; None for none.
         idle: the idle motion of the face between the first and the last of the times.
     """
-    requested = np.asarray(times, np.float64)
-    order = in_order(requested)
-    times = requested if order is None else requested[order]
+    times = np.asarray(times, np.float64)
     visible = _visible(channels, times)
     # Only columns that move are computed; `place` holds the row of each of them.
     moved = {channel.target.column for channel in visible}
@@ -71,13 +69,11 @@ def blend(
     first, last = (bisect_left(columns, len(AU_NAMES()) + count) for count in (0, 68))
     for limited in (values[:first], values[last:]) if first < last else (values,):
         np.clip(limited, 0.0, 1.0, out=limited)
-    frames = _by_column(values, columns, len(axis()), order)
-    if overridden is None or not overridden[first:last].any():
-        return AUFrames(requested, frames, rules, None, tuple(columns))
-    faps = [column - len(AU_NAMES()) for column in columns[first:last]]
-    return AUFrames(
-        requested, frames, rules, _by_column(overridden[first:last], faps, 68, order), tuple(columns)
-    )
+    replaced = None
+    if overridden is not None and overridden[first:last].any():
+        faps = [column - len(AU_NAMES()) for column in columns[first:last]]
+        replaced = _by_column(overridden[first:last], faps, 68)
+    return AUFrames(times, _by_column(values, columns, len(axis())), rules, replaced, tuple(columns))
 
 
 def _visible(channels: Iterable[Channel], times: Float64) -> list[Channel]:
@@ -122,13 +118,10 @@ def _layers(
     return one, base, gaze
 
 
-def _by_column(rows: Float64, columns: list[int], count: int, order: Index | None) -> Float32:
+def _by_column(rows: Float64, columns: list[int], count: int) -> Float32:
     """Return frames (n, count) float32 with `rows` (m, n) as their columns, stored column by column."""
     whole = np.zeros((count, rows.shape[1]), np.float32)
-    if order is None:
-        whole[columns] = rows
-    else:
-        whole[np.array(columns)[:, None], order] = rows
+    whole[columns] = rows
     return whole.T
 
 

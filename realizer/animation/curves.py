@@ -76,17 +76,11 @@ def sample(channels: Sequence[Channel], times: Float64) -> Float64:
     Raises:
         KeyError: if a curve is not in `CURVES`.
     """
-    order = in_order(times)
-    found = samples(channels, times if order is None else times[order])
+    order = np.argsort(times, kind="stable")
+    found = samples(channels, times[order])
     values = np.zeros((len(channels), len(times)))
-    frames = found.frames if order is None else order[found.frames]
-    values[found.spread(np.arange(len(channels))), frames] = found.values
+    values[found.spread(np.arange(len(channels))), order[found.frames]] = found.values
     return values
-
-
-def in_order(times: Float64) -> Index | None:
-    """Return the indices (n,) that sort the times (n,), or None if they are sorted."""
-    return None if (times[1:] >= times[:-1]).all() else np.argsort(times, kind="stable")
 
 
 def weights(channels: Sequence[Channel], times: Float64) -> Float64:

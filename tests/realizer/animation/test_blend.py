@@ -176,17 +176,6 @@ def test_blend_adds_a_document_to_idle_motion() -> None:
     np.testing.assert_array_equal(np.delete(both, NOD.column, 1), np.delete(alone, NOD.column, 1))
 
 
-@given(many, st.randoms(use_true_random=False))
-def test_blend_ignores_the_order_of_times(given: list[Channel], random: st.DataObject) -> None:
-    order = list(range(len(TIMES)))
-    random.shuffle(order)  # type: ignore[attr-defined]
-    idle = idle_face(0.0, 5.0, 1)
-    whole, other = blend(given, TIMES, idle=idle), blend(given, TIMES[order], idle=idle)
-    np.testing.assert_array_equal(whole.values[order], other.values)
-    np.testing.assert_array_equal(to_fap(whole).values[order], to_fap(other).values)
-    np.testing.assert_array_equal(other.times, TIMES[order])
-
-
 @given(many)
 def test_blend_names_all_columns_that_differ_from_0(given: list[Channel]) -> None:
     frames = blend(given, TIMES)
