@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -65,25 +65,21 @@ def _timed(name: str, letter: str, spans: Iterable[Span]) -> dict[str, Any]:
     }
 
 
-def _visemes(speaking: ScheduledSpeech) -> Iterator[Span]:
-    """Yield the strongest viseme of each sound; equal neighbours are joined."""
+def _visemes(speaking: ScheduledSpeech) -> list[Span]:
+    """Return the strongest viseme of each sound; equal neighbours are joined."""
     names = {row.viseme: NAMES.get(row.name, row.name) for row in oculus_visemes()}
-    now: Span | None = None
+    spans: list[Span] = []
     for phoneme in speech_spans.phonemes(speaking):
         start = phoneme.start
         for sound in sounds(phoneme.text):
             end = start + sound.share * (phoneme.end - phoneme.start)
             if sound.mix:
                 name = names[max(sound.mix, key=lambda part: part[1])[0]]
-                if now is not None and now.text == name and start - now.end < speech_spans.LEAST:
-                    now = replace(now, end=end)
-                else:
-                    if now is not None:
-                        yield now
-                    now = Span(start, end, name)
+                if spans and spans[-1].text == name and start - spans[-1].end < speech_spans.LEAST:
+                    start = spans.pop().start
+                spans.append(Span(start, end, name))
             start = end
-    if now is not None:
-        yield now
+    return spans
 
 
 def _anim(realization: Realization) -> dict[str, Any]:

@@ -18,9 +18,8 @@ VOLUMES = {
     "loud": 1.4,
     "x-loud": 2.0,
 }
-MIN_RATE, MAX_RATE = 0.25, 4.0
-MIN_PITCH, MAX_PITCH = 0.5, 2.0
-MAX_VOLUME = 4.0
+# Attribute -> named steps, least and greatest factor.
+SCALES = {"rate": (RATES, 0.25, 4.0), "pitch": (PITCHES, 0.5, 2.0), "volume": (VOLUMES, 0.0, 4.0)}
 HERTZ = re.compile(r"\s*[+-]?(\d+(?:\.\d+)?|\.\d+)\s*Hz\s*", re.IGNORECASE)
 NUMBER = re.compile(r"\s*([+-]?)(\d+(?:\.\d+)?|\.\d+)\s*(%|st|dB|)\s*", re.IGNORECASE)
 
@@ -41,11 +40,11 @@ class Prosody:
 
     def within(self, attributes: Mapping[str, str]) -> Prosody:
         """Return the prosody of a <prosody> element inside this one; unknown values change nothing."""
-        return Prosody(
-            self.rate * _bounded(_factor(attributes.get("rate", ""), RATES), MIN_RATE, MAX_RATE),
-            self.pitch * _bounded(_factor(attributes.get("pitch", ""), PITCHES), MIN_PITCH, MAX_PITCH),
-            self.volume * _bounded(_factor(attributes.get("volume", ""), VOLUMES), 0.0, MAX_VOLUME),
-        )
+        factors = {
+            name: min(most, max(least, _factor(attributes.get(name, ""), steps)))
+            for name, (steps, least, most) in SCALES.items()
+        }
+        return Prosody(**{name: getattr(self, name) * factor for name, factor in factors.items()})
 
 
 PLAIN = Prosody()
@@ -53,17 +52,16 @@ PLAIN = Prosody()
 
 def is_supported(attribute: str, value: str) -> bool:
     """Return whether the value of an attribute of <prosody> is valid; True except for rate, pitch, volume."""
-    names = {"rate": RATES, "pitch": PITCHES, "volume": VOLUMES}.get(attribute)
-    if names is None or value.strip() in names or NUMBER.fullmatch(value):
+    if attribute not in SCALES or value.strip() in SCALES[attribute][0] or NUMBER.fullmatch(value):
         return True
     return attribute == "pitch" and bool(HERTZ.fullmatch(value))
 
 
-def _factor(text: str, names: Mapping[str, float]) -> float:
+def _factor(text: str, steps: Mapping[str, float]) -> float:
     """Return the factor of a name, a percentage ("80%", "+10%"), semitones ("-2st") or decibels ("+6dB")."""
     number = NUMBER.fullmatch(text)
     if not number:
-        return names.get(text.strip(), 1.0)
+        return steps.get(text.strip(), 1.0)
     sign, digits, unit = number[1], float(number[2]), number[3].lower()
     signed = -digits if sign == "-" else digits
     if unit == "st":
@@ -73,10 +71,6 @@ def _factor(text: str, names: Mapping[str, float]) -> float:
     if unit == "%":
         return 1.0 + signed / 100 if sign else digits / 100
     # A bare number is a factor of the rate, or a volume of 0..100, where 100 is the voice's own (SSML 1.0).
-    if names is VOLUMES and not sign:
+    if steps is VOLUMES and not sign:
         return digits / 100
-    return digits if names is RATES and not sign else 1.0
-
-
-def _bounded(value: float, least: float, most: float) -> float:
-    return min(most, max(least, value))
+    return digits if steps is RATES and not sign else 1.0

@@ -46,7 +46,10 @@ def lip_channels(phonemes: Sequence[Phoneme], start: float, room: float = 0.0) -
     mouth = _mouth(track, times) * masked
     _constrain(mouth, track, times, masked, facts)
     mouth[:, [0, -1]] = 0.0  # smoothing leaves traces of very short sounds
-    return _channels(times + start, mouth, masked)
+    moved = {mask_channel("lips"): masked}
+    moved |= {fap(number): values for number, values in mouth_faps(mouth.T).items()}
+    times = times + start  # one array, which all channels share
+    return tuple(Channel(target, times, values, "linear", Layer.SPEECH) for target, values in moved.items())
 
 
 def _mouth(track: Track, times: Float64) -> Float64:
@@ -119,9 +122,3 @@ def _bell(half: int) -> Float64:
     bell = np.hanning(2 * half + 3)[1:-1]
     weights: Float64 = bell / bell.sum()
     return weights
-
-
-def _channels(times: Float64, mouth: Float64, masked: Float64) -> tuple[Channel, ...]:
-    lips = Channel(mask_channel("lips"), times, masked, "linear", Layer.SPEECH)
-    moved = mouth_faps(mouth.T).items()
-    return (lips, *(Channel(fap(number), times, value, "linear", Layer.SPEECH) for number, value in moved))

@@ -95,9 +95,10 @@ def sounds(ipa: str) -> tuple[Sound, ...]:
     found: list[tuple[tuple[tuple[int, float], ...], bool]] = []
     for symbol, labialised in _symbols(ipa):
         row = phoneme_features()[symbol]
-        mix = _vowel_mix(row) if row.kind == "vowel" else _consonant_mix(row)
+        viseme = _viseme_of(row.place, row.manner)
+        mix = _vowel_mix(row) if row.kind == "vowel" else ((viseme, 1.0),) if viseme else ()
         if labialised and mix and mix[0][0] not in coarticulation()["closure"]["visemes"]:
-            mix = (*((viseme, part / 2) for viseme, part in mix), (ROUNDED, 0.5))
+            mix = (*((number, part / 2) for number, part in mix), (ROUNDED, 0.5))
         found.append((mix, row.kind == "vowel"))
     consonant = coarticulation()["diphthong"]["consonant"]
     first = coarticulation()["diphthong"]["first"]
@@ -138,11 +139,6 @@ def _vowel_mix(row: PhonemeFeatures) -> tuple[tuple[int, float], ...]:
             if share:
                 mix[viseme] = mix.get(viseme, 0.0) + share
     return tuple(mix.items())
-
-
-def _consonant_mix(row: PhonemeFeatures) -> tuple[tuple[int, float], ...]:
-    viseme = _viseme_of(row.place, row.manner)
-    return ((viseme, 1.0),) if viseme else ()
 
 
 @cache

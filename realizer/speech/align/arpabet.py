@@ -25,7 +25,7 @@ def to_arpabet(ipa: Iterable[str]) -> tuple[str, ...]:
     for phoneme in ipa:
         text, at = phoneme.translate(STRIPPED), 0
         while at < len(text):
-            size = next((n for n in range(_longest(), 0, -1) if text[at : at + n] in _phones()), 0)
+            size = next((n for n in range(len(text) - at, 0, -1) if text[at : at + n] in _phones()), 0)
             if size:
                 phones += _phones()[text[at : at + size]].split()
             at += size or 1
@@ -45,11 +45,6 @@ def _rows() -> tuple[Sounded, ...]:
 @cache
 def _phones() -> Mapping[str, str]:
     return {row.ipa: row.arpabet for row in _rows()}
-
-
-@cache
-def _longest() -> int:
-    return max(map(len, _phones()))
 
 
 @cache
