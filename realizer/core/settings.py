@@ -200,7 +200,11 @@ class Settings:
     workers: int = _setting(1, _number(int, 1, 64), "number of processes that share the port")
     # An empty token must not open the service by mistake.
     token: str | None = _setting(
-        None, _text, "password for WebSocket clients; none: no password", secret=True, empty=False
+        None,
+        _text,
+        "password for WebSocket clients; REALIZER_TOKEN hides it from other users; none: no password",
+        secret=True,
+        empty=False,
     )
     jwt_key: str | None = _setting(
         None,
@@ -216,13 +220,22 @@ class Settings:
     log: str = _setting("text", _word_of("text", "json"), "format of log messages")
     # The URL may contain a password.
     journal: str | None = _setting(
-        None, _text, "file or redis://HOST:PORT/N that saves named sessions; none: not saved", secret=True
+        None,
+        _text,
+        "file or redis://HOST:PORT/N that saves named sessions for a restart; none: not saved",
+        secret=True,
     )
-    record: Path | None = _setting(None, _path, "folder for recordings of all sessions; none: not recorded")
+    record: Path | None = _setting(
+        None, _path, "folder for recordings, for `realizer replay`; none: not recorded"
+    )
     asap_ports: tuple[int, int] | None = _setting(
-        None, _ports, "ports of ASAP's TCP: BML in, feedback to this port of the client; none: off"
+        None,
+        _ports,
+        "ports of ASAP's TCP, such as 7500 7501: BML in, feedback to that port of the client; none: off",
     )
-    xface_port: int | None = _setting(None, _number(int, 0, 65535), "port of Xface's TCP; none: off")
+    xface_port: int | None = _setting(
+        None, _number(int, 0, 65535), "port for clients of an Xface player; none: off"
+    )
     xface_player: str | None = _setting(
         None, _address, "HOST:PORT of an Xface player that shows a session; none: off"
     )
@@ -253,9 +266,13 @@ class Settings:
     deformer: str | None = _setting(
         None, _word_of("mpeg4", "au"), "what moves faces: mpeg4 or au; none: each face's own choice"
     )
-    voice: str | None = _setting(None, _text, "default voice; none: espeak-ng if installed, else silent")
+    voice: str | None = _setting(
+        None, _text, "default voice; see `realizer voices`; none: espeak-ng if installed, else silent"
+    )
     language: str = _setting("en-US", _text, "BCP-47 tag of speech without xml:lang")
-    camera: str = _setting("front", _text, "default camera of pictures")
+    camera: str = _setting(
+        "front", _text, "default camera of pictures: front, three-quarter, profile, close, or the face's own"
+    )
     light: str | None = _setting(None, _text, "default light of pictures; none: portrait")
     background: str | None = _setting(
         None,
@@ -263,7 +280,7 @@ class Settings:
         "default background of pictures; none: the light's own",
     )
     fps: float = _setting(25.0, _number(float, 0.01, 240), "default frames per second of streams")
-    scene: Path | None = _setting(None, _path, "file of targets for all sessions")
+    scene: Path | None = _setting(None, _path, "file of targets for all sessions: NAME X Y Z, in metres")
     media: Path | None = _setting(None, _folder, "folder of the files that documents may refer to")
     expressions: Path | None = _setting(
         None, _folder, "folder of a user's expressions; none: only built-in ones"

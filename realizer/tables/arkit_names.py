@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from typing import Literal
@@ -87,15 +86,3 @@ def nearest(name: str) -> tuple[str, ...]:
     letters = re.sub(r"[^a-z0-9]", "", re.split(r"[.:|/]", name)[-1].lower())
     similar = get_close_matches(letters, list(_spellings()), n=3, cutoff=0.72)
     return tuple(dict.fromkeys(_spellings()[spelling] for spelling in similar))
-
-
-def group_names(names: Iterable[str]) -> tuple[dict[str, list[str]], tuple[str, ...]]:
-    """Return ARKit name -> the names for it, and the names that are not ARKit's."""
-    groups: dict[str, list[str]] = {}
-    unknown = []
-    for name in names:
-        if (known := canonical(name)) is None:
-            unknown.append(name)
-        else:
-            groups.setdefault(known, []).append(name)
-    return groups, tuple(unknown)

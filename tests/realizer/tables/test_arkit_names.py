@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from realizer.tables.arkit_names import canonical, group_names, nearest, shapes
+from realizer.tables.arkit_names import canonical, nearest, shapes
 
 
 def test_shapes_are_the_52_of_arkit() -> None:
@@ -36,9 +36,3 @@ def test_canonical_returns_none_for_other_names(name: str) -> None:
 def test_nearest_suggests_names_for_a_misspelt_one() -> None:
     assert nearest("mouthSmileLeftt")[0] == "mouthSmileLeft"
     assert nearest("hat") == ()
-
-
-def test_group_names_groups_spellings_of_one_shape() -> None:
-    known, foreign = group_names(["mouthSmile_L", "MouthSmileLeft", "hat", "jawOpen"])
-    assert known == {"mouthSmileLeft": ["mouthSmile_L", "MouthSmileLeft"], "jawOpen": ["jawOpen"]}
-    assert foreign == ("hat",)
