@@ -1,4 +1,4 @@
-"""Short documents, how they are played, and what a batch of them comes to."""
+"""Short documents with options, and the outcomes of a batch of them."""
 
 from __future__ import annotations
 

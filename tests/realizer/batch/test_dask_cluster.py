@@ -20,7 +20,7 @@ pytest.importorskip("distributed")
 
 
 def start(*arguments: str) -> subprocess.Popen[str]:
-    """A Dask program that has said that it is there."""
+    """A Dask program that has printed that it is ready."""
     command = [sys.executable, "-W", "ignore", "-m", "dask", *arguments, "--no-dashboard"]
     return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
 

@@ -1,4 +1,4 @@
-"""What is a document, and what it is called."""
+"""Finding documents, and their names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The manifest: rows that survive a crash, and know whether an output is still what was written."""
+"""The manifest: rows survive a crash, and unchanged outputs are recognized."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Local workers: all outcomes whatever dies, and the same ones."""
+"""Local workers: all outcomes, although processes die."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A batch: resumed where it was, idempotent, and the same bytes whatever ran it."""
+"""Batches: resumed, idempotent, and with the same bytes on any workers."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_batch_gives_the_same_bytes_with_any_workers_in_any_order(
 
 @pytest.mark.espeak
 def test_batch_gives_the_same_sound_with_any_workers_in_any_order(talks: Path, tmp_path: Path) -> None:
-    """What espeak-ng says depends on what it said before, but for the pains taken with it."""
+    """The output of espeak-ng depends on earlier texts, but for the measures of our engine."""
     aloud = Options(formats=(".fap", ".wav"), voice="espeak")
     for k, words in enumerate(["Oh, hello!", "Who was that?", "Nobody at all."]):
         (talks / f"said{k}.bml").write_text(f'<bml id="b"><speech id="s"><text>{words}</text></speech></bml>')

@@ -1,4 +1,4 @@
-"""A worker: the bytes that `realize` writes, and a row for whatever happens."""
+"""A worker: the bytes of `realize`, and a row for each outcome."""
 
 from __future__ import annotations
 

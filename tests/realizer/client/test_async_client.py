@@ -1,4 +1,4 @@
-"""The client in an event loop, against the real service: send, play, iterate frames, be told of errors."""
+"""The asynchronous client against the real service: sending, waiting, iterating, errors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Messages are sorted by what they are: answers to whom asked, errors of others aside, frames by stream."""
+"""The router of messages: answers, errors, frames by stream."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A film of what was drawn live: as long as its block, with its picture and its sound."""
+"""Films of live pictures: as long as the block, with picture and sound."""
 
 from __future__ import annotations
 

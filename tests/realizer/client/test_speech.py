@@ -1,4 +1,4 @@
-"""A speech that is said while its text comes, from the client's side, against the real service."""
+"""Streaming speech from the client's side, against the real service."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def test_speech_closed_with_its_connection_refuses_text_of_the_next_one() -> Non
             speech = await lost.__aenter__()
             await speech.append("One two three four five six seven eight nine ten. ")
             await client.ask("ping")
-            await client.close()  # while what is appended waits a moment for more
+            await client.close()  # while appended text waits a moment for more
             with pytest.raises(ClientError, match="the connection has ended"):
                 await speech.append("Eleven. ")
         async with connect(f"{url}?session=show&seen=0") as client:

@@ -1,4 +1,4 @@
-"""The service while what it stands on fails: engines, the disk, the clock of the machine, its clients."""
+"""The service while its surroundings fail: engines, the disk, the clock, its clients."""
 
 from __future__ import annotations
 
@@ -199,7 +199,7 @@ def test_chaos_full_disk_refuses_documents_and_lets_the_rest_play(disk: Disk) ->
             while not (message := str(await client.recv())).startswith("{"):
                 refused.append(message)
             assert json.loads(message)["code"] == "journal"
-            await client.send('{"type":"ping"}')  # which nobody need keep
+            await client.send('{"type":"ping"}')  # which is not written to the journal
             while not (message := str(await client.recv())).startswith("{"):
                 refused.append(message)
             assert json.loads(message)["type"] == "pong"
@@ -216,7 +216,7 @@ def test_chaos_full_disk_refuses_documents_and_lets_the_rest_play(disk: Disk) ->
                 told = await before(server)
             ends = [text for text in told if re.search(r'blockProgress.* id="\w+:end"', text)]
             assert [re.search(r' id="(\w+):end"', text)[1] for text in ends] == ["plays", "again"]  # type: ignore[index]
-            # What was refused is in no journal: it has no number there, nor here.
+            # A refused document is in no journal, and has no number in the feedback.
             told = [text for text in told if 'id="late"' not in text]
             assert numbers(told) == list(range(1, len(told) + 1))
             async with Server(settings) as server, connect(f"{server.url}?session=full&seen=0") as client:
@@ -227,7 +227,7 @@ def test_chaos_full_disk_refuses_documents_and_lets_the_rest_play(disk: Disk) ->
 
 
 async def crowd(server: Server) -> None:
-    """Sessions of all names, one after the other; what is left of the last page takes some."""
+    """Yield sessions of all names; those left over from the last page take some."""
     for k in range(1000):
         async with connect(f"{server.url}?session=new-{k}") as one:
             await one.send('{"type":"ping"}')
@@ -284,7 +284,7 @@ def test_chaos_client_under_other_clocks_gets_all_feedback_once(
         async with asyncio.timeout(LIMIT):
             async with Server(kept) as server, connect(f"{server.url}?session=s") as client:
                 await client.send(block)
-                told = await until(client, 'id="b:n:end"')  # long after its last message
+                told = await until(client, 'id="b:n:end"')  # long after the client's last message
             clock.step = step
             seen = numbers(told)[-1]
             async with Server(kept) as server, connect(f"{server.url}?session=s&seen={seen}") as client:
@@ -301,7 +301,7 @@ def test_chaos_client_under_other_clocks_gets_all_feedback_once(
 
 
 async def emptied(server: Server, files: int) -> None:
-    """Wait until nobody is there any more, and nothing is open that was not before."""
+    """Wait until there are no connections, and no more open files than before."""
     while server._sessions.health()["connections"] or files_open(os.getpid()) > files:
         await asyncio.sleep(0.01)
 
@@ -336,7 +336,7 @@ def test_chaos_client_that_closes_its_side_only_is_disconnected() -> None:
         while server._sessions.health()["connections"]:
             await asyncio.sleep(0.01)
         async with connect(f"{server.url}?session=show&seen=0") as again:
-            await until(again, 'id="b:end"')  # what it has asked for was played
+            await until(again, 'id="b:end"')  # its document was played
 
     serving(test)
 

@@ -233,7 +233,7 @@ def test_serve_names_a_host_that_does_not_exist(workers: int) -> None:
 
 def test_serve_prints_a_line_for_each_transport_that_is_ready() -> None:
     with socket.socket() as nobody:
-        nobody.bind(("127.0.0.1", 0))  # bound, but nobody listens
+        nobody.bind(("127.0.0.1", 0))  # bound, but not listening
         there = f"127.0.0.1:{nobody.getsockname()[1]}"
         ours = ("--asap-ports", "0", "7501", "--xface-port", "0")
         with running(
@@ -355,7 +355,7 @@ async def run():
     loop = asyncio.get_running_loop()
     loop.set_default_executor(ThreadPoolExecutor(1))
     async with Server(Settings(port=0, voice="silent")) as server, connect(server.url) as socket:
-        await loop.run_in_executor(None, len, "")  # after what the service loads in the background
+        await loop.run_in_executor(None, len, "")  # after the warm-up in the background
         for stream in ("fap", "arkit"):
             modules, misses = set(sys.modules), arkit._system.cache_info().misses
             await socket.send(json.dumps({"type": "subscribe", "stream": stream, "encoding": "json"}))

@@ -1,4 +1,4 @@
-"""Who may come in: tokens, pages of elsewhere, a service that is full; and how fast messages are read."""
+"""Access control: tokens, origins, memory, TLS and rate limits."""
 
 from __future__ import annotations
 

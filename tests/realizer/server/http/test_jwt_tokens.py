@@ -1,4 +1,4 @@
-"""Tokens that a key has signed: whom they let in, until when, into which sessions; and whom they do not."""
+"""Signed tokens: their keys, claims, sessions and clocks."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_verifier_accepts_a_secret() -> None:
 
 @pytest.mark.parametrize("algorithm", ["HS256", "none", "HS512"])
 def test_verifier_does_not_take_a_public_key_for_a_secret(algorithm: str) -> None:
-    """Who knows the public key, as all do, must not be able to sign by another algorithm."""
+    """A public key, which anybody may know, must not sign by another algorithm."""
     key = keys("RS256")
     head = {"alg": algorithm, "typ": "JWT"}
     signed = jwt.encode({"sub": "me"}, "x" * 64, "HS256").split(".")

@@ -1,4 +1,4 @@
-"""The text that Prometheus reads, read back."""
+"""The metrics, parsed from their text format."""
 
 from __future__ import annotations
 

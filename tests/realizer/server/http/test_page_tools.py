@@ -1,4 +1,4 @@
-"""What the page's tools ask: faults, feelings, poses; and what is refused."""
+"""The tools of the page: faults, emotions and poses, and their errors."""
 
 from __future__ import annotations
 

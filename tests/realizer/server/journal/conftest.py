@@ -1,4 +1,4 @@
-"""Both journals, each empty: SQLite in a file, Redis where its server is installed."""
+"""Empty journals: SQLite in a file, and Redis if its server is installed."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def redis_url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 @pytest.fixture
 def redis_server(tmp_path: Path) -> Iterator[RedisServer]:
-    """One that the test may kill and start again."""
+    """A server that the test may kill and start again."""
     server = RedisServer(tmp_path)
     yield server
     server.kill()
@@ -60,7 +60,7 @@ def redis_server(tmp_path: Path) -> Iterator[RedisServer]:
 
 @pytest.fixture(params=["file", "redis"])
 def where(request: pytest.FixtureRequest, tmp_path: Path) -> str:
-    """What the setting `journal` says."""
+    """The setting `journal`."""
     if request.param == "file":
         return str(tmp_path / "journal.db")
     url: str = request.getfixturevalue("redis_url")

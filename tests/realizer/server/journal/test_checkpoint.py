@@ -1,4 +1,4 @@
-"""A session that goes on from a checkpoint is the one that was never touched."""
+"""Checkpoints: a restored session behaves as if it had never died."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tests.waking import wakes
 SETTINGS = Settings(voice="silent")
 EPOCH = 1.7e9
 RATE = 8000
-# Documents that say and show what the others do not, and what lasts.
+# Documents with contents that the others lack, and lasting effects.
 MORE = (
     '<faceShift id="s" lexeme="SMILE" end="0.7"/>',
     '<gazeShift id="s" target="cup" end="0.4"/><pointing id="p" target="cup"/>',
@@ -32,7 +32,7 @@ MORE = (
     '<speech id="s"><text>Here it is</text></speech><head id="n" lexeme="NOD" start="{other}:bml:end"/>',
 )
 OWN_HEADS = (*HEADS, 'characterId="Ben"', 'characterId="Ben"')
-# What lasts, more often than it is said among all that can be.
+# Lasting effects, more often than among all documents.
 LASTING = (
     {"type": "set", "emotion": {"name": "joy", "intensity": 0.7}},
     {"type": "set", "emotion": {"name": "sadness"}, "character": "Ben"},
@@ -71,7 +71,7 @@ class Run:
 
 
 class Pair:
-    """Two sessions to which the same is done; one of them dies now and then, and goes on from its journal."""
+    """Two sessions with the same input, one of which dies now and then and is restored from its journal."""
 
     def __init__(self, seed: int) -> None:
         self.random = Random(seed)
@@ -115,7 +115,7 @@ class Pair:
         self._both(pack_clip(ClipPiece(self.random.choice("cd"), number, rate, sound, number == 1)))
 
     def _answer(self) -> None:
-        """Voices say what they were asked for, not in that order."""
+        """Answer speech requests, in another order."""
         ids = sorted(self.whole.owed.keys() | self.torn.owed.keys())
         self.random.shuffle(ids)
         for id in ids:
@@ -125,7 +125,7 @@ class Pair:
                     run.collect()
 
     def _rest(self) -> None:
-        """Nobody does anything until nothing is seen any more; what is open is mostly closed."""
+        """Send nothing until nothing is visible any more; most open speeches are closed."""
         if self.random.random() < 0.7:
             self._both('{"type": "stop"}')
             for id in ("turn", "other"):

@@ -34,7 +34,7 @@ NEXT = '<bml id="b" composition="APPEND"><head id="n" lexeme="SHAKE" end="0.8"/>
 
 
 class Node:
-    """A service of its own. `kill` is that of the system: it is told nothing."""
+    """A service. `kill` is that of the system, without warning."""
 
     def __init__(self, journal: str) -> None:
         command = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--voice", "silent"]
@@ -42,7 +42,7 @@ class Node:
 
     @cached_property
     def address(self) -> str:
-        """Where it listens, as soon as it does."""
+        """Its address, as soon as it listens."""
         assert self._process.stdout is not None
         return self._process.stdout.readline().split()[2].removeprefix("ws://").removesuffix("/ws")
 
@@ -82,7 +82,7 @@ def proxy(nodes: Sequence[Node], log: IO[str], **settings: str) -> Iterator[str]
 @pytest.fixture
 def nodes(redis_url: str) -> Iterator[tuple[Node, Node]]:
     with ExitStack() as stack:
-        one, other = Node(redis_url), Node(redis_url)  # both start at once
+        one, other = Node(redis_url), Node(redis_url)  # which start at the same time
         stack.callback(one.close)
         stack.callback(other.close)
         yield one, other

@@ -53,7 +53,7 @@ def play(session: Session, message: str | bytes, begin: float, until: float) -> 
 
 
 def talked(session: Session, documents: int) -> float:
-    """Let a session play so many; when it has."""
+    """Play so many documents in a session, and return when it has."""
     for k in range(documents):
         play(session, TALK if k % 100 == 0 else WAIT, APART * k, APART * (k + 1))
     return APART * documents

@@ -1,4 +1,4 @@
-"""What is written for a session, and what becomes of it where that cannot be."""
+"""The writer of journals and recordings: failures, checkpoints and warnings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What was recorded of a session is seen, heard and told again."""
+"""The replay of recordings: feedback, frames and sound."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SCENE = '{"type": "scene", "objects": {"cup": {"x": 0.2, "y": -0.1, "z": 0.5}}}'
 
 
 def recorded(folder: Path) -> tuple[Path, list[str]]:
-    """A session that was played with a voice that takes its time: its record, and what was told."""
+    """A session that was played with a slow voice: its recording, and its feedback."""
     session = Session("s", SETTINGS, 100.0, named=True, epoch=1e9)
     session.journal = JournalWriter("s", recorder=RecordingFolder(folder, recording_head(SETTINGS, None)))
     session.journal.begin(1e9)

@@ -1,4 +1,4 @@
-"""What a service has recorded is compared with what its clients got: frames and feedback."""
+"""Recordings of a real service, compared with the frames and feedback of its clients."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def test_recorded_frames_are_those_of_a_live_viewer(tmp_path: Path) -> None:
 
 
 async def until(url: str, last: str, *messages: str) -> list[str]:
-    """Send, and what is told up to a progress."""
+    """Send, and return the feedback up to a progress."""
     async with asyncio.timeout(LIMIT), connect(url, max_queue=None) as client:
         for message in messages:
             await client.send(message)

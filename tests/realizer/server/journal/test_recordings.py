@@ -77,13 +77,13 @@ def test_recording_that_began_with_a_checkpoint_resumes(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("written", "kept"),
     [
-        (ENTRIES, SavedSession(1e9, ENTRIES[:3])),  # more than was kept
+        (ENTRIES, SavedSession(1e9, ENTRIES[:3])),  # more than in the journal
         ([ENTRIES[0], ENTRIES[2]], SavedSession(1e9, ENTRIES)),  # a hole
         (
             ENTRIES[:2],
             SavedSession(1e9, ENTRIES[4:], {"state": "{}"}),
-        ),  # what the checkpoint stands for is not there
-        (ENTRIES, SavedSession(1e9, [], {"state": "{}"})),  # nobody knows whether it is
+        ),  # the entries before the checkpoint are missing
+        (ENTRIES, SavedSession(1e9, [], {"state": "{}"})),  # it cannot be known whether they are
     ],
 )
 def test_recording_that_lacks_other_entries_stays_and_another_begins(

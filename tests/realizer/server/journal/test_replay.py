@@ -1,4 +1,4 @@
-"""A service that is killed while it plays, and another one that goes on with its sessions."""
+"""Sessions of a service that is killed, restored by another one."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ SCENE = json.dumps({"type": "scene", "objects": {"cup": {"x": 0.2, "y": -0.1, "z
 
 
 def points(told: list[str]) -> list[str]:
-    """The blocks and sync points that were told to have been reached."""
+    """Return the blocks and sync points that feedback has reported as reached."""
     return [text.split(' id="')[1].split('"')[0] for text in told if "Progress" in text.split(" ")[0]]
 
 
@@ -85,12 +85,12 @@ def test_restored_session_sends_all_feedback_once_and_in_order(where: str) -> No
 
     with serving("--journal", where) as (url, _):
         undisturbed = asyncio.run(whole(url))
-    # Which is told first of two that have nothing to do with each other depends on when messages came.
+    # The order of two unrelated messages depends on when the documents came.
     assert sorted(points(first + rest)) == sorted(points(undisturbed))
 
 
 def in_a_checkpoint(where: str, session: str) -> bool:
-    """Whether the journal has one of a session, which stays whose it is."""
+    """Whether the journal has an entry of a session, whose owner stays the same."""
     if where.startswith("redis://"):
         with Redis.from_url(where) as store:
             return bool(store.hexists(f"realizer:{{{session}}}:parts", "state"))
@@ -258,7 +258,7 @@ async def two_that_share(where: str) -> AsyncIterator[tuple[Server, Server]]:
 
 
 async def held(client: ClientConnection) -> float:
-    """How far AU 12L is held."""
+    """Return the value of AU 12L."""
     await client.send('{"type": "state"}')
     layers = json.loads(await client.recv())["characters"][0]["layers"]
     return float(layers.get("direct", {"aus": {}})["aus"].get("12L", 0.0))
@@ -275,7 +275,7 @@ def test_restored_session_is_unchanged_by_connections_that_still_leave(
             two_that_share(where) as (one, other),
             connect(f"{one.url}?session=deaf") as deaf,
         ):
-            deaf.transport.pause_reading()  # it does not hear that it is let go of
+            deaf.transport.pause_reading()  # it does not notice that it is disconnected
             async with connect(f"{other.url}?session=deaf") as second:
                 await second.send('{"type": "set", "aus": {"12L": 0.5}}')
                 while not one._sessions._registry.sessions["deaf"].closed:
@@ -305,7 +305,7 @@ def test_restored_session_disconnects_viewers_of_the_old_process(
             async with connect(f"{other.url}?session=seen") as second:
                 await second.send('{"type": "set", "aus": {"12L": 0.5}}')
                 with pytest.raises(ConnectionClosed) as closed:
-                    await drained(watching)  # nobody says anything to the first process
+                    await drained(watching)  # without a message to the first process
             assert closed.value.rcvd is not None
             assert closed.value.rcvd.code == 1012
             assert "seen" in closed.value.rcvd.reason

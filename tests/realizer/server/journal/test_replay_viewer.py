@@ -1,4 +1,4 @@
-"""Frames that a client got while a session was live are those of its replay, whatever it did meanwhile."""
+"""The viewer of replays: its frames are those that a client of the live session received."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from realizer.speech.silent import SilentVoice
 from tests.waking import wakes
 
 SETTINGS = Settings(voice="silent", seed=3)
-OPENED = 100.0  # s, on the clock of who wakes the session
+OPENED = 100.0  # s, on the clock of the host
 WATCH = '{"type": "subscribe", "stream": "fap", "encoding": "binary"}'
 BROW = AU_NAMES().index("4L")
 PLAYED = [
@@ -51,10 +51,10 @@ def recorded(
     late: Random | None = None,
     watch: str = WATCH,
 ) -> tuple[SavedSession, list[bytes]]:
-    """A session to which that is done: its record, and what its client got of the stream it asked for.
+    """Return the recording of a session with that input, and what a client received of its stream.
 
     Args:
-        doings: seconds on its clock, what is sent.
+        doings: seconds on its clock, and the message.
         late: draws how late it is woken; None: never.
     """
     session = Session("s", SETTINGS, OPENED, named=True, epoch=1e9)

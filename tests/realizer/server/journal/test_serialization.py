@@ -1,4 +1,4 @@
-"""What a face holds and when points were is the same after it was written as JSON, to the last bit."""
+"""Characters and schedules are the same after a round trip through JSON, to the last bit."""
 
 from __future__ import annotations
 

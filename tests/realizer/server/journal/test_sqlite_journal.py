@@ -15,7 +15,7 @@ from tests.realizer.server.journal.conftest import Clock
 pytestmark = pytest.mark.usefixtures("clock")
 
 FIRST = Entry(0.0, "join", 1)
-# What version 1 wrote: its tables, one session and its lines.
+# A file of version 1: its tables, and the entries of one session.
 VERSION_1 = """
 CREATE TABLE sessions (id TEXT PRIMARY KEY, owner TEXT NOT NULL, epoch REAL NOT NULL);
 CREATE TABLE entries (n INTEGER PRIMARY KEY, session TEXT NOT NULL, line TEXT NOT NULL);

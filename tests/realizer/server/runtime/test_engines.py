@@ -19,7 +19,7 @@ from realizer.server.session.effects import Draw, RenderOptions
 @dataclass
 class Clock:
     now: float = 0.0
-    asked: threading.Event | None = None  # is set when somebody asks
+    asked: threading.Event | None = None  # is set by each request
 
     def __call__(self) -> float:
         now = self.now
@@ -65,7 +65,7 @@ def test_engines_refuse_one_picture_too_many_and_draw_the_others(
         picture = studio.draw(order(17, form))
         assert Image.open(io.BytesIO(picture)).format == form.upper()
         assert width(picture) == 17
-    # Nobody looks at the first one any more: it makes room.
+    # The first one is idle, and makes room.
     clock.now = IDLE + 0.5
     assert width(studio.draw(order(99))) == 99
     assert isinstance(studio.draw(order(16)), RenderError)
@@ -84,7 +84,7 @@ def test_engines_keep_a_renderer_that_takes_long_to_start(
     clock.now = IDLE + 1.0
     clock.asked = None
     assert width(starting.result(60)) == 17
-    # Who looks at the first one waited for the second one to start, for longer than otherwise counts.
+    # The first one has waited for the second to start, for longer than an idle one may.
     assert isinstance(studio.draw(order(99)), RenderError)
     assert width(studio.draw(order(16))) == 16
     clock.now += IDLE

@@ -1,4 +1,4 @@
-"""What holds itself is freed when there may be much of it, and not before."""
+"""The collection policy: cycles are collected when there may be many, and not before."""
 
 from __future__ import annotations
 

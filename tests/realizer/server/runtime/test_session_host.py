@@ -1,4 +1,4 @@
-"""Sessions in an event loop whose clock jumps to whatever is due next."""
+"""The session host in an event loop whose clock jumps to the next deadline."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PHASES = [k / 8 * PERIOD for k in range(8)]  # where between two frames somethin
 
 
 class Selector(selectors.DefaultSelector):
-    """Returns at once, and moves the clock by the time that it was to wait."""
+    """Return at once, and advance the clock by the timeout."""
 
     now = 1000.0
 
@@ -42,7 +42,7 @@ class Loop(asyncio.SelectorEventLoop):
 
 @dataclass
 class Client:
-    """A client, and what it got."""
+    """A client with the data it received."""
 
     unsent_bytes: int = 0
     frames: list[bytes] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""Sessions by name: joined, made, moved between, and closed when nobody comes back."""
+"""The registry of sessions: names, limits, moves and expiry."""
 
 from __future__ import annotations
 
@@ -262,7 +262,7 @@ def test_registry_never_exceeds_the_limit_of_an_address(
             else:
                 share = None
             if share is not None:
-                # Only where all that could make room have somebody in them.
+                # Only if all sessions that could make room have connections.
                 mine = [s for s in hub.sessions.values() if not share or opened[s] == address]
                 assert all(s.empty_since is None for s in mine)
                 assert len(mine) == (2 if share else 4)

@@ -1,4 +1,4 @@
-"""Sessions that another process has taken over are found, whoever looks and however many there are."""
+"""Detection of sessions that another process has taken over."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One timer for many things: each is woken at its time, in order, and none keeps the others waiting."""
+"""The timer wheel: one timer for many items, in order of their times."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Clock:
 
 
 def alarms(clock: Clock, *, costs: float = 0.0) -> tuple[TimerWheel[str], list[tuple[str, float, float]]]:
-    """Alarms and what they woke: (thing, when it was to be, when it was)."""
+    """Return a wheel and its calls: (item, its time, the time of the call)."""
     woken: list[tuple[str, float, float]] = []
 
     def wake(thing: str, when: float) -> None:

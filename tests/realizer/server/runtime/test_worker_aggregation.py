@@ -1,4 +1,4 @@
-"""What all workers answer to one request: their sum, the first refusal, or what is left of them."""
+"""The answers of all workers to one request: sums, refusals, silent workers."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def health(sessions: int) -> bytes:
 
 
 def asked(*answers: bytes | None, request: bytes = REQUEST) -> tuple[bytes, list[bytes]]:
-    """What a client gets of workers that answer so (None: says nothing), and what these were asked."""
+    """Return a client's answer if the workers answer so (None: not at all), and their requests."""
     heard: list[bytes] = []
     kept: list[socket.socket] = []
 
@@ -42,7 +42,7 @@ def asked(*answers: bytes | None, request: bytes = REQUEST) -> tuple[bytes, list
             loop = asyncio.get_running_loop()
             heard.append(await loop.sock_recv(one, 10_000))
             if (said := answers[number]) is not None:
-                for k in range(0, len(said), 1000):  # in several reads
+                for k in range(0, len(said), 1000):  # in several writes
                     await loop.sock_sendall(one, said[k : k + 1000])
                 one.close()
 

@@ -1,4 +1,4 @@
-"""Several processes behind one port: a session has one of them, whoever comes to it."""
+"""Several processes behind one port, each with its sessions."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def test_workers_say_how_to_reach_a_session_of_another_worker(
             await client.send(json.dumps({"type": "hello", "version": 1, "session": one_of(1)}))
             error = json.loads(await told(client, '"error"'))
             assert f"/ws?session={one_of(1)}" in error["message"]
-            await client.send(NOD.format("b"))  # and plays on where it is
+            await client.send(NOD.format("b"))  # and plays on
             await told(client, '"b:end"')
 
     played(test())
@@ -116,7 +116,7 @@ def test_workers_show_the_metrics_of_the_worker_that_is_named(workers: Workers) 
 
 
 def metrics(workers: Workers, query: str = "", headers: dict[str, str] | None = None) -> dict[str, float]:
-    """name and labels -> value, of what all workers or one of them tell."""
+    """Return name and labels -> value, of all workers or one of them."""
     address = f"http://127.0.0.1:{workers.port}/metrics{query}"
     with urllib.request.urlopen(urllib.request.Request(address, headers=headers or {}), timeout=LIMIT) as got:
         text = got.read().decode()
@@ -137,7 +137,7 @@ def test_workers_show_the_sum_of_all_metrics(workers: Workers) -> None:
         async with contextlib.AsyncExitStack() as stack:
             clients = [await stack.enter_async_context(connect(f"{url}?session={name}")) for name in names]
             clients.append(await stack.enter_async_context(connect(f"{url}?session={names[1]}")))
-            # One after the other: two documents that a session plans in one wake count as one planning.
+            # One after the other, because two documents planned in one wake-up count as one.
             for number, client in enumerate(clients):
                 await client.send(NOD.format(f"m{number}"))
                 await told(client, f'"m{number}:start"')

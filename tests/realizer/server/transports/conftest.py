@@ -30,7 +30,7 @@ CONFIGURATION = """<beans xmlns="http://www.springframework.org/schema/beans"
  </broker>
 </beans>
 """
-# A broker that asks who is there.
+# A broker that asks which components there are.
 PASSWORD = """<plugins><simpleAuthenticationPlugin anonymousAccessAllowed="false"><users>
  <authenticationUser username="face" password="secret" groups="users"/>
 </users></simpleAuthenticationPlugin></plugins>"""
@@ -48,7 +48,7 @@ def free_port() -> int:
 
 
 class Process:
-    """A program that runs until it is killed; `start` returns once it has said `ready`."""
+    """A program that runs until it is killed; `start` returns once it has printed `ready`."""
 
     def __init__(self, command: list[str], ready: str, folder: Path, **variables: str) -> None:
         self._process = subprocess.Popen(
@@ -67,7 +67,7 @@ class Process:
         assert any(ready in line for line in self._lines), "".join(self._lines)
 
     def _read(self, ready: str) -> None:
-        """What it says, up to its end, so that it never waits for a reader."""
+        """Read its output to the end, so that it never blocks."""
         assert self._process.stdout is not None
         with self._process.stdout as said:
             for line in said:
@@ -118,7 +118,7 @@ class Broker:
         self._process = Process(command, "Connector stomp started", folder)
 
     def freeze(self) -> None:
-        """Let it hold its connections and do nothing."""
+        """Let it keep its connections and do nothing."""
         assert self._process is not None
         self._process.send(signal.SIGSTOP)
 
@@ -148,7 +148,7 @@ class Rabbit:
     def start(self) -> None:
         folder = str(self._folder)
         names = str(free_port())
-        # The name server of its runtime: otherwise it starts one that outlives it.
+        # The name server of its runtime, or it starts one that outlives it.
         self._names = Process(["epmd", "-d", "-port", names, "-address", "127.0.0.1"], "epmd", self._folder)
         self._process = Process(
             [str(RABBIT)],

@@ -1,4 +1,4 @@
-"""Who is let in at the real door: tokens, origins, TLS, a rate; what /metrics tells, and logs do not."""
+"""Admission at the real transport: tokens, origins, TLS, rates, metrics and logs."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ async def read(url: str, headers: dict[str, str] | None = None) -> str:
 
 
 async def welcomed(url: str, hello: dict[str, Any] | None = None, **options: Any) -> dict[str, Any]:
-    """What the service answers a hello with."""
+    """Return the answer of the service to a hello."""
     async with connect(url, **options) as socket:
         await socket.send(json.dumps({"type": "hello", **(hello or {})}))
         reply: dict[str, Any] = json.loads(await socket.recv())
@@ -183,7 +183,7 @@ def test_admission_limits_the_sessions_of_an_address() -> None:
                 pass
             await socket.send(json.dumps({"type": "hello"}))
             assert json.loads(await socket.recv())["type"] == "welcome"
-        # Both have a name and are kept; the one that was left first makes room.
+        # Both sessions are named and stay; the one that was left first makes room.
         async with connect(f"{server.url}?session=c"):
             pass
         assert json.loads(await read(f"{server.page}healthz"))["sessions"] == 2

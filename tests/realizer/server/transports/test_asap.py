@@ -1,4 +1,4 @@
-"""The Asap TCP door on loopback, with a client written from the description of the protocol alone."""
+"""The Asap TCP transport on loopback, with a client written only from the description of the protocol."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ def free_port(host: str = "127.0.0.1") -> int:
 
 
 class Client:
-    """Sends BML to one port; listens on another, but only once the first connection stands.
+    """A client that sends BML to one port, and listens on another once the first connection is open.
 
-    What comes back is one XML element after the other; an incremental parser, not a splitter of lines,
+    The feedback is one XML element after the other; an incremental parser, not a splitter of lines,
     finds their ends, as in the clients there are.
     """
 

@@ -1,4 +1,4 @@
-"""Bytes of a stream become documents, however they are cut into reads and whatever else comes with them."""
+"""The splitter of streams into documents: cuts, garbage and limits."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def test_framer_does_not_depend_on_how_a_stream_is_cut(pieces: list[str], cuts: 
 
 @given(st.binary(max_size=600))
 def test_framer_finds_the_next_document_after_any_bytes(garbage: bytes) -> None:
-    stream = garbage + b"\n" + NOD.encode() * 20  # one of them ends whatever the garbage began
+    stream = garbage + b"\n" + NOD.encode() * 20  # one of them ends any construct that the garbage has begun
     assert assemble(stream)[-1] == NOD
 
 
@@ -135,6 +135,6 @@ def test_framer_does_not_parse_a_slow_document_again_from_its_start(inside: str)
     assembler = DocumentFramer(2**20)
     for n in range(len(data) - 1):
         assert assembler.feed(data[n : n + 1]) == []
-        # What the next byte makes it look at again: never more than the longest mark.
+        # Bytes that each new byte makes it examine again: never more than the longest mark.
         assert len(assembler._data) - assembler._here <= 80
     assert assembler.feed(data[-1:]) == [data.decode()]

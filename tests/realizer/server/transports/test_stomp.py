@@ -1,4 +1,4 @@
-"""The STOMP door with a real ActiveMQ between it and a peer that speaks STOMP through stomp.py."""
+"""The STOMP transport with a real ActiveMQ, and a peer that uses stomp.py."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class Peer(stomp.ConnectionListener):
                 return found
 
     async def heard(self, last: str) -> list[str]:
-        """What components say, up to a text that begins with `last`."""
+        """Return the texts of components up to one that begins with `last`."""
         found: list[str] = []
         while not (found and found[-1].startswith(last)):
             _, headers, body = await self.queue.get()

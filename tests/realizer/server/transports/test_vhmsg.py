@@ -37,7 +37,7 @@ def spoken(dialect: Vhmsg, text: str) -> list[str]:
 
 
 def said(messages) -> list[str]:
-    """What messages say, decoded; their headers agree with it."""
+    """Return the decoded texts of messages, whose headers must match them."""
     for message in messages:
         assert message.topic == "/topic/DEFAULT_SCOPE"
         assert message.headers["ELVISH_SCOPE"] == "DEFAULT_SCOPE"

@@ -1,4 +1,4 @@
-"""A client is in a session from its greeting to its end, or is told why it is not."""
+"""WebSocket connections: admission, logs, frames and the end."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ TOKEN = "a-token-of-many-letters-and-0123456789"
 
 
 def closed(url: str, *messages: str, **settings: object) -> tuple[list[str], int, str]:
-    """What a client that says this is told before it is let go of, and the code and the reason of that."""
+    """Return the answers to a client whose first messages are these, and the code and reason of the close."""
 
     async def run() -> tuple[list[str], int, str]:
         told: list[str] = []

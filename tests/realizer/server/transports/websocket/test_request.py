@@ -1,4 +1,4 @@
-"""What an HTTP request says is read once, and answers say what browsers must know."""
+"""The requests of WebSockets, and HTTP responses."""
 
 from __future__ import annotations
 

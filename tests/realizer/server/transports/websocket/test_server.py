@@ -1,4 +1,4 @@
-"""The WebSocket door against clients that misbehave: limits with clear errors, and others notice nothing."""
+"""The WebSocket transport against clients that misbehave: limits, clear errors, and no effect on others."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def serving(test: Callable[[Server], Awaitable[None]], **settings: Any) -> None:
 
 
 def connect(url: str) -> dial:
-    """A client whose goodbye is not behind the frames that it has not read."""
+    """A client whose close frame does not wait behind frames that it has not read."""
     return dial(url, max_queue=None)
 
 
@@ -66,7 +66,7 @@ async def frames(socket: ClientConnection, count: int) -> list[int]:
 
 
 def flows(numbers: list[int]) -> bool:
-    """Frames come in order, each once. A machine that stands still for half a second loses some by itself."""
+    """Check that frames come in order, each once. A machine that stalls for half a second loses some."""
     return numbers == sorted(set(numbers)) and numbers[-1] - numbers[0] < 2 * len(numbers)
 
 
@@ -108,7 +108,7 @@ def test_websocket_shows_one_sender_and_three_viewers_the_same() -> None:
             assert len(shared) > 3 * 10
             assert all(one[key] == seen[0][key] for one in seen for key in shared)
             assert heard[0] == heard[1] == heard[2]
-            # Who sends gets its feedback and nothing else.
+            # The client that sends gets only its feedback.
             messages = []
             while not messages or 'id="b:end"' not in messages[-1]:
                 messages.append(str(await manager.recv()))
@@ -226,7 +226,7 @@ def test_websocket_survives_one_who_reconnects_again_and_again() -> None:
         async with connect(server.url) as viewer:
             await ask(viewer, type="subscribe", stream="fap", fps=25)
             for k in range(500):
-                # A name each: the sessions are kept, and make room for those that follow.
+                # A name for each: the sessions stay, and make room for those that follow.
                 async with connect(f"{server.url}?session=many-{k}"):
                     pass
             numbers = await frames(viewer, 25)

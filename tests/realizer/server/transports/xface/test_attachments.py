@@ -1,4 +1,4 @@
-"""What a task brings: a clip, documents, or why neither."""
+"""The attachments of tasks: clips, documents and their errors."""
 
 from __future__ import annotations
 

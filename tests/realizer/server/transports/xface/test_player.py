@@ -1,4 +1,4 @@
-"""The Xface player door against a player of the test's own, which reads, answers and shows as that does."""
+"""The Xface player transport against a rebuilt player, which reads, answers and shows as the real one."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from realizer.server.transports.xface.player import XfacePlayerTransport
 from realizer.server.transports.xface.server import XfaceTransport
 
 LIMIT = 30  # s; a hung test ends
-CHUNK = 40_000  # bytes that the player reads at once
+CHUNK = 40_000  # bytes of one read of the player
 TASK = re.compile(
     r'<task name="(\w+)" ownerId="(\d+)" taskId="(\d+)">(?:<param>(.*)</param>)?</task>\0', re.S
 )
@@ -27,7 +27,7 @@ ERROR = '<notify name="ERROR" ownerId="0" taskId="0" status="7"/>'
 
 
 class Player:
-    """A real socket server. It takes a read for a task, and shows what it loaded only when it is stopped.
+    """A real socket server. It takes each read for one task, and shows a clip only when it is stopped.
 
     Attributes:
         shown: the frames that were on its screen, {FAP: value that is not 0}.
@@ -119,7 +119,7 @@ def playing(test: Callable[[Server, Player], Awaitable[None]], **settings: objec
 
 
 async def hold(server: Server, text: str, session: str = "xface-player") -> None:
-    """Let the face of a session hold something."""
+    """Set FAPs of a session."""
     async with connect(f"{server.url}?session={session}") as client:
         await client.send(text)
         await client.send('{"type":"ping"}')

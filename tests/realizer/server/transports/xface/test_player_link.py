@@ -1,4 +1,4 @@
-"""What a player is sent and when, told the time: one task after the other, no frame sooner than it may."""
+"""The protocol of a player on a fake clock: one task after the other, and the least interval of frames."""
 
 from __future__ import annotations
 

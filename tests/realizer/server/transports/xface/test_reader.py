@@ -1,4 +1,4 @@
-"""Tasks out of a stream, however it is cut and whatever else is in it."""
+"""The parser of tasks: cuts, garbage and limits."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def test_reader_reports_an_absurd_size_and_does_not_wait(size: str) -> None:
 
 
 def test_reader_takes_linear_time_for_a_tag_that_never_ends() -> None:
-    # Where each letter began a search of its own this took a minute of processor time.
+    # A search from each letter would take a minute.
     everything = found(b"<task " + b"x" * 100_000 + b">" + b"y" * 3000 + b"\0" + NEXT)
     assert everything[-1] == STOP
 

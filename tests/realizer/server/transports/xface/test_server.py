@@ -1,4 +1,4 @@
-"""The Xface TCP door on loopback, with both published clients rebuilt from what is known of their bytes."""
+"""The Xface transport on loopback, with both published clients rebuilt from their known bytes."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class Client:
         return self.raw.decode()
 
     async def statuses(self, id: int, last: int = 3) -> list[int]:
-        """All statuses of a task, once `last` is there."""
+        """Return all statuses of a task, once `last` has arrived."""
         await self.until(lambda: any(note[2:] == (id, last) for note in self.notes))
         return [status for _, _, number, status in self.notes if number == id]
 
@@ -117,7 +117,7 @@ def note(name: bytes, id: int, *statuses: int) -> bytes:
 
 
 async def exchange(port: int, talk: list[tuple[bytes, bytes]]) -> None:
-    """Send what a client sends, byte by byte, and read exactly what must come back before it goes on."""
+    """Send the bytes of a client, and read exactly the expected answer before going on."""
     reader, writer = await asyncio.open_connection("127.0.0.1", port)
     for said, wanted in talk:
         for byte in said:
@@ -391,7 +391,7 @@ def test_xface_kill_app_ends_the_client_and_not_the_service() -> None:
 
 
 READ = ("ERROR", 1, 5, 7)
-# What is sent, and the note it is answered by: with the ids that could be read.
+# Bytes, and the note that answers them, with the ids that could be read.
 BAD = {
     "rubbish": (b"hello\0", ERROR),
     "binary": (bytes(range(1, 256)) + b"\0", ERROR),

@@ -27,7 +27,7 @@ def clip(*jaw: int, fps: float = 25) -> FAPClip:
 
 
 class Talk:
-    """A desk, and what it answers in short: ("NAME", id, status) for notes, text for the session."""
+    """A task runner with short answers: ("NAME", id, status) for notes, text for the session."""
 
     def __init__(self) -> None:
         self.desk = TaskRunner(1)
