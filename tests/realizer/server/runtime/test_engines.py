@@ -34,10 +34,10 @@ def clock() -> Clock:
 
 
 @pytest.fixture
-def studio(clock) -> Iterator[Engines]:
-    studio = Engines(clock=clock)
-    yield studio
-    studio.close()
+def engines(clock) -> Iterator[Engines]:
+    engines = Engines(clock=clock)
+    yield engines
+    engines.close()
 
 
 def order(width: int, form: str = "jpeg") -> Draw:
@@ -51,60 +51,60 @@ def width(picture: bytes) -> int:
 
 @pytest.mark.gl
 def test_engines_refuse_one_picture_too_many_and_draw_the_others(
-    studio, clock, monkeypatch: pytest.MonkeyPatch
+    engines, clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("realizer.server.runtime.engines.RENDERERS", 2)
     for k in range(2):
         clock.now = 0.1 * k
-        assert width(studio.draw(order(16 + k))) == 16 + k
-    refused = studio.draw(order(99))
+        assert width(engines.draw(order(16 + k))) == 16 + k
+    refused = engines.draw(order(99))
     assert isinstance(refused, RenderError)
     assert "different pictures" in str(refused)
     clock.now = 1.0
     for form in ("jpeg", "png", "webp"):
-        picture = studio.draw(order(17, form))
+        picture = engines.draw(order(17, form))
         assert Image.open(io.BytesIO(picture)).format == form.upper()
         assert width(picture) == 17
     # The first one is idle, and makes room.
     clock.now = IDLE + 0.5
-    assert width(studio.draw(order(99))) == 99
-    assert isinstance(studio.draw(order(16)), RenderError)
+    assert width(engines.draw(order(99))) == 99
+    assert isinstance(engines.draw(order(16)), RenderError)
 
 
 @pytest.mark.gl
 @pytest.mark.slow
 def test_engines_keep_a_renderer_that_takes_long_to_start(
-    studio, clock, monkeypatch: pytest.MonkeyPatch
+    engines, clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("realizer.server.runtime.engines.RENDERERS", 2)
-    assert width(studio.draw(order(16))) == 16
+    assert width(engines.draw(order(16))) == 16
     begins = clock.asked = threading.Event()
-    starting = studio.render_pool.submit(studio.draw, order(17))
+    starting = engines.render_pool.submit(engines.draw, order(17))
     assert begins.wait(60)
     clock.now = IDLE + 1.0
     clock.asked = None
     assert width(starting.result(60)) == 17
     # The first one has waited for the second to start, for longer than an idle one may.
-    assert isinstance(studio.draw(order(99)), RenderError)
-    assert width(studio.draw(order(16))) == 16
+    assert isinstance(engines.draw(order(99)), RenderError)
+    assert width(engines.draw(order(16))) == 16
     clock.now += IDLE
-    assert width(studio.draw(order(99))) == 99
+    assert width(engines.draw(order(99))) == 99
 
 
 @pytest.mark.gl
-def test_engines_keep_a_renderer_that_draws(studio, clock, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_engines_keep_a_renderer_that_draws(engines, clock, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("realizer.server.runtime.engines.RENDERERS", 1)
     begins = clock.asked = threading.Event()
-    drawing = studio.render_pool.submit(studio.draw, order(16))
+    drawing = engines.render_pool.submit(engines.draw, order(16))
     assert begins.wait(60)
     clock.asked = None
     clock.now = 2 * IDLE
-    assert isinstance(studio.draw(order(99)), RenderError)
+    assert isinstance(engines.draw(order(99)), RenderError)
     assert width(drawing.result(60)) == 16
 
 
 @pytest.mark.gl
-def test_engines_return_the_error_of_an_unknown_face(studio) -> None:
+def test_engines_return_the_error_of_an_unknown_face(engines) -> None:
     look = RenderOptions((16, 16), "front", None, None, 80)
-    answer = studio.draw(Draw(1, "nobody", np.zeros(68, np.float32), look))
+    answer = engines.draw(Draw(1, "nobody", np.zeros(68, np.float32), look))
     assert "nobody" in str(answer)

@@ -124,8 +124,8 @@ def serving(test: Callable[[Server, int, int], Awaitable[None]], loop=None, **se
         feedback = free_port()
         wanted = Settings(port=0, asap_ports=(0, feedback), voice="silent", **settings)
         async with asyncio.timeout(LIMIT), Server(wanted) as server:
-            (door,) = [d for d in server.transports if isinstance(d, AsapTransport)]
-            await test(server, door.port, feedback)
+            (transport,) = [d for d in server.transports if isinstance(d, AsapTransport)]
+            await test(server, transport.port, feedback)
 
     with asyncio.Runner(loop_factory=loop) as runner:
         runner.run(run())
@@ -476,9 +476,9 @@ def test_asap_applies_and_names_the_limits_of_the_service(limit: dict[str, int],
 
 def test_asap_prints_its_address_and_raises_if_it_is_in_use() -> None:
     async def test(server: Server, bml: int, port: int) -> None:
-        (door,) = [d for d in server.transports if isinstance(d, AsapTransport)]
+        (transport,) = [d for d in server.transports if isinstance(d, AsapTransport)]
         told = f"asap: BML at 127.0.0.1:{bml}, feedback to port {port} of the client, session asap-ADDRESS"
-        assert door.startup_lines == (told,)
+        assert transport.startup_lines == (told,)
         with pytest.raises(OSError, match="in use"):
             await Server(Settings(port=0, asap_ports=(bml, port))).start()
 

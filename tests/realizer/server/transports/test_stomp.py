@@ -96,21 +96,21 @@ class Peer(stomp.ConnectionListener):
         return found
 
 
-def door_of(server: Server) -> StompTransport:
-    (door,) = [d for d in server.transports if isinstance(d, StompTransport)]
-    return door
+def transport_of(server: Server) -> StompTransport:
+    (transport,) = [d for d in server.transports if isinstance(d, StompTransport)]
+    return transport
 
 
 def serving(
     test: Callable[[Server], Awaitable[None]], address: str, *, ready: bool = True, **settings
 ) -> None:
-    """Run a test against a service of its own, once its door is ready."""
+    """Run a test against a service of its own, once its transport is ready."""
 
     async def run() -> None:
         wanted = Settings(port=0, stomp=address, voice="silent", **settings)
         async with asyncio.timeout(LIMIT), Server(wanted) as server:
             if ready:
-                await door_of(server).ready()
+                await transport_of(server).ready()
             await test(server)
 
     asyncio.run(run())
@@ -265,7 +265,7 @@ def test_stomp_topics_are_settings_and_may_be_off(broker) -> None:
     }
 
     async def test(server: Server) -> None:
-        assert door_of(server).startup_lines == (
+        assert transport_of(server).startup_lines == (
             f"stomp: {broker.address} reads /topic/mine.in in session stomp-json, "
             "/topic/MINE in session stomp-vhmsg",
         )
@@ -287,11 +287,11 @@ def test_stomp_leaves_when_a_component_kills_it(broker) -> None:
             await peer.heard("vrAgentBML Brad ALL m1 start")
             peer.say("vrKillComponent renderer")
             await peer.heard("vrAgentBML Brad ALL m1 end interrupted")
-            leaving = door_of(server)._leaving
+            leaving = transport_of(server)._leaving
             assert leaving is not None
             await leaving
             assert server._sessions.health()["connections"] == 0
-            async with connect(server.url) as socket:  # the other doors stay open
+            async with connect(server.url) as socket:  # the other transports stay open
                 await socket.send(WAIT.format("b", 0))
                 assert "feedback" in str(await socket.recv()).lower()
 
@@ -302,7 +302,7 @@ def test_stomp_reports_the_end_of_the_service(broker) -> None:
     async def run() -> None:
         async with asyncio.timeout(LIMIT), Peer(broker.port, "/topic/DEFAULT_SCOPE") as peer:
             async with Server(Settings(port=0, stomp=broker.address, voice="silent")) as server:
-                await door_of(server).ready()
+                await transport_of(server).ready()
                 peer.say("vrSpeak Brad ALL m1 " + WAIT.format("b", 60))
                 await peer.heard("vrAgentBML Brad ALL m1 start")
             await peer.heard("vrAgentBML Brad ALL m1 end interrupted")
@@ -311,8 +311,8 @@ def test_stomp_reports_the_end_of_the_service(broker) -> None:
 
 
 async def gone(server: Server) -> None:
-    """Wait until the door knows that its broker is away."""
-    while door_of(server)._broker is not None:
+    """Wait until the transport knows that its broker is away."""
+    while transport_of(server)._broker is not None:
         await asyncio.sleep(0)
 
 
@@ -329,11 +329,11 @@ def test_stomp_reconnects_to_a_broker_that_dies(own_broker, caplog) -> None:
         await gone(server)
         while server._sessions.busy:  # what plays, plays on
             await asyncio.sleep(0)
-        door = door_of(server)
-        assert any("over%3Aend" in message.body for message in door._out)
-        door._up.clear()
+        transport = transport_of(server)
+        assert any("over%3Aend" in message.body for message in transport._out)
+        transport._up.clear()
         await asyncio.to_thread(own_broker.start)
-        await door.ready()
+        await transport.ready()
         async with Peer(own_broker_port, "/topic/bmlFeedback") as peer:
             peer.ask(WAIT.format("after", 0))
             await peer.feedback("after:end")
@@ -349,11 +349,11 @@ def test_stomp_reconnects_to_a_broker_that_dies(own_broker, caplog) -> None:
 
 def test_stomp_logs_once_that_there_is_no_broker_and_waits(own_broker, caplog) -> None:
     async def test(server: Server) -> None:
-        async with connect(server.url) as socket:  # the other doors are open already
+        async with connect(server.url) as socket:  # the other transports are open already
             await socket.send('{"type":"ping"}')
             assert "pong" in str(await socket.recv())
         await asyncio.to_thread(own_broker.start)
-        await door_of(server).ready()
+        await transport_of(server).ready()
         async with Peer(own_broker.port, "/topic/bmlFeedback") as peer:
             peer.ask(WAIT.format("b", 0))
             await peer.feedback("b:end")
@@ -373,10 +373,10 @@ def test_stomp_reconnects_if_the_broker_falls_silent(own_broker, monkeypatch, ca
     async def test(server: Server) -> None:
         own_broker.freeze()
         await gone(server)
-        door = door_of(server)
-        door._up.clear()
+        transport = transport_of(server)
+        transport._up.clear()
         own_broker.thaw()
-        await door.ready()
+        await transport.ready()
         async with Peer(own_broker.port, "/topic/bmlFeedback") as peer:
             peer.ask(WAIT.format("b", 0))
             await peer.feedback("b:end")

@@ -171,7 +171,9 @@ def test_player_may_be_another_service() -> None:
     async def run() -> None:
         common = {"port": 0, "voice": "silent", "idle": False}
         async with asyncio.timeout(LIMIT), Server(Settings(**common, xface_port=0)) as showing:  # type: ignore[arg-type]
-            port = next(door for door in showing.transports if isinstance(door, XfaceTransport)).port
+            port = next(
+                transport for transport in showing.transports if isinstance(transport, XfaceTransport)
+            ).port
             pushing = Settings(**common, xface_player=f"127.0.0.1:{port}", xface_player_interval=0.0)  # type: ignore[arg-type]
             async with Server(pushing) as server, connect(f"{showing.url}?session=xface-127.0.0.1") as viewer:
                 await hold(server, '{"type":"set","faps":{"open_jaw":500}}')
@@ -185,9 +187,13 @@ def test_player_may_be_another_service() -> None:
 
 def test_player_prints_its_line_once_it_is_greeted() -> None:
     async def test(server: Server, player: Player) -> None:
-        door = next(door for door in server.transports if isinstance(door, XfacePlayerTransport))
-        await door.ready()
-        assert door.startup_lines == (f"xface player: 127.0.0.1:{player.port} shows session xface-player",)
+        transport = next(
+            transport for transport in server.transports if isinstance(transport, XfacePlayerTransport)
+        )
+        await transport.ready()
+        assert transport.startup_lines == (
+            f"xface player: 127.0.0.1:{player.port} shows session xface-player",
+        )
 
     playing(test)
 

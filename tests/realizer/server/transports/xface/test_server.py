@@ -88,22 +88,26 @@ def serving(test: Callable[[Server, XfaceTransport], Awaitable[None]], **setting
     async def run() -> None:
         chosen = Settings(port=0, xface_port=0, idle=False, voice="silent", **settings)  # type: ignore[arg-type]
         async with asyncio.timeout(LIMIT), Server(chosen) as server:
-            door = next(door for door in server.transports if isinstance(door, XfaceTransport))
-            await test(server, door)
+            transport = next(
+                transport for transport in server.transports if isinstance(transport, XfaceTransport)
+            )
+            await test(server, transport)
 
     asyncio.run(run())
 
 
 def test_xface_prints_its_address() -> None:
-    async def test(server: Server, door: XfaceTransport) -> None:
-        assert door.startup_lines == (f"xface: tasks at 127.0.0.1:{door.port}, session xface-ADDRESS",)
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        assert transport.startup_lines == (
+            f"xface: tasks at 127.0.0.1:{transport.port}, session xface-ADDRESS",
+        )
 
     serving(test)
 
 
 def test_xface_sends_the_literal_greeting_that_clients_compare() -> None:
-    async def test(server: Server, door: XfaceTransport) -> None:
-        async with Client(door.port) as first, Client(door.port) as second:
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        async with Client(transport.port) as first, Client(transport.port) as second:
             wanted = b'<notify name="CONNECTION_OK" ownerId="1" taskId="0" status="0"/>\0\0'
             assert first.raw == wanted
             assert second.raw == wanted.replace(b'ownerId="1"', b'ownerId="2"')
@@ -159,8 +163,8 @@ def test_xface_serves_the_player_s_own_client_byte_by_byte() -> None:
         (b'<task name="KILL_APP" ownerId="1" taskId="1000006">\n</task>\0', note(b"KILL_APP", 1000006, 3)),
     ]
 
-    async def test(server: Server, door: XfaceTransport) -> None:
-        await exchange(door.port, talk)
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        await exchange(transport.port, talk)
 
     serving(test)
 
@@ -177,15 +181,15 @@ def test_xface_serves_the_streaming_client_byte_by_byte() -> None:
         talk.append((upload % (id, JAW, 100 * id), note(b"UPLOAD_FAP", id, 1, 2, 3)))
         talk.append((stop % (id + 1), note(b"STOP_PLAYBACK", id + 1, 1, 3)))
 
-    async def test(server: Server, door: XfaceTransport) -> None:
-        await exchange(door.port, talk)
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        await exchange(transport.port, talk)
 
     serving(test)
 
 
 def test_xface_uploads_plays_and_stops_for_the_player_s_own_client() -> None:
-    async def test(server: Server, door: XfaceTransport) -> None:
-        async with Client(door.port) as client:
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        async with Client(transport.port) as client:
             client.send(task("UPLOAD_FAP", client.owner, 1000001, fap(1000)))
             assert await client.statuses(1000001) == [1, 2, 3]
             client.send(task("RESUME_PLAYBACK", client.owner, 1000002))
@@ -199,8 +203,8 @@ def test_xface_uploads_plays_and_stops_for_the_player_s_own_client() -> None:
 
 
 def test_xface_finishes_playback_when_the_file_ends() -> None:
-    async def test(server: Server, door: XfaceTransport) -> None:
-        async with Client(door.port) as client:
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        async with Client(transport.port) as client:
             client.send(task("UPLOAD_FAP", 1, 1, fap(5)) + task("RESUME_PLAYBACK", 1, 2))
             assert await client.statuses(2) == [1, 2, 3]
 
@@ -221,8 +225,8 @@ async def face(server: Server, wanted: Callable[[list[int]], bool], after: Calla
 def test_xface_moves_the_face_for_the_streaming_client_without_nuls() -> None:
     """Its files have one frame, a fixed Windows path for a name, and no FAP that is 0."""
 
-    async def test(server: Server, door: XfaceTransport) -> None:
-        async with Client(door.port) as client:
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        async with Client(transport.port) as client:
 
             def send(value: int, id: int) -> None:
                 mask = MASK.replace("1", "0", 0) if value else " ".join("0" * 68)
@@ -244,15 +248,15 @@ def test_xface_moves_the_face_for_the_streaming_client_without_nuls() -> None:
 
 
 def test_xface_shows_a_frame_of_the_next_client_alone() -> None:
-    async def test(server: Server, door: XfaceTransport) -> None:
-        async with Client(door.port) as first:
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        async with Client(transport.port) as first:
             await face(
                 server,
                 lambda values: values[2] == 300,
                 lambda: first.send(task("UPLOAD_FAP", 1, 1, fap(1, 300))),
             )
         head = fap(1).replace(MASK, " ".join("1" if n == 48 else "0" for n in range(1, 69)))
-        async with Client(door.port) as second:
+        async with Client(transport.port) as second:
             await face(
                 server,
                 lambda values: values[2] == 0 and values[47] == 9,
@@ -263,8 +267,8 @@ def test_xface_shows_a_frame_of_the_next_client_alone() -> None:
 
 
 def test_xface_shows_a_file_to_viewers() -> None:
-    async def test(server: Server, door: XfaceTransport) -> None:
-        async with Client(door.port) as client:
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        async with Client(transport.port) as client:
 
             def play() -> None:
                 client.send(task("UPLOAD_FAP", 1, 1, fap(50)) + task("RESUME_PLAYBACK", 1, 2))
@@ -277,8 +281,8 @@ def test_xface_shows_a_file_to_viewers() -> None:
 @pytest.mark.parametrize("end", ["", "\0", "\0\0", "\n\0", "\r\n"])
 @pytest.mark.parametrize("cut", [1, 7, 100, 10_000])
 def test_xface_reads_tasks_cut_anywhere_with_any_end(end: str, cut: int) -> None:
-    async def test(server: Server, door: XfaceTransport) -> None:
-        async with Client(door.port) as client:
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        async with Client(transport.port) as client:
             data = "".join(task("UPLOAD_FAP", 1, id, fap(2), end=end) for id in (1, 2, 3)).encode()
             for begin in range(0, len(data), cut):
                 client.send(data[begin : begin + cut])
@@ -290,8 +294,8 @@ def test_xface_reads_tasks_cut_anywhere_with_any_end(end: str, cut: int) -> None
 
 
 def test_xface_starts_and_finishes_a_script_with_its_blocks() -> None:
-    async def test(server: Server, door: XfaceTransport) -> None:
-        async with Client(door.port) as client:
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        async with Client(transport.port) as client:
             script = SCRIPT.format("a") + SCRIPT.format("b").replace(" id=", ' composition="APPEND" id=', 1)
             client.send(task("UPLOAD_SCRIPT", 1, 9, script, "BML"))
             assert await client.statuses(9) == [1, 2, 3]
@@ -300,8 +304,8 @@ def test_xface_starts_and_finishes_a_script_with_its_blocks() -> None:
 
 
 def test_xface_ends_a_script_at_a_stop() -> None:
-    async def test(server: Server, door: XfaceTransport) -> None:
-        async with Client(door.port) as client:
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        async with Client(transport.port) as client:
             client.send(
                 task("UPLOAD_SCRIPT", 1, 9, '<bml id="a"><wait id="w" duration="1000"/></bml>', "BML")
             )
@@ -334,8 +338,8 @@ def test_xface_ends_a_script_at_a_stop() -> None:
     ],
 )
 def test_xface_reports_a_script_that_cannot_be_played(params: tuple[str, ...], statuses: list[int]) -> None:
-    async def test(server: Server, door: XfaceTransport) -> None:
-        async with Client(door.port) as client:
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        async with Client(transport.port) as client:
             client.send(task("UPLOAD_SCRIPT", 1, 9, *params))
             assert await client.statuses(9, last=7) == statuses
 
@@ -343,8 +347,8 @@ def test_xface_reports_a_script_that_cannot_be_played(params: tuple[str, ...], s
 
 
 def test_xface_reports_a_bad_file_and_finishes_as_clients_expect() -> None:
-    async def test(server: Server, door: XfaceTransport) -> None:
-        async with Client(door.port) as client:
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        async with Client(transport.port) as client:
             client.send(task("UPLOAD_FAP", 1, 1, "hello world"))
             assert await client.statuses(1) == [1, 7, 3]
             client.send(task("UPLOAD_FAP", 1, 2, ""))
@@ -358,8 +362,8 @@ def test_xface_reports_a_bad_file_and_finishes_as_clients_expect() -> None:
 def test_xface_loads_files_of_the_media_folder(tmp_path: Path) -> None:
     (tmp_path / "clip.fap").write_text(fap(3))
 
-    async def test(server: Server, door: XfaceTransport) -> None:
-        async with Client(door.port) as client:
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        async with Client(transport.port) as client:
             client.send(task("LOAD_FAP", 1, 1, "C:\\faps\\clip.fap"))
             assert await client.statuses(1) == [1, 2, 3]
             client.send(task("LOAD_FAP", 1, 2, "../../etc/passwd"))
@@ -369,8 +373,8 @@ def test_xface_loads_files_of_the_media_folder(tmp_path: Path) -> None:
 
 
 def test_xface_sends_no_notes_to_owner_0() -> None:
-    async def test(server: Server, door: XfaceTransport) -> None:
-        async with Client(door.port) as client:
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        async with Client(transport.port) as client:
             client.send(task("UPLOAD_FAP", 0, 1, fap(2)) + task("UPLOAD_FAP", 1, 2, fap(2)))
             await client.statuses(2)
             assert {note[2] for note in client.notes} == {2}
@@ -379,8 +383,8 @@ def test_xface_sends_no_notes_to_owner_0() -> None:
 
 
 def test_xface_kill_app_ends_the_client_and_not_the_service() -> None:
-    async def test(server: Server, door: XfaceTransport) -> None:
-        async with Client(door.port) as client, Client(door.port) as other:
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        async with Client(transport.port) as client, Client(transport.port) as other:
             client.send(task("KILL_APP", 1, 1))
             assert await client.statuses(1) == [3]
             assert await client.reader.read() == b""
@@ -411,8 +415,8 @@ BAD = {
 def test_xface_reports_one_error_and_reads_the_next_task(
     data: bytes, note: tuple[str, int, int, int]
 ) -> None:
-    async def test(server: Server, door: XfaceTransport) -> None:
-        async with Client(door.port) as client:
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        async with Client(transport.port) as client:
             client.send(data + task("STOP_PLAYBACK", 1, 9).encode())
             assert await client.statuses(9) == [1, 3]
             assert client.notes[0] == note
@@ -426,8 +430,8 @@ def test_xface_refuses_a_task_that_is_too_large(
 ) -> None:
     monkeypatch.setattr(xface, "LIMIT", 100_000)
 
-    async def test(server: Server, door: XfaceTransport) -> None:
-        async with Client(door.port) as client, Client(door.port) as other:
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        async with Client(transport.port) as client, Client(transport.port) as other:
             client.send(task("UPLOAD_FAP", 1, 5, "9 " * 500_000))
             other.send(task("UPLOAD_FAP", 2, 6, fap(3)))
             assert await other.statuses(6) == [1, 2, 3]
@@ -439,8 +443,8 @@ def test_xface_refuses_a_task_that_is_too_large(
 
 
 def test_xface_loads_a_million_bytes_of_frames() -> None:
-    async def test(server: Server, door: XfaceTransport) -> None:
-        async with Client(door.port) as client:
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        async with Client(transport.port) as client:
             client.send(task("UPLOAD_FAP", 1, 5, fap(7000)))
             assert await client.statuses(5) == [1, 2, 3]
 
@@ -448,10 +452,10 @@ def test_xface_loads_a_million_bytes_of_frames() -> None:
 
 
 def test_xface_accepts_a_thousand_connections_one_after_the_other() -> None:
-    async def test(server: Server, door: XfaceTransport) -> None:
-        async with Client(door.port) as other:
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        async with Client(transport.port) as other:
             for _ in range(1000):
-                async with Client(door.port):
+                async with Client(transport.port):
                     pass
             other.send(task("STOP_PLAYBACK", 1, 2))
             assert await other.statuses(2) == [1, 3]
@@ -460,9 +464,9 @@ def test_xface_accepts_a_thousand_connections_one_after_the_other() -> None:
 
 
 def test_xface_refuses_connections_beyond_the_limit_at_once() -> None:
-    async def test(server: Server, door: XfaceTransport) -> None:
-        async with Client(door.port) as one:
-            pairs = [await asyncio.open_connection("127.0.0.1", door.port) for _ in range(300)]
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        async with Client(transport.port) as one:
+            pairs = [await asyncio.open_connection("127.0.0.1", transport.port) for _ in range(300)]
             first = [await reader.readuntil(b"\0\0") for reader, _ in pairs]
             refused = b'<notify name="ERROR" ownerId="0" taskId="0" status="7"/>\0\0'
             assert sum(answer == refused for answer in first) == 300 - (xface.MAX_CLIENTS - 1)
@@ -477,9 +481,9 @@ def test_xface_refuses_connections_beyond_the_limit_at_once() -> None:
 def test_xface_limits_the_number_of_clients(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(xface, "MAX_CLIENTS", 2)
 
-    async def test(server: Server, door: XfaceTransport) -> None:
-        async with Client(door.port) as one, Client(door.port):
-            reader, writer = await asyncio.open_connection("127.0.0.1", door.port)
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        async with Client(transport.port) as one, Client(transport.port):
+            reader, writer = await asyncio.open_connection("127.0.0.1", transport.port)
             assert await reader.read() == b'<notify name="ERROR" ownerId="0" taskId="0" status="7"/>\0\0'
             writer.close()
             one.send(task("STOP_PLAYBACK", 1, 2))
@@ -491,8 +495,8 @@ def test_xface_limits_the_number_of_clients(monkeypatch: pytest.MonkeyPatch) -> 
 def test_xface_reads_a_flood_slowly_and_loses_nothing(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    async def test(server: Server, door: XfaceTransport) -> None:
-        async with Client(door.port) as client:
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        async with Client(transport.port) as client:
             for id in range(1, 9):
                 client.send(task("UPLOAD_FAP", client.owner, id, fap(1)))
             assert await client.statuses(8) == [1, 2, 3]
@@ -502,9 +506,9 @@ def test_xface_reads_a_flood_slowly_and_loses_nothing(
 
 
 def test_xface_limits_the_connections_of_an_address() -> None:
-    async def test(server: Server, door: XfaceTransport) -> None:
-        async with Client(door.port) as client:
-            reader, writer = await asyncio.open_connection("127.0.0.1", door.port)
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        async with Client(transport.port) as client:
+            reader, writer = await asyncio.open_connection("127.0.0.1", transport.port)
             assert await reader.read() == b""
             writer.transport.abort()
             client.send(task("UPLOAD_FAP", client.owner, 1, fap(1)))
@@ -514,8 +518,8 @@ def test_xface_limits_the_connections_of_an_address() -> None:
 
 
 def test_xface_stops_reading_a_client_that_never_reads() -> None:
-    async def test(server: Server, door: XfaceTransport) -> None:
-        async with Client(door.port) as deaf, Client(door.port) as other:
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        async with Client(transport.port) as deaf, Client(transport.port) as other:
             deaf.reader._transport.pause_reading()  # type: ignore[attr-defined]
             for _ in range(200):
                 deaf.send(task("RENDER_FRAME", 1, 5) * 500)
@@ -526,8 +530,8 @@ def test_xface_stops_reading_a_client_that_never_reads() -> None:
 
 
 def test_xface_skips_sound_files_and_waits_for_half_of_one() -> None:
-    async def test(server: Server, door: XfaceTransport) -> None:
-        async with Client(door.port) as client, Client(door.port) as half:
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        async with Client(transport.port) as client, Client(transport.port) as half:
             half.send(task("UPLOAD_WAV", 2, 1, "a.wav", "1000") + "RIFF")
             client.send(task("UPLOAD_WAV", 1, 1, "a.wav", "1000"))
             assert await client.statuses(1, last=7) == [1, 7]

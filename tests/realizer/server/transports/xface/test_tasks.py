@@ -30,14 +30,14 @@ class Talk:
     """A task runner with short answers: ("NAME", id, status) for notes, text for the session."""
 
     def __init__(self) -> None:
-        self.desk = TaskRunner(1)
+        self.runner = TaskRunner(1)
         self.count = 0
         self.now = 0.0
 
     def ask(self, name: str, brought: Attachment = None) -> list[object]:
         self.count += 1
         task = Task(name, 1, self.count)
-        return self._short([*self.desk.accept(task), *self.desk.run(task, brought, self.now)])
+        return self._short([*self.runner.accept(task), *self.runner.run(task, brought, self.now)])
 
     def tell(self, id: str, *, warning: bool = False) -> list[object]:
         feedback = (
@@ -45,7 +45,7 @@ class Talk:
             if warning
             else BlockProgress(id=id, global_time=self.now)
         )
-        return self._short(self.desk.on_feedback(feedback.to_xml(), self.now))
+        return self._short(self.runner.on_feedback(feedback.to_xml(), self.now))
 
     def _short(self, answers: Iterable[Answer]) -> list[object]:
         out: list[object] = []
@@ -229,15 +229,15 @@ def test_task_runner_fails_tasks_of_xface_s_own_player(name: str) -> None:
 
 def test_task_runner_answers_an_unknown_task_with_its_ids() -> None:
     talk = Talk()
-    assert talk._short(talk.desk.accept(Task("DANCE", 1, 5))) == [("ERROR", 5, 7)]
-    assert talk._short(talk.desk.refuse(Task("", 1, 5))) == [("ERROR", 5, 7)]
-    assert talk._short(talk.desk.refuse(Task("UPLOAD_FAP", 1, 5))) == [("UPLOAD_FAP", 5, 7)]
+    assert talk._short(talk.runner.accept(Task("DANCE", 1, 5))) == [("ERROR", 5, 7)]
+    assert talk._short(talk.runner.refuse(Task("", 1, 5))) == [("ERROR", 5, 7)]
+    assert talk._short(talk.runner.refuse(Task("UPLOAD_FAP", 1, 5))) == [("UPLOAD_FAP", 5, 7)]
 
 
 @pytest.mark.parametrize("name", sorted(ABLE | UNABLE))
 def test_task_runner_sends_no_notes_to_owner_0(name: str) -> None:
-    desk, task = TaskRunner(1), Task(name, 0, 5)
-    assert not [a for a in (*desk.accept(task), *desk.run(task, None, 0.0)) if isinstance(a, bytes)]
+    runner, task = TaskRunner(1), Task(name, 0, 5)
+    assert not [a for a in (*runner.accept(task), *runner.run(task, None, 0.0)) if isinstance(a, bytes)]
 
 
 def test_task_runner_kill_app_finishes_and_disconnects() -> None:
