@@ -19,17 +19,16 @@ from realizer.server.runtime.session_registry import JoinError
 from realizer.server.transports.broker import BrokerConnection, check_installed
 from realizer.server.transports.message_format import Disconnect, Inbound, Message, MessageFormat
 from realizer.server.transports.message_formats import MESSAGE_FORMATS
+from realizer.server.transports.reconnecting import ReconnectingTransport
 
 log = logging.getLogger(__name__)
 
-FIRST_RETRY = 0.2  # s
-LAST_RETRY = 10.0  # s
 ATTEMPT = 5.0  # s; to connect, and to disconnect
 # Messages that wait for the broker; beyond it the oldest are dropped.
 MAX_QUEUED = 4 * 2**20  # characters
 
 
-class StompTransport:
+class StompTransport(ReconnectingTransport):
     """A client of the broker at `settings.stomp`, which reconnects whenever the connection is lost.
 
     Each message format has a session, named as in MESSAGE_FORMATS, which begins with the first message and
@@ -38,8 +37,7 @@ class StompTransport:
 
     def __init__(self, sessions: SessionHost, settings: Settings) -> None:
         assert settings.stomp is not None
-        host, _, port = settings.stomp.rpartition(":")
-        self._address = (host.strip("[]"), int(port))
+        super().__init__("stomp", settings.stomp)
         self._sessions = sessions
         self._settings = settings
         self._links = [
@@ -53,22 +51,16 @@ class StompTransport:
         self._out: deque[Message] = deque()
         self._size = 0  # characters in _out
         self._news = asyncio.Event()
-        self._up = asyncio.Event()
-        self._keeper: asyncio.Task[None] | None = None
         self._leaving: asyncio.Task[None] | None = None
 
     @property
     def startup_lines(self) -> tuple[str, ...]:
         names = ", ".join(f"{link.format.topic} in session {link.name}" for link in self._links)
-        return (f"stomp: {self._settings.stomp} reads {names}",)
+        return (f"stomp: {self._peer} reads {names}",)
 
     async def start(self) -> None:
         check_installed()
-        self._loop = asyncio.get_running_loop()
-        self._keeper = asyncio.create_task(self._keep_connected())
-
-    async def ready(self) -> None:
-        await self._up.wait()
+        await super().start()
 
     def stop_accepting(self) -> None:
         """Go on reading: the sessions answer documents with a refusal."""
@@ -86,10 +78,7 @@ class StompTransport:
             async with asyncio.timeout(ATTEMPT):
                 while self._out and self._broker is not None:
                     await asyncio.sleep(0.01)
-        if self._keeper is not None:
-            self._keeper.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await self._keeper
+        await super().close()
         self._thread.shutdown(wait=False)
 
     # messages -----------------------------------------------------------------------------------
@@ -137,30 +126,20 @@ class StompTransport:
 
     # the connection -----------------------------------------------------------------------------
 
-    async def _keep_connected(self) -> None:
-        """Connect, and reconnect whenever the connection is lost, until cancelled."""
-        pause = FIRST_RETRY
-        logged = False
-        while True:
-            broker = BrokerConnection(self._loop, self._take, ATTEMPT)
-            try:
-                await self._connect(broker)
-                level = logging.WARNING if logged else logging.INFO
-                log.log(level, "stomp: connected to %s", self._settings.stomp)
-                pause, logged = FIRST_RETRY, False
-                await self._send_queue(broker)
-                words = "the broker at %s is gone%s; looking for it"
-            except (OSError, RealizerError) as error:
-                broker.fault = broker.fault or str(error)
-                words = "no broker at %s%s; looking for it"
-            finally:
-                self._broker = None
-                await asyncio.shield(self._disconnect(broker))
-            if not logged:
-                log.warning("stomp: " + words, self._settings.stomp, broker.fault and f" ({broker.fault})")
-                logged = True
-            await asyncio.sleep(pause)
-            pause = min(2 * pause, LAST_RETRY)
+    async def _serve(self, connected: Callable[[], None]) -> str:
+        broker = BrokerConnection(self._loop, self._take, ATTEMPT)
+        try:
+            await self._connect(broker)
+            connected()
+            await self._send_queue(broker)
+            reason = f"the broker at {self._peer} is gone"
+        except (OSError, RealizerError) as error:
+            broker.fault = broker.fault or str(error)
+            reason = f"no broker at {self._peer}"
+        finally:
+            self._broker = None
+            await asyncio.shield(self._disconnect(broker))
+        return f"{reason} ({broker.fault})" if broker.fault else reason
 
     async def _connect(self, broker: BrokerConnection) -> None:
         s = self._settings

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import json
 import logging
+from collections.abc import Callable
 
 from realizer.core.settings import Settings
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError
+from realizer.server.transports.reconnecting import ReconnectingTransport
 from realizer.server.transports.xface.player_link import PlayerLink, State
 
 log = logging.getLogger(__name__)
 
-FIRST_RETRY = 0.2  # s
-LAST_RETRY = 10.0  # s
 ATTEMPT = 5.0  # s; to connect, and for the greeting
 READ = 4096  # bytes
 STUCK = 2**18  # bytes that the player has not read: hundreds of frames
@@ -26,7 +25,7 @@ WANTS = (
 )
 
 
-class XfacePlayerTransport:
+class XfacePlayerTransport(ReconnectingTransport):
     """A client of the player at `settings.xface_player`, which reconnects whenever the connection is lost.
 
     The player shows the first character of the session `settings.xface_player_session`.
@@ -34,36 +33,19 @@ class XfacePlayerTransport:
 
     def __init__(self, sessions: SessionHost, settings: Settings) -> None:
         assert settings.xface_player is not None
-        host, _, port = settings.xface_player.rpartition(":")
-        self._address = (host.strip("[]"), int(port))
-        self._settings = settings
+        super().__init__("xface player", settings.xface_player)
+        self._session = settings.xface_player_session
         self._sessions = sessions
         self._link = PlayerLink(settings.xface_player_interval)
         self._writer: asyncio.StreamWriter | None = None
         self._timer: asyncio.TimerHandle | None = None
-        self._up = asyncio.Event()
-        self._keeper: asyncio.Task[None] | None = None
 
     @property
     def startup_lines(self) -> tuple[str, ...]:
-        settings = self._settings
-        return (f"xface player: {settings.xface_player} shows session {settings.xface_player_session}",)
-
-    async def start(self) -> None:
-        self._loop = asyncio.get_running_loop()
-        self._keeper = asyncio.create_task(self._keep_connected())
-
-    async def ready(self) -> None:
-        await self._up.wait()
+        return (f"xface player: {self._peer} shows session {self._session}",)
 
     def stop_accepting(self) -> None:
         """Go on: what plays is shown to its end."""
-
-    async def close(self) -> None:
-        if self._keeper is not None:
-            self._keeper.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await self._keeper
 
     # the session's side --------------------------------------------------------------------------
 
@@ -80,35 +62,24 @@ class XfacePlayerTransport:
                 self._pump()
 
     def disconnect(self, code: int, reason: str) -> None:
-        log.warning("xface player: session %s ends: %s", self._settings.xface_player_session, reason)
+        log.warning("xface player: session %s ends: %s", self._session, reason)
         if self._writer is not None:
-            self._writer.transport.abort()  # `_keep_connected` opens another one
+            self._writer.transport.abort()  # another one will be opened
 
     # the player's side ---------------------------------------------------------------------------
 
-    async def _keep_connected(self) -> None:
-        """Connect, and reconnect whenever the connection is lost, until cancelled."""
-        name = self._settings.xface_player
-        pause, logged = FIRST_RETRY, False
-        while True:
-            try:
-                reader = await self._connect()
-                level = logging.WARNING if logged else logging.INFO
-                log.log(level, "xface player: connected to %s", name)
-                pause, logged = FIRST_RETRY, False
-                await self._show(reader)
-                words = f"the player at {name} is gone"
-            except JoinError as error:
-                words = str(error)
-            except OSError as error:  # also TimeoutError
-                words = f"no player at {name} ({error.strerror or str(error) or 'nobody answers'})"
-            finally:
-                self._part()
-            if not logged:
-                log.warning("xface player: %s; looking for it", words)
-                logged = True
-            await asyncio.sleep(pause)
-            pause = min(2 * pause, LAST_RETRY)
+    async def _serve(self, connected: Callable[[], None]) -> str:
+        try:
+            reader = await self._connect()
+            connected()
+            await self._show(reader)
+            return f"the player at {self._peer} is gone"
+        except JoinError as error:
+            return str(error)
+        except OSError as error:  # also TimeoutError
+            return f"no player at {self._peer} ({error.strerror or str(error) or 'nobody answers'})"
+        finally:
+            self._part()
 
     async def _connect(self) -> asyncio.StreamReader:
         """Connect to the player and wait for its greeting."""
@@ -125,7 +96,7 @@ class XfacePlayerTransport:
 
     async def _show(self, reader: asyncio.StreamReader) -> None:
         """Show the frames of the session until the connection is lost."""
-        number = self._sessions.join(self, self._settings.xface_player_session)
+        number = self._sessions.join(self, self._session)
         self._up.set()
         try:
             for wants in WANTS:
@@ -147,7 +118,7 @@ class XfacePlayerTransport:
         while (task := self._link.due(now)) is not None:
             self._writer.write(task)
         if self._writer.transport.get_write_buffer_size() > STUCK:
-            log.warning("xface player: %s reads nothing and is disconnected", self._settings.xface_player)
+            log.warning("xface player: %s reads nothing and is disconnected", self._peer)
             self._writer.transport.abort()
         if (at := self._link.next_deadline()) is not None:
             self._timer = self._loop.call_at(at, self._pump)

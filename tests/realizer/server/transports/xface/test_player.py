@@ -14,6 +14,7 @@ from realizer.animation.fap.fap_reader import read_fap
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
 from realizer.server.serve import Server
+from realizer.server.transports import reconnecting
 from realizer.server.transports.xface import player as xface_player
 from realizer.server.transports.xface.player import XfacePlayerTransport
 from realizer.server.transports.xface.server import XfaceTransport
@@ -199,8 +200,8 @@ def test_player_prints_its_line_once_it_is_greeted() -> None:
 
 
 def test_player_that_comes_back_is_found_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(xface_player, "FIRST_RETRY", 0.01)
-    monkeypatch.setattr(xface_player, "LAST_RETRY", 0.02)
+    monkeypatch.setattr(reconnecting, "FIRST_RETRY", 0.01)
+    monkeypatch.setattr(reconnecting, "LAST_RETRY", 0.02)
 
     async def test(server: Server, player: Player) -> None:
         await hold(server, '{"type":"set","faps":{"open_jaw":500}}')
@@ -216,7 +217,7 @@ def test_player_that_comes_back_is_found_again(monkeypatch: pytest.MonkeyPatch) 
 
 @pytest.mark.parametrize("lost", ["a session that fails", "a player that reads nothing"])
 def test_player_reconnects_after(lost: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(xface_player, "FIRST_RETRY", 0.01)
+    monkeypatch.setattr(reconnecting, "FIRST_RETRY", 0.01)
 
     async def test(server: Server, player: Player) -> None:
         await hold(server, '{"type":"set","faps":{"open_jaw":500}}')
@@ -237,7 +238,7 @@ def test_player_without_a_greeting_is_given_up(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(xface_player, "ATTEMPT", 0.05)
-    monkeypatch.setattr(xface_player, "FIRST_RETRY", 0.01)
+    monkeypatch.setattr(reconnecting, "FIRST_RETRY", 0.01)
 
     async def test(server: Server, player: Player) -> None:
         player.greets = False
