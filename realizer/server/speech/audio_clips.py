@@ -59,31 +59,30 @@ class Clip:
         """Return all fields as JSON values."""
         sound = None
         if self.sound is not None:
-            sound = {"rate": self.sound[0], "pcm": _text(self.sound[1].astype("<i2").tobytes())}
+            sound = {"rate": self.sound[0], "pcm": _base64(self.sound[1].astype("<i2").tobytes())}
         return {
-            "pieces": [_text(piece) for piece in self.pieces],
+            "pieces": [_base64(piece) for piece in self.pieces],
             "rate": self.rate,
             "sound": sound,
             "text": self.text,
-            "words": [one.model_dump() for one in self.words],
-            "phonemes": [one.model_dump() for one in self.phonemes],
+            "words": [word.model_dump() for word in self.words],
+            "phonemes": [phoneme.model_dump() for phoneme in self.phonemes],
             "told": self.is_annotated,
         }
 
     @classmethod
-    def from_json(cls, told: Mapping[str, Any]) -> Clip:
+    def from_json(cls, fields: Mapping[str, Any]) -> Clip:
         """Return the clip that `to_json` wrote.
 
         Raises:
             KeyError, TypeError, ValueError: it is not one.
         """
         sound = None
-        if told["sound"] is not None:
-            pcm = np.frombuffer(base64.b64decode(told["sound"]["pcm"]), "<i2")
-            sound = int(told["sound"]["rate"]), pcm.astype(np.int16, copy=False)
-        words, phonemes = ([TimedText(**one) for one in told[of]] for of in ("words", "phonemes"))
-        pieces = [base64.b64decode(piece) for piece in told["pieces"]]
-        return cls(pieces, told["rate"], sound, told["text"], words, phonemes, told["told"])
+        if fields["sound"] is not None:
+            sound = int(fields["sound"]["rate"]), _samples(base64.b64decode(fields["sound"]["pcm"]))
+        words, phonemes = ([TimedText(**item) for item in fields[name]] for name in ("words", "phonemes"))
+        pieces = [base64.b64decode(piece) for piece in fields["pieces"]]
+        return cls(pieces, fields["rate"], sound, fields["text"], words, phonemes, fields["told"])
 
 
 class AudioClips:
@@ -131,7 +130,8 @@ class AudioClips:
         self._changed.add(piece.id)
         clip = self._clips.get(piece.id)
         if clip is None or (piece.number == 0 and clip.sound is not None):
-            clip = self._new(piece.id)
+            self.recordings.pop(piece.id, None)
+            clip = self._clips[piece.id] = Clip()
         if piece.number == 0:
             clip.pieces = []
             clip.rate = piece.rate
@@ -158,40 +158,32 @@ class AudioClips:
             ClipError: a viseme is unknown, times decrease, or there are too many of them.
         """
         assert message.clip is not None
-        phonemes = [*message.phonemes, *_sounds(message)]
+        phonemes = [*message.phonemes, *_phonemes(message)]
         self._changed.add(message.clip)
         clip = self._clips.get(message.clip) or Clip()
-        before: tuple[list[TimedText], list[TimedText], str | None]
-        before = ([], [], None) if clip.is_annotated else (clip.words, clip.phonemes, clip.text)
-        for name, old, new in (("words", before[0], message.words), ("phonemes", before[1], phonemes)):
-            times = [one.start for one in (*old[-1:], *new)]
-            if any(later < sooner for sooner, later in pairwise(times)):
+        old = Clip() if clip.is_annotated else clip
+        for name, known, new in (("words", old.words, message.words), ("phonemes", old.phonemes, phonemes)):
+            if any(later.start < sooner.start for sooner, later in pairwise((*known[-1:], *new))):
                 raise ClipError(f"speech.{name}", "wanted times that rise, got some that go back")
-            if len(old) + len(new) > MAX_TIMES:
+            if len(known) + len(new) > MAX_TIMES:
                 raise ClipError(f"speech.{name}", f"wanted at most {MAX_TIMES}, got more")
-        clip.words = [*before[0], *message.words]
-        clip.phonemes = [*before[1], *phonemes]
-        clip.text = before[2] if message.text is None else message.text
+        clip.words, clip.phonemes = [*old.words, *message.words], [*old.phonemes, *phonemes]
         clip.is_annotated = message.final
+        clip.text = old.text if message.text is None else message.text
         self._clips[message.clip] = clip
         self._publish(message.clip, clip)
         self._make_room(message.clip)
-
-    def _new(self, id: str) -> Clip:
-        self.recordings.pop(id, None)
-        self._clips[id] = Clip()
-        return self._clips[id]
 
     def _complete(self, id: str, clip: Clip) -> None:
         content, clip.pieces = b"".join(clip.pieces), []
         try:
             if clip.rate:
-                clip.sound = clip.rate, np.frombuffer(content, "<i2").astype(np.int16, copy=False)
+                clip.sound = clip.rate, _samples(content)
                 if not len(clip.sound[1]):
                     raise RealizerError("wanted sound, got none")
             else:
-                heard = read_sound(content)
-                clip.sound = heard.rate, heard.pcm
+                sound = read_sound(content)
+                clip.sound = sound.rate, sound.pcm
         except RealizerError as error:
             del self._clips[id]
             raise ClipError(f"clip:{id}", str(error)) from None
@@ -202,9 +194,9 @@ class AudioClips:
         if clip.sound is None or not clip.is_annotated:
             return
         rate, pcm = clip.sound
-        whole = len(pcm) / rate
-        words = tuple(Word(start, end, text) for start, end, text in _spans(clip.words, whole))
-        phonemes = tuple(Phoneme(start, end, ipa) for start, end, ipa in _spans(clip.phonemes, whole))
+        duration = len(pcm) / rate
+        words = tuple(Word(*span) for span in _spans(clip.words, duration))
+        phonemes = tuple(Phoneme(*span) for span in _spans(clip.phonemes, duration))
         text = clip.text
         if text is None and words:
             text = " ".join(word.text for word in words)
@@ -220,26 +212,28 @@ class AudioClips:
             self.recordings.pop(oldest, None)
 
 
-def _text(data: bytes) -> str:
+def _base64(data: bytes) -> str:
     return base64.b64encode(data).decode()
 
 
-def _sounds(message: SpeechMessage) -> list[TimedText]:
+def _samples(data: bytes) -> Int16:
+    return np.frombuffer(data, "<i2").astype(np.int16, copy=False)
+
+
+def _phonemes(message: SpeechMessage) -> list[TimedText]:
     """Return the visemes of a message as phonemes of the same mouth shape."""
+    name = message.viseme_set
     try:
-        return [
-            one.model_copy(update={"text": sound_of(message.viseme_set, one.text)}) for one in message.visemes
-        ]
+        return [v.model_copy(update={"text": sound_of(name, v.text)}) for v in message.visemes]
     except KeyError as error:
         raise ClipError("speech.visemes", str(error.args[0])) from None
 
 
-def _spans(timed: Sequence[TimedText], whole: float) -> list[tuple[float, float, str]]:
+def _spans(timed: Sequence[TimedText], duration: float) -> list[tuple[float, float, str]]:
     """Return (start, end, text); a missing end is the start of the next one."""
-    starts = [*(one.start for one in timed[1:]), whole]
-    return [
-        (one.start, max(one.start, following if one.end is None else one.end), one.text)
-        for one, following in zip(
-            timed, starts, strict=False
-        )  # `starts` has one item even if `timed` is empty
-    ]
+    following = [*(item.start for item in timed[1:]), duration]
+    spans = []
+    for item, next_start in zip(timed, following, strict=False):  # `following` is never empty
+        end = next_start if item.end is None else item.end
+        spans.append((item.start, max(item.start, end), item.text))
+    return spans
