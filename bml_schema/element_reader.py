@@ -134,8 +134,9 @@ class ElementReader:
             faults += _drafts(shape, values, foreign)
         if shape.timed and not timed and "id" not in element.attrib:
             values["id"] = ""  # a part of <face> has no timing, so its id is optional
-        missing = (s for s in shape.required if s.field not in values and s.name not in element.attrib)
-        faults += [f"{s.name}: wanted {s.value.wanted}, got none" for s in missing]
+        for s in shape.required:
+            if s.field not in values and s.name not in element.attrib:
+                faults.append(f"{s.name}: wanted {s.value.wanted}, got none")
         unknown = self.describe_unknown(shape, element, foreign, timed) if foreign else ""
         if faults:
             raise Fault("; ".join([*faults, unknown] if unknown else faults), element)

@@ -142,9 +142,10 @@ def camel(name: str) -> str:
 
 def schema_of(cls: type[Any]) -> NodeSchema:
     """Return the schema of a node class, derived once from its fields."""
-    if cls not in _SCHEMAS:
-        _SCHEMAS[cls] = _derived(cls)
-    return _SCHEMAS[cls]
+    schema = _SCHEMAS.get(cls)
+    if schema is None:
+        schema = _SCHEMAS[cls] = _derived(cls)
+    return schema
 
 
 _SCHEMAS: dict[type[Any], NodeSchema] = {}
