@@ -74,15 +74,15 @@ class BlockOutline:
                 kind = kinds[raw] = self.kind(element)
             step = kind.step
             counts[step] = n = counts.get(step, 0) + 1
-            here = f"{path}/{step}[{n}]"
+            child_path = f"{path}/{step}[{n}]"
             if not loose or loose.isspace():
                 loose = element.tail
             if kind.tag == Required.tag:
-                inside = self.entries(element, here, required=True)
+                inside = self.entries(element, child_path, required=True)
                 tree.append(flat(inside))
                 continue
             id = element.get("id", "").strip()
-            entry = Entry(element, kind, id, here, required)
+            entry = Entry(element, kind, id, child_path, required)
             tree.append(entry)
             # All names must be known before the first reference is read.
             if id and id not in owners and kind.tag != Constraint.tag:

@@ -30,14 +30,14 @@ def _append(element: etree._Element, default: str, out: list[str]) -> None:
         out.append(f' xmlns="{escape_value(space)}"')
     prefixes: dict[str, str] = {}
     for key, value in attributes(element):
-        theirs, label = _split(key)
-        if theirs == _XML:
+        namespace, label = _split(key)
+        if namespace == _XML:
             label = f"xml:{label}"
-        elif theirs:
-            prefix = prefixes.get(theirs)
+        elif namespace:
+            prefix = prefixes.get(namespace)
             if prefix is None:
-                prefix = prefixes[theirs] = f"p{len(prefixes) + 1}"
-                out.append(f' xmlns:{prefix}="{escape_value(theirs)}"')
+                prefix = prefixes[namespace] = f"p{len(prefixes) + 1}"
+                out.append(f' xmlns:{prefix}="{escape_value(namespace)}"')
             label = f"{prefix}:{label}"
         out.append(f' {label}="{escape_value(value)}"')
     if not len(element) and not element.text:

@@ -46,40 +46,40 @@ class _Mark(NamedTuple):
 
 def _marks(text: str, first: int, last: int) -> Iterator[_Mark]:
     """Yield the marks that decide where documents begin and end, in linear time for any text."""
-    never: set[str] = set()  # closers that do not occur any more: searched for once, not for each opener
-    here = first
+    missing_closers: set[str] = set()  # searched for once, not for each opener
+    offset = first
     for n in count():
-        found = _MARKS.search(text, here, last)
-        if found is None:
+        match = _MARKS.search(text, offset, last)
+        if match is None:
             return
         if n == _MAX_MARKS:
             raise BMLError(f"wanted at most {n} tags of <bml>, comments and the like in one text")
-        start, here = found.span()
-        opener = found[0]
+        start, offset = match.span()
+        opener = match[0]
         if opener.startswith("</"):
-            yield _Mark("close", start, here)
+            yield _Mark("close", start, offset)
             continue
         if opener not in _CLOSERS:
-            rest = _REST_OF_TAG.match(text, here, last)
-            here = rest.end() if rest else here
-            yield _Mark("whole" if rest and text[here - 2] == "/" else "open", start, here)
+            rest = _REST_OF_TAG.match(text, offset, last)
+            offset = rest.end() if rest else offset
+            yield _Mark("whole" if rest and text[offset - 2] == "/" else "open", start, offset)
             continue
         doctype = opener == "<!DOCTYPE"
         if doctype:
-            rest = _REST_OF_DOCTYPE.match(text, here, last)
-            here = rest.end() if rest else here
-            if rest is None or text[here - 1] == ">":
-                yield _Mark("doctype", start, here)
+            rest = _REST_OF_DOCTYPE.match(text, offset, last)
+            offset = rest.end() if rest else offset
+            if rest is None or text[offset - 1] == ">":
+                yield _Mark("doctype", start, offset)
                 continue
-        closer = None if opener in never else _CLOSERS[opener].search(text, here, last)
+        closer = None if opener in missing_closers else _CLOSERS[opener].search(text, offset, last)
         if closer is None:
-            never.add(opener)
+            missing_closers.add(opener)
         else:
-            here = closer.end()
+            offset = closer.end()
         if doctype:
-            yield _Mark("doctype", start, here)
+            yield _Mark("doctype", start, offset)
         elif closer is not None and opener != "<![CDATA[":
-            yield _Mark("skip", start, here)
+            yield _Mark("skip", start, offset)
 
 
 def document_spans(text: str, first: int = 0, last: int | None = None) -> Iterator[DocumentSpan]:
@@ -97,34 +97,34 @@ def document_spans(text: str, first: int = 0, last: int | None = None) -> Iterat
             ends[opened.pop()] = mark.end
     roots = [n for n, mark in enumerate(marks) if mark.kind in ("open", "whole")]
     after = dict(zip(roots, [marks[n].start for n in roots[1:]], strict=False))
-    here = first
+    offset = first
     junk = doctype = -1  # start of a broken stretch that was not reported yet, or -1
     for n, mark in enumerate([*marks, _Mark("end", last, last)]):
-        if mark.start < here:
+        if mark.start < offset:
             continue  # inside a document
         if junk < 0:
-            between = _BETWEEN.match(text, here, mark.start)
+            between = _BETWEEN.match(text, offset, mark.start)
             junk = between.end() if between and between.end() < mark.start else -1
         if junk < 0 and mark.kind == "close":
             junk = mark.start
         if doctype < 0 and mark.kind == "doctype":
             doctype = mark.start if junk < 0 else junk
-        here = mark.end
+        offset = mark.end
         if mark.kind not in ("open", "whole", "end"):
             continue
         end = ends.get(n) or after.get(n, last)
         if mark.kind == "end":
             if doctype >= 0:
-                yield DocumentSpan(doctype, here, fault=_NO_DTD)
+                yield DocumentSpan(doctype, offset, fault=_NO_DTD)
             elif junk >= 0:
-                yield DocumentSpan(junk, here, fault=_not_bml(text[junk:here]))
+                yield DocumentSpan(junk, offset, fault=_not_bml(text[junk:offset]))
         elif doctype >= 0:
             yield DocumentSpan(doctype, end, text[mark.start : mark.end], _NO_DTD)
         else:
             if junk >= 0:
                 yield DocumentSpan(junk, mark.start, fault=_not_bml(text[junk : mark.start]))
             yield DocumentSpan(mark.start, end, text[mark.start : mark.end])
-        here = end
+        offset = end
         junk = doctype = -1
 
 

@@ -56,10 +56,10 @@ def parse(
             (BMLSizeError), not one document.
     """
     first: Block | BMLError | None = None
-    for found in read(text, vocabulary, max_bytes=max_bytes, max_behaviours=max_behaviours):
+    for result in read(text, vocabulary, max_bytes=max_bytes, max_behaviours=max_behaviours):
         if first is not None:
             raise BMLError("wanted one document, got several") if isinstance(first, Block) else first
-        first = found
+        first = result
         if isinstance(first, BMLError):
             break
     if first is None:
@@ -102,14 +102,14 @@ def read(
         yield wrong
         return
     try:
-        found = list(document_spans(text))
+        spans = list(document_spans(text))
     except BMLError as wrong:
         yield wrong
         return
     line = 1
     counted = 0
     broken = False  # the stretch before was broken XML: all text up to the next document is part of it
-    todo = deque(found)
+    todo = deque(spans)
     retries, again = _MAX_RETRIES, _MAX_AGAIN
     reported = 0  # end of the broken XML that was reported
     for n in count():
@@ -178,11 +178,11 @@ def _begins(data: bytes) -> dict[tuple[int, str], int]:
     if data.count(b"\n") == data.count(b">\n"):
         return begins  # every line ends with a tag
     line, counted = 1, 0
-    for found in _LONG_TAG.finditer(data):
-        start, end = found.span()
+    for match in _LONG_TAG.finditer(data):
+        start, end = match.span()
         line += data.count(b"\n", counted, start)
         counted = start
-        name = found[1].rpartition(b":")[2].decode(errors="replace")
+        name = match[1].rpartition(b":")[2].decode(errors="replace")
         begins.setdefault((line + data.count(b"\n", start, end), name), line)
     return begins
 

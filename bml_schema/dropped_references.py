@@ -34,10 +34,10 @@ def without(block: Block, gone: Collection[str]) -> ReducedBlock:
         gone: ids of behaviours. For an id that the block does not have, references to it are removed.
     """
     gone = frozenset(gone)
-    losses = ReferenceRemover(gone)
-    rest = block.with_children(losses.without)
-    lost = {id: tuple(names) for id, names in losses.lost_references.items()}
-    return ReducedBlock(rest, lost, frozenset(losses.fatal))
+    remover = ReferenceRemover(gone)
+    rest = block.with_children(remover.without)
+    lost = {id: tuple(names) for id, names in remover.lost_references.items()}
+    return ReducedBlock(rest, lost, frozenset(remover.fatal))
 
 
 class ReferenceRemover:

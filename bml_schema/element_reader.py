@@ -96,7 +96,7 @@ class ElementReader:
             values[shape.text] = self.text(element)
         elif shape.children or len(element):
             self.children(shape, element, values)
-        elif (loose := element.text) and not loose.isspace():
+        elif (text := element.text) and not text.isspace():
             self.no_text(element)
         node: Any = cls(**values)
         if timed and (fault := node.fault()):
@@ -156,13 +156,13 @@ class ElementReader:
 
     def children(self, shape: NodeSchema, element: etree._Element, values: dict[str, Any]) -> None:
         """Read child elements into the fields of `values`."""
-        found: dict[str, list[Any]] = {}
+        nodes_by_field: dict[str, list[Any]] = {}
         descriptions: list[Description] = []
         others: list[str] = []
-        loose = element.text
+        text = element.text
         for child in element:
-            if not loose or loose.isspace():
-                loose = child.tail
+            if not text or text.isspace():
+                text = child.tail
             tag = self.tag(child)
             spec = shape.by_tag.get(tag)
             if spec is None and tag == _DESCRIPTION and shape.timed:
@@ -172,15 +172,15 @@ class ElementReader:
                 # Some documents put an extension's children into the core namespace, or into none.
                 spec = shape.by_local.get(local(tag))
             if spec is not None:
-                found.setdefault(spec[0].field, []).append(self.node(spec[1], child))
+                nodes_by_field.setdefault(spec[0].field, []).append(self.node(spec[1], child))
             elif tag.startswith(_OURS):
                 raise Fault(f"wanted {shape.listed}, got <{local(tag)}>", child)
             elif shape.timed:
                 others.append(canonical(child))
-        if loose and not loose.isspace():
+        if text and not text.isspace():
             self.no_text(element)
         for kind in shape.children:
-            nodes = found.get(kind.field, [])
+            nodes = nodes_by_field.get(kind.field, [])
             if len(nodes) < kind.least:
                 raise Fault(f"wanted {shape.listed}, got none", element)
             if kind.many:
@@ -195,10 +195,10 @@ class ElementReader:
             values["unknown_children"] = tuple(others)
 
     def no_text(self, element: etree._Element) -> None:
-        loose = loose_text(element)
-        if loose:
+        text = loose_text(element)
+        if text:
             hint = ", put it into <text>" if self.tag(element) == Speech.tag else ""
-            raise Fault(f"wanted elements, got the text {quoted(loose)}{hint}", element)
+            raise Fault(f"wanted elements, got the text {quoted(text)}{hint}", element)
 
     def mixed(self, shape: NodeSchema, element: etree._Element) -> Iterator[Any]:
         """Read text := (characters | sync)*, with whitespace as written."""

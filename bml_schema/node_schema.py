@@ -158,19 +158,19 @@ def _derived(cls: type[Any]) -> NodeSchema:
     for f in fields(cls):
         if _KEY not in f.metadata:
             continue
-        kind, what, more = f.metadata[_KEY]
+        kind, value, extra = f.metadata[_KEY]
         if kind == "attribute":
             required = f.default is MISSING
-            name, old = more
+            name, old = extra
             xml = name or camel(f.name)
-            read = None if what is sync_ref else what.read
+            read = None if value is sync_ref else value.read
             default = None if required else f.default
-            attributes[xml] = Attribute(f.name, xml, what, required, default, read, old)
+            attributes[xml] = Attribute(f.name, xml, value, required, default, read, old)
             continue
         if kind in content:
             content[kind] = f.name
         if kind != "text":
-            kinds.append(Child(f.name, what, kind != "child", int(more)))
+            kinds.append(Child(f.name, value, kind != "child", int(extra)))
     by_tag = {c.tag: (k, c) for k in kinds for c in k.classes}
     timed = hasattr(cls, "sync_points")
     return NodeSchema(
@@ -179,7 +179,7 @@ def _derived(cls: type[Any]) -> NodeSchema:
         required=tuple(a for a in attributes.values() if a.required),
         children=tuple(kinds),
         by_tag=by_tag,
-        by_local={local(tag): found for tag, found in by_tag.items()},
+        by_local={local(tag): entry for tag, entry in by_tag.items()},
         mixed=content["mixed"],
         text=content["text"],
         name=local(getattr(cls, "tag", "")),

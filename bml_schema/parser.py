@@ -81,8 +81,8 @@ def read_block(
         raise BMLSizeError(text, line=line, path="/bml", block=names.block)
     if wrong_attributes:
         reader.problem(names.block, Fault(wrong_attributes, root), "/bml", root, dropped=False)
-    if stray := elements.describe_unknown(schema_of(Block), root, values["unknown_attributes"], False):
-        reader.report_unknown(names.block, stray, "/bml", root, root)
+    if unknown := elements.describe_unknown(schema_of(Block), root, values["unknown_attributes"], False):
+        reader.report_unknown(names.block, unknown, "/bml", root, root)
     for text, parent, path in outline.loose:
         # The text belongs to no behaviour, so the problem is the block's.
         reader.problem(
@@ -224,8 +224,8 @@ class _Reader:
 
     def report_unknown_attributes(self, id: str, entry: Entry) -> None:
         """Report the unknown attributes of a behaviour or constraint, one Problem for each element."""
-        for said, element in self.elements.unknown_attributes:
-            self.report_unknown(id, said, entry.path, element, entry.element)
+        for text, element in self.elements.unknown_attributes:
+            self.report_unknown(id, text, entry.path, element, entry.element)
         self.elements.unknown_attributes.clear()
 
     def constraint(self, entry: Entry) -> Constraint | None:
@@ -249,9 +249,9 @@ class _Reader:
         gone = self.owners.keys() - self.places.keys()
         if not gone:
             return
-        losses = ReferenceRemover(gone)
+        remover = ReferenceRemover(gone)
         for n, node in list(nodes.items()):
-            left = losses.without(node)
+            left = remover.without(node)
             if left is None:
                 del nodes[n]
             else:
@@ -259,18 +259,18 @@ class _Reader:
         prefix = f"{self.names.block}:"
         for n, problem in enumerate(self.problems):
             id = problem.id.removeprefix(prefix) if problem.id.startswith(prefix) else ""
-            lost = tuple(losses.lost_references.pop(id, ()))
+            lost = tuple(remover.lost_references.pop(id, ()))
             if lost:
-                more = len(lost) - _MAX_LISTED
-                named = ", ".join(lost[:_MAX_LISTED]) + (f" and {more} more" if more > 0 else "")
+                rest = len(lost) - _MAX_LISTED
+                named = ", ".join(lost[:_MAX_LISTED]) + (f" and {rest} more" if rest > 0 else "")
                 text = f"{problem.text}; with it went {named}"
-                fatal = problem.fatal or id in losses.fatal
+                fatal = problem.fatal or id in remover.fatal
                 self.problems[n] = replace(problem, text=text, lost_references=lost, fatal=fatal)
 
     def report_unknown(
-        self, id: str, said: str, path: str, element: etree._Element, top: etree._Element
+        self, id: str, text: str, path: str, element: etree._Element, top: etree._Element
     ) -> None:
-        fault = Fault(said, element, CUSTOM_ATTRIBUTE_NOT_SUPPORTED)
+        fault = Fault(text, element, CUSTOM_ATTRIBUTE_NOT_SUPPORTED)
         self.problem(id, fault, path, top, dropped=False)
 
     def problem(

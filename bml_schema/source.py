@@ -123,11 +123,11 @@ class Source:
     def below(self, element: Element) -> Iterator[Element]:
         """Yield the elements inside an element, in order."""
         first = bisect_right(self.elements, element.offset, key=lambda e: e.offset)
-        around = {first - 1}
+        parents = {first - 1}
         for number in range(first, len(self.elements)):
-            if self.elements[number].parent not in around:
+            if self.elements[number].parent not in parents:
                 return
-            around.add(number)
+            parents.add(number)
             yield self.elements[number]
 
     def on_line(self, line: int) -> Iterator[Element]:

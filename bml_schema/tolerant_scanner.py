@@ -49,9 +49,9 @@ class Element:
 
 def scan(text: str) -> tuple[list[Element], list[ScanError]]:
     """Return every start tag and every syntax error, in order."""
-    one = _Scan(text)
-    one.run()
-    return one.elements, sorted(one.errors)
+    result = _Scan(text)
+    result.run()
+    return result.elements, sorted(result.errors)
 
 
 class _Scan:
@@ -67,11 +67,11 @@ class _Scan:
         self.never: set[str] = set()  # closers that do not occur any more
 
     def run(self) -> None:
-        here = 0
-        while found := _OPENER.search(self.text, here):
-            self.entities(here, found.start())
-            here = self.tag(found[0], found.start(), found.end())
-        self.entities(here, len(self.text))
+        offset = 0
+        while match := _OPENER.search(self.text, offset):
+            self.entities(offset, match.start())
+            offset = self.tag(match[0], match.start(), match.end())
+        self.entities(offset, len(self.text))
         if self.open:
             first = self.elements[self.open[-1]]
             end = len(self.text.rstrip())
@@ -94,52 +94,52 @@ class _Scan:
         assert name is not None
         return self.start_tag(name[0], start, name.end())
 
-    def start_tag(self, name: str, start: int, here: int) -> int:
+    def start_tag(self, name: str, start: int, offset: int) -> int:
         parent, number = self.open[-1] if self.open else -1, len(self.elements)
         local = name.rpartition(":")[2]
         nth = self.counts[parent, local] = self.counts.get((parent, local), 0) + 1
-        around = self.elements[parent].root if self.open else -1
-        element = Element(name, start, here, parent, nth, number if local == DOCUMENT else around)
+        parent_root = self.elements[parent].root if self.open else -1
+        element = Element(name, start, offset, parent, nth, number if local == DOCUMENT else parent_root)
         self.elements.append(element)
-        while not (end := _TAG_END.match(self.text, here)):
-            found = _ATTRIBUTE.match(self.text, here)
-            if found is None:
-                here = self.report_errors(name, here)
+        while not (end := _TAG_END.match(self.text, offset)):
+            match = _ATTRIBUTE.match(self.text, offset)
+            if match is None:
+                offset = self.report_errors(name, offset)
                 break
-            key, quoted = found[1], 2 if found[2] is not None else 3
+            key, quoted = match[1], 2 if match[2] is not None else 3
             if key in element.attributes:
                 words = f"{key} is given twice"
-                self.errors.append(ScanError(found.start(1), len(key), words, element.attributes[key][0]))
+                self.errors.append(ScanError(match.start(1), len(key), words, element.attributes[key][0]))
             else:
-                element.attributes[key] = found.span(quoted)
-            self.entities(*found.span(quoted))
-            here = found.end()
-        element.end = end.end() if end else here
+                element.attributes[key] = match.span(quoted)
+            self.entities(*match.span(quoted))
+            offset = match.end()
+        element.end = end.end() if end else offset
         if not end or self.text[end.end() - 2] != "/":
             self.open.append(number)
             self.names[name] = self.names.get(name, 0) + 1
         return element.end
 
-    def report_errors(self, tag: str, here: int) -> int:
+    def report_errors(self, tag: str, offset: int) -> int:
         """Report the error in a start tag; return where to look for the next tag."""
         errors, text = self.errors, self.text
-        found = _BROKEN_ATTRIBUTE.match(text, here)
-        if found is None:
-            at = here + len(text[here : here + 200]) - len(text[here : here + 200].lstrip())
+        match = _BROKEN_ATTRIBUTE.match(text, offset)
+        if match is None:
+            at = offset + len(text[offset : offset + 200]) - len(text[offset : offset + 200].lstrip())
             errors.append(ScanError(at, 1, f"wanted an attribute or the end of <{tag}>"))
-            return here
-        name, value = found[1], found[2]
+            return offset
+        name, value = match[1], match[2]
         if value is None:
-            errors.append(ScanError(found.start(1), len(name), f'wanted {name}="...", got no value'))
+            errors.append(ScanError(match.start(1), len(name), f'wanted {name}="...", got no value'))
         elif value[:1] in ('"', "'"):
             errors.append(
-                ScanError(found.start(2), len(value), f"the value of {name} is never closed by {value[0]}")
+                ScanError(match.start(2), len(value), f"the value of {name} is never closed by {value[0]}")
             )
         else:
             errors.append(
-                ScanError(found.start(2), max(1, len(value)), f"wanted quotes around the value of {name}")
+                ScanError(match.start(2), max(1, len(value)), f"wanted quotes around the value of {name}")
             )
-        return found.end()
+        return match.end()
 
     def close(self, name: str, start: int, end: int) -> int:
         elements = self.elements
@@ -162,9 +162,9 @@ class _Scan:
         return end
 
     def entities(self, start: int, end: int) -> None:
-        for found in _BAD_ENTITY.finditer(self.text, start, end):
-            if found[0].endswith(";"):
-                words = f"no entity {found[0]} in XML, write the character itself"
+        for match in _BAD_ENTITY.finditer(self.text, start, end):
+            if match[0].endswith(";"):
+                words = f"no entity {match[0]} in XML, write the character itself"
             else:
                 words = "wanted &amp; for the character &"
-            self.errors.append(ScanError(found.start(), len(found[0]), words))
+            self.errors.append(ScanError(match.start(), len(match[0]), words))

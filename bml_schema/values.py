@@ -135,9 +135,9 @@ def _read_names(text: str) -> tuple[str, ...]:
 
 
 def _write_names(names: tuple[str, ...]) -> str:
-    for one in names:
-        if "," in one:
-            raise ValueError(f'wanted a name without ",", which stands between names in a list, got "{one}"')
+    for name in names:
+        if "," in name:
+            raise ValueError(f'wanted a name without ",", which stands between names in a list, got "{name}"')
     return ",".join(names)
 
 

@@ -141,20 +141,20 @@ class Realization:
         if len(self.face_changes) < 2:
             return [(0, self)]
         name = next(iter(self.characters))
-        ends = [*(one.frame for one in self.face_changes[1:]), self.frames]
+        ends = [*(change.frame for change in self.face_changes[1:]), self.frames]
         parts = []
-        for one, end in zip(self.face_changes, ends, strict=True):
-            aus, faps = self.aus.part(one.frame, end), self.faps.values[one.frame : end]
-            shown = Performance(aus, FAPFrames(aus.times, faps, self.faps.mask))
+        for change, end in zip(self.face_changes, ends, strict=True):
+            aus, faps = self.aus.part(change.frame, end), self.faps.values[change.frame : end]
+            performance = Performance(aus, FAPFrames(aus.times, faps, self.faps.mask))
             part = replace(
                 self,
-                face_name=one.face,
-                mapping=one.mapping,
-                characters={name: shown},
+                face_name=change.face,
+                mapping=change.mapping,
+                characters={name: performance},
                 speeches=(),
                 face_changes=(),
             )
-            parts.append((one.frame, part))
+            parts.append((change.frame, part))
         return parts
 
     def visemes(self, character: int = 0) -> Float64:

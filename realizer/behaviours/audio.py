@@ -16,8 +16,8 @@ from realizer.speech.utterance import Utterance
 def timing(node: AudioFile, context: PlanningContext) -> Timing:
     """Return the duration of the file; with an end in the document, sound is cut off or silence added."""
     length = np.array([sound(node, context).duration])
-    whole = Timing(("start", "end"), length, length, np.ones(1), rigid=True)
-    return replace(whole, least=np.zeros(1), rigid=False) if "end" in node.syncs else whole
+    rigid = Timing(("start", "end"), length, length, np.ones(1), rigid=True)
+    return replace(rigid, least=np.zeros(1), rigid=False) if "end" in node.syncs else rigid
 
 
 def check(node: AudioFile, context: PlanningContext) -> tuple[Fault, ...]:

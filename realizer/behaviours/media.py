@@ -34,8 +34,8 @@ def load(name: str, context: PlanningContext, read: Callable[[bytes], T]) -> T:
     Raises:
         MediaError: no such file, or it cannot be read.
     """
-    kept = _cache.get((context.media, name, read))
-    value: T = kept[1] if kept is not None else _read(name, context, read)
+    cached = _cache.get((context.media, name, read))
+    value: T = cached[1] if cached is not None else _read(name, context, read)
     return value
 
 
@@ -51,15 +51,15 @@ def faults(name: str, context: PlanningContext, read: Callable[[bytes], Any]) ->
 def _read(name: str, context: PlanningContext, read: Callable[[bytes], T]) -> T:
     path = media_file(name, context)
     try:
-        found = path.stat()
-        stamp, key = (found.st_mtime_ns, found.st_size), (context.media, name, read)
-        kept = _cache.get(key)
-        if kept is not None and kept[0] == stamp:
-            known: T = kept[1]
+        stat = path.stat()
+        stamp, key = (stat.st_mtime_ns, stat.st_size), (context.media, name, read)
+        cached = _cache.get(key)
+        if cached is not None and cached[0] == stamp:
+            known: T = cached[1]
             return known
-        if found.st_size > MAX_BYTES:
+        if stat.st_size > MAX_BYTES:
             raise MediaError(
-                f"wanted at most {MAX_BYTES // 2**20} MiB, got {_quoted_name(name)} of {found.st_size} bytes"
+                f"wanted at most {MAX_BYTES // 2**20} MiB, got {_quoted_name(name)} of {stat.st_size} bytes"
             )
         content = path.read_bytes()
     except OSError as error:
@@ -92,14 +92,14 @@ def media_file(name: str, context: PlanningContext) -> Path:
     for first in range(len(parts) if elsewhere else 1):
         try:
             path = folder.joinpath(*parts[first:]).resolve()
-            inside, there = path.is_relative_to(folder), path.is_file()
+            inside, is_file = path.is_relative_to(folder), path.is_file()
         except (OSError, RuntimeError, ValueError):  # a name too long, a circle of links, a null byte
             continue
-        if there and not inside:
+        if is_file and not inside:
             raise MediaError(
                 f"wanted a file inside the media folder, got {_quoted_name(name)}, a link that leads out"
             )
-        if there:
+        if is_file:
             return path
     near = _near(folder, parts)
     raise MediaError(f"wanted a file of the media folder, got {_quoted_name(name)}{near}")
@@ -129,10 +129,10 @@ def _parts(name: str) -> tuple[bool, list[str]]:
 def _near(folder: Path, parts: list[str]) -> str:
     """Return `, did you mean "hello.wav"?` if a file beside it has a similar name, else ""."""
     try:
-        beside = folder.joinpath(*parts[:-1]).resolve()
-        if not beside.is_relative_to(folder):
+        parent = folder.joinpath(*parts[:-1]).resolve()
+        if not parent.is_relative_to(folder):
             return ""
-        with os.scandir(beside) as entries:
+        with os.scandir(parent) as entries:
             names = [entry.name for entry in islice(entries, MAX_NAMES)]
     except (OSError, RuntimeError, ValueError):
         return ""

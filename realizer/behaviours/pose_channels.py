@@ -47,7 +47,7 @@ def unknown_word(attribute: str, word: str, known: Iterable[str]) -> Fault:
     family, _, part = got.upper().rpartition(":")
     parts = {name.rpartition(":")[2]: name for name in names if name.rpartition(":")[0] == family}
     near = difflib.get_close_matches(part, list(parts), n=3)
-    meant = " or ".join(names[parts[name]] for name in near)
-    hint = f", did you mean {meant}?" if near else ""
+    suggestions = " or ".join(names[parts[name]] for name in near)
+    hint = f", did you mean {suggestions}?" if near else ""
     wanted = f"{attribute}: wanted one of {', '.join(names.values())}"
     return Fault("CANNOT_CREATE_BEHAVIOR", f"{wanted}; got {got!r}{hint}")

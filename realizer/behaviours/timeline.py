@@ -34,10 +34,10 @@ def expand(node: Node, times: Float64, context: PlanningContext) -> tuple[Channe
     timeline = _timeline(node, context)
     start, end = float(times[0]), float(times[-1])
     scale = (end - start) / duration_of(timeline, context.library)
-    shown = (
+    channels = (
         channel for track in timeline.tracks for channel in _channels(track, start, scale, node, context)
     )
-    return (*shown, *_mixing(timeline, start, end, node.id))
+    return (*channels, *_mixing(timeline, start, end, node.id))
 
 
 def check(node: Node, context: PlanningContext) -> tuple[Fault, ...]:
@@ -48,8 +48,8 @@ def check(node: Node, context: PlanningContext) -> tuple[Fault, ...]:
     if faults := media.faults(node.file_name, context, read_timeline):
         return tuple(replace(fault, text=fault.text.replace("\n", "; ")) for fault in faults)
     timeline = _timeline(node, context)
-    if wrong := faults_of(timeline, context.library):
-        return (Fault("CANNOT_CREATE_BEHAVIOR", f"fileName: {node.file_name!r}: {'; '.join(wrong)}"),)
+    if unknown := faults_of(timeline, context.library):
+        return (Fault("CANNOT_CREATE_BEHAVIOR", f"fileName: {node.file_name!r}: {'; '.join(unknown)}"),)
     takes = context.face_inputs() if timeline.mixer == "successive" else None
     return tuple(
         Fault("CUSTOM_ATTRIBUTE_NOT_SUPPORTED", f"fileName: {node.file_name!r}: {remark}", fatal=False)
@@ -65,20 +65,22 @@ def _channels(
     track: Track, start: float, scale: float, node: Node, context: PlanningContext
 ) -> list[Channel]:
     shown = spans(track, context.library)
-    whole = [_pose(span.entry.expression, span.entry.intensity, context) for span in shown]
+    poses = [_pose(span.entry.expression, span.entry.intensity, context) for span in shown]
     keys = [start + shown[0].start * scale]
     for span in shown:
         keys += [start + span.reached * scale, start + span.left * scale]
     times = np.array([*keys, start + shown[-1].end * scale])
     # Two keys at one time become one: an apex without duration, or a missing onset.
-    kept = np.append(np.diff(times) > 1e-9, True)
+    distinct = np.append(np.diff(times) > 1e-9, True)
     channels = []
-    for target in sorted({target for pose in whole for target in pose}, key=lambda target: target.column):
+    for target in sorted({target for pose in poses for target in pose}, key=lambda target: target.column):
         values = [0.0]
-        for pose in whole:
+        for pose in poses:
             values += [pose.get(target, 0.0)] * 2
         channels.append(
-            Channel(target, times[kept], np.array([*values, 0.0])[kept], curve=track.curve, source=node.id)
+            Channel(
+                target, times[distinct], np.array([*values, 0.0])[distinct], curve=track.curve, source=node.id
+            )
         )
     return channels
 
@@ -98,8 +100,8 @@ def _mixing(timeline: Timeline, start: float, end: float, source: str) -> list[C
 
 
 def _pose(name: str, intensity: float, context: PlanningContext) -> dict[Target, float]:
-    found = context.library.get(name)
-    return {} if found is None else pose_channels.columns(found.aus, intensity)
+    expression = context.library.get(name)
+    return {} if expression is None else pose_channels.columns(expression.aus, intensity)
 
 
 KINDS = (BehaviourKind(Node, timing, expand, check, parameters={"amount": 1.0}),)

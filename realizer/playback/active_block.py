@@ -44,8 +44,8 @@ class ScheduledSpeech:
 
     def words(self, now: float) -> list[str]:
         """Return the words that have been heard completely."""
-        heard = min(self.until, now) - self.start + HEARD
-        return [word.text for word in self.utterance.words if word.end <= heard]
+        until = min(self.until, now) - self.start + HEARD
+        return [word.text for word in self.utterance.words if word.end <= until]
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,10 +145,10 @@ class ActiveBlock:
     def words_spoken(self, now: float) -> str | None:
         """Return the words heard completely before its speech was cut off; None if it was not."""
         spoken = [b for b in self.context.utterances if b in self.first_schedule.times]
-        heard = [self.speech[b] for b in spoken if b in self.speech]
-        if len(heard) == len(spoken) and all(s.is_complete(now) for s in heard):
+        speeches = [self.speech[b] for b in spoken if b in self.speech]
+        if len(speeches) == len(spoken) and all(s.is_complete(now) for s in speeches):
             return None
-        order = sorted(heard, key=lambda s: s.start)
+        order = sorted(speeches, key=lambda s: s.start)
         return " ".join(word for s in order for word in s.words(now))
 
     @property
@@ -186,8 +186,8 @@ class ActiveBlock:
         if plan.block is not self.block:
             self.external_refs = external_refs(plan.block)
         if start != plan.schedule.start:
-            late = start - plan.schedule.start
-            shifted = tuple(claim.shifted(late) for claim in plan.claims)
+            delay = start - plan.schedule.start
+            shifted = tuple(claim.shifted(delay) for claim in plan.claims)
             plan = replace(plan, schedule=replace(plan.schedule, start=start), claims=shifted)
         self.plan = plan
         self.channels, self.shifts, self.speech = {}, {}, {}
@@ -204,9 +204,9 @@ class ActiveBlock:
                 self.channels[behaviour] = own
             sound = kind.sound(node, self.context)
             if sound is not None:
-                whole = end - begin >= sound.duration - 1e-6
+                is_complete = end - begin >= sound.duration - 1e-6
                 self.speech[behaviour] = ScheduledSpeech(
-                    begin, float("inf") if whole else end, sound, self.character
+                    begin, float("inf") if is_complete else end, sound, self.character
                 )
 
     def unfinished(self, now: float) -> set[str]:
@@ -235,8 +235,8 @@ class ActiveBlock:
         self.plan = replace(self.plan, schedule=own)
         for behaviour in changed:
             node = self.block[behaviour]
-            shown = self.kinds[node.tag].expand(node, times[behaviour], self.context)
-            new = self._placed(behaviour, shown)
+            expanded = self.kinds[node.tag].expand(node, times[behaviour], self.context)
+            new = self._placed(behaviour, expanded)
             begun = self.start + float(before.times[behaviour][0]) < now
             region = self.kinds[node.tag].region
             if region is not None:
@@ -249,9 +249,11 @@ class ActiveBlock:
                 old = self.channels.get(behaviour, ())
                 self.channels[behaviour] = crossfade(old, new, now) if begun else new
             if behaviour in self.speech and not begun:
-                late = float(times[behaviour][0]) - float(before.times[behaviour][0])
-                heard = self.speech[behaviour]
-                self.speech[behaviour] = replace(heard, start=heard.start + late, until=heard.until + late)
+                delay = float(times[behaviour][0]) - float(before.times[behaviour][0])
+                speech = self.speech[behaviour]
+                self.speech[behaviour] = replace(
+                    speech, start=speech.start + delay, until=speech.until + delay
+                )
         self.plan = replace(self.plan, claims=tuple(claims(self.block, own, self.kinds, self.context)))
         return changed
 
@@ -294,12 +296,12 @@ class ActiveBlock:
         with `ends`, if the whole block is cut off.
         """
         points, times = dict(self.schedule.points), dict(self.schedule.times)
-        never: list[str] = []
+        not_begun: list[str] = []
         for behaviour in behaviours:
             names, at = points[behaviour], times[behaviour]
             local = now - self.start
             if local <= at[0]:
-                never.append(behaviour)
+                not_begun.append(behaviour)
                 for table in (points, times, self.channels, self.speech):
                     table.pop(behaviour, None)
             elif local < at[-1]:
@@ -309,13 +311,13 @@ class ActiveBlock:
                     for c in self.channels.get(behaviour, ())
                 )
                 if behaviour in self.speech:
-                    heard = self.speech[behaviour]
-                    self.speech[behaviour] = replace(heard, until=min(heard.until, now))
+                    speech = self.speech[behaviour]
+                    self.speech[behaviour] = replace(speech, until=min(speech.until, now))
         left = tuple(c for c in self.plan.claims if c.behaviour not in behaviours)
         timings = {b: timing for b, timing in self.plan.timings.items() if b not in behaviours}
         schedule = replace(self.schedule, points=points, times=times)
         # A waiting block may be planned again.
-        block = without(self.block, never).block if never and self.is_waiting else self.block
+        block = without(self.block, not_begun).block if not_begun and self.is_waiting else self.block
         self.plan = replace(self.plan, block=block, schedule=schedule, claims=left, timings=timings)
 
     def _cut_times(
@@ -324,16 +326,16 @@ class ActiveBlock:
         times = {name: float(time) for name, time in zip(names, at, strict=True) if time <= local}
         if "relax" in names:
             times.setdefault("relax", local)
-        shown = "relax" in names or behaviour in self.channels or behaviour in self.shifts
-        relax = 0.0 if ends else SPEECH_FADE if behaviour in self.speech else RELAX if shown else 0.0
+        visible = "relax" in names or behaviour in self.channels or behaviour in self.shifts
+        relax = 0.0 if ends else SPEECH_FADE if behaviour in self.speech else RELAX if visible else 0.0
         times["end"] = min(local + relax, float(at[-1]))
         return tuple(times), np.array(list(times.values()))
 
     def scale(self, behaviour: str, gains: Collection[Gain], *, sound: bool) -> None:
         """Scale the sound of a behaviour, or all its channels."""
         if sound and behaviour in self.speech:
-            heard = self.speech[behaviour]
-            self.speech[behaviour] = replace(heard, gains=(*heard.gains, *gains))
+            speech = self.speech[behaviour]
+            self.speech[behaviour] = replace(speech, gains=(*speech.gains, *gains))
         elif not sound:
             own = self.channels.get(behaviour, ())
             self.channels[behaviour] = tuple(replace(c, gains=(*c.gains, *gains)) for c in own)

@@ -21,8 +21,8 @@ def render_utterance(speaking: ScheduledSpeech, rate: int) -> Float32:
     assert utterance.pcm is not None
     pcm = resample(utterance.pcm, utterance.sample_rate, rate)
     if speaking.until < speaking.start + utterance.duration:
-        kept = max(0, round((speaking.until + CUT - speaking.start) * rate))
-        pcm = pcm[:kept].copy()
+        length = max(0, round((speaking.until + CUT - speaking.start) * rate))
+        pcm = pcm[:length].copy()
         ramp = min(len(pcm), round(CUT * rate))
         pcm[len(pcm) - ramp :] *= np.linspace(1, 0, ramp, dtype=np.float32)
     if speaking.gains:

@@ -73,19 +73,19 @@ def _change(blocks: Blocks, act: Change, now: float, until: float) -> None:
         names = ", ".join(sorted(known)) or "none"
         raise CommandError(f"paramId: {act.block}:{act.behaviour} has {names}, got {act.parameter!r}")
     usual = known[act.parameter]
-    whole = float(getattr(node, usual) if isinstance(usual, str) else usual)
-    if whole <= 0.0:
+    unscaled = float(getattr(node, usual) if isinstance(usual, str) else usual)
+    if unscaled <= 0.0:
         raise CommandError(
             f"{act.parameter}: wanted one that was above 0, got {act.block}:{act.behaviour} at 0"
         )
     sound = act.parameter == "volume"
     if act.to < 0 or (act.initial or 0) < 0:
         raise CommandError(f"{act.parameter}: wanted 0 or more, got {min(act.to, act.initial or 0):g}")
-    soon = now + AT_ONCE[sound]
-    gains = [] if act.initial is None else [Gain(now, soon, act.initial / whole)]
-    if act.curve is None or until <= soon:
-        gains = [Gain(now, soon, act.to / whole)]
+    reached = now + AT_ONCE[sound]
+    gains = [] if act.initial is None else [Gain(now, reached, act.initial / unscaled)]
+    if act.curve is None or until <= reached:
+        gains = [Gain(now, reached, act.to / unscaled)]
     else:
-        gains.append(Gain(soon if gains else now, until, act.to / whole, act.curve))
+        gains.append(Gain(reached if gains else now, until, act.to / unscaled, act.curve))
     target.scale(act.behaviour, gains, sound=sound)
     blocks.timeline.mark_changed()

@@ -58,12 +58,12 @@ def existing_claims(
 def all_dependencies(waits: Iterable[Dependency]) -> set[int]:
     """Return the id() of every direct and indirect dependency."""
     todo = [wait.block for wait in waits]
-    found = {id(p) for p in todo}
+    visited = {id(p) for p in todo}
     while todo:
-        more = [w.block for w in todo.pop().dependencies if id(w.block) not in found]
-        found.update(map(id, more))
+        more = [w.block for w in todo.pop().dependencies if id(w.block) not in visited]
+        visited.update(map(id, more))
         todo += more
-    return found
+    return visited
 
 
 def external_times(

@@ -106,7 +106,7 @@ class BlockManager:
             if self._in_use(block, character):
                 text = f"block id {block.id!r} is still in use: wanted an id of no block that plays or waits"
                 raise _Rejection(Warning(block.id, "PARSING_FAILURE", text))
-            waits, behind = self._links(block, character)
+            waits, waiting = self._links(block, character)
         except _Rejection as refused:
             self._announced.pop(block.id, None)
             return self._refuse(block, refused.warning, now)
@@ -136,7 +136,7 @@ class BlockManager:
         playing.apply_plan(planned, playing.earliest)  # it may have ended its own dependencies
         self.blocks.add(playing)
         self.timeline.place(playing)
-        for follower, subsiding in ((p, s) for p, s in behind if not p.is_done):
+        for follower, subsiding in ((p, s) for p, s in waiting if not p.is_done):
             follower.add_dependency(Dependency(playing, subsiding))
             self.timeline.reorder(follower)
         for name, subsiding in block_links.followers(block):
@@ -318,23 +318,25 @@ class BlockManager:
             _Rejection: one of the latter has started, or is itself a dependency.
         """
         waits = self._dependencies(block, character)
-        behind: list[tuple[ActiveBlock, bool]] = []
+        waiting: list[tuple[ActiveBlock, bool]] = []
         for name, subsiding in block_links.followers(block):
             playing = self.blocks.find(name)
             if playing is not None and playing.is_waiting:
-                behind.append((playing, subsiding))
+                waiting.append((playing, subsiding))
             elif playing is not None or name not in self._announced:
                 text = f"prependBefore, chunkBefore: wanted blocks that have not started, got {name!r}"
                 raise _Rejection(Warning(block.id, "TargetBlockAlreadyStartedException", text))
-        if behind and any(id(playing) in block_links.all_dependencies(waits) for playing, _ in behind):
+        if waiting and any(id(playing) in block_links.all_dependencies(waits) for playing, _ in waiting):
             text = "prependBefore, chunkBefore: wanted blocks that this one does not wait for itself"
             raise _Rejection(Warning(block.id, "IMPOSSIBLE_TO_SCHEDULE", text))
-        return waits, behind
+        return waits, waiting
 
     def _dependencies(self, block: Block, character: int) -> list[Dependency]:
         announced = self._announced.get(block.id)
-        ahead = [w for w in announced.dependencies if not w.block.is_done] if announced is not None else []
-        return block_links.dependencies(block, character, self.blocks.active()) + ahead
+        placed_before = (
+            [w for w in announced.dependencies if not w.block.is_done] if announced is not None else []
+        )
+        return block_links.dependencies(block, character, self.blocks.active()) + placed_before
 
     def _in_use(self, block: Block, character: int) -> bool:
         """Whether its id belongs to a playing or waiting block that it does not end."""

@@ -143,23 +143,25 @@ class _PlanBuilder:
         while True:
             priorities = {node.id: node.priority for node in self.block.behaviours if node.priority}
             own = Member(self.block, self.timings, priorities=priorities)
-            found, *moved = schedule_together([own, *others], outside=outside)
-            if found.failed or len(found.times) < len(self.timings):
-                self.try_stretching(own, others, outside, found)
+            schedule, *moved = schedule_together([own, *others], outside=outside)
+            if schedule.failed or len(schedule.times) < len(self.timings):
+                self.try_stretching(own, others, outside, schedule)
             warnings = [
-                replace(w, text=self.with_place(self.behaviour_of(w), w.text)) for w in found.warnings
+                replace(w, text=self.with_place(self.behaviour_of(w), w.text)) for w in schedule.warnings
             ]
-            if found.failed:
+            if schedule.failed:
                 raise _RequiredPartFailed(warnings[0])
-            gone = self.timings.keys() - found.times.keys()
+            gone = self.timings.keys() - schedule.times.keys()
             self.drop([(self.behaviour_of(w), w) for w in warnings if self.behaviour_of(w) in gone])
             self.warnings += [w for w in warnings if self.behaviour_of(w) not in gone]
-            whole = tuple(self.warnings)
-            found = replace(found, start=start, character=self.block.character_id, warnings=whole)
-            self.claims = tuple(claims(self.block, found, self.kinds, self.context))
+            all_warnings = tuple(self.warnings)
+            schedule = replace(
+                schedule, start=start, character=self.block.character_id, warnings=all_warnings
+            )
+            self.claims = tuple(claims(self.block, schedule, self.kinds, self.context))
             lost = conflicts(self.claims, existing_claims, start)
             if not lost:
-                return [found, *moved]
+                return [schedule, *moved]
             losers = ((loss.claim.behaviour, str(loss)) for loss in lost)
             self.drop((id, self.warning("CANNOT_CREATE_BEHAVIOR", id, text)) for id, text in losers)
 
@@ -189,10 +191,14 @@ class _PlanBuilder:
         could = {b: timing for b, timing in flexible.items() if timing is not own.timings[b]}
         if not could:
             return
-        found = schedule_together([replace(own, timings=flexible), *others], outside=outside)[0]
-        if found.failed or len(found.times) <= len(rigid.times):
+        flexible_schedule = schedule_together([replace(own, timings=flexible), *others], outside=outside)[0]
+        if flexible_schedule.failed or len(flexible_schedule.times) <= len(rigid.times):
             return
-        at = {b: found.times[b] - found.times[b][0] for b in could if b in found.times}
+        at = {
+            b: flexible_schedule.times[b] - flexible_schedule.times[b][0]
+            for b in could
+            if b in flexible_schedule.times
+        }
         natural = {b: np.append(0.0, np.cumsum(own.timings[b].preferred)) for b in at}
         # A voice has one rate for a whole speech: of the rates of its gaps, the one that lets most fit.
         most = len(rigid.times)
@@ -200,8 +206,8 @@ class _PlanBuilder:
             if could[b].most is None or self.context.utterances[b].stretch == WARP:
                 continue
             gaps = own.timings[b].preferred
-            asked = np.diff(at[b])[gaps > SHORT] / gaps[gaps > SHORT]
-            for rate in sorted({round(float(r), 9) for r in asked}, key=lambda r: abs(r - 1.0)):
+            rates = np.diff(at[b])[gaps > SHORT] / gaps[gaps > SHORT]
+            for rate in sorted({round(float(r), 9) for r in rates}, key=lambda r: abs(r - 1.0)):
                 evened = replace(own.timings[b], preferred=gaps * rate)
                 fits = schedule_together(
                     [replace(own, timings={**own.timings, b: evened}), *others], outside=outside
@@ -234,8 +240,8 @@ class _PlanBuilder:
                     replace(warning, text=f"{warning.text} (a required constraint names {id})")
                 )
             if names := lost.get(id):
-                more = len(names) - _MAX_LISTED
-                listed = ", ".join(names[:_MAX_LISTED]) + (f" and {more} more" if more > 0 else "")
+                rest = len(names) - _MAX_LISTED
+                listed = ", ".join(names[:_MAX_LISTED]) + (f" and {rest} more" if rest > 0 else "")
                 warning = replace(warning, text=f"{warning.text}; with it went {listed}")
             # Earlier warnings about it do not matter any more.
             self.warnings = [w for w in self.warnings if w.id != warning.id]

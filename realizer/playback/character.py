@@ -73,8 +73,8 @@ class Character:
         Raises:
             KeyError: no such AU or FAP; nothing is changed then.
         """
-        asked = dict.fromkeys(self.emotion) | dict(values)
-        _hold(self.emotion, asked, now, Layer.EXPRESSION, RELAX)
+        changes = dict.fromkeys(self.emotion) | dict(values)
+        _hold(self.emotion, changes, now, Layer.EXPRESSION, RELAX)
 
     def channels(self) -> list[Channel]:
         """Return base states, each until the next shift of its region, and direct values."""
@@ -98,23 +98,23 @@ class Character:
 
 
 def _hold(
-    held: dict[str, Channel], values: Mapping[str, float | None], now: float, layer: Layer, rise: float
+    channels: dict[str, Channel], values: Mapping[str, float | None], now: float, layer: Layer, rise: float
 ) -> None:
     """Move channels to these values within `rise` seconds, in place; None fades one out."""
     columns = axis()
     targets = {name: columns[name] for name in values}
     for name, value in values.items():
-        old = held.get(name)
+        old = channels.get(name)
         if value is None:
             if old is not None:
-                held[name] = old.faded(now, now + RELAX)
+                channels[name] = old.faded(now, now + RELAX)
             continue
         before = share = 0.0
         if old is not None:
             at = np.array([now])
             before, share = float(sample([old], at)[0, 0]), float(weights([old], at)[0, 0])
         keys, ends = np.array([now, now + rise]), np.array([before, value])
-        there = np.array([share, 1.0])
-        held[name] = Channel(
-            targets[name], keys, ends, layer=layer, keeps_last=True, weight=there, source="set"
+        weight = np.array([share, 1.0])
+        channels[name] = Channel(
+            targets[name], keys, ends, layer=layer, keeps_last=True, weight=weight, source="set"
         )

@@ -107,18 +107,18 @@ def sync_progress(block: Block, behaviour: str, sync: str, time: float, start: f
 
 def events(block: Block, schedule: Schedule, order: int, number: int) -> list[Event]:
     """Return an event for every sync point of a block; for `order` and `number` see Event."""
-    found: list[Event] = []
+    due: list[Event] = []
     phase = Phase.SYNC
     for place, node in enumerate(block.behaviours):
         id = node.id
         if id not in schedule.times:
             continue
         times = (schedule.start + schedule.times[id]).tolist()
-        found += [
+        due += [
             Event(time, order, phase, place, index, number, id, sync)
             for index, (sync, time) in enumerate(zip(schedule.points[id], times, strict=True))
         ]
-    return found
+    return due
 
 
 class Reports:

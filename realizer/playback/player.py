@@ -89,7 +89,7 @@ class Player:
 
     def speech_requests(self, block: Block) -> dict[str, SpeechRequest]:
         """Return {behaviour id: request to the voice}, whose results `submit` needs."""
-        says: dict[str, SpeechRequest] = {}
+        requests: dict[str, SpeechRequest] = {}
         for node in block.behaviours:
             kind = self.kinds.get(node.tag)
             if (
@@ -97,8 +97,8 @@ class Player:
                 and kind.speech_request is not None
                 and (say := kind.speech_request(node, self.context)) is not None
             ):
-                says[node.id] = say
-        return says
+                requests[node.id] = say
+        return requests
 
     def announce(self, block: Block, now: float) -> None:
         """Acknowledge a block: planning has begun. `submit` does it if it was not done before."""
@@ -293,17 +293,17 @@ class Player:
         if not self.idle:
             return channels, None
         seed = self.context.seed + 7919 * character
-        said = (s for p in blocks for s in p.speech.values()) if self.prosody else ()
+        speeches = (s for p in blocks for s in p.speech.values()) if self.prosody else ()
         talks = [
             SpeechSpan(s.start + at, s.until, part)
-            for s in said
+            for s in speeches
             for at, part in s.utterance.sections or [(0.0, s.utterance)]
         ]
         near = [t for t in talks if t.start - NEAR <= last and t.start + t.utterance.duration + NEAR >= first]
         if near:
-            asked = [KnownMotion(p.not_before, c) for p in blocks for c in p.moving_channels()]
-            asked += [KnownMotion(c.span[0], c) for c in own]
-            channels += prosody_channels(near, first, last, seed, asked)
+            known = [KnownMotion(p.not_before, c) for p in blocks for c in p.moving_channels()]
+            known += [KnownMotion(c.span[0], c) for c in own]
+            channels += prosody_channels(near, first, last, seed, known)
         return channels, idle_face(first, last, seed, phrase_ends(talks))
 
     @property
@@ -352,8 +352,8 @@ class Player:
             faps = {name: round(value) for name, value in values if abs(value) >= 0.5}
             if (aus := _up(own)) or faps:
                 layers[layer.name.lower()] = {"aus": aus, "faps": faps}
-        shown = _up(blend(channels, times, self.rules, idle))
-        return {"character": self._characters[character].id, "aus": shown, "layers": layers}
+        visible = _up(blend(channels, times, self.rules, idle))
+        return {"character": self._characters[character].id, "aus": visible, "layers": layers}
 
     # inside -------------------------------------------------------------------------------------
 
@@ -373,5 +373,5 @@ class Player:
 
 def _up(frames: AUFrames) -> dict[str, float]:
     """Return the AUs of the first frame that are not 0."""
-    shown = zip(AU_NAMES(), frames.aus[0].tolist(), strict=True)
-    return {name: round(value, 3) for name, value in shown if value > 0.005}
+    values = zip(AU_NAMES(), frames.aus[0].tolist(), strict=True)
+    return {name: round(value, 3) for name, value in values if value > 0.005}

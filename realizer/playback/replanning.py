@@ -37,29 +37,30 @@ def affected_blocks(
         (block.id, external_refs(block)),
         *((id, p.external_refs) for id, p in by_id.items() if p.external_refs),
     ]
-    beside: dict[str, set[str]] = {}
+    neighbours: dict[str, set[str]] = {}
     for own, refs in named:
         for ref in refs:
             other = by_id.get(ref.block or "")
             if other is not None and not _has_passed(ref, other, now):
-                beside.setdefault(own, set()).add(other.block.id)
-                beside.setdefault(other.block.id, set()).add(own)
-    found: set[str] = set()
+                neighbours.setdefault(own, set()).add(other.block.id)
+                neighbours.setdefault(other.block.id, set()).add(own)
+    connected: set[str] = set()
     names = [block.id]
     while names:
-        for name in beside.get(names.pop(), ()):
-            if name not in found:
-                found.add(name)
+        for name in neighbours.get(names.pop(), ()):
+            if name not in connected:
+                connected.add(name)
                 names.append(name)
-    if not found:
+    if not connected:
         return []
-    apart = all_dependencies(waits)
+    dependencies = all_dependencies(waits)
     together: list[ActiveBlock] = []
     for name, p in by_id.items():
-        if name in found and name != block.id and id(p) not in apart:
-            behind = all_dependencies(p.dependencies)
+        if name in connected and name != block.id and id(p) not in dependencies:
+            own_dependencies = all_dependencies(p.dependencies)
             if not any(
-                id(other) in behind or id(p) in all_dependencies(other.dependencies) for other in together
+                id(other) in own_dependencies or id(p) in all_dependencies(other.dependencies)
+                for other in together
             ):
                 together.append(p)
     return together
@@ -77,12 +78,12 @@ def _has_passed(ref: SyncRef, playing: ActiveBlock, now: float) -> bool:
 
 def member(playing: ActiveBlock, origin: float, now: float) -> Member:
     """Return a playing block on the clock of a block that starts at `origin`, with fixed past points."""
-    late = playing.start - origin
+    delay = playing.start - origin
     passed: dict[str, dict[str, float]] = {}
     for behaviour in playing.plan.timings:
         points, times = playing.schedule.points[behaviour], playing.schedule.times[behaviour]
         when = {
-            point: float(time) + late
+            point: float(time) + delay
             for point, time in zip(points, times, strict=True)
             if playing.start + float(time) <= now
         }
@@ -91,8 +92,8 @@ def member(playing: ActiveBlock, origin: float, now: float) -> Member:
     return Member(
         playing.block,
         playing.plan.timings,
-        start=late,
-        earliest=max(late, now - origin),
+        start=delay,
+        earliest=max(delay, now - origin),
         passed_times=passed,
         is_fixed=True,
     )

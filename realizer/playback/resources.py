@@ -80,8 +80,8 @@ def claims(
         last = points.index("relax") if "relax" in points else -1
         begin, end = schedule.start + float(times[0]), schedule.start + float(times[last])
         rank = (-node.priority, node.id not in block.required, order)
-        for what in sorted(wanted):
-            yield ResourceClaim(what, begin, end, block.id, node.id, rank)
+        for resource in sorted(wanted):
+            yield ResourceClaim(resource, begin, end, block.id, node.id, rank)
 
 
 def conflicts(
@@ -100,8 +100,8 @@ def conflicts(
     lost: list[ResourceConflict] = []
     for own in by_behaviour.values():
         clash = ((c, h) for c in own for h in had.get(c.resource, ()) if h.conflicts_with(c))
-        if (found := next(clash, None)) is not None:
-            lost.append(ResourceConflict(*found, start))
+        if (conflict := next(clash, None)) is not None:
+            lost.append(ResourceConflict(*conflict, start))
             continue
         for claim in own:
             had.setdefault(claim.resource, []).append(claim)

@@ -92,8 +92,8 @@ class BlockTimeline:
         """Whether blocks with new times would conflict with the claims of the others."""
         for playing, schedule in zip(blocks, schedules, strict=True):
             at = replace(schedule, start=playing.start)
-            held = block_links.existing_claims(playing.character, self.blocks.active(), blocks)
-            if conflicts(claims(playing.block, at, self.kinds, playing.context), held):
+            existing = block_links.existing_claims(playing.character, self.blocks.active(), blocks)
+            if conflicts(claims(playing.block, at, self.kinds, playing.context), existing):
                 return True
         return False
 
@@ -181,8 +181,8 @@ class BlockTimeline:
         """Whether the claims of a block with another start would conflict with those of other blocks."""
         if not playing.plan.claims:
             return False
-        late = start - playing.start
-        wanted = [claim.shifted(late) for claim in playing.plan.claims]
+        delay = start - playing.start
+        wanted = [claim.shifted(delay) for claim in playing.plan.claims]
         return bool(
             conflicts(wanted, block_links.existing_claims(playing.character, self.blocks.active(), [playing]))
         )
@@ -214,11 +214,11 @@ class BlockTimeline:
             return
         members = [member(p, origin, now) for p in blocks]
         instants = block_links.external_times(self.blocks.schedule_of, origin, self.blocks.first_schedule_of)
-        found = schedule_together(members, outside=instants)
-        if not found[0].failed and not self._conflict(blocks, found):
-            self.retime(blocks, found, now)
+        schedules = schedule_together(members, outside=instants)
+        if not schedules[0].failed and not self._conflict(blocks, schedules):
+            self.retime(blocks, schedules, now)
             return
-        why = found[0].warnings[0].text if found[0].failed else "it would disturb another block"
+        why = schedules[0].warnings[0].text if schedules[0].failed else "it would disturb another block"
         for playing in blocks:
             warning = Warning(playing.block.id, "IMPOSSIBLE_TO_SCHEDULE", f"stays as it was planned: {why}")
             self.reports.warn(warning, playing.block.character_id)

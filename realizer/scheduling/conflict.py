@@ -98,20 +98,20 @@ class ConstraintGraph:
 
     def _chain(self, begin: int, end: int) -> list[Relation]:
         """Return the fewest equalities that connect one point to another."""
-        came: dict[int, tuple[int, Relation] | None] = {begin: None}
+        previous: dict[int, tuple[int, Relation] | None] = {begin: None}
         queue = deque([begin])
-        while queue and end not in came:
+        while queue and end not in previous:
             at = queue.popleft()
             for to, relation in self._beside.get(at, ()):
-                if to not in came:
-                    came[to] = (at, relation)
+                if to not in previous:
+                    previous[to] = (at, relation)
                     queue.append(to)
-        found: list[Relation] = []
-        step = came.get(end)
+        chain: list[Relation] = []
+        step = previous.get(end)
         while step is not None:
-            found.append(step[1])
-            step = came[step[0]]
-        return found[::-1]
+            chain.append(step[1])
+            step = previous[step[0]]
+        return chain[::-1]
 
 
 def _conflict(problem: Problem, relations: Sequence[Relation], links: Sequence[Link]) -> Conflict:
@@ -139,15 +139,15 @@ def _conflict(problem: Problem, relations: Sequence[Relation], links: Sequence[L
     return Conflict(tuple(unique.values()), tuple(gaps), earliest, tuple(_once(owners)))
 
 
-def _joined(one: Gap, after: Gap) -> list[Gap]:
+def _joined(first: Gap, after: Gap) -> list[Gap]:
     """Join two successive lengths of a cycle, if they are of one kind and meet."""
-    if one.part is after.part and one.most is after.most:
-        seconds = one.seconds + after.seconds
-        if one.most and one.begin == after.end:
-            return [Gap(one.part, after.begin, one.end, seconds, True)]
-        if not one.most and one.end == after.begin:
-            return [Gap(one.part, one.begin, after.end, seconds)]
-    return [one, after]
+    if first.part is after.part and first.most is after.most:
+        seconds = first.seconds + after.seconds
+        if first.most and first.begin == after.end:
+            return [Gap(first.part, after.begin, first.end, seconds, True)]
+        if not first.most and first.end == after.begin:
+            return [Gap(first.part, first.begin, after.end, seconds)]
+    return [first, after]
 
 
 def _once(parts: Iterable[Part]) -> list[Part]:

@@ -74,30 +74,30 @@ def solve_groups(model: Model, clusters: RigidClusters, groups: Sequence[Group])
         if not group.held:
             begin[group.clusters] = clusters.at[_anchor(model, group)]
     clusters.at -= begin[clusters.label[model.owner]]
-    whole = _group_problem(model, clusters, groups)
-    x = active_set(whole.quadratic, whole.start(clusters))
+    problem = _group_problem(model, clusters, groups)
+    x = active_set(problem.quadratic, problem.start(clusters))
     if x is None:
         cycles = [cycle for group in groups if (cycle := _impossible(model, clusters, group))]
         if cycles:
             return cycles
         # Some least gaps may have been dropped.
-        whole = _group_problem(model, clusters, groups)
-        x = active_set(whole.quadratic, whole.start(clusters))
+        problem = _group_problem(model, clusters, groups)
+        x = active_set(problem.quadratic, problem.start(clusters))
     if x is None:
-        level, _ = whole.keep(clusters)
-        x = optimum(whole.quadratic, level)
-    clusters.at[whole.points] = x[whole.number[model.root[whole.points]]] + model.shift[whole.points]
+        level, _ = problem.keep(clusters)
+        x = optimum(problem.quadratic, level)
+    clusters.at[problem.points] = x[problem.number[model.root[problem.points]]] + model.shift[problem.points]
     return []
 
 
 def _impossible(model: Model, clusters: RigidClusters, group: Group) -> list[Link] | None:
     """Return why a group violates its inequalities, or None if it can satisfy them with shorter gaps."""
-    one = _group_problem(model, clusters, [group])
-    _, cycle = one.keep(clusters)
-    if cycle and _yield_to_stated(model, one.gaps):
-        one = _group_problem(model, clusters, [group])
-        _, cycle = one.keep(clusters)
-    return [one.link(model, k) for k in cycle] if cycle else None
+    group_problem = _group_problem(model, clusters, [group])
+    _, cycle = group_problem.keep(clusters)
+    if cycle and _yield_to_stated(model, group_problem.gaps):
+        group_problem = _group_problem(model, clusters, [group])
+        _, cycle = group_problem.keep(clusters)
+    return [group_problem.link(model, k) for k in cycle] if cycle else None
 
 
 def _group_problem(model: Model, clusters: RigidClusters, groups: Sequence[Group]) -> _GroupProblem:

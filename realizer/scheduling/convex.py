@@ -74,10 +74,10 @@ def active_set(quadratic: Quadratic, x: Float64) -> Float64 | None:
     for _ in range(GUESSES):
         exact, force = _bound(quadratic, binding, x)
         broken = (exact[v] - exact[u] < w - TIGHT) & differ
-        wrong = broken | (force < -RESTS * quadratic.stiffness.max(initial=0.0))
-        if not wrong.any():
+        misplaced = broken | (force < -RESTS * quadratic.stiffness.max(initial=0.0))
+        if not misplaced.any():
             return exact
-        binding = (binding & ~wrong) | broken
+        binding = (binding & ~misplaced) | broken
         # The same guess may be worth a second try, because it starts from another x.
         seen.append(binding.tobytes())
         if seen.count(seen[-1]) > 2:

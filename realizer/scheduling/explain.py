@@ -49,10 +49,10 @@ def fault_warning(part: Part, text: str) -> Warning:
 def in_words(clash: Conflict) -> str:
     """Return the conflict as the clauses of one sentence, in the order of their chain."""
     unique = list(dict.fromkeys(f"{c.text}{_placed(part, c.line)}" for part, c in _clauses(clash)))
-    how = "all " if len(unique) > 2 else "both " if len(unique) > 1 else ""
+    quantity = "all " if len(unique) > 2 else "both " if len(unique) > 1 else ""
     if len(unique) > MAX_CLAUSES:
         unique[MAX_CLAUSES - 1 :] = [f"{len(unique) - MAX_CLAUSES + 1} more such things"]
-    return f"{_join(unique)} cannot {how}hold"
+    return f"{_join(unique)} cannot {quantity}hold"
 
 
 def clauses(clash: Conflict) -> tuple[Clause, ...]:

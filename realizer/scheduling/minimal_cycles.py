@@ -25,7 +25,7 @@ def minimal_cycles(model: Model, web: ConstraintGraph, cycles: Sequence[Sequence
     shorter cycle passes through any of its points.
     """
     ways = _StepGraph(model)
-    found = []
+    conflicts = []
     for cycle in cycles:
         clash, left = web.cycle(cycle), MAX_STEPS
         points = {end for r in clash.relations for end in (r.u, r.v)}
@@ -40,8 +40,8 @@ def minimal_cycles(model: Model, web: ConstraintGraph, cycles: Sequence[Sequence
                 steps = _simple(start, steps)
                 clash = web.conflict(steps)
                 todo = sorted(point for point, _, _ in steps)
-        found.append(clash)
-    return found
+        conflicts.append(clash)
+    return conflicts
 
 
 class _StepGraph:
@@ -71,11 +71,11 @@ class _StepGraph:
             steps tried.
         """
         best, layer = {start: 0.0}, {start: 0.0}
-        came: list[dict[int, tuple[int, Step]]] = []
+        previous: list[dict[int, tuple[int, Step]]] = []
         tried = 0
         for _ in range(statements):
             after: dict[int, float] = {}
-            came.append({})
+            previous.append({})
             for u, so_far in layer.items():
                 if (ways := self._known.get(u)) is None:
                     ways = self._known[u] = list(self._from(u))
@@ -85,10 +85,10 @@ class _StepGraph:
                     total = so_far + seconds
                     if v == start:
                         if total > LOOSE:
-                            return _walk(came, u, step), tried
+                            return _walk(previous, u, step), tried
                     elif total > best.get(v, -np.inf) + LOOSE / 100:
                         best[v] = after[v] = total
-                        came[-1][v] = (u, step)
+                        previous[-1][v] = (u, step)
                 if tried > steps:
                     return [], tried
             layer = after
@@ -136,10 +136,10 @@ def _simple(start: int, steps: list[Step]) -> list[Step]:
     return steps
 
 
-def _walk(came: list[dict[int, tuple[int, Step]]], at: int, last: Step) -> list[Step]:
+def _walk(previous: list[dict[int, tuple[int, Step]]], at: int, last: Step) -> list[Step]:
     """Return the steps that led to a point, layer by layer, and the one that closes the cycle."""
     steps = [last]
-    for layer in reversed(came[:-1]):
+    for layer in reversed(previous[:-1]):
         at, step = layer[at]
         steps.append(step)
     return steps[::-1]

@@ -111,8 +111,8 @@ class Problem:
         if timing.rigid:
             at = np.cumsum(timing.preferred).tolist()
             for i, seconds in enumerate(at, 1):
-                says = (part.name, "rigid", timing.points[i])
-                self.equalities.append(Relation(first + i, first, seconds, part, says))
+                words = (part.name, "rigid", timing.points[i])
+                self.equalities.append(Relation(first + i, first, seconds, part, words))
         return first
 
     def name_of(self, point: int) -> str:
@@ -133,13 +133,13 @@ class Problem:
             if id(part) not in gone:
                 old, new = self.first[b], smaller.add(part, self.timings[b], self.earliest[b])
                 number.update((old + i, new + i) for i in range(len(self.timings[b].points)))
-        for u, v, seconds, part, says in self.equalities:
+        for u, v, seconds, part, words in self.equalities:
             # `add` has already made the equalities of a rigid behaviour.
-            if id(part) not in gone and u in number and v in number and says[1] != "rigid":
-                smaller.equalities.append(Relation(number[u], number[v], seconds, part, says))
-        for u, v, seconds, part, says in self.orders:
+            if id(part) not in gone and u in number and v in number and words[1] != "rigid":
+                smaller.equalities.append(Relation(number[u], number[v], seconds, part, words))
+        for u, v, seconds, part, words in self.orders:
             if id(part) not in gone and u in number and v in number:
-                smaller.orders.append(Relation(number[u], number[v], seconds, part, says))
+                smaller.orders.append(Relation(number[u], number[v], seconds, part, words))
         smaller.faults = [fault for fault in self.faults if id(fault[0]) not in gone]
         return smaller
 
@@ -195,8 +195,8 @@ def problem_of(
                 break
             if target[0] == ORIGIN and sync in member.passed_times.get(node.id, ()):
                 continue  # the other end may have moved since
-            says = (f"{part.name}:{sync}", "=", ref)
-            problem.equalities.append(Relation(start + points.index(sync), *target, part, says))
+            words = (f"{part.name}:{sync}", "=", ref)
+            problem.equalities.append(Relation(start + points.index(sync), *target, part, words))
     for member in members:
         for order, constraint in enumerate(member.block.constraints):
             _add_constraint(problem, resolvers[member.block.id], constraint, order)
@@ -215,12 +215,12 @@ def _pass(
     later = False
     for i, sync in enumerate(points):
         if sync in when:
-            says = (f"{part.name}:{sync}", "=", f"the time at which it passed, {when[sync]:.3f}")
-            problem.equalities.append(Relation(first + i, ORIGIN, when[sync], part, says))
+            words = (f"{part.name}:{sync}", "=", f"the time at which it passed, {when[sync]:.3f}")
+            problem.equalities.append(Relation(first + i, ORIGIN, when[sync], part, words))
         elif not later:
             later = True
-            says = (f"{part.name}:{sync}", "not before", "now")
-            problem.orders.append(Relation(ORIGIN, first + i, member.earliest, part, says))
+            words = (f"{part.name}:{sync}", "not before", "now")
+            problem.orders.append(Relation(ORIGIN, first + i, member.earliest, part, words))
 
 
 def _add_constraint(
@@ -245,16 +245,18 @@ def _add_constraint(
         for piece in constraint.parts:
             members = [(*resolver.required_point(ref), ref) for ref in piece.refs]
             target = piece.refs[0] if isinstance(piece, Synchronize) else piece.ref
-            r, there = resolver.required_point(target)
-            for x, here, ref in members:
+            r, target_offset = resolver.required_point(target)
+            for x, offset, ref in members:
                 if isinstance(piece, Before):
-                    says = (ref, "not after", target)
-                    problem.orders.append(Relation(x, r, here - there, part, says))
+                    words = (ref, "not after", target)
+                    problem.orders.append(Relation(x, r, offset - target_offset, part, words))
                 elif isinstance(piece, After):
-                    says = (ref, "not before", target)
-                    problem.orders.append(Relation(r, x, there - here, part, says))
+                    words = (ref, "not before", target)
+                    problem.orders.append(Relation(r, x, target_offset - offset, part, words))
                 elif ref is not target:
-                    problem.equalities.append(Relation(x, r, there - here, part, (target, "=", ref)))
+                    problem.equalities.append(
+                        Relation(x, r, target_offset - offset, part, (target, "=", ref))
+                    )
     except LookupError as fault:
         problem.faults.append((part, str(fault)))
 
@@ -276,10 +278,10 @@ class _ReferenceResolver:
 
     def required_point(self, ref: SyncRef) -> tuple[int, float]:
         """Return the point of a reference, as `point`; raise LookupError if its behaviour is absent."""
-        found = self.point(ref)
-        if found is None:
+        point = self.point(ref)
+        if point is None:
             raise LookupError(f"{ref} is not known")
-        return found
+        return point
 
     def external_time(self, ref: SyncRef) -> float:
         """Return the seconds, on the members' clock, of a point outside this problem."""
@@ -294,21 +296,21 @@ class _ReferenceResolver:
         Raises:
             LookupError: there is no such sync point; the message has the existing ones.
         """
-        there = self.member if ref.block is None else self.members.get(ref.block)
+        member = self.member if ref.block is None else self.members.get(ref.block)
         name = ref.behaviour
-        if there is None or (name == "bml" and not self.is_own(ref)):
+        if member is None or (name == "bml" and not self.is_own(ref)):
             return ORIGIN, self.external_time(ref)
         if name is None:
-            return ORIGIN, there.start + ref.offset
+            return ORIGIN, member.start + ref.offset
         if name == "bml":
             if ref.sync != "start":
                 raise LookupError(f"{ref}: of its own block only bml:start can be referred to")
-            return ORIGIN, there.start + ref.offset
-        first = self.first.get((there.block.id, name))
+            return ORIGIN, member.start + ref.offset
+        first = self.first.get((member.block.id, name))
         if first is None:
             return None if self.is_own(ref) else (ORIGIN, self.external_time(ref))
         sync = ref.sync if ref.index is None else f"{ref.sync}:{ref.index}"
-        points = there.timings[name].points
+        points = member.timings[name].points
         if sync not in points:
             raise LookupError(f"{ref}: {name} has no {sync}, only {', '.join(points)}")
         return first + points.index(sync), ref.offset

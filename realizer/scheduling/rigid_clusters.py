@@ -97,8 +97,8 @@ def attach(
         if (hooked := hook.get(root)) is None:
             hook[root] = b, start
             continue
-        other, there = hooked
-        if abs(ties.tie(b, other, start - there)) > FITS:
+        other, other_start = hooked
+        if abs(ties.tie(b, other, start - other_start)) > FITS:
             strained.append(b)
     return ties, strained, held
 

@@ -103,14 +103,14 @@ def _attempt(problem: Problem, block: str) -> Solution | list[tuple[Part, Warnin
     if isinstance(clashes, Solution):
         return clashes
     drops: list[tuple[Part, Warning]] = []
-    gone: set[int] = set()
+    dropped: set[int] = set()
     for clash in clashes:
         # A conflict that a drop of this round may have settled is examined again in the next.
-        if any(id(part) in gone for part in (*clash.parts, *clash.named)):
+        if any(id(part) in dropped for part in (*clash.parts, *clash.named)):
             continue
         part = choose(clash)
         if part is None:
             return refusal(block, clash)
-        gone.add(id(part))
+        dropped.add(id(part))
         drops.append((part, warning_of(clash, part)))
     return drops
