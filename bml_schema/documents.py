@@ -238,12 +238,17 @@ def _encoded(document: str, line: int, block: str | None) -> bytes:
         raise BMLSyntaxError(text, line=line, block=block) from None
 
 
+def encoding_of(data: bytes) -> str:
+    """Return the encoding of a text by BOM or declaration; UTF-8 by default."""
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return "utf-16"
+    named = _ENCODING.match(data.removeprefix(codecs.BOM_UTF8).lstrip())
+    return named[1].decode() if named else "utf-8"
+
+
 def _decoded(data: bytes) -> str:
     """Decode bytes by BOM, declaration, or as UTF-8."""
-    named = _ENCODING.match(data.removeprefix(codecs.BOM_UTF8).lstrip())
-    encoding = named[1].decode() if named else "utf-8"
-    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        encoding = "utf-16"
+    encoding = encoding_of(data)
     try:
         if codecs.lookup(encoding).name not in _CODECS:
             raise LookupError(encoding)

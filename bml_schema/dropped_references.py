@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 from bml_schema.behaviours import Speech
 from bml_schema.nodes import Behaviour, Block, Constraint
 from bml_schema.sync_refs import SyncRef
+
+MAX_LISTED = 10  # lost references in a warning's text; `Problem.lost_references` has all
+
+
+def listed(references: Sequence[str]) -> str:
+    """Return lost references as words of a warning."""
+    rest = len(references) - MAX_LISTED
+    return ", ".join(references[:MAX_LISTED]) + (f" and {rest} more" if rest > 0 else "")
 
 
 class ReducedBlock(NamedTuple):

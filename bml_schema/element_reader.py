@@ -195,8 +195,9 @@ class ElementReader:
             values["unknown_children"] = tuple(others)
 
     def no_text(self, element: etree._Element) -> None:
-        text = loose_text(element)
-        if text:
+        """Raise a Fault for character data beside the child elements."""
+        texts = (element.text, *(child.tail for child in element))
+        if text := next((t.strip() for t in texts if t and not t.isspace()), ""):
             hint = ", put it into <text>" if self.tag(element) == Speech.tag else ""
             raise Fault(f"wanted elements, got the text {quoted(text)}{hint}", element)
 
@@ -284,15 +285,3 @@ def _drafts(shape: NodeSchema, values: dict[str, Any], foreign: dict[str, str]) 
 
 def _unwanted(spec: Attribute, text: str) -> str:
     return describe_mismatch(spec.value.wanted, text, quoted(text))
-
-
-def loose_text(element: etree._Element) -> str:
-    """Return character data of an element that should only have child elements, or ""."""
-    text = element.text
-    if text and not text.isspace():
-        return text.strip()
-    for child in element:
-        text = child.tail
-        if text and not text.isspace():
-            return text.strip()
-    return ""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import count
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -16,7 +17,7 @@ from lxml import etree
 
 from bml_schema.block_outline import BlockOutline, Entry, flat
 from bml_schema.canonical import attributes
-from bml_schema.dropped_references import ReferenceRemover
+from bml_schema.dropped_references import ReferenceRemover, listed
 from bml_schema.element_reader import ElementReader, Vocabulary
 from bml_schema.errors import (
     BEHAVIOR_TYPE_NOT_SUPPORTED,
@@ -35,7 +36,6 @@ from bml_schema.sync_refs import Names
 from bml_schema.values import block_names, describe_mismatch
 
 MAX_BEHAVIOURS = 10_000  # in one block; scheduled in about a second
-_MAX_LISTED = 10  # lost references in a warning's text; `Problem.lost_references` has all
 # BMLA writes this in composition or in an attribute of its own.
 _APPEND_AFTER = re.compile(r"\s*APPEND-AFTER\s*\(([^()]*)\)\s*", re.IGNORECASE)
 _BLOCK_LISTS = {a.field for a in schema_of(Block).attributes.values() if a.value is block_names}
@@ -261,9 +261,7 @@ class _Reader:
             id = problem.id.removeprefix(prefix) if problem.id.startswith(prefix) else ""
             lost = tuple(remover.lost_references.pop(id, ()))
             if lost:
-                rest = len(lost) - _MAX_LISTED
-                named = ", ".join(lost[:_MAX_LISTED]) + (f" and {rest} more" if rest > 0 else "")
-                text = f"{problem.text}; with it went {named}"
+                text = f"{problem.text}; with it went {listed(lost)}"
                 fatal = problem.fatal or id in remover.fatal
                 self.problems[n] = replace(problem, text=text, lost_references=lost, fatal=fatal)
 
@@ -301,19 +299,14 @@ def _grouped(
     tree: list[Entry | list[Entry]], nodes: Mapping[int, Behaviour | Constraint]
 ) -> tuple[Behaviour | Required | Constraint, ...]:
     """Arrange the remaining nodes in the tree of their entries."""
-    if list not in map(type, tree):
-        return tuple(nodes.values())
+    numbers = count()
     out: list[Behaviour | Required | Constraint] = []
-    n = 0
     for item in tree:
         if isinstance(item, list):
-            span = range(n, n + len(item))
-            out.append(Required(children=tuple(nodes[k] for k in span if k in nodes)))
-            n += len(item)
-        else:
-            if n in nodes:
-                out.append(nodes[n])
-            n += 1
+            inside = (nodes.get(next(numbers)) for _ in item)
+            out.append(Required(children=tuple(node for node in inside if node is not None)))
+        elif (node := nodes.get(next(numbers))) is not None:
+            out.append(node)
     return tuple(out)
 
 

@@ -5,17 +5,16 @@ The parser only knows lines; this module scans the text again, and tolerates err
 
 from __future__ import annotations
 
-import codecs
 import html
 import re
 from bisect import bisect_right
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from bml_schema.documents import encoding_of
 from bml_schema.tolerant_scanner import DOCUMENT, Element, ScanError, scan
 
 _STEP = re.compile(r"([^/\[\]]+)(?:\[([0-9]{1,9})\])?")
-_ENCODING = re.compile(rb"""<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
 
 
 class Spot(NamedTuple):
@@ -215,10 +214,7 @@ class Source:
 
 def _decoded(data: bytes) -> str:
     """Decode bytes by BOM, declaration or as UTF-8; undecodable bytes become U+FFFD."""
-    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return data.decode("utf-16", "replace")
-    named = _ENCODING.match(data.removeprefix(codecs.BOM_UTF8).lstrip())
     try:
-        return data.decode(named[1].decode() if named else "utf-8", "replace")
+        return data.decode(encoding_of(data), "replace")
     except LookupError:
         return data.decode("utf-8", "replace")

@@ -130,35 +130,26 @@ class _Scan:
             return offset
         name, value = match[1], match[2]
         if value is None:
-            errors.append(ScanError(match.start(1), len(name), f'wanted {name}="...", got no value'))
+            place, length, words = 1, len(name), f'wanted {name}="...", got no value'
         elif value[:1] in ('"', "'"):
-            errors.append(
-                ScanError(match.start(2), len(value), f"the value of {name} is never closed by {value[0]}")
-            )
+            place, length, words = 2, len(value), f"the value of {name} is never closed by {value[0]}"
         else:
-            errors.append(
-                ScanError(match.start(2), max(1, len(value)), f"wanted quotes around the value of {name}")
-            )
+            place, length, words = 2, max(1, len(value)), f"wanted quotes around the value of {name}"
+        errors.append(ScanError(match.start(place), length, words))
         return match.end()
 
     def close(self, name: str, start: int, end: int) -> int:
-        elements = self.elements
-        if self.names.get(name):
-            if elements[self.open[-1]].name != name:
-                inner = elements[self.open[-1]]
-                words = f"wanted </{inner.name}>, got </{name}>"
-                self.errors.append(ScanError(start, end - start, words, inner.offset))
-            while self.names.get(name):
-                last = elements[self.open.pop()].name
-                self.names[last] -= 1
-                if last == name:
-                    break
-        elif self.open:
-            inner = elements[self.open[-1]]
+        inner = self.elements[self.open[-1]] if self.open else None
+        if inner is None:
+            self.errors.append(ScanError(start, end - start, f"</{name}> closes nothing"))
+        elif inner.name != name:
             words = f"wanted </{inner.name}>, got </{name}>"
             self.errors.append(ScanError(start, end - start, words, inner.offset))
-        else:
-            self.errors.append(ScanError(start, end - start, f"</{name}> closes nothing"))
+        while self.names.get(name):
+            last = self.elements[self.open.pop()].name
+            self.names[last] -= 1
+            if last == name:
+                break
         return end
 
     def entities(self, start: int, end: int) -> None:

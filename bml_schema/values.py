@@ -58,32 +58,29 @@ def describe_mismatch(wanted: str, got: str, shown: str) -> str:
 
 def number(low: float, high: float, *, wanted: str = "") -> Value:
     """Return the Value of decimal numbers in low..high."""
-
-    def read(text: str) -> float:
-        text = text.strip()
-        if len(text) > _MAX_DIGITS or not NUMBER.fullmatch(text):
-            raise ValueError(text)
-        value = float(text)
-        if not low <= value <= high:
-            raise ValueError(text)
-        return value
-
+    read = _reader(float, NUMBER, _MAX_DIGITS, low, high)
     return Value(wanted or f"{low:g}..{high:g}", read, decimal, "decimal", low=low, high=high)
 
 
 def integer(low: int, high: int) -> Value:
     """Return the Value of whole numbers in low..high."""
+    read = _reader(int, _WHOLE, 20, low, high)
+    return Value(f"a whole number {low}..{high}", read, str, "integer", low=low, high=high)
 
-    def read(text: str) -> int:
+
+def _reader(
+    convert: Callable[[str], float], pattern: re.Pattern[str], longest: int, low: float, high: float
+) -> Callable[[str], float]:
+    def read(text: str) -> float:
         text = text.strip()
-        if len(text) > 20 or not _WHOLE.fullmatch(text):
+        if len(text) > longest or not pattern.fullmatch(text):
             raise ValueError(text)
-        value = int(text)
+        value = convert(text)
         if not low <= value <= high:
             raise ValueError(text)
         return value
 
-    return Value(f"a whole number {low}..{high}", read, str, "integer", low=low, high=high)
+    return read
 
 
 def one_of(*words: str, any_case: bool = False) -> Value:

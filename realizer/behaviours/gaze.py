@@ -11,8 +11,8 @@ from bml_schema import Gaze, GazeShift
 from realizer import tables
 from realizer.animation.axis import au, mask_channel
 from realizer.animation.channel import Channel, Layer
-from realizer.behaviours.gaze_targets import Turn, angles, facts, limited, limits, target_faults, turn
-from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext, claiming
+from realizer.behaviours.gaze_targets import Turn, angles, check_target, facts, limited, limits, turn
+from realizer.behaviours.kind import BehaviourKind, PlanningContext, claiming
 from realizer.behaviours.table_timing import timing_from_table
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
@@ -133,10 +133,6 @@ def expand_shift(node: GazeShift, times: Float64, context: PlanningContext) -> t
     )
 
 
-def check(node: Gaze | GazeShift, context: PlanningContext) -> tuple[Fault, ...]:
-    return target_faults(node.target, context)
-
-
 def _lead(length: float) -> float:
     """Return the seconds by which the eyes lead in a turn of this length: at most half of it."""
     return min(float(facts()["eyes"]["lead"]), length / 2)
@@ -154,8 +150,8 @@ def _converge(
 
 # Every influence needs the gaze; a temporary one does not need the base gaze.
 KINDS = (
-    BehaviourKind(Gaze, timing, expand, check, claims=claiming("gaze")),
+    BehaviourKind(Gaze, timing, expand, check_target, claims=claiming("gaze")),
     BehaviourKind(
-        GazeShift, timing_of_shift, expand_shift, check, claims=claiming("base gaze"), region="eyes"
+        GazeShift, timing_of_shift, expand_shift, check_target, claims=claiming("base gaze"), region="eyes"
     ),
 )

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from bml_schema import Gaze, GazeShift, HeadDirectionShift
 from realizer import tables
 from realizer.animation.axis import au
 from realizer.animation.channel import Channel, Layer
@@ -70,8 +71,9 @@ def angles(target: str, context: PlanningContext) -> tuple[float, float, float]:
     return yaw, pitch, inward
 
 
-def target_faults(target: str, context: PlanningContext) -> tuple[Fault, ...]:
+def check_target(node: Gaze | GazeShift | HeadDirectionShift, context: PlanningContext) -> tuple[Fault, ...]:
     """Return NO_SUCH_TARGET, not fatal, for a name that is not in a declared scene."""
+    target = node.target
     if context.scene is None or position(target, context) is not None:
         return ()
     near = difflib.get_close_matches(target, list(context.scene), n=3) or sorted(context.scene)[:5]

@@ -11,7 +11,7 @@ from bml_schema import Head, HeadDirectionShift
 from realizer import tables
 from realizer.animation.axis import au
 from realizer.animation.channel import Channel, Layer
-from realizer.behaviours.gaze_targets import angles, limited, limits, target_faults, turn
+from realizer.behaviours.gaze_targets import angles, check_target, limited, limits, turn
 from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext, claiming
 from realizer.behaviours.pose_channels import unknown_word
 from realizer.behaviours.table_timing import from_gaps, table_timing
@@ -98,17 +98,13 @@ def expand_shift(node: HeadDirectionShift, times: Float64, context: PlanningCont
     return turn("head", times, turns, layer=Layer.BASE, holds=True, source=node.id)
 
 
-def check_shift(node: HeadDirectionShift, context: PlanningContext) -> tuple[Fault, ...]:
-    return target_faults(node.target, context)
-
-
 KINDS = (
     BehaviourKind(Head, timing, expand, check, parameters={"amount": "amount"}),
     BehaviourKind(
         HeadDirectionShift,
         table_timing("headDirectionShift"),
         expand_shift,
-        check_shift,
+        check_target,
         claims=claiming("base head"),
         region="head",
     ),

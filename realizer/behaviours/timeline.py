@@ -71,16 +71,14 @@ def _channels(
         keys += [start + span.reached * scale, start + span.left * scale]
     times = np.array([*keys, start + shown[-1].end * scale])
     # Two keys at one time become one: an apex without duration, or a missing onset.
-    distinct = np.append(np.diff(times) > 1e-9, True)
+    keep = np.append(np.diff(times) > 1e-9, True)
     channels = []
     for target in sorted({target for pose in poses for target in pose}, key=lambda target: target.column):
         values = [0.0]
         for pose in poses:
             values += [pose.get(target, 0.0)] * 2
         channels.append(
-            Channel(
-                target, times[distinct], np.array([*values, 0.0])[distinct], curve=track.curve, source=node.id
-            )
+            Channel(target, times[keep], np.array([*values, 0.0])[keep], curve=track.curve, source=node.id)
         )
     return channels
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bml_schema import Block, SyncRef, without
+from bml_schema.dropped_references import listed
 from realizer.animation.channel import Channel
 from realizer.behaviours.kind import BehaviourKind, PlanningContext
 from realizer.playback.resources import ResourceClaim, claims, conflicts
@@ -19,7 +20,6 @@ from realizer.speech.utterance import WARP
 SAME = 1e-6
 # s; shorter gaps of a speech are too short to determine its rate.
 SHORT = 0.02
-_MAX_LISTED = 10  # lost references that a warning names
 
 
 @dataclass(frozen=True)
@@ -154,10 +154,8 @@ class _PlanBuilder:
             gone = self.timings.keys() - schedule.times.keys()
             self.drop([(self.behaviour_of(w), w) for w in warnings if self.behaviour_of(w) in gone])
             self.warnings += [w for w in warnings if self.behaviour_of(w) not in gone]
-            all_warnings = tuple(self.warnings)
-            schedule = replace(
-                schedule, start=start, character=self.block.character_id, warnings=all_warnings
-            )
+            character, all_warnings = self.block.character_id, tuple(self.warnings)
+            schedule = replace(schedule, start=start, character=character, warnings=all_warnings)
             self.claims = tuple(claims(self.block, schedule, self.kinds, self.context))
             lost = conflicts(self.claims, existing_claims, start)
             if not lost:
@@ -191,14 +189,10 @@ class _PlanBuilder:
         could = {b: timing for b, timing in flexible.items() if timing is not own.timings[b]}
         if not could:
             return
-        flexible_schedule = schedule_together([replace(own, timings=flexible), *others], outside=outside)[0]
-        if flexible_schedule.failed or len(flexible_schedule.times) <= len(rigid.times):
+        stretched = schedule_together([replace(own, timings=flexible), *others], outside=outside)[0]
+        if stretched.failed or len(stretched.times) <= len(rigid.times):
             return
-        at = {
-            b: flexible_schedule.times[b] - flexible_schedule.times[b][0]
-            for b in could
-            if b in flexible_schedule.times
-        }
+        at = {b: stretched.times[b] - stretched.times[b][0] for b in could if b in stretched.times}
         natural = {b: np.append(0.0, np.cumsum(own.timings[b].preferred)) for b in at}
         # A voice has one rate for a whole speech: of the rates of its gaps, the one that lets most fit.
         most = len(rigid.times)
@@ -240,9 +234,7 @@ class _PlanBuilder:
                     replace(warning, text=f"{warning.text} (a required constraint names {id})")
                 )
             if names := lost.get(id):
-                rest = len(names) - _MAX_LISTED
-                listed = ", ".join(names[:_MAX_LISTED]) + (f" and {rest} more" if rest > 0 else "")
-                warning = replace(warning, text=f"{warning.text}; with it went {listed}")
+                warning = replace(warning, text=f"{warning.text}; with it went {listed(names)}")
             # Earlier warnings about it do not matter any more.
             self.warnings = [w for w in self.warnings if w.id != warning.id]
             self.warnings.append(warning)

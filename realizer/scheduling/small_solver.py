@@ -19,8 +19,6 @@ from realizer.scheduling.timing import TimingArrays
 from realizer.scheduling.union_find import UnionFind
 
 NEVER = float("-inf")
-# NamedTuples are made in a third of the time without their own `__new__`, which is Python code.
-made = tuple.__new__
 
 
 class _Knot(NamedTuple):
@@ -52,7 +50,7 @@ def solve_small(problem: Problem) -> tuple[list[float], float] | None:
     for p in sorted(named):
         b = problem.owner[p]
         place, root, shift = p - problem.first[b], ties.find(p), ties.shift[p]
-        knots[b].append(made(_Knot, (place, root, shift)))
+        knots[b].append(_Knot(place, root, shift))
         hooks.append((b, root, shift - lists[b].chain[place]))
 
     # Tied behaviours at their preferred lengths; then the clusters that must stretch.
