@@ -20,7 +20,7 @@ def test_angles_without_a_scene_are_straight_ahead() -> None:
 
 
 @pytest.mark.parametrize("element", ["gaze", "gazeShift", "headDirectionShift"])
-def test_target_faults_suggest_names_for_an_unknown_one(element: str) -> None:
+def test_check_target_suggests_names_for_an_unknown_one(element: str) -> None:
     (fault,) = check(f'<{element} id="x" target="cupp"/>', SCENE)
     assert fault.type == "NO_SUCH_TARGET"
     assert not fault.fatal
@@ -29,6 +29,6 @@ def test_target_faults_suggest_names_for_an_unknown_one(element: str) -> None:
     assert not check(f'<{element} id="x" target="1, -2.5, .5"/>', SCENE)
 
 
-def test_target_faults_suggest_a_point_in_an_empty_scene() -> None:
+def test_check_target_suggests_a_point_in_an_empty_scene() -> None:
     (fault,) = check('<gaze id="x" target="cup"/>', PlanningContext(scene={}))
     assert "0,0,1" in fault.text
