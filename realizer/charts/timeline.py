@@ -78,7 +78,7 @@ class Gap(NamedTuple):
 
 @dataclass(frozen=True)
 class BehaviourRow:
-    """One behaviour.
+    """The row of a behaviour.
 
     Attributes:
         element: its name, such as "head".
@@ -132,7 +132,7 @@ class Dropped(NamedTuple):
 
 @dataclass(frozen=True)
 class BlockChart:
-    """One block.
+    """The chart of a block.
 
     Attributes:
         start, end: seconds on the session clock; None while unknown.

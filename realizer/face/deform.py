@@ -84,8 +84,7 @@ def complete_poses(poses: Any, inputs: tuple[str, ...]) -> Float32:
 def jaw_pose(basis: Any, opening: Any) -> tuple[Float64, Float64]:
     """Return the jaw's pose when the chin (2.1) has sunk by `opening` metres: rotation in rad, slide in m.
 
-    A jaw turns about its joint, and where it opens far the joint slides: what the turn cannot reach, the
-    slide does.
+    A jaw turns about its joint. Where it opens further than the turn reaches, the joint slides.
     """
     y, z = basis["chin"]
     opening = np.asarray(opening, np.float64)

@@ -131,13 +131,11 @@ def eyeball(name: str, centre: Float64, radius: float, look: dict[str, list[floa
 
 UPPER = (8.4, 6.8, 7.6, 7.0, 6.6, 9.5)  # mm: widths of the teeth of one side, from the middle
 LOWER = (5.4, 5.9, 6.7, 7.0, 7.0, 10.0)
-# Of the light, how much reaches a tooth from the gum at the tongue to the gum at the lips.
+# The share of the light that reaches a tooth, from the gum at the tongue to the gum at the lips.
 SHADES = (0.55, 0.78, 0.75, 1, 1, 0.8, 0.55, 0.4)
 SHINES = (0.1, 0.15, 0.35, 1, 1, 1, 1, 1)  # gloss by ring
-IN_LIP = (
-    0.62  # of the light, how much is left for the lower teeth: the upper ones and the lips stand before it
-)
-WARM = np.array([1.0, 0.78, 0.64])  # what light is left behind the teeth has been on tongue and cheeks
+IN_LIP = 0.62  # the share of the light that reaches the lower teeth past the upper ones and the lips
+WARM = np.array([1.0, 0.78, 0.64])  # the light behind the teeth comes from tongue and cheeks
 
 
 def teeth(name: str, front: Float64, width: float, depth: float, colours: dict[str, list[float]]) -> Part:

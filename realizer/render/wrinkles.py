@@ -116,7 +116,7 @@ class Wrinkles:
 
 @dataclass(frozen=True, eq=False)
 class _Strip:
-    """One furrow: (k, 3) vertices and weights of each point, and the darkness (k,) per drive."""
+    """A furrow: (k, 3) vertices and weights of each point, and the darkness (k,) per drive."""
 
     corners: Int32
     weights: Float64

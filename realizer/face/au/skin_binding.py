@@ -33,7 +33,7 @@ def attached_parts(face: Face) -> list[tuple[int, int, Int32, Float64]]:
 def skin_roots(face: Face, part: str) -> tuple[Int32, Float64]:
     """Return three vertices of skin for each vertex of the part, (n, 3), and their shares, (n, 3).
 
-    What stands off, such as a lash's tip, follows the nearest vertex of the part that is on the skin.
+    Vertices off the skin, such as a lash's tip, follow the nearest vertex of the part that is on the skin.
     """
     from scipy.sparse.csgraph import dijkstra
     from scipy.spatial import cKDTree

@@ -13,8 +13,8 @@ from realizer.face.au.skin_binding import attached_parts, skin
 from realizer.face.model import Face
 
 LEAST = 1e-5  # m; smaller movements of a unit are ignored
-# Times what a unit moves the neutral face by: further it moves nothing. Off the skin, where its functions
-# were not fitted, they may grow without bounds.
+# The limit of a unit's movement, as a multiple of its largest on the neutral face. Off the skin, where its
+# functions were not fitted, they may grow without bounds.
 FURTHEST = 1.3
 
 

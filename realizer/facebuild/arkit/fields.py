@@ -2,8 +2,8 @@
 
 A shape such as a raised brow moves several feature points at once. Along the line that joins them each has a
 share that is 1 at itself and 0 at the others; a FAP's field is its share of the shape over what the shape
-does on that line. So the FAPs that the shape itself asks for give the shape back, and every point obeys its
-own FAP alone.
+does on that line. So the FAPs that describe the shape reproduce it, and every point follows its own FAP
+alone.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from realizer.facebuild.mpeg4.zones import Triple
 from realizer.facebuild.parts import smooth
 from realizer.tables import faps
 
-FLOOR = 0.35  # of the most on its line: a point that a shape hardly moves does not blow its field up
+FLOOR = 0.35  # least share of the largest move on its line, or a point that hardly moves inflates its field
 TRUE = 0.25  # the least share of its largest move by which a shape must move a point along a FAP's direction
 BLOWN = 0.1  # the same for cheeks: they go forwards more than aside
 # FAP -> its point, its station along the lips (0 right corner .. 4 left), and 1 on the outer contour.

@@ -30,7 +30,7 @@ def points_of(
     """Return the feature points, and the names of those that are guesses.
 
     The form decides most points (`mpeg4.find_points`); where the lips meet and at the edges of the lids the
-    shapes decide: what moves with the upper lip is upper lip, however close the lower one lies.
+    shapes decide: vertices that move with the upper lip belong to it, however close the lower lip is.
 
     Raises:
         FaceError: the eyes do not stand side by side.

@@ -1,13 +1,14 @@
 """Limits on how far a fitted action unit may move any point of a face.
 
-A fit sees landmarks, not what lies between and behind them: there a sum of Gaussians can grow to metres and
-no table shows it. So no vertex of the face, hidden ones too, goes much further than the furthest landmark;
-nor does what lies between them, where a mesh of another topology may have its vertices.
+A fit sees landmarks. Between and behind them a sum of Gaussians can grow to metres without a trace in any
+table. So no vertex of the face, visible or hidden, may move much further than the furthest landmark, nor may
+places between the vertices, where a mesh of another topology may have its own.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,6 +27,7 @@ STEEP = 10.0  # and beyond it the excess squared, times this
 REACH = 1e-3  # share of a half that counts as belonging to it
 
 
+@dataclass(frozen=True, eq=False)
 class WatchedPlaces:
     """The places of a face at which a fit is limited.
 
@@ -35,8 +37,9 @@ class WatchedPlaces:
         plane: (n,) and as the mouth's plane does.
     """
 
-    def __init__(self, at: Float64, upper: Float64, plane: Float64) -> None:
-        self.at, self.upper, self.plane = at, upper, plane
+    at: Float64
+    upper: Float64
+    plane: Float64
 
     def of(self, half: str) -> Float64:
         """Return the places (k, 3) that the motion of "whole", "upper" or "lower" has any part in."""

@@ -1,8 +1,8 @@
 """FaceEditor's parameter XML (Paul 2010, appendix C): reader and writer.
 
-The printed DTD has lost its beginning. What it does not say is read so: an `fp-position` has fp, x, y, z; a
-deformer's x, y, z is its neutral feature point; a mask lists the vertices that move; smooth-center and
-smooth-side are percent, as ease is; a plain `deformer`, which has no size, is a part that moves as a whole.
+The printed DTD lacks its beginning. We assume that an `fp-position` has fp, x, y, z; that a deformer's x, y, z
+is its neutral feature point; that a mask lists the vertices that move; that smooth-center and
+smooth-side are percent, as ease is; and that a plain `deformer`, without a size, moves a part as a whole.
 """
 
 from __future__ import annotations

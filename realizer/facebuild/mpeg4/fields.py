@@ -3,7 +3,7 @@
 Neighbours whose zones meet share what they both move. At a vertex every one of them gets a part of the
 influence of the line that joins their points, and the parts add up to one: equal FAPs move the skin between
 them as far as themselves, without the w that a plain sum makes (Paul 2010, 7.1). As a neighbour's part is 0
-at the other's feature point, every point goes exactly as far as it is asked, whatever the others do.
+at the other's feature point, every point moves exactly as its own FAP says, whatever the others do.
 """
 
 from __future__ import annotations

@@ -17,10 +17,10 @@ from realizer.facebuild.person.lips import Lips, lip_fields
 
 BEND = 0.45  # of the slope of a cardinal spline: less dips between the stations, more roundness at them
 PUFFED_FROM = np.array([0.034, 0.0, 0.010])  # m, from the middle of the cheek inwards, down and back
-SINKS = 0.35, 0.70  # how far the tongue's back and tip sink with the jaw: a tongue is lifted, or none is seen
+SINKS = 0.35, 0.70  # how far the tongue's back and tip sink with the jaw; more would hide it
 CLIMB = 0.4  # metres that the tongue's tip rises for each metre forwards
 SLACK = 30  # times that the throat's part in the jaw is softened
-LOWEST = -0.16  # m; below it no FAP but the head's moves a thing
+LOWEST = -0.16  # m; below it only the head's FAPs move anything
 
 
 def face_fields(ground: Ground, jaw_pivot: Float64) -> tuple[dict[int, Float64], Lips]:

@@ -14,7 +14,7 @@ from realizer.facebuild.person.makehuman import walk
 # Two vertices each of the rings around the left eye, from the edge of the lid outwards.
 RINGS = ((13352, 13369), (6785, 6844), (11465, 11485), (6787, 6845), (6789, 6846), (11515, 11493))
 
-DEEP, LINING = 6, 0.85  # rings of the lining that follow the edge, and how much each does of the one before
+DEEP, LINING = 6, 0.85  # rings of the lining that follow the edge; the share that each passes on
 
 
 class Lid:

@@ -43,7 +43,7 @@ _STRETCH = _stretch()
 def spline_basis(u: Any) -> Float64:
     """Return cardinal splines (5, n) over the knots u = -1, -0.5, 0, 0.5, 1; each is 1 at its own knot only.
 
-    The weights sum to 1 everywhere, so a lip whose FAPs are equal does not bend into a w.
+    The weights sum to 1 everywhere, so equal FAPs move a lip evenly.
     """
     u = np.clip(np.asarray(u, float), -1, 1)
     # Half-way to an ellipse's angle: an open mouth is round at its corners, a smile still runs into them.

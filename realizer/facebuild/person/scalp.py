@@ -11,11 +11,7 @@ from realizer.core.array_types import Float64
 from realizer.face.mesh_geometry import vertex_normals
 from realizer.facebuild.submesh import Submesh
 
-CROWN, CHIN, BACK = (
-    0.1087,
-    -0.1002,
-    -0.1559,
-)  # m; heights and depth of the head that the hairline was drawn on
+CROWN, CHIN = 0.1087, -0.1002  # m; heights of the head that the hairline was drawn on
 # The hair leaves the ear free: an ellipse in the side view, drawn from the ear's top and lobe (10.1, 10.5).
 EAR_ABOVE, EAR_BEHIND, EAR_TALL, EAR_WIDE, EAR_LEAN = 0.04, 0.066, 0.70, 0.45, 0.22
 EARS_FROM = 0.03  # m from the middle

@@ -129,7 +129,7 @@ def paint_mouth(
 ) -> None:
     """Paint the lining of the mouth, in place: wet, red and lit behind the lips, darker to the back.
 
-    What is baked there at rest, when the lips are closed, is no light at all; an open mouth lets it in.
+    The occlusion baked at rest, behind closed lips, leaves no light there; an open mouth lets it in.
 
     Args:
         out: (n, 3) sRGB; gloss, light: (n,) 0..1.
