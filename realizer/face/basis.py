@@ -20,6 +20,7 @@ FAPS = 68
 JAW_COS, JAW_SIN, TONGUE_COS, TONGUE_SIN, JAW_DROP = range(FAPS, FAPS + 5)
 ROWS = FAPS + 5
 
+AGAIN = "build or import the face again"
 LOOKS = {23, 24, 25, 26}  # FAPs that turn eyeballs, or have fields where the eyes are no balls
 
 ARRAYS = {
@@ -62,19 +63,8 @@ def basis_from(
     from scipy.sparse import csr_matrix
 
     stored = read_arrays(path, ARRAYS)
-    n = len(vertices)
-    for name, size in (("head", n), ("jaw_pivot", 3), ("head_pivot", 3)):
-        if len(stored[name]) != size:
-            raise FaceError(f"{path}: {name}: wanted {size} values, got {len(stored[name])}; build again")
-    for name in ("vertex", "lid"):
-        index = stored[name]
-        if len(index) and (index.min() < 0 or index.max() >= n):
-            raise FaceError(
-                f"{path}: {name}: wanted 0..{n - 1}, got {index.min()}..{index.max()}; build again"
-            )
-    for name in ("move", "lid_radius", "jaw_pivot", "head_pivot", "eye_centre"):
-        if not np.isfinite(stored[name]).all():
-            raise FaceError(f"{path}: {name}: wanted finite numbers, got NaN or infinity; build again")
+    if faults := array_faults(stored, len(vertices)):
+        raise FaceError(f"{path}: {faults[0]}")
     first, last = int(stored["vertex"].min()), int(stored["vertex"].max()) + 1
     fields = np.zeros((ROWS, last - first, 3), np.float32)
     table = faps()
@@ -102,6 +92,22 @@ def basis_from(
         "lid_eye": stored["lid_eye"].astype(np.int32),
         "lid_radius": stored["lid_radius"].astype(np.float32),
     }
+
+
+def array_faults(stored: Mapping[str, Any], n: int) -> list[str]:
+    """Return the faults of a fields.npz that was made for another mesh than one of n vertices, or damaged."""
+    faults = []
+    for name, size, each in (("head", n, "vertex"), ("jaw_pivot", 3, "axis"), ("head_pivot", 3, "axis")):
+        if len(stored[name]) != size:
+            faults.append(f"{name}: wanted {size} values, one a {each}, got {len(stored[name])}; {AGAIN}")
+    for name in ("vertex", "lid"):
+        index = stored[name]
+        if len(index) and (index.min() < 0 or index.max() >= n):
+            faults.append(f"{name}: wanted 0..{n - 1}, got {index.min()}..{index.max()}; {AGAIN}")
+    for name in ("move", "lid_radius", "jaw_pivot", "head_pivot", "eye_centre"):
+        if not np.isfinite(stored[name]).all():
+            faults.append(f"{name}: wanted finite numbers, got NaN or infinity; {AGAIN}")
+    return faults
 
 
 def pack(rows: Mapping[int, Any], threshold: float = 2e-3) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from realizer.core.errors import FaceError, TableError
-from realizer.face.basis import ARRAYS, ROWS
+from realizer.face.basis import AGAIN, ARRAYS, ROWS, array_faults
 from realizer.face.features import INSIDE, Point, fapu_of, read_features
 from realizer.face.load import MESH, folder_of, load_folder, read_head
 from realizer.face.mesh_checks import NEEDED, range_faults, surface_faults, value_faults
@@ -149,39 +149,25 @@ def _point_faults(folder: Path, points: dict[str, Point], vertices: Any, triangl
 
 def _stored_faults(folder: Path, stored: dict[str, Any], n: int) -> list[str]:
     """Return the faults of fields that were made for another mesh, or truncated."""
-    path, faults = folder / "fields.npz", []
-    again = "build or import the face again"
-    if len(stored["head"]) != n:
-        faults.append(f"{path}: head: wanted {n} values, one a vertex, got {len(stored['head'])}; {again}")
-    for name in ("vertex", "lid"):
-        index = stored[name]
-        if len(index) and (index.min() < 0 or index.max() >= n):
-            faults.append(f"{path}: {name}: wanted 0..{n - 1}, got {index.min()}..{index.max()}; {again}")
-    for name in ("move", "lid_radius", "jaw_pivot", "head_pivot", "eye_centre"):
-        if not np.isfinite(stored[name]).all():
-            faults.append(f"{path}: {name}: wanted finite numbers, got NaN or infinity; {again}")
+    faults = array_faults(stored, n)
     sides = stored["lid_eye"]
     if len(sides) != len(stored["lid"]) or len(stored["lid_radius"]) != len(sides):
-        faults.append(f"{path}: lid, lid_eye, lid_radius: wanted as many of each; {again}")
+        faults.append(f"lid, lid_eye, lid_radius: wanted as many of each; {AGAIN}")
     if len(sides) and (sides.min() < 0 or sides.max() > 1):
-        faults.append(f"{path}: lid_eye: wanted 0 or 1, got {sides.min()}..{sides.max()}; {again}")
+        faults.append(f"lid_eye: wanted 0 or 1, got {sides.min()}..{sides.max()}; {AGAIN}")
     if stored["eye_centre"].shape != (2, 3) or stored["eye_centre"][0, 0] <= stored["eye_centre"][1, 0]:
-        faults.append(f"{path}: eye_centre: wanted the left eye's middle, then the right's; {again}")
+        faults.append(f"eye_centre: wanted the left eye's middle, then the right's; {AGAIN}")
     farthest = np.abs(stored["move"]).max(initial=0)
     if farthest > FARTHEST:
-        faults.append(
-            f"{path}: move: wanted at most {FARTHEST} times its point's way, got {farthest:g}; {again}"
-        )
+        faults.append(f"move: wanted at most {FARTHEST} times its point's way, got {farthest:g}; {AGAIN}")
     row, start = stored["row"], stored["start"]
     if len(row) and (row.min() < 3 or row.max() > ROWS or (np.diff(row) <= 0).any()):
-        faults.append(
-            f"{path}: row: wanted ascending numbers 3..{ROWS}, got {row.min()}..{row.max()}; {again}"
-        )
+        faults.append(f"row: wanted ascending numbers 3..{ROWS}, got {row.min()}..{row.max()}; {AGAIN}")
     if len(start) != len(row) + 1 or (np.diff(start) < 0).any() or start[-1] != len(stored["vertex"]):
-        faults.append(f"{path}: start: wanted {len(row) + 1} ascending ends of vertex, got others; {again}")
+        faults.append(f"start: wanted {len(row) + 1} ascending ends of vertex, got others; {AGAIN}")
     if stored["move"].shape != (len(stored["vertex"]), 3):
-        faults.append(f"{path}: move: wanted 3 numbers a vertex, got {stored['move'].shape}; {again}")
-    return faults
+        faults.append(f"move: wanted 3 numbers a vertex, got {stored['move'].shape}; {AGAIN}")
+    return [f"{folder / 'fields.npz'}: {fault}" for fault in faults]
 
 
 def _zone_faults(folder: Path, skin: Any) -> list[str]:

@@ -1,7 +1,7 @@
 """FaceEditor's parameter XML (Paul 2010, appendix C): reader and writer.
 
-The printed DTD lacks its beginning. We assume that an `fp-position` has fp, x, y, z; that a deformer's x, y, z
-is its neutral feature point; that a mask lists the vertices that move; that smooth-center and
+The printed DTD lacks its beginning. We assume that an `fp-position` has fp, x, y, z; that a deformer's x, y,
+z is its neutral feature point; that a mask lists the vertices that move; that smooth-center and
 smooth-side are percent, as ease is; and that a plain `deformer`, without a size, moves a part as a whole.
 """
 

@@ -73,7 +73,7 @@ def test_basis_of_eyes_with_fields_of_their_own_has_no_balls(
 @pytest.mark.parametrize(
     ("name", "values", "words"),
     [
-        ("head", np.zeros(3), r"head: wanted \d+ values, got 3"),
+        ("head", np.zeros(3), r"head: wanted \d+ values, one a vertex, got 3"),
         ("lid", np.array([-1]), r"lid: wanted 0\.\.\d+, got -1\.\.-1"),
         ("vertex", np.array([7, 10**6]), r"vertex: wanted 0\.\.\d+, got 7\.\.1000000"),
         ("jaw_pivot", np.full(3, np.nan), "jaw_pivot: wanted finite numbers"),
