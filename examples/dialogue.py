@@ -1,20 +1,20 @@
-"""A dialogue manager: a model's text in as it comes, a face that says it, and a user who may break in.
+"""A dialogue manager: a face speaks the text of a model while it is generated, and the user can interrupt.
 
-  python examples/dialogue.py                     # a scripted model and a service of its own: no network
-  python examples/dialogue.py --voice silent      # only the face, at a reader's pace
-  python examples/dialogue.py --openai http://127.0.0.1:8080/v1 --name llama    # a model that runs there
+  python examples/dialogue.py                     # a scripted model and its own service: no network
+  python examples/dialogue.py --voice silent      # only the face, at reading speed
+  python examples/dialogue.py --openai http://127.0.0.1:8080/v1 --name llama    # a model on a server
   python examples/dialogue.py --model mine.py:reply     # def reply(history): yield "Hel"; yield "lo."
 
-Type a line: the words of the answer appear as they are said, and the page whose address is printed shows and
-sounds them. A line that you type while the face speaks interrupts it: it is silent at once, and the model
-gets your line and as much of its own text as was heard. An empty line only silences it; "go on" lets it say
-the rest. The end of input (Ctrl-D) ends the dialogue.
+Type a line: the words of the answer are printed when they are spoken, and the page at the printed address
+shows the face and plays the sound. A line typed while the face speaks interrupts it: the face stops at once,
+and the model gets the line and the part of its own text that was heard. An empty line only stops the face;
+"go on" makes it speak the rest. The end of input (Ctrl-D) ends the dialogue.
 
-This file is the tutorial, read it from top to bottom. A model is a function of the history (the messages of
-a chat) that yields tokens. In its text stand marks: [nod] [shake] [smile] and all other lexemes of the
-service, [joy] and all its other emotions become behaviours that start where they stand, [pause] half a
-second of silence. Every word and every mark, whatever its name, is also a sync point: the service tells when
-it is said. When a speech is cut off, the service tells which words of it were heard.
+This file is a tutorial; read it from top to bottom. A model is a function that takes the history (the
+messages of a chat) and yields tokens. Its text may contain marks: lexemes of the service such as [nod],
+[shake] and [smile], and emotions such as [joy], become behaviours that start at this place; [pause] is half
+a second of silence. Every word and every mark is also a sync point, so the service reports when it is
+spoken. When a speech is interrupted, the service reports which words were heard.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ __all__ = ["converse", "flow", "heard", "openai", "scripted"]
 History = list[dict[str, str]]
 Model = Callable[[History], Iterable[str]]
 
-# 1. Models: the history in, tokens out. They may block; a thread of their own draws from them.
+# 1. Models take the history and yield tokens. They may block, as each runs in a thread of its own.
 
 SCRIPT = {  # what the user says -> what the model says
     r"\b(story|tell)\b": """[joy] With pleasure. Once there was a face that could not stop. [sadness] When
@@ -54,14 +54,14 @@ SCRIPT = {  # what the user says -> what the model says
     r"\b(bye|thanks?)\b": "[joy] It was a pleasure. [nod] Goodbye!",
     r"": '[raise_brows] I only know a story. Say "tell me", or "go on" where you stopped me.',
 }
-CUT = " ..."  # ends a text of the history that was not heard to its end
-PROMPT = """You are a face that speaks with somebody. Answer in a few short sentences of plain text. Put marks
+CUT = " ..."  # the end of an interrupted text in the history
+PROMPT = """You are a face that talks to a user. Answer in a few short sentences of plain text. Put marks
 before words they belong to: [nod] [shake] [smile] [raise_brows] [pause] [joy] [sadness] [anger] [surprise].
-A text of yours that ends with "..." was interrupted: the user has heard only what stands there."""
+An answer of yours that ends with "..." was interrupted: the user has heard only this part of it."""
 
 
 def scripted(history: History) -> Iterator[str]:
-    """A model that needs no network. Its tokens end within words and marks, as those of others do."""
+    """Answer by a script, without a network; tokens end within words and marks, as those of models do."""
     said = history[-1]["content"].lower()
     text = " ".join(next(text for words, text in SCRIPT.items() if re.search(words, said)).split())
     if len(history) > 1 and (before := history[-2]["content"]).endswith(CUT):
@@ -72,7 +72,7 @@ def scripted(history: History) -> Iterator[str]:
 
 
 def openai(url: str, name: str) -> Model:
-    """A model that speaks OpenAI's protocol at an address, as servers of local models do."""
+    """Return a model on a server with OpenAI's protocol, which servers of local models support too."""
 
     def model(history: History) -> Iterator[str]:
         messages = [{"role": "system", "content": PROMPT}, *history]
@@ -90,21 +90,21 @@ def openai(url: str, name: str) -> Model:
     return model
 
 
-# 2. What blocks, such as a model or a keyboard, becomes a queue.
+# 2. Blocking iterables, such as a model or the keyboard, become queues.
 
 Flow = asyncio.Queue[str | Exception | None]
 
 
 def flow(blocking: Iterable[str]) -> Flow:
-    """Draw from it in a thread; at the end comes None, or the exception that it ended with."""
+    """Return a queue of the items, which a thread reads; None or an exception marks the end."""
     loop, queue = asyncio.get_running_loop(), Flow()
 
     def draw() -> None:
         end: Exception | None = None
-        with contextlib.suppress(RuntimeError):  # the loop is closed: nobody listens any more
+        with contextlib.suppress(RuntimeError):  # the loop is closed
             try:
-                for one in blocking:
-                    loop.call_soon_threadsafe(queue.put_nowait, one)
+                for item in blocking:
+                    loop.call_soon_threadsafe(queue.put_nowait, item)
             except Exception as error:
                 end = error
             loop.call_soon_threadsafe(queue.put_nowait, end)
@@ -113,39 +113,39 @@ def flow(blocking: Iterable[str]) -> Flow:
     return queue
 
 
-async def taken(queue: Flow) -> str | None:
-    """The next of it, None at its end."""
-    one = await queue.get()
-    if isinstance(one, Exception):
-        raise one
-    return one
+async def next_item(queue: Flow) -> str | None:
+    """Return the next item of a queue, or None at its end."""
+    item = await queue.get()
+    if isinstance(item, Exception):
+        raise item
+    return item
 
 
-# 3. A turn: text with marks becomes a speech with behaviours and syncs in it.
+# 3. A turn: text with marks becomes a speech with behaviours and sync points.
 
 
 class Turn:
-    """What the character says at a time: `text`, which is there, and the tokens that follow it."""
+    """An answer of the character: `text`, which has arrived, and the tokens that follow it."""
 
     def __init__(self, client: Client, id: str, tokens: Flow, text: str = "") -> None:
         self.client, self.id, self.tokens, self.text = client, id, tokens, text
-        self.syncs: list[str] = []  # what stands at the syncs s0, s1, ... of the speech
+        self.syncs: list[str] = []  # the word or mark at each sync point s0, s1, ... of the speech
 
     async def words(self) -> AsyncIterator[str]:
-        """Whole words, each as soon as the blank behind it has come."""
+        """Yield whole words, each as soon as the blank after it has arrived."""
         *whole, rest = re.split(r"(?<=\s)", self.text)
         while True:
             for word in whole:
                 yield word
-            if (token := await taken(self.tokens)) is None:
+            if (token := await next_item(self.tokens)) is None:
                 break
             self.text += token
             *whole, rest = re.split(r"(?<=\s)", rest + token)
         yield rest
 
     def marked(self, word: str) -> str:
-        """A word and its marks as the service takes them: with syncs; < and & are no markup."""
-        can, parts = self.client.welcome["capabilities"], []
+        """Return a word and its marks as BML: with sync points, and with < and & escaped."""
+        capabilities, parts = self.client.welcome["capabilities"], []
         for part in re.split(r"(\[[\w-]+\])", word):
             if part.strip():
                 parts.append(f'<sync id="s{len(self.syncs)}"/>')
@@ -155,51 +155,51 @@ class Turn:
                 parts.append(escape(part))
             elif mark == "pause":
                 parts.append('<break time="500ms"/>')
-            elif mark in can["emotions"]:
+            elif mark in capabilities["emotions"]:
                 parts.append(f'<realizer:emotion name="{mark}"/>')
             else:
-                kinds = [kind for kind, lexemes in can["lexemes"].items() if mark.upper() in lexemes]
+                kinds = [kind for kind, lexemes in capabilities["lexemes"].items() if mark.upper() in lexemes]
                 parts += [f'<{kind} lexeme="{mark.upper()}"/>' for kind in kinds[:1]]
         return "".join(parts)
 
     async def speak(self) -> None:
-        """Say the text as it comes. Leaving `async with` closes the speech, an exception stops it."""
+        """Speak the text as it arrives. `async with` closes the speech; an exception stops it."""
         async with self.client.speech(self.id) as speech:
             async for word in self.words():
                 await speech.append(self.marked(word))
 
     async def show(self) -> BlockProgress:
-        """Print words and marks when they are said, until the speech ends; what told the end."""
-        async for told in self.client.until_end(self.id):
-            match told:
-                case SyncPointProgress() if found := re.fullmatch(rf".*:{self.id}:s(\d+)", told.id):
+        """Print words and marks when they are spoken, and return the feedback for the end of the speech."""
+        async for feedback in self.client.until_end(self.id):
+            match feedback:
+                case SyncPointProgress() if found := re.fullmatch(rf".*:{self.id}:s(\d+)", feedback.id):
                     print(self.syncs[int(found[1])], end=" ", flush=True)
-                case BlockProgress() if told.id == f"{self.id}:end":
-                    return told
-        raise ClientError(f"the service did not say {self.id} to its end")
+                case BlockProgress() if feedback.id == f"{self.id}:end":
+                    return feedback
+        raise ClientError(f"the service did not finish {self.id}")
 
 
 def heard(text: str, said: str) -> tuple[str, str]:
-    """A text divided behind the last word of it that was said."""
+    """Split a text after its last word in `said`, the spoken words."""
     between = r"(?:\[[\w-]+\]|\W)"
     words = f"{between}+".join(map(re.escape, said.split()))
     found = re.match(rf"{between}*{words}[^\w\s\[]*", text) if words else None
     return (found[0], text[found.end() :]) if found else (said, text)
 
 
-# 4. The dialogue: a turn goes on to its end, or until the user types a line.
+# 4. The dialogue: a turn ends by itself, or when the user types a line.
 
 
 async def converse(client: Client, model: Model, lines: Flow) -> History:
-    """Answer the user's lines until there are no more; what was said, as it was heard."""
+    """Answer the user's lines until the input ends, and return the history as it was heard."""
     history: History = []
-    left: Turn | None = None  # what was not said because the user broke in
-    hearing = asyncio.create_task(taken(lines))
+    left: Turn | None = None  # the rest of an interrupted turn
+    hearing = asyncio.create_task(next_item(lines))
     while True:
         print("\n> ", end="", flush=True)
         if (line := await hearing) is None:
             return history
-        hearing = asyncio.create_task(taken(lines))
+        hearing = asyncio.create_task(next_item(lines))
         if not (line := line.strip()):
             continue
         history.append({"role": "user", "content": line})
@@ -219,7 +219,7 @@ async def converse(client: Client, model: Model, lines: Flow) -> History:
         end = await showing
         await asyncio.wait({speaking})
         if not speaking.cancelled():
-            speaking.result()  # where the model failed, this says so
+            speaking.result()  # raises the exception of a failed model
         said = turn.text
         if end.status != "DONE":
             said, rest = heard(turn.text, end.said or "")
@@ -230,11 +230,11 @@ async def converse(client: Client, model: Model, lines: Flow) -> History:
 
 
 async def run(url: str | None, voice: str | None, model: Model) -> None:
-    """Converse with who types, over the service at an address, or over one of our own."""
+    """Converse with the user over the service at an address, or over a service of this process."""
     async with contextlib.AsyncExitStack() as stack:
         if url is None:
             from realizer.core.settings import Settings
-            from realizer.server.serve import Server  # a client alone does without
+            from realizer.server.serve import Server  # not needed by a client alone
 
             settings = Settings.read({"port": 0, "voice": voice})
             url = (await stack.enter_async_context(Server(settings))).url
@@ -248,11 +248,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, usage="%(prog)s [options]", formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--service", metavar="URL", help="a service that runs, as ws://127.0.0.1:8765/ws")
-    parser.add_argument("--voice", help="of our own service, see `realizer voices`; the first that is there")
-    parser.add_argument("--openai", metavar="URL", help="of a model; OPENAI_API_KEY where it wants a key")
-    parser.add_argument("--name", default="default", help="of the model there")
-    parser.add_argument("--model", metavar="FILE.py:FUNCTION", help="a model of yours, as above")
+    parser.add_argument(
+        "--service", metavar="URL", help="address of a running service, such as ws://127.0.0.1:8765/ws"
+    )
+    parser.add_argument(
+        "--voice", help="voice of the own service, see `realizer voices`; default: the first installed"
+    )
+    parser.add_argument(
+        "--openai", metavar="URL", help="address of a model; the variable OPENAI_API_KEY is its key"
+    )
+    parser.add_argument("--name", default="default", help="name of the model there")
+    parser.add_argument("--model", metavar="FILE.py:FUNCTION", help="your own model, as above")
     given = parser.parse_args()
     model: Model = openai(given.openai, given.name) if given.openai else scripted
     if given.model:

@@ -266,7 +266,7 @@ def test_dialogue_ends_with_the_reason_of_a_failed_model() -> None:
 @pytest.mark.parametrize(
     ("options", "status", "message"),
     [
-        (["--help"], 0, "interrupts it: it is silent at once"),
+        (["--help"], 0, "interrupts it: the face stops at once"),
         (["--model", "none.py:reply"], 2, "wanted FILE.py:FUNCTION, there is no none.py:reply"),
         (["--service", "ws://127.0.0.1:1/ws"], 1, "dialogue: "),
     ],
