@@ -22,9 +22,9 @@ MILLIMETRES = {
     "none": 0.0, "MNS": 0.022, "MW": 0.05, "ENS": 0.044, "ES": 0.06, "IRISD": 0.011, "angle_unit": 1.2e-4,
 }  # fmt: skip
 # FAPs that no shape shows: the head, the tongue inside the mouth, pupils and nostrils.
-UNTOLD = (29, 30, 43, 44, 46, 47, 48, 49, 50)
+UNMAPPED = (29, 30, 43, 44, 46, 47, 48, 49, 50)
 RIDGE = 0.15  # mm^2: prefers solutions close to the weights of the action units
-STEPS, NEAR = 400, 1e-4
+STEPS, TOLERANCE = 400, 1e-4
 RELAXED = 1.6  # over-relaxation; values above 1 converge faster
 JAW = (3, 14, 15)
 CLOSE, OPEN = "mouthClose", "jawOpen"
@@ -86,7 +86,7 @@ def arkit(frames: AUFrames, mapping: FapMapping | None = None) -> ArkitFrames:
     weights = np.empty((len(whole), len(ARKIT_NAMES())), np.float32)
     for start in range(0, len(whole), CHUNK):
         part = slice(start, start + CHUNK)
-        weights[part] = _nearest(first[part].astype(np.float64), rest[part], mapping)
+        weights[part] = _fit(first[part].astype(np.float64), rest[part], mapping)
     turns = whole * np.float32(ANGLE_UNIT)
     return ArkitFrames(
         frames.times,
@@ -102,7 +102,7 @@ def warm_up(mapping: FapMapping | None = None) -> None:
     _system(mapping)
 
 
-def _nearest(first: Float64, rest: Float32, mapping: FapMapping | None) -> Float64:
+def _fit(first: Float64, rest: Float32, mapping: FapMapping | None) -> Float64:
     """Return weights (n, 52), 0..1, that best show `first` plus the FAPs `rest` (n, 68)."""
     moves, scale, inverse, rho = _system(mapping)
     first = np.clip(first, 0, 1)
@@ -117,7 +117,7 @@ def _nearest(first: Float64, rest: Float32, mapping: FapMapping | None) -> Float
         free = RELAXED * free + (1 - RELAXED) * change
         before, change = change, np.clip(free + dual, low, high)
         dual += free - change
-        if max(np.abs(change - before).max(initial=0), np.abs(free - change).max(initial=0)) < NEAR:
+        if max(np.abs(change - before).max(initial=0), np.abs(free - change).max(initial=0)) < TOLERANCE:
             break
     out[busy] = np.clip(first[busy] + change, 0, 1)
     return out
@@ -125,8 +125,8 @@ def _nearest(first: Float64, rest: Float32, mapping: FapMapping | None) -> Float
 
 @cache
 def _system(mapping: FapMapping | None) -> tuple[Float64, Float64, Float64, float]:
-    """Return the shapes' movements (52, 68) in mm, scale (68,), inverse matrix and rho for `_nearest`."""
-    scale = np.array([0.0 if row.fap in UNTOLD else MILLIMETRES[row.unit] for row in faps()])
+    """Return the shapes' movements (52, 68) in mm, scale (68,), inverse matrix and rho for `_fit`."""
+    scale = np.array([0.0 if row.fap in UNMAPPED else MILLIMETRES[row.unit] for row in faps()])
     moves = shape_faps(mapping) * scale
     square = moves @ moves.T + RIDGE * np.eye(len(moves))
     sizes = np.linalg.eigvalsh(square)
@@ -159,7 +159,7 @@ def _columns(au: int, side: str) -> list[int]:
 
 
 @cache
-def _beside(side: str) -> Float32:
+def _side_share(side: str) -> Float32:
     """Return the part (68,) of each FAP that a one-sided shape moves: 1 on its side, 0.5 in the middle."""
     sides = [re.search(r"_([lr])m?(_|$)", row.name) for row in faps()]
     return np.array([0.5 if found is None else found[1] == side.lower() for found in sides], np.float32)
@@ -175,7 +175,7 @@ def shape_faps(mapping: FapMapping | None) -> Float32:
     effects = to_fap(AUFrames(np.zeros(len(names)), values), mapping).values
     for k, name in enumerate(names):
         if shapes()[name].side:
-            effects[k] *= _beside(shapes()[name].side)
+            effects[k] *= _side_share(shapes()[name].side)
     for slide in read_csv(text_of("arkit_slides.csv"), _Slide, "arkit_slides.csv"):
         effects[names.index(slide.name), slide.fap - 1] = slide.value
     lips = -effects[names.index(OPEN)]

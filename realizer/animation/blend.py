@@ -18,9 +18,9 @@ from realizer.core.array_types import Float32, Float64
 from realizer.tables.cooccurrence import Rules
 
 # Layers that replace those below them, bottom up.
-OVER = (Layer.FAPS, Layer.DIRECT)
+REPLACING = (Layer.FAPS, Layer.DIRECT)
 # Layers that are summed separately before they join the others.
-APART = (Layer.BASE, Layer.GAZE)
+SEPARATE = (Layer.BASE, Layer.GAZE)
 
 
 def blend(
@@ -91,13 +91,13 @@ def _layers(
 
     Expressions include all other layers, except those that replace the ones below.
     """
-    own = [channel for channel in channels if channel.layer not in OVER]
+    own = [channel for channel in channels if channel.layer not in REPLACING]
     layers = {Layer.EXPRESSION: 0}
     rows, adds, sums = [], [], _sums()
     for channel in own:
         column, layer = channel.target.column, channel.layer
         adds.append(layer is Layer.BASE or sums[column])
-        apart = layer if adds[-1] and layer in APART else Layer.EXPRESSION
+        apart = layer if adds[-1] and layer in SEPARATE else Layer.EXPRESSION
         rows.append(layers.setdefault(apart, len(layers)) * len(place) + place[column])
     whole = np.zeros((len(layers), len(place), len(times)))
     if idle is not None:
@@ -112,7 +112,7 @@ def _layers(
         np.add.at(whole.reshape(-1), at[summed], values[summed])
         np.maximum.at(whole.reshape(-1), at[strongest], values[strongest])
     one, base, gaze = (
-        whole[layers[layer]] if layer in layers else None for layer in (Layer.EXPRESSION, *APART)
+        whole[layers[layer]] if layer in layers else None for layer in (Layer.EXPRESSION, *SEPARATE)
     )
     assert one is not None
     return one, base, gaze
@@ -176,7 +176,7 @@ def _override(
         (c, n) 0..1 how far each value was replaced, or None if nowhere.
     """
     overridden: Float64 | None = None
-    for layer in OVER:
+    for layer in REPLACING:
         if over := [channel for channel in channels if channel.layer is layer]:
             rows = [place[channel.target.column] for channel in over]
             weight, shown = np.zeros_like(values), np.zeros_like(values)

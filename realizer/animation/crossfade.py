@@ -11,9 +11,9 @@ from realizer.animation.channel import Channel, Crossfade
 from realizer.animation.curves import sample, weights
 
 # s until a crossfade has ended: about the attack of an expression.
-HEALS = 0.3
+DURATION = 0.3
 # s; keys that differ by less are equal but for rounding in the scheduler.
-SAME = 1e-9
+TOLERANCE = 1e-9
 # s over which a slope is measured.
 STEP = 1e-4
 
@@ -33,7 +33,7 @@ def crossfade(old: Sequence[Channel], new: Sequence[Channel], now: float) -> tup
     pending: list[Channel] = []
     for channel in new:
         previous = comparable.get((id(channel.values), channel.target))
-        if previous is not None and np.abs(previous.times - channel.times).max() < SAME:
+        if previous is not None and np.abs(previous.times - channel.times).max() < TOLERANCE:
             unchanged.add(id(previous))
         else:
             pending.append(channel)
@@ -41,7 +41,7 @@ def crossfade(old: Sequence[Channel], new: Sequence[Channel], now: float) -> tup
     playing = [c for c in playing if id(c) not in unchanged]
     pairs = [(c, _twin(c, n, playing, pending)) for n, c in enumerate(playing)]
     follow = [(c, replace(twin, gains=c.gains)) for c, twin in pairs if twin is not None]
-    unmatched = [c.faded(now, now + HEALS) for c, twin in pairs if twin is None]
+    unmatched = [c.faded(now, now + DURATION) for c, twin in pairs if twin is None]
     matched = {id(twin) for _, twin in pairs}
     fresh = [c for c in pending if id(c) not in matched]
     if not follow:
@@ -51,7 +51,7 @@ def crossfade(old: Sequence[Channel], new: Sequence[Channel], now: float) -> tup
     value, ahead = (shown[0] - shown[1]).T
     present = weights([*before, *after], np.array([now])).reshape(2, len(follow))
     continued = [
-        replace(c, crossfade=Crossfade(now, float(v), float((a - v) / STEP), HEALS, float(share)))
+        replace(c, crossfade=Crossfade(now, float(v), float((a - v) / STEP), DURATION, float(share)))
         for c, v, a, share in zip(after, value, ahead, present[0] - present[1], strict=True)
     ]
     return (*kept, *(replace(c, until=now) for c in before), *continued, *unmatched, *fresh)

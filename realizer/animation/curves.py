@@ -229,14 +229,14 @@ def _changed(found: Samples, channels: Sequence[Channel], changed: Sequence[int]
             values *= gains[channel.gains][frames]
         shown = times[frames]
         if crossfade is not None:
-            values += _healing(crossfade, shown)
+            values += _correction(crossfade, shown)
             values[shown < crossfade.at] = 0.0
         if channel.until < np.inf:
             values[shown >= channel.until] = 0.0
     return found if len(more) == 1 else _joined(more)
 
 
-def _healing(crossfade: Crossfade, times: Float64) -> Float64:
+def _correction(crossfade: Crossfade, times: Float64) -> Float64:
     """Return the correction (n,) that makes value and slope continuous at the crossfade; 0 after its end."""
     passed = times - crossfade.at
     left = 1.0 - smooth(np.clip(passed / crossfade.length, 0.0, 1.0))

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from realizer.face.model import Face
     from realizer.outputs.morph_targets import MorphTargets
 
-BENT = 0.01  # smaller changes of a normal, half a degree, are invisible
+NEGLIGIBLE_BEND = 0.01  # smaller changes of a normal, half a degree, are invisible
 
 
 def rigid_mesh(
@@ -35,7 +35,7 @@ def rigid_mesh(
     primitive = {
         "attributes": {
             "POSITION": file.add(face.vertices[part] - np.float32(centre), target=ARRAY_BUFFER, bounds=True),
-            "NORMAL": file.add(_ups(face, face.vertices)[part], target=ARRAY_BUFFER),
+            "NORMAL": file.add(_normals(face, face.vertices)[part], target=ARRAY_BUFFER),
             "COLOR_0": file.add(colours, target=ARRAY_BUFFER, normalised=True),
         },
         "indices": file.add(numbers[triangles].astype(np.uint32).ravel(), target=ELEMENT_ARRAY_BUFFER),
@@ -56,7 +56,7 @@ def morphing_mesh(file: GlbFile, face: Face, part: Bool, material: int, made: Mo
     primitive["attributes"]["JOINTS_0"] = file.add(joints, target=ARRAY_BUFFER)
     primitive["attributes"]["WEIGHTS_0"] = file.add(shares, target=ARRAY_BUFFER)
     if made.names:
-        ups = _ups(face, face.vertices)
+        ups = _normals(face, face.vertices)
         primitive["targets"] = [_target(file, face, part, moves, ups) for moves in made.moves]
         mesh["weights"] = [0.0] * len(made.names)
         # The usual place for names of targets, which glTF does not define.
@@ -65,15 +65,15 @@ def morphing_mesh(file: GlbFile, face: Face, part: Bool, material: int, made: Mo
 
 
 def _target(file: GlbFile, face: Face, part: Bool, moves: Float32, ups: Float32) -> dict[str, int]:
-    bent = _ups(face, face.vertices + moves) - ups
-    bent[np.abs(bent).max(axis=1) < BENT] = 0
+    bent = _normals(face, face.vertices + moves) - ups
+    bent[np.abs(bent).max(axis=1) < NEGLIGIBLE_BEND] = 0
     return {
         "POSITION": file.add_sparse(moves[part], bounds=True),
         "NORMAL": file.add_sparse(bent[part]),
     }
 
 
-def _ups(face: Face, vertices: Float32) -> Float32:
+def _normals(face: Face, vertices: Float32) -> Float32:
     """Return normals; forward for a vertex without a triangle, because glTF requires unit length."""
     ups: Float32 = normals(face, vertices[None])[0]
     ups[np.abs(ups).sum(axis=1) == 0] = (0, 0, 1)

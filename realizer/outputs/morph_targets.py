@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 HEAD = (48, 49, 50)  # FAPs that turn the head: pitch, yaw, roll
 EYES = ((25, 23), (26, 24))  # FAPs that turn the eyeballs: pitch and yaw of the left, of the right
 THRUST = (27, 28)  # FAPs that push them forward
-TRUE = 1e-4  # m; greatest error of a vertex in any frame
-SEEN = 5e-6  # m; smaller movements are omitted from a target
+TOLERANCE = 1e-4  # m; greatest error of a vertex in any frame
+NEGLIGIBLE = 5e-6  # m; smaller movements are omitted from a target
 CHUNK = 64  # frames at once
-FIRST = 256  # frames, spread over the performance, that are analysed first
+SAMPLED = 256  # frames, spread over the performance, that are analysed first
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +82,7 @@ def make_morph_targets(face: Face, poses: Float32) -> MorphTargets:
     names, targets, weights = _used(face, still, moved)
     found = np.empty((0, rest.size))
     whole = [np.arange(len(still))[k : k + CHUNK] for k in range(0, len(still), CHUNK)]
-    spread = np.unique(np.linspace(0, len(still) - 1, min(FIRST, len(still))).astype(int))
+    spread = np.unique(np.linspace(0, len(still) - 1, min(SAMPLED, len(still))).astype(int))
     for frames in (spread, *whole):
         left = moved(still[frames]) - weights[frames] @ targets
         left -= left @ found.T @ found
@@ -92,7 +92,7 @@ def make_morph_targets(face: Face, poses: Float32) -> MorphTargets:
         shares[frames] = (moved(still[frames]) - weights[frames] @ targets) @ found.T
     more, ways, shares = _one_way(shares, [f"correction {k + 1}" for k in range(len(found))])
     moves = np.concatenate([targets, ways @ found]).reshape(-1, len(face.vertices), 3)
-    moves[np.abs(moves).max(axis=2) < SEEN] = 0
+    moves[np.abs(moves).max(axis=2) < NEGLIGIBLE] = 0
     return MorphTargets(
         (*names, *more),
         moves.astype(np.float32),
@@ -125,13 +125,13 @@ def _used(
     """Return names, moves (k, 3 n_vertices) and weights (n, k) of the columns that move vertices."""
     names, alone, weights = _one_way(still, face.inputs)
     moves = moved(alone.astype(np.float32)) if names else np.empty((0, 3 * len(face.vertices)))
-    kept = np.flatnonzero(np.abs(moves).max(axis=1, initial=0) > SEEN)
+    kept = np.flatnonzero(np.abs(moves).max(axis=1, initial=0) > NEGLIGIBLE)
     return [names[k] for k in kept], moves[kept], weights[:, kept]
 
 
 def _components(left: Float64) -> Float64:
-    """Return the fewest principal components (k, m), orthonormal, that bring errors (n, m) below TRUE."""
-    if np.abs(left).max(initial=0) <= TRUE / 2:
+    """Return the fewest orthonormal components (k, m) that bring errors (n, m) below TOLERANCE."""
+    if np.abs(left).max(initial=0) <= TOLERANCE / 2:
         return np.empty((0, left.shape[1]))
     # By the products of frames, which are fewer than coordinates.
     sizes, mixes = np.linalg.eigh(left @ left.T)
@@ -140,6 +140,6 @@ def _components(left: Float64) -> Float64:
     axes = (mixes[:, order] / np.sqrt(sizes[order])).T @ left
     for k in range(1, len(axes) + 1):
         rest = left - left @ axes[:k].T @ axes[:k]
-        if np.linalg.norm(rest.reshape(len(left), -1, 3), axis=2).max() <= TRUE / 2:
+        if np.linalg.norm(rest.reshape(len(left), -1, 3), axis=2).max() <= TOLERANCE / 2:
             return np.asarray(axes[:k])
     return np.asarray(axes)

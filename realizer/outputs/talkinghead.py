@@ -29,7 +29,7 @@ MOUTH, CORNERS = ("jaw", "mouth", "tongue"), ("mouthSmile", "mouthFrown", "mouth
 # TalkingHead has one value for both eyes.
 BOTH = {"eyeLookDownLeft": "eyesLookDown", "eyeLookUpLeft": "eyesLookUp"}
 HEAD = ("headRotateY", "headRotateX", "headRotateZ")  # radians: yaw, pitch, roll
-SEEN = 0.005  # values that never exceed it are omitted
+NEGLIGIBLE = 0.005  # values that never exceed it are omitted
 
 
 def encode_talkinghead(realization: Realization) -> str:
@@ -95,7 +95,7 @@ def _anim(realization: Realization) -> dict[str, Any]:
     shown = {
         name: [round(value, 3) + 0.0 for value in column[1:].tolist()]
         for name, column in values.items()
-        if np.abs(column).max() > SEEN
+        if np.abs(column).max() > NEGLIGIBLE
     }
     return {"name": "performance", "dt": dt, "vs": shown if dt else {}}
 

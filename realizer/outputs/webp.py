@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 PACE = 25  # pictures a second at most
 QUALITY, METHOD = 75, 4  # 160 kB a second at 512x512
 MOST = 2**24 - 1  # the greatest number of three bytes
-ANIMATED, WHOLE = 0x02, 0x02  # flags: of the file; of a picture that replaces the one before
+ANIMATED, REPLACES = 0x02, 0x02  # flags: of the file; of a picture that replaces the one before
 
 
 def encode_webp(pictures: Iterable[UInt8], starts: Sequence[float], end: float) -> bytes:
@@ -46,7 +46,7 @@ def encode_webp(pictures: Iterable[UInt8], starts: Sequence[float], end: float) 
         size = image.size
         head = b"\0\0\0" * 2 + _three(size[0] - 1) + _three(size[1] - 1) + _three(after - start)
         # Without the file header of 12 bytes.
-        parts.append(_chunk(b"ANMF", head + bytes([WHOLE]) + buffer.getvalue()[12:]))
+        parts.append(_chunk(b"ANMF", head + bytes([REPLACES]) + buffer.getvalue()[12:]))
     look = struct.pack("<B3x", ANIMATED) + _three(size[0] - 1) + _three(size[1] - 1)
     body = b"WEBP" + _chunk(b"VP8X", look) + _chunk(b"ANIM", b"\xff\xff\xff\xff\0\0") + b"".join(parts)
     return b"RIFF" + struct.pack("<I", len(body)) + body

@@ -31,7 +31,7 @@ SACCADE_LEAST, SACCADE_DEGREE = 0.021, 0.0022  # s, and s for each degree (Carpe
 COUNTER = {(52, 51): (61, 62), (53, 54): (64, 63)}
 # Poses are computed in batches; the latest batches are cached, 5 kB each, for neighbouring windows and
 # sessions with the same seed.
-BATCH, KEPT = 8, 512
+BATCH, CACHED = 8, 512
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +144,7 @@ def _numbers(start: float, end: float, period: float) -> tuple[int, int]:
     return first // BATCH * BATCH, (last // BATCH + 1) * BATCH
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=CACHED)
 def _motion(seed: int, sways: tuple[int, int], jumps: tuple[int, int]) -> Motion:
     """Return motion with head poses sways[0] .. sways[1] - 1 and eye points jumps[0] .. jumps[1] - 1."""
     turns = [(kind, kind, most) for kind, most in enumerate(SWAY.values(), 1)]

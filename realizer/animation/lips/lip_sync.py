@@ -77,8 +77,8 @@ def _constrain(mouth: Float64, track: Track, times: Float64, masked: Float64, fa
     speed = facts["speed"]["lips"]
     # The upper lip uncovers the teeth for f v: it is raised there, and then lowered where p b m close.
     raised = shapes[LABIODENTAL, column["upper"]] * masked
-    upper[:] = _reachable(upper, times, speed)
-    upper[:] = -_reachable(-np.where(bitten, np.maximum(upper, raised), upper), times, speed)
+    upper[:] = _limit_speed(upper, times, speed)
+    upper[:] = -_limit_speed(-np.where(bitten, np.maximum(upper, raised), upper), times, speed)
     upper[[0, -1]] = 0.0
     for lip, name in ((upper, "upper"), (lower, "lower")):
         lip[:] = np.where(closed, np.minimum(lip, shapes[BILABIAL, column[name]] * masked), lip)
@@ -90,13 +90,13 @@ def _constrain(mouth: Float64, track: Track, times: Float64, masked: Float64, fa
         limit = facts["speed"]["jaw" if name == "jaw" else "lips"]
         reach = facts["articulators"][name]["smooth"] * facts["rate"]
         block = _block(members)
-        mouth[block] = _smooth(_reachable(mouth[block], times, limit), reach)
+        mouth[block] = _smooth(_limit_speed(mouth[block], times, limit), reach)
     # Pressed lips meet, but do not pass through each other.
     least = shapes[BILABIAL, column["upper"]] + shapes[BILABIAL, column["lower"]]
     lower[:] = np.maximum(lower, least - upper)
 
 
-def _reachable(values: Float64, times: Float64, speed: float) -> Float64:
+def _limit_speed(values: Float64, times: Float64, speed: float) -> Float64:
     """Return the greatest curves along the last axis, not above `values` and not steeper than `speed`."""
     climb = speed * times
     values = np.minimum.accumulate(values - climb, axis=-1) + climb

@@ -77,11 +77,11 @@ def dtw_align(sound: Float32, references: Sequence[Utterance]) -> Spans:
     energy = f.energies(sound, FINE)
     part, talks = f.voice_activity(f.loudness(energy))
     fine = _states(best.spoken, FINE * best.speed, reference)
-    change = _likened(best.heard.features, states, way)
+    change = _adaptation(best.heard.features, states, way)
     likened = States(
         np.hstack([fine.features, np.ones((len(fine.times), 1))]) @ change, fine.pause, fine.times
     )
-    heard = _heard(f.cepstra(energy), part, talks, likened)
+    heard = _observed(f.cepstra(energy), part, talks, likened)
     about = np.minimum(np.arange(len(energy)) * FINE // COARSE, len(way) - 1)
     centre = np.maximum.accumulate(np.searchsorted(fine.times, states.times[way[about]]).astype(np.intp))
     centre[-1] = len(fine.times) - 1
@@ -110,11 +110,11 @@ def _matched(sound: Float32, reference: Utterance) -> _Match:
     pace = max(seconds, LEAST) / max(float(talks.sum()) * COARSE / f.RATE, LEAST)
     speed = min(max(pace, SLOWEST), FASTEST)
     states = _states(spoken, COARSE * speed, reference)
-    heard = _heard(f.cepstra(energy), part, talks, states)
+    heard = _observed(f.cepstra(energy), part, talks, states)
     centre = np.rint(np.linspace(0, len(states.times) - 1, len(energy))).astype(np.intp)
     reach = max(round(FAR * f.RATE / COARSE), 1)
     way, spent = best_path(heard, states, centre, reach)
-    null = _null(heard, states, centre, reach)
+    null = _wrong_text_cost(heard, states, centre, reach)
     return _Match(reference, spoken, speed, pace, states, heard, way, spent, null)
 
 
@@ -140,13 +140,13 @@ def _states(spoken: Float32, hop: float, reference: Utterance) -> States:
     )
 
 
-def _heard(values: Float64, part: Float64, talks: Bool, states: States) -> Observed:
+def _observed(values: Float64, part: Float64, talks: Bool, states: States) -> Observed:
     values = f.normalised(values, talks)
     unit = usual(values[talks] if talks.any() else values, states.features[~states.pause])
     return Observed(values, quiet(part, f.HEARD), unit)
 
 
-def _likened(values: Float64, states: States, way: Index) -> Float64:
+def _adaptation(values: Float64, states: States, way: Index) -> Float64:
     """Return the affine map (d + 1, d) from the reference's features to the recording's."""
     pairs = ~states.pause[way]
     ours = np.hstack([states.features[way[pairs]], np.ones((int(pairs.sum()), 1))])
@@ -155,7 +155,7 @@ def _likened(values: Float64, states: States, way: Index) -> Float64:
     return np.asarray(change, np.float64)
 
 
-def _null(heard: Observed, states: States, centre: Index, reach: int) -> float:
+def _wrong_text_cost(heard: Observed, states: States, centre: Index, reach: int) -> float:
     """Return the cost of a wrong text: the least cost of the same sounds in other orders."""
     places = np.arange(len(states.times))
     found = [1.0]

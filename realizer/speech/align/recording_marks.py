@@ -12,7 +12,7 @@ from realizer.speech.align.aligner import Aligner, align_request
 from realizer.speech.align.recording import mono
 from realizer.speech.utterance import Recording, SpeechRequest, Utterance
 
-KEPT = 8  # recordings; a document is planned more than once before it plays
+CACHED = 8  # recordings; a document is planned more than once before it plays
 
 
 def utterance_of_recording(
@@ -48,7 +48,7 @@ def utterance_of_recording(
     )
 
 
-@lru_cache(KEPT)
+@lru_cache(CACHED)
 def align_recording(request: SpeechRequest, recording: Recording) -> Utterance:
     """Return `utterance_of_recording`, or the sound alone with a warning if it cannot be aligned."""
     try:

@@ -49,16 +49,16 @@ def align_words(
     pcm = np.clip(np.rint(sound * 32767), -32768, 32767).astype("<i2").tobytes()
     with _lock:
         decoder = _decoder()
-        names = [_known(decoder, spelling, phones) for spelling, phones in words]
+        names = [_dictionary_name(decoder, spelling, phones) for spelling, phones in words]
         if not any(names):
             return None
         try:
             decoder.set_align_text(" ".join(filter(None, names)))
-            _hear(decoder, pcm)
+            _decode(decoder, pcm)
             if decoder.hyp() is None:
                 return None
             decoder.set_alignment()
-            _hear(decoder, pcm)
+            _decode(decoder, pcm)
             found = [_aligned_word(word) for word in decoder.get_alignment() if word.name[0] not in "<[("]
         except RuntimeError:
             # After a failed pass the decoder is in an undefined state.
@@ -77,7 +77,7 @@ def _decoder() -> Any:
     return Decoder(samprate=16000, lm=None, loglevel="FATAL")
 
 
-def _known(decoder: Any, spelling: str, phones: Sequence[str]) -> str:
+def _dictionary_name(decoder: Any, spelling: str, phones: Sequence[str]) -> str:
     """Return the name of the word in the decoder's dictionary, adding it if needed; "" without phones."""
     plain = spelling.lower().replace("’", "'")
     if decoder.lookup_word(plain) is not None:
@@ -90,7 +90,7 @@ def _known(decoder: Any, spelling: str, phones: Sequence[str]) -> str:
     return name
 
 
-def _hear(decoder: Any, pcm: bytes) -> None:
+def _decode(decoder: Any, pcm: bytes) -> None:
     decoder.reinit_feat()  # forget earlier noise, so that the same sound gives the same times
     decoder.start_utt()
     decoder.process_raw(pcm, full_utt=True)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer.animation.axis import AU_NAMES, Target, au, axis, fap, mask_channel
-from realizer.animation.blend import OVER, blend
+from realizer.animation.blend import REPLACING, blend
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.fap.conversion import to_fap
 from realizer.animation.idle.blinks import BlinkReduction, Blinks
@@ -217,7 +217,7 @@ def set_faps(draw: st.DrawFn) -> Channel:
     times = np.cumsum(draw(st.lists(st.floats(0.1, 1.0), min_size=4, max_size=4)))
     there = np.array([0.0, 1.0, 1.0, 0.0])
     value = draw(st.floats(-200.0, 200.0))
-    return Channel(CORNER, times, value * there, layer=draw(st.sampled_from(OVER)), weight=there)
+    return Channel(CORNER, times, value * there, layer=draw(st.sampled_from(REPLACING)), weight=there)
 
 
 def corner(channels: list[Channel], times: Float64) -> Float64:

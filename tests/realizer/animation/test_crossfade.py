@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from realizer.animation.axis import au
 from realizer.animation.channel import Channel, Gain
-from realizer.animation.crossfade import HEALS, crossfade
+from realizer.animation.crossfade import DURATION, crossfade
 from realizer.animation.curves import sample
 
 SMILE, BROW = au(12, "LEFT")[0], au(4, "LEFT")[0]
@@ -41,7 +41,7 @@ def test_crossfade_keeps_value_and_velocity(now: float, first: float, second: fl
 def test_crossfade_goes_from_the_old_to_the_new_channel() -> None:
     old, new = hill(0.0, 0.5, 2.0, 3.0), hill(0.0, 0.5, 3.0, 4.0)
     both = crossfade([old], [new], 2.5)
-    early, late = np.linspace(0, 2.4, 20), np.linspace(2.5 + HEALS, 4, 20)
+    early, late = np.linspace(0, 2.4, 20), np.linspace(2.5 + DURATION, 4, 20)
     assert shown(both, early) == pytest.approx(shown((old,), early))
     assert shown(both, late) == pytest.approx(shown((new,), late))
 
@@ -64,7 +64,7 @@ def test_crossfade_pairs_targets_and_fades_the_others() -> None:
     old = [hill(0.0, 0.5, 2.0, 3.0), hill(0.0, 0.5, 2.0, 3.0, target=BROW)]
     both = crossfade(old, [hill(0.0, 0.5, 2.5, 3.5)], 1.0)
     rows = {c.target.name: 0.0 for c in both}
-    for channel, value in zip(both, sample(both, np.array([1.0 + HEALS]))[:, 0], strict=True):
+    for channel, value in zip(both, sample(both, np.array([1.0 + DURATION]))[:, 0], strict=True):
         rows[channel.target.name] += value
     assert rows == {"12L": pytest.approx(0.8), "4L": pytest.approx(0.0)}
 

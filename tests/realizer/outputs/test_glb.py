@@ -16,7 +16,7 @@ from realizer.face.load import load_face
 from realizer.facebuild.arkit.gltf import Gltf
 from realizer.offline import realize
 from realizer.outputs.glb import encode_glb
-from realizer.outputs.morph_targets import TRUE, make_morph_targets
+from realizer.outputs.morph_targets import TOLERANCE, make_morph_targets
 from realizer.outputs.output import RenderSettings
 from realizer.outputs.registry import OUTPUTS
 
@@ -60,7 +60,7 @@ def test_glb_is_valid_and_looks_like_the_face_in_three_js(played, path, read_by)
     wanted = deform(played.face, played.poses[frames])
     assert np.linalg.norm(wanted - played.face.vertices, axis=2).max() > 0.01
     for got, vertices in zip(seen["frames"], wanted, strict=True):
-        assert far(got, split(played.face, vertices)) < 1.5 * TRUE
+        assert far(got, split(played.face, vertices)) < 1.5 * TOLERANCE
 
 
 def test_glb_of_the_service_is_valid(tmp_path, read_by):
@@ -103,7 +103,7 @@ def test_glb_reproduces_every_frame(played, path):
         turned = turned_by(tracks["head", "rotation"][k], shaped - pivot) + pivot
         got = shares[:, :1] * shaped + shares[:, 1:2] * turned
         wanted = split(played.face, vertices)[played.face.name]
-        assert np.linalg.norm(got - wanted, axis=1).max() < 1.5 * TRUE
+        assert np.linalg.norm(got - wanted, axis=1).max() < 1.5 * TOLERANCE
 
 
 def test_glb_weights_are_0_to_1(played, path):
@@ -134,7 +134,7 @@ def test_glb_moves_pushed_eyes_by_their_nodes(tmp_path, read_by):
     seen = read_by("gltf.mjs", tmp_path / "x.glb", *(str(k / 25) for k in range(4)))
     assert seen["issues"]["messages"] == []
     for got, vertices in zip(seen["frames"], deform(face, poses), strict=True):
-        assert far(got, split(face, vertices)) < 1.5 * TRUE
+        assert far(got, split(face, vertices)) < 1.5 * TOLERANCE
 
 
 def test_glb_includes_eyes_without_balls_in_the_face(tmp_path, read_by):
@@ -147,7 +147,7 @@ def test_glb_includes_eyes_without_balls_in_the_face(tmp_path, read_by):
     seen = read_by("gltf.mjs", tmp_path / "x.glb", "0", "0.04")
     assert seen["issues"]["messages"] == []
     for got, vertices in zip(seen["frames"], deform(flat, poses), strict=True):
-        assert far(got, {face.name: vertices}) < 1.5 * TRUE
+        assert far(got, {face.name: vertices}) < 1.5 * TOLERANCE
 
 
 def test_glb_of_a_face_at_rest_has_no_targets(tmp_path, read_by):

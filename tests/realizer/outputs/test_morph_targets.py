@@ -9,7 +9,7 @@ from realizer.animation.axis import fap
 from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.offline import realize
-from realizer.outputs.morph_targets import TRUE, make_morph_targets
+from realizer.outputs.morph_targets import TOLERANCE, make_morph_targets
 
 pytestmark = pytest.mark.xdist_group("outputs")
 
@@ -32,7 +32,7 @@ def test_morph_targets_are_exact_to_a_tenth_of_a_millimetre(played):
     wanted = deform(face, still(face, played.poses))
     got = face.vertices + np.einsum("nk,kvc->nvc", made.weights, made.moves)
     assert np.abs(wanted - face.vertices).max() > 5e-3
-    assert np.linalg.norm(got - wanted, axis=2).max() < 1.2 * TRUE
+    assert np.linalg.norm(got - wanted, axis=2).max() < 1.2 * TOLERANCE
 
 
 def test_morph_targets_are_inputs_and_few_corrections(played):
@@ -69,7 +69,7 @@ def test_morph_targets_move_lids_with_pushed_eyeballs():
     got = face.vertices + np.einsum("nk,kvc->nvc", made.weights, made.moves)
     (first, last), _ = face.basis["eyes"][0]
     got[:, first:last, 2] += made.thrust[:, :1]
-    assert np.linalg.norm(got - wanted, axis=2).max() < 1.2 * TRUE
+    assert np.linalg.norm(got - wanted, axis=2).max() < 1.2 * TOLERANCE
 
 
 def test_morph_targets_of_a_face_at_rest_are_empty():
