@@ -26,8 +26,8 @@ def test_reply_leaves_out_empty_fields() -> None:
 
 
 def test_welcome_has_version_capabilities_and_limits(driver) -> None:
-    (told,) = driver.send({"type": "hello"}).of("welcome")
-    welcome = Welcome.model_validate(told, extra="forbid")
+    (message,) = driver.send({"type": "hello"}).of("welcome")
+    welcome = Welcome.model_validate(message, extra="forbid")
     assert welcome.version == 1
     assert welcome.capabilities.streams == {name: list(row.encodings) for name, row in STREAMS.items()}
     assert welcome.capabilities.pictures == list(PICTURES)
@@ -51,8 +51,8 @@ def test_schedule_message_and_state_message_describe_the_wire(driver) -> None:
     driver.run(0.2)
     driver.send({"type": "state"})
     client = driver.run(5)
-    for told in client.of("schedule"):
-        ScheduleMessage.model_validate(told, extra="forbid")
-    (state,) = [StateMessage.model_validate(told, extra="forbid") for told in client.of("state")]
+    for message in client.of("schedule"):
+        ScheduleMessage.model_validate(message, extra="forbid")
+    (state,) = [StateMessage.model_validate(message, extra="forbid") for message in client.of("state")]
     assert [(b.id, b.status, b.behaviours) for b in state.blocks] == [("b", "IN_EXEC", ["n"])]
     assert json.loads(state.text()) == client.of("state")[0]

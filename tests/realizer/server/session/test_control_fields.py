@@ -9,20 +9,23 @@ from realizer.server.documents.limits import MAX_CHARACTERS
 from realizer.server.session.control_fields import FieldError, character_index, direct_values, emotion_values
 
 
-def asked(**fields: object) -> SetMessage:
+def make(**fields: object) -> SetMessage:
     return SetMessage.model_validate({"type": "set", **fields})
 
 
 @pytest.mark.parametrize(
     ("message", "values"),
     [
-        (asked(aus={"12L": 0.5}), {"12L": 0.5}),
-        (asked(aus={"12": 0.5}), {"12L": 0.5, "12R": 0.5}),
-        (asked(aus={"25": None}), {"25": None}),
-        (asked(faps={"3": 100, "raise_l_i_eyebrow": None}), {"open_jaw": 100, "raise_l_i_eyebrow": None}),
-        (asked(aus=None), {"12L": None}),
-        (asked(faps=None, aus={"4": 1}), {"open_jaw": None, "4L": 1.0, "4R": 1.0}),
-        (asked(), {}),
+        (make(aus={"12L": 0.5}), {"12L": 0.5}),
+        (make(aus={"12": 0.5}), {"12L": 0.5, "12R": 0.5}),
+        (make(aus={"25": None}), {"25": None}),
+        (
+            make(faps={"3": 100, "raise_l_i_eyebrow": None}),
+            {"open_jaw": 100, "raise_l_i_eyebrow": None},
+        ),
+        (make(aus=None), {"12L": None}),
+        (make(faps=None, aus={"4": 1}), {"open_jaw": None, "4L": 1.0, "4R": 1.0}),
+        (make(), {}),
     ],
 )
 def test_direct_values_resolves_names(message: SetMessage, values: dict[str, float | None]) -> None:
@@ -32,11 +35,11 @@ def test_direct_values_resolves_names(message: SetMessage, values: dict[str, flo
 @pytest.mark.parametrize(
     ("message", "where", "says"),
     [
-        (asked(aus={"99": 0.5}), "aus", "wanted an AU number, with L or R for one side, got '99'"),
-        (asked(aus={"25L": 0.5}), "aus", "'25L'"),
-        (asked(faps={"2": 1}), "faps", "wanted the name or the number (3..68) of a FAP, got '2'"),
-        (asked(faps={"69": 1}), "faps", "'69'"),
-        (asked(faps={"\u00b3": 1}), "faps", "a FAP"),
+        (make(aus={"99": 0.5}), "aus", "wanted an AU number, with L or R for one side, got '99'"),
+        (make(aus={"25L": 0.5}), "aus", "'25L'"),
+        (make(faps={"2": 1}), "faps", "wanted the name or the number (3..68) of a FAP, got '2'"),
+        (make(faps={"69": 1}), "faps", "'69'"),
+        (make(faps={"\u00b3": 1}), "faps", "a FAP"),
     ],
 )
 def test_direct_values_names_the_field_of_an_unknown_name(message: SetMessage, where: str, says: str) -> None:

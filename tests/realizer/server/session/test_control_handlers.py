@@ -32,12 +32,12 @@ class Face:
 
     def __init__(self, drive) -> None:
         self.driver = drive(idle=False)
-        told = self.driver.send({"type": "subscribe", "stream": "au", "fps": 25})
-        self.names = told.of("subscribed")[0]["names"]
+        client = self.driver.send({"type": "subscribe", "stream": "au", "fps": 25})
+        self.names = client.of("subscribed")[0]["names"]
 
-    def set(self, seconds: float = 0.5, **asked) -> dict[str, float]:
+    def set(self, seconds: float = 0.5, **fields) -> dict[str, float]:
         """Set something and return the AUs so many seconds later."""
-        self.driver.send({"type": "set", **asked})
+        self.driver.send({"type": "set", **fields})
         return self.after(seconds)
 
     def after(self, seconds: float) -> dict[str, float]:
@@ -57,23 +57,23 @@ def face(drive) -> Face:
 
 @pytest.mark.parametrize("pause", [0, 1])
 def test_set_gives_the_same_face_in_any_order(drive, pause: float) -> None:
-    found = []
+    faces = []
     for messages in permutations(SETS):
         face = Face(drive)
         for message in messages:
             face.set(pause, **message)
         face.after(1)
-        found.append(face.whole)
+        faces.append(face.whole)
     together = Face(drive)
     together.set(1, **{key: value for message in SETS for key, value in message.items()})
-    found.append(together.whole)
-    assert np.abs(found[0]).sum() > 1
-    for other in found[1:]:
-        assert other == pytest.approx(found[0], abs=1e-5)
+    faces.append(together.whole)
+    assert np.abs(faces[0]).sum() > 1
+    for other in faces[1:]:
+        assert other == pytest.approx(faces[0], abs=1e-5)
 
 
 def test_set_gives_the_same_face_before_and_after_documents(drive) -> None:
-    found = []
+    faces = []
     for chosen in permutations((*BLOCKS, SETS[0], SETS[1])):
         face = Face(drive)
         for one in chosen:
@@ -82,9 +82,9 @@ def test_set_gives_the_same_face_before_and_after_documents(drive) -> None:
             else:
                 face.set(0, **one)
         face.after(3)
-        found.append(face.whole)
-    for other in found[1:]:
-        assert other == pytest.approx(found[0], abs=1e-5)
+        faces.append(face.whole)
+    for other in faces[1:]:
+        assert other == pytest.approx(faces[0], abs=1e-5)
 
 
 def test_set_replaces_aus_of_an_emotion_until_they_are_released(face) -> None:
@@ -152,7 +152,7 @@ def test_set_ignores_whole_turns_of_the_wheel(face) -> None:
 
 
 @pytest.mark.parametrize(
-    ("asked", "where"),
+    ("emotion", "where"),
     [
         ({}, "set.emotion"),
         ({"name": "joy", "angle": 3}, "set.emotion"),
@@ -163,8 +163,8 @@ def test_set_ignores_whole_turns_of_the_wheel(face) -> None:
         ({"angle": 7, "activation": 40}, "set.emotion.activation"),
     ],
 )
-def test_set_refuses_an_invalid_emotion_as_a_whole(face, asked, where: str) -> None:
-    face.driver.send({"type": "set", "emotion": asked, "aus": {"12": 1}})
+def test_set_refuses_an_invalid_emotion_as_a_whole(face, emotion, where: str) -> None:
+    face.driver.send({"type": "set", "emotion": emotion, "aus": {"12": 1}})
     (error,) = face.driver.clients[1].of("error")
     assert error["where"] == where
     assert max(face.after(1).values()) == 0
@@ -255,8 +255,8 @@ def test_scene_message_makes_unknown_targets_a_warning(driver) -> None:
     driver.send(gaze.format("b", "cup"))
     driver.run(2)
     driver.send(gaze.format("c", "moon"))
-    found = [f for f in driver.run(5).feedback if isinstance(f, WarningFeedback)]
-    assert [(w.id, w.type) for w in found] == [("c:g", "NO_SUCH_TARGET")]
+    warnings = [f for f in driver.run(5).feedback if isinstance(f, WarningFeedback)]
+    assert [(w.id, w.type) for w in warnings] == [("c:g", "NO_SUCH_TARGET")]
     assert "c:end" in driver.clients[1].ids
 
 
@@ -301,7 +301,7 @@ def test_anticipate_moves_behaviours_that_refer_to_the_point(driver) -> None:
 
 
 def test_character_message_refuses_an_unknown_voice(driver) -> None:
-    told = driver.send({"type": "character", "id": "Z", "voice": "nope"})
-    (error,) = told.of("error")
+    client = driver.send({"type": "character", "id": "Z", "voice": "nope"})
+    (error,) = client.of("error")
     assert (error["code"], error["where"]) == ("voice", "character.voice")
     assert "nope" in error["message"]

@@ -52,9 +52,9 @@ def test_add_limits_the_number_of_recent_messages() -> None:
 @given(seq=st.integers(-5, 700))
 def test_since_unpacks_compressed_messages(seq: int) -> None:
     log = FeedbackLog()
-    told = [log.add(BlockProgress(id=f"b{n}:end", global_time=n * 0.1), n * 0.1) for n in range(600)]
-    assert sum(map(len, told)) > 4 * PACK
-    assert log.since(seq) == told[max(seq - 1, 0) :]
+    texts = [log.add(BlockProgress(id=f"b{n}:end", global_time=n * 0.1), n * 0.1) for n in range(600)]
+    assert sum(map(len, texts)) > 4 * PACK
+    assert log.since(seq) == texts[max(seq - 1, 0) :]
 
 
 def test_restore_continues_the_numbers() -> None:

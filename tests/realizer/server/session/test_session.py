@@ -211,9 +211,9 @@ def test_session_sends_a_warning_without_seq_if_the_journal_is_full() -> None:
     (warning,) = warnings(client)
     assert (warning.id, warning.seq) == ("turn", None)
     assert "no room" in warning.text
-    told = sorted(f.seq for f in client.feedback if f.seq is not None)
-    assert len(told) == len(client.feedback) - 1
-    assert told == list(range(1, len(told) + 1))
+    numbers = sorted(f.seq for f in client.feedback if f.seq is not None)
+    assert len(numbers) == len(client.feedback) - 1
+    assert numbers == list(range(1, len(numbers) + 1))
     assert "turn.2:end" in client.ids, "the speech of that name goes on"
 
 
@@ -559,8 +559,8 @@ def test_session_interrupts_a_block_in_preparation() -> None:
     driver.send(TALK.format("a"))
     driver.send(f'<bml id="b" {BMLA}><bmla:interrupt id="i" target="a"/></bml>')
     driver.say(driver.spoken[0].id, spoken(2.0))
-    told = [f for f in driver.run(9).feedback if isinstance(f, BlockProgress) and f.id.startswith("a:")]
-    assert [(f.id, f.status) for f in told] == [("a:end", "REVOKED")]
+    progress = [f for f in driver.run(9).feedback if isinstance(f, BlockProgress) and f.id.startswith("a:")]
+    assert [(f.id, f.status) for f in progress] == [("a:end", "REVOKED")]
 
 
 def test_session_requests_a_stretched_speech_again() -> None:
@@ -580,10 +580,10 @@ def test_session_does_not_request_a_speech_a_third_time() -> None:
     driver.send('<bml id="a"><speech id="s" start="0" end="3"><text>Hello there</text></speech></bml>')
     driver.say(driver.spoken[0].id, replace(spoken(2.0), stretch=(0.6, 1.8)))
     driver.say(driver.spoken[1].id, replace(spoken(2.5), stretch=(0.6, 1.8)))
-    told = driver.run(9)
+    client = driver.run(9)
     assert len(driver.spoken) == 2
-    assert [w.id for w in told.feedback if isinstance(w, WarningFeedback)] == ["a:s"]
-    assert "a:end" in told.ids
+    assert [w.id for w in client.feedback if isinstance(w, WarningFeedback)] == ["a:s"]
+    assert "a:end" in client.ids
 
 
 def test_session_stretches_a_late_speech_to_its_end() -> None:
@@ -594,9 +594,9 @@ def test_session_stretches_a_late_speech_to_its_end() -> None:
     driver.say(driver.spoken[0].id, replace(spoken(2.5), stretch=(0.6, 1.8)))
     driver.run(0.6)
     driver.say(driver.spoken[1].id, spoken(3.5))
-    told = driver.run(9)
-    assert not [f for f in told.feedback if isinstance(f, WarningFeedback)]
-    times = {f.id: f.global_time for f in told.feedback if hasattr(f, "global_time")}
+    client = driver.run(9)
+    assert not [f for f in client.feedback if isinstance(f, WarningFeedback)]
+    times = {f.id: f.global_time for f in client.feedback if hasattr(f, "global_time")}
     assert times["b:s:end"] == pytest.approx(4.0)
     assert times["b:start"] == times["b:s:start"] == pytest.approx(0.6)
 

@@ -20,8 +20,10 @@ def subscribe(stream: str, **fields):
 @pytest.mark.parametrize("stream", sorted(STREAMS))
 def test_subscribe_accepts_exactly_the_encodings_of_a_stream(driver, stream: str) -> None:
     for encoding in STREAMS[stream].encodings:
-        told = driver.send({"type": "subscribe", "stream": stream, "encoding": encoding}).of("subscribed")[-1]
-        assert (told["stream"], told["encoding"]) == (stream, encoding)
+        reply = driver.send({"type": "subscribe", "stream": stream, "encoding": encoding}).of("subscribed")[
+            -1
+        ]
+        assert (reply["stream"], reply["encoding"]) == (stream, encoding)
     other = next(word for word in ("binary", "json", "text") if word not in STREAMS[stream].encodings)
     (error,) = driver.send({"type": "subscribe", "stream": stream, "encoding": other}).of("error")
     assert error["where"] == "subscribe.encoding"
@@ -32,8 +34,8 @@ def test_subscribe_accepts_exactly_the_encodings_of_a_stream(driver, stream: str
 def test_subscribe_names_every_value(driver, stream: str) -> None:
     driver.send({"type": "subscribe", "stream": stream})
     client = driver.run(0.1)
-    (told,) = client.of("subscribed")
-    assert {len(frame.values) for frame in client.frames} == {len(set(told["names"]))}
+    (reply,) = client.of("subscribed")
+    assert {len(frame.values) for frame in client.frames} == {len(set(reply["names"]))}
 
 
 def test_announce_face_change_precedes_the_first_new_mesh(drive) -> None:
@@ -50,15 +52,15 @@ def test_announce_face_change_precedes_the_first_new_mesh(drive) -> None:
     first, ada, ben, fap = (driver.clients[number] for number in (1, 2, 3, 4))
     assert ben.of("changed") == fap.of("changed") == []
     for client, name, fps in ((first, None, 25), (ada, "Ada", 10)):
-        (told,) = client.of("changed")
-        assert (told["stream"], told.get("character"), told["face"]) == ("mesh", name, "ben")
-        assert told["vertices"] == len(load_face("ben").vertices)
+        (reply,) = client.of("changed")
+        assert (reply["stream"], reply.get("character"), reply["face"]) == ("mesh", name, "ben")
+        assert reply["vertices"] == len(load_face("ben").vertices)
         kinds = [m if isinstance(m, str) else unpack(m) for m in client.messages]
         at = next(k for k, m in enumerate(kinds) if isinstance(m, str) and '"changed"' in m)
         before, after = kinds[at - 1], kinds[at + 1]
-        assert (before.frame + 1, len(before.values)) == (told["frame"], len(load_face("ada").vertices))
-        assert (after.frame, len(after.values)) == (told["frame"], told["vertices"])
-        assert told["frame"] == fps + 1
+        assert (before.frame + 1, len(before.values)) == (reply["frame"], len(load_face("ada").vertices))
+        assert (after.frame, len(after.values)) == (reply["frame"], reply["vertices"])
+        assert reply["frame"] == fps + 1
 
 
 def test_subscribe_bounds_the_pixels_of_all_views_together(drive) -> None:
@@ -66,9 +68,9 @@ def test_subscribe_bounds_the_pixels_of_all_views_together(drive) -> None:
     driver.join(2)
     driver.join(3)
 
-    def look(connection: int, **asked) -> str:
+    def look(connection: int, **options) -> str:
         """The answer to a subscription of pictures, 64 x 64 at 25 a second."""
-        message = {"type": "subscribe", "stream": "video", "size": [64, 64], "fps": 25, **asked}
+        message = {"type": "subscribe", "stream": "video", "size": [64, 64], "fps": 25, **options}
         return driver.send(message, connection).json[-1]["type"]
 
     assert look(1) == look(2) == "subscribed"  # the same picture
@@ -86,11 +88,11 @@ def test_subscribe_bounds_the_pixels_of_all_views_together(drive) -> None:
 def test_subscribe_runs_views_of_a_character_side_by_side(drive) -> None:
     driver = drive()
 
-    def look(**asked) -> int:
-        message = {"type": "subscribe", "stream": "video", "size": [64, 64], "fps": 10, **asked}
-        told = driver.send(message).of("subscribed")[-1]
-        assert told.get("view") == asked.get("view")
-        return int(told["index"])
+    def look(**options) -> int:
+        message = {"type": "subscribe", "stream": "video", "size": [64, 64], "fps": 10, **options}
+        reply = driver.send(message).of("subscribed")[-1]
+        assert reply.get("view") == options.get("view")
+        return int(reply["index"])
 
     plain, side, far = look(), look(view="side", camera="three-quarter"), look(view="far", fps=5)
     assert plain == 0
@@ -168,18 +170,18 @@ def test_subscribe_to_feedback_again_begins_with_new_messages(driver) -> None:
     driver.send(NOD.format("a"))
     client = driver.run(10)
     assert not client.feedback
-    told = driver.session.feedback_log.newest
+    newest = driver.session.feedback_log.newest
     driver.send({"type": "subscribe", "stream": "feedback"})
     assert not client.feedback
     driver.send(NOD.format("b"))
     driver.run(20)
-    assert [f.seq for f in client.feedback] == list(range(told + 1, driver.session.feedback_log.newest + 1))
+    assert [f.seq for f in client.feedback] == list(range(newest + 1, driver.session.feedback_log.newest + 1))
 
 
 def test_subscribe_to_feedback_filters_by_element(driver) -> None:
     viewer = driver.join(2)
-    asked = {"type": "subscribe", "stream": "feedback", "elements": ["blockProgress"]}
-    assert driver.send(asked, 2).of("subscribed")[0]["elements"] == ["blockProgress"]
+    message = {"type": "subscribe", "stream": "feedback", "elements": ["blockProgress"]}
+    assert driver.send(message, 2).of("subscribed")[0]["elements"] == ["blockProgress"]
     driver.send(NOD.format("b"))
     driver.run(5)
     assert viewer.ids == ["b:start", "b:end"]
@@ -209,8 +211,8 @@ def test_subscribe_to_feedback_without_elements_removes_the_filter(driver) -> No
 
 
 def test_subscribe_to_feedback_refuses_an_unknown_element(driver) -> None:
-    told = driver.send({"type": "subscribe", "stream": "feedback", "elements": ["blockprogress"]})
-    assert told.of("error")[0]["code"] == "invalid"
+    client = driver.send({"type": "subscribe", "stream": "feedback", "elements": ["blockprogress"]})
+    assert client.of("error")[0]["code"] == "invalid"
 
 
 def test_subscribe_refuses_a_transparent_jpeg(driver) -> None:

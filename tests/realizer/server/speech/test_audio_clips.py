@@ -28,7 +28,7 @@ SPEAK = (
 )
 
 
-def told(**fields):
+def annotation(**fields):
     return parse_control(json.dumps({"type": "speech", **fields}))
 
 
@@ -61,22 +61,24 @@ def test_add_chunk_joins_pieces_of_a_file() -> None:
 
 def test_annotate_accepts_times_before_and_after_the_sound() -> None:
     known = AudioClips()
-    known.annotate(told(clip="c", words=[{"start": 0, "text": "Hi"}], final=False))
+    known.annotate(annotation(clip="c", words=[{"start": 0, "text": "Hi"}], final=False))
     known.add_chunk(ClipPiece("c", 0, RATE, SOUND.tobytes()))
-    assert not known.recordings, "more is to be told"
-    known.annotate(told(clip="c", words=[{"start": 0.5, "end": 0.9, "text": "you"}]))
+    assert not known.recordings, "the annotation is not complete"
+    known.annotate(annotation(clip="c", words=[{"start": 0.5, "end": 0.9, "text": "you"}]))
     recording = known.recordings["c"]
     assert [(w.start, w.end, w.text) for w in recording.words] == [(0, 0.5, "Hi"), (0.5, 0.9, "you")]
     assert recording.text == "Hi you"
-    known.annotate(told(clip="c", visemes=[{"start": 0.2, "viseme": "PP"}, {"start": 0.3, "viseme": "sil"}]))
+    known.annotate(
+        annotation(clip="c", visemes=[{"start": 0.2, "viseme": "PP"}, {"start": 0.3, "viseme": "sil"}])
+    )
     assert [(p.start, p.ipa) for p in known.recordings["c"].phonemes] == [(0.2, "p"), (0.3, "")]
-    assert known.recordings["c"].words == (), "what is told anew replaces what was told"
+    assert known.recordings["c"].words == (), "a new annotation replaces the old one"
 
 
 def test_add_chunk_replaces_a_clip_that_begins_anew() -> None:
     known = AudioClips()
     known.add_chunk(ClipPiece("c", 0, RATE, SOUND.tobytes()))
-    known.annotate(told(clip="c", text="Hello"))
+    known.annotate(annotation(clip="c", text="Hello"))
     known.add_chunk(ClipPiece("c", 0, RATE, SOUND[:80].tobytes()))
     assert len(known.recordings["c"].pcm) == 80
     assert known.recordings["c"].text is None
@@ -121,7 +123,7 @@ def test_add_chunk_removes_the_oldest_clips(monkeypatch) -> None:
 )
 def test_annotate_names_the_field_of_invalid_times(fields, where) -> None:
     with pytest.raises(ClipError) as error:
-        AudioClips().annotate(told(clip="c", **fields))
+        AudioClips().annotate(annotation(clip="c", **fields))
     assert error.value.where == where
 
 
@@ -165,13 +167,13 @@ def test_clips_are_spoken_with_their_annotated_times() -> None:
         },
         SPEAK.format('<text>One <sync id="m"/>two</text>', "c1"),
     )
-    told = feedback(got)
-    assert not [f for f in told if isinstance(f, WarningFeedback)]
-    times = {f.id: f.time for f in told if isinstance(f, SyncPointProgress)}
+    received = feedback(got)
+    assert not [f for f in received if isinstance(f, WarningFeedback)]
+    times = {f.id: f.time for f in received if isinstance(f, SyncPointProgress)}
     assert times["b:s:m"] == pytest.approx(0.62, abs=1e-3)
     assert times["b:s:end"] == pytest.approx(1.0, abs=1e-6)
     packets = [unpack(m) for m in got if isinstance(m, bytes)]
-    start = next(f for f in told if isinstance(f, BlockProgress)).global_time
+    start = next(f for f in received if isinstance(f, BlockProgress)).global_time
     late = packets[1]  # the first one has silence before the start, or comes when the start is past
     assert late.stream == "audio"
     first = round(late.time * RATE) - round(start * RATE)

@@ -61,8 +61,8 @@ def said(order: Speak) -> Utterance:
 
 def times(client: Client) -> dict[str, float]:
     """Return the times of all feedback."""
-    told = (f for f in client.feedback if isinstance(f, BlockProgress | SyncPointProgress))
-    return {f.id: f.global_time for f in told}
+    progress = (f for f in client.feedback if isinstance(f, BlockProgress | SyncPointProgress))
+    return {f.id: f.global_time for f in progress}
 
 
 def texts(driver: Driver) -> list[str]:
@@ -134,9 +134,12 @@ def test_awaits_sync_ends_when_the_speech_is_closed() -> None:
 
 def test_speech_streams_accept_a_speech_without_words() -> None:
     driver = Talker()
-    told = [*driver.send({"type": "speech", "id": "turn", "close": True}).feedback, *driver.run(1).feedback]
-    assert [f.status for f in told if isinstance(f, BlockProgress) and f.id == "turn:end"] == ["DONE"]
-    assert not [f for f in told if isinstance(f, WarningFeedback)]
+    received = [
+        *driver.send({"type": "speech", "id": "turn", "close": True}).feedback,
+        *driver.run(1).feedback,
+    ]
+    assert [f.status for f in received if isinstance(f, BlockProgress) and f.id == "turn:end"] == ["DONE"]
+    assert not [f for f in received if isinstance(f, WarningFeedback)]
 
 
 def test_speech_streams_are_followed_as_one_block() -> None:
@@ -198,14 +201,14 @@ def test_advance_predicts_the_end_once_it_is_known() -> None:
     driver = Talker()
     driver.append("One. Two.")
     driver.append(close=True)
-    told = [
+    ends = [
         b.global_end
         for f in driver.clients[1].feedback
         if isinstance(f, PredictionFeedback)
         for b in f.blocks
         if b.id == "turn" and b.global_end is not None
     ]
-    assert told[-1] == pytest.approx(1.001, abs=1e-3)
+    assert ends[-1] == pytest.approx(1.001, abs=1e-3)
 
 
 CUTS = [
@@ -380,8 +383,8 @@ def streamed(test) -> list[str | bytes]:
 
 
 def told_at(messages: list[str | bytes]) -> dict[str, float]:
-    told = [parse_feedback(m) for m in messages if isinstance(m, str) and m.startswith("<")]
-    return {f.id: f.global_time for f in told if isinstance(f, BlockProgress | SyncPointProgress)}
+    feedback = [parse_feedback(m) for m in messages if isinstance(m, str) and m.startswith("<")]
+    return {f.id: f.global_time for f in feedback if isinstance(f, BlockProgress | SyncPointProgress)}
 
 
 def packets(messages: list[str | bytes]):
@@ -429,5 +432,5 @@ def test_speech_streams_stop_within_50_ms_over_a_websocket() -> None:
     assert played, "it was heard"
     assert max(played.values()) < end + 0.05
     feedback = [parse_feedback(m) for m in messages if isinstance(m, str) and m.startswith("<")]
-    (told,) = (f for f in feedback if getattr(f, "id", "") == "turn:end")
-    assert (told.status, (told.said or "").split()[:1]) == ("INTERRUPTED", ["Well"])
+    (end,) = (f for f in feedback if getattr(f, "id", "") == "turn:end")
+    assert (end.status, (end.said or "").split()[:1]) == ("INTERRUPTED", ["Well"])

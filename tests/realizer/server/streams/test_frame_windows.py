@@ -20,8 +20,8 @@ def subscribe(stream: str, **fields):
 
 
 def test_arkit_rows_are_weights_then_head_and_eyes(driver) -> None:
-    (told,) = driver.send(subscribe("arkit", fps=25)).of("subscribed")
-    assert told["names"] == [*ARKIT_NAMES(), *TURNS]
+    (reply,) = driver.send(subscribe("arkit", fps=25)).of("subscribed")
+    assert reply["names"] == [*ARKIT_NAMES(), *TURNS]
     driver.send(TURN)
     frames = driver.run(1.5).frames
     assert {frame.stream for frame in frames} == {"arkit"}
@@ -31,8 +31,8 @@ def test_arkit_rows_are_weights_then_head_and_eyes(driver) -> None:
     assert values[:, :52] == pytest.approx(shown.weights, abs=2e-3)
     assert values[:, 52:55] == pytest.approx(shown.head, abs=2e-3)
     assert values[:, 55:] == pytest.approx(shown.eyes.reshape(-1, 4), abs=2e-3)
-    assert values[:, told["names"].index("mouthSmileLeft")].max() > 0.3
-    assert np.abs(values[:, told["names"].index("headYaw")]).max() > 0.05
+    assert values[:, reply["names"].index("mouthSmileLeft")].max() > 0.3
+    assert np.abs(values[:, reply["names"].index("headYaw")]).max() > 0.05
 
 
 def test_arkit_rows_are_the_same_in_json(driver) -> None:
@@ -92,8 +92,8 @@ def test_frames_show_idle_motion_without_a_document(driver) -> None:
 
 def test_frames_have_aus_after_or_before_the_rules(driver) -> None:
     def jaw_and_lips(asked: bool) -> list[float]:
-        told = driver.send({"type": "subscribe", "stream": "au", "encoding": "json", "asked": asked})
-        names = told.of("subscribed")[-1]["names"]
+        client = driver.send({"type": "subscribe", "stream": "au", "encoding": "json", "asked": asked})
+        names = client.of("subscribed")[-1]["names"]
         values = driver.run(driver.now + 1.0).of("au")[-1]["values"]
         return [values[names.index("25")], values[names.index("26")]]
 

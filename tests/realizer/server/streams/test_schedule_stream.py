@@ -84,7 +84,7 @@ def test_schedule_stream_sends_a_block_when_planned_started_and_ended(driver) ->
     ]
     _, waits, begins, ends = client.of("schedule")[1:]
     assert waits["blocks"][0]["behaviours"][0]["gaps"][0]["actual"] == 1.0
-    # What has not changed is not told again.
+    # What has not changed is not sent again.
     assert begins["blocks"][1].keys() == {"block", "character", "state", "start", "end"}
     assert ends["blocks"] == [{"block": "b", "character": None, "state": "DONE", "start": 1.0, "end": 2.0}]
     assert (begins["time"], ends["time"]) == pytest.approx((1.0, 2.0), abs=1e-5)
@@ -194,7 +194,7 @@ def test_schedule_stream_sends_a_slow_client_all_blocks_later(driver) -> None:
     driver.session.update_backlog(1, 0)
     driver.run(4.5)
     assert [m["whole"] for m in client.of("schedule")][:2] == [True, True]
-    # From there on it is told what everybody is told, and has missed nothing.
+    # From there on it gets the same messages as the others, and has missed nothing.
     assert {b: s["state"] for b, s in known(client).items()} == {"b": "DONE", "c": "IN_EXEC"}
     alive = {b: s for b, s in known(fast).items() if s["state"] != "DONE"}
     assert {b: ends(s) for b, s in known(client).items() if s["state"] != "DONE"} == {
