@@ -36,7 +36,7 @@ def test_solve_groups_lets_a_stated_length_win_over_least_gaps() -> None:
     assert (np.diff(found.at[1:]) >= -1e-9).all()
 
 
-def test_solve_groups_returns_the_cycle_of_an_impossible_group_and_moves_nothing() -> None:
+def test_solve_groups_returns_the_cycle_of_an_impossible_group() -> None:
     recipe = Recipe([FREE._replace(most=1.5), FREE], [], [], [((0, 0), 0.0), ((0, 2), 4.0), ((1, 0), 0.0)])
     model, found = clusters(recipe)
     before = found.at.copy()
