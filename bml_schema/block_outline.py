@@ -122,5 +122,5 @@ class BlockOutline:
 
 
 def flat(tree: list[Entry | list[Entry]]) -> list[Entry]:
-    """The entries of a tree in document order."""
+    """Return the entries of a tree in document order."""
     return [e for item in tree for e in (item if isinstance(item, list) else (item,))]

@@ -112,7 +112,7 @@ class ActiveBlock:
 
     @property
     def latest(self) -> Schedule:
-        """What has become of `first`, with the warnings of both."""
+        """Its present schedule, with the warnings of the first one too."""
         first = self.first_schedule
         if self.start == float("inf"):
             return first

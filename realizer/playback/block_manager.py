@@ -291,10 +291,9 @@ class BlockManager:
             )
 
     def update_speech(self, id: str, behaviour: str, utterance: Utterance, now: float) -> bool:
-        """A voice says how it really speaks: what has not passed follows; False where it is not (still) said.
+        """Replace an utterance by its real timing; return False if the speech neither plays nor waits.
 
-        Args:
-            id: of a block that plays or waits.
+        Points that have passed stay, and the rest of the block follows.
         """
         self.advance(now)
         playing = self.blocks.find(id)
