@@ -54,7 +54,7 @@ class DocumentFramer:
     def __init__(self, limit: int) -> None:
         self._limit = limit
         self._data = bytearray()
-        self._here = 0  # the data before it is parsed
+        self._parsed = 0  # the data before it is parsed
         self._document = -1  # where the open document begins; -1 outside
         self._hidden = b""  # the open construct that hides marks: its mark, or a quote within a tag
         self._opened = 0  # where it began
@@ -62,7 +62,7 @@ class DocumentFramer:
         self._broken = False  # whether a fault was reported after the last good document
         self._stray = bytearray()
         self._orphans = 0  # end tags to come of documents that were given up
-        self._found: list[str | Fault] = []
+        self._items: list[str | Fault] = []
 
     def feed(self, data: bytes) -> list[str | Fault]:
         """Return what `data` completes, in order: documents, each from `<bml` to its end, and Faults."""
@@ -70,14 +70,14 @@ class DocumentFramer:
         while self._step():
             pass
         self._give_up()
-        consumed = self._document if self._document >= 0 else self._here
+        consumed = self._document if self._document >= 0 else self._parsed
         del self._data[:consumed]
-        self._here -= consumed
+        self._parsed -= consumed
         self._opened -= consumed
         if self._document >= 0:
             self._document = 0
-        found, self._found = self._found, []
-        return found
+        items, self._items = self._items, []
+        return items
 
     def _step(self) -> bool:
         """Parse up to the next mark, or the end of the open construct. Return False if data is missing."""
@@ -92,17 +92,17 @@ class DocumentFramer:
         return self._in_tag()
 
     def _to_mark(self) -> bool:
-        found = _MARK.search(self._data, self._here)
-        if found is None:
-            coming = _COMING.search(self._data, max(self._here, len(self._data) - 80))
+        match = _MARK.search(self._data, self._parsed)
+        if match is None:
+            coming = _COMING.search(self._data, max(self._parsed, len(self._data) - 80))
             self._text(coming.start() if coming else len(self._data))
             return False
-        start, end = found.span()
+        start, end = match.span()
         self._text(start)
         self._give_up()
         self._report_stray()
-        self._here, self._opened = end, start
-        mark = found[0]
+        self._parsed, self._opened = end, start
+        mark = match[0]
         if mark in _CLOSERS or mark == b"<!DOCTYPE":
             if self._document < 0 and mark == b"<![CDATA[":
                 self._fault("got <![CDATA[ outside a document")
@@ -121,60 +121,60 @@ class DocumentFramer:
     def _in_tag(self) -> bool:
         """Parse to the end of a <bml> tag. A `>` in a value does not end it, a `<` means it is not closed."""
         inside = _IN_VALUE.get(self._hidden, _IN_TAG)
-        found = inside.search(self._data, self._here)
-        if found is None:
-            self._here = len(self._data)
+        match = inside.search(self._data, self._parsed)
+        if match is None:
+            self._parsed = len(self._data)
             return False
-        mark, self._here = found[0], found.end()
+        mark, self._parsed = match[0], match.end()
         if mark in _IN_VALUE:
             self._hidden = b"<" if self._hidden == mark else mark
             return True
         self._hidden = b""
         if mark == b"<":
-            self._here = found.start()
-        if self._closing or (mark == b">" and self._data[found.start() - 1 : found.start()] == b"/"):
+            self._parsed = match.start()
+        if self._closing or (mark == b">" and self._data[match.start() - 1 : match.start()] == b"/"):
             self._end()
         return True
 
     def _past(self, closer: bytes) -> bool:
         """Parse to the end of a comment or the like. Give up one longer than a document may be."""
         last = self._opened + len(self._hidden) + self._limit
-        at = self._data.find(closer, self._here, last)
+        at = self._data.find(closer, self._parsed, last)
         if at >= 0:
-            self._here, self._hidden = at + len(closer), b""
+            self._parsed, self._hidden = at + len(closer), b""
             return True
         return self._not_yet(last, len(closer) - 1)
 
     def _not_yet(self, last: int, kept: int) -> bool:
         """Wait for the end of a construct, or give the construct up at `last`."""
         if len(self._data) < last:
-            self._here = max(self._here, len(self._data) - kept)  # part of the closer may be there
+            self._parsed = max(self._parsed, len(self._data) - kept)  # part of the closer may be there
             return False
         if self._document < 0:
             opener = "<!DOCTYPE" if self._hidden == b"[" else self._hidden.decode()
             self._fault(f"wanted an end of {opener} within {self._limit} bytes")
-        self._here, self._hidden = last, b""
+        self._parsed, self._hidden = last, b""
         return True
 
     def _in_doctype(self) -> bool:
         last = self._opened + len(self._hidden) + self._limit
-        found = _IN_DOCTYPE.search(self._data, self._here, last)
-        if found is None:
+        match = _IN_DOCTYPE.search(self._data, self._parsed, last)
+        if match is None:
             return self._not_yet(last, 0)
-        self._here = found.end()
-        self._hidden = b"[" if found[0] == b"[" else b""
-        if found[0] == b"<":
-            self._here = found.start()
+        self._parsed = match.end()
+        self._hidden = b"[" if match[0] == b"[" else b""
+        if match[0] == b"<":
+            self._parsed = match.start()
             if self._document < 0:
                 self._fault("wanted an end of <!DOCTYPE, got <")
         return True
 
     def _in_subset(self) -> bool:
         last = self._opened + len(b"<!DOCTYPE") + self._limit
-        found = _END_OF_SUBSET.search(self._data, self._here, last)
-        if found is None:
+        match = _END_OF_SUBSET.search(self._data, self._parsed, last)
+        if match is None:
             return self._not_yet(last, 17)
-        self._here, self._hidden = found.end(), b""
+        self._parsed, self._hidden = match.end(), b""
         return True
 
     def _end(self) -> None:
@@ -186,18 +186,18 @@ class DocumentFramer:
             else:
                 self._fault("got </bml> without <bml")
             return
-        raw = bytes(self._data[self._document : self._here])
+        raw = bytes(self._data[self._document : self._parsed])
         try:
-            self._found.append(raw.decode())
+            self._items.append(raw.decode())
             self._broken = False
         except UnicodeDecodeError as wrong:
             self._broken = False
-            self._fault(f"wanted UTF-8, got the byte 0x{raw[wrong.start]:02X}", self._id(self._here))
+            self._fault(f"wanted UTF-8, got the byte 0x{raw[wrong.start]:02X}", self._id(self._parsed))
         self._document = -1
 
     def _give_up(self) -> None:
         """Drop an open document that has grown too large."""
-        if self._document >= 0 and self._here - self._document > self._limit:
+        if self._document >= 0 and self._parsed - self._document > self._limit:
             self._broken = False
             words = f"wanted at most {self._limit} bytes in a document, got more"
             self._fault(words, self._id(self._document + self._limit), large=True)
@@ -207,7 +207,7 @@ class DocumentFramer:
     def _text(self, end: int) -> None:
         """Skip text without marks up to `end`; outside a document it should be blank."""
         if self._document < 0 and not self._broken:
-            start = self._here
+            start = self._parsed
             if not self._stray:
                 solid = _SOLID.search(self._data, start, end)
                 start = solid.start() if solid else end
@@ -216,7 +216,7 @@ class DocumentFramer:
             self._stray += self._data[start : min(room, end if line < 0 else line)]
             if self._stray and (line >= 0 or end >= room):
                 self._report_stray()
-        self._here = end
+        self._parsed = end
 
     def _report_stray(self) -> None:
         if self._stray:
@@ -227,7 +227,7 @@ class DocumentFramer:
         """Report a fault, once for each span between good documents."""
         self._stray.clear()
         if not self._broken:
-            self._found.append(Fault(text, block, large))
+            self._items.append(Fault(text, block, large))
         self._broken = True
 
     def _id(self, end: int) -> str | None:
@@ -235,5 +235,5 @@ class DocumentFramer:
         start = self._document
         end = min(end, start + 4096)
         tag = _EDGE.search(self._data, start + 1, end)
-        found = _ID.search(self._data, start, tag.start() if tag else end)
-        return (found[1] or found[2]).decode("utf-8", "replace") if found else None
+        match = _ID.search(self._data, start, tag.start() if tag else end)
+        return (match[1] or match[2]).decode("utf-8", "replace") if match else None

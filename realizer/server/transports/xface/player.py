@@ -19,7 +19,7 @@ ATTEMPT = 5.0  # s; to connect, and for the greeting
 READ = 4096  # bytes
 STUCK = 2**18  # bytes that the player has not read: hundreds of frames
 # The frames of the first character, at the rate of the service, and no feedback.
-WANTS = (
+SUBSCRIPTIONS = (
     '{"type":"unsubscribe","stream":"feedback"}',
     '{"type":"subscribe","stream":"fap","encoding":"json"}',
 )
@@ -99,8 +99,8 @@ class XfacePlayerTransport(ReconnectingTransport):
         number = self._sessions.join(self, self._session)
         self._up.set()
         try:
-            for wants in WANTS:
-                self._sessions.receive(number, wants)
+            for message in SUBSCRIPTIONS:
+                self._sessions.receive(number, message)
             while data := await reader.read(READ):
                 self._link.receive(data)
                 self._pump()

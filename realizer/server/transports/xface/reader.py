@@ -68,15 +68,15 @@ class TaskReader:
     def feed(self, data: bytes) -> list[Task | Content | Fault]:
         """Return what `data` completes, in order."""
         self._data += data
-        found: list[Task | Content | Fault] = []
-        while self._step(found):
+        items: list[Task | Content | Fault] = []
+        while self._step(items):
             pass
-        return found
+        return items
 
-    def _step(self, found: list[Task | Content | Fault]) -> bool:
+    def _step(self, items: list[Task | Content | Fault]) -> bool:
         """Parse the next item. Return False if data is missing."""
         if self._content is not None:
-            return self._take_content(found)
+            return self._take_content(items)
         if self._lost:
             return self._skip()
         if (passed := _PASSED.match(self._data)) is not None:
@@ -90,57 +90,57 @@ class TaskReader:
             if self._data.startswith((b"<?", b"\xef")) and len(self._data) < 200 and b"\0" not in self._data:
                 return False
             shown = bytes(self._data[:_SHOWN]).split(b"\0")[0].decode("utf-8", "replace")
-            return self._give_up(f"wanted <task name=...>, got {shown!r}", found)
-        return self._in_task(found)
+            return self._give_up(f"wanted <task name=...>, got {shown!r}", items)
+        return self._in_task(items)
 
-    def _in_task(self, found: list[Task | Content | Fault]) -> bool:
+    def _in_task(self, items: list[Task | Content | Fault]) -> bool:
         start = _START.match(self._data)
         if start is None:
             bound = _BOUND.search(self._data, 5)
             if (bound.start() if bound is not None else len(self._data)) > LONGEST_TAG:
-                return self._give_up(f"wanted <task ...> of at most {LONGEST_TAG} bytes, got more", found)
+                return self._give_up(f"wanted <task ...> of at most {LONGEST_TAG} bytes, got more", items)
             if bound is None:
                 return False
-            return self._give_up("wanted > at the end of <task, got another beginning", found)
+            return self._give_up("wanted > at the end of <task, got another beginning", items)
         if start[1].endswith(b"/"):
-            self._tell(start[1][:-1], b"", start.end(), found)
+            self._tell(start[1][:-1], b"", start.end(), items)
             return True
         end = _END.search(self._data, max(start.end(), self._looked))
         if end is None or not end[0].startswith(b"</"):
             if end is not None:
                 got = "a NUL" if end[0] == b"\0" else "another <task"
-                return self._give_up(f"wanted </task>, got {got}: half a task", found, start[1])
+                return self._give_up(f"wanted </task>, got {got}: half a task", items, start[1])
             if len(self._data) > self._limit:
-                return self._give_up(self._too_large, found, start[1])
+                return self._give_up(self._too_large, items, start[1])
             self._looked = max(start.end(), len(self._data) - 80)  # part of an end may be there
             return False
         if end.end() > self._limit:
-            return self._give_up(self._too_large, found, start[1])
-        self._tell(start[1], bytes(self._data[start.end() : end.start()]), end.end(), found)
+            return self._give_up(self._too_large, items, start[1])
+        self._tell(start[1], bytes(self._data[start.end() : end.start()]), end.end(), items)
         return True
 
-    def _tell(self, tag: bytes, body: bytes, end: int, found: list[Task | Content | Fault]) -> None:
+    def _tell(self, tag: bytes, body: bytes, end: int, items: list[Task | Content | Fault]) -> None:
         self._drop(end)
         task = replace(_head(tag), params=_params(body.decode("utf-8", "replace")))
         if not task.name:
             got = _values(tag).get("name", "")
-            found.append(Fault(f"wanted <task> with the name of a task, got {got[:64]!r}", _head(tag)))
+            items.append(Fault(f"wanted <task> with the name of a task, got {got[:64]!r}", _head(tag)))
             return
-        found.append(task)
+        items.append(task)
         if task.name != FOLLOWED or len(task.params) != 2:
             return
         size = task.params[1].strip()
         if not (size.isascii() and size.isdecimal() and len(size) < 12 and 0 < int(size) <= self._limit):
-            found.append(Fault(f"{FOLLOWED}: wanted 1..{self._limit} bytes to follow, got {size[:20]!r}"))
+            items.append(Fault(f"{FOLLOWED}: wanted 1..{self._limit} bytes to follow, got {size[:20]!r}"))
             return
         self._content, self._size = task, int(size)
 
-    def _take_content(self, found: list[Task | Content | Fault]) -> bool:
+    def _take_content(self, items: list[Task | Content | Fault]) -> bool:
         assert self._content is not None
         nul = self._data[:1] == b"\0"  # the terminator of the task; no sound file begins so
         if len(self._data) < self._size + nul:
             return False
-        found.append(Content(self._content, bytes(self._data[nul : self._size + nul])))
+        items.append(Content(self._content, bytes(self._data[nul : self._size + nul])))
         self._drop(self._size + nul)
         self._content = None
         return True
@@ -149,9 +149,9 @@ class TaskReader:
     def _too_large(self) -> str:
         return f"wanted a task of at most {self._limit} bytes, got more"
 
-    def _give_up(self, text: str, found: list[Task | Content | Fault], tag: bytes = b"") -> bool:
+    def _give_up(self, text: str, items: list[Task | Content | Fault], tag: bytes = b"") -> bool:
         """Report a fault; `tag` is the rest of the start tag of the task that has it."""
-        found.append(Fault(text, _head(tag)))
+        items.append(Fault(text, _head(tag)))
         self._lost = True
         self._drop(1)  # at least the mark where parsing failed
         return True

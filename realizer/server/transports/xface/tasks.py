@@ -229,9 +229,9 @@ class TaskRunner:
         for row, value in zip(faps(), self._clip.values[frame].tolist(), strict=True):
             if value:
                 values[row.name] = max(row.least, min(row.most, float(value)))
-        held = _hold_faps(self._moved | values)
+        message = _hold_faps(self._moved | values)
         self._moved = dict.fromkeys(values, 0.0)
-        return held
+        return message
 
 
 def _hold_faps(values: dict[str, float]) -> Inbound:

@@ -58,10 +58,10 @@ def read_notes(data: bytearray) -> list[Note]:
     """Return the complete notes of a player, and remove them from `data`."""
     notes: list[Note] = []
     end = 0
-    for found in _NOTE.finditer(data):
-        name, *numbers = found.groups()
+    for match in _NOTE.finditer(data):
+        name, *numbers = match.groups()
         notes.append(Note(name.decode("utf-8", "replace"), *map(int, numbers)))
-        end = found.end()
+        end = match.end()
     del data[:end]
     if len(data) > LONGEST_NOTE:  # not a note; its end may be the beginning of one
         del data[: len(data) - 200]

@@ -14,9 +14,9 @@ NOD = '<bml id="b"><head id="n" lexeme="NOD"/></bml>'
 
 def assemble(data: bytes | str, *, limit: int = LIMIT, step: int | None = None) -> list[str | Fault]:
     data = data.encode() if isinstance(data, str) else data
-    assembler = DocumentFramer(limit)
+    framer = DocumentFramer(limit)
     reads = [data] if step is None else [data[n : n + step] for n in range(0, len(data), step)]
-    return [found for read in reads for found in assembler.feed(read)]
+    return [found for read in reads for found in framer.feed(read)]
 
 
 WHOLE = {
@@ -89,9 +89,9 @@ def test_framer_reports_no_fault_for_the_end_of_a_document_given_up() -> None:
 
 
 def test_framer_returns_nothing_for_half_a_document() -> None:
-    assembler = DocumentFramer(LIMIT)
-    assert assembler.feed(NOD[:-1].encode()) == []
-    assert assembler.feed(b">") == [NOD]
+    framer = DocumentFramer(LIMIT)
+    assert framer.feed(NOD[:-1].encode()) == []
+    assert framer.feed(b">") == [NOD]
 
 
 PIECES = [
@@ -105,13 +105,13 @@ PIECES = [
 @given(st.lists(st.sampled_from(PIECES), max_size=8), st.lists(st.integers(0, 400), max_size=30))
 def test_framer_does_not_depend_on_how_a_stream_is_cut(pieces: list[str], cuts: list[int]) -> None:
     data = "".join(pieces).encode("latin-1", "replace")
-    assembler = DocumentFramer(LIMIT)
+    framer = DocumentFramer(LIMIT)
     found: list[str | Fault] = []
     at = 0
     for cut in cuts:
-        found += assembler.feed(data[at : at + cut])
+        found += framer.feed(data[at : at + cut])
         at += cut
-    found += assembler.feed(data[at:])
+    found += framer.feed(data[at:])
     assert found == assemble(data) == assemble(data, step=1)
 
 
@@ -122,19 +122,19 @@ def test_framer_finds_the_next_document_after_any_bytes(garbage: bytes) -> None:
 
 
 def test_framer_bounds_what_it_stores() -> None:
-    assembler = DocumentFramer(1000)
+    framer = DocumentFramer(1000)
     for junk in (b"x" * 999, b"<bml>" * 200, b"<!--" + b"y" * 900, b'<bml id="b">' + b"z" * 900, b"<" * 999):
         for _ in range(50):
-            assembler.feed(junk)
-            assert len(assembler._data) <= 3000
+            framer.feed(junk)
+            assert len(framer._data) <= 3000
 
 
 @pytest.mark.parametrize("inside", ["{}", "<!--{}-->", "<![CDATA[{}]]>", "<?x {}?>", '<wait id="{}"/>'])
 def test_framer_does_not_parse_a_slow_document_again_from_its_start(inside: str) -> None:
     data = f'<bml id="{"v" * 2000}">{inside.format("ab < ]] -- ? " * 200)}</bml>'.encode()
-    assembler = DocumentFramer(2**20)
+    framer = DocumentFramer(2**20)
     for n in range(len(data) - 1):
-        assert assembler.feed(data[n : n + 1]) == []
+        assert framer.feed(data[n : n + 1]) == []
         # Bytes that each new byte makes it examine again: never more than the longest mark.
-        assert len(assembler._data) - assembler._here <= 80
-    assert assembler.feed(data[-1:]) == [data.decode()]
+        assert len(framer._data) - framer._parsed <= 80
+    assert framer.feed(data[-1:]) == [data.decode()]
