@@ -1,4 +1,4 @@
-"""The closed loop: a profile moves a face, its feature points are measured, the profile is recognised."""
+"""Tests of `realizer.analysis.faps_from_mesh`."""
 
 from __future__ import annotations
 

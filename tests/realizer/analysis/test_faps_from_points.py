@@ -1,4 +1,4 @@
-"""Feature points to FAPs, and the 15 features."""
+"""Tests of `realizer.analysis.faps_from_points`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Looking expressions up by a picture of one of our faces."""
+"""Tests of `realizer.analysis.picture_search`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables of tracked points."""
+"""Tests of `realizer.analysis.points_file`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The fuzzy recogniser on FAP frames, and that what is synthesised is recognised."""
+"""Tests of `realizer.analysis.recognise`."""
 
 from __future__ import annotations
 

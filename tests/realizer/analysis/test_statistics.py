@@ -1,4 +1,4 @@
-"""Profiles from statistics and from observed faces."""
+"""Tests of `realizer.analysis.statistics`."""
 
 from __future__ import annotations
 

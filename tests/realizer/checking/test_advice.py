@@ -1,4 +1,4 @@
-"""Tests of advice on valid blocks."""
+"""Tests of `realizer.checking.advice`."""
 
 from __future__ import annotations
 

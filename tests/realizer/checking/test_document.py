@@ -1,4 +1,4 @@
-"""A document in, all of its faults out, block by block; how they are told is tested with the command."""
+"""Tests of `realizer.checking.document`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tests of the explanation of warnings."""
+"""Tests of `realizer.checking.explain`."""
 
 from __future__ import annotations
 

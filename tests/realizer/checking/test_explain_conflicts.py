@@ -1,4 +1,4 @@
-"""Tests of the explanation of scheduling conflicts."""
+"""Tests of `realizer.checking.explain_conflicts`."""
 
 from __future__ import annotations
 

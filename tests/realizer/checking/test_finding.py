@@ -1,4 +1,4 @@
-"""Tests of the finding value."""
+"""Tests of `realizer.checking.finding`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tests of the builder of findings."""
+"""Tests of `realizer.checking.finding_builder`."""
 
 from __future__ import annotations
 

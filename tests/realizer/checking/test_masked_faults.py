@@ -1,4 +1,4 @@
-"""Faults of one behaviour that are found at different steps are all told, each at its place."""
+"""Tests of `realizer.checking.masked_faults`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`realizer align`."""
+"""Tests of `realizer align`."""
 
 from __future__ import annotations
 

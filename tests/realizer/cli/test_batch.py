@@ -1,4 +1,4 @@
-"""`realizer batch`: places in, a folder with a manifest out, and the exit status."""
+"""Tests of `realizer batch`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`realizer check` gives the advice of the knowledge base, with the place it is about."""
+"""Tests of advice on behaviours by `realizer check`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`realizer check` as its user sees it: what is marked, what is said, what the exit status is."""
+"""Tests of `realizer check`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The demonstration: where its page is."""
+"""Tests of `realizer demo`."""
 
 from __future__ import annotations
 

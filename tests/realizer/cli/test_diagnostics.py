@@ -1,4 +1,4 @@
-"""The text of findings: one line for programs, source and marks for people."""
+"""Tests of the text of findings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`realizer doctor`: a line for each part, and the fix for what is missing."""
+"""Tests of `realizer doctor`."""
 
 from __future__ import annotations
 

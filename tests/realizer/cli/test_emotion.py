@@ -1,4 +1,4 @@
-"""`realizer emotion`: words and places to FAPs, files and pictures."""
+"""Tests of `realizer emotion`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`realizer enrich` as its user sees it."""
+"""Tests of `realizer enrich`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`realizer expressions`: the library on the command line."""
+"""Tests of `realizer expressions`."""
 
 from __future__ import annotations
 

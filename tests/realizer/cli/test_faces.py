@@ -1,4 +1,4 @@
-"""`realizer faces`: what is listed, and copies with zones."""
+"""Tests of `realizer faces`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`realizer fap`: FAP files looked into, converted and played."""
+"""Tests of `realizer fap`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`realizer faces fit`: what it refuses, and where files go."""
+"""Tests of `realizer faces fit`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`realizer faces import` and `realizer faces check`: what they say of heads and of faces."""
+"""Tests of `realizer faces import` and `realizer faces check`."""
 
 from __future__ import annotations
 

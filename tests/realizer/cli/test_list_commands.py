@@ -1,4 +1,4 @@
-"""`realizer outputs` and `realizer voices`: what can be written and spoken here."""
+"""Tests of `realizer outputs` and `realizer voices`."""
 
 from __future__ import annotations
 

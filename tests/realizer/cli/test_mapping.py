@@ -1,4 +1,4 @@
-"""`faces mapping` writes what is in force, in a form that can be played again."""
+"""Tests of `realizer faces mapping`."""
 
 from __future__ import annotations
 

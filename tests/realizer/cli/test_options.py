@@ -1,4 +1,4 @@
-"""Options that several commands share: the same words, the same refusals."""
+"""Tests of the options that several commands share."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`realizer schedule`: a table, JSON, or the documents themselves with absolute times."""
+"""Tests of `realizer realize` and `realizer schedule`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`realizer replay`: recordings as feedback and as files."""
+"""Tests of `realizer replay`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `serve` is told on the command line: every limit, and who may come in."""
+"""Tests of `realizer serve`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`realizer faces sheet`: a picture, and what it says of wrong wishes."""
+"""Tests of `realizer faces sheet`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a sheet shows: everything once, as far as it goes."""
+"""Tests of the poses of face sheets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`realizer timeline` and `realizer check` of timelines."""
+"""Tests of `realizer timeline`, and of `realizer check` with timelines."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`realizer track`: points in, a FAP file out that plays the same."""
+"""Tests of `realizer track`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files are written whole or not at all."""
+"""Tests of `realizer.core.atomic_files`."""
 
 from __future__ import annotations
 

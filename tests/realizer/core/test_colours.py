@@ -1,4 +1,4 @@
-"""The sRGB curve by its published values, and there and back."""
+"""Tests of `realizer.core.colours`."""
 
 from __future__ import annotations
 

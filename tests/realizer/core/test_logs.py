@@ -1,4 +1,4 @@
-"""Logs as JSON lines."""
+"""Tests of `realizer.core.logs`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Options of playing documents."""
+"""Tests of `realizer.core.options`."""
 
 from __future__ import annotations
 

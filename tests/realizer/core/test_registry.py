@@ -1,4 +1,4 @@
-"""Names of ours and of plug-ins, each imported when it is first used."""
+"""Tests of `realizer.core.registry`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Settings come from flags, variables and a file, in that order of weight."""
+"""Tests of `realizer.core.settings`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Conversions at the edges."""
+"""Tests of `realizer.core.units`."""
 
 from __future__ import annotations
 

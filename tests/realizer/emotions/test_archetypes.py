@@ -1,4 +1,4 @@
-"""The three sets of archetypes, against the print and against MPEG-4."""
+"""Tests of `realizer.emotions.archetypes`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Intermediate emotions: the examples of both papers, in numbers."""
+"""Tests of `realizer.emotions.intermediate`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A profile as a value: its middle, draws from it, its text."""
+"""Tests of `realizer.emotions.profile`."""
 
 from __future__ import annotations
 

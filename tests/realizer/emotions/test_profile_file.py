@@ -1,4 +1,4 @@
-"""Paul's file of profiles."""
+"""Tests of `realizer.emotions.profile_file`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The wheel: archetypes at their places, and no jump over the whole disc."""
+"""Tests of `realizer.emotions.wheel`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Words for emotions."""
+"""Tests of `realizer.emotions.words`."""
 
 from __future__ import annotations
 

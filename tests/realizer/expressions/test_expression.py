@@ -1,4 +1,4 @@
-"""One expression as a value."""
+"""Tests of `realizer.expressions.expression`."""
 
 from __future__ import annotations
 

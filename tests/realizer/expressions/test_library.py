@@ -1,4 +1,4 @@
-"""The library: everything that ships has words and times, and a user's own go before it."""
+"""Tests of `realizer.expressions.library`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Looking expressions up, by what they mean and by what they show."""
+"""Tests of `realizer.expressions.search`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When each entry of a timeline shows."""
+"""Tests of `realizer.expressions.spans`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a timeline asks for that a library or a face does not have."""
+"""Tests of `realizer.expressions.timeline`."""
 
 from __future__ import annotations
 

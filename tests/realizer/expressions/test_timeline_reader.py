@@ -1,4 +1,4 @@
-"""Timeline files, good and bad."""
+"""Tests of `realizer.expressions.timeline_reader`."""
 
 from __future__ import annotations
 

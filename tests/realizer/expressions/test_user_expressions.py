@@ -1,4 +1,4 @@
-"""Files of expressions of one's own, good and bad."""
+"""Tests of `realizer.expressions.user_expressions`."""
 
 from __future__ import annotations
 

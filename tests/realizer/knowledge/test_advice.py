@@ -1,4 +1,4 @@
-"""What the knowledge base says about a document."""
+"""Tests of `realizer.knowledge.advice`."""
 
 from __future__ import annotations
 

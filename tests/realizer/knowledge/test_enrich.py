@@ -1,4 +1,4 @@
-"""Text and documents get expressions where the knowledge base puts them, and nothing is lost."""
+"""Tests of `realizer.knowledge.enrich`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which expression goes where in a text, and why."""
+"""Tests of `realizer.knowledge.placement_rules`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A text falls into sentences, and its words get times by their vowels."""
+"""Tests of `realizer.knowledge.sentences`."""
 
 from __future__ import annotations
 

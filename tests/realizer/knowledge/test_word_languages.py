@@ -1,4 +1,4 @@
-"""Each text is in its own language, and only the words of that language count in it."""
+"""Tests of `realizer.knowledge.word_languages`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tests of the names of ARKit's blend shapes."""
+"""Tests of `realizer.tables.arkit_names`."""
 
 from __future__ import annotations
 

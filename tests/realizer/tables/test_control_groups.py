@@ -1,4 +1,4 @@
-"""Headings: everything stands under one."""
+"""Tests of `realizer.tables.control_groups`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The rules of co-occurrence are read as Wojdel writes them; a bad file says all that is wrong with it."""
+"""Tests of `realizer.tables.cooccurrence`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The numbers of wheel and recogniser."""
+"""Tests of `realizer.tables.emotion_model`."""
 
 from __future__ import annotations
 

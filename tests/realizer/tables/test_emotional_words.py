@@ -1,4 +1,4 @@
-"""Words find their category: phrases before words, words before beginnings."""
+"""Tests of `realizer.tables.emotional_words`."""
 
 from __future__ import annotations
 

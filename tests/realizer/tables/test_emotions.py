@@ -1,4 +1,4 @@
-"""What archetypes show in action units."""
+"""Tests of `realizer.tables.emotions`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tests of the search words of expressions."""
+"""Tests of `realizer.tables.expression_words`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The 15 features of feature points."""
+"""Tests of `realizer.tables.facial_features`."""
 
 from __future__ import annotations
 

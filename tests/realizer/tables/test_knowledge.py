@@ -1,4 +1,4 @@
-"""The knowledge base is read whole, and names only what there is."""
+"""Tests of `realizer.tables.knowledge`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tests of the table of lexemes."""
+"""Tests of `realizer.tables.lexemes`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Mappings read as Paul wrote them, read back as they were written, and are refused with their line."""
+"""Tests of `realizer.tables.mappings`."""
 
 from __future__ import annotations
 

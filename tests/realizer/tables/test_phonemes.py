@@ -1,4 +1,4 @@
-"""The features of phonemes: vowels have a height, consonants a manner."""
+"""Tests of `realizer.tables.phonemes`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Profiles, vocabularies and statistics against each other: what was copied wrongly would not agree."""
+"""Tests of `realizer.tables.profiles`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The tables agree with each other, and a bad table is refused with its place."""
+"""Tests of the tables and of their readers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The templates' table."""
+"""Tests of `realizer.tables.templates`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""timing.toml has the sync points of every element, and what it takes from films is what was measured."""
+"""Tests of `realizer.tables.timing`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Words and rings: what points elsewhere points at something."""
+"""Tests of `realizer.tables.wheel_words`."""
 
 from __future__ import annotations
 
