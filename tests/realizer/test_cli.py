@@ -24,7 +24,7 @@ def process(*args: str, stdin: str = "", cwd: Path | None = None) -> subprocess.
     )
 
 
-def test_process_reads_standard_input_and_exits_with_the_status_of_the_command() -> None:
+def test_process_reads_standard_input_and_exits_with_its_status() -> None:
     done = process("check", "-", stdin=DROPS)
     assert (done.returncode, done.stderr.count("Traceback")) == (1, 0)
     assert "line 2" in done.stdout
