@@ -351,7 +351,7 @@ class Interleaving:
             assert "internal error" not in data, data
             if seq is None:  # a document that was not taken
                 assert self._full, data
-                assert "could not be kept" in data, data
+                assert "could not be written to the journal" in data, data
                 return
             follows = seq == view.last + 1 if view.whole else seq > view.last
             assert follows, f"{connection} in {view.session.id} got {seq} after {view.last}: {data}"
