@@ -48,7 +48,7 @@ def connected(test: Callable[[BrokerConnection, list[tuple[int, bytes]]], Any]) 
     asyncio.run(run())
 
 
-def test_broker_connection_settles_when_connected_and_reads_after_the_receipt() -> None:
+def test_broker_connection_settles_and_reads_after_the_receipt() -> None:
     async def test(connection: BrokerConnection, _: object) -> None:
         in_thread(connection.on_connected, frame())
         await connection.settled.wait()
