@@ -34,7 +34,7 @@ def render_utterance(speaking: ScheduledSpeech, rate: int) -> Float32:
 def resample(pcm: Int16, rate: int, wanted: int) -> Float32:
     """Return PCM at another rate, (n,) float32: linear interpolation, box-filtered if the rate falls."""
     samples: Float32 = pcm.astype(np.float32)
-    if rate == wanted:
+    if rate == wanted or not len(pcm):
         return samples
     if wanted < rate:
         width = max(1, round(rate / wanted))

@@ -37,3 +37,7 @@ def test_resample_to_a_lower_rate_does_not_alias_high_tones() -> None:
     high = (1000 * (-1) ** np.arange(800)).astype(np.int16)
     assert np.abs(resample(high, 8000, 4000)[2:-2]).max() < 1
     assert np.array_equal(resample(high, 8000, 8000), high)
+
+
+def test_resample_of_no_samples_is_empty() -> None:
+    assert resample(np.zeros(0, np.int16), 22050, 8000).tolist() == []
