@@ -135,10 +135,10 @@ def test_subscribe_yields_names_after_a_change_of_face(page) -> None:  # type: i
       let done;
       const all = new Promise((resolve) => (done = resolve));
       realizer.ask({ type: "character", face: faces[0] });
-      await realizer.subscribe("mesh", { fps: 30 }, ({ told, values }) => {
-        shown.push([told.face, told.scale, values().length === 3 * told.vertices]);
+      await realizer.subscribe("mesh", { fps: 30 }, ({ streamInfo, values }) => {
+        shown.push([streamInfo.face, streamInfo.scale, values().length === 3 * streamInfo.vertices]);
         if (shown.length === 2) realizer.ask({ type: "character", face: faces[1] });
-        if (told.face === faces[1]) done();
+        if (streamInfo.face === faces[1]) done();
       });
       await all;
       realizer.unsubscribe("mesh");

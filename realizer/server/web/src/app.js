@@ -79,7 +79,7 @@ link.onreply = (message) => {
 link.onframe = (frame) => {
   if (frame.stream === "mesh") {
     clock.heard(frame.time, performance.now() / 1000);
-    stage.add(frame.time, frame.values(), frame.told?.face);
+    stage.add(frame.time, frame.values(), frame.streamInfo?.face);
   } else if (frame.stream === "audio") {
     if (timeline.scrub !== null) return;
     sound.packet(frame.time, frame.values(), frame.forget);

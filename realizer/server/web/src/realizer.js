@@ -61,7 +61,7 @@ export class RealizerError extends Error {
  *   onlost()                    disconnected; a new connection is tried
  *   onfeedback(element, seq)    BML feedback, as an XML element
  *   onreply(message)            every JSON message that is not a frame: welcome, subscribed, state, error, ...
- *   onframe(frame)              every frame of every stream, see `frameOf`; its `told` has the fields of the last
+ *   onframe(frame)              every frame of every stream, see `frameOf`; its `streamInfo` has the fields of the last
  *                               `subscribed` or `changed` of its stream, such as face, scale and offset of a mesh
  */
 export class Realizer {
@@ -77,7 +77,7 @@ export class Realizer {
   #tries = 0;
   #closed = false;
   #asked = []; // { message, resolve, reject } of requests without an answer
-  #streams = new Map(); // stream, character and view -> { message, take, told: fields of `subscribed` }
+  #streams = new Map(); // stream, character and view -> { message, take, streamInfo: fields of `subscribed` }
   #unsent = []; // documents to send once the connection is open
   #awaited = new Map(); // block id -> [{ planned, resolve, reject }]
 
@@ -161,7 +161,7 @@ export class Realizer {
   subscribe(stream, options = {}, take = nothing) {
     const message = { type: "subscribe", stream, ...options };
     const key = keyOf(message);
-    this.#streams.set(key, { message, take, told: { index: 0 } });
+    this.#streams.set(key, { message, take, streamInfo: { index: 0 } });
     const answer = this.ask(message);
     answer.catch(() => {
       if (this.#streams.get(key)?.message === message) this.#streams.delete(key);
@@ -212,18 +212,18 @@ export class Realizer {
     if (message.type === "gap") this.seen = null;
     if (message.type === "subscribed" || message.type === "changed") {
       const stream = this.#streams.get(keyOf(message));
-      if (stream) stream.told = { ...stream.told, ...message };
+      if (stream) stream.streamInfo = { ...stream.streamInfo, ...message };
     }
     this.#answer(message);
     this.onreply(message);
   }
 
   #frame(frame) {
-    for (const { message, take, told } of this.#streams.values()) {
+    for (const { message, take, streamInfo } of this.#streams.values()) {
       // JSON frames name the character like the subscription, binary frames have its index.
-      const own = frame.kind === undefined ? message.character : told.index;
+      const own = frame.kind === undefined ? message.character : streamInfo.index;
       if (message.stream !== frame.stream || own !== frame.character) continue;
-      frame.told = told;
+      frame.streamInfo = streamInfo;
       take(frame);
     }
     this.onframe(frame);
