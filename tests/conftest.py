@@ -4,22 +4,13 @@ from __future__ import annotations
 
 import logging
 import os
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, Phase, settings
 
 # Tests run beside each other: one thread of linear algebra each. numpy reads it once, when it is loaded.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
-# Hundreds of processes start in a run of all tests: they share compiled modules, also where none may be put
-# beside the sources.
-if "PYTEST_XDIST_WORKER" in os.environ and os.environ.pop("PYTHONDONTWRITEBYTECODE", None):
-    sys.dont_write_bytecode = False
-    sys.pycache_prefix = str(Path(__file__).parents[1] / ".pytest_cache" / "compiled")
-    os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
 
 # The same examples each run, so that a failure is a change; `HYPOTHESIS_PROFILE=thorough` looks for new ones.
 # A failure is told as it was found: making it smaller can take minutes, `HYPOTHESIS_PROFILE=small` does it.

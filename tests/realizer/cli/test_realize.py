@@ -108,7 +108,8 @@ def test_realize_on_a_full_disk_names_the_file_and_leaves_no_part(tmp_path: Path
     (tmp_path / "0.bml").write_text(TALK)
     (tmp_path / "out").mkdir()
     name, *flags = command.split()
-    line = shlex.join([sys.executable, "-m", "realizer", name, "0.bml", "--voice", "silent", *flags])
+    # -B: the limit would also cut compiled modules, which other processes load.
+    line = shlex.join([sys.executable, "-B", "-m", "realizer", name, "0.bml", "--voice", "silent", *flags])
     limited = ["sh", "-c", f"ulimit -f 8; exec {line}"]
     done = subprocess.run(limited, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 3
