@@ -68,6 +68,7 @@ def test_mean_score_gives_back_paul_s_own_figures() -> None:
     assert mean_score(tuple(t for t in his if t.fap not in missing)) == pytest.approx(2.88, abs=0.005)
 
 
+@pytest.mark.slow
 def test_score_faps_finds_wrong_lengths_and_directions() -> None:
     found = spoiled({31: lambda field: field * 1.1, 33: lambda field: -field})
     assert found[31, 1].error == pytest.approx(0.1, abs=0.001)
@@ -77,6 +78,7 @@ def test_score_faps_finds_wrong_lengths_and_directions() -> None:
     assert found[32, 1].mirror == pytest.approx(0.1, abs=0.001)
 
 
+@pytest.mark.slow
 def test_score_faps_finds_a_lip_that_drags_the_other() -> None:
     face = load_face()
     both = face.basis["fields"].toarray()[:, 3]
@@ -85,6 +87,7 @@ def test_score_faps_finds_a_lip_that_drags_the_other() -> None:
     assert found[5, 1].score < 2
 
 
+@pytest.mark.slow
 def test_score_faps_calls_a_spike_rough() -> None:
     face = load_face()
     vertex = face.feature_points["4.1"] - face.basis["moving"][0]
@@ -97,6 +100,7 @@ def test_score_faps_calls_a_spike_rough() -> None:
     assert spoiled({31: spike})[31, 1].rough > 0.9
 
 
+@pytest.mark.slow
 def test_score_faps_finds_flipped_skin() -> None:
     face = load_face()
     sharp = np.zeros((face.basis["moving"][1] - face.basis["moving"][0], 3), np.float32)

@@ -98,6 +98,7 @@ def words(printed: str) -> list[str]:
 STORY = words(next(iter(dialogue.SCRIPT.values())))
 
 
+@pytest.mark.slow
 def test_dialogue_goes_on_after_an_interruption() -> None:
     async def test(console: Console) -> None:
         await console.until("> ")
@@ -131,6 +132,7 @@ def reply(history):
 """
 
 
+@pytest.mark.slow
 def test_dialogue_plays_tokens_on_a_running_service(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(MODEL)
     told: list[Feedback] = []

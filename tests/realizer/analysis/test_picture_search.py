@@ -28,6 +28,7 @@ def drawn(face: str, light: str, size: tuple[int, int], intensity: float) -> lis
         return [picture[..., :3].copy() for picture in renderer.draw(poses(frames, input_names(face)))]
 
 
+@pytest.mark.slow
 def test_by_picture_finds_the_expression_of_a_known_face() -> None:
     _, picture, *_ = drawn("ada", "evening", (150, 200), 0.7)
     seen = by_picture(picture, KNOWN, ["ada"])
@@ -51,6 +52,7 @@ def test_by_picture_finds_face_light_and_expression_at_any_size() -> None:
 
 
 @pytest.mark.parametrize("shape", [(200, 200, 3), (900, 20, 3), (20, 900, 3)])
+@pytest.mark.slow
 def test_by_picture_refuses_an_unknown_face(shape: tuple[int, int, int]) -> None:
     noise = np.random.default_rng(0).integers(0, 255, shape).astype(np.uint8)
     with pytest.raises(UnknownPictureError, match="wanted a picture of one of our faces from the front"):

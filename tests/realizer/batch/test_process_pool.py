@@ -34,6 +34,7 @@ def test_process_pool_gives_the_outputs_of_one_worker(
     assert crew.pids == ()
 
 
+@pytest.mark.slow
 def test_process_pool_loses_nothing_when_a_worker_is_killed(
     tasks: list[Task], options: Options, expected: dict[str, Outcome]
 ) -> None:

@@ -42,6 +42,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
 
+@pytest.mark.slow
 def test_batch_gives_the_same_bytes_with_any_workers_in_any_order(
     talks: Path, options: Options, tmp_path: Path
 ) -> None:
@@ -53,6 +54,7 @@ def test_batch_gives_the_same_bytes_with_any_workers_in_any_order(
 
 
 @pytest.mark.espeak
+@pytest.mark.slow
 def test_batch_gives_the_same_sound_with_any_workers_in_any_order(talks: Path, tmp_path: Path) -> None:
     """The output of espeak-ng depends on earlier texts, but for the measures of our engine."""
     aloud = Options(formats=(".fap", ".wav"), voice="espeak")

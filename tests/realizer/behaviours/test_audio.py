@@ -81,6 +81,7 @@ def test_audio_volume_changes_while_it_sounds(play, media: Path) -> None:
     assert heard[2800:4000].max() == pytest.approx(0.1 * 32767, rel=0.02)
 
 
+@pytest.mark.slow
 def test_speech_with_a_recording_moves_its_lips_and_syncs(play, media: Path) -> None:
     if fix := install_hint():
         pytest.skip(fix)

@@ -38,6 +38,7 @@ def test_keyframes_of_action_units_have_sides(play) -> None:
     assert played.aus(2.0) == {}
 
 
+@pytest.mark.slow
 def test_keyframes_that_are_not_at_rest_are_eased(play) -> None:
     played = play(keyframe("FACS", "12.BOTH", "0 1\n2 1"))
     course = [played.aus(t / 100).get("12L", 0) for t in range(201)]

@@ -321,6 +321,7 @@ def on_a_terminal(document: Path, **environment: str) -> str:
     return said.decode()
 
 
+@pytest.mark.slow
 def test_check_prints_source_and_colours_on_a_terminal(tmp_path: Path) -> None:
     document = tmp_path / "d.bml"
     document.write_text(f'{HEAD}<head id="n" lexeme="NOD" amount="7"/></bml>')

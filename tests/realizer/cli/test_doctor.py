@@ -10,6 +10,7 @@ import pytest
 from tests.commands import run
 
 
+@pytest.mark.slow
 def test_doctor_names_every_part_and_exits_with_0() -> None:
     done = run("doctor")
     assert done.returncode == 0

@@ -126,6 +126,7 @@ def test_play_holds_a_file_of_one_frame_for_a_second(tmp_path: Path) -> None:
     assert rows[13][jaw] == "400"
 
 
+@pytest.mark.slow
 def test_play_draws_a_picture(actor: Path, tmp_path: Path) -> None:
     out = tmp_path / "face.png"
     done = run("play", str(actor), "--at", "0.5", "--size", "64x64", "--face", "ben", "-o", str(out))

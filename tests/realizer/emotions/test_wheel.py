@@ -48,6 +48,7 @@ def test_affect_is_continuous(valence: float, arousal: float, profiles: str) -> 
         assert np.abs(affect(there, arousal, profiles).frame() - here).max() < 0.5
 
 
+@pytest.mark.slow
 def test_wheel_is_continuous_in_the_width_of_ranges() -> None:
     widths = [wheel(angle, 5, "published").ranges.get(3, (0.0, 0.0)) for angle in np.arange(0, 360, 0.01)]
     assert np.abs(np.diff(np.array(widths), axis=0)).max() < 1

@@ -38,6 +38,7 @@ def test_teeth_are_closed_towards_the_tongue(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [info.name for info in list_faces()])
+@pytest.mark.slow
 def test_parts_of_an_open_mouth_are_dark_red_not_black(name: str) -> None:
     face = load_face(name)
     shape = opened(face)

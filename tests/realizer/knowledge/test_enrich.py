@@ -141,6 +141,7 @@ def test_block_enriched_twice_is_the_same(text: str) -> None:
 @pytest.mark.parametrize(
     "text", ['Are you sure? What a horror, he said; "nonsense!" ' * 1000, "No! & yes. " * 2000, "x" * 30_000]
 )
+@pytest.mark.slow
 def test_texts_splits_a_long_text_into_playable_blocks(text: str) -> None:
     blocks = list(Enricher().texts(text, MAX_TEXT))
     assert "".join(str(block["speech1"].text) for block in blocks) == text

@@ -50,6 +50,7 @@ def same(one: FAPClip, other: FAPClip) -> bool:
 
 
 @given(clips(), st.lists(st.sampled_from(list(ENCODINGS)), min_size=1, max_size=3))
+@pytest.mark.slow
 def test_read_clip_inverts_all_encodings(original: FAPClip, suffixes: list[str]) -> None:
     clip = original
     for suffix in suffixes:

@@ -139,6 +139,7 @@ def test_film_without_pyav_says_what_to_install(tmp_path):
 
 @pytest.mark.gl
 @pytest.mark.parametrize("suffix", FORMATS)
+@pytest.mark.slow
 def test_film_of_a_realization_shows_its_face(realization, tmp_path, suffix):
     path = tmp_path / f"x{suffix}"
     OUTPUTS[suffix].write(realization, path, RenderSettings(size=(129, 128)))

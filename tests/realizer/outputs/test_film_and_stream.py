@@ -61,6 +61,7 @@ def played(turn):
 
 
 @pytest.mark.gl
+@pytest.mark.slow
 def test_pictures_of_film_and_stream_are_equal(streamed, played):
     with RenderSettings(SIZE).make_renderer(played, SIZE) as renderer:
         drawn = renderer.draw(played.poses)

@@ -51,6 +51,7 @@ def drawn(realization, path, drawing) -> np.ndarray:
 
 
 @pytest.mark.gl
+@pytest.mark.slow
 def test_png_at_an_instant_is_one_picture(realization, tmp_path):
     picture = drawn(realization, tmp_path / "x.png", RenderSettings((160, 120), at=0.4))
     assert picture.shape == (120, 160, 3)

@@ -68,6 +68,7 @@ def test_webp_of_a_realization_shows_its_face(realization, tmp_path):
 
 
 @pytest.mark.gl
+@pytest.mark.slow
 def test_webp_has_at_most_25_pictures_a_second(tmp_path):
     quick = realize('<bml id="b"><head id="n" lexeme="NOD" end="0.5"/></bml>', fps=60, idle=False)
     OUTPUTS[".webp"].write(quick, tmp_path / "x.webp", RenderSettings(size=(32, 32)))

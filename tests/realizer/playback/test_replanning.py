@@ -158,6 +158,7 @@ def test_anticipate_moves_a_behaviour_tied_to_the_point(stage: Stage) -> None:
     assert times["a:n:start"] < 2.2, "it had begun by then"
 
 
+@pytest.mark.slow
 def test_anticipate_forgets_the_oldest_that_no_block_is_tied_to(stage: Stage) -> None:
     stage.player.anticipate("clock", {"beat": 3.0}, 0.0)
     stage.send("a", BEAT)

@@ -7,6 +7,7 @@ import pytest
 from realizer.render.drawing_process import available, available_backend
 
 
+@pytest.mark.slow
 def test_available_names_the_backend_or_what_to_install():
     way, fix = available_backend()
     assert (way in ("gl", "onboard")) != (way == "")
@@ -24,6 +25,7 @@ def test_available_lists_the_known_backends():
 
 
 @pytest.mark.gl("onboard")
+@pytest.mark.slow
 def test_available_backend_reads_the_variable(monkeypatch):
     monkeypatch.setenv("REALIZER_DRAW", "onboard")
     available_backend.cache_clear()

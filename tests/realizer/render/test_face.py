@@ -59,6 +59,7 @@ def test_face_has_hairline_and_chin_as_framed(face):
     assert (chin + hairline) / 2 == pytest.approx(0.47, abs=0.015)
 
 
+@pytest.mark.slow
 def test_face_picture_is_framed_as_projected(renderer, face):
     """Skin starts below the hairline; below the chin the neck is in shade: both seen, not computed."""
     picture = renderer.draw(row())[0].astype(int)
@@ -102,6 +103,7 @@ def test_face_lids_hide_the_eyes_and_their_glints(renderer, face):
         assert patch(closed, box).min(2).max() < 190
 
 
+@pytest.mark.slow
 def test_face_eyes_have_a_glint_in_the_iris(face):
     with Renderer("default", (1024, 1024)) as renderer:
         picture = renderer.draw(row())[0]
@@ -122,6 +124,7 @@ def test_face_turned_to_its_left_looks_to_the_right(renderer, face):
 @pytest.mark.parametrize(
     "camera", ["three-quarter", pytest.param("profile", marks=pytest.mark.slow), "close"]
 )
+@pytest.mark.slow
 def test_face_is_shown_by_every_camera(camera):
     with Renderer("default", (128, 128), camera) as renderer:
         (picture,) = renderer.draw(row())

@@ -37,6 +37,7 @@ def renderer() -> Iterator[Renderer]:
 
 
 @pytest.mark.gl
+@pytest.mark.slow
 def test_renderer_draws_many_pictures_in_order(renderer):
     """More rows than the shared memory holds: each slot is drawn several times."""
     pictures = renderer.draw(rows(41))
@@ -105,6 +106,7 @@ def test_renderer_serves_two_threads_one_after_the_other(renderer):
 
 
 @pytest.mark.gl
+@pytest.mark.slow
 def test_renderer_close_ends_the_process_and_frees_its_memory():
     shared = Path("/dev/shm")
     before = set(shared.glob("realizer-*"))
@@ -121,6 +123,7 @@ def test_renderer_close_ends_the_process_and_frees_its_memory():
 
 
 @pytest.mark.gl
+@pytest.mark.slow
 def test_renderer_draws_with_the_process_that_start_made(renderer):
     with Renderer("default", SIZE) as early:
         early.start()
@@ -141,6 +144,7 @@ def test_renderer_start_without_a_picture_leaves_nothing():
 
 
 @pytest.mark.gl
+@pytest.mark.slow
 def test_renderer_process_dies_with_its_owner():
     """The owner is killed, so it can tidy nothing; its drawing process sees the pipe close."""
     code = (
@@ -207,6 +211,7 @@ def test_renderer_encodes_every_form(renderer, form):
 
 @pytest.mark.gl
 @pytest.mark.parametrize("way", ["gl", "onboard"])
+@pytest.mark.slow
 def test_renderer_draws_transparent_pictures(way):
     if missing := available(way):
         pytest.skip(missing)
@@ -223,6 +228,7 @@ def test_renderer_draws_transparent_pictures(way):
 
 
 @pytest.mark.gl
+@pytest.mark.slow
 def test_renderer_draws_another_light(renderer):
     with Renderer("default", SIZE, light="evening") as evening:
         assert evening.draw(rows(1)).mean() < renderer.draw(rows(1)).mean() - 15

@@ -34,6 +34,7 @@ def pose(face, **faps):
 @pytest.mark.gl("gl")
 @pytest.mark.parametrize("camera", ["front", "three-quarter", "profile", "close"])
 @pytest.mark.parametrize("light", ["portrait", "evening"])
+@pytest.mark.slow
 def test_software_canvas_draws_the_picture_of_opengl(face, camera, light):
     from realizer.render.opengl import OpenGLCanvas
 
@@ -65,6 +66,7 @@ def test_software_canvas_draws_points_where_they_project(face):
     assert red > blue + 30
 
 
+@pytest.mark.slow
 def test_software_canvas_without_smoothing_has_rough_edges(face):
     fine = SoftwareCanvas(face, SIZE, camera_for(face), preset()).draw(*pose(face)).astype(int)
     plain = SoftwareCanvas(face, SIZE, camera_for(face), preset(), smooth=False).draw(*pose(face)).astype(int)

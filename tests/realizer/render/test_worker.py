@@ -38,18 +38,21 @@ def test_worker_names_the_extra_without_any_backend(tmp_path):
 
 
 @pytest.mark.gl("gl")
+@pytest.mark.slow
 def test_worker_draws_by_opengl_without_numba(tmp_path):
     done = check(tmp_path, "import sys; sys.modules['numba'] = None")
     assert (done.returncode, done.stdout.strip()) == (0, "gl"), done.stderr
 
 
 @pytest.mark.gl("onboard")
+@pytest.mark.slow
 def test_worker_draws_by_the_processor_without_pyrender(tmp_path):
     done = check(tmp_path, "import sys; sys.modules['pyrender'] = None")
     assert (done.returncode, done.stdout.strip()) == (0, "onboard"), done.stderr
 
 
 @pytest.mark.gl("onboard")
+@pytest.mark.slow
 def test_worker_compiles_the_loops_without_a_writable_folder(tmp_path):
     """Numba keeps machine code beside the source or in the user's cache, and refuses where neither is."""
     site = "import numba.core.caching as c\nc.CacheImpl._locator_classes = []\n"

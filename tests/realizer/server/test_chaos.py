@@ -117,6 +117,7 @@ def test_chaos_killed_voice_costs_its_sound_and_one_warning(
 
 
 @pytest.mark.gl
+@pytest.mark.slow
 def test_chaos_killed_renderer_is_started_again() -> None:
     async def picture(client: ClientConnection) -> float:
         while True:
@@ -306,6 +307,7 @@ async def emptied(server: Server, files: int) -> None:
         await asyncio.sleep(0.01)
 
 
+@pytest.mark.slow
 def test_chaos_two_thousand_connections_leave_nothing_behind() -> None:
     async def test(server: Server) -> None:
         await asyncio.to_thread(come_and_go, server.port, 10, 10)

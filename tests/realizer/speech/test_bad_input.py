@@ -169,6 +169,7 @@ def test_engines_speak_by_the_named_voice(name: str) -> None:
     "name",
     [pytest.param("espeak", marks=pytest.mark.espeak), pytest.param("hibari", marks=pytest.mark.hibari)],
 )
+@pytest.mark.slow
 def test_engines_lose_one_sound_when_a_process_is_killed(
     name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

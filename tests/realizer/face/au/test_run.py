@@ -150,6 +150,7 @@ def renderers() -> Iterator[dict[str, Renderer]]:
     [facs(12), facs(43), lexeme("RAISE_BROWS"), facs(26)],
     ids=["smile", "closed", "brows", "jaw"],
 )
+@pytest.mark.slow
 def test_deformers_change_the_picture_at_the_same_place(renderers: dict[str, Renderer], inner: str) -> None:
     places = []
     for name, renderer in renderers.items():

@@ -116,6 +116,7 @@ def test_gltf_takes_a_number_as_a_name(ada_glb: Path, tmp_path: Path) -> None:
     assert inspect_head(written(tmp_path / "odd.glb", document, data)).lines
 
 
+@pytest.mark.slow
 def test_gltf_reads_data_inside_and_beside_the_document(ada_glb: Path, tmp_path: Path) -> None:
     document, data = split(ada_glb)
     path = tmp_path / "head.gltf"

@@ -42,6 +42,7 @@ def landmarks(model: Model, aus: tuple[int, ...], count: int = 120) -> str:
     return HEAD + "\n".join(lines) + "\n"
 
 
+@pytest.mark.slow
 def test_fit_models_recovers_a_published_unit(known: Model, tmp_path: Path) -> None:
     path = tmp_path / "landmarks.csv"
     path.write_text(landmarks(known, (1, 15)))

@@ -44,6 +44,7 @@ def test_apply_zones_makes_a_sound_face(plain: Path) -> None:
     assert check_face(plain.name, plain.parent) == ()
 
 
+@pytest.mark.slow
 def test_apply_zones_makes_true_faps(plain: Path) -> None:
     truths = score_faps(face_of(plain))
     assert mean_score(truths) > 2.8

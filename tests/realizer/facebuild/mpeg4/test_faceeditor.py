@@ -106,6 +106,7 @@ def test_fitted_converts_units_and_a_mirrored_axis(size: float, flip: int) -> No
     assert back.zones[31].size == pytest.approx(ours.zones[31].size)
 
 
+@pytest.mark.slow
 def test_read_faceeditor_makes_a_face_as_true(tmp_path: Path) -> None:
     xml = tmp_path / "zones.xml"
     for arguments in (

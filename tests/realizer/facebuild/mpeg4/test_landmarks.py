@@ -50,6 +50,7 @@ def test_find_points_is_sure_of_lips_and_lids(name: str) -> None:
         assert found[above].y >= found[below].y - 3e-4
 
 
+@pytest.mark.slow
 def test_zones_command_marks_a_bare_mesh_and_lists_guesses(tmp_path: Path) -> None:
     bare = tmp_path / "bare"
     bare.mkdir()

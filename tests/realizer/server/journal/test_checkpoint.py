@@ -181,6 +181,7 @@ def eager(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(thresholds, "ENTRIES", 1)
 
 
+@pytest.mark.slow
 def test_checkpoint_restores_a_session_as_if_it_had_never_died(
     eager: None,
 ) -> None:

@@ -88,6 +88,7 @@ def nodes(redis_url: str) -> Iterator[tuple[Node, Node]]:
         yield one, other
 
 
+@pytest.mark.slow
 def test_fleet_repeats_no_feedback_to_a_client_that_comes_back(
     nodes: tuple[Node, Node], tmp_path: Path
 ) -> None:
@@ -124,6 +125,7 @@ def test_fleet_repeats_no_feedback_to_a_client_that_comes_back(
     assert "hidden" not in written
 
 
+@pytest.mark.slow
 def test_fleet_distributes_sessions_and_joins_their_clients(nodes: tuple[Node, Node], tmp_path: Path) -> None:
     names = [f"show-{number}" for number in range(16)]
 
@@ -144,6 +146,7 @@ def test_fleet_distributes_sessions_and_joins_their_clients(nodes: tuple[Node, N
         asyncio.run(test(at))
 
 
+@pytest.mark.slow
 def test_fleet_limits_the_connections_of_an_address(nodes: tuple[Node, Node], tmp_path: Path) -> None:
     async def test(url: str) -> None:
         async with asyncio.timeout(LIMIT), connect(url), connect(url):
@@ -155,6 +158,7 @@ def test_fleet_limits_the_connections_of_an_address(nodes: tuple[Node, Node], tm
         asyncio.run(test(f"ws://{at}/ws?session=one"))
 
 
+@pytest.mark.slow
 def test_fleet_is_healthy_while_one_node_is(nodes: tuple[Node, Node], tmp_path: Path) -> None:
     services = yaml.safe_load(CONFIGURATION.with_name("compose.yaml").read_text("utf-8"))["services"]
     _, program, *options = services["proxy"]["healthcheck"]["test"]
@@ -169,6 +173,7 @@ def test_fleet_is_healthy_while_one_node_is(nodes: tuple[Node, Node], tmp_path: 
         assert subprocess.run(check, check=False).returncode
 
 
+@pytest.mark.slow
 def test_fleet_hides_the_metrics_of_its_nodes(nodes: tuple[Node, Node], tmp_path: Path) -> None:
     with (tmp_path / "proxy.log").open("w") as log, proxy(nodes, log) as at:
         with urllib.request.urlopen(f"http://{at}/healthz") as answer:

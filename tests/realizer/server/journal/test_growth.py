@@ -59,6 +59,7 @@ def talked(session: Session, documents: int) -> float:
     return APART * documents
 
 
+@pytest.mark.slow
 def test_journal_has_no_more_entries_after_thousands_of_documents(where: str) -> None:
     journal = journal_at(where)
     session = opened(journal)

@@ -61,6 +61,7 @@ def written(record: Path) -> list[list[int]]:
     return values
 
 
+@pytest.mark.slow
 def test_recorded_frames_are_those_of_a_live_viewer(tmp_path: Path) -> None:
     live: dict[int, list[int]] = {}
     doings = [
@@ -109,6 +110,7 @@ async def until(url: str, last: str, *messages: str) -> list[str]:
         return await feedback(client, last)
 
 
+@pytest.mark.slow
 def test_recorded_session_is_whole_after_a_takeover(tmp_path: Path) -> None:
     records, options = tmp_path / "r", ("--journal", str(tmp_path / "j"), "--record", str(tmp_path / "r"))
     with serving(*options) as (url, service):
@@ -124,6 +126,7 @@ def test_recorded_session_is_whole_after_a_takeover(tmp_path: Path) -> None:
     assert replay_feedback(read_recording(path))[: len(first + rest)] == first + rest
 
 
+@pytest.mark.slow
 def test_recorded_session_begins_anew_where_its_file_is_missing(tmp_path: Path) -> None:
     journal = tmp_path / "journal.db"
 

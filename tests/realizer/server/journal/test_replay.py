@@ -46,6 +46,7 @@ async def drained(client: ClientConnection) -> None:
         await client.recv()
 
 
+@pytest.mark.slow
 def test_restored_session_sends_all_feedback_once_and_in_order(where: str) -> None:
     async def before(url: str, service: subprocess.Popen[str]) -> list[str]:
         async with asyncio.timeout(LIMIT), connect(f"{url}?session=killed") as client:
@@ -228,6 +229,7 @@ def test_restored_session_holds_set_values(where: str) -> None:
             assert asyncio.run(state(url))["12L"] == 0.5
 
 
+@pytest.mark.slow
 def test_restored_session_belongs_to_the_last_process(where: str) -> None:
     async def test(one: str, other: str) -> None:
         async with asyncio.timeout(LIMIT), connect(f"{one}?session=torn") as first:
@@ -338,6 +340,7 @@ def test_restored_session_catches_up_for_a_second_client_without_a_gap(clock: Cl
     asyncio.run(run())
 
 
+@pytest.mark.slow
 def test_restored_session_is_not_replaced_by_a_hello(where: str) -> None:
     async def play(url: str) -> list[str]:
         async with asyncio.timeout(LIMIT), connect(f"{url}?session=kept") as client:

@@ -50,6 +50,7 @@ def width(picture: bytes) -> int:
 
 
 @pytest.mark.gl
+@pytest.mark.slow
 def test_engines_refuse_one_picture_too_many_and_draw_the_others(
     engines, clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -224,6 +224,7 @@ def test_workers_leave_a_hanging_worker_out_of_the_sum(
         os.kill(workers.processes[1], signal.SIGCONT)
 
 
+@pytest.mark.slow
 def test_workers_show_the_sum_only_with_the_token() -> None:
     async def test() -> None:
         there = await Workers(
@@ -245,6 +246,7 @@ def test_workers_show_the_sum_only_with_the_token() -> None:
     played(test())
 
 
+@pytest.mark.slow
 def test_workers_restart_one_that_was_killed_while_others_play(workers: Workers) -> None:
     url = address(workers)
 
@@ -286,6 +288,7 @@ def test_workers_do_not_wait_for_clients_that_send_half_a_line(workers: Workers)
     played(test())
 
 
+@pytest.mark.slow
 def test_workers_of_the_command_drain_and_end() -> None:
     with running([*SERVE, "--workers", "2"]) as service:
         assert service.stdout is not None
@@ -305,6 +308,7 @@ def test_workers_of_the_command_drain_and_end() -> None:
         assert service.wait(LIMIT) == 0
 
 
+@pytest.mark.slow
 def test_workers_that_hang_do_not_keep_the_service_from_ending(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

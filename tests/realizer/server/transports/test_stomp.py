@@ -316,6 +316,7 @@ async def gone(server: Server) -> None:
         await asyncio.sleep(0)
 
 
+@pytest.mark.slow
 def test_stomp_reconnects_to_a_broker_that_dies(own_broker, caplog) -> None:
     async def test(server: Server) -> None:
         own_broker_port = own_broker.port
@@ -366,6 +367,7 @@ def test_stomp_logs_once_that_there_is_no_broker_and_waits(own_broker, caplog) -
     ]
 
 
+@pytest.mark.slow
 def test_stomp_reconnects_if_the_broker_falls_silent(own_broker, monkeypatch, caplog) -> None:
     monkeypatch.setattr("realizer.server.transports.broker.HEARTBEAT", 200)
     monkeypatch.setattr("realizer.server.transports.stomp.ATTEMPT", 1)

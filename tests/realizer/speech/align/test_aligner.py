@@ -32,6 +32,7 @@ def errors(found: Alignment, onsets: np.ndarray) -> np.ndarray:
 
 
 @both
+@pytest.mark.slow
 def test_align_finds_words_in_noise(aligner, sentence) -> None:
     found = align(sentence.pcm, sentence.rate, TEXT, aligner=aligner)
     assert [word.text for word in found.words] == [word.text for word in sentence.said.words]

@@ -49,6 +49,7 @@ def tiles(utterance: Utterance) -> bool:
 
 
 @hibari
+@pytest.mark.slow
 def test_hibari_duration_is_that_of_sound_and_phonemes(neural: HibariVoice) -> None:
     said = neural.say(HELLO)
     assert said.pcm is not None
@@ -188,6 +189,7 @@ def test_hibari_speaks_to_a_given_length(neural: HibariVoice, ratio: float) -> N
 
 
 @hibari
+@pytest.mark.slow
 def test_hibari_sound_is_independent_of_earlier_requests(neural: HibariVoice) -> None:
     lone = HibariVoice()
     try:
@@ -198,6 +200,7 @@ def test_hibari_sound_is_independent_of_earlier_requests(neural: HibariVoice) ->
 
 
 @hibari
+@pytest.mark.slow
 def test_hibari_serves_many_threads(neural: HibariVoice) -> None:
     texts = [SpeechRequest(f"It is line {k}. I am sure of {k}.") for k in range(3)]
     said: dict[tuple[int, int], Utterance] = {}
@@ -218,6 +221,7 @@ def test_hibari_serves_many_threads(neural: HibariVoice) -> None:
 
 
 @hibari
+@pytest.mark.slow
 def test_hibari_estimates_times_without_durations(neural: HibariVoice) -> None:
     lone = HibariVoice(options=("--durations", "/of/another/version"))
     try:

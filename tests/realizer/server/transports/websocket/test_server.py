@@ -179,6 +179,7 @@ def test_websocket_drops_frames_only_for_a_viewer_that_never_reads() -> None:
     serving(test)
 
 
+@pytest.mark.slow
 def test_websocket_disconnects_a_client_that_asks_and_never_reads() -> None:
     async def test(server: Server) -> None:
         async with connect(f"{server.url}?session=show") as other:
