@@ -246,12 +246,16 @@ def well_composed(blocks: list[Block], told: list[Feedback]) -> None:
     starts = {f.id.rpartition(":")[0]: (n, f) for n, f in enumerate(told) if started(f)}
     ends = {f.id.rpartition(":")[0]: (n, f) for n, f in enumerate(told) if ended(f)}
     first = next((b.character_id for b in blocks if b.character_id), None)
+    idle: set[str] = set()  # blocks that wait for an activation, themselves or by way of others
+    for block in blocks:
+        if block.preplan or idle & {*block.append_after, *block.chunk_after}:
+            idle.add(block.id)
     for n, block in enumerate(blocks):
         if block.composition == "MERGE" or block.id not in starts:
             continue
         for earlier in blocks[:n]:
-            if earlier.preplan:
-                continue  # it waits for its activation, so no block waits for it
+            if earlier.id in idle:
+                continue  # no block waits for it
             if (earlier.character_id or first) == (block.character_id or first) and earlier.id in starts:
                 assert ends[earlier.id][0] < starts[block.id][0], (
                     f"{earlier.id} ends before {block.id} starts"
