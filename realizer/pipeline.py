@@ -9,14 +9,13 @@
     7 deform    FAPs or AUs -> the vertices of a face                             `realizer.face.deform`
     8 draw      vertices -> pixels                                                `realizer.render`
 
-Blocks wait for, replace and refer to each other, so a `Player` plans each block together with the earlier
-ones: steps 2 to 4 are in `realizer.playback.block_planner`. The service does the same, with a clock.
-"""
+Blocks wait for, replace and refer to each other, so a `Player` plans each together with the earlier ones.
+Steps 2 to 4 are in `realizer.playback.block_planner`. The service does the same, with a clock."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Sequence
+from math import inf
 from typing import TYPE_CHECKING
 
 from bml_schema import Block, read
@@ -44,8 +43,7 @@ Planned = tuple[list[Schedule], list[Warning]]
 
 def plan(documents: Documents, player: Player, voice: Voice | str | None = None) -> Planned:
     """Submit documents at 0 s; return the schedules of their blocks, and a warning for each refused part."""
-    schedules: list[Schedule] = []
-    refused: list[Warning] = []
+    schedules, refused = list[Schedule](), list[Warning]()
     with open_voice(voice) as speaker:
         for item in (item for text in documents for item in read(text, VOCABULARY)):  # 1 parse
             if isinstance(item, Block):
@@ -61,10 +59,10 @@ def play(documents: Documents, options: PlayOptions, voice: Voice | str | None =
     """Play documents from 0 s to the end of the last block, without a clock."""
     mapping = mapping_of(options.face, options.mapping)
     player = Player(
-        options, history=math.inf, face_inputs=lambda _: input_names(options.face, deformer=options.deformer)
+        options, history=inf, face_inputs=lambda _: input_names(options.face, deformer=options.deformer)
     )
     schedules, refused = plan(documents, player, voice)
-    feedback = player.due(math.inf)
+    feedback = player.due(inf)
     characters = {}
     for index, name in enumerate(player.characters):
         windows = []
