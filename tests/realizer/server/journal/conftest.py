@@ -29,7 +29,9 @@ class RedisServer:
     def start(self) -> None:
         if shutil.which("redis-server") is None:
             pytest.skip("redis-server is not installed")
-        options = ["--port", str(self._port), "--bind", "127.0.0.1", "--dir", str(self._folder)]
+        # By default Redis may lose the last two seconds when it is killed and the disk is busy.
+        options = ["--appendfsync", "always", "--dir", str(self._folder)]
+        options += ["--port", str(self._port), "--bind", "127.0.0.1"]
         command = yaml.safe_load(COMPOSE.read_text("utf-8"))["services"]["journal"]["command"]
         self.process = subprocess.Popen([*command, *options], stdout=subprocess.PIPE, text=True)
         assert self.process.stdout is not None
