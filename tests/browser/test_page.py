@@ -25,6 +25,7 @@ pytestmark = [
     # Playwright's own event loop closes its pipes late.
     pytest.mark.filterwarnings("ignore::ResourceWarning"),
 ]
+PATIENCE = 100_000  # ms; pages that draw without a graphics card are slow
 ARGUMENTS = [
     "--no-sandbox",
     "--use-angle=swiftshader",
@@ -74,6 +75,7 @@ def opened(browser, address):  # type: ignore[no-untyped-def]
     """The page, open, and the errors of its console."""
     # Playwright's own predicates need eval, which the page's policy forbids.
     page = browser.new_page(viewport={"width": 1000, "height": 660}, bypass_csp=True)
+    page.set_default_timeout(PATIENCE)
     faults: list[str] = []
     page.on("pageerror", lambda error: faults.append(str(error)))
     page.on("console", lambda message: faults.append(message.text) if message.type == "error" else None)
@@ -153,6 +155,7 @@ def quiet_page(browser):  # type: ignore[no-untyped-def]
     command = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--no-idle"]
     with serving(command) as address:
         opened = browser.new_page(viewport={"width": 960, "height": 540}, bypass_csp=True)
+        opened.set_default_timeout(PATIENCE)
         opened.goto(address)
         style = f"#stage {{ flex: none; width: {STILL + 60}px; height: {STILL}px; min-height: 0 }}"
         opened.add_style_tag(content=style + " .choice, #time { display: none !important }")
@@ -336,6 +339,7 @@ def test_page_reconnects_and_shows_missed_feedback(page) -> None:  # type: ignor
 
 def test_page_obeys_its_content_policy(browser, address) -> None:  # type: ignore[no-untyped-def]
     opened = browser.new_page()
+    opened.set_default_timeout(PATIENCE)
     faults: list[str] = []
     opened.on("console", lambda message: faults.append(message.text) if message.type == "error" else None)
     opened.goto(address)

@@ -11,7 +11,7 @@ import pytest
 
 from realizer.animation.fap.fap_reader import read_fap
 from realizer.tables import action_units, faps
-from tests.browser.test_page import ARGUMENTS, CHROMIUM, browser, pytestmark, serving
+from tests.browser.test_page import ARGUMENTS, CHROMIUM, PATIENCE, browser, pytestmark, serving
 
 __all__ = ["ARGUMENTS", "CHROMIUM", "browser", "pytestmark"]
 
@@ -31,7 +31,7 @@ def opened(browser, address):  # type: ignore[no-untyped-def]
     """The page, with the errors of its console."""
     context = browser.new_context(viewport={"width": 1100, "height": 760}, bypass_csp=True)
     page = context.new_page()
-    page.set_default_timeout(20_000)
+    page.set_default_timeout(PATIENCE)
     faults: list[str] = []
     page.on("pageerror", lambda error: faults.append(str(error)))
     page.on("console", lambda message: faults.append(message.text) if message.type == "error" else None)
