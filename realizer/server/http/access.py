@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 import hmac
 import json
 import logging
 import ssl
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from http import HTTPStatus
 from urllib.parse import parse_qs, urlsplit
 
@@ -177,6 +178,20 @@ class RateLimiter:
         self.notice = words if pause and not self._was_limited else None
         self._was_limited = bool(pause)
         return pause
+
+    async def pause(self, warn: Callable[[str], None]) -> None:
+        """Wait as long as the message that was just read demands.
+
+        Others run in between also if that is 0: one read may hold many messages, which must not delay the
+        frames of other clients.
+
+        Args:
+            warn: takes `notice`, if there is one.
+        """
+        seconds = self.wait(asyncio.get_running_loop().time())
+        if self.notice is not None:
+            warn(self.notice)
+        await asyncio.sleep(seconds)
 
 
 def _digest(token: str) -> bytes:

@@ -76,7 +76,6 @@ class AsapTransport(TcpTransport):
 
     async def _read(self, reader: asyncio.StreamReader, number: int, link: CallBack) -> None:
         framer, limiter = DocumentFramer(self._limit), RateLimiter(self._rate)
-        loop = asyncio.get_running_loop()
         while data := await reader.read(READ):
             for item in framer.feed(data):
                 if isinstance(item, Fault):
@@ -84,11 +83,7 @@ class AsapTransport(TcpTransport):
                     link.warn("PARSING_FAILURE", text, item.block or "<no id>")
                 elif not self._sessions.receive(number, item):
                     return
-                pause = limiter.wait(loop.time())
-                if limiter.notice is not None:
-                    link.warn("IOException", limiter.notice)
-                # Also if it is 0: one read may hold many documents, which must not delay frames of others.
-                await asyncio.sleep(pause)
+                await limiter.pause(lambda notice: link.warn("IOException", notice))
 
 
 class CallBack(asyncio.Protocol):

@@ -107,16 +107,11 @@ class WebSocketConnections:
 
     async def _read(self, socket: ServerConnection, number: int, client: WebSocketWriter) -> None:
         """Pass on messages, no faster than the rate limit: the others wait in the client's buffers."""
-        loop = asyncio.get_running_loop()
         limiter = RateLimiter(self._settings.max_rate)
         async for message in socket:
             if not self._sessions.receive(number, message):
                 return
-            pause = limiter.wait(loop.time())
-            if limiter.notice is not None:
-                client.send(ErrorMessage(code="rate", message=limiter.notice).text())
-            # Also if it is 0: messages that are buffered already must not delay others.
-            await asyncio.sleep(pause)
+            await limiter.pause(lambda notice: client.send(ErrorMessage(code="rate", message=notice).text()))
 
     async def _first_message(self, socket: ServerConnection) -> tuple[str | bytes, Grant]:
         """Return the first message of a client without a token, and the grant of the token in it.

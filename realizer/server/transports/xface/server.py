@@ -88,13 +88,10 @@ class XfaceTransport(TcpTransport):
                         pass  # of a task that was refused
                 if link.has_left:
                     return
-                pause = limiter.wait(loop.time())
-                if limiter.notice is not None:
-                    log.warning("xface: client %d: %s", link.tasks.owner, limiter.notice)
-                # Also if it is 0: one read may hold many tasks, which must not delay frames of others, nor
-                # fill the buffer of a client that reads no notes.
-                await asyncio.sleep(pause)
-                await writer.drain()
+                await limiter.pause(
+                    lambda notice: log.warning("xface: client %d: %s", link.tasks.owner, notice)
+                )
+                await writer.drain()  # the client may not read its notifications
 
     async def _prepared(self, task: Task) -> Attachment:
         try:
