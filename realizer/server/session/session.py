@@ -198,11 +198,7 @@ class Session:
         if self.closed or connection not in self._connections:
             return
         t = now - self.opened
-        # Feedback and frames that are due go out before anything changes, also if the session was woken too
-        # late: a replay of the journal has no wake-ups in between and must publish the same.
-        self._publish(t)
-        if self.broadcast.active:
-            self._effects += self.broadcast.frames_due(t)[0]
+        self._send_due(t)
         if self.journal.needs_checkpoint and not self._compact(t):
             return
         in_journal = self._dispatch(self._connections[connection], message, t)
@@ -399,9 +395,7 @@ class Session:
         if self.closed:
             return
         t = now - self.opened
-        self._publish(t)
-        if self.broadcast.active:
-            self._effects += self.broadcast.frames_due(t)[0]
+        self._send_due(t)
         if self.log_entry(t, "spoken", speak, "" if isinstance(result, Utterance) else str(result)):
             self._effects += self.submission.tts.answer(speak, result, t)
             self._work(t)
@@ -549,6 +543,15 @@ class Session:
         if texts:
             for connection in self._connections.values():
                 self._send_feedback(connection, texts)
+
+    def _send_due(self, t: float) -> None:
+        """Send due feedback and frames before anything changes, also if the session was woken too late.
+
+        A replay of the journal has no wake-ups in between and must publish the same.
+        """
+        self._publish(t)
+        if self.broadcast.active:
+            self._effects += self.broadcast.frames_due(t)[0]
 
     def _send_feedback(self, connection: Connection, texts: list[str]) -> None:
         if (filter := connection.feedback) is not None:
