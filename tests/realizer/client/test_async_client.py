@@ -14,17 +14,7 @@ from realizer.core.settings import Settings
 from realizer.face.load import load_face
 from realizer.protocol.wire import WireFrame
 from realizer.server.serve import Server
-
-WAIT = '<bml id="{}"><wait id="w" duration="0.1"/></bml>'
-LIMIT = 30  # s
-
-
-def serving(test) -> None:
-    async def run() -> None:
-        async with asyncio.timeout(LIMIT), Server(Settings(port=0, voice="silent")) as server:
-            await test(server.url)
-
-    asyncio.run(run())
+from tests.realizer.client.service import LIMIT, WAIT, serving
 
 
 def test_client_follows_a_block_to_its_end() -> None:

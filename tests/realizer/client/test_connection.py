@@ -9,17 +9,7 @@ import pytest
 from realizer.client import ClientError, connect
 from realizer.core.settings import Settings
 from realizer.server.serve import Server
-
-WAIT = '<bml id="{}"><wait id="w" duration="0.1"/></bml>'
-LIMIT = 30  # s
-
-
-def serving(test) -> None:
-    async def run() -> None:
-        async with asyncio.timeout(LIMIT), Server(Settings(port=0, voice="silent")) as server:
-            await test(server.url)
-
-    asyncio.run(run())
+from tests.realizer.client.service import LIMIT, WAIT, serving
 
 
 def test_connect_refuses_a_service_of_another_version(monkeypatch: pytest.MonkeyPatch) -> None:

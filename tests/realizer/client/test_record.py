@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import io
 from pathlib import Path
 
@@ -14,24 +13,14 @@ from realizer.client import ClientError, connect
 from realizer.client.record import RATE
 from realizer.client.record import _film_frames as each
 from realizer.client.record import _sound as sound_of
-from realizer.core.settings import Settings
 from realizer.protocol.wire import WireFrame, pack, unpack
-from realizer.server.serve import Server
+from tests.realizer.client.service import serving
 
 LIMIT = 120  # s
 FPS = 5
 SIZE = 128
 LOOK = '<faceFacs id="f{au}" au="{au}" amount="{amount}" start="0" attackPeak="0.2" relax="2.6" end="2.8"/>'
 HELD = f'<bml id="b">{LOOK.format(au=12, amount=1)}{LOOK.format(au=26, amount=0.8)}</bml>'
-
-
-def serving(test) -> None:
-    async def run() -> None:
-        settings = Settings(port=0, voice="silent", idle=False)
-        async with asyncio.timeout(LIMIT), Server(settings) as server:
-            await test(server.url)
-
-    asyncio.run(run())
 
 
 @pytest.mark.gl
@@ -48,7 +37,7 @@ def test_record_films_what_is_drawn_without_a_clock(tmp_path: Path) -> None:
             end = await client.film(film, HELD, fps=FPS, size=[SIZE, SIZE])
             assert end.id == "b:end"
 
-    serving(test)
+    serving(test, LIMIT, idle=False)
     played = realizer.realize(HELD, fps=FPS, idle=False)
     with Renderer("default", (SIZE, SIZE)) as renderer:
         (still,) = renderer.draw(played.poses[8:9])
@@ -69,7 +58,7 @@ def test_record_refuses_a_suffix_that_is_no_film(tmp_path: Path) -> None:
             with pytest.raises(ClientError, match=r"wanted a film \(.mp4 or .webm\), got live.gif"):
                 await client.film(tmp_path / "live.gif", HELD)
 
-    serving(test)
+    serving(test, LIMIT, idle=False)
 
 
 def test_record_names_a_missing_folder_before_it_plays(tmp_path: Path) -> None:
@@ -79,7 +68,7 @@ def test_record_names_a_missing_folder_before_it_plays(tmp_path: Path) -> None:
                 await client.film(tmp_path / "nowhere" / "x.mp4", '<bml id="b"/>')
             assert not client._router.feedback
 
-    serving(test)
+    serving(test, LIMIT, idle=False)
 
 
 def test_record_places_sound_at_its_time_and_removes_what_was_flushed() -> None:

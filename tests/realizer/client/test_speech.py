@@ -12,7 +12,7 @@ from realizer.client import ClientError, connect
 from realizer.client.speech import Speech, SpeechProgress
 from realizer.core.settings import Settings
 from realizer.server.serve import Server
-from tests.realizer.client.test_async_client import LIMIT, serving
+from tests.realizer.client.service import LIMIT, serving
 
 
 def test_speech_waits_for_syncs_and_the_end() -> None:

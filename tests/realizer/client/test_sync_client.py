@@ -12,9 +12,7 @@ from realizer.client import ClientError, connect
 from realizer.core.settings import Settings
 from realizer.protocol.wire import WireFrame
 from realizer.server.serve import Server
-
-WAIT = '<bml id="{}"><wait id="w" duration="0.1"/></bml>'
-LIMIT = 30  # s
+from tests.realizer.client.service import LIMIT, WAIT
 
 
 @pytest.fixture
