@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, Phase, settings
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # The same examples each run, so that a failure is a change; `HYPOTHESIS_PROFILE=thorough` looks for new ones.
-# A failure is told as it was found: making it smaller can take minutes, `HYPOTHESIS_PROFILE=small` does it.
+# Shrinking a failing example can take minutes, so it is left to `HYPOTHESIS_PROFILE=small`.
 settings.register_profile(
     "small", derandomize=True, deadline=None, max_examples=60, suppress_health_check=[HealthCheck.too_slow]
 )

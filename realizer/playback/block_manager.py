@@ -253,7 +253,7 @@ class BlockManager:
         return [p.block.id for p in stopped]
 
     def activate(self, id: str, now: float) -> bool:
-        """Let a preplanned block start after its dependencies; return False if there is none."""
+        """Activate a preplanned block: it starts after its dependencies. Return False if there is none."""
         playing = self.blocks.find(id)
         if playing is None:
             announced = self._announced.get(id)

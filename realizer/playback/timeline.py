@@ -107,7 +107,7 @@ class BlockTimeline:
             self.mark_changed()
 
     def reorder(self, playing: ActiveBlock) -> None:
-        """Let a waiting block, and its followers, report after all others at one instant.
+        """Move a waiting block and its followers behind all others whose feedback is due at the same time.
 
         Raises:
             graphlib.CycleError: blocks wait for each other.

@@ -105,7 +105,7 @@ class PendingBlocks:
         ]
 
     def remove(self, blocks: Iterable[PendingBlock]) -> None:
-        """Remove blocks, also from the predecessors of others; answers to their requests are dropped."""
+        """Remove blocks. Other blocks no longer wait for them, and answers to their requests are ignored."""
         removed = set(blocks)
         self.blocks = [w for w in self.blocks if w not in removed]
         for pending in self.blocks:

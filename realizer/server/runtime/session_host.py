@@ -171,7 +171,7 @@ class SessionHost:
     def join(
         self, client: Outbound, name: str | None = None, seen: int | None = None, visitor: Visitor = ANYBODY
     ) -> int:
-        """Let a client join the named session, or a new one, and return the number of the connection.
+        """Add a client to the named session, or to a new one, and return the number of its connection.
 
         Args:
             seen: sequence number of the last feedback that the client received.

@@ -117,7 +117,7 @@ class SessionRegistry:
         seen: int | None = None,
         visitor: Visitor = ANYBODY,
     ) -> Session:
-        """Let a connection join the named session, which is created if it is missing, or a new one.
+        """Add a connection to the named session, which is created if it is missing, or to a new one.
 
         Raises:
             JoinError: as `check`.

@@ -165,7 +165,7 @@ class BrokerConnection:
     # in the event loop
 
     def handled(self) -> None:
-        """Let the next message come in."""
+        """Allow the next message to be read."""
         self._ahead.release()
 
     def _settle(self, connected: bool, fault: str) -> None:

@@ -46,9 +46,10 @@ class _Speak:
 
 
 class Vhmsg:
-    """The format of SmartBody and the Virtual Human Toolkit: vrSpeak in, vrAgentBML and vrSpoke out.
+    """The format of SmartBody and the Virtual Human Toolkit.
 
-    The documents of a vrSpeak become blocks of the agent it names; one without an id gets the message's id.
+    It reads vrSpeak, and writes vrAgentBML and vrSpoke. The documents of a vrSpeak become blocks of the agent
+    it names; one without an id gets the message's id.
     All components share one topic, so most messages are for others, and some are our own.
     """
 
