@@ -8,9 +8,9 @@ import click
 
 from realizer.cli import options
 from realizer.cli.fit import fit
-from realizer.cli.import_face import check, import_
-from realizer.cli.mapping import mapping
 from realizer.cli.sheet import sheet
+
+HEADS = (".glb", ".gltf")
 
 
 @click.group()
@@ -22,8 +22,8 @@ def faces() -> None:
     """
 
 
-for command in (check, fit, import_, mapping, sheet):
-    faces.add_command(command)
+faces.add_command(fit)
+faces.add_command(sheet)
 
 
 @faces.command("list")
@@ -83,3 +83,100 @@ def zones(name: str, output: Path, parameters: Path | None, xml: Path | None, on
     for problem in write_faceeditor(xml, setup) if xml else ():
         click.echo(f"{xml}: {problem}", err=True)
     click.echo(f"{output}: {len(only) or len(setup.zones)} zones")
+
+
+@faces.command("import")
+@click.argument("head", type=options.FILE)
+@click.option("--name", help="Name of the face.  [default: that of the output folder, or of the file]")
+@click.option("-o", "--output", type=options.OUTPUT, help="Folder to write.  [default: faces/NAME]")
+def import_(head: Path, name: str | None, output: Path | None) -> None:
+    """Make a face folder from a GLB or glTF head with ARKit blend shapes (jawOpen, mouthSmileLeft, ...).
+
+    Prints what the file has, what is missing, and what to check by eye.
+
+    \b
+    realizer faces import anna.glb
+    realizer faces sheet anna -o anna.png
+    """
+    from realizer.facebuild.arkit.importer import import_head
+
+    folder = output or Path("faces") / (name or head.stem)
+    for line in import_head(head, folder, name or folder.name).lines:
+        click.echo(line)
+    options.note(f"{folder}: written; look at it: realizer faces sheet {folder.name} -o {folder.name}.png")
+
+
+@faces.command()
+@click.argument("names", nargs=-1, metavar="[NAME | FOLDER | HEAD.glb]...")
+def check(names: tuple[str, ...]) -> int:
+    """Print every fault of face folders; without a name, of all of them.
+
+    For a GLB or glTF head, prints what `realizer faces import` would find.
+    """
+    from realizer.face.load import face_folders
+    from realizer.facebuild.check import check_face
+
+    status = 0
+    for name in names or face_folders():
+        path = Path(name)
+        if path.suffix.lower() in HEADS:
+            faults = _inspect_head(path)
+        elif path.name != name and path.is_dir():
+            folder = path.resolve()
+            faults = check_face(folder.name, folder.parent)
+        else:
+            faults = check_face(name)
+        for fault in faults:
+            click.echo(fault)
+            status = 1
+        if not faults:
+            options.note(f"{name}: sound")
+    return status
+
+
+def _inspect_head(head: Path) -> tuple[str, ...]:
+    """Print what an import would find, or return why the head cannot be imported."""
+    from realizer.core.errors import FaceError
+    from realizer.facebuild.arkit.importer import inspect_head
+
+    try:
+        for line in inspect_head(head).lines:
+            click.echo(line)
+    except FaceError as error:
+        return (str(error),)
+    return ()
+
+
+@faces.command()
+@click.argument("name", default="default")
+@click.option(
+    "-o",
+    "--output",
+    metavar="FILE",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Write a .txt file in the format of Paul (2010, 5.2) or a .csv file.  [default: print the former]",
+)
+@options.mapping
+def mapping(name: str, output: Path | None, mapping: Path | None) -> None:
+    """Write how action units move the FAPs of a face, as a file to edit.
+
+    The edited file works with --mapping of other commands: action units in it move as it says, all others
+    as before. To change a face for good, save it as au_to_fap.txt or au_to_fap.csv in the face's folder.
+
+    \b
+    realizer faces mapping ada -o mine.txt
+    realizer realize hello.bml -o hello.mp4 --mapping mine.txt
+    """
+    from realizer.face.fap_mapping import mapping_of
+    from realizer.tables.mappings import FORMS, as_text, write_mapping
+
+    options.check_suffix(output, *FORMS)
+    chosen = mapping_of(name, options.settings(mapping=mapping).mapping)
+    source = f"{name}: {', then '.join(chosen.sources)}"
+    if output is None:
+        click.echo(as_text(chosen.rows, source), nl=False)
+        return
+    with options.writing(output):
+        write_mapping(output, chosen.rows, source)
+    units = len({(row.au, row.side) for row in chosen.rows})
+    options.note(f"{output}: {units} action units by side, {len(chosen.rows)} rows")

@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+from click.testing import CliRunner
 
+from realizer import tables
+from realizer.cli.faces import mapping
+from realizer.core.errors import FaceError
 from realizer.face.load import list_faces
+from realizer.tables.mappings import read_mapping
 from tests.commands import run
+
+IMPORTER = "realizer.facebuild.arkit.importer"
 
 
 def test_faces_list_has_a_line_for_each_face_with_its_licence() -> None:
@@ -36,3 +44,81 @@ def test_faces_build_without_its_data_exits_with_3(tmp_path: Path) -> None:
     done = run("faces", "build", "ada", "--data", str(tmp_path), "-o", str(tmp_path / "ada"))
     assert done.returncode == 3
     assert str(tmp_path) in done.stderr
+
+
+@pytest.fixture
+def head(tmp_path: Path) -> Path:
+    path = tmp_path / "anna.glb"
+    path.write_bytes(b"glTF")
+    return path
+
+
+def test_import_names_the_face_after_the_option_the_folder_or_the_file(
+    head: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = []
+
+    def import_head(path: Path, folder: Path, name: str) -> SimpleNamespace:
+        calls.append((folder, name))
+        return SimpleNamespace(lines=("52 shapes",))
+
+    monkeypatch.setattr(f"{IMPORTER}.import_head", import_head)
+    done = run("faces", "import", str(head))
+    assert (done.returncode, done.stdout) == (0, "52 shapes\n")
+    assert "realizer faces sheet anna -o anna.png" in done.stderr
+    run("faces", "import", str(head), "-o", str(tmp_path / "eve"))
+    run("faces", "import", str(head), "--name", "mia")
+    assert calls == [(Path("faces/anna"), "anna"), (tmp_path / "eve", "eve"), (Path("faces/mia"), "mia")]
+
+
+def test_import_of_a_file_that_is_no_head_exits_with_3(head: Path, tmp_path: Path) -> None:
+    done = run("faces", "import", str(head), "-o", str(tmp_path / "x"))
+    assert done.returncode == 3
+    assert "anna.glb" in done.stderr
+    assert not (tmp_path / "x").exists()
+
+
+def test_check_of_a_head_prints_what_an_import_would_find(
+    head: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(f"{IMPORTER}.inspect_head", lambda path: SimpleNamespace(lines=("no jawOpen",)))
+    done = run("faces", "check", str(head))
+    assert (done.returncode, done.stdout) == (0, "no jawOpen\n")
+
+
+def test_check_exits_with_1_if_one_of_several_has_faults(head: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def inspect_head(path: Path) -> SimpleNamespace:
+        raise FaceError(f"{path}: wanted shapes")
+
+    monkeypatch.setattr(f"{IMPORTER}.inspect_head", inspect_head)
+    monkeypatch.setattr("realizer.facebuild.check.check_face", lambda name: ())
+    done = run("faces", "check", str(head), "default")
+    assert (done.returncode, done.stdout) == (1, f"{head}: wanted shapes\n")
+    assert done.stderr == "default: sound\n"
+    assert run("faces", "check", "-q", "default").stderr == ""
+
+
+def test_mapping_prints_the_text_form() -> None:
+    said = CliRunner().invoke(mapping, ["ada"])
+    assert said.exit_code == 0
+    assert said.stdout.startswith("# AU to FAP: ada: au_to_fap.csv\n")
+    assert "# Lip corner puller\n12\tL\n" in said.stdout
+    assert "# Head forward; FAPs turn the head and do not move it\n57\n" in said.stdout
+
+
+@pytest.mark.parametrize("form", ["txt", "csv"])
+def test_mapping_writes_the_table_with_the_users_rows(tmp_path: Path, form: str) -> None:
+    (tmp_path / "mine.txt").write_text("26\n3 0 1 0 111\n", "utf-8")
+    asked = ["ada", "-o", str(tmp_path / f"all.{form}"), "--mapping", str(tmp_path / "mine.txt")]
+    said = CliRunner().invoke(mapping, asked)
+    assert said.exit_code == 0, said.output
+    units = read_mapping(tmp_path / f"all.{form}")
+    assert [(row.fap, row.fap_to) for row in units[26, ""]] == [(3, 111)]
+    others = sorted((row for (au, _), unit in units.items() for row in unit if au != 26), key=repr)
+    assert others == sorted((row for row in tables.au_to_fap() if row.au != 26), key=repr)
+
+
+def test_mapping_refuses_an_unknown_suffix(tmp_path: Path) -> None:
+    said = CliRunner().invoke(mapping, ["ada", "-o", str(tmp_path / "all.xml")])
+    assert said.exit_code == 2
+    assert "wanted a name that ends in .txt or .csv" in said.output
