@@ -13,8 +13,7 @@ from bml_schema.node_schema import Attribute, local, schema_of
 from bml_schema.source import Source, Spot
 from bml_schema.tolerant_scanner import Element
 from realizer.checking.explain_conflicts import explain_conflict
-from realizer.checking.finding import Finding, Label
-from realizer.checking.finding_builder import FindingBuilder
+from realizer.checking.finding import Finding, FindingBuilder, Label
 from realizer.scheduling.timing import Warning
 
 _PLACED = re.compile(r"line (\d+)(?:, (/[^\s:]+))?: (.*)", re.DOTALL)

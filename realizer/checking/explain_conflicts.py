@@ -7,8 +7,7 @@ from collections.abc import Iterable
 
 from bml_schema.source import Spot
 from bml_schema.tolerant_scanner import Element
-from realizer.checking.finding import Label
-from realizer.checking.finding_builder import FindingBuilder
+from realizer.checking.finding import FindingBuilder, Label
 from realizer.scheduling.timing import Clause, Warning
 
 _STATED = re.compile(r"(\S+) (?:is )?(=|not before|not after) (.+)")

@@ -14,13 +14,12 @@ from realizer.cli.align import align
 from realizer.cli.batch import batch
 from realizer.cli.check import check
 from realizer.cli.demo import demo
-from realizer.cli.doctor import doctor
+from realizer.cli.doctor import doctor, outputs, voices
 from realizer.cli.emotion import emotion
 from realizer.cli.enrich import enrich
 from realizer.cli.expressions import expressions
 from realizer.cli.faces import faces
 from realizer.cli.fap import fap
-from realizer.cli.list_commands import outputs, voices
 from realizer.cli.realize import realize, schedule
 from realizer.cli.replay import replay
 from realizer.cli.serve import serve

@@ -62,10 +62,9 @@ def check(
     as a timeline (see `realizer timeline`).
     """
     from bml_schema.source import Source
-    from realizer.checking.advice import advice
+    from realizer.checking.advice import advice, advise_on_behaviours
     from realizer.checking.document import check_document
     from realizer.checking.finding import Finding
-    from realizer.cli.behaviour_advice import advise_on_behaviours
     from realizer.cli.diagnostics import one_line, render
     from realizer.playback.player import Player
 

@@ -1,14 +1,16 @@
-"""`doctor`: reports which parts work on this machine and what to install for the others."""
+"""`doctor`, `voices` and `outputs`: list what works on this machine, and how to install the rest."""
 
 from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
+from functools import cache
 from importlib.util import find_spec
 
 import click
 
 Finding = tuple[bool, str, str]  # whether it works, its name, a description or the fix
+MODULES = {"film": "av"}  # extra -> a module that it installs
 
 
 @click.command()
@@ -67,3 +69,39 @@ def _page() -> Iterator[Finding]:
     works = files("realizer.server").joinpath("static", "index.html").is_file()
     fix = "the page is not built; install from a wheel, or have npm and run pip install -e ."
     yield works, "page", "served at http://HOST:PORT/" if works else fix
+
+
+@click.command()
+def voices() -> None:
+    """List the voices that --voice takes, and how to install missing ones."""
+    from realizer.speech.registry import voices as all_voices
+
+    for voice in all_voices():
+        click.echo(f"{voice.name:<16} {voice.description}")
+
+
+@click.command()
+def outputs() -> None:
+    """List the file formats that `realize -o` writes.
+
+    Prints suffix, media type and contents, and what to install where something is missing.
+    """
+    from realizer.outputs.registry import OUTPUTS
+
+    working = sorted(OUTPUTS.working())
+    width = max(len(suffix) for suffix, _ in working)
+    type_width = max(len(output.media_type) for _, output in working)
+    for suffix, output in working:
+        fixes = "; ".join(filter(None, map(_fix, output.needs)))
+        missing = f"  (missing: {fixes})" if fixes else ""
+        click.echo(f"{suffix:<{width}}  {output.media_type:<{type_width}}  {output.description}{missing}")
+
+
+@cache
+def _fix(extra: str) -> str | None:
+    """Return how to install an extra, or None if it works."""
+    if extra == "render":
+        from realizer.render import available
+
+        return available()
+    return None if find_spec(MODULES[extra]) else f"pip install 'bml-realizer[{extra}]'"

@@ -1,15 +1,20 @@
-"""The base class of voices whose engine runs in a process of its own."""
+"""The base class of voices whose engine runs in a process of its own, and a cache of their utterances."""
 
 from __future__ import annotations
 
+import threading
 from abc import abstractmethod
+from collections import OrderedDict
+from collections.abc import Callable
 from typing import ClassVar
 
 from realizer.speech.base_voice import BaseVoice
-from realizer.speech.cache import UtteranceCache
 from realizer.speech.engine_process import Engine, EngineProcess
 from realizer.speech.ssml import Break, Script, read_script
 from realizer.speech.utterance import SpeechRequest, Utterance
+
+MOST = 64  # utterances
+MAX_SAMPLES = 30_000_000  # about 60 MB
 
 
 class EngineVoice(BaseVoice):
@@ -63,3 +68,32 @@ class EngineVoice(BaseVoice):
     @abstractmethod
     def _synthesize(self, request: SpeechRequest, script: Script) -> Utterance:
         """Return the engine's utterance of a script that is not empty."""
+
+
+class UtteranceCache:
+    """The latest utterances by request; thread-safe."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._utterances: OrderedDict[SpeechRequest, Utterance] = OrderedDict()
+        self._samples = 0
+
+    def get(self, request: SpeechRequest, speak: Callable[[SpeechRequest], Utterance]) -> Utterance:
+        """Return the cached utterance of a request, or synthesize it with `speak` and cache it."""
+        with self._lock:
+            if request in self._utterances:
+                self._utterances.move_to_end(request)
+                return self._utterances[request]
+        utterance = speak(request)
+        with self._lock:
+            if (same := self._utterances.pop(request, None)) is not None:  # from another thread
+                self._samples -= _samples(same)
+            self._utterances[request] = utterance
+            self._samples += _samples(utterance)
+            while self._utterances and (len(self._utterances) > MOST or self._samples > MAX_SAMPLES):
+                self._samples -= _samples(self._utterances.popitem(last=False)[1])
+        return utterance
+
+
+def _samples(utterance: Utterance) -> int:
+    return 0 if utterance.pcm is None else len(utterance.pcm)

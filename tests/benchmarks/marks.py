@@ -16,7 +16,7 @@ import numpy as np
 
 from realizer.core.array_types import Float64
 from realizer.speech.espeak.document import write_document
-from realizer.speech.espeak.protocol import PHONEME, WORD, read_answer
+from realizer.speech.espeak.events import PHONEME, WORD, read_answer
 from realizer.speech.espeak.voice import EspeakVoice, choose_voice
 from realizer.speech.ssml import read_script
 from realizer.speech.utterance import SpeechRequest

@@ -29,8 +29,8 @@ from realizer.core.settings import Settings
 from realizer.protocol.wire import unpack
 from realizer.server.session.effects import Send, Speak
 from realizer.server.session.session import Session
-from realizer.speech.cache import UtteranceCache
 from realizer.speech.duration_fit import speak_to_length
+from realizer.speech.engine_voice import UtteranceCache
 from realizer.speech.registry import find_voice, voices
 from realizer.speech.utterance import MAX_TEXT, SpeechRequest, Utterance, Voice
 

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
+from functools import lru_cache
 from typing import Literal
 from xml.sax.saxutils import escape
 
+import numpy as np
 import numpy.typing as npt
 
-from realizer.core.array_types import Float32
-from realizer.speech.align import sphinx
+from realizer.core.array_types import Float32, Float64
+from realizer.core.errors import RealizerError
+from realizer.speech.align import features, sphinx
 from realizer.speech.align.alignment import AlignError, Alignment, moved, probability
 from realizer.speech.align.dtw_align import dtw_align
 from realizer.speech.align.model_align import model_align
 from realizer.speech.align.recording import mono, to_aligner
-from realizer.speech.align.uniform_align import uniform_align
 from realizer.speech.registry import reference_voice
-from realizer.speech.utterance import SpeechRequest, Utterance, Voice
+from realizer.speech.utterance import Recording, SpeechRequest, Utterance, Voice
 
 Aligner = Literal["pocketsphinx", "espeak"]
 
@@ -27,6 +29,10 @@ COST, COST_OF_WORD = (0.935, -0.01), (1.0, -0.05)
 DOUBT = 0.5
 OTHER = "+f3"  # a female voice of espeak-ng, in addition to the default, which is male
 FASTEST = 4.0  # times the rate of a voice; nobody speaks faster
+
+HOP = 160  # samples
+INSTALL = "no aligner, words are spread evenly: pip install 'bml-realizer[speech,align]'"
+CACHED = 8  # recordings; a document is planned more than once before it plays
 
 log = logging.getLogger(__name__)
 
@@ -120,3 +126,65 @@ def _unusable_reason(aligner: str | None, voice: Voice | None) -> str | None:
 
 def _english(language: str) -> bool:
     return language.replace("_", "-").split("-")[0].lower() == "en"
+
+
+def uniform_align(sound: Float32, duration: float, reference: Utterance) -> Alignment:
+    """Spread the words of the reference over the audible parts of the recording; the confidence is 0."""
+    loud = features.loudness(features.energies(sound, HOP))
+    _, talks = features.voice_activity(loud)
+    passed = np.append(0.0, np.cumsum(talks)) / max(int(talks.sum()), 1)
+    passed += np.arange(len(passed)) * 1e-12  # strictly rising, so that it has an inverse
+    times = np.minimum(np.arange(len(passed)) * HOP / features.RATE, duration)
+    first, last = reference.words[0].start, reference.words[-1].end
+
+    def spread(pairs: Float64) -> Float64:
+        return np.interp(np.clip((pairs - first) / max(last - first, 1e-6), 1e-6, 1.0), passed, times)
+
+    words = spread(np.array([(w.start, w.end) for w in reference.words]))
+    phonemes = spread(np.array([(p.start, p.end) for p in reference.phonemes]))
+    words_told = moved("even", reference, duration, words, phonemes, [0.0] * len(words), 0.0)
+    return replace(words_told, warnings=(INSTALL,))
+
+
+def utterance_of_recording(
+    pcm: npt.ArrayLike, rate: float, request: SpeechRequest, *, aligner: Aligner | None = None
+) -> Utterance:
+    """Return a recording as an utterance, with words, phonemes and marks at the times of alignment.
+
+    Args:
+        pcm: as in `align`.
+        rate: Hz.
+        request: the text with its marks; its voice, rate and duration are ignored.
+        aligner: the only one to use.
+
+    Raises:
+        AlignError, VoiceError: as `align`.
+    """
+    sound = mono(pcm, rate)
+    found, reference = align_request(sound, int(rate), request, aligner, None)
+    knots = [(time, at) for a, b in zip(reference.words, found.words, strict=True) for time, at in
+             ((a.start, b.start), (a.end, b.end))]  # fmt: skip
+    was, now = np.maximum.accumulate(np.array([(0.0, 0.0), *knots]), axis=0).T
+    # Words that are adjacent in the reference may have a pause between them here: of knots at one time the
+    # last counts, so that a mark before a word is at the start of that word.
+    marks = {name: float(np.interp(time, was, now)) for name, time in reference.marks.items()}
+    return Utterance(
+        duration=len(sound) / rate,
+        words=found.words,
+        phonemes=found.phonemes,
+        marks=marks,
+        sample_rate=int(rate),
+        pcm=np.rint(sound * 32767).astype(np.int16),
+        warnings=found.warnings,
+    )
+
+
+@lru_cache(CACHED)
+def align_recording(request: SpeechRequest, recording: Recording) -> Utterance:
+    """Return `utterance_of_recording`, or the sound alone with a warning if it cannot be aligned."""
+    try:
+        return utterance_of_recording(recording.pcm, recording.rate, request)
+    except RealizerError as error:
+        warning = f"the lips do not move with the recording: {error}"
+        duration = len(recording.pcm) / recording.rate
+        return Utterance(duration, (), (), {}, recording.rate, recording.pcm, (warning,))

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+
 import numpy as np
 
+from realizer import tables
 from realizer.core.array_types import Float32
 from realizer.speech.align import sphinx
 from realizer.speech.align.alignment import Alignment, build, probability
-from realizer.speech.align.arpabet import to_arpabet, to_ipa
 from realizer.speech.utterance import Phoneme, Utterance
 
 # The score (`AlignedWord`) of a probability of 1/2, and the width of the curve, which separates right texts
@@ -15,6 +19,7 @@ from realizer.speech.utterance import Phoneme, Utterance
 SCORE, SCORE_OF_WORD = (-35.0, 4.0), (-45.0, 8.0)
 UNSTRESSED = {"ʌ": "ə", "ɝ": "ɚ"}
 VOWELS = set("aeiouæɑɔəɚɛɝɪʊʌ")
+STRIPPED = str.maketrans("", "", "ːˑˈˌ̩̯̃̍͡ʲʰˀ_-~|")
 
 
 def model_align(sound: Float32, duration: float, reference: Utterance) -> Alignment | None:
@@ -63,3 +68,44 @@ def model_align(sound: Float32, duration: float, reference: Utterance) -> Alignm
         [0.0 if word is None else probability(word.score, SCORE_OF_WORD) for word in aligned],
         probability(score, SCORE),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class Sounded:
+    """One or two phones of ARPABET, and their IPA."""
+
+    arpabet: str
+    ipa: str
+
+
+def to_arpabet(ipa: Iterable[str]) -> tuple[str, ...]:
+    """Return the phones of phonemes; symbols that are not in the table are ignored."""
+    phones: list[str] = []
+    for phoneme in ipa:
+        text, at = phoneme.translate(STRIPPED), 0
+        while at < len(text):
+            size = next((n for n in range(len(text) - at, 0, -1) if text[at : at + n] in _phones()), 0)
+            if size:
+                phones += _phones()[text[at : at + size]].split()
+            at += size or 1
+    return tuple(phones)
+
+
+def to_ipa(phone: str) -> str:
+    """Return the IPA of one phone; "" for silence and noise."""
+    return _sounds().get(phone, "")
+
+
+@cache
+def _rows() -> tuple[Sounded, ...]:
+    return tables.read_csv(tables.text_of("phonemes_arpabet.csv"), Sounded, "phonemes_arpabet.csv")
+
+
+@cache
+def _phones() -> Mapping[str, str]:
+    return {row.ipa: row.arpabet for row in _rows()}
+
+
+@cache
+def _sounds() -> Mapping[str, str]:
+    return {row.arpabet: row.ipa for row in reversed(_rows())}

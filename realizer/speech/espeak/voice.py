@@ -12,8 +12,7 @@ from realizer.core.errors import VoiceError
 from realizer.speech.engine_process import Engine
 from realizer.speech.engine_voice import EngineVoice
 from realizer.speech.espeak.document import write_document
-from realizer.speech.espeak.events import timeline
-from realizer.speech.espeak.protocol import read_answer
+from realizer.speech.espeak.events import read_answer, timeline
 from realizer.speech.ssml import Script
 from realizer.speech.utterance import STRETCH, SpeechRequest, Utterance
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
+from typing import Any
 
 import numpy as np
 
-from realizer.core.array_types import Float64
-from realizer.speech.recorded.loudness_lips import by_loudness
+from realizer import tables
+from realizer.core.array_types import Float64, Int16
 from realizer.speech.utterance import Phoneme, Recording, SpeechRequest, Utterance, Word
 
 # Words of a voice are adjacent, while those of a recording may have gaps: the end of a word is mapped as a
@@ -28,7 +30,7 @@ def utterance_of(request: SpeechRequest, recording: Recording) -> Utterance:
         VoiceError: if the text is too long, or the reference voice died.
     """
     # Imported here, because loading the aligners takes longer than most texts to speak.
-    from realizer.speech.align.recording_marks import align_recording
+    from realizer.speech.align.aligner import align_recording
 
     if not recording.words and not recording.phonemes:
         if request.ssml.strip():
@@ -126,3 +128,38 @@ def _letters(words: Sequence[Word]) -> tuple[Float64, Float64]:
     letters = np.column_stack([np.append(0.0, ends)[:-1], ends]).ravel()
     times = np.array([time for word, _ in spoken for time in (word.start, word.end)], np.float64)
     return letters, np.maximum.accumulate(times)
+
+
+def by_loudness(pcm: Int16, rate: int) -> tuple[Phoneme, ...]:
+    """Return vowels that are the more open the louder the sound is (`envelope.toml`).
+
+    Phonemes and pauses cover the sound without gaps; () for silence.
+
+    Args:
+        pcm: (n,) mono.
+        rate: Hz.
+    """
+    facts = _facts()
+    size = max(1, round(facts["window"] * rate))
+    count = -(-len(pcm) // size)
+    padded = np.zeros(count * size)
+    padded[: len(pcm)] = pcm
+    rms = np.sqrt(np.mean(padded.reshape(count, size) ** 2, axis=1))
+    loud = float(np.quantile(rms, facts["loud"])) if count else 0.0
+    if loud < facts["quietest"]:
+        return ()
+    level = 20 * np.log10(np.maximum(rms, 1e-9) / loud)
+    steps = facts["opening"]
+    sounds = [next((s["ipa"] for s in steps if one >= s["above"]), "") for one in level]
+    starts = [k for k in range(count) if k == 0 or sounds[k] != sounds[k - 1]]
+    ends = [*starts[1:], count]
+    whole = len(pcm) / rate
+    return tuple(
+        Phoneme(first * size / rate, min(last * size / rate, whole), sounds[first])
+        for first, last in zip(starts, ends, strict=True)
+    )
+
+
+@cache
+def _facts() -> dict[str, Any]:
+    return tables.read_toml(tables.text_of("envelope.toml"), "envelope.toml")

@@ -7,6 +7,9 @@ import sys
 
 import pytest
 
+from realizer.cli.doctor import _fix
+from realizer.outputs.registry import OUTPUTS
+from realizer.speech.registry import voices
 from tests.commands import run
 
 
@@ -38,3 +41,36 @@ def test_doctor_shows_the_first_fault_of_a_face(monkeypatch: pytest.MonkeyPatch)
     lines = [line for line in run("doctor").stdout.splitlines() if "torn" in line]
     assert lines
     assert all(line.startswith("missing") and "more" not in line for line in lines)
+
+
+def lines() -> dict[str, str]:
+    """Suffix -> the rest of its line."""
+    _fix.cache_clear()
+    return dict(line.split(maxsplit=1) for line in run("outputs").stdout.splitlines())
+
+
+def test_outputs_has_a_line_for_each_output() -> None:
+    found = lines()
+    assert list(found) == sorted(OUTPUTS)
+    for suffix, output in OUTPUTS.items():
+        assert output.media_type in found[suffix]
+        assert output.description in found[suffix]
+
+
+def test_outputs_says_what_to_install_for_films(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "av", None)
+    found = lines()
+    _fix.cache_clear()
+    for suffix in (".mp4", ".webm"):
+        assert "pip install 'bml-realizer[film]'" in found[suffix]
+    assert not [suffix for suffix in (".fap", ".glb", ".wav") if "missing" in found[suffix]]
+
+
+@pytest.mark.parametrize("suffix", OUTPUTS)
+def test_outputs_that_draw_need_the_extra_render(suffix: str) -> None:
+    assert ("render" in OUTPUTS[suffix].needs) == (OUTPUTS[suffix].picture_size is not None)
+
+
+def test_voices_has_a_line_for_each_voice() -> None:
+    rows = [line.split(maxsplit=1) for line in run("voices").stdout.splitlines()]
+    assert rows == [[voice.name, voice.description] for voice in voices()]

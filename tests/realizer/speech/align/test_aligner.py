@@ -6,11 +6,18 @@ import numpy as np
 import pytest
 
 from realizer.core.errors import RealizerError
-from realizer.speech.align.aligner import align
+from realizer.speech.align.aligner import (
+    INSTALL,
+    align,
+    align_recording,
+    uniform_align,
+    utterance_of_recording,
+)
 from realizer.speech.align.alignment import AlignError, Alignment
 from realizer.speech.align.sphinx import install_hint
+from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.silent import SilentVoice
-from realizer.speech.utterance import MAX_TEXT
+from realizer.speech.utterance import MAX_TEXT, Recording, SpeechRequest
 from tests.realizer.speech.align.conftest import TEXT, WRONG
 
 AFTER = "how quietly they came"
@@ -24,6 +31,12 @@ both = pytest.mark.parametrize(
             marks=[pytest.mark.espeak, pytest.mark.skipif(bool(install_hint()), reason=str(install_hint()))],
         ),
     ],
+)
+TIMES = np.arange(48_000) / 16_000
+TONE = 0.3 * np.sin(2 * np.pi * 300 * TIMES)
+MARKED = (
+    '<mark name="a"/>The tall woman <mark name="b"/>carried a basket of apples '
+    '<break time="300ms"/><mark name="c"/>down the hill.<mark name="d"/>'
 )
 
 
@@ -126,3 +139,51 @@ def test_align_refuses(pcm, rate, text, says) -> None:
 def test_align_refuses_an_unknown_aligner(sentence) -> None:
     with pytest.raises(AlignError, match="wanted pocketsphinx or espeak, got 'mine'"):
         align(sentence.pcm, sentence.rate, TEXT, aligner="mine")  # type: ignore[arg-type]
+
+
+def test_uniform_align_skips_silence() -> None:
+    loud = ((TIMES > 0.5) & (TIMES < 1.0)) | ((TIMES > 2.0) & (TIMES < 2.5))
+    reference = SilentVoice().say(SpeechRequest("one two"))
+    found = uniform_align(np.where(loud, TONE, 0).astype(np.float32), 3.0, reference)
+    first, second = found.words
+    assert (first.start, first.end) == (pytest.approx(0.5, abs=0.03), pytest.approx(1.0, abs=0.03))
+    assert second.start >= first.end
+    assert second.end == pytest.approx(2.5, abs=0.03)
+    assert (found.aligner, found.confidence, found.confidences) == ("even", 0.0, (0.0, 0.0))
+    assert found.warnings == (INSTALL,)
+
+
+def test_uniform_align_keeps_the_proportions_of_the_reference() -> None:
+    reference = SilentVoice().say(SpeechRequest("banana dog"))  # three vowel units, and one
+    first, second = uniform_align(TONE.astype(np.float32), 3.0, reference).words
+    assert first.end - first.start == pytest.approx(3 * (second.end - second.start), rel=0.1)
+
+
+@pytest.mark.espeak
+def test_utterance_of_recording_places_marks_before_their_words(sentence) -> None:
+    said = utterance_of_recording(sentence.pcm, sentence.rate, SpeechRequest(MARKED, ("a", "b", "c", "d")))
+    starts = {word.text: word.start for word in said.words}
+    assert said.marks["a"] == starts["The"]
+    assert said.marks["b"] == starts["carried"]
+    assert said.marks["c"] == pytest.approx(starts["down"], abs=0.1)
+    assert said.marks["d"] == pytest.approx(said.words[-1].end, abs=0.01)
+    assert said.duration == len(sentence.pcm) / sentence.rate
+    assert np.abs(said.pcm.astype(int) - sentence.pcm).max() <= 1
+    assert said.stretch == (1, 1)
+
+
+@pytest.mark.espeak
+def test_recording_in_a_request_replaces_the_voice(sentence) -> None:
+    request = SpeechRequest(MARKED, ("a",), seconds=1.0, recording=Recording(sentence.rate, sentence.pcm))
+    said = speak_to_length(SilentVoice(), request)
+    assert said.duration == len(sentence.pcm) / sentence.rate
+    assert [word.text for word in said.words] == [word.text for word in sentence.said.words]
+    assert speak_to_length(SilentVoice(), request) is said, "it is aligned once"
+
+
+def test_align_recording_falls_back_to_the_sound() -> None:
+    silence = Recording(8000, np.zeros(8000, np.int16))
+    said = align_recording(SpeechRequest("Hello", recording=silence), silence)
+    assert said.pcm is silence.pcm
+    assert (said.duration, said.words, said.phonemes) == (1.0, (), ())
+    assert "lips do not move with the recording" in said.warnings[0]

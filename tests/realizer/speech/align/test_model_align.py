@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.speech.align.model_align import model_align
+from realizer.speech.align.model_align import model_align, to_arpabet, to_ipa
 from realizer.speech.align.recording import mono, to_aligner
 from realizer.speech.align.sphinx import install_hint
 from realizer.speech.espeak.voice import EspeakVoice
@@ -46,3 +46,23 @@ def test_model_align_speaks_unknown_words_like_the_reference(voice: EspeakVoice)
     assert found is not None
     assert np.median(np.abs([a.start - b.start for a, b in zip(found.words, said.words, strict=True)])) < 0.06
     assert found.confidence > 0.5
+
+
+@pytest.mark.parametrize(
+    ("ipa", "phones"),
+    [
+        (("h", "ə", "l", "oʊ"), ("HH", "AH", "L", "OW")),
+        (("tʃ", "ɜː", "tʃ"), ("CH", "ER", "CH")),
+        (("n", "iː", "ɹ"), ("N", "IY", "R")),
+        (("ɛɹ", "aɪə"), ("EH", "R", "AY", "AH")),
+        (("l̩", "ʲ", "☃"), ("L",)),
+        ((), ()),
+    ],
+)
+def test_to_arpabet_converts_the_longest_symbol_first(ipa, phones) -> None:
+    assert to_arpabet(ipa) == phones
+
+
+def test_to_ipa_uses_the_first_row_of_a_phone() -> None:
+    assert [to_ipa(phone) for phone in ("HH", "AA", "ER", "JH", "SIL")] == ["h", "ɑ", "ɝ", "dʒ", ""]
+    assert to_arpabet([to_ipa("NG"), to_ipa("OY")]) == ("NG", "OY")
