@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from itertools import pairwise
@@ -91,4 +92,4 @@ def _coded(codec: str, text: str) -> bytes:
         # 3GPP TS 26.245, 5.17: the length in bytes, then the text; no boxes after it.
         raw = text.encode()
         return len(raw).to_bytes(2, "big") + raw
-    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;").encode()
+    return html.escape(text, quote=False).encode()

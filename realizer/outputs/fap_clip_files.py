@@ -60,16 +60,9 @@ def clip_to_range(clip: FAPClip) -> FAPClip:
 
 def _to_csv(clip: FAPClip) -> str:
     """Return rows of `time` in seconds, the numbers of FAP 1 and 2, and the FAPs in the mask, in FAPU."""
-    given = [row for row in faps()[2:] if clip.mask[row.fap - 1]]
-    parts = [clip.values[:, [row.fap - 1 for row in given]]]
-    names = [row.name for row in given]
-    if clip.mask[1]:
-        parts.insert(0, clip.expressions)
-        names = [*EXPRESSION, *names]
-    if clip.mask[0]:
-        parts.insert(0, clip.visemes)
-        names = [*VISEME, *names]
-    rows = enumerate(np.hstack(parts).tolist())
+    columns = [VISEME, EXPRESSION, *((row.name,) for row in faps()[2:])]
+    names = [name for part, shown in zip(columns, clip.mask, strict=True) if shown for name in part]
+    rows = enumerate(fap_text.columns(clip).tolist())
     return csv_text(["time", *names], ([f"{frame / clip.fps:.9g}", *row] for frame, row in rows))
 
 

@@ -32,14 +32,17 @@ def encode(clip: FAPClip) -> str:
     if not (math.isfinite(clip.fps) and clip.fps > 0):
         raise ValueError(f"fps: wanted a positive number, got {clip.fps}")
     fps = int(clip.fps) if clip.fps == int(clip.fps) else clip.fps
-    columns = [clip.values[:, 2:][:, clip.mask[2:]]]
-    if clip.mask[1]:
-        columns.insert(0, clip.expressions)
-    if clip.mask[0]:
-        columns.insert(0, clip.visemes)
     mask = "\n" + " ".join("1" if bit else "0" for bit in clip.mask) + "\n"
-    frames = [" ".join([str(k), *words]) for k, words in enumerate(_words(np.hstack(columns)))]
+    frames = [" ".join([str(k), *words]) for k, words in enumerate(_words(columns(clip)))]
     return mask.join([f"2.1 {_word(clip.name)} {fps} {len(frames)}", *frames]) + "\n"
+
+
+def columns(clip: FAPClip) -> Int32:
+    """Return (n, k) int32: the numbers of FAP 1 and 2 if they are in the mask, then the FAPs in it."""
+    compound = [
+        part for part, shown in zip((clip.visemes, clip.expressions), clip.mask, strict=False) if shown
+    ]
+    return np.hstack([*compound, clip.values[:, 2:][:, clip.mask[2:]]])
 
 
 def _words(numbers: Int32) -> list[list[str]]:

@@ -39,8 +39,7 @@ class Format:
 
     Attributes:
         container, video, audio, subtitles: FFmpeg's names.
-        options: of the video encoder. Threads are fixed, so that two machines write the same bytes.
-        container_options: bitexact omits the writer's version and random identifiers.
+        options: of the video encoder, in addition to `VIDEO`.
     """
 
     container: str
@@ -49,9 +48,11 @@ class Format:
     subtitles: str
     bit_rate: int
     options: Mapping[str, str]
-    container_options: Mapping[str, str] = field(default_factory=lambda: {"fflags": "+bitexact"})
+    container_options: Mapping[str, str] = field(default_factory=dict)
 
 
+# Options of all video encoders. Threads are fixed, so that two machines write the same bytes.
+VIDEO = {"threads": "2", "g": "50"}
 FORMATS: Mapping[str, Format] = {
     ".mp4": Format(
         "mp4",
@@ -59,8 +60,8 @@ FORMATS: Mapping[str, Format] = {
         "aac",
         "mov_text",
         96_000,
-        {"preset": "veryfast", "crf": "19", "threads": "2", "bf": "2", "g": "50"},
-        {"fflags": "+bitexact", "movflags": "+faststart"},
+        {"preset": "veryfast", "crf": "19", "bf": "2"},
+        {"movflags": "+faststart"},
     ),
     ".webm": Format(
         "webm",
@@ -68,15 +69,7 @@ FORMATS: Mapping[str, Format] = {
         "libopus",
         "webvtt",
         64_000,
-        {
-            "deadline": "realtime",
-            "cpu-used": "7",
-            "crf": "28",
-            "b": "0",
-            "threads": "2",
-            "row-mt": "1",
-            "g": "50",
-        },
+        {"deadline": "realtime", "cpu-used": "7", "crf": "28", "b": "0", "row-mt": "1"},
     ),
 }
 
@@ -108,51 +101,52 @@ def encode_film(
     length = round(count / pace * rate)
     pcm = np.zeros(length, np.int16)
     pcm[: min(len(sound), length)] = sound[:length]
+    video_options = {**VIDEO, **form.options, **_steady(form.video)}
+    # Omits the writer's version and random identifiers.
+    container_options = {"fflags": "+bitexact", **form.container_options}
     try:
-        with av.open(str(path), "w", format=form.container, options=dict(form.container_options)) as film:
-            _write(film, form, pictures, count, pace, pcm, rate, lines)
+        with av.open(str(path), "w", format=form.container, options=container_options) as film:
+            video = film.add_stream(form.video, rate=pace, options=video_options)
+            audio = film.add_stream(form.audio, rate=rate, layout="mono")
+            audio.bit_rate = form.bit_rate
+            # Without this, encoders write their version into the stream, or choose threads by the machine.
+            for stream in (video, audio):
+                stream.codec_context.flags |= av.codec.context.Flags.bitexact
+            track = Track(av, film, form.subtitles, lines, float(count / pace)) if lines else None
+            heard = 0
+            # A new one for each frame would cost as much as converting.
+            converter = av.video.reformatter.VideoReformatter()
+            for k, picture in enumerate(pictures):
+                height, width = picture.shape[0] // 2 * 2, picture.shape[1] // 2 * 2
+                if k == 0:
+                    video.width, video.height, video.pix_fmt = width, height, "yuv420p"
+                    context = video.codec_context
+                    context.time_base = 1 / pace
+                    context.colorspace = context.color_primaries = context.color_trc = BT709
+                    context.color_range = 1  # 16..235, as players expect
+                frame = av.VideoFrame.from_ndarray(
+                    np.ascontiguousarray(picture[:height, :width]), format="rgb24"
+                )
+                frame = converter.reformat(
+                    frame, format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG"
+                )
+                frame.pts, frame.time_base = k, 1 / pace
+                film.mux(video.encode(frame))
+                until = round((k + 1) / pace * rate)
+                if until > heard:
+                    part = np.ascontiguousarray(pcm[None, heard:until])
+                    sample = av.AudioFrame.from_ndarray(part, format="s16", layout="mono")
+                    sample.sample_rate, sample.pts, sample.time_base = rate, heard, Fraction(1, rate)
+                    film.mux(audio.encode(sample))
+                    heard = until
+                if track is not None:
+                    track.write(float((k + 1) / pace))
+                if (k + 1) % REPORT == 0:
+                    log.info("film: %d of %d pictures", k + 1, count)
+            film.mux(video.encode(None))
+            film.mux(audio.encode(None))
     except (av.error.FFmpegError, ValueError) as error:
         raise RealizerError(f"the film could not be written: {error}") from error
-
-
-def _write(
-    film: Any,
-    form: Format,
-    pictures: Iterable[UInt8],
-    count: int,
-    pace: Fraction,
-    pcm: Int16,
-    rate: int,
-    lines: Sequence[Span],
-) -> None:
-    av = _av()
-    video = film.add_stream(form.video, rate=pace, options={**form.options, **_steady(form.video)})
-    audio = film.add_stream(form.audio, rate=rate, layout="mono")
-    audio.bit_rate = form.bit_rate
-    # Without this, encoders write their version into the stream, or choose threads by the machine.
-    for stream in (video, audio):
-        stream.codec_context.flags |= av.codec.context.Flags.bitexact
-    track = Track(av, film, form.subtitles, lines, float(count / pace)) if lines else None
-    heard = 0
-    converter = av.video.reformatter.VideoReformatter()  # a new one each frame costs as much as converting
-    for k, picture in enumerate(pictures):
-        height, width = picture.shape[0] // 2 * 2, picture.shape[1] // 2 * 2
-        if k == 0:
-            _picture_format(video, width, height, pace)
-        frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture[:height, :width]), format="rgb24")
-        frame = converter.reformat(frame, format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
-        frame.pts, frame.time_base = k, 1 / pace
-        film.mux(video.encode(frame))
-        until = round((k + 1) / pace * rate)
-        if until > heard:
-            film.mux(audio.encode(_sound(av, pcm[heard:until], rate, heard)))
-            heard = until
-        if track is not None:
-            track.write(float((k + 1) / pace))
-        if (k + 1) % REPORT == 0:
-            log.info("film: %d of %d pictures", k + 1, count)
-    film.mux(video.encode(None))
-    film.mux(audio.encode(None))
 
 
 @cache
@@ -168,20 +162,6 @@ def _steady(encoder: str) -> dict[str, str]:
     except OSError:
         wide = False
     return {"x264-params": "asm=AVX2"} if wide else {}
-
-
-def _picture_format(video: Any, width: int, height: int, pace: Fraction) -> None:
-    video.width, video.height, video.pix_fmt = width, height, "yuv420p"
-    context = video.codec_context
-    context.time_base = 1 / pace
-    context.colorspace = context.color_primaries = context.color_trc = BT709
-    context.color_range = 1  # 16..235, as players expect
-
-
-def _sound(av: Any, pcm: Int16, rate: int, first: int) -> Any:
-    frame = av.AudioFrame.from_ndarray(np.ascontiguousarray(pcm[None]), format="s16", layout="mono")
-    frame.sample_rate, frame.pts, frame.time_base = rate, first, Fraction(1, rate)
-    return frame
 
 
 def write_film(realization: Realization, path: Path, drawing: RenderSettings) -> None:

@@ -47,27 +47,17 @@ class RenderSettings:
                     continue
                 if part.face_name not in renderers:
                     renderers[part.face_name] = stack.enter_context(
-                        self.make_renderer(realization, size, face=part.face_name)
+                        self.make_renderer(realization, size, part.face_name)
                     )
                 yield from pictures(part, renderers[part.face_name], rows)
 
     def make_renderer(
-        self,
-        realization: Realization,
-        size: tuple[int, int],
-        *,
-        alpha: bool = False,
-        face: str | None = None,
+        self, realization: Realization, size: tuple[int, int], face: str, *, alpha: bool = False
     ) -> Renderer:
-        """Return a renderer for poses of a realization; `alpha` if pictures may be transparent.
-
-        Args:
-            face: one of its faces; None for its first.
-        """
-        own = face in (None, realization.face_name)
-        if own and self.renderer is not None and self.renderer.size == size:
+        """Return a renderer for one of a realization's faces; `alpha` if pictures may be transparent."""
+        if face == realization.face_name and self.renderer is not None and self.renderer.size == size:
             return self.renderer
-        return self.make_renderer_for(face or realization.face_name, realization.deformer, size, alpha=alpha)
+        return self.make_renderer_for(face, realization.deformer, size, alpha=alpha)
 
     def make_renderer_for(
         self, face: str, deformer: str | None, size: tuple[int, int], *, alpha: bool = False

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from realizer.core.array_types import Float32, UInt8
+from realizer.outputs import speech_spans
 from realizer.outputs.output import Output, RenderSettings
 
 if TYPE_CHECKING:
@@ -53,11 +54,9 @@ def row_at(realization: Realization, seconds: float) -> Float32:
     """Return the pose (k,) at an instant, interpolated between frames; the nearest outside of them."""
     frames = realization.poses
     place = min(max(seconds * realization.fps, 0.0), len(frames) - 1)
-    below = int(place)
+    below, part = int(place), np.float32(place % 1)
     above = min(below + 1, len(frames) - 1)
-    part = np.float32(place - below)
-    row: Float32 = frames[below] * (1 - part) + frames[above] * part
-    return row
+    return np.asarray(frames[below] * (1 - part) + frames[above] * part)
 
 
 def encode_png(pixels: UInt8) -> bytes:
@@ -77,7 +76,7 @@ def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
     if drawing.at is not None:
         now = drawing.at * realization.fps
         first, part = next(pair for pair in reversed(realization.faces) if pair[0] <= max(now, 0))
-        with drawing.make_renderer(realization, size, alpha=alpha, face=part.face_name) as renderer:
+        with drawing.make_renderer(realization, size, part.face_name, alpha=alpha) as renderer:
             (picture,) = renderer.draw(row_at(part, drawing.at - first / realization.fps)[None])
         return encode_png(picture)
     shown = moments(realization)
@@ -95,15 +94,13 @@ def _picture_size(drawing: RenderSettings) -> tuple[tuple[int, int], bool]:
 
 def _points(realization: Realization, count: int) -> dict[int, tuple[str, ...]]:
     """Return the sync points nearest to each frame, with block names if there are several blocks."""
-    names: dict[int, list[str]] = {}
-    several = len(realization.schedules) > 1
-    for schedule in realization.schedules:
-        for behaviour, times in schedule.times.items():
-            for point, time in zip(schedule.points[behaviour], times, strict=True):
-                frame = min(max(round((schedule.start + float(time)) * realization.fps), 0), count - 1)
-                name = f"{schedule.block}:{behaviour}:{point}" if several else f"{behaviour}:{point}"
-                names.setdefault(frame, []).append(name)
-    return {frame: tuple(points) for frame, points in names.items()}
+    names: dict[int, tuple[str, ...]] = {}
+    # With one block, its name is left out.
+    own = "" if len(realization.schedules) != 1 else f"{realization.schedules[0].block}:"
+    for time, name in speech_spans.points(realization):
+        frame = min(max(round(time * realization.fps), 0), count - 1)
+        names[frame] = (*names.get(frame, ()), name.removeprefix(own))
+    return names
 
 
 PNG = Output(

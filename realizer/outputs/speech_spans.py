@@ -33,15 +33,12 @@ def phonemes(speaking: ScheduledSpeech) -> Iterator[Span]:
     return _audible(speaking, ((phoneme, phoneme.ipa) for phoneme in speaking.utterance.phonemes))
 
 
-def points(realization: Realization) -> tuple[tuple[float, str], ...]:
-    """Return (seconds, "block:behaviour:point") of every sync point, by time, then by name."""
-    found = (
-        (schedule.start + float(time), f"{schedule.block}:{behaviour}:{point}")
-        for schedule in realization.schedules
-        for behaviour, times in schedule.times.items()
-        for point, time in zip(schedule.points[behaviour], times, strict=True)
-    )
-    return tuple(sorted(found))
+def points(realization: Realization) -> Iterator[tuple[float, str]]:
+    """Yield (seconds, "block:behaviour:point") of every sync point, by block and behaviour."""
+    for schedule in realization.schedules:
+        for behaviour, times in schedule.times.items():
+            for point, time in zip(schedule.points[behaviour], times, strict=True):
+                yield schedule.start + float(time), f"{schedule.block}:{behaviour}:{point}"
 
 
 def _audible(speaking: ScheduledSpeech, timed: Iterator[tuple[Word | Phoneme, str]]) -> Iterator[Span]:

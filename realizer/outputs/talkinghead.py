@@ -42,7 +42,7 @@ def encode_talkinghead(realization: Realization) -> str:
     own = tuple(s for s in realization.speeches if s.character == 0)
     words = [word for speaking in own for word in speech_spans.words(speaking)]
     visemes = [viseme for speaking in own for viseme in _visemes(speaking)]
-    points = speech_spans.points(realization)
+    points = sorted(speech_spans.points(realization))
     sound = replace(realization, speeches=own).sound(RATE)
     content = {
         **_timed("words", "w", words),

@@ -22,15 +22,20 @@ def encode_textgrid(realization: Realization) -> str:
     Further characters have tiers named after them. Points at the same time are one, with names separated by
     blanks, because a tier cannot have two points at the same time.
     """
-    end = max([realization.duration, 1 / realization.fps, *_ends(realization)])
-    tiers = []
+    spans: list[tuple[str, list[Span]]] = []
     for index, name in enumerate(realization.characters):
         own = [speaking for speaking in realization.speeches if speaking.character == index]
         own.sort(key=lambda speaking: speaking.start)
         prefix = f"{name or index} " if index else ""
-        tiers.append(_intervals(f"{prefix}words", end, (w for s in own for w in speech_spans.words(s))))
-        tiers.append(_intervals(f"{prefix}phonemes", end, (p for s in own for p in speech_spans.phonemes(s))))
-    tiers.append(_points("syncs", end, speech_spans.points(realization)))
+        spans += [
+            (f"{prefix}words", [word for speaking in own for word in speech_spans.words(speaking)]),
+            (f"{prefix}phonemes", [sound for speaking in own for sound in speech_spans.phonemes(speaking)]),
+        ]
+    points = sorted(speech_spans.points(realization))
+    ends = [*(span.end for _, tier in spans for span in tier), *(time for time, _ in points)]
+    end = max([realization.duration, 1 / realization.fps, *ends])
+    tiers = [_intervals(name, end, tier) for name, tier in spans]
+    tiers.append(_points("syncs", end, points))
     lines = [
         'File type = "ooTextFile"', 'Object class = "TextGrid"', "",
         "xmin = 0", f"xmax = {_number(end)}", "tiers? <exists>", f"size = {len(tiers)}", "item []:",
@@ -80,13 +85,6 @@ def _points(name: str, end: float, points: Iterable[tuple[float, str]]) -> list[
 
 def _head(kind: str, name: str, end: float) -> list[str]:
     return [f'class = "{kind}"', f"name = {_quoted(name)}", "xmin = 0", f"xmax = {_number(end)}"]
-
-
-def _ends(realization: Realization) -> Iterator[float]:
-    for speaking in realization.speeches:
-        for spans in (speech_spans.words(speaking), speech_spans.phonemes(speaking)):
-            yield from (span.end for span in spans)
-    yield from (time for time, _ in speech_spans.points(realization))
 
 
 def _number(seconds: float) -> str:

@@ -14,13 +14,12 @@ from realizer.core.array_types import Float32, Float64
 from realizer.face.glb_file import GlbFile
 from realizer.outputs.glb import quaternions
 from realizer.outputs.output import Output
-from realizer.tables import read_toml, text_of
+from realizer.tables import toml_table
 from realizer.tables.lexemes import face_lexemes
 
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-FILE = "vrm.toml"
 EXTENSION, VERSION = "VRMC_vrm_animation", "1.0"
 BLINKS = {"blinkLeft": "eyeBlinkLeft", "blinkRight": "eyeBlinkRight"}
 # Action units of speaking lips, which are ignored in expressions.
@@ -78,7 +77,8 @@ def expressions(realization: Realization) -> dict[str, Float32]:
     visemes = realization.visemes()
     blinks = arkit(realization.aus, realization.mapping).weights
     found: dict[str, Any] = {
-        name: visemes[:, list(parts)] @ list(parts.values()) for name, parts in _mouth().items()
+        name: visemes[:, list(map(int, parts))] @ list(parts.values())
+        for name, parts in _table()["mouth"].items()
     }
     found |= {name: blinks[:, ARKIT_NAMES().index(shape)] for name, shape in BLINKS.items()}
     found |= dict(zip(_faces()[0], _mixture(realization.aus.aus).T, strict=True))
@@ -114,14 +114,6 @@ def _faces() -> tuple[tuple[str, ...], Float64]:
     return tuple(names), faces
 
 
-@cache
-def _mouth() -> dict[str, dict[int, float]]:
-    return {
-        name: {int(viseme): weight for viseme, weight in parts.items()}
-        for name, parts in _table()["mouth"].items()
-    }
-
-
 def _skeleton() -> tuple[list[dict[str, Any]], dict[str, int]]:
     """Return the nodes of the skeleton, and the node number of each bone."""
     bones = _table()["bones"]
@@ -135,7 +127,7 @@ def _skeleton() -> tuple[list[dict[str, Any]], dict[str, int]]:
 
 @cache
 def _table() -> dict[str, Any]:
-    return read_toml(text_of(FILE), FILE)
+    return toml_table("vrm.toml")
 
 
 VRMA = Output(

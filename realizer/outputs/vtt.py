@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from realizer.outputs import speech_spans
@@ -14,16 +12,7 @@ if TYPE_CHECKING:
     from realizer.realization import Realization
 
 LEAST = 0.001  # s; WebVTT requires cues to end after their start, and counts milliseconds
-KINDS = ("word", "phoneme", "sync")  # the order of cues that start together
-
-
-@dataclass(frozen=True, slots=True)
-class _Cue:
-    start: float
-    end: float
-    kind: str  # the class for style sheets and programs
-    text: str
-    id: str = ""
+KINDS = ("word", "phoneme", "sync")  # classes for style sheets, in the order of cues that start together
 
 
 def encode_vtt(realization: Realization) -> str:
@@ -31,22 +20,20 @@ def encode_vtt(realization: Realization) -> str:
 
     The cue of a sync point lasts a frame, and its identifier is its name.
     """
+    cues = [
+        (span.start, kind, "", span.end, span.text)
+        for kind, spans_of in enumerate((speech_spans.words, speech_spans.phonemes))
+        for speaking in realization.speeches
+        for span in spans_of(speaking)
+    ]
+    points = speech_spans.points(realization)
+    cues += [(time, 2, name, time + 1 / realization.fps, name) for time, name in points]
     blocks = ["WEBVTT\n"]
-    for cue in sorted(_cues(realization), key=lambda cue: (cue.start, KINDS.index(cue.kind), cue.id)):
-        identifier = cue.id.replace("-->", "--") + "\n" if cue.id else ""
-        clock = f"{timestamp(cue.start)} --> {timestamp(max(cue.end, cue.start + LEAST))}"
-        text = html.escape(cue.text, quote=False)
-        blocks.append(f"{identifier}{clock}\n<c.{cue.kind}>{text}</c>\n")
+    for start, kind, id, end, text in sorted(cues, key=lambda cue: cue[:3]):
+        identifier = id.replace("-->", "--") + "\n" if id else ""
+        clock = f"{timestamp(start)} --> {timestamp(max(end, start + LEAST))}"
+        blocks.append(f"{identifier}{clock}\n<c.{KINDS[kind]}>{html.escape(text, quote=False)}</c>\n")
     return "\n".join(blocks)
-
-
-def _cues(realization: Realization) -> Iterator[_Cue]:
-    for kind, spans_of in (("word", speech_spans.words), ("phoneme", speech_spans.phonemes)):
-        for speaking in realization.speeches:
-            for span in spans_of(speaking):
-                yield _Cue(span.start, span.end, kind, span.text)
-    for time, name in speech_spans.points(realization):
-        yield _Cue(time, time + 1 / realization.fps, "sync", name, name)
 
 
 def timestamp(seconds: float) -> str:

@@ -63,7 +63,7 @@ def played(turn):
 @pytest.mark.gl
 @pytest.mark.slow
 def test_pictures_of_film_and_stream_are_equal(streamed, played):
-    with RenderSettings(SIZE).make_renderer(played, SIZE) as renderer:
+    with RenderSettings(SIZE).make_renderer(played, SIZE, played.face_name) as renderer:
         drawn = renderer.draw(played.poses)
     assert set(range(len(drawn))) <= set(streamed)
     assert np.abs(drawn[0].astype(int) - drawn[8]).max() > 60

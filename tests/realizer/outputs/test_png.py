@@ -79,7 +79,7 @@ def test_output_begin_starts_a_renderer(realization, tmp_path, at):
     started = early.renderer.pid
     assert started is not None
     size, alpha = ((160, 120), True) if at is not None else ((80, 60), False)
-    assert early.make_renderer(realization, size, alpha=alpha).pid == started
+    assert early.make_renderer(realization, size, realization.face_name, alpha=alpha).pid == started
     assert np.array_equal(
         drawn(realization, tmp_path / "x.png", early), drawn(realization, tmp_path / "y.png", drawing)
     )

@@ -23,9 +23,9 @@ def test_phonemes_exclude_pauses(realization) -> None:
     assert [span.text for span in phonemes(speaking)] == ["h", "o\u028a", "i\u02d0"]
 
 
-def test_points_are_sorted_by_time(realization) -> None:
-    assert points(realization) == (
+def test_points_have_the_names_of_block_and_behaviour(realization) -> None:
+    assert list(points(realization)) == [
         (0.2, "greeting:nod:start"),
         (0.81, "greeting:nod:stroke"),
         (1.4, "greeting:nod:end"),
-    )
+    ]

@@ -59,7 +59,9 @@ def test_webp_of_a_realization_shows_its_face(realization, tmp_path):
     found, _ = opened(tmp_path / "x.webp")
     assert len(found) == 38
     assert {shown for shown, _ in found} == {0.04}
-    with RenderSettings(size=(97, 96)).make_renderer(realization, (97, 96)) as renderer:
+    with RenderSettings(size=(97, 96)).make_renderer(
+        realization, (97, 96), realization.face_name
+    ) as renderer:
         drawn = renderer.draw(realization.poses)
     for (_, got), wanted in zip(found, drawn, strict=True):
         assert np.abs(got.astype(int) - wanted).mean() < 4
