@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
-from typing import Any
+from functools import partial
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -13,8 +12,8 @@ import numpy as np
 from realizer import tables
 from realizer.speech.utterance import Utterance
 
-FILE = "prosody.toml"
 PRIMARY = 1
+prosody_facts = partial(tables.toml_table, "prosody.toml")
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,12 +31,6 @@ class Phrase:
     start: float
     end: float
     accents: tuple[Accent, ...]
-
-
-@cache
-def prosody_facts() -> dict[str, Any]:
-    """Return the contents of prosody.toml."""
-    return tables.read_toml(tables.text_of(FILE), FILE)
 
 
 # Results are cached as long as the utterance is in use.

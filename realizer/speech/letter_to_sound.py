@@ -6,13 +6,15 @@ import re
 import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from typing import Any, Literal
 
 from realizer import tables
 
 GENERIC = "any"
 LONGEST_GROUP = 6  # letters
+# The table of vowel units: durations, and the vowels of each language.
+syllable_facts = partial(tables.toml_table, "syllables.toml")
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,12 +25,6 @@ class LetterRule:
     letters: str
     place: Literal["any", "start", "end", "word"]
     ipa: str
-
-
-@cache
-def syllable_facts() -> dict[str, Any]:
-    """Return the table of vowel units: durations, and the vowels of each language."""
-    return tables.read_toml(tables.text_of("syllables.toml"), "syllables.toml")
 
 
 @lru_cache(maxsize=4096)  # texts repeat words
@@ -103,7 +99,7 @@ def _plain(letter: str) -> str:
 
 @cache
 def _rules() -> Mapping[tuple[str, str, str], tuple[str, ...]]:
-    rows = tables.read_csv(tables.text_of("phonemes_letters.csv"), LetterRule, "phonemes_letters.csv")
+    rows = tables.csv_rows("phonemes_letters.csv", LetterRule)
     return {
         (row.language, row.letters, row.place): tuple(row.ipa.split("-")) if row.ipa else () for row in rows
     }

@@ -97,6 +97,7 @@ def csv_rows(name: str, row_class: type[Row]) -> tuple[Row, ...]:
     return read_csv(text_of(name), row_class, name)
 
 
+@cache
 def toml_table(name: str) -> dict[str, Any]:
     """Return a built-in TOML table; errors as for `read_toml`."""
     return read_toml(text_of(name), name)

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from realizer.core.array_types import Float32, Float64
 from realizer.core.errors import RealizerError
 from realizer.speech.align import features, sphinx
-from realizer.speech.align.alignment import AlignError, Alignment, moved, probability
+from realizer.speech.align.alignment import AlignError, Alignment, moved
 from realizer.speech.align.dtw_align import dtw_align
 from realizer.speech.align.model_align import model_align
 from realizer.speech.align.recording import mono, to_aligner
@@ -23,9 +23,6 @@ from realizer.speech.utterance import Recording, SpeechRequest, Utterance, Voice
 
 Aligner = Literal["pocketsphinx", "espeak"]
 
-# The cost (`Spans`) of a probability of 1/2, and the width of the curve, which separates right texts from
-# wrong ones in human speech and that of espeak-ng.
-COST, COST_OF_WORD = (0.935, -0.01), (1.0, -0.05)
 DOUBT = 0.5
 OTHER = "+f3"  # a female voice of espeak-ng, in addition to the default, which is male
 FASTEST = 4.0  # times the rate of a voice; nobody speaks faster
@@ -104,10 +101,7 @@ def align_request(
             found = uniform_align(heard, duration, reference)
         else:
             others = [speaker.say(replace(plain, voice=OTHER))] if voice is None else []
-            spans = dtw_align(heard, [reference, *others])
-            each = [probability(cost, COST_OF_WORD) for cost in spans.costs]
-            whole = probability(spans.cost, COST)
-            found = moved("espeak", spans.reference, duration, spans.words, spans.phonemes, each, whole)
+            found = dtw_align(heard, duration, [reference, *others])
     if found.confidence < DOUBT and found.aligner != "even":
         warnings += (f"the recording does not sound like the text (confidence {found.confidence:.2f})",)
     return replace(found, warnings=(*warnings, *found.warnings)), reference
@@ -142,49 +136,31 @@ def uniform_align(sound: Float32, duration: float, reference: Utterance) -> Alig
 
     words = spread(np.array([(w.start, w.end) for w in reference.words]))
     phonemes = spread(np.array([(p.start, p.end) for p in reference.phonemes]))
-    words_told = moved("even", reference, duration, words, phonemes, [0.0] * len(words), 0.0)
-    return replace(words_told, warnings=(INSTALL,))
+    found = moved("even", reference, duration, words, phonemes, [0.0] * len(words), 0.0)
+    return replace(found, warnings=(INSTALL,))
 
 
-def utterance_of_recording(
-    pcm: npt.ArrayLike, rate: float, request: SpeechRequest, *, aligner: Aligner | None = None
-) -> Utterance:
+@lru_cache(CACHED)
+def align_recording(request: SpeechRequest, recording: Recording) -> Utterance:
     """Return a recording as an utterance, with words, phonemes and marks at the times of alignment.
 
-    Args:
-        pcm: as in `align`.
-        rate: Hz.
-        request: the text with its marks; its voice, rate and duration are ignored.
-        aligner: the only one to use.
+    If it cannot be aligned, return the sound alone with a warning.
 
-    Raises:
-        AlignError, VoiceError: as `align`.
+    Args:
+        request: the text with its marks; its voice, rate and duration are ignored.
     """
-    sound = mono(pcm, rate)
-    found, reference = align_request(sound, int(rate), request, aligner, None)
+    pcm, rate = recording.pcm, recording.rate
+    try:
+        sound = mono(pcm, rate)
+        found, reference = align_request(sound, rate, request, None, None)
+    except RealizerError as error:
+        warning = f"the lips do not move with the recording: {error}"
+        return Utterance(len(pcm) / rate, (), (), {}, rate, pcm, (warning,))
     knots = [(time, at) for a, b in zip(reference.words, found.words, strict=True) for time, at in
              ((a.start, b.start), (a.end, b.end))]  # fmt: skip
     was, now = np.maximum.accumulate(np.array([(0.0, 0.0), *knots]), axis=0).T
     # Words that are adjacent in the reference may have a pause between them here: of knots at one time the
     # last counts, so that a mark before a word is at the start of that word.
     marks = {name: float(np.interp(time, was, now)) for name, time in reference.marks.items()}
-    return Utterance(
-        duration=len(sound) / rate,
-        words=found.words,
-        phonemes=found.phonemes,
-        marks=marks,
-        sample_rate=int(rate),
-        pcm=np.rint(sound * 32767).astype(np.int16),
-        warnings=found.warnings,
-    )
-
-
-@lru_cache(CACHED)
-def align_recording(request: SpeechRequest, recording: Recording) -> Utterance:
-    """Return `utterance_of_recording`, or the sound alone with a warning if it cannot be aligned."""
-    try:
-        return utterance_of_recording(recording.pcm, recording.rate, request)
-    except RealizerError as error:
-        warning = f"the lips do not move with the recording: {error}"
-        duration = len(recording.pcm) / recording.rate
-        return Utterance(duration, (), (), {}, recording.rate, recording.pcm, (warning,))
+    pcm = np.rint(sound * 32767).astype(np.int16)
+    return Utterance(len(sound) / rate, found.words, found.phonemes, marks, rate, pcm, found.warnings)

@@ -9,6 +9,7 @@ import numpy as np
 
 from realizer.core.array_types import Bool, Float32, Float64, Index
 from realizer.speech.align import features as f
+from realizer.speech.align.alignment import Alignment, moved, probability
 from realizer.speech.align.dtw import Observed, States, best_path, quiet, usual
 from realizer.speech.utterance import Utterance
 
@@ -17,28 +18,9 @@ FAR, NEAR = 30.0, 0.4  # s on each side of the diagonal, and of the coarse path,
 SLOWEST, FASTEST = 0.4, 2.5  # limits of the factor by which the reference is brought to the recording's rate
 LEAST = 0.2  # s of speech
 RIDGE = 30.0  # regularisation, in frames, when the reference is adapted to the recorded voice
-
-
-@dataclass(frozen=True, eq=False)
-class Spans:
-    """The result of an alignment, in seconds of the recording.
-
-    Attributes:
-        reference: the most similar of the voices' utterances.
-        words: (n, 2) start and end of each word of the reference.
-        phonemes: (m, 2) start and end of each phoneme; (nan, nan) for pauses.
-        costs: (n,) difference of the two in each word, where 1 is that of the same sounds in the wrong order:
-            under 0.9 for the same words in another voice, near 1 for other words.
-        cost: of the whole.
-        pace: the speed of the recording relative to the reference.
-    """
-
-    reference: Utterance
-    words: Float64
-    phonemes: Float64
-    costs: Float64
-    cost: float
-    pace: float
+# The cost of a probability of 1/2, and the width of the curve, which separates right texts from wrong ones in
+# human speech and that of espeak-ng. The cost of the same sounds in the wrong order is 1.
+COST, COST_OF_WORD = (0.935, -0.01), (1.0, -0.05)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +30,6 @@ class _Match:
     reference: Utterance
     spoken: Float32
     speed: float
-    pace: float
     states: States
     heard: Observed
     way: Index
@@ -61,11 +42,12 @@ class _Match:
         return float(self.spent[voiced].mean()) / self.null if voiced.any() else 1.0
 
 
-def dtw_align(sound: Float32, references: Sequence[Utterance]) -> Spans:
+def dtw_align(sound: Float32, duration: float, references: Sequence[Utterance]) -> Alignment:
     """Warp the most similar of several utterances to the recording.
 
     Args:
         sound: (n,) at 16 kHz, not silent.
+        duration: seconds of the recording.
         references: the same text by different voices, with sound.
 
     Source: Malfrère and Dutoit 1997, who align speech by synthesis.
@@ -91,14 +73,10 @@ def dtw_align(sound: Float32, references: Sequence[Utterance]) -> Spans:
         return _spans(np.array(pairs).reshape(-1, 2), fine, closely) * FINE / f.RATE
 
     words = spans([(word.start, word.end) for word in reference.words])
-    return Spans(
-        reference=reference,
-        words=words,
-        phonemes=spans([(p.start, p.end) if p.ipa else (np.nan, np.nan) for p in reference.phonemes]),
-        costs=_costs(words, way, best.spent, states.pause, best.null),
-        cost=best.cost,
-        pace=best.pace,
-    )
+    phonemes = spans([(p.start, p.end) if p.ipa else (np.nan, np.nan) for p in reference.phonemes])
+    costs = _costs(words, way, best.spent, states.pause, best.null)
+    each = [probability(cost, COST_OF_WORD) for cost in costs]
+    return moved("espeak", reference, duration, words, phonemes, each, probability(best.cost, COST))
 
 
 def _matched(sound: Float32, reference: Utterance) -> _Match:
@@ -107,15 +85,15 @@ def _matched(sound: Float32, reference: Utterance) -> _Match:
     seconds = sum(p.end - p.start for p in reference.phonemes if p.ipa)
     energy = f.energies(sound, COARSE)
     part, talks = f.voice_activity(f.loudness(energy))
-    pace = max(seconds, LEAST) / max(float(talks.sum()) * COARSE / f.RATE, LEAST)
-    speed = min(max(pace, SLOWEST), FASTEST)
+    speed = max(seconds, LEAST) / max(float(talks.sum()) * COARSE / f.RATE, LEAST)
+    speed = min(max(speed, SLOWEST), FASTEST)
     states = _states(spoken, COARSE * speed, reference)
     heard = _observed(f.cepstra(energy), part, talks, states)
     centre = np.rint(np.linspace(0, len(states.times) - 1, len(energy))).astype(np.intp)
     reach = max(round(FAR * f.RATE / COARSE), 1)
     way, spent = best_path(heard, states, centre, reach)
     null = _wrong_text_cost(heard, states, centre, reach)
-    return _Match(reference, spoken, speed, pace, states, heard, way, spent, null)
+    return _Match(reference, spoken, speed, states, heard, way, spent, null)
 
 
 def _states(spoken: Float32, hop: float, reference: Utterance) -> States:

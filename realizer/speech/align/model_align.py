@@ -98,7 +98,7 @@ def to_ipa(phone: str) -> str:
 
 @cache
 def _rows() -> tuple[Sounded, ...]:
-    return tables.read_csv(tables.text_of("phonemes_arpabet.csv"), Sounded, "phonemes_arpabet.csv")
+    return tables.csv_rows("phonemes_arpabet.csv", Sounded)
 
 
 @cache

@@ -11,7 +11,7 @@ import numpy as np
 
 from realizer.core.array_types import Int16
 from realizer.speech.espeak.document import Document
-from realizer.speech.utterance import Phoneme, Word, tile
+from realizer.speech.utterance import STRETCH, Phoneme, Utterance, Word, tile
 from realizer.speech.word_boundaries import boundaries, is_vowel, strip_marks
 
 STRESS = {"ˈ": 1, "ˌ": 2}
@@ -40,13 +40,6 @@ LAYOUT = np.dtype(
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Timeline:
-    words: tuple[Word, ...]
-    phonemes: tuple[Phoneme, ...]
-    marks: Mapping[str, float]
-
-
 @dataclass(slots=True)
 class WordGroup:
     """A run of phonemes that starts where espeak-ng reports a word, and the words in it."""
@@ -56,8 +49,8 @@ class WordGroup:
     words: list[int] = field(default_factory=list)
 
 
-def timeline(document: Document, events: Sequence[Event], pcm: Int16, rate: int, spoken: Spoken) -> Timeline:
-    """Return all times in seconds; phonemes and pauses cover 0..len(pcm)/rate without gaps.
+def timeline(document: Document, events: Sequence[Event], pcm: Int16, rate: int, spoken: Spoken) -> Utterance:
+    """Return the utterance; its phonemes and pauses cover 0..len(pcm)/rate without gaps.
 
     Args:
         document: the spoken document.
@@ -70,14 +63,17 @@ def timeline(document: Document, events: Sequence[Event], pcm: Int16, rate: int,
     begins, sounds, word_events = _sounds(events, len(pcm))
     words = _words(document, begins, sounds, word_events, len(pcm), spoken)
     marks = _marks(document, events, words)
-    phonemes = _phonemes(_with_closures(begins, sounds, pcm, rate), sounds, len(pcm), rate)
-    return Timeline(
+    return Utterance(
+        duration=len(pcm) / rate,
         words=tuple(
             Word(first / rate, last / rate, text)
             for (text, _), (first, last) in zip(document.words, words, strict=True)
         ),
-        phonemes=phonemes,
+        phonemes=_phonemes(_with_closures(begins, sounds, pcm, rate), sounds, len(pcm), rate),
         marks={name: sample / rate for name, sample in marks.items()},
+        sample_rate=rate,
+        pcm=pcm,
+        stretch=STRETCH,
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import threading
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from realizer.speech.engine_voice import EngineVoice
 from realizer.speech.espeak.document import write_document
 from realizer.speech.espeak.events import read_answer, timeline
 from realizer.speech.ssml import Script
-from realizer.speech.utterance import STRETCH, SpeechRequest, Utterance
+from realizer.speech.utterance import SpeechRequest, Utterance
 
 WORDS_A_MINUTE = 175  # espeak-ng's own rate
 SLOWEST, FASTEST = 80, 450  # words a minute; the range that it accepts
@@ -67,19 +68,10 @@ class EspeakVoice(EngineVoice):
         head, body = self._process.ask({"op": "say", "text": document.text, "voice": voice, "wpm": wpm})
         rate: int = hello["rate"]
         events, pcm = read_answer(head, body)
-        times = timeline(document, events, pcm, rate, lambda words: self._word_phonemes(voice, words))
-        if not any(phoneme.ipa for phoneme in times.phonemes) and not script.is_silent:
+        said = timeline(document, events, pcm, rate, lambda words: self._word_phonemes(voice, words))
+        if not any(phoneme.ipa for phoneme in said.phonemes) and not script.is_silent:
             warnings = (*warnings, "espeak-ng found nothing to pronounce in the text")
-        return Utterance(
-            duration=len(pcm) / rate,
-            stretch=STRETCH,
-            words=times.words,
-            phonemes=times.phonemes,
-            marks=times.marks,
-            sample_rate=rate,
-            pcm=pcm,
-            warnings=(*script.warnings, *warnings),
-        )
+        return replace(said, warnings=(*script.warnings, *warnings))
 
     def _word_phonemes(self, voice: str, words: Sequence[str]) -> list[tuple[str, ...]]:
         """Return the phonemes of each word spoken separately."""

@@ -55,9 +55,7 @@ class Sound:
 
 @cache
 def _signs() -> Mapping[str, SignRow]:
-    name = "phonemes_hibari.csv"
-    rows = tables.read_csv(tables.text_of(name), SignRow, name)
-    return {row.sign or " ": row for row in rows}
+    return {row.sign or " ": row for row in tables.csv_rows("phonemes_hibari.csv", SignRow)}
 
 
 def _role(sign: str) -> tuple[str, Role]:

@@ -6,7 +6,6 @@ import importlib.util
 import unicodedata
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -56,11 +55,6 @@ def voice_hint(name: str) -> str | None:
 
 
 ENGINE = Engine("hibari", Path(__file__).with_name("worker.py"), install_hint)
-
-
-@cache
-def _facts() -> dict[str, float]:
-    return tables.read_toml(tables.text_of("hibari.toml"), "hibari.toml")
 
 
 class HibariVoice(EngineVoice):
@@ -166,7 +160,7 @@ class HibariVoice(EngineVoice):
         self, sentence: Sequence[Token], run: ProsodyRun, pace: float, rate: int
     ) -> tuple[Int16, list[Sound]]:
         """Return the sound of a sentence and its phonemes, which cover it without gaps."""
-        facts = _facts()
+        facts = tables.toml_table("hibari.toml")
         speed = min(facts["fastest"], max(facts["slowest"], pace * run.prosody.rate))
         request = {"op": "say", "phonemes": signs_of(sentence)[0], "speed": speed, "pitch": run.prosody.pitch}
         head, body = self._process.ask(request)

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
-from typing import Any
 
 import numpy as np
 
 from realizer import tables
 from realizer.core.array_types import Float64, Int16
-from realizer.speech.utterance import Phoneme, Recording, SpeechRequest, Utterance, Word
+from realizer.speech.utterance import Phoneme, Recording, SpeechRequest, Utterance, Word, tile
 
 # Words of a voice are adjacent, while those of a recording may have gaps: the end of a word is mapped as a
 # time this much before the start of the next one.
@@ -139,7 +137,7 @@ def by_loudness(pcm: Int16, rate: int) -> tuple[Phoneme, ...]:
         pcm: (n,) mono.
         rate: Hz.
     """
-    facts = _facts()
+    facts = tables.toml_table("envelope.toml")
     size = max(1, round(facts["window"] * rate))
     count = -(-len(pcm) // size)
     padded = np.zeros(count * size)
@@ -149,17 +147,6 @@ def by_loudness(pcm: Int16, rate: int) -> tuple[Phoneme, ...]:
     if loud < facts["quietest"]:
         return ()
     level = 20 * np.log10(np.maximum(rms, 1e-9) / loud)
-    steps = facts["opening"]
-    sounds = [next((s["ipa"] for s in steps if one >= s["above"]), "") for one in level]
+    sounds = [next((s["ipa"] for s in facts["opening"] if one >= s["above"]), "") for one in level]
     starts = [k for k in range(count) if k == 0 or sounds[k] != sounds[k - 1]]
-    ends = [*starts[1:], count]
-    whole = len(pcm) / rate
-    return tuple(
-        Phoneme(first * size / rate, min(last * size / rate, whole), sounds[first])
-        for first, last in zip(starts, ends, strict=True)
-    )
-
-
-@cache
-def _facts() -> dict[str, Any]:
-    return tables.read_toml(tables.text_of("envelope.toml"), "envelope.toml")
+    return tile([(k * size, sounds[k], 0) for k in starts], len(pcm), rate)

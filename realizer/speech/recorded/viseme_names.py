@@ -34,7 +34,7 @@ def sound_of(set: str, viseme: str) -> str:
 
 @cache
 def _sounds() -> Mapping[str, Mapping[str, str]]:
-    rows = tables.read_csv(tables.text_of("visemes_given.csv"), NamedViseme, "visemes_given.csv")
+    rows = tables.csv_rows("visemes_given.csv", NamedViseme)
     return {
         name: {r.viseme: r.ipa for r in rows if r.set == name} for name in dict.fromkeys(r.set for r in rows)
     }

@@ -24,7 +24,7 @@ def test_fap_regions_are_the_groups_of_the_standard() -> None:
 
 def test_regions_refuse_missing_and_repeated_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     text = tables.text_of(control_groups.FILE).replace("[61, 62, 63, 64]", "[61, 62, 63, 63]", 1)
-    monkeypatch.setattr(tables, "text_of", lambda _: text)
+    monkeypatch.setattr(tables, "toml_table", lambda name: tables.read_toml(text, name))
     control_groups.fap_regions.cache_clear()
     with pytest.raises(TableError, match=r"regions.toml, fap: .* \[63, 64\]"):
         control_groups.fap_regions()

@@ -11,7 +11,6 @@ from realizer.speech.align.aligner import (
     align,
     align_recording,
     uniform_align,
-    utterance_of_recording,
 )
 from realizer.speech.align.alignment import AlignError, Alignment
 from realizer.speech.align.sphinx import install_hint
@@ -160,8 +159,9 @@ def test_uniform_align_keeps_the_proportions_of_the_reference() -> None:
 
 
 @pytest.mark.espeak
-def test_utterance_of_recording_places_marks_before_their_words(sentence) -> None:
-    said = utterance_of_recording(sentence.pcm, sentence.rate, SpeechRequest(MARKED, ("a", "b", "c", "d")))
+def test_align_recording_places_marks_before_their_words(sentence) -> None:
+    recording = Recording(sentence.rate, sentence.pcm)
+    said = align_recording(SpeechRequest(MARKED, ("a", "b", "c", "d")), recording)
     starts = {word.text: word.start for word in said.words}
     assert said.marks["a"] == starts["The"]
     assert said.marks["b"] == starts["carried"]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from realizer.speech.espeak.document import Document
-from realizer.speech.espeak.events import END, MARK, PHONEME, WORD, Event, Timeline, read_answer, timeline
+from realizer.speech.espeak.events import END, MARK, PHONEME, WORD, Event, read_answer, timeline
 from realizer.speech.espeak.voice import EspeakVoice
 from realizer.speech.espeak.worker import Event as Struct
 from realizer.speech.utterance import Phoneme, SpeechRequest, Utterance, Word
@@ -32,7 +32,7 @@ def document(*words: str, marks: tuple[PlacedMark, ...] = ()) -> Document:
     return Document("", tuple((word, 10 * k) for k, word in enumerate(words)), marks)
 
 
-def times_of(document: Document, events: list[Event], alone: dict[str, list[str]] | None = None) -> Timeline:
+def times_of(document: Document, events: list[Event], alone: dict[str, list[str]] | None = None) -> Utterance:
     pcm = np.full(1000, 1000, np.int16)
     return timeline(document, events, pcm, RATE, lambda words: [(alone or {})[word] for word in words])
 
