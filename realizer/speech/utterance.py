@@ -130,18 +130,10 @@ def tile(starts: Iterable[tuple[float, str, int]], end: float, rate: float = 1.0
 
 
 class Voice(Protocol):
-    """A speech synthesizer. Its methods block, and may be called from any thread."""
+    """A speech synthesizer; see `base_voice.BaseVoice`."""
 
     name: str
 
-    def say(self, request: SpeechRequest) -> Utterance:
-        """Synthesize speech.
+    def say(self, request: SpeechRequest) -> Utterance: ...
 
-        Raises:
-            VoiceError: if the engine is missing or died; the text says what to do. The next call restarts it.
-        """
-        ...
-
-    def close(self) -> None:
-        """End the engine's process, if it has one. May be called twice."""
-        ...
+    def close(self) -> None: ...

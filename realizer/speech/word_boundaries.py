@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -54,6 +55,13 @@ def boundaries(
         passed += len(word)
     found[0] = 0
     return found
+
+
+def divided(
+    own: Sequence[int], expected: Sequence[Sequence[str]], heard: Sequence[str], hints: Collection[int] = ()
+) -> list[Sequence[int]]:
+    """Return the part of each word of `own`, items of the heard phonemes; the rest is as for `boundaries`."""
+    return [own[first:last] for first, last in pairwise([*boundaries(expected, heard, hints), len(own)])]
 
 
 def strip_marks(ipa: str) -> str:

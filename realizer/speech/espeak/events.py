@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
@@ -12,7 +11,7 @@ import numpy as np
 from realizer.core.array_types import Int16
 from realizer.speech.espeak.document import Document
 from realizer.speech.utterance import STRETCH, Phoneme, Utterance, Word, tile
-from realizer.speech.word_boundaries import boundaries, is_vowel, strip_marks
+from realizer.speech.word_boundaries import divided, is_vowel, strip_marks
 
 STRESS = {"ˈ": 1, "ˌ": 2}
 SILENCE = 8  # of 32768; a closure is exact zeros, except for the tail of the sound before
@@ -38,15 +37,6 @@ LAYOUT = np.dtype(
     ],
     align=True,
 )
-
-
-@dataclass(slots=True)
-class WordGroup:
-    """A run of phonemes that starts where espeak-ng reports a word, and the words in it."""
-
-    sample: int
-    first: int  # of the phonemes
-    words: list[int] = field(default_factory=list)
 
 
 def timeline(document: Document, events: Sequence[Event], pcm: Int16, rate: int, spoken: Spoken) -> Utterance:
@@ -120,40 +110,31 @@ def _words(
     if not document.words:
         return []
     starts = {place: index for index, (_, place) in enumerate(document.words)}
-    groups: list[WordGroup] = []
-    last = -1
+    # Runs of phonemes that start where espeak-ng reports a word: (sample, first phoneme, first word).
+    groups: list[tuple[int, int, int]] = []
     for sample, place, first in events:
         # After some punctuation the place is the blank before the word.
         index = starts.get(place, starts.get(place + 1, -1))
-        if index > last:
-            groups.append(WordGroup(sample, first))
-            groups[-1].words.append(index)
-            last = index
+        if index > (groups[-1][2] if groups else -1):
+            groups.append((sample, first, index))
     if not groups:
-        groups = [WordGroup(begins[0] if begins else 0, 0)]
-    if not groups[0].words or groups[0].words[0] != 0:  # words before the first reported one
-        groups[0].words = [0]
-        groups[0].first = 0
-    bounds = [group.words[0] for group in groups] + [len(document.words)]
-    for k, group in enumerate(groups):
-        group.words = list(range(bounds[k], bounds[k + 1]))
-    merged = [i for group in groups if len(group.words) > 1 for i in group.words]
+        groups = [(begins[0] if begins else 0, 0, 0)]
+    elif groups[0][2]:  # words before the first reported one
+        groups[0] = (groups[0][0], 0, 0)
+    following = [*groups[1:], (end, len(sounds), len(document.words))]
+    inside = [range(group[2], after[2]) for group, after in zip(groups, following, strict=True)]
+    merged = [i for words in inside if len(words) > 1 for i in words]
     alone = dict(zip(merged, spoken([document.words[i][0] for i in merged]), strict=True)) if merged else {}
     inner = {first: sample for sample, _, first in events}
 
     found: list[tuple[int, int]] = []
-    for k, group in enumerate(groups):
-        stop = groups[k + 1].first if k + 1 < len(groups) else len(sounds)
-        own = [i for i in range(group.first, stop) if sounds[i]]  # without pauses
-        places = [0]
-        if len(group.words) > 1:
-            hints = {n for n, i in enumerate(own) if i in inner}
-            places = boundaries([alone[w] for w in group.words], [sounds[i] for i in own], hints)
-        places.append(len(own))
-        for n in range(len(group.words)):
-            part = own[places[n] : places[n + 1]]
+    for (sample, opens, _), (_, stop, _), words in zip(groups, following, inside, strict=True):
+        own = [i for i in range(opens, stop) if sounds[i]]  # without pauses
+        hints = {n for n, i in enumerate(own) if i in inner}
+        parts = divided(own, [alone.get(i, ()) for i in words], [sounds[i] for i in own], hints)
+        for n, part in enumerate(parts):
             if n == 0:
-                first = group.sample
+                first = sample
             elif part:
                 first = inner.get(part[0], begins[part[0]])
             else:

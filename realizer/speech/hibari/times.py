@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 
 from realizer import tables
 from realizer.core.array_types import Int16
-from realizer.speech.word_boundaries import boundaries, is_vowel, strip_marks
+from realizer.speech.word_boundaries import divided, is_vowel
 from realizer.speech.words import words_in
 
 Role = Literal["sound", "primary", "secondary", "long", "pause", "joint"]
@@ -31,15 +32,6 @@ class SignRow:
     sign: str
     ipa: str
     role: Role
-
-
-@dataclass(frozen=True, slots=True)
-class Lengths:
-    """The length of each sign of a sentence, in samples; they add up to its sound."""
-
-    lead: int
-    signs: tuple[int, ...]
-    tail: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,16 +65,19 @@ def signs_of(sentence: Sequence[Token]) -> tuple[str, tuple[int, ...]]:
     return signs, tuple(owners)
 
 
-def sounds(sentence: Sequence[Token], lengths: Lengths) -> list[Sound]:
+def sounds(sentence: Sequence[Token], lengths: Sequence[int]) -> list[Sound]:
     """Return phonemes and pauses in order, which cover the sentence from 0 without gaps.
 
     The length of a stress sign is added to its vowel, that of a blank to the phoneme before.
+
+    Args:
+        lengths: in samples: of the silence before, of each sign, and of the silence after.
     """
     signs, owners = signs_of(sentence)
-    found = [Sound("", 0, 0, lengths.lead, 0)]
-    at = lengths.lead
+    at, *each, tail = lengths
+    found = [Sound("", 0, 0, at, 0)]
     opened: tuple[int, int] | None = None  # stress, and the start of its sign
-    for sign, owner, length in zip(signs, owners, lengths.signs, strict=True):
+    for sign, owner, length in zip(signs, owners, each, strict=True):
         ipa, role = _role(sign)
         end = at + length
         last = found[-1]
@@ -99,7 +94,7 @@ def sounds(sentence: Sequence[Token], lengths: Lengths) -> list[Sound]:
             found[-1] = Sound(last.ipa + mark, last.stress, last.start, end, last.token)
         at = end
     last = found[-1]
-    end = at + lengths.tail
+    end = at + tail
     if last.ipa and end > last.end:
         found.append(Sound("", 0, last.end, end, last.token))
     else:
@@ -123,11 +118,10 @@ def trim_to_sound(timed: Sequence[Sound], pcm: Int16) -> list[Sound]:
     return found
 
 
-def guess_lengths(sentence: Sequence[Token], pcm: Int16) -> Lengths:
-    """Return estimated lengths, for models that do not report them: shares of the audible part."""
-    loud = np.flatnonzero(
-        np.abs(pcm.astype(np.int32)) > QUIET * max(1, int(np.abs(pcm.astype(np.int32)).max()))
-    )
+def guess_lengths(sentence: Sequence[Token], pcm: Int16) -> list[int]:
+    """Return lengths for `sounds`, for models that do not report them: shares of the audible part."""
+    amplitudes = np.abs(pcm.astype(np.int32))
+    loud = np.flatnonzero(amplitudes > QUIET * max(1, int(amplitudes.max())))
     first, last = (int(loud[0]), int(loud[-1]) + 1) if len(loud) else (0, len(pcm))
     shares = []
     for sign in signs_of(sentence)[0]:
@@ -136,9 +130,9 @@ def guess_lengths(sentence: Sequence[Token], pcm: Int16) -> Lengths:
         shares.append(SHARES.get(kind, 0.0))
     total = sum(shares)
     if not total:
-        return Lengths(0, (0,) * len(shares), len(pcm))
+        return [0] * (len(shares) + 1) + [len(pcm)]
     borders = first + np.rint(np.cumsum([0.0, *shares]) / total * (last - first)).astype(int)
-    return Lengths(first, tuple(np.diff(borders).tolist()), len(pcm) - int(borders[-1]))
+    return np.diff(borders, prepend=0, append=len(pcm)).tolist()
 
 
 def word_spans(
@@ -179,16 +173,11 @@ def word_spans(
 
     order = sorted(begins)
     found: list[tuple[int, int]] = []
-    for k, opens in enumerate(order):
-        inside = range(opens, order[k + 1] if k + 1 < len(order) else len(words))
-        until = begins[order[k + 1]] if k + 1 < len(order) else len(heard)
+    for opens, closes in pairwise([*order, len(words)]):
+        inside, until = range(opens, closes), begins.get(closes, len(heard))
         own = [i for i in range(begins[opens], until) if heard[i].ipa]
-        at = [0]
-        if len(inside) > 1:
-            at = boundaries(alone([words[i] for i in inside]), [strip_marks(heard[i].ipa) for i in own])
-        at.append(len(own))
-        for n in range(len(inside)):
-            part = own[at[n] : at[n + 1]]
+        expected = alone([words[i] for i in inside]) if len(inside) > 1 else [()]
+        for part in divided(own, expected, [heard[i].ipa for i in own]):
             last = found[-1][1] if found else begins[opens]
             found.append((part[0], part[-1] + 1) if part else (last, last))
     return found

@@ -17,7 +17,6 @@ from realizer.speech.engine_process import Engine
 from realizer.speech.engine_voice import EngineVoice
 from realizer.speech.hibari.text import ProsodyRun, runs
 from realizer.speech.hibari.times import (
-    Lengths,
     Sound,
     Token,
     guess_lengths,
@@ -168,7 +167,7 @@ class HibariVoice(EngineVoice):
         pcm = np.rint(np.clip(np.frombuffer(body, "<f4") * volume, -32768, 32767)).astype(np.int16)
         if head["signs"] is None:
             return pcm, sounds(sentence, guess_lengths(sentence, pcm))
-        timed = sounds(sentence, Lengths(head["lead"], tuple(head["signs"]), head["tail"]))
+        timed = sounds(sentence, [head["lead"], *head["signs"], head["tail"]])
         shift = round(facts["offset"] * rate)
         borders = [0, *(min(max(0, sound.end + shift), len(pcm)) for sound in timed[:-1]), len(pcm)]
         heard = [
@@ -182,7 +181,7 @@ class HibariVoice(EngineVoice):
         head, _ = self._process.ask({"op": "read", "texts": list(words)})
         found = []
         for text in head["texts"]:
-            each = (sounds(sentence, Lengths(0, (1,) * len(signs_of(sentence)[0]), 0)) for sentence in text)
+            each = (sounds(sentence, [0, *(1 for _ in signs_of(sentence)[0]), 0]) for sentence in text)
             found.append([sound.ipa for timed in each for sound in timed if sound.ipa])
         return found
 
@@ -193,7 +192,7 @@ def _is_latin(letter: str) -> bool:
 
 def _ends_in_pause(sentence: Sequence[Token]) -> bool:
     signs = signs_of(sentence)[0].rstrip()
-    return not sounds([("", signs[-1:], False)], Lengths(0, (1,), 0))[-1].ipa
+    return not sounds([("", signs[-1:], False)], [0, 1, 0])[-1].ipa
 
 
 def _warnings(request: SpeechRequest, track: SpeechBuffer, hello: dict[str, Any]) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from realizer.speech.utterance import Phoneme, Recording, SpeechRequest, Utteran
 # time this much before the start of the next one.
 EDGE = 1e-4  # s
 SIDE = 1e-3  # letters
+
+Timed = TypeVar("Timed", Word, Phoneme)
 
 
 def utterance_of(request: SpeechRequest, recording: Recording) -> Utterance:
@@ -41,23 +44,13 @@ def utterance_of(request: SpeechRequest, recording: Recording) -> Utterance:
         own = words or _one_word(phonemes, reference)
         was, now = _knots(reference.words, own)
         marks = {name: float(np.interp(time, was, now)) for name, time in reference.marks.items()}
-        if not words:
-            words = tuple(
-                replace(w, start=float(s), end=float(e))
-                for w, s, e in zip(
-                    reference.words,
-                    np.interp([w.start for w in reference.words], was, now),
-                    np.interp([w.end - EDGE for w in reference.words], was, now),
-                    strict=True,
-                )
-            )
-        if not phonemes:
-            phonemes = tuple(
-                replace(
-                    p, start=float(np.interp(p.start, was, now)), end=float(np.interp(p.end - EDGE, was, now))
-                )
-                for p in reference.phonemes
-            )
+
+        def moved(part: Timed) -> Timed:
+            start, end = np.interp((part.start, part.end - EDGE), was, now).tolist()
+            return replace(part, start=start, end=end)
+
+        words = words or tuple(map(moved, reference.words))
+        phonemes = phonemes or tuple(map(moved, reference.phonemes))
         return _utterance(recording, words, phonemes, marks)
     return _utterance(recording, words, phonemes or _opening(recording), {})
 

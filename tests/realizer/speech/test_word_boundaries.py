@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.speech.word_boundaries import MAX_CELLS, boundaries, is_vowel, strip_marks
+from realizer.speech.word_boundaries import MAX_CELLS, boundaries, divided, is_vowel, strip_marks
 
 SOUNDS = st.sampled_from(["a", "ˈɪ", "iː", "t", "n", "ʃ", "m", "oʊ"])
 WORDS = st.lists(st.lists(SOUNDS, max_size=5), min_size=1, max_size=6)
@@ -42,6 +42,11 @@ def test_boundaries_of_long_texts_are_shares() -> None:
     words = [["a"] * 100, ["b"] * 300]
     heard = ["a"] * (MAX_CELLS // 400 + 1)
     assert boundaries(words, heard) == [0, round(len(heard) / 4)]
+
+
+def test_divided_returns_the_items_of_each_word() -> None:
+    assert divided([3, 4, 6], [["aɪ"], ["æ", "m"]], ["aɪ", "æ", "m"]) == [[3], [4, 6]]
+    assert divided([3, 4, 6], [()], ["aɪ", "æ", "m"]) == [[3, 4, 6]]
 
 
 def test_strip_marks_removes_stress_and_length() -> None:

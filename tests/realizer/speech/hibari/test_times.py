@@ -7,7 +7,6 @@ import pytest
 
 from realizer.speech.hibari.times import (
     KEPT_OF_LAST,
-    Lengths,
     Sound,
     guess_lengths,
     sounds,
@@ -18,7 +17,7 @@ from realizer.speech.hibari.times import (
 
 def test_sounds_add_stress_signs_to_vowels_and_blanks_to_the_sound_before() -> None:
     sentence = [("Hi", "hˈI", True), ("you", "jˌu", False), (".", ".", False)]
-    found = sounds(sentence, Lengths(10, (2, 3, 4, 1, 5, 6, 7, 8), 9))
+    found = sounds(sentence, [10, 2, 3, 4, 1, 5, 6, 7, 8, 9])
     assert [(s.ipa, s.stress, s.start, s.end, s.token) for s in found] == [
         ("", 0, 0, 10, 0),
         ("h", 0, 10, 12, 0),
@@ -31,7 +30,7 @@ def test_sounds_add_stress_signs_to_vowels_and_blanks_to_the_sound_before() -> N
 
 def test_word_spans_divide_expanded_words_by_their_sounds() -> None:
     tokens = [("at", "æt", True), ("seven", "sɛvən", True), ("P.M.", "piɛm", True), ("now", "nW", False)]
-    heard = sounds(tokens, Lengths(0, (1,) * 16, 0))
+    heard = sounds(tokens, [0] + [1] * 16 + [0])
     alone = {"at": "æt", "7": "sɛvən", "pm": "piɛm"}
     separate = []
 
@@ -45,7 +44,7 @@ def test_word_spans_divide_expanded_words_by_their_sounds() -> None:
 
 
 def test_word_spans_are_empty_for_words_without_sounds() -> None:
-    heard = sounds([("one", "wʌn", False)], Lengths(0, (1,) * 3, 0))
+    heard = sounds([("one", "wʌn", False)], [0, 1, 1, 1, 0])
     assert word_spans(["one", "?"], [("one", "wʌn", False)], heard, lambda words: [("w",), ()]) == [
         (0, 3),
         (3, 3),
@@ -67,9 +66,9 @@ def test_guess_lengths_divides_the_audible_part() -> None:
     pcm = np.zeros(100, np.int16)
     pcm[10:90] = 5000
     sentence = [("aka", "aka", False)]
-    lengths = guess_lengths(sentence, pcm)
-    assert lengths.lead + sum(lengths.signs) + lengths.tail == len(pcm)
-    assert (lengths.lead, lengths.tail) == (10, 10)
-    assert lengths.signs[0] == pytest.approx(lengths.signs[2], abs=1)
-    assert lengths.signs[0] > lengths.signs[1]
-    assert guess_lengths([("", "", False)], pcm) == Lengths(0, (), 100)
+    lead, *signs, tail = guess_lengths(sentence, pcm)
+    assert lead + sum(signs) + tail == len(pcm)
+    assert (lead, tail) == (10, 10)
+    assert signs[0] == pytest.approx(signs[2], abs=1)
+    assert signs[0] > signs[1]
+    assert guess_lengths([("", "", False)], pcm) == [0, 100]
