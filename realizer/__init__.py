@@ -13,62 +13,39 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from realizer.core.errors import (
-        FaceError,
-        RealizerError,
-        RenderError,
-        ScheduleError,
-        TableError,
-        VoiceError,
-    )
-    from realizer.core.settings import Settings
-    from realizer.face.load import load_face
-    from realizer.face.model import Face
-    from realizer.offline import realize, schedule
-    from realizer.playback.player import Player
-    from realizer.realization import Realization
-    from realizer.scheduling.timing import Schedule
-    from realizer.server.serve import serve
+    from realizer.core.errors import FaceError as FaceError
+    from realizer.core.errors import RealizerError as RealizerError
+    from realizer.core.errors import RenderError as RenderError
+    from realizer.core.errors import ScheduleError as ScheduleError
+    from realizer.core.errors import TableError as TableError
+    from realizer.core.errors import VoiceError as VoiceError
+    from realizer.core.settings import Settings as Settings
+    from realizer.face.load import load_face as load_face
+    from realizer.face.model import Face as Face
+    from realizer.offline import realize as realize
+    from realizer.offline import schedule as schedule
+    from realizer.playback.player import Player as Player
+    from realizer.realization import Realization as Realization
+    from realizer.scheduling.timing import Schedule as Schedule
+    from realizer.server.serve import serve as serve
 
 __version__ = "0.1.0"
 
-# The module of each public name. They are imported on first use: `import realizer` stays quick, and works
+# The public names of each module. They are imported on first use: `import realizer` stays quick, and works
 # without the optional parts.
-_HOMES = {
-    "Face": "realizer.face.model",
-    "FaceError": "realizer.core.errors",
-    "Player": "realizer.playback.player",
-    "RealizerError": "realizer.core.errors",
-    "Realization": "realizer.realization",
-    "RenderError": "realizer.core.errors",
-    "Schedule": "realizer.scheduling.timing",
-    "ScheduleError": "realizer.core.errors",
-    "Settings": "realizer.core.settings",
-    "TableError": "realizer.core.errors",
-    "VoiceError": "realizer.core.errors",
-    "load_face": "realizer.face.load",
-    "realize": "realizer.offline",
-    "schedule": "realizer.offline",
-    "serve": "realizer.server.serve",
+_NAMES = {
+    "core.errors": "FaceError RealizerError RenderError ScheduleError TableError VoiceError",
+    "core.settings": "Settings",
+    "face.load": "load_face",
+    "face.model": "Face",
+    "offline": "realize schedule",
+    "playback.player": "Player",
+    "realization": "Realization",
+    "scheduling.timing": "Schedule",
+    "server.serve": "serve",
 }
-
-__all__ = [
-    "Face",
-    "FaceError",
-    "Player",
-    "Realization",
-    "RealizerError",
-    "RenderError",
-    "Schedule",
-    "ScheduleError",
-    "Settings",
-    "TableError",
-    "VoiceError",
-    "load_face",
-    "realize",
-    "schedule",
-    "serve",
-]
+_HOMES = {name: f"realizer.{module}" for module, names in _NAMES.items() for name in names.split()}
+__all__ = sorted(_HOMES)
 
 
 def __getattr__(name: str) -> Any:

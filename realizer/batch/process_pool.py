@@ -36,11 +36,6 @@ class ProcessPool:
         self.count = count
         self._workers: list[_WorkerProcess] = []
 
-    @property
-    def pids(self) -> tuple[int, ...]:
-        """The ids of the running processes."""
-        return tuple(worker.pid for worker in self._workers)
-
     def perform(self, tasks: Iterable[Task]) -> Iterator[Outcome]:
         """Yield the outcome of each task as it arrives. A task whose process dies is repeated."""
         source = ((task, 1) for task in tasks)
@@ -102,11 +97,6 @@ class _WorkerProcess:
                     del os.environ[name]
         theirs.close()
         self.work: tuple[Task, int] | None = None
-
-    @property
-    def pid(self) -> int:
-        assert self._process.pid is not None
-        return self._process.pid
 
     def send(self, work: tuple[Task, int]) -> None:
         self.work = work

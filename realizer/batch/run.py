@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from itertools import chain
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from realizer.batch.documents import Document
 from realizer.batch.manifest import Manifest, Row
@@ -13,21 +13,13 @@ from realizer.batch.task import Options, Task, fingerprint, key_of
 from realizer.batch.worker import Outcome, failure
 from realizer.core.atomic_files import write_bytes
 
-
-class Workers(Protocol):
-    """A `ProcessPool` or a `DaskCluster`."""
-
-    def perform(self, tasks: Iterable[Task]) -> Iterator[Outcome]:
-        """Yield the outcome of each task, in any order."""
-        ...
-
-    def close(self) -> None:
-        """End the workers, or disconnect from them."""
-        ...
+if TYPE_CHECKING:
+    from realizer.batch.dask_cluster import DaskCluster
+    from realizer.batch.process_pool import ProcessPool
 
 
 def batch(
-    documents: Iterable[Document], folder: Path, options: Options, workers: Workers
+    documents: Iterable[Document], folder: Path, options: Options, workers: ProcessPool | DaskCluster
 ) -> Iterator[tuple[Row, bool]]:
     """Play the documents that have no valid outputs yet. Yield (row of the manifest, whether it was skipped).
 

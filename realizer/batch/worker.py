@@ -62,10 +62,6 @@ class _Speaker:
         except VoiceError as error:
             raise SpeechFailedError(str(error)) from None
 
-    @property
-    def pid(self) -> int | None:
-        return getattr(self._voice, "pid", None)
-
     def close(self) -> None:
         if self._voice is not None:
             self._voice.close()
@@ -113,16 +109,6 @@ class Worker:
             },
         }
         return Outcome(row, files)
-
-    @property
-    def voice_pid(self) -> int | None:
-        """The id of the voice's process, or None."""
-        return self._speaker.pid
-
-    @property
-    def drawing_pids(self) -> tuple[int, ...]:
-        """The ids of the renderers' processes."""
-        return tuple(renderer.pid for renderer in self._renderers.values() if renderer.pid is not None)
 
     def close(self) -> None:
         """Close the voice and the renderers."""

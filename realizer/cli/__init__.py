@@ -4,30 +4,23 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from typing import NoReturn
 
 import click
 
 import realizer
 from realizer.cli import options
-from realizer.cli.align import align
-from realizer.cli.batch import batch
-from realizer.cli.check import check
-from realizer.cli.demo import demo
-from realizer.cli.doctor import doctor, outputs, voices
-from realizer.cli.emotion import emotion
-from realizer.cli.enrich import enrich
-from realizer.cli.expressions import expressions
-from realizer.cli.faces import faces
-from realizer.cli.fap import fap
-from realizer.cli.realize import realize, schedule
-from realizer.cli.replay import replay
-from realizer.cli.serve import serve
-from realizer.cli.timeline import timeline
-from realizer.cli.track import track
 from realizer.core.errors import RealizerError, TableError
 
 __all__ = ["main"]
+
+COMMANDS = """
+    align batch check demo doctor emotion enrich expressions faces fap outputs realize replay schedule serve
+    timeline track voices
+"""
+# Commands that are not in the module of their name.
+MODULES = {"outputs": "doctor", "schedule": "realize", "voices": "doctor"}
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -61,26 +54,8 @@ def cli(context: click.Context, verbose: bool, quiet: bool) -> None:
     options.configure_logging(context, quiet=quiet, verbose=verbose)
 
 
-for command in (
-    serve,
-    realize,
-    schedule,
-    check,
-    emotion,
-    track,
-    fap,
-    enrich,
-    expressions,
-    timeline,
-    faces,
-    voices,
-    align,
-    outputs,
-    batch,
-    replay,
-    doctor,
-    demo,
-):
+for name in COMMANDS.split():
+    command: click.Command = getattr(import_module(f"realizer.cli.{MODULES.get(name, name)}"), name)
     options.verbosity(command)
     cli.add_command(command)
 
@@ -101,12 +76,10 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     except click.ClickException as error:
         error.show()
         sys.exit(error.exit_code)
-    except TableError as error:  # in a file of the user: rules, a mapping, words
-        click.echo(f"realizer: {error}", err=True)
-        sys.exit(2)
     except RealizerError as error:
         click.echo(f"realizer: {error}", err=True)
-        sys.exit(3)
+        # A TableError is in a file of the user: rules, a mapping, words.
+        sys.exit(2 if isinstance(error, TableError) else 3)
     except OSError as error:
         click.echo(
             f"realizer: {error.filename or ''}: {error.strerror or error}".replace(" : ", " "), err=True

@@ -14,7 +14,8 @@ from realizer.cli import options
 from realizer.cli.realize import PICTURES, performance_options
 
 if TYPE_CHECKING:
-    from realizer.batch.run import Workers
+    from realizer.batch.dask_cluster import DaskCluster
+    from realizer.batch.process_pool import ProcessPool
     from realizer.batch.task import Options
 
 STATUS = ("done", "refused", "failed")
@@ -83,10 +84,8 @@ def batch(
     from realizer.batch.documents import DocumentsError, find
     from realizer.batch.run import batch as run
 
-    try:
+    with options.usage_errors(DocumentsError):
         documents = find(_read_places(places))
-    except DocumentsError as error:
-        raise click.UsageError(str(error)) from None
     counts: Counter[str] = Counter()
     dropped = 0
     pool = _workers(how, min(workers or _core_count(), len(documents)), dask)
@@ -144,7 +143,7 @@ def _read_places(places: tuple[str, ...]) -> list[str]:
     return found
 
 
-def _workers(how: Options, workers: int, dask: str | None) -> Workers:
+def _workers(how: Options, workers: int, dask: str | None) -> ProcessPool | DaskCluster:
     if dask is not None:
         from realizer.batch.dask_cluster import DaskCluster
 

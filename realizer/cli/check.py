@@ -6,18 +6,17 @@ import os
 import shutil
 import sys
 from itertools import chain, islice
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from realizer.cli import options
 from realizer.cli.enrich import language, languages_in, mood, role, warn_unknown_languages, words, words_for
-from realizer.cli.timeline import advice_on, faults_in, is_timeline
+from realizer.cli.timeline import SUFFIXES, advice_on, faults_in
 from realizer.core.options import PlayOptions
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from realizer.tables.knowledge import Mood, Role
 
 MAX_ADVICE = 20  # per block: one mistake is often repeated all over a document
@@ -84,7 +83,7 @@ def check(
     faults = 0
     warned: set[str] = set()
     for name, text in zip(documents, options.read_documents(documents), strict=True):
-        if is_timeline(name):
+        if Path(name).suffix.lower() in SUFFIXES:
             faults += _check_timeline(name, text, chosen.expressions, role, mood)
             continue
         # Each file has a player of its own, so that reports are independent.

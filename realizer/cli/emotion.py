@@ -109,7 +109,7 @@ def _requested_profile(
     given = sum(option is not None for option in (word, angle, valence))
     if given > 1 or not (given or wheel_only):
         raise click.UsageError("wanted one of WORD, --angle, or --valence with --arousal")
-    try:
+    with options.usage_errors(ValueError):
         if angle is not None:
             return wheel(angle, activation, profiles)
         if valence is not None and arousal is not None:
@@ -117,8 +117,6 @@ def _requested_profile(
         if word is not None and word.lower().endswith(".txt"):
             return _read_profile(Path(word))
         return None if word is None else profile_of(word, profiles)
-    except ValueError as error:
-        raise click.UsageError(str(error)) from None
 
 
 def _read_profile(path: Path) -> Profile:

@@ -74,10 +74,8 @@ def words_for(language: str | None, file: Path | None) -> Words:
     from realizer.knowledge.word_languages import Words
     from realizer.tables.emotional_words import words_of
 
-    try:
+    with options.usage_errors(TableError):
         own = words_of(file) if file is not None else None
-    except TableError as error:
-        raise click.UsageError(str(error)) from None
     return Words(options.settings(language=language).language, own, everywhere=language is None)
 
 

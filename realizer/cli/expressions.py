@@ -133,10 +133,8 @@ def find(
 def _find_similar(like: Path, library: Sequence[Expression], face: str | None) -> Likeness:
     from realizer.analysis.picture_search import UnknownPictureError, by_picture, read_picture
 
-    try:
+    with options.usage_errors(UnknownPictureError):
         return by_picture(read_picture(like), library, None if face is None else [face])
-    except UnknownPictureError as error:
-        raise click.UsageError(str(error)) from None
 
 
 def _check_picture(output: Path | None, face: str) -> None:

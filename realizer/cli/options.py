@@ -112,10 +112,8 @@ def settings(**flags: Any) -> Settings:
     """
     from realizer.core.settings import Settings, SettingsError
 
-    try:
+    with usage_errors(SettingsError):
         return Settings.read(flags)
-    except SettingsError as error:
-        raise click.UsageError(str(error)) from None
 
 
 def play_settings(options: Mapping[str, Any], **flags: Any) -> Settings:
@@ -127,12 +125,19 @@ def play_settings(options: Mapping[str, Any], **flags: Any) -> Settings:
     return settings(**flags, idle=False if options["no_idle"] else None)
 
 
-def playback_options(command: Command) -> Command:
-    """Add --voice, --scene, --media, --expressions and --strict."""
-    strict = click.option("--strict", is_flag=True, help="Exit with 1 if any behaviour was dropped.")
-    for option in (strict, expressions, media, scene, voice):
-        command = option(command)
-    return command
+def several(*options: Callable[[Any], Any]) -> Callable[[Command], Command]:
+    """Return a decorator that adds these options to a command."""
+
+    def add(command: Command) -> Command:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return add
+
+
+strict = click.option("--strict", is_flag=True, help="Exit with 1 if any behaviour was dropped.")
+playback_options = several(voice, scene, media, expressions, strict)
 
 
 def read_documents(names: Iterable[str]) -> list[bytes]:
@@ -174,16 +179,24 @@ def read_scene(path: str | Path | None) -> dict[str, Position] | None:
 
     if path is None:
         return None
-    try:
+    with usage_errors(ValueError, f"{path}: "):
         return parse_scene(Path(path).read_text("utf-8"))
-    except ValueError as error:
-        raise click.UsageError(f"{path}: {error}") from None
 
 
 def check_suffix(path: Path | None, *suffixes: str) -> None:
     """Refuse a path that ends in none of the suffixes, in either case."""
     if path is not None and path.suffix.lower() not in suffixes:
         raise click.UsageError(f"{path}: wanted a name that ends in {' or '.join(suffixes)}")
+
+
+@contextmanager
+def usage_errors(kind: type[Exception], prefix: str = "", option: str | None = None) -> Iterator[None]:
+    """Report errors of a kind as wrong usage, or as a wrong value of an option."""
+    try:
+        yield
+    except kind as error:
+        text = f"{prefix}{error}"
+        raise click.BadParameter(text, param_hint=option) if option else click.UsageError(text) from None
 
 
 @contextmanager

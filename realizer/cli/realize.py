@@ -15,7 +15,6 @@ from realizer.core.options import PlayOptions
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from realizer.charts.timeline import BlockChart
     from realizer.outputs.output import Output, RenderSettings
     from realizer.playback.player import Player
     from realizer.realization import Realization
@@ -25,44 +24,32 @@ PICTURES = (".png", ".webp", ".mp4", ".webm")
 DRAWN = ("size", "camera", "at", "light", "background", "visemes")  # fields of RenderSettings
 
 
-def performance_options(command: options.Command) -> options.Command:
-    """Add the options for playing and drawing documents."""
-    for option in (
-        options.playback_options,
-        options.mapping,
-        options.cooccurrence,
-        options.prosody,
-        click.option("--no-idle", is_flag=True, help="No blinks or small head motion of an idle face."),
-        click.option(
-            "--seed", type=int, help="Seed of idle motion: equal seeds give equal files.  [default: 0]"
-        ),
-        options.background,
-        options.light,
-        options.camera,
-        options.size,
-        options.deformer,
-        click.option("--face", metavar="NAME", help="Face to animate; see `realizer faces list`."),
-        options.fps,
-    ):
-        command = option(command)
-    return command
-
-
-def output_options(command: options.Command) -> options.Command:
-    """Add the options for playing, drawing and writing documents."""
-    for option in (
-        performance_options,
-        click.option("--visemes", is_flag=True, help="With .fap: also write the visemes (FAP 1)."),
-        options.at,
-        click.option(
-            "-o",
-            "--output",
-            metavar="OUT",
-            help="File to write, in the format of its suffix; see `realizer outputs`.  [default: print JSON]",
-        ),
-    ):
-        command = option(command)
-    return command
+performance_options = options.several(
+    options.fps,
+    click.option("--face", metavar="NAME", help="Face to animate; see `realizer faces list`."),
+    options.deformer,
+    options.size,
+    options.camera,
+    options.light,
+    options.background,
+    click.option("--seed", type=int, help="Seed of idle motion: equal seeds give equal files.  [default: 0]"),
+    click.option("--no-idle", is_flag=True, help="No blinks or small head motion of an idle face."),
+    options.prosody,
+    options.cooccurrence,
+    options.mapping,
+    options.playback_options,
+)
+output_options = options.several(
+    click.option(
+        "-o",
+        "--output",
+        metavar="OUT",
+        help="File to write, in the format of its suffix; see `realizer outputs`.  [default: print JSON]",
+    ),
+    options.at,
+    click.option("--visemes", is_flag=True, help="With .fap: also write the visemes (FAP 1)."),
+    performance_options,
+)
 
 
 @click.command()
@@ -142,10 +129,8 @@ def writer_for(output: str | None) -> Output | None:
 
     if output in (None, "-"):
         return None
-    try:
+    with options.usage_errors(ValueError, option="-o"):
         return output_for(Path(output))
-    except ValueError as error:
-        raise click.BadParameter(str(error), param_hint="-o") from None
 
 
 def save(realization: Realization, writer: Output, path: Path, drawing: RenderSettings) -> None:
@@ -188,6 +173,9 @@ def schedule(
     behaviour: sync points, gaps coloured by their distance from the preferred length, links, the room before
     and after, and dropped behaviours.
     """
+    from realizer.charts.chart_data import charts_of
+    from realizer.charts.write_chart import write_timeline
+    from realizer.charts.write_chart import writer_for as chart_writer_for
     from realizer.pipeline import plan
     from realizer.playback.player import Player
 
@@ -196,7 +184,8 @@ def schedule(
     if detail and not as_json:
         raise click.UsageError("--detail: wanted --json too")
     if plot is not None:
-        _check_plot(plot)
+        with options.usage_errors(ValueError, option="--plot"):
+            chart_writer_for(plot)
     chosen = options.settings(voice=voice, scene=scene, media=media, expressions=expressions)
     player = Player(
         PlayOptions(
@@ -215,7 +204,7 @@ def schedule(
     options.print_warnings(w for w in refused if not any(w in s.warnings for s in schedules))
     for planned in schedules:
         options.print_warnings(planned.warnings)
-    charts = _charts(player, accepted) if detail or plot is not None else []
+    charts = charts_of(player.blocks, accepted) if detail or plot is not None else []
     if as_bml:
         text = _as_documents(texts, schedules)
     elif as_json:
@@ -226,8 +215,6 @@ def schedule(
     else:
         text = "" if plot is not None else "".join(_table(planned) for planned in schedules)
     if plot is not None:
-        from realizer.charts.write_chart import write_timeline
-
         with options.writing(plot):
             write_timeline(charts, plot)
     if output in (None, "-"):
@@ -242,21 +229,6 @@ def _final_schedule(player: Player, planned: Schedule) -> Schedule:
     """Return a schedule as later documents moved it, but complete if they cut it short."""
     latest = player.latest(planned)
     return latest if latest.times.keys() == planned.times.keys() else planned
-
-
-def _check_plot(plot: str) -> None:
-    from realizer.charts.write_chart import writer_for
-
-    try:
-        writer_for(plot)
-    except ValueError as error:
-        raise click.BadParameter(str(error), param_hint="--plot") from None
-
-
-def _charts(player: Player, accepted: list[Schedule]) -> list[BlockChart]:
-    from realizer.charts.chart_data import charts_of
-
-    return charts_of(player.blocks, accepted)
 
 
 def _table(planned: Schedule) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -30,18 +31,7 @@ from realizer.cli.realize import PICTURES, save, writer_for
 @options.camera
 @options.light
 @options.background
-def replay(
-    record: Path,
-    output: str | None,
-    fps: float | None,
-    face: str | None,
-    voice: str | None,
-    at: float | None,
-    size: tuple[int, int],
-    camera: str,
-    light: str | None,
-    background: str | None,
-) -> None:
+def replay(record: Path, output: str | None, **flags: Any) -> None:
     """Play a session again that `realizer serve --record DIR` recorded.
 
     RECORD is a recording, or a folder with a single one. Prints the feedback, or writes what the session
@@ -58,7 +48,7 @@ def replay(
     from realizer.server.journal.recordings import read_recording
 
     writer = writer_for(output)
-    changes = {"fps": fps, "face": face, "voice": voice}
+    changes = {name: flags.pop(name) for name in ("fps", "face", "voice")}
     try:
         recording = read_recording(record)
         if writer is None or output is None:
@@ -68,12 +58,8 @@ def replay(
         realization, _ = replay_recording(recording, **changes)
     except JournalError as error:
         raise click.ClickException(str(error)) from None
+    drawing = RenderSettings(**flags)
     if writer.suffix in PICTURES:
-        options.check_camera(realization.face_name, camera)
-    drawing = RenderSettings(size=size, camera=camera, at=at, light=light, background=background)
-    save(
-        realization,
-        writer,
-        Path(output),
-        writer.begin(drawing, realization.face_name, realization.deformer),
-    )
+        options.check_camera(realization.face_name, drawing.camera)
+    drawing = writer.begin(drawing, realization.face_name, realization.deformer)
+    save(realization, writer, Path(output), drawing)

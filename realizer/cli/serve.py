@@ -26,14 +26,8 @@ def setting(name: str, metavar: str, **attributes: Any) -> Callable[[options.Com
 
 
 def settings_of(*rows: tuple[str, str]) -> Callable[[options.Command], options.Command]:
-    """Add the options of several settings, each with its metavar."""
-
-    def add(command: options.Command) -> options.Command:
-        for name, metavar in reversed(rows):
-            command = setting(name, metavar)(command)
-        return command
-
-    return add
+    """Return a decorator that adds the options of several settings, each with its metavar."""
+    return options.several(*(setting(name, metavar) for name, metavar in rows))
 
 
 @click.command()
@@ -94,10 +88,8 @@ def serve(config: Path | None, **flags: Any) -> None:
     from realizer.server.serve import serve as start
     from realizer.speech.registry import find_voice
 
-    try:
+    with options.usage_errors(SettingsError):
         settings = Settings.read(flags, file=config)
-    except SettingsError as error:
-        raise click.UsageError(str(error)) from None
     options.check_camera(settings.face, settings.camera)
     options.check_light(settings.light)
     find_voice(settings.voice).close()  # fails before a transport opens if the voice is not installed

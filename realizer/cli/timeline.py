@@ -69,11 +69,6 @@ def timeline(file: Path, **flags: Any) -> int:
     return play_documents(lambda: [document.encode()], flags | {"media": file.parent})
 
 
-def is_timeline(name: str) -> bool:
-    """Return whether a file is a timeline, by its suffix."""
-    return Path(name).suffix.lower() in SUFFIXES
-
-
 def faults_in(content: bytes, library: Library) -> list[str]:
     """Return the faults of a timeline, each with its channel and entry."""
     from realizer.core.errors import TableError

@@ -56,11 +56,9 @@ def track(points: str, output: Path, fps: float, profiles: str | None) -> None:
     options.check_suffix(output, ".fap")
     (content,) = options.read_documents([points])
     text = options.decode(content, points, "a table")
-    try:
+    with options.usage_errors(ValueError):
         moving, rest = read_points(text, points)
         values, seen = faps_from_points(bridge(moving), rest, _fapu(rest, points))
-    except ValueError as error:
-        raise click.UsageError(str(error)) from None
     times = np.arange(len(values)) / fps
     output.write_text(encode(FAPClip.of(FAPFrames(times, values, seen), fps, output.stem)), "utf-8")
     options.note(f"{output}: {len(values)} frames, {int(seen.sum())} FAPs")

@@ -8,6 +8,7 @@ import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -49,6 +50,9 @@ def _number(kind: type[int] | type[float], low: float, high: float) -> Callable[
     return read
 
 
+_whole, _real = partial(_number, int), partial(_number, float)
+
+
 def raises(name: str) -> str:
     """Return the part of a message that says which variable sets a limit."""
     return f"({PREFIX}{name.upper()} sets it)"
@@ -61,14 +65,8 @@ def _flag(value: Any) -> bool:
     return word in ("1", "true", "yes", "on")
 
 
-def _text(value: Any) -> str:
-    if not isinstance(value, str) or not value.strip():
-        raise ValueError("a word")
-    return value
-
-
 def _ports(value: Any) -> tuple[int, int]:
-    port = _number(int, 0, 65535)
+    port = _whole(0, 65535)
     ports = value.replace(",", " ").split() if isinstance(value, str) else value
     if not isinstance(ports, list | tuple) or len(ports) != 2 or port(ports[1]) == 0:
         raise ValueError("two ports, of which the first may be 0")
@@ -91,22 +89,29 @@ def _matching(pattern: str, wanted: str) -> Callable[[Any], str]:
     return read
 
 
+def _word_of(*words: str) -> Callable[[Any], str]:
+    return _matching("|".join(words), " or ".join(words))
+
+
+_text = _matching(r"(?s).*\S.*", "a word")
+
+
 def _path(value: Any) -> Path:
     if not isinstance(value, str | Path):
         raise ValueError("the name of a file or folder")
     return Path(value)
 
 
-def _folder(value: Any) -> Path:
-    if not (path := _path(value)).is_dir():
-        raise ValueError("an existing folder")
-    return path
+def _existing(is_kind: Callable[[Path], bool], kind: str) -> Callable[[Any], Path]:
+    def read(value: Any) -> Path:
+        if not is_kind(path := _path(value)):
+            raise ValueError(f"an existing {kind}")
+        return path
+
+    return read
 
 
-def _file(value: Any) -> Path:
-    if not (path := _path(value)).is_file():
-        raise ValueError("an existing file")
-    return path
+_folder, _file = _existing(Path.is_dir, "folder"), _existing(Path.is_file, "file")
 
 
 def _switch_or_file(value: Any) -> str:
@@ -149,15 +154,6 @@ def _key(value: Any) -> str:
     return text
 
 
-def _word_of(*words: str) -> Callable[[Any], str]:
-    def read(value: Any) -> str:
-        if value not in words:
-            raise ValueError(" or ".join(words))
-        return str(value)
-
-    return read
-
-
 def _closest(name: str, known: Iterable[str]) -> str | None:
     """Return the setting with the most similar name, or None."""
     from difflib import get_close_matches
@@ -196,8 +192,8 @@ class Settings:
     """
 
     host: str = _setting("127.0.0.1", _text, "address to listen on")
-    port: int = _setting(8765, _number(int, 0, 65535), "port; 0: any free one")
-    workers: int = _setting(1, _number(int, 1, 64), "number of processes that share the port")
+    port: int = _setting(8765, _whole(0, 65535), "port; 0: any free one")
+    workers: int = _setting(1, _whole(1, 64), "number of processes that share the port")
     # An empty token must not open the service by mistake.
     token: str | None = _setting(
         None,
@@ -234,7 +230,7 @@ class Settings:
         "ports of ASAP's TCP, such as 7500 7501: BML in, feedback to that port of the client; none: off",
     )
     xface_port: int | None = _setting(
-        None, _number(int, 0, 65535), "port for clients of an Xface player; none: off"
+        None, _whole(0, 65535), "port for clients of an Xface player; none: off"
     )
     xface_player: str | None = _setting(
         None, _address, "HOST:PORT of an Xface player that shows a session; none: off"
@@ -245,7 +241,7 @@ class Settings:
         "session that xface_player shows",
     )
     xface_player_interval: float = _setting(
-        0.25, _number(float, 0, 60), "seconds between frames for xface_player; it stops at shorter ones"
+        0.25, _real(0, 60), "seconds between frames for xface_player; it stops at shorter ones"
     )
     stomp: str | None = _setting(None, _address, "HOST:PORT of a STOMP broker; none: off")
     stomp_login: str | None = _setting(None, _text, "login for the broker")
@@ -279,13 +275,13 @@ class Settings:
         _matching(r"#[0-9a-fA-F]{6}|transparent", "transparent or a colour such as #d8dde2"),
         "default background of pictures; none: the light's own",
     )
-    fps: float = _setting(25.0, _number(float, 0.01, 240), "default frames per second of streams")
+    fps: float = _setting(25.0, _real(0.01, 240), "default frames per second of streams")
     scene: Path | None = _setting(None, _path, "file of targets for all sessions: NAME X Y Z, in metres")
     media: Path | None = _setting(None, _folder, "folder of the files that documents may refer to")
     expressions: Path | None = _setting(
         None, _folder, "folder of a user's expressions; none: only built-in ones"
     )
-    seed: int = _setting(0, _number(int, -(2**63), 2**63 - 1), "seed of idle motion")
+    seed: int = _setting(0, _whole(-(2**63), 2**63 - 1), "seed of idle motion")
     idle: bool = _setting(True, _flag, "blinks and small head motion")
     cooccurrence: str = _setting(
         "on", _switch_or_file, "rules for AUs that no face shows together: on, off, or a file"
@@ -293,39 +289,37 @@ class Settings:
     prosody: bool = _setting(True, _flag, "nods, brows, blinks and glances that accompany speech: on or off")
     mapping: Path | None = _setting(None, _file, "file that maps AUs to FAPs; none: each face's own mapping")
     keep: float = _setting(
-        60.0, _number(float, 0, 1e9), "seconds that a named session lives after its last connection"
+        60.0, _real(0, 1e9), "seconds that a named session lives after its last connection"
     )
     drain: float = _setting(
-        5.0, _number(float, 0, 3600), "seconds that blocks may go on playing when the service stops"
+        5.0, _real(0, 3600), "seconds that blocks may go on playing when the service stops"
     )
-    max_message: int = _setting(16 * 2**20, _number(int, 1, 2**31), "bytes of one WebSocket message")
-    max_document: int = _setting(2**20, _number(int, 1, 2**31), "bytes of BML in one message")
-    max_elements: int = _setting(100_000, _number(int, 1, 10**7), "XML elements in one message")
-    max_behaviours: int = _setting(10_000, _number(int, 1, 10**6), "behaviours in one block")
-    max_duration: float = _setting(1_800.0, _number(float, 1, 1e9), "planned duration of a block in seconds")
+    max_message: int = _setting(16 * 2**20, _whole(1, 2**31), "bytes of one WebSocket message")
+    max_document: int = _setting(2**20, _whole(1, 2**31), "bytes of BML in one message")
+    max_elements: int = _setting(100_000, _whole(1, 10**7), "XML elements in one message")
+    max_behaviours: int = _setting(10_000, _whole(1, 10**6), "behaviours in one block")
+    max_duration: float = _setting(1_800.0, _real(1, 1e9), "planned duration of a block in seconds")
     max_blocks: int = _setting(
         1_000,
-        _number(int, 1, 10**6),
+        _whole(1, 10**6),
         "blocks that play or wait in one session, and messages that wait with further blocks",
     )
     max_connections: int = _setting(
-        2_000, _number(int, 1, 10**6), "open connections per address, at each transport"
+        2_000, _whole(1, 10**6), "open connections per address, at each transport"
     )
-    max_sessions: int = _setting(5_000, _number(int, 1, 10**6), "sessions of each worker")
-    max_address_sessions: int = _setting(
-        2_000, _number(int, 1, 10**6), "live sessions that one address has opened"
-    )
-    max_size: int = _setting(2048, _number(int, 16, 16384), "pixels of a picture's longer side")
+    max_sessions: int = _setting(5_000, _whole(1, 10**6), "sessions of each worker")
+    max_address_sessions: int = _setting(2_000, _whole(1, 10**6), "live sessions that one address has opened")
+    max_size: int = _setting(2048, _whole(16, 16384), "pixels of a picture's longer side")
     max_pixels: float = _setting(
-        125e6, _number(float, 256, 1e12), "pixels per second of all pictures of a session: 1920x1080 at 60"
+        125e6, _real(256, 1e12), "pixels per second of all pictures of a session: 1920x1080 at 60"
     )
-    max_speech: int = _setting(20_000, _number(int, 1, 10**7), "characters of one speech in a document")
+    max_speech: int = _setting(20_000, _whole(1, 10**7), "characters of one speech in a document")
     max_rate: float = _setting(
-        500.0, _number(float, 0.1, 1e6), "messages per second that are read from one connection"
+        500.0, _real(0.1, 1e6), "messages per second that are read from one connection"
     )
     max_memory: int | None = _setting(
         None,
-        _number(int, 64, 10**7),
+        _whole(64, 10**7),
         "MB of the process above which no session is opened; none: no limit",
     )
 

@@ -148,7 +148,7 @@ def fap(name: str, voice: str, seconds: int, *, speech: bool) -> float:
 
     first, *rest = (played(task) for task in tasks(DOCUMENTS + 1, seconds, speech=speech))
     first()  # tables and face are read, the voice has started
-    cost = row(name, iter(rest), lambda: spent_by(worker.voice_pid))
+    cost = row(name, iter(rest), lambda: spent_by(getattr(worker._speaker._voice, "pid", None)))
     worker.close()
     return cost
 
