@@ -87,15 +87,16 @@ def _both_ways(row: Fap, value: float) -> list[Pose]:
 
 def of_aus(intensity: float) -> list[Series]:
     """Return each action unit on both sides, by place and direction."""
-    names = by_number()
     return [
         Series(
             f"Action units: {region.name}",
-            _poses(
-                [{(number, "BOTH"): intensity} for number in region.members],
-                [f"AU{number} {names[number].name}" for number in region.members],
-                [names[number].no_fap or f"{intensity:g}" for number in region.members],
-            ),
+            [
+                _pose(
+                    {(number, "BOTH"): intensity}, f"AU{number} {unit.name}", unit.no_fap or f"{intensity:g}"
+                )
+                for number in region.members
+                for unit in [by_number()[number]]
+            ],
         )
         for region in au_regions()
     ]
@@ -103,12 +104,14 @@ def of_aus(intensity: float) -> list[Series]:
 
 def of_emotions() -> list[Series]:
     """Return the archetypes, and the wheel at 17 angles and 4 activations (Paul 2010, 6.4)."""
-    emotions = archetypes()
-    poses = _poses(
-        [face_lexemes()[emotion.name].aus for emotion in emotions],
-        [emotion.name.lower() for emotion in emotions],
-        [f"{emotion.angle:g} degrees, activation {emotion.activation:g}" for emotion in emotions],
-    )
+    poses = [
+        _pose(
+            face_lexemes()[emotion.name].aus,
+            emotion.name.lower(),
+            f"{emotion.angle:g} degrees, activation {emotion.activation:g}",
+        )
+        for emotion in archetypes()
+    ]
     names = {place.angle: name for name, place in ring("paul").items()}
     grid = [
         Pose(
@@ -127,24 +130,15 @@ def of_emotions() -> list[Series]:
 
 def of_expressions(expressions: Sequence[Expression]) -> list[Pose]:
     """Return each expression at full intensity."""
-    return _poses(
-        [expression.aus for expression in expressions],
-        [expression.name for expression in expressions],
-        [expression.units for expression in expressions],
-    )
+    return [_pose(expression.aus, expression.name, expression.units) for expression in expressions]
 
 
-def _poses(
-    intensities: Sequence[Mapping[tuple[int, str], float]], titles: Sequence[str], notes: Sequence[str]
-) -> list[Pose]:
-    """Return poses of action units, each from (AU, side) -> intensity."""
-    found = []
-    for aus, title, note in zip(intensities, titles, notes, strict=True):
-        row = _nothing()
-        for (number, side), amount in aus.items():
-            row[[target.column for target in au(number, side)]] = amount
-        found.append(Pose(row, title, (note,)))
-    return found
+def _pose(aus: Mapping[tuple[int, str], float], title: str, note: str) -> Pose:
+    """Return a pose of action units, (AU, side) -> intensity."""
+    row = _nothing()
+    for (number, side), amount in aus.items():
+        row[[target.column for target in au(number, side)]] = amount
+    return Pose(row, title, (note,))
 
 
 def _faps(values: Mapping[int, float]) -> Float32:

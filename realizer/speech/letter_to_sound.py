@@ -7,6 +7,7 @@ import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, lru_cache, partial
+from itertools import product
 from typing import Any, Literal
 
 from realizer import tables
@@ -124,15 +125,10 @@ def _sounded(word: str, language: str) -> tuple[str, ...]:
 def _longest(word: str, at: int, language: str) -> tuple[int, tuple[str, ...]]:
     for size in range(min(LONGEST_GROUP, len(word) - at), 0, -1):
         letters = word[at : at + size]
-        places = ["any"]
-        if at == 0:
-            places.insert(0, "start")
-        if at + size == len(word) and at > 0:
-            places.insert(0, "end")
-        for place in places:
-            for owner in (language, GENERIC):
-                if (owner, letters, place) in _rules():
-                    return size, _rules()[owner, letters, place]
+        place = "start" if at == 0 else "end" if at + size == len(word) else "any"
+        for where, owner in product((place, "any"), (language, GENERIC)):
+            if (owner, letters, where) in _rules():
+                return size, _rules()[owner, letters, where]
     plain = _plain(word[at])
     if plain != word[at]:
         return 1, _rules().get((language, plain, "any"), _rules().get((GENERIC, plain, "any"), ()))

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from realizer.speech.base_voice import BaseVoice
 from realizer.speech.letter_to_sound import GENERIC, letters_to_phonemes, syllable_facts, vowel_units
 from realizer.speech.ssml import Mark, read_script
 from realizer.speech.utterance import STRETCH, SpeechRequest, Utterance, Word, tile
-from realizer.speech.words import Pause, Token, WordToken, tokens
+from realizer.speech.words import Pause, WordToken, tokens
 from realizer.tables.phonemes import vowels
 
 SLOWEST, FASTEST = 0.25, 4.0  # of the voice's own rate
@@ -36,44 +36,39 @@ class SilentVoice(BaseVoice):
         if script.is_silent and not any(not isinstance(part, (str, Mark)) for part in script.parts):
             return Utterance(0.0, (), (), dict.fromkeys(script.marks, 0.0), warnings=script.warnings)
         rate = min(FASTEST, max(SLOWEST, request.rate))
-        return _layout(tokens(script, facts["phrase"]), request.language, rate, script.warnings)
-
-
-def _layout(items: Sequence[Token], language: str, rate: float, warnings: tuple[str, ...]) -> Utterance:
-    facts = syllable_facts()
-    now = facts["edge"]
-    words: list[Word] = []
-    starts: list[tuple[float, str, int]] = [(0.0, "", 0)]
-    marks: dict[str, float] = {}
-    waiting: list[str] = []  # marks before the next word
-    for item in items:
-        if isinstance(item, Mark):
-            waiting.append(item.name)
-            continue
-        if isinstance(item, Pause):
-            if item.seconds:  # a mark before a <break> is at its start
+        now = facts["edge"]
+        words: list[Word] = []
+        starts: list[tuple[float, str, int]] = [(0.0, "", 0)]
+        marks: dict[str, float] = {}
+        waiting: list[str] = []  # marks before the next word
+        for item in tokens(script, facts["phrase"]):
+            if isinstance(item, Mark):
+                waiting.append(item.name)
+                continue
+            if isinstance(item, Pause):
+                if item.seconds:  # a mark before a <break> is at its start
+                    marks.update(dict.fromkeys(waiting, now))
+                    waiting = []
+                length = item.seconds or facts["unit"] / rate
+                starts.append((now, "", 0))
+            else:
                 marks.update(dict.fromkeys(waiting, now))
                 waiting = []
-            length = item.seconds or facts["unit"] / rate
-            starts.append((now, "", 0))
-        else:
-            marks.update(dict.fromkeys(waiting, now))
-            waiting = []
-            length = vowel_units(item.text, language) * facts["unit"] / (rate * item.rate)
-            words.append(Word(now, now + length, item.text))
-            starts += _phonemes(item, language, now, length, facts["consonant"])
-        now += length
-    spoken_end = words[-1].end if words else now
-    marks.update(dict.fromkeys(waiting, spoken_end))
-    starts.append((now, "", 0))
-    return Utterance(
-        duration=now + facts["closing"],
-        words=tuple(words),
-        phonemes=tile(starts, now + facts["closing"]),
-        marks=marks,
-        stretch=STRETCH,
-        warnings=warnings,
-    )
+                length = vowel_units(item.text, request.language) * facts["unit"] / (rate * item.rate)
+                words.append(Word(now, now + length, item.text))
+                starts += _phonemes(item, request.language, now, length, facts["consonant"])
+            now += length
+        spoken_end = words[-1].end if words else now
+        marks.update(dict.fromkeys(waiting, spoken_end))
+        starts.append((now, "", 0))
+        return Utterance(
+            duration=now + facts["closing"],
+            words=tuple(words),
+            phonemes=tile(starts, now + facts["closing"]),
+            marks=marks,
+            stretch=STRETCH,
+            warnings=script.warnings,
+        )
 
 
 def _phonemes(

@@ -53,10 +53,8 @@ class Observed:
 def distance(features: Float64, others: Float64) -> Float64:
     """Return the root mean square differences (t, j) of features (t, d) and (j, d)."""
     squares = (features**2).sum(axis=1)[:, None] + (others**2).sum(axis=1)
-    distance: Float64 = np.sqrt(
-        np.maximum(squares - 2 * (features @ others.T), 0.0) / max(1, features.shape[1])
-    )
-    return distance
+    squares = np.maximum(squares - 2 * (features @ others.T), 0.0)
+    return np.asarray(np.sqrt(squares / max(1, features.shape[1])), np.float64)
 
 
 def usual(features: Float64, others: Float64) -> float:
@@ -67,8 +65,7 @@ def usual(features: Float64, others: Float64) -> float:
 
 def quiet(part: Float64, threshold: float) -> Float64:
     """Return the costs (t,) of frames in a pause, by their loudness between silence (0) and speech (1)."""
-    cost: Float64 = np.minimum(SILENT + NOT_SILENT * np.maximum(0.0, part - threshold), NOISE)
-    return cost
+    return np.minimum(SILENT + NOT_SILENT * np.maximum(0.0, part - threshold), NOISE)
 
 
 def best_path(

@@ -129,8 +129,7 @@ def _adaptation(values: Float64, states: States, way: Index) -> Float64:
     pairs = ~states.pause[way]
     ours = np.hstack([states.features[way[pairs]], np.ones((int(pairs.sum()), 1))])
     same = np.eye(ours.shape[1])
-    change = np.linalg.solve(ours.T @ ours + RIDGE * same, ours.T @ values[pairs] + RIDGE * same[:, :-1])
-    return np.asarray(change, np.float64)
+    return np.linalg.solve(ours.T @ ours + RIDGE * same, ours.T @ values[pairs] + RIDGE * same[:, :-1])
 
 
 def _wrong_text_cost(heard: Observed, states: States, centre: Index, reach: int) -> float:
@@ -156,8 +155,7 @@ def _costs(words: Float64, way: Index, spent: Float64, pause: Bool, null: float)
     last = np.minimum(np.maximum(last, first + 1), len(way))
     first = np.minimum(first, last - 1)
     frames = count[last] - count[first]
-    costs = np.where(frames > 0, (total[last] - total[first]) / np.maximum(frames, 1) / null, 1.0)
-    return np.asarray(costs, np.float64)
+    return np.where(frames > 0, (total[last] - total[first]) / np.maximum(frames, 1) / null, 1.0)
 
 
 def _spans(pairs: Float64, states: States, way: Index) -> Float64:

@@ -30,8 +30,7 @@ def resampled(pcm: Float32, rate: int) -> Float32:
     shared = gcd(rate, RATE)
     if rate == RATE:
         return pcm
-    sound: Float32 = resample_poly(pcm, RATE // shared, rate // shared).astype(np.float32)
-    return sound
+    return np.asarray(resample_poly(pcm, RATE // shared, rate // shared), np.float32)
 
 
 def energies(sound: Float32, hop: float) -> Float64:
@@ -65,8 +64,7 @@ def cepstra(energy: Float64) -> Float64:
 
 def loudness(energy: Float64) -> Float64:
     """Return the loudness (n,), in powers of ten, of energies (n, bands)."""
-    total: Float64 = np.log10(energy.sum(axis=1) + 1e-9)
-    return total
+    return np.asarray(np.log10(energy.sum(axis=1) + 1e-9), np.float64)
 
 
 def voice_activity(loud: Float64) -> tuple[Float64, Bool]:
@@ -80,8 +78,7 @@ def voice_activity(loud: Float64) -> tuple[Float64, Bool]:
 def normalised(features: Float64, of: Bool) -> Float64:
     """Scale columns to mean 0 and deviation 1 over the frames `of`; removes effects of room and loudness."""
     chosen = features[of] if of.any() else features
-    scaled: Float64 = (features - chosen.mean(axis=0)) / (chosen.std(axis=0) + 1e-6)
-    return scaled
+    return np.asarray((features - chosen.mean(axis=0)) / (chosen.std(axis=0) + 1e-6), np.float64)
 
 
 def _slopes(values: Float64) -> Float64:
@@ -89,11 +86,8 @@ def _slopes(values: Float64) -> Float64:
     padded = np.pad(values, ((SLOPE, SLOPE), (0, 0)), mode="edge")
     count = len(values)
     steps = range(1, SLOPE + 1)
-    rise: Float64 = np.add.reduce(
-        [k * (padded[SLOPE + k :][:count] - padded[SLOPE - k :][:count]) for k in steps]
-    )
-    slopes: Float64 = rise / (2.0 * sum(k * k for k in steps))
-    return slopes
+    rise = sum(k * (padded[SLOPE + k :][:count] - padded[SLOPE - k :][:count]) for k in steps)
+    return np.asarray(rise / (2.0 * sum(k * k for k in steps)), np.float64)
 
 
 @cache
@@ -104,13 +98,11 @@ def _bands() -> Float64:
     places = np.fft.rfftfreq(SPECTRUM, 1 / RATE)[:, None]
     rise = (places - edges[:-2]) / np.diff(edges[:-1])
     fall = (edges[2:] - places) / np.diff(edges[1:])
-    bands: Float64 = np.maximum(0.0, np.minimum(rise, fall))
-    return bands
+    return np.asarray(np.maximum(0.0, np.minimum(rise, fall)), np.float64)
 
 
 @cache
 def _cosines() -> Float64:
     """Return the cosine transform (bands, kept)."""
     angles = np.pi / BANDS * (np.arange(BANDS)[:, None] + 0.5) * np.arange(KEPT)
-    cosines: Float64 = np.cos(angles) * np.sqrt(2 / BANDS)
-    return cosines
+    return np.asarray(np.cos(angles) * np.sqrt(2 / BANDS), np.float64)
