@@ -109,12 +109,7 @@ def languages_in(block: Block, words: Words) -> list[str]:
     "-o", "--output", metavar="OUT.bml", type=options.OUTPUT, help="File to write.  [default: print it]"
 )
 def enrich(
-    text: str,
-    role: Any,
-    mood: Any,
-    language: str | None,
-    words: Path | None,
-    output: Path | None,
+    text: str, role: Any, mood: Any, language: str | None, words: Path | None, output: Path | None
 ) -> int:
     """Add facial expressions to a text or a BML document (Wojdel 2005, 6.5).
 

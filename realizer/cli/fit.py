@@ -40,11 +40,7 @@ FORMS = ("published", "extended")
     help="Folder for au_FORM.toml, or the file of one form.  [default: the face's folder]",
 )
 def fit(
-    name: str,
-    measurements: Path | None,
-    data: Path | None,
-    form: str | None,
-    output: Path | None,
+    name: str, measurements: Path | None, data: Path | None, form: str | None, output: Path | None
 ) -> None:
     """Fit the action unit model of a face, and print its errors (Wojdel 2005, table 4.3).
 

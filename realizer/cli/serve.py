@@ -50,10 +50,7 @@ def settings_of(*rows: tuple[str, str]) -> Callable[[options.Command], options.C
 @settings_of(("tls_cert", "FILE"), ("tls_key", "FILE"), ("log", "text|json"))
 @setting("asap_ports", "BML FEEDBACK", nargs=2)
 @settings_of(
-    ("xface_port", "PORT"),
-    ("xface_player", "HOST:PORT"),
-    ("stomp", "HOST:PORT"),
-    ("journal", "FILE|URL"),
+    ("xface_port", "PORT"), ("xface_player", "HOST:PORT"), ("stomp", "HOST:PORT"), ("journal", "FILE|URL")
 )
 @setting("record", "DIR", type=click.Path(file_okay=False, path_type=Path))
 @setting("face", "NAME")

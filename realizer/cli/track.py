@@ -18,12 +18,7 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("points", type=click.Path(exists=True, dir_okay=False, allow_dash=True))
 @click.option(
-    "-o",
-    "--output",
-    required=True,
-    metavar="OUT.fap",
-    type=options.OUTPUT,
-    help="FAP file to write.",
+    "-o", "--output", required=True, metavar="OUT.fap", type=options.OUTPUT, help="FAP file to write."
 )
 @click.option(
     "--fps", type=options.Number(0.1, 1000), default=25.0, show_default=True, help="Frame rate of the points."

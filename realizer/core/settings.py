@@ -318,9 +318,7 @@ class Settings:
         500.0, _real(0.1, 1e6), "messages per second that are read from one connection"
     )
     max_memory: int | None = _setting(
-        None,
-        _whole(64, 10**7),
-        "MB of the process above which no session is opened; none: no limit",
+        None, _whole(64, 10**7), "MB of the process above which no session is opened; none: no limit"
     )
 
     def __post_init__(self) -> None:

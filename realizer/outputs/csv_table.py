@@ -25,10 +25,7 @@ def csv_text(header: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:
 def encode_csv(realization: Realization) -> str:
     """Return rows of `time` in seconds, AUs such as `AU12L` in 0..1, FAPs as integers in FAPU."""
     frames = zip(
-        realization.aus.times,
-        realization.aus.aus.tolist(),
-        realization.faps.integers().tolist(),
-        strict=True,
+        realization.aus.times, realization.aus.aus.tolist(), realization.faps.integers().tolist(), strict=True
     )
     return csv_text(
         ["time", *(f"AU{name}" for name in AU_NAMES()), *(row.name for row in faps())],

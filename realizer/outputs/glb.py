@@ -162,10 +162,7 @@ def morphing_mesh(file: GlbFile, face: Face, part: Bool, material: int, made: Mo
 def _target(file: GlbFile, face: Face, part: Bool, moves: Float32, ups: Float32) -> dict[str, int]:
     bent = _normals(face, face.vertices + moves) - ups
     bent[np.abs(bent).max(axis=1) < NEGLIGIBLE_BEND] = 0
-    return {
-        "POSITION": file.add_sparse(moves[part], bounds=True),
-        "NORMAL": file.add_sparse(bent[part]),
-    }
+    return {"POSITION": file.add_sparse(moves[part], bounds=True), "NORMAL": file.add_sparse(bent[part])}
 
 
 def _normals(face: Face, vertices: Float32) -> Float32:
