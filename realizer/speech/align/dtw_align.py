@@ -129,7 +129,8 @@ def _adaptation(values: Float64, states: States, way: Index) -> Float64:
     pairs = ~states.pause[way]
     ours = np.hstack([states.features[way[pairs]], np.ones((int(pairs.sum()), 1))])
     same = np.eye(ours.shape[1])
-    return np.linalg.solve(ours.T @ ours + RIDGE * same, ours.T @ values[pairs] + RIDGE * same[:, :-1])
+    change = np.linalg.solve(ours.T @ ours + RIDGE * same, ours.T @ values[pairs] + RIDGE * same[:, :-1])
+    return np.asarray(change, np.float64)
 
 
 def _wrong_text_cost(heard: Observed, states: States, centre: Index, reach: int) -> float:

@@ -132,7 +132,7 @@ def guess_lengths(sentence: Sequence[Token], pcm: Int16) -> list[int]:
     if not total:
         return [0] * (len(shares) + 1) + [len(pcm)]
     borders = first + np.rint(np.cumsum([0.0, *shares]) / total * (last - first)).astype(int)
-    return np.diff(borders, prepend=0, append=len(pcm)).tolist()
+    return [first, *np.diff(borders).tolist(), len(pcm) - int(borders[-1])]
 
 
 def word_spans(
