@@ -53,7 +53,7 @@ def _number(kind: type[int] | type[float], low: float, high: float) -> Callable[
 _whole, _real = partial(_number, int), partial(_number, float)
 
 
-def raises(name: str) -> str:
+def limit_hint(name: str) -> str:
     """Return the part of a message that says which variable sets a limit."""
     return f"({PREFIX}{name.upper()} sets it)"
 

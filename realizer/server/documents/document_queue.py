@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 from bml_schema import Block, BMLError, BMLSizeError, Speech, read
 from realizer.behaviours.registry import VOCABULARY
-from realizer.core.settings import Settings, raises
+from realizer.core.settings import Settings, limit_hint
 from realizer.playback.feedback_events import parse_warning
 from realizer.playback.player import Player
 from realizer.playback.speaking import stretch_to_fit, without_stretch
@@ -51,7 +51,7 @@ class DocumentQueue:
         limits = self._settings
         if len(self._unread) >= limits.max_blocks:
             error = f"{limits.max_blocks} messages wait to be read: wanted fewer at a time"
-            return Warning(block_id_of(text), "PARSING_FAILURE", f"{error} {raises('max_blocks')}")
+            return Warning(block_id_of(text), "PARSING_FAILURE", f"{error} {limit_hint('max_blocks')}")
         if (too_large := size_error(text, limits)) is not None:
             return Warning(block_id_of(text), "PARSING_FAILURE", too_large)
         self._unread.append(
@@ -85,7 +85,7 @@ class DocumentQueue:
             if item is not None:
                 refused = parse_warning(item)
                 if isinstance(item, BMLSizeError):  # too many behaviours: `put` has counted the bytes
-                    refused = replace(refused, text=f"{refused.text} {raises('max_behaviours')}")
+                    refused = replace(refused, text=f"{refused.text} {limit_hint('max_behaviours')}")
                 return refused
             self._unread.popleft()
         self._cancelled.clear()
@@ -267,12 +267,12 @@ def size_error(text: str, settings: Settings) -> str | None:
     size = len(text) if text.isascii() else len(text.encode("utf-8", "surrogatepass"))
     if size > settings.max_document:
         words = f"wanted at most {settings.max_document} bytes of BML in a message, got {size}"
-        return f"{words} {raises('max_document')}"
+        return f"{words} {limit_hint('max_document')}"
     # Comments are counted as elements too; a document has few of them.
     count = text.count("<") - text.count("</")
     if count > settings.max_elements:
         words = f"wanted at most {settings.max_elements} elements in a message, got {count}"
-        return f"{words} {raises('max_elements')}"
+        return f"{words} {limit_hint('max_elements')}"
     return None
 
 
@@ -288,10 +288,10 @@ def block_limit_error(
     longest = _longest_speech(block)
     if longest > settings.max_speech:
         words = f"wanted at most {settings.max_speech} characters in one speech, got {longest}"
-        return f"{words} {raises('max_speech')}"
+        return f"{words} {limit_hint('max_speech')}"
     if busy >= settings.max_blocks:
         words = f"{settings.max_blocks} blocks play or wait: wanted fewer at a time"
-        return f"{words} {raises('max_blocks')}"
+        return f"{words} {limit_hint('max_blocks')}"
     if block.character_id not in (None, *characters) and len(characters) >= MAX_CHARACTERS:
         return f"wanted at most {MAX_CHARACTERS} characters in a session"
     return None

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from bml_schema import Block
-from realizer.core.settings import Settings, raises
+from realizer.core.settings import Settings, limit_hint
 from realizer.playback.references import external_refs
 from realizer.scheduling.timing import Schedule
 
@@ -26,7 +26,7 @@ def duration_error(block: Block, schedule: Schedule, settings: Settings) -> str 
     if schedule.duration <= settings.max_duration or external_refs(block):
         return None
     text = f"wanted a block of at most {settings.max_duration:g} s, got {schedule.duration:.1f}"
-    return f"{text} {raises('max_duration')}"
+    return f"{text} {limit_hint('max_duration')}"
 
 
 def pixel_rate_error(
@@ -42,14 +42,14 @@ def pixel_rate_error(
         return None
     text = f"wanted at most {settings.max_pixels:g} pixels a second of a session's pictures, got {pixels:g}"
     more = f" beside {others:g} of others" if others else ""
-    return f"{text}, {size[0]}x{size[1]} at {fps:g} fps{more} {raises('max_pixels')}"
+    return f"{text}, {size[0]}x{size[1]} at {fps:g} fps{more} {limit_hint('max_pixels')}"
 
 
 def memory_error(settings: Settings) -> str | None:
     """Return why there is no memory for another session, or None."""
     if settings.max_memory is None or (used := memory() / 1e6) <= settings.max_memory:
         return None
-    return f"the service uses {used:.0f} MB: wanted at most {settings.max_memory} {raises('max_memory')}"
+    return f"the service uses {used:.0f} MB: wanted at most {settings.max_memory} {limit_hint('max_memory')}"
 
 
 def memory() -> int:

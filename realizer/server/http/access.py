@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from http import HTTPStatus
 from urllib.parse import parse_qs, urlsplit
 
-from realizer.core.settings import Settings, SettingsError, raises
+from realizer.core.settings import Settings, SettingsError, limit_hint
 from realizer.protocol.messages.common import MAX_CONTROL
 from realizer.server.documents.limits import memory_error
 from realizer.server.http.jwt_tokens import Grant, TokenError, TokenVerifier
@@ -174,7 +174,9 @@ class RateLimiter:
         """Return the seconds to wait after a message that arrived `now`."""
         self._free = max(self._free, now) + 1.0 / self._rate
         pause = max(0.0, self._free - now - 2.0)
-        words = f"wanted at most {self._rate:g} messages a second; more are read later {raises('max_rate')}"
+        words = (
+            f"wanted at most {self._rate:g} messages a second; more are read later {limit_hint('max_rate')}"
+        )
         self.notice = words if pause and not self._was_limited else None
         self._was_limited = bool(pause)
         return pause

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from realizer.core.errors import RealizerError
-from realizer.core.settings import Settings, raises
+from realizer.core.settings import Settings, limit_hint
 from realizer.protocol.messages.replies import ErrorMessage
 from realizer.server.documents.limits import memory_error
 from realizer.server.session.effects import Close, Effect, MoveConnection, Send
@@ -100,12 +100,12 @@ class SessionRegistry:
             opened -= 1
         if visitor.address and opened >= most and not self._abandoned(visitor.address):
             words = f"{most} sessions that {visitor.address} has opened live: wanted fewer"
-            raise JoinError(429, f"{words} {raises('max_address_sessions')}")
+            raise JoinError(429, f"{words} {limit_hint('max_address_sessions')}")
         if name in self.sessions:
             return
         most = self._settings.max_sessions
         if len(self.sessions) - (ends is not None) >= most and not self._abandoned():
-            raise JoinError(503, f"{most} sessions are open: wanted fewer {raises('max_sessions')}")
+            raise JoinError(503, f"{most} sessions are open: wanted fewer {limit_hint('max_sessions')}")
         if ends is None and (full := memory_error(self._settings)) is not None:
             raise JoinError(503, full)
 

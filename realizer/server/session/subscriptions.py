@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from realizer.core.settings import Settings, raises
+from realizer.core.settings import Settings, limit_hint
 from realizer.playback.player import Player
 from realizer.protocol.messages.common import PICTURES, Reply
 from realizer.protocol.messages.replies import FaceChanged, Subscribed
@@ -173,7 +173,7 @@ class Subscriptions:
 
         settings, largest = self._settings, self._settings.max_size
         if not all(16 <= side <= largest for side in message.size):
-            text = f"wanted sides of 16..{largest} pixels, got {list(message.size)} {raises('max_size')}"
+            text = f"wanted sides of 16..{largest} pixels, got {list(message.size)} {limit_hint('max_size')}"
             raise FieldError("size", text)
         if message.light is not None and message.light not in presets():
             raise FieldError("light", f"wanted one of {', '.join(presets())}, got {message.light!r}")

@@ -12,7 +12,7 @@ from typing import Any
 
 from bml_schema import WarningFeedback
 from realizer.core.errors import RealizerError
-from realizer.core.settings import Settings, raises
+from realizer.core.settings import Settings, limit_hint
 from realizer.server.http.access import RateLimiter
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError
@@ -110,7 +110,7 @@ class StompTransport(ReconnectingTransport):
         if len(body) > self._settings.max_message:
             words = f"wanted at most {self._settings.max_message} bytes in a message, got {len(body)}"
             log.warning("stomp: %s: %s", link.name, words)
-            text = f"{words} {raises('max_message')}"
+            text = f"{words} {limit_hint('max_message')}"
             link.send(WarningFeedback(id="<no id>", type="PARSING_FAILURE", text=text).to_xml())
             return
         for action in link.format.incoming(body):

@@ -9,7 +9,7 @@ import socket
 from abc import ABC, abstractmethod
 from collections import Counter
 
-from realizer.core.settings import raises
+from realizer.core.settings import limit_hint
 
 log = logging.getLogger(__name__)
 
@@ -84,7 +84,9 @@ class TcpTransport(ABC):
         self._from[host] += 1
         try:
             if self._from[host] > self._most:
-                words = f"{self._most} connections from it are open: wanted fewer {raises('max_connections')}"
+                words = (
+                    f"{self._most} connections from it are open: wanted fewer {limit_hint('max_connections')}"
+                )
                 log.warning("%s: %s is refused: %s", self._name, host, words)
             elif peer is not None:  # None: it has already left
                 # The protocols have no heartbeat, and a host that loses power closes nothing.

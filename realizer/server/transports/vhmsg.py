@@ -10,7 +10,7 @@ from urllib.parse import quote, unquote_plus
 from xml.sax.saxutils import quoteattr, unescape
 
 from bml_schema import BlockProgress, PredictionFeedback, WarningFeedback, parse_feedback
-from realizer.core.settings import raises
+from realizer.core.settings import limit_hint
 from realizer.server.transports.document_framing import DocumentFramer
 from realizer.server.transports.message_format import Action, Disconnect, Inbound, Message
 
@@ -85,7 +85,7 @@ class Vhmsg:
         speak = _Speak(agent, recipient, id, set())
         if not documents:
             faults = [
-                f"{item.text} {raises('max_document')}" if item.large else item.text
+                f"{item.text} {limit_hint('max_document')}" if item.large else item.text
                 for item in items
                 if not isinstance(item, str) and "<bml" not in item.text
             ]

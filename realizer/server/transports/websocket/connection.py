@@ -16,7 +16,7 @@ from websockets.frames import Frame, Opcode
 from websockets.http11 import Request
 from websockets.protocol import State
 
-from realizer.core.settings import Settings, raises
+from realizer.core.settings import Settings, limit_hint
 from realizer.protocol.messages.replies import ErrorMessage
 from realizer.server.http import access
 from realizer.server.http.access import AccessControl, RateLimiter
@@ -48,7 +48,7 @@ class WebSocketConnections:
         if self._from[address_of(socket)] >= most:
             words = (
                 f"{most} connections from {address_of(socket)} are open: wanted fewer "
-                f"{raises('max_connections')}"
+                f"{limit_hint('max_connections')}"
             )
             raise JoinError(http.HTTPStatus.TOO_MANY_REQUESTS, words)
 

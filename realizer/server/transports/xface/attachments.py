@@ -15,7 +15,7 @@ from realizer.behaviours.kind import PlanningContext
 from realizer.behaviours.media import media_file
 from realizer.behaviours.registry import VOCABULARY
 from realizer.core.errors import RealizerError
-from realizer.core.settings import Settings, raises
+from realizer.core.settings import Settings, limit_hint
 from realizer.server.documents.document_queue import size_error
 from realizer.server.transports.xface.wire import Task
 
@@ -79,5 +79,5 @@ def _clip(text: str | bytes, settings: Settings) -> FAPClip:
     if len(clip.values) > 1 and clip.mask.any() and len(document_of(clip, "")) > most:
         got = f"{len(clip.values)} frames of {clip.mask.sum()} FAPs"
         words = f"wanted a file that plays as at most {most} bytes of BML, got {got}: send parts"
-        raise RealizerError(f"{words} {raises('max_document')}")
+        raise RealizerError(f"{words} {limit_hint('max_document')}")
     return clip
