@@ -237,7 +237,7 @@ class Interleaving:
         self._hub.leave(one, self.now)
 
     def _receive(self, connection: int, message: str | bytes) -> None:
-        session = self._hub.session_of(connection)
+        session = self._hub.session_of.get(connection)
         assert session is not None
         session.receive(connection, message, self.now)
 
@@ -274,7 +274,7 @@ class Interleaving:
 
     def _slow(self) -> None:
         one = self._one()
-        session = self._hub.session_of(one)
+        session = self._hub.session_of.get(one)
         assert session is not None
         session.update_backlog(one, self.random.choice((0, 0, 10**6, 10**9)))
 

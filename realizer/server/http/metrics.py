@@ -14,19 +14,28 @@ PLANNING = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
 
 
 class Histogram:
-    """A histogram of seconds, whose buckets have the upper bounds `ends`."""
+    """A histogram of seconds, whose buckets have the upper bounds `ends`.
+
+    Attributes:
+        pending: seconds that `count` will add to the buckets.
+    """
 
     def __init__(self, ends: Sequence[float]) -> None:
+        self.pending: list[float] = []
         self._ends = ends
         self._counts = [0] * (len(ends) + 1)
         self._sum = 0.0
 
-    def observe(self, seconds: float) -> None:
-        self._counts[bisect_left(self._ends, seconds)] += 1
-        self._sum += seconds
+    def count(self) -> None:
+        """Add the pending seconds to the buckets."""
+        for seconds in self.pending:
+            self._counts[bisect_left(self._ends, seconds)] += 1
+        self._sum += sum(self.pending)
+        self.pending.clear()
 
     def lines(self, name: str, labels: str) -> Iterable[str]:
         """Yield the samples; `labels` without the braces, or ""."""
+        self.count()
         count = 0
         for end, n in zip((*(f"{end:g}" for end in self._ends), "+Inf"), self._counts, strict=True):
             count += n

@@ -6,6 +6,7 @@ import asyncio
 import functools
 import itertools
 import logging
+import math
 from typing import Any
 
 from realizer.core.settings import Settings
@@ -18,7 +19,6 @@ from realizer.server.runtime.gc_policy import GcPolicy
 from realizer.server.runtime.session_factory import SessionFactory
 from realizer.server.runtime.session_registry import ANYBODY, SessionRegistry, Visitor, worker_of
 from realizer.server.runtime.takeovers import taken_over
-from realizer.server.runtime.timer_wheel import TimerWheel
 from realizer.server.session.effects import Close, Draw, Effect, Send, Speak
 from realizer.server.session.session import Session
 from realizer.server.streams.connection import SLOW
@@ -26,6 +26,9 @@ from realizer.server.transports.transport import Outbound
 
 log = logging.getLogger(__name__)
 
+# Wake-up times are rounded up to whole steps of uvloop's clock, except those so little after a step.
+STEP = 0.001  # s
+SLACK = 5e-4  # of a step
 EXPIRY_INTERVAL = 5.0  # s; how often expired sessions and due checkpoints are looked for
 
 
@@ -55,6 +58,7 @@ class SessionHost:
         self._registry = SessionRegistry(self._factory.new, settings, is_local)
         self._engines = Engines(settings.deformer)
         self._clients: dict[int, Outbound] = {}
+        self._timers: dict[Session, tuple[float, asyncio.Handle]] = {}  # wake-up times and their calls
         self._reading: dict[Session, None] = {}  # sessions with documents to parse or plan, in turn
         self._numbers = itertools.count(1)
         self._expiry_timer: asyncio.TimerHandle | None = None
@@ -74,7 +78,6 @@ class SessionHost:
             JournalError: the journal cannot be opened.
         """
         self._loop = asyncio.get_running_loop()
-        self._timers = TimerWheel(self._loop, self._tick)
         await self._factory.load()
         self._expiry_timer = self._loop.call_later(EXPIRY_INTERVAL, self._expire_sessions)
 
@@ -92,9 +95,8 @@ class SessionHost:
     async def close(self) -> None:
         """End every session and every engine."""
         self._closed = True
-        self._timers.close()
         self._reading.clear()
-        for task in (self._expiry_timer, self._takeover_check):
+        for task in (self._expiry_timer, self._takeover_check, *(timer for _, timer in self._timers.values())):
             if task is not None:
                 task.cancel()
         for session in self._registry.sessions.values():
@@ -187,7 +189,7 @@ class SessionHost:
 
     def receive(self, number: int, message: str | bytes) -> bool:
         """Pass on a message of a connection. Return False if it is in no session any more."""
-        session = self._registry.session_of(number)
+        session = self._registry.session_of.get(number)
         if session is None or session.closed:
             return False
         self.metrics.counts["messages"] += 1
@@ -202,7 +204,7 @@ class SessionHost:
 
     def leave(self, number: int) -> None:
         """Remove a closed connection."""
-        left = self._registry.session_of(number)
+        left = self._registry.session_of.get(number)
         if left is not None:
             self.metrics.counts["frames_dropped"] += left.dropped_count(number)
         self._registry.leave(number, self._loop.time())
@@ -223,23 +225,40 @@ class SessionHost:
         """Schedule the next wake-up of a session, and its next document, which waits for its turn."""
         if self._closed:
             return
-        self._timers.schedule(session, session.next_due())
+        self._wake_at(session, session.next_due())
         if session.has_documents:
             if not self._reading:
                 self._loop.call_soon(self._read)
             self._reading.setdefault(session)
 
+    def _wake_at(self, session: Session, when: float) -> None:
+        """Call `_tick` at a time, instead of the one before; infinite: never.
+
+        A call that is already due stays, or a session that gets messages all the time would never be woken.
+        """
+        now = self._loop.time()
+        if (known := self._timers.get(session)) is not None:
+            old, timer = known
+            if when < math.inf and (old == when or old <= min(when, now)):
+                return
+            timer.cancel()
+            del self._timers[session]
+        if when < math.inf and not self._closed:
+            step = math.ceil(max(when, now) / STEP - SLACK) * STEP
+            self._timers[session] = when, self._loop.call_at(step, self._tick, session, when)
+
     def _tick(self, session: Session, when: float) -> None:
         """Send the frames and the feedback of a session that are due, and do what else is."""
         now = self._loop.time()
-        self.metrics.late.observe(now - when)
+        del self._timers[session]
+        self.metrics.late.pending.append(now - when)
         run = session.fast_path
         if run is not None and (data := run.next_message(now)) is not None:
             client = self._clients[run.connection]
             client.send(data)
             if (waiting := client.unsent_bytes) > SLOW:
                 session.update_backlog(run.connection, waiting)
-            self._timers.schedule(session, run.wake_at)
+            self._wake_at(session, run.wake_at)
             return
         try:
             frames = session.frames(now)
@@ -255,7 +274,7 @@ class SessionHost:
         for number in session.connections:
             if (waiting := self._clients[number].unsent_bytes) > SLOW:
                 session.update_backlog(number, waiting)
-        self._timers.schedule(session, due)
+        self._wake_at(session, due)
 
     def _read(self) -> None:
         """Parse or plan one document of one session. What is due in others comes before the next one."""
@@ -268,7 +287,7 @@ class SessionHost:
         began, plans = self._loop.time(), session.player.version
         self._work(session, began, read_documents=True)
         if session.player.version != plans:
-            self.metrics.planning.observe(self._loop.time() - began)
+            self.metrics.planning.pending.append(self._loop.time() - began)
 
     def _work(self, session: Session, now: float, *, read_documents: bool) -> None:
         for number in session.connections:
@@ -330,6 +349,8 @@ class SessionHost:
 
     def _expire_sessions(self) -> None:
         self._gc_policy.collect_if_needed(len(self._clients))
+        for histogram in (self.metrics.late, self.metrics.planning):
+            histogram.count()
         now = self._loop.time()
         self._registry.remove_expired(now)
         self._resumed = {name: end for name, end in self._resumed.items() if end > now}

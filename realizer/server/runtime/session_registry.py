@@ -59,6 +59,10 @@ class SessionRegistry:
         make: (id, now, named) -> Session.
         settings: the limits of sessions.
         is_local: (name) -> whether the session of that name belongs to this process.
+
+    Attributes:
+        sessions: name -> session.
+        session_of: number of a connection -> its session.
     """
 
     def __init__(
@@ -71,7 +75,7 @@ class SessionRegistry:
         self._make = make
         self._settings = settings
         self.sessions: dict[str, Session] = {}
-        self._session_of: dict[int, Session] = {}
+        self.session_of: dict[int, Session] = {}
         self._visitors: dict[int, Visitor] = {}
         self._opened_by: dict[str, str] = {}  # session -> the address that opened it
         self._opened_count: Counter[str] = Counter()  # address -> number of sessions it has opened
@@ -136,19 +140,15 @@ class SessionRegistry:
                 self.sessions[id] = self._make(id, now, name is not None)
             self._opened_by[id] = visitor.address
             self._opened_count[visitor.address] += 1
-        session = self._session_of[connection] = self.sessions[id]
+        session = self.session_of[connection] = self.sessions[id]
         self._visitors[connection] = visitor
         session.connect(connection, now, seen)
         return session
 
-    def session_of(self, connection: int) -> Session | None:
-        """Return the session of a connection."""
-        return self._session_of.get(connection)
-
     def leave(self, connection: int, now: float) -> None:
         """Remove a closed connection, and its session if that ends with it."""
         self._visitors.pop(connection, None)
-        session = self._session_of.pop(connection, None)
+        session = self.session_of.pop(connection, None)
         if session is not None:
             session.disconnect(connection, now)
             if session.closed:

@@ -31,7 +31,7 @@ def test_metrics_describe_each_series_once() -> None:
 def test_histogram_counts_rise_to_the_total() -> None:
     metrics = Metrics()
     for seconds in (0.0, 0.0005, 0.002, 0.3, 70.0):
-        metrics.late.observe(seconds)
+        metrics.late.pending.append(seconds)
     got = samples(metrics.text(dict.fromkeys(GAUGES, 0), {}))
     buckets = [value for (name, _), value in got.items() if name == "realizer_lateness_seconds_bucket"]
     assert buckets == sorted(buckets)
@@ -54,7 +54,7 @@ def test_metrics_of_a_worker_have_its_number() -> None:
 def test_metrics_print_counts_to_the_last_digit() -> None:
     metrics = Metrics()
     metrics.counts["messages"] = 123_456_789
-    metrics.late.observe(1e9 + 0.25)
+    metrics.late.pending.append(1e9 + 0.25)
     got = samples(metrics.text(dict.fromkeys(GAUGES, 7_654_321), {}))
     assert got["realizer_messages_total", ""] == 123_456_789
     assert got["realizer_sessions", ""] == 7_654_321
@@ -66,7 +66,7 @@ def test_sum_samples_adds_the_counts_of_all_workers() -> None:
         metrics = Metrics(worker=number)
         metrics.counts["frames_dropped"] = 10_000_000 + number
         for seconds in (0.0001, 0.3 * (number + 1)):
-            metrics.late.observe(seconds)
+            metrics.late.pending.append(seconds)
         texts[number] = metrics.text(dict.fromkeys(GAUGES, number + 1), {})
     whole = sum_samples(texts)
     got = samples(whole)

@@ -109,3 +109,25 @@ def test_session_host_sends_frames_at_their_times() -> None:
         assert len(client.frames) == 101
 
     hosted(test)
+
+
+def test_session_host_wakes_a_session_that_gets_messages_all_the_time() -> None:
+    async def test(host: SessionHost) -> None:
+        number, client = subscribed(host)
+        for _ in range(1000):
+            host.receive(number, '{"type": "ping"}')
+            await asyncio.sleep(0.001)
+        assert len(client.frames) >= 25
+
+    hosted(test)
+
+
+def test_session_host_wakes_no_session_after_close() -> None:
+    async def test(host: SessionHost) -> None:
+        _, client = subscribed(host)
+        await host.close()
+        before = len(client.frames)
+        await asyncio.sleep(1)
+        assert len(client.frames) == before
+
+    hosted(test)

@@ -30,14 +30,14 @@ def test_registry_shares_named_sessions_only(registry) -> None:
     shared = registry.open(1, "show", 0.0)
     assert registry.open(2, "show", 0.0) is shared
     assert registry.open(3, None, 0.0) is not shared
-    assert registry.session_of(2) is shared
+    assert registry.session_of.get(2) is shared
 
 
 def test_registry_ends_an_unnamed_session_with_its_connection(registry) -> None:
     registry.open(1, None, 0.0)
     registry.leave(1, 1.0)
     assert not registry.sessions
-    assert registry.session_of(1) is None
+    assert registry.session_of.get(1) is None
 
 
 def test_registry_keeps_a_named_session_until_it_expires(registry) -> None:
@@ -86,7 +86,7 @@ def test_registry_refuses_a_hello_into_one_session_too_many(registry) -> None:
     here.receive(3, '{"type":"hello","session":"more"}', 0.5)
     (effect,) = registry.take_effects(here, 0.5)
     assert '"where":"hello.session"' in effect.data
-    assert registry.session_of(3) is here
+    assert registry.session_of.get(3) is here
 
 
 def test_registry_moves_a_connection_to_the_session_of_its_hello(registry) -> None:
@@ -94,7 +94,7 @@ def test_registry_moves_a_connection_to_the_session_of_its_hello(registry) -> No
     here = registry.open(2, None, 0.0)
     here.receive(2, '{"type":"hello","session":"show","seen":0}', 0.5)
     effects = registry.take_effects(here, 0.5)
-    assert registry.session_of(2) is there
+    assert registry.session_of.get(2) is there
     assert here.id not in registry.sessions
     assert '"session":"show"' in effects[0].data
 
@@ -124,7 +124,7 @@ def test_registry_closes_a_connection_whose_new_session_cannot_be_stored() -> No
     here = registry.open(1, "here", 0.0)
     here.receive(1, '{"type":"hello","session":"show"}', 0.5)
     assert registry.take_effects(here, 0.5) == [Close(1, 1013, "the journal has no room")]
-    assert registry.session_of(1) is None
+    assert registry.session_of.get(1) is None
 
 
 HERE, THERE = Visitor("10.0.0.1"), Visitor("10.0.0.2")
@@ -192,7 +192,7 @@ def test_registry_counts_both_sessions_of_a_move() -> None:
     here = registry.open(1, None, 0.0, visitor=HERE)
     here.receive(1, '{"type":"hello","session":"show"}', 0.5)
     registry.take_effects(here, 0.5)
-    there = registry.session_of(1)
+    there = registry.session_of.get(1)
     assert there is not None
     assert there.id == "show"
     there.receive(1, '{"type":"hello","session":"another"}', 0.6)
@@ -211,10 +211,10 @@ def test_registry_restricts_a_visitor_to_its_sessions() -> None:
     here.receive(1, '{"type":"hello","session":"other"}', 0.5)
     (effect,) = registry.take_effects(here, 0.5)
     assert "hello.session" in effect.data
-    assert registry.session_of(1) is here
+    assert registry.session_of.get(1) is here
     here.receive(1, '{"type":"hello","session":"stage"}', 0.5)
     registry.take_effects(here, 0.5)
-    there = registry.session_of(1)
+    there = registry.session_of.get(1)
     assert there is not None
     assert there.id == "stage"
 
@@ -250,7 +250,7 @@ def test_registry_never_exceeds_the_limit_of_an_address(
     opened: dict[Session, str] = {}
     who: dict[int, str] = {}
     for now, (move, connection, name, address) in enumerate(moves):
-        session = registry.session_of(connection)
+        session = registry.session_of.get(connection)
         if move == "open" and session is None:
             share: bool | None
             try:
@@ -271,7 +271,7 @@ def test_registry_never_exceeds_the_limit_of_an_address(
         elif move == "hello" and session is not None and name is not None:
             session.receive(connection, f'{{"type":"hello","session":"{name}"}}', now)
             registry.take_effects(session, now)
-            there = registry.session_of(connection)
+            there = registry.session_of.get(connection)
             assert there is not None
             opened.setdefault(there, who[connection])
         elif move == "sweep":
