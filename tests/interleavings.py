@@ -319,7 +319,7 @@ class Interleaving:
 
     def _pump(self) -> None:
         for session in list(self._hub.sessions.values()):
-            for effect in self._hub.take_effects(session, self.now):
+            for effect in self._hub.move_connections(session, session.take_effects(), self.now):
                 self._do(session, effect)
 
     def _do(self, session: Session, effect: Effect) -> None:

@@ -19,7 +19,7 @@ from realizer.server.runtime.gc_policy import GcPolicy
 from realizer.server.runtime.session_factory import SessionFactory
 from realizer.server.runtime.session_registry import ANYBODY, SessionRegistry, Visitor, worker_of
 from realizer.server.runtime.takeovers import taken_over
-from realizer.server.session.effects import Close, Draw, Effect, Send, Speak
+from realizer.server.session.effects import Close, Draw, Effect, MoveConnection, Send, Speak
 from realizer.server.session.session import Session
 from realizer.server.streams.connection import SLOW
 from realizer.server.transports.transport import Outbound
@@ -217,7 +217,10 @@ class SessionHost:
 
     def _apply_effects(self, session: Session) -> None:
         """Carry out the effects of a session, and schedule its next wake-up."""
-        for effect in self._registry.take_effects(session, self._loop.time()):
+        effects = session.take_effects()
+        if any(isinstance(effect, MoveConnection) for effect in effects):
+            effects = self._registry.move_connections(session, effects, self._loop.time())
+        for effect in effects:
             self._apply_effect(session, effect)
         self._schedule_wakeup(session)
 

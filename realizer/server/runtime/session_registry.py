@@ -6,7 +6,7 @@ import re
 import secrets
 import zlib
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from realizer.core.errors import RealizerError
@@ -165,11 +165,15 @@ class SessionRegistry:
                 if not self._opened_count[address]:
                     del self._opened_count[address]
 
-    def take_effects(self, session: Session, now: float) -> list[Effect]:
-        """Return the effects of a session, after moving connections that change to another session."""
+    def move_connections(self, session: Session, taken: Iterable[Effect], now: float) -> list[Effect]:
+        """Move the connections that change to another session, and return the effects that are left.
+
+        Args:
+            taken: the effects of the session that they leave.
+        """
         effects: list[Effect] = []
         moved: set[int] = set()
-        for effect in session.take_effects():
+        for effect in taken:
             if isinstance(effect, Send) and effect.connection in moved:
                 continue  # the client would take it for a message of the session it is in now
             if not isinstance(effect, MoveConnection):

@@ -84,7 +84,7 @@ def test_registry_refuses_a_hello_into_one_session_too_many(registry) -> None:
         registry.open(k, f"s{k}", 0.0)
     here = registry.open(3, "s0", 0.0)
     here.receive(3, '{"type":"hello","session":"more"}', 0.5)
-    (effect,) = registry.take_effects(here, 0.5)
+    (effect,) = registry.move_connections(here, here.take_effects(), 0.5)
     assert '"where":"hello.session"' in effect.data
     assert registry.session_of.get(3) is here
 
@@ -93,7 +93,7 @@ def test_registry_moves_a_connection_to_the_session_of_its_hello(registry) -> No
     there = registry.open(1, "show", 0.0)
     here = registry.open(2, None, 0.0)
     here.receive(2, '{"type":"hello","session":"show","seen":0}', 0.5)
-    effects = registry.take_effects(here, 0.5)
+    effects = registry.move_connections(here, here.take_effects(), 0.5)
     assert registry.session_of.get(2) is there
     assert here.id not in registry.sessions
     assert '"session":"show"' in effects[0].data
@@ -103,10 +103,10 @@ def test_registry_sends_nothing_of_the_old_session_after_a_move(registry) -> Non
     registry.open(1, "show", 0.0)
     here = registry.open(2, "here", 0.0)
     here.receive(2, '<bml id="b"><wait id="w" duration="1"/></bml>', 0.0)
-    registry.take_effects(here, 0.0)
+    registry.move_connections(here, here.take_effects(), 0.0)
     # Something of the old session is due in the very moment in which it goes.
     here.receive(2, '{"type":"hello","session":"show"}', 0.0)
-    effects = registry.take_effects(here, 0.0)
+    effects = registry.move_connections(here, here.take_effects(), 0.0)
     welcome = next(n for n, effect in enumerate(effects) if '"session":"show"' in effect.data)
     assert [effect.data for effect in effects[welcome + 1 :]] == []
     assert here.feedback_log.newest > 0
@@ -123,7 +123,7 @@ def test_registry_closes_a_connection_whose_new_session_cannot_be_stored() -> No
     registry = SessionRegistry(make, settings)
     here = registry.open(1, "here", 0.0)
     here.receive(1, '{"type":"hello","session":"show"}', 0.5)
-    assert registry.take_effects(here, 0.5) == [Close(1, 1013, "the journal has no room")]
+    assert registry.move_connections(here, here.take_effects(), 0.5) == [Close(1, 1013, "the journal has no room")]
     assert registry.session_of.get(1) is None
 
 
@@ -191,12 +191,12 @@ def test_registry_counts_both_sessions_of_a_move() -> None:
     registry = limited(max_address_sessions=1)
     here = registry.open(1, None, 0.0, visitor=HERE)
     here.receive(1, '{"type":"hello","session":"show"}', 0.5)
-    registry.take_effects(here, 0.5)
+    registry.move_connections(here, here.take_effects(), 0.5)
     there = registry.session_of.get(1)
     assert there is not None
     assert there.id == "show"
     there.receive(1, '{"type":"hello","session":"another"}', 0.6)
-    (effect,) = registry.take_effects(there, 0.6)
+    (effect,) = registry.move_connections(there, there.take_effects(), 0.6)
     assert "REALIZER_MAX_ADDRESS_SESSIONS" in effect.data
 
 
@@ -209,11 +209,11 @@ def test_registry_restricts_a_visitor_to_its_sessions() -> None:
         assert caught.value.status == 403
     here = registry.open(1, "show", 0.0, visitor=bound)
     here.receive(1, '{"type":"hello","session":"other"}', 0.5)
-    (effect,) = registry.take_effects(here, 0.5)
+    (effect,) = registry.move_connections(here, here.take_effects(), 0.5)
     assert "hello.session" in effect.data
     assert registry.session_of.get(1) is here
     here.receive(1, '{"type":"hello","session":"stage"}', 0.5)
-    registry.take_effects(here, 0.5)
+    registry.move_connections(here, here.take_effects(), 0.5)
     there = registry.session_of.get(1)
     assert there is not None
     assert there.id == "stage"
@@ -270,7 +270,7 @@ def test_registry_never_exceeds_the_limit_of_an_address(
             registry.leave(connection, now)
         elif move == "hello" and session is not None and name is not None:
             session.receive(connection, f'{{"type":"hello","session":"{name}"}}', now)
-            registry.take_effects(session, now)
+            registry.move_connections(session, session.take_effects(), now)
             there = registry.session_of.get(connection)
             assert there is not None
             opened.setdefault(there, who[connection])
