@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
 
-from realizer.behaviours.kind import Position
-from realizer.playback.character import Character
-from realizer.scheduling.timing import Schedule
+from realizer.playback.player import Player
+from realizer.server.documents.document_queue import Submission
 from realizer.server.journal.entry import JournalError
 from realizer.server.journal.serialization import (
     character_from_json,
@@ -16,99 +14,93 @@ from realizer.server.journal.serialization import (
     schedule_from_json,
     schedule_to_json,
 )
-from realizer.server.speech.audio_clips import Clip
+from realizer.server.session.character_faces import CharacterFaces
+from realizer.server.session.feedback_log import FeedbackLog
+from realizer.server.speech.audio_clips import AudioClips, Clip
 
 VERSION = 1
 STATE, CLIP = "state", "clip:"
 
 
-@dataclass(frozen=True)
-class SessionState:
-    """The state of a session that outlives its blocks.
+class Checkpoint:
+    """The state of a session that outlives its blocks: written to a journal, and read from it."""
 
-    Attributes:
-        at: seconds on the session clock.
-        connections: numbers of the connections.
-        seq: sequence number of the last feedback.
-        last_messages: the last feedback messages, the oldest first.
-        faces, voices: index of a character -> name of the face or voice that a client chose.
-        past, expected: schedules of ended blocks, and of anticipated sync points.
-        request_count: number of speech requests so far.
-        fault: last error of a voice.
-        clips: ids of the sound clips, the oldest first.
-    """
+    def __init__(
+        self,
+        player: Player,
+        faces: CharacterFaces,
+        clips: AudioClips,
+        submission: Submission,
+        feedback_log: FeedbackLog,
+    ) -> None:
+        self._player = player
+        self._faces = faces
+        self._clips = clips
+        self._submission = submission
+        self._log = feedback_log
 
-    at: float
-    connections: Sequence[int]
-    seq: int
-    last_messages: Sequence[str]
-    scene: Mapping[str, Position] | None
-    characters: Sequence[Character]
-    faces: Mapping[int, str]
-    voices: Mapping[int, str]
-    past: Sequence[Schedule]
-    expected: Schedule
-    request_count: int
-    fault: str | None
-    clips: Sequence[str]
+    def write(self, at: float, connections: Collection[int]) -> dict[str, str | None]:
+        """Return the parts that a journal stores.
 
+        Args:
+            at: seconds on the session clock.
+            connections: numbers of the connections.
+        """
+        player, tts, scene = self._player, self._submission.tts, self._player.context.scene
+        past, expected = player.blocks.snapshot()
+        data = {
+            "version": VERSION,
+            "at": at,
+            "connections": list(connections),
+            "seq": self._log.newest,
+            "told": self._log.last(),
+            "scene": None if scene is None else {name: list(place) for name, place in scene.items()},
+            "characters": [character_to_json(character) for character in player.character_states],
+            "faces": {str(index): face for index, face in self._faces.assigned.items()},
+            "voices": {str(index): voice for index, voice in self._submission.voices.items()},
+            "past": [schedule_to_json(schedule) for schedule in past],
+            "expected": schedule_to_json(expected),
+            "spoken": tts.request_count,
+            "fault": tts.fault,
+            "clips": self._clips.ids,
+        }
+        clips = {CLIP + id: text for id, text in self._clips.changes().items()}
+        return {STATE: json.dumps(data, ensure_ascii=False), **clips}
 
-def write(state: SessionState, clips: Mapping[str, str | None]) -> dict[str, str | None]:
-    """Return the parts that a journal stores.
+    def read(self, session: str, parts: Mapping[str, str]) -> tuple[float, list[int]]:
+        """Restore the state of a new session from a checkpoint.
 
-    Args:
-        clips: id -> JSON of each clip that has changed since the last checkpoint, None for a deleted clip.
-    """
-    data = {
-        "version": VERSION,
-        "at": state.at,
-        "connections": list(state.connections),
-        "seq": state.seq,
-        "told": list(state.last_messages),
-        "scene": None if state.scene is None else {name: list(place) for name, place in state.scene.items()},
-        "characters": [character_to_json(character) for character in state.characters],
-        "faces": {str(index): face for index, face in state.faces.items()},
-        "voices": {str(index): voice for index, voice in state.voices.items()},
-        "past": [schedule_to_json(schedule) for schedule in state.past],
-        "expected": schedule_to_json(state.expected),
-        "spoken": state.request_count,
-        "fault": state.fault,
-        "clips": list(state.clips),
-    }
-    return {STATE: json.dumps(data, ensure_ascii=False), **{CLIP + id: text for id, text in clips.items()}}
+        Args:
+            session: its name, for errors.
+            parts: as in `SavedSession`.
 
+        Returns:
+            The time of the checkpoint on the session clock, and the numbers of the connections.
 
-def read(session: str, parts: Mapping[str, str]) -> tuple[SessionState, dict[str, Clip]]:
-    """Return the state in the checkpoint of a session, and its clips by id.
-
-    Args:
-        parts: as in `SavedSession`.
-
-    Raises:
-        JournalError: the parts are not a checkpoint, or of another version.
-    """
-    try:
-        data = json.loads(parts[STATE])
-        if data["version"] != VERSION:
-            words = f"wanted one of version {VERSION}, got {data['version']!r}"
-            raise JournalError(f"the checkpoint of session {session}: {words}")
-        scene = data["scene"]
-        state = SessionState(
-            at=float(data["at"]),
-            connections=[int(connection) for connection in data["connections"]],
-            seq=int(data["seq"]),
-            last_messages=[str(text) for text in data["told"]],
-            scene=None if scene is None else {name: (x, y, z) for name, (x, y, z) in scene.items()},
-            characters=[character_from_json(character) for character in data["characters"]],
-            faces={int(index): face for index, face in data["faces"].items()},
-            voices={int(index): voice for index, voice in data["voices"].items()},
-            past=[schedule_from_json(schedule) for schedule in data["past"]],
-            expected=schedule_from_json(data["expected"]),
-            request_count=int(data["spoken"]),
-            fault=data["fault"],
-            clips=data["clips"],
-        )
-        return state, {id: Clip.from_json(json.loads(parts[CLIP + id])) for id in state.clips}
-    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
-        fault = f"{type(error).__name__}: {error}"
-        raise JournalError(f"the checkpoint of session {session} cannot be read: {fault}") from None
+        Raises:
+            JournalError: the parts are not a checkpoint, or of another version.
+        """
+        player, tts = self._player, self._submission.tts
+        try:
+            data = json.loads(parts[STATE])
+            if data["version"] != VERSION:
+                words = f"wanted one of version {VERSION}, got {data['version']!r}"
+                raise JournalError(f"the checkpoint of session {session}: {words}")
+            at, scene = float(data["at"]), data["scene"]
+            player.set_scene(
+                None if scene is None else {name: (x, y, z) for name, (x, y, z) in scene.items()}
+            )
+            player.restore(
+                [character_from_json(character) for character in data["characters"]],
+                [schedule_from_json(schedule) for schedule in data["past"]],
+                schedule_from_json(data["expected"]),
+            )
+            self._faces.assigned.update({int(index): face for index, face in data["faces"].items()})
+            self._submission.voices.update({int(index): voice for index, voice in data["voices"].items()})
+            tts.request_count, tts.fault = int(data["spoken"]), data["fault"]
+            self._clips.restore({id: Clip.from_json(json.loads(parts[CLIP + id])) for id in data["clips"]})
+            self._log.restore(int(data["seq"]), [str(text) for text in data["told"]], at)
+            return at, [int(connection) for connection in data["connections"]]
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+            fault = f"{type(error).__name__}: {error}"
+            raise JournalError(f"the checkpoint of session {session} cannot be read: {fault}") from None

@@ -96,7 +96,11 @@ class SessionHost:
         """End every session and every engine."""
         self._closed = True
         self._reading.clear()
-        for task in (self._expiry_timer, self._takeover_check, *(timer for _, timer in self._timers.values())):
+        for task in (
+            self._expiry_timer,
+            self._takeover_check,
+            *(timer for _, timer in self._timers.values()),
+        ):
             if task is not None:
                 task.cancel()
         for session in self._registry.sessions.values():

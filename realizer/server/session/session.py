@@ -41,8 +41,8 @@ from realizer.protocol.messages.requests import Hello, Ping, StateQuery, Subscri
 from realizer.protocol.wire import WireError, unpack_clip
 from realizer.server.documents.document_queue import Submission, block_id_of
 from realizer.server.documents.limits import duration_error
-from realizer.server.journal import JournalError, TakenOver, checkpoint
-from realizer.server.journal.checkpoint import SessionState
+from realizer.server.journal import JournalError, TakenOver
+from realizer.server.journal.checkpoint import Checkpoint
 from realizer.server.journal.entry import Kind
 from realizer.server.journal.journal_writer import JournalWriter
 from realizer.server.session.character_faces import CharacterFaces
@@ -121,6 +121,7 @@ class Session:
         self.submission = Submission(id, settings, self.player, self._add_effects)
         self._connections: dict[int, Connection] = {}
         self.feedback_log = log or FeedbackLog(epoch)
+        self._checkpoint = Checkpoint(self.player, self.faces, self.clips, self.submission, self.feedback_log)
         self.fast_path: FrameRun | None = None
         self._effects: list[Effect] = []
         # The cached deadlines on the session clock: of the next event that is neither a frame nor feedback
@@ -334,30 +335,12 @@ class Session:
         ):
             return True
         try:
-            if self.journal.compact(checkpoint.write(self._state_to_save(t), self.clips.changes())):
+            if self.journal.compact(self._checkpoint.write(t, self.connections)):
                 self.clips.settle()
         except TakenOver as error:
             self.hand_over(error)
             return False
         return True
-
-    def _state_to_save(self, t: float) -> SessionState:
-        past, expected = self.player.blocks.snapshot()
-        return SessionState(
-            at=t,
-            connections=self.connections,
-            seq=self.feedback_log.newest,
-            last_messages=self.feedback_log.last(),
-            scene=self.player.context.scene,
-            characters=self.player.character_states,
-            faces=self.faces.assigned,
-            voices=self.submission.voices,
-            past=past,
-            expected=expected,
-            request_count=self.submission.tts.request_count,
-            fault=self.submission.tts.fault,
-            clips=self.clips.ids,
-        )
 
     def restore(self, parts: Mapping[str, str]) -> float:
         """Restore the state and the connections of a checkpoint. The session must be new and opened at 0.
@@ -371,17 +354,10 @@ class Session:
         Raises:
             JournalError: the parts are invalid, or of another version.
         """
-        state, clips = checkpoint.read(self.id, parts)
-        self.player.set_scene(state.scene)
-        self.player.restore(state.characters, state.past, state.expected)
-        self.faces.assigned.update(state.faces)
-        self.submission.voices.update(state.voices)
-        self.submission.tts.request_count, self.submission.tts.fault = state.request_count, state.fault
-        self.clips.restore(clips)
-        self.feedback_log.restore(state.seq, state.last_messages, state.at)
-        for connection in state.connections:
-            self.connect(connection, state.at)
-        return state.at
+        at, connections = self._checkpoint.read(self.id, parts)
+        for connection in connections:
+            self.connect(connection, at)
+        return at
 
     def hand_over(self, error: TakenOver) -> None:
         """Close all connections because another process has taken over; clients reconnect there."""
