@@ -40,7 +40,7 @@ from realizer.protocol.messages.parse import parse_control
 from realizer.protocol.messages.replies import ErrorMessage
 from realizer.server.session.effects import Send
 from realizer.server.session.session import Session
-from realizer.server.transports.message_format import Disconnect, Inbound
+from realizer.server.transports.message_formats import Disconnect, Inbound
 from realizer.server.transports.xface.attachments import prepare
 from realizer.server.transports.xface.reader import Content, Fault, TaskReader
 from realizer.server.transports.xface.tasks import ABLE, UNABLE, Answer, TaskRunner

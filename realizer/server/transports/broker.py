@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from realizer.core.errors import RealizerError
-from realizer.server.transports.message_format import Message
+from realizer.server.transports.message_formats import Message
 
 HEARTBEAT = 10_000  # ms, both ways: the only sign that the broker's host has died
 REASON = 0.1  # s from the loss of a connection until it is reported, for its reason to arrive first

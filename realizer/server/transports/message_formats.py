@@ -1,18 +1,60 @@
-"""The message formats on a broker: plain BML, Asap's BML in JSON, and the registry with VHMSG.
-
-A new format is a `MessageFormat` and a row of MESSAGE_FORMATS.
-"""
+"""Message formats on a broker: their protocol, plain BML, and Asap's BML in JSON."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
 from urllib.parse import quote, unquote_plus
 
 from bml_schema import WarningFeedback
-from realizer.core.settings import Settings
-from realizer.server.transports.message_format import Action, Inbound, Message, MessageFormat
-from realizer.server.transports.vhmsg import Vhmsg
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A message to the broker."""
+
+    topic: str
+    body: str
+    headers: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Inbound:
+    """A message to the session: a document, or a control message."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Disconnect:
+    """A request to disconnect."""
+
+
+Action = Inbound | Message | Disconnect
+
+
+class MessageFormat(Protocol):
+    """A message format of one session, which may keep state; `topic` is the topic it reads."""
+
+    topic: str
+
+    def hello(self) -> list[Message]:
+        """Return the messages to send when the broker is connected."""
+        ...
+
+    def incoming(self, body: bytes) -> list[Action]:
+        """Return the actions that a message of the topic asks for; [] if it is for other clients."""
+        ...
+
+    def outgoing(self, feedback: str) -> list[Message]:
+        """Return the messages to send for feedback of the session."""
+        ...
+
+    def farewell(self) -> list[Message]:
+        """Return the messages to send before the session ends."""
+        ...
 
 
 class AsapXml:
@@ -66,11 +108,3 @@ class AsapJson(AsapXml):
         # Blanks as %20, which all decoders understand, not as +.
         body = json.dumps({"feedback": {"content": quote(feedback, safe="")}})
         return [Message(self._out, body, {"content-type": "application/json"})]
-
-
-# Name of the session -> its topic to read in the settings, None to switch it off, and the format's factory.
-MESSAGE_FORMATS: dict[str, tuple[str, Callable[[str, Settings], MessageFormat]]] = {
-    "stomp-json": ("stomp_json_in", lambda topic, settings: AsapJson(topic, settings.stomp_json_out)),
-    "stomp-xml": ("stomp_xml_in", lambda topic, settings: AsapXml(topic, settings.stomp_xml_out)),
-    "stomp-vhmsg": ("stomp_vhmsg", lambda topic, settings: Vhmsg(topic, settings.max_document)),
-}

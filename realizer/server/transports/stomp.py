@@ -17,15 +17,28 @@ from realizer.server.http.access import RateLimiter
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError
 from realizer.server.transports.broker import BrokerConnection, check_installed
-from realizer.server.transports.message_format import Disconnect, Inbound, Message, MessageFormat
-from realizer.server.transports.message_formats import MESSAGE_FORMATS
+from realizer.server.transports.message_formats import (
+    AsapJson,
+    AsapXml,
+    Disconnect,
+    Inbound,
+    Message,
+    MessageFormat,
+)
 from realizer.server.transports.reconnecting import ReconnectingTransport
+from realizer.server.transports.vhmsg import Vhmsg
 
 log = logging.getLogger(__name__)
 
 ATTEMPT = 5.0  # s; to connect, and to disconnect
 # Messages that wait for the broker; beyond it the oldest are dropped.
 MAX_QUEUED = 4 * 2**20  # characters
+# Name of the session -> its topic to read in the settings, None to switch it off, and the format's factory.
+MESSAGE_FORMATS: dict[str, tuple[str, Callable[[str, Settings], MessageFormat]]] = {
+    "stomp-json": ("stomp_json_in", lambda topic, settings: AsapJson(topic, settings.stomp_json_out)),
+    "stomp-xml": ("stomp_xml_in", lambda topic, settings: AsapXml(topic, settings.stomp_xml_out)),
+    "stomp-vhmsg": ("stomp_vhmsg", lambda topic, settings: Vhmsg(topic, settings.max_document)),
+}
 
 
 class StompTransport(ReconnectingTransport):

@@ -12,7 +12,7 @@ from xml.sax.saxutils import quoteattr, unescape
 from bml_schema import BlockProgress, PredictionFeedback, WarningFeedback, parse_feedback
 from realizer.core.settings import limit_hint
 from realizer.server.transports.document_framing import DocumentFramer
-from realizer.server.transports.message_format import Action, Disconnect, Inbound, Message
+from realizer.server.transports.message_formats import Action, Disconnect, Inbound, Message
 
 # The names by which components of a VHMSG system know the realizer.
 COMPONENT = "renderer"

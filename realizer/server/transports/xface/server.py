@@ -11,7 +11,7 @@ from realizer.core.settings import Settings
 from realizer.server.http.access import RateLimiter
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError
-from realizer.server.transports.message_format import Disconnect, Inbound
+from realizer.server.transports.message_formats import Disconnect, Inbound
 from realizer.server.transports.tcp_listener import TcpTransport, session_name
 from realizer.server.transports.xface.attachments import Attachment, prepare
 from realizer.server.transports.xface.reader import Content, Fault, TaskReader

@@ -13,7 +13,7 @@ from bml_schema.feedback import parse_feedback
 from realizer.animation.fap.fap_clip import FAPClip
 from realizer.behaviours.fap_document import document_of
 from realizer.core.errors import RealizerError
-from realizer.server.transports.message_format import Disconnect, Inbound
+from realizer.server.transports.message_formats import Disconnect, Inbound
 from realizer.server.transports.xface.attachments import Attachment, MissingAttachment, Script
 from realizer.server.transports.xface.wire import Status, Task, pack_note
 from realizer.tables import faps

@@ -16,7 +16,7 @@ from realizer.core.settings import Settings
 from realizer.server.serve import Server
 from realizer.server.transports import broker
 from realizer.server.transports.broker import BrokerConnection
-from realizer.server.transports.message_format import Message
+from realizer.server.transports.message_formats import Message
 
 LIMIT = 10  # s; a hung test ends
 

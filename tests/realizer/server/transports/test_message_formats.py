@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from bml_schema.feedback import WarningFeedback, parse_feedback
 from realizer.core.settings import Settings
-from realizer.server.transports.message_format import Inbound, Message
-from realizer.server.transports.message_formats import MESSAGE_FORMATS, AsapJson, AsapXml
+from realizer.server.transports.message_formats import AsapJson, AsapXml, Inbound, Message
+from realizer.server.transports.stomp import MESSAGE_FORMATS
 
 NOD = '<bml id="b"><head id="n" lexeme="NOD"/></bml>'
 TRICKY = '<bml id="b"><speech id="s"><text>50 % + é &amp; more</text></speech></bml>'

@@ -9,7 +9,7 @@ import pytest
 
 from bml_schema import parse
 from bml_schema.feedback import BlockPrediction, BlockProgress, PredictionFeedback, WarningFeedback
-from realizer.server.transports.message_format import Disconnect, Inbound
+from realizer.server.transports.message_formats import Disconnect, Inbound
 from realizer.server.transports.vhmsg import Vhmsg
 
 pytestmark = pytest.mark.xdist_group("brokers")

@@ -11,7 +11,7 @@ import pytest
 from bml_schema import BlockProgress, WarningFeedback
 from realizer.animation.fap.fap_clip import FAPClip
 from realizer.core.errors import RealizerError
-from realizer.server.transports.message_format import Disconnect, Inbound
+from realizer.server.transports.message_formats import Disconnect, Inbound
 from realizer.server.transports.xface.attachments import Attachment, MissingAttachment, Script
 from realizer.server.transports.xface.tasks import ABLE, UNABLE, Answer, TaskRunner
 from realizer.server.transports.xface.wire import Task, read_notes
