@@ -65,10 +65,17 @@ class HttpSite:
             return HttpResponse(200, JSON, vocabulary())
         if path in ("/feeling.json", "/pose.fap"):
             return self._tool(path, {name: values[-1] for name, values in parse_qs(query).items()})
-        if path == "/look.json":
-            return self._look(parse_qs(query).get("face", ["default"])[0])
-        if path.startswith("/faces/"):
-            return self._face(path.removeprefix("/faces/").removesuffix(".glb"))
+        try:
+            if path == "/look.json":
+                name = parse_qs(query).get("face", ["default"])[0]
+                return HttpResponse(200, JSON, _look(name, self._settings.light, self._settings.background))
+            if path.startswith("/faces/"):
+                glb = _glb(path.removeprefix("/faces/").removesuffix(".glb"))
+                return HttpResponse(200, "model/gltf-binary", glb, (("Cache-Control", "no-cache"),))
+        except FaceError as error:
+            return HttpResponse(404, TEXT, f"{error}\n".encode())
+        except RealizerError as error:
+            return HttpResponse(500, TEXT, f"{error}\n".encode())
         return self._file("index.html" if path == "/" else path[1:])
 
     def _tool(self, path: str, query: dict[str, str]) -> HttpResponse:
@@ -82,20 +89,6 @@ class HttpSite:
             return HttpResponse(200, "text/x-fap", pose.encode(), headers)
         except page_tools.ToolError as error:
             return HttpResponse(400, TEXT, f"{error}\n".encode())
-
-    def _face(self, name: str) -> HttpResponse:
-        try:
-            return HttpResponse(200, "model/gltf-binary", _glb(name), (("Cache-Control", "no-cache"),))
-        except FaceError as error:
-            return HttpResponse(404, TEXT, f"{error}\n".encode())
-        except RealizerError as error:
-            return HttpResponse(500, TEXT, f"{error}\n".encode())
-
-    def _look(self, name: str) -> HttpResponse:
-        try:
-            return HttpResponse(200, JSON, _look(name, self._settings.light, self._settings.background))
-        except FaceError as error:
-            return HttpResponse(404, TEXT, f"{error}\n".encode())
 
     def _file(self, name: str) -> HttpResponse:
         """Return a file of the page. Only names in its folder are accepted, so that no path can leave it."""

@@ -29,20 +29,54 @@ def vocabulary() -> bytes:
     values: {"element attribute": words} for words that are looked up in a table.
     aus, faps, groups: for the sliders. wheel: points, in degrees and 0..7. profiles: {set: names}.
     """
-    return json.dumps(
-        {
-            "elements": _elements(),
-            "values": _values(),
-            "aus": _aus(),
-            "faps": _faps(),
-            "groups": _groups(),
-            "wheel": _wheel(),
-            "profiles": _profiles(),
-            "voices": _voices(),
-        },
-        ensure_ascii=False,
-        separators=(",", ":"),
-    ).encode()
+    from realizer.animation.axis import AU_NAMES
+    from realizer.emotions.archetypes import archetypes
+    from realizer.emotions.words import known_words
+    from realizer.expressions.library import builtin
+    from realizer.speech.registry import voices
+    from realizer.tables import action_units, faps
+    from realizer.tables.control_groups import au_regions, fap_regions
+    from realizer.tables.lexemes import face_lexemes, head_lexemes
+    from realizer.tables.wheel_words import ring
+
+    known, words = AU_NAMES(), sorted(known_words())
+    aus = [
+        {"au": row.au, "name": row.name, "sides": f"{row.au}L" in known}
+        for row in action_units()
+        if f"{row.au}L" in known or str(row.au) in known
+    ]
+    movable = [_fields(row, "fap", "name", "group", "unit", "least", "most") for row in faps()[2:]]
+    values = {
+        "faceLexeme lexeme": list(face_lexemes()),
+        "head lexeme": list(head_lexemes()),
+        "faceFacs au": [str(au["au"]) for au in aus],
+        "emotion name": words,
+        "mood name": words,
+        "emotion profile": ["own", "published", "raw"],
+        "mood profile": ["own", "published", "raw"],
+        "expression name": list(builtin()),
+        "fap number": [str(fap["fap"]) for fap in movable],
+    }
+    regions = {"aus": au_regions(), "faps": fap_regions()}
+    profiles = {
+        kind: [f"{name} {number}" for name, numbered in archetypes(kind).items() for number in numbered]
+        for kind in ("published", "raw")
+    }
+    data = {
+        "elements": _elements(),
+        "values": values,
+        "aus": aus,
+        "faps": movable,
+        "groups": {kind: [_fields(row, "name", "members") for row in rows] for kind, rows in regions.items()},
+        "wheel": [_fields(row, "name", "kind", "angle", "activation") for row in ring("paul").values()],
+        "profiles": profiles,
+        "voices": [_fields(voice, "name", "engine", "available") for voice in voices()],
+    }
+    return json.dumps(data, ensure_ascii=False, separators=(",", ":")).encode()
+
+
+def _fields(row: object, *names: str) -> dict[str, Any]:
+    return {name: getattr(row, name) for name in names}
 
 
 def _elements() -> list[dict[str, Any]]:
@@ -106,70 +140,3 @@ def _attribute(
         "required": required,
         "namespace": namespace,
     }
-
-
-def _values() -> dict[str, list[str]]:
-    from realizer.emotions.words import known_words
-    from realizer.expressions.library import builtin
-    from realizer.tables.lexemes import face_lexemes, head_lexemes
-
-    words = sorted(known_words())
-    return {
-        "faceLexeme lexeme": list(face_lexemes()),
-        "head lexeme": list(head_lexemes()),
-        "faceFacs au": [str(au["au"]) for au in _aus()],
-        "emotion name": words,
-        "mood name": words,
-        "emotion profile": ["own", "published", "raw"],
-        "mood profile": ["own", "published", "raw"],
-        "expression name": list(builtin()),
-        "fap number": [str(fap["fap"]) for fap in _faps()],
-    }
-
-
-def _aus() -> list[dict[str, Any]]:
-    from realizer.animation.axis import AU_NAMES
-    from realizer.tables import action_units
-
-    known = AU_NAMES()
-    return [
-        {"au": row.au, "name": row.name, "sides": f"{row.au}L" in known}
-        for row in action_units()
-        if f"{row.au}L" in known or str(row.au) in known
-    ]
-
-
-def _faps() -> list[dict[str, Any]]:
-    from realizer.tables import faps
-
-    fields = ("fap", "name", "group", "unit", "least", "most")
-    return [{field: getattr(row, field) for field in fields} for row in faps()[2:]]
-
-
-def _groups() -> dict[str, list[dict[str, Any]]]:
-    from realizer.tables.control_groups import au_regions, fap_regions
-
-    regions = {"aus": au_regions(), "faps": fap_regions()}
-    return {kind: [{"name": r.name, "members": r.members} for r in rows] for kind, rows in regions.items()}
-
-
-def _wheel() -> list[dict[str, Any]]:
-    from realizer.tables.wheel_words import ring
-
-    fields = ("name", "kind", "angle", "activation")
-    return [{field: getattr(point, field) for field in fields} for point in ring("paul").values()]
-
-
-def _profiles() -> dict[str, list[str]]:
-    from realizer.emotions.archetypes import archetypes
-
-    return {
-        kind: [f"{name} {number}" for name, numbered in archetypes(kind).items() for number in numbered]
-        for kind in ("published", "raw")
-    }
-
-
-def _voices() -> list[dict[str, Any]]:
-    from realizer.speech.registry import voices
-
-    return [{"name": v.name, "engine": v.engine, "available": v.available} for v in voices()]
