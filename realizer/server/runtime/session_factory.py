@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from itertools import islice
 from typing import Any
 
 from realizer.behaviours.kind import Position
@@ -25,6 +26,9 @@ from realizer.server.session.welcome import capabilities_of
 from realizer.speech.utterance import Utterance
 
 log = logging.getLogger(__name__)
+
+# A query for so many sessions takes a millisecond or two, which delays no frame.
+BATCH = 100
 
 
 class SessionFactory:
@@ -123,6 +127,26 @@ class SessionFactory:
             session.disconnect(connection, now)
         log.info("session %s is resumed, %d entries long", name, len(saved.entries))
         return session, unanswered
+
+    async def taken_over(self, sessions: Iterable[Session]) -> list[Session]:
+        """Return those of the named sessions that another process has taken over.
+
+        The journal is queried in a thread, because a server may hang.
+        """
+        if self.journal is None:
+            return []
+        loop = asyncio.get_running_loop()
+        named = iter([session for session in sessions if session.named and not session.closed])
+        lost: list[Session] = []
+        while batch := {session.id: session for session in islice(named, BATCH)}:
+            try:
+                ids = await loop.run_in_executor(None, self.journal.taken_over, batch.keys())
+            except JournalError as error:
+                log.warning("sessions that other processes have taken over are not known: %s", error)
+                break
+            # A failed write may have closed one meanwhile.
+            lost += [batch[id] for id in ids if not batch[id].closed]
+        return lost
 
     def _session(self, id: str, now: float, *, named: bool, epoch: float) -> Session:
         session = Session(

@@ -12,13 +12,12 @@ from typing import Any
 from realizer.core.settings import Settings
 from realizer.server.documents.limits import memory
 from realizer.server.http.metrics import Metrics
-from realizer.server.journal import Journal, TakenOver
+from realizer.server.journal import TakenOver
 from realizer.server.journal.replay import catch_up
 from realizer.server.runtime.engines import Engines
 from realizer.server.runtime.gc_policy import GcPolicy
 from realizer.server.runtime.session_factory import SessionFactory
 from realizer.server.runtime.session_registry import ANYBODY, SessionRegistry, Visitor, worker_of
-from realizer.server.runtime.takeovers import taken_over
 from realizer.server.session.effects import Close, Draw, Effect, MoveConnection, Send, Speak
 from realizer.server.session.session import Session
 from realizer.server.streams.connection import SLOW
@@ -348,9 +347,9 @@ class SessionHost:
             self._fail(session)
         self._apply_effects(session)
 
-    async def _check_takeovers(self, journal: Journal) -> None:
+    async def _check_takeovers(self) -> None:
         """Disconnect the clients of sessions that another process has taken over."""
-        for session in await taken_over(journal, self._registry.sessions.values()):
+        for session in await self._factory.taken_over(self._registry.sessions.values()):
             session.hand_over(TakenOver(session.id))
             self._apply_effects(session)
 
@@ -365,8 +364,6 @@ class SessionHost:
         grown = [session for session in self._registry.sessions.values() if session.journal.needs_checkpoint]
         for k, session in enumerate(grown):
             self._loop.call_later(EXPIRY_INTERVAL * k / len(grown), self._compact_journal, session)
-        if self._factory.journal is not None and (
-            self._takeover_check is None or self._takeover_check.done()
-        ):
-            self._takeover_check = self._loop.create_task(self._check_takeovers(self._factory.journal))
+        if self._takeover_check is None or self._takeover_check.done():
+            self._takeover_check = self._loop.create_task(self._check_takeovers())
         self._expiry_timer = self._loop.call_later(EXPIRY_INTERVAL, self._expire_sessions)

@@ -15,7 +15,8 @@ from realizer.core.errors import FaceError
 from realizer.core.settings import Settings
 from realizer.server.documents.document_queue import Submission
 from realizer.server.http.metrics import Metrics
-from realizer.server.journal import JournalError
+from realizer.server.journal import Journal, JournalError, TakenOver, journal_at
+from realizer.server.runtime import session_factory
 from realizer.server.runtime.session_factory import SessionFactory
 from realizer.server.runtime.session_registry import JoinError
 from realizer.server.serve import Server
@@ -145,3 +146,47 @@ def test_factory_restores_a_session_whose_recording_failed(
                 assert await feedback(client, "b:end") == told
 
     asyncio.run(run())
+
+
+def opened(name: str, *, named: bool = True) -> Session:
+    return Session(name, Settings(), 0.0, named=named)
+
+
+async def taken_over(journal: Journal, sessions: list[Session]) -> list[Session]:
+    factory = SessionFactory(Settings(), Metrics())
+    factory.journal = journal
+    return await factory.taken_over(sessions)
+
+
+def test_factory_taken_over_finds_lost_sessions_among_many(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(session_factory, "BATCH", 2)
+    here, there = (journal_at(str(tmp_path / "journal.db")) for _ in range(2))
+    sessions = [opened(f"s{number}") for number in range(5)]
+    for session in sessions:
+        here.begin(session.id, 0.0)
+    own = opened("own", named=False)
+    here.begin("own", 0.0)
+    for name in ("s1", "s3", "s4", "own"):
+        there.claim(name)
+    sessions[3].hand_over(TakenOver("known already"))
+    found = asyncio.run(taken_over(here, [*sessions, own]))
+    assert found == [sessions[1], sessions[4]]
+    assert asyncio.run(taken_over(there, sessions)) == [sessions[0], sessions[2]]
+    here.close()
+    there.close()
+
+
+def test_factory_taken_over_finds_none_if_the_journal_cannot_be_read(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    journal = journal_at(str(tmp_path / "journal.db"))
+
+    def broken(sessions: object) -> set[str]:
+        raise JournalError("it does not answer")
+
+    monkeypatch.setattr(journal, "taken_over", broken)
+    assert asyncio.run(taken_over(journal, [opened("s")])) == []
+    assert "it does not answer" in caplog.text
+    journal.close()

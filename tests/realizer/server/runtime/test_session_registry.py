@@ -123,7 +123,9 @@ def test_registry_closes_a_connection_whose_new_session_cannot_be_stored() -> No
     registry = SessionRegistry(make, settings)
     here = registry.open(1, "here", 0.0)
     here.receive(1, '{"type":"hello","session":"show"}', 0.5)
-    assert registry.move_connections(here, here.take_effects(), 0.5) == [Close(1, 1013, "the journal has no room")]
+    assert registry.move_connections(here, here.take_effects(), 0.5) == [
+        Close(1, 1013, "the journal has no room")
+    ]
     assert registry.session_of.get(1) is None
 
 
