@@ -101,29 +101,15 @@ class PackedFrames:
 
 
 class FrameWindow:
-    """Frames `first` .. `first + count - 1` of one character; each stream of them is computed on first use.
+    """Frames `first` .. `first + count - 1` of a timeline; each stream of them is computed on first use."""
 
-    Args:
-        aus: returns the AUs at times in seconds.
-        face: returns the face for meshes and poses.
-    """
-
-    def __init__(
-        self,
-        first: int,
-        count: int,
-        fps: float,
-        aus: Callable[[Float64], AUFrames],
-        face: Callable[[], Face],
-        mapping: FapMapping,
-    ) -> None:
+    def __init__(self, timeline: FrameTimeline, mapping: FapMapping, first: int, count: int) -> None:
         self.first = first
-        self.count = count
-        self.fps = fps
-        self._make = aus
-        self._aus: AUFrames | None = None
-        self._face = face
+        self.end = first + count
+        self._timeline = timeline
         self._mapping = mapping
+        self._times = np.arange(first, self.end) / timeline.fps
+        self._aus: AUFrames | None = None
         self._packed: dict[tuple[str, bool], PackedFrames] = {}
         self._latest: dict[tuple[str, str, bool, str | None], tuple[int, str | bytes]] = {}
         self._meshes: Int16 | None = None
@@ -133,16 +119,12 @@ class FrameWindow:
     def aus(self) -> AUFrames:
         """The AUs of the frames, from which all streams are computed."""
         if self._aus is None:
-            self._aus = self._make(np.arange(self.first, self.end) / self.fps)
+            self._aus = self._timeline.player.frames(self._times, self._timeline.character)
         return self._aus
 
     def drop_source(self) -> None:
         """Free the AUs, which are several times as large as the streamed frames."""
         self._aus = None
-
-    @property
-    def end(self) -> int:
-        return self.first + self.count
 
     @property
     def faps(self) -> FAPFrames:
@@ -160,7 +142,7 @@ class FrameWindow:
     @cached_property
     def poses(self) -> Float32:
         """(n, k) float32, the values of the face's inputs."""
-        return poses(self.aus, self._face().inputs, self._mapping)
+        return poses(self.aus, self._timeline.face().inputs, self._mapping)
 
     def message(self, subscription: FrameSubscription, frame: int) -> str | bytes:
         """Return the WebSocket message of a frame."""
@@ -180,15 +162,14 @@ class FrameWindow:
         packed = self._packed.get((stream, raw))
         if packed is None:
             rows = self.rows(stream, raw)
-            times = np.arange(self.first, self.end) / self.fps
             packed = self._packed[stream, raw] = PackedFrames(
-                stream, self.first, times, rows, subscription.index
+                stream, self.first, self._times, rows, subscription.index
             )
         return packed
 
     def _encode(self, subscription: FrameSubscription, frame: int) -> str | bytes:
         """Return the message of a single frame: meshes, and all streams in JSON."""
-        s, time = subscription, frame / self.fps
+        s, time = subscription, frame / self._timeline.fps
         row = self.mesh(frame - self.first) if s.stream == "mesh" else self.packed(s).row(frame)
         if s.encoding == "binary":
             return pack(s.stream, frame, time, row.tobytes(), character=s.index)
@@ -201,7 +182,7 @@ class FrameWindow:
         from realizer.face.surface import quantise
 
         if self._meshes is None or not 0 <= row - self._meshes_from < MESHES:
-            face, self._meshes_from = self._face(), row - row % MESHES
+            face, self._meshes_from = self._timeline.face(), row - row % MESHES
             poses = self.poses[self._meshes_from : self._meshes_from + MESHES]
             self._meshes = np.ascontiguousarray(quantise(face, deform(face, poses)).astype("<i2"))
         mesh: Int16 = self._meshes[row - self._meshes_from]
@@ -227,7 +208,7 @@ class FrameTimeline:
         self.player = player
         self.character = character
         self.fps = fps
-        self._face = face
+        self.face = face
         self._find_mapping = mapping
         self._mapping: FapMapping | None = None
         self._window: FrameWindow | None = None
@@ -239,14 +220,8 @@ class FrameTimeline:
         if window is None or not self.is_current or first < window.first or last >= window.end:
             if self._mapping is None:
                 self._mapping = self._find_mapping()
-            window = self._window = FrameWindow(
-                first,
-                max(math.ceil(WINDOW * self.fps), last - first + 1),
-                self.fps,
-                lambda times: self.player.frames(times, self.character),
-                self._face,
-                self._mapping,
-            )
+            count = max(math.ceil(WINDOW * self.fps), last - first + 1)
+            window = self._window = FrameWindow(self, self._mapping, first, count)
             self._version = self.player.version
         return window
 
