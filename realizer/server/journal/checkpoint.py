@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 
 from realizer.playback.player import Player
 from realizer.server.documents.document_queue import Submission
@@ -22,22 +23,15 @@ VERSION = 1
 STATE, CLIP = "state", "clip:"
 
 
+@dataclass(eq=False)
 class Checkpoint:
     """The state of a session that outlives its blocks: written to a journal, and read from it."""
 
-    def __init__(
-        self,
-        player: Player,
-        faces: CharacterFaces,
-        clips: AudioClips,
-        submission: Submission,
-        feedback_log: FeedbackLog,
-    ) -> None:
-        self._player = player
-        self._faces = faces
-        self._clips = clips
-        self._submission = submission
-        self._log = feedback_log
+    player: Player
+    faces: CharacterFaces
+    clips: AudioClips
+    submission: Submission
+    feedback_log: FeedbackLog
 
     def write(self, at: float, connections: Collection[int]) -> dict[str, str | None]:
         """Return the parts that a journal stores.
@@ -46,25 +40,25 @@ class Checkpoint:
             at: seconds on the session clock.
             connections: numbers of the connections.
         """
-        player, tts, scene = self._player, self._submission.tts, self._player.context.scene
+        player, tts, scene = self.player, self.submission.tts, self.player.context.scene
         past, expected = player.blocks.snapshot()
         data = {
             "version": VERSION,
             "at": at,
             "connections": list(connections),
-            "seq": self._log.newest,
-            "told": self._log.last(),
+            "seq": self.feedback_log.newest,
+            "told": self.feedback_log.last(),
             "scene": None if scene is None else {name: list(place) for name, place in scene.items()},
             "characters": [character_to_json(character) for character in player.character_states],
-            "faces": {str(index): face for index, face in self._faces.assigned.items()},
-            "voices": {str(index): voice for index, voice in self._submission.voices.items()},
+            "faces": {str(index): face for index, face in self.faces.assigned.items()},
+            "voices": {str(index): voice for index, voice in self.submission.voices.items()},
             "past": [schedule_to_json(schedule) for schedule in past],
             "expected": schedule_to_json(expected),
             "spoken": tts.request_count,
             "fault": tts.fault,
-            "clips": self._clips.ids,
+            "clips": self.clips.ids,
         }
-        clips = {CLIP + id: text for id, text in self._clips.changes().items()}
+        clips = {CLIP + id: text for id, text in self.clips.changes().items()}
         return {STATE: json.dumps(data, ensure_ascii=False), **clips}
 
     def read(self, session: str, parts: Mapping[str, str]) -> tuple[float, list[int]]:
@@ -80,7 +74,7 @@ class Checkpoint:
         Raises:
             JournalError: the parts are not a checkpoint, or of another version.
         """
-        player, tts = self._player, self._submission.tts
+        player, tts = self.player, self.submission.tts
         try:
             data = json.loads(parts[STATE])
             if data["version"] != VERSION:
@@ -95,11 +89,11 @@ class Checkpoint:
                 [schedule_from_json(schedule) for schedule in data["past"]],
                 schedule_from_json(data["expected"]),
             )
-            self._faces.assigned.update({int(index): face for index, face in data["faces"].items()})
-            self._submission.voices.update({int(index): voice for index, voice in data["voices"].items()})
+            self.faces.assigned.update({int(index): face for index, face in data["faces"].items()})
+            self.submission.voices.update({int(index): voice for index, voice in data["voices"].items()})
             tts.request_count, tts.fault = int(data["spoken"]), data["fault"]
-            self._clips.restore({id: Clip.from_json(json.loads(parts[CLIP + id])) for id in data["clips"]})
-            self._log.restore(int(data["seq"]), [str(text) for text in data["told"]], at)
+            self.clips.restore({id: Clip.from_json(json.loads(parts[CLIP + id])) for id in data["clips"]})
+            self.feedback_log.restore(int(data["seq"]), [str(text) for text in data["told"]], at)
             return at, [int(connection) for connection in data["connections"]]
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
             fault = f"{type(error).__name__}: {error}"

@@ -8,13 +8,14 @@ from bml_schema import Emotion
 from realizer.animation.axis import AU_NAMES
 from realizer.behaviours import emotion
 from realizer.behaviours.kind import PlanningContext
+from realizer.core.errors import RealizerError
 from realizer.playback.player import Player
 from realizer.protocol.messages.requests import EmotionFields, SetMessage
 from realizer.server.documents.limits import MAX_CHARACTERS
 from realizer.tables import faps
 
 
-class FieldError(Exception):
+class FieldError(RealizerError):
     """A field of a control message, `where`, has an invalid value."""
 
     def __init__(self, where: str, text: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from realizer.core.errors import FaceError, VoiceError
 from realizer.playback.player import Player
@@ -27,28 +28,20 @@ from realizer.server.speech.audio_clips import AudioClips, ClipError
 from realizer.server.streams.connection import Connection
 
 
+@dataclass(eq=False)
 class ControlHandlers:
     """The handlers of the control messages that change what a session shows or sends.
 
-    Args:
+    Attributes:
         reply: sends a message to a connection, by its id.
     """
 
-    def __init__(
-        self,
-        player: Player,
-        faces: CharacterFaces,
-        clips: AudioClips,
-        submission: Submission,
-        subscriptions: Subscriptions,
-        reply: Callable[[int, Reply], None],
-    ) -> None:
-        self._player = player
-        self._faces = faces
-        self._clips = clips
-        self._submission = submission
-        self._subscriptions = subscriptions
-        self._reply = reply
+    player: Player
+    faces: CharacterFaces
+    clips: AudioClips
+    submission: Submission
+    subscriptions: Subscriptions
+    reply: Callable[[int, Reply], None]
 
     def handle(self, connection: Connection, message: Control, t: float) -> None:
         """Handle a control message, or reply with an error and change nothing.
@@ -58,11 +51,11 @@ class ControlHandlers:
         """
         try:
             self._handle(connection, message, t)
+        except ClipError as error:
+            self._error(connection, "clip", error, error.where)
         except FieldError as error:
             id = message.id if isinstance(message, SpeechMessage) else None
             self._error(connection, "invalid", error, f"{message.type}.{error.where}", id)
-        except ClipError as error:
-            self._error(connection, "clip", error, error.where)
         except FaceError as error:
             self._error(connection, "face", error, f"{message.type}.face")
         except VoiceError as error:
@@ -71,16 +64,16 @@ class ControlHandlers:
     def _error(
         self, connection: Connection, code: ErrorCode, error: Exception, where: str, id: str | None = None
     ) -> None:
-        self._reply(connection.id, ErrorMessage(code=code, message=str(error), where=where, id=id))
+        self.reply(connection.id, ErrorMessage(code=code, message=str(error), where=where, id=id))
 
     def _handle(self, connection: Connection, message: Control, t: float) -> None:
         match message:
             case Subscribe():
-                self._subscriptions.subscribe(connection, message, t)
+                self.subscriptions.subscribe(connection, message, t)
             case Unsubscribe():
-                self._subscriptions.unsubscribe(connection, message)
+                self.subscriptions.unsubscribe(connection, message)
             case SceneMessage(objects=objects):
-                self._player.set_scene(
+                self.player.set_scene(
                     None if objects is None else {name: (p.x, p.y, p.z) for name, p in objects.items()}
                 )
             case CharacterMessage():
@@ -88,7 +81,7 @@ class ControlHandlers:
             case SetMessage():
                 self._set(message, t)
             case Anticipate():
-                self._player.anticipate(message.id, message.syncs, t)
+                self.player.anticipate(message.id, message.syncs, t)
             case SpeechMessage():
                 self._speech(connection, message, t)
             case Stop():
@@ -96,49 +89,49 @@ class ControlHandlers:
 
     def _stop(self, message: Stop, t: float) -> None:
         """End blocks. A block that has just ended by itself is no error."""
-        submission, wanted = self._submission, None if message.blocks is None else set(message.blocks)
+        submission, wanted = self.submission, None if message.blocks is None else set(message.blocks)
         # Unread documents may contain any of the blocks.
         unread = bool(submission.queue)
         known = submission.stop(wanted, t)
-        self._player.stop(t, wanted)
+        self.player.stop(t, wanted)
         unknown = [
             repr(id[:80])
             for id in message.blocks or ()
-            if not (unread or id in known or id in submission.speeches or self._player.blocks.has_seen(id))
+            if not (unread or id in known or id in submission.speeches or self.player.blocks.has_seen(id))
         ]
         if unknown:
             raise FieldError("blocks", f"wanted blocks that play or wait, got {', '.join(unknown[:10])}")
 
     def _speech(self, connection: Connection, message: SpeechMessage, t: float) -> None:
         if message.clip is not None and (message.id is None or _has_annotation(message)):
-            self._clips.annotate(message)
+            self.clips.annotate(message)
         if message.id is None:
             return
-        if message.clip is not None and message.clip not in self._clips.recordings:
+        if message.clip is not None and message.clip not in self.clips.recordings:
             raise FieldError("clip", f"wanted a clip that was sent to its last piece, got {message.clip!r}")
-        character_index(self._player, message.character)
-        self._submission.speeches.handle(message, connection.id, t)
+        character_index(self.player, message.character)
+        self.submission.speeches.handle(message, connection.id, t)
 
     def _character(self, message: CharacterMessage) -> None:
         if message.face is not None:
-            self._faces.check(message.face)
+            self.faces.check(message.face)
         if message.voice is not None:
             from realizer.speech.registry import find_voice
 
             find_voice(message.voice).close()  # report an unknown voice now, not with the next speech
-        index = character_index(self._player, message.id)
+        index = character_index(self.player, message.id)
         if message.face is not None:
-            self._faces.assigned[index] = message.face
-            self._subscriptions.announce_face_change(index)
+            self.faces.assigned[index] = message.face
+            self.subscriptions.announce_face_change(index)
         if message.voice is not None:
-            self._submission.voices[index] = message.voice
+            self.submission.voices[index] = message.voice
 
     def _set(self, message: SetMessage, t: float) -> None:
-        index = character_index(self._player, message.character)
-        values = direct_values(message, self._player.direct_names(index))
+        index = character_index(self.player, message.character)
+        values = direct_values(message, self.player.direct_names(index))
         if "emotion" in message.model_fields_set:
-            self._player.set_emotion(emotion_values(message.emotion), t, index)
-        self._player.set_direct(values, t, index)
+            self.player.set_emotion(emotion_values(message.emotion), t, index)
+        self.player.set_direct(values, t, index)
 
 
 def _has_annotation(message: SpeechMessage) -> bool:

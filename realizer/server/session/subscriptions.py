@@ -28,54 +28,25 @@ from realizer.server.streams.connection import (
 )
 from realizer.server.streams.frame_windows import SOURCES, FrameSubscription
 
-
-@dataclass(frozen=True)
-class _Request:
-    """A message `subscribe` of a connection.
-
-    Attributes:
-        index: index of the character.
-        fps: frames a second.
-        old: the subscription that is replaced.
-        t: seconds on the session clock.
-    """
-
-    connection: Connection
-    message: Subscribe
-    encoding: str
-    index: int
-    fps: float
-    old: Subscription | None
-    t: float
-
-
 # A subscription and the fields of the reply `subscribed`.
 _Answer = tuple[Subscription, dict[str, Any]]
 
 
+@dataclass(eq=False)
 class Subscriptions:
     """The subscriptions of a session's connections to its streams.
 
-    Args:
+    Attributes:
         connections: the session's own dictionary of connections, by id.
         reply: sends a message to a connection, by its id.
     """
 
-    def __init__(
-        self,
-        settings: Settings,
-        player: Player,
-        faces: CharacterFaces,
-        broadcast: Broadcast,
-        connections: Mapping[int, Connection],
-        reply: Callable[[int, Reply], None],
-    ) -> None:
-        self._settings = settings
-        self._player = player
-        self._faces = faces
-        self._broadcast = broadcast
-        self._connections = connections
-        self._reply = reply
+    settings: Settings
+    player: Player
+    faces: CharacterFaces
+    broadcast: Broadcast
+    connections: Mapping[int, Connection]
+    reply: Callable[[int, Reply], None]
 
     def subscribe(self, connection: Connection, message: Subscribe, t: float) -> None:
         """Subscribe a connection to a stream, replace its earlier subscription, and reply `subscribed`.
@@ -95,17 +66,16 @@ class Subscriptions:
             connection.feedback = FeedbackFilter(elements, message.character)
             fields = {"elements": message.elements}
         else:
-            index = character_index(self._player, message.character)
+            index = character_index(self.player, message.character)
             key = self._key(message)
-            fps, old = message.fps or self._settings.fps, connection.subscriptions.get(key)
-            request = _Request(connection, message, encoding, index, fps, old, t)
             # All other streams consist of frames.
-            make = {"schedule": _schedule, "audio": self._audio, "video": self._video}.get(
+            make = {"schedule": self._schedule, "audio": self._audio, "video": self._video}.get(
                 stream, self._frames
             )
-            connection.subscriptions[key], fields = make(request)
+            old = connection.subscriptions.get(key)
+            connection.subscriptions[key], fields = make(connection, message, index, old, t)
         fields |= {"stream": stream, "encoding": encoding, "character": message.character}
-        self._reply(connection.id, Subscribed(**fields))
+        self.reply(connection.id, Subscribed(**fields))
 
     def unsubscribe(self, connection: Connection, message: Unsubscribe) -> None:
         """End a subscription. It is no error if there is none."""
@@ -115,53 +85,60 @@ class Subscriptions:
 
     def announce_face_change(self, index: int) -> None:
         """Send the new scale of a character's meshes to their subscribers."""
-        for connection, mesh in self._broadcast.face_changed(index):
+        for connection, mesh in self.broadcast.face_changed(index):
             fields = {"stream": "mesh", "character": mesh.name, "index": index, "frame": mesh.next}
-            self._reply(connection, FaceChanged(**fields, **self._mesh(index)))
+            self.reply(connection, FaceChanged(**fields, **self._mesh(index)))
 
     def views(self, without: Subscription | None = None) -> list[VideoView]:
         """Return the views that are drawn, each once, without that of one subscription."""
-        subscriptions = [s for c in self._connections.values() for s in c.subscriptions.values()]
+        subscriptions = [s for c in self.connections.values() for s in c.subscriptions.values()]
         videos = [s for s in subscriptions if isinstance(s, VideoSubscription) and s is not without]
         return list({s.view.key: s.view for s in videos}.values())
 
     # one method for each kind of stream -----------------------------------------------------------
 
-    def _audio(self, request: _Request) -> _Answer:
-        message, old = request.message, request.old
-        index = None if message.character is None else request.index
-        new = self._broadcast.subscribe_audio(index, message.rate, request.t)
+    def _schedule(
+        self, connection: Connection, message: Subscribe, index: int, old: Subscription | None, t: float
+    ) -> _Answer:
+        return ScheduleSubscription(None if message.character is None else index, message.character), {}
+
+    def _audio(
+        self, connection: Connection, message: Subscribe, index: int, old: Subscription | None, t: float
+    ) -> _Answer:
+        heard = None if message.character is None else index
+        new = self.broadcast.subscribe_audio(heard, message.rate, t)
         if isinstance(old, AudioSubscription) and old.sound is new.sound:
             new = old  # do not send again what was sent ahead
-        return new, {"index": request.index, "rate": message.rate, "frame": new.next, "fps": 50.0}
+        return new, {"index": index, "rate": message.rate, "frame": new.next, "fps": 50.0}
 
-    def _video(self, request: _Request) -> _Answer:
-        message, index, fps = request.message, request.index, request.fps
-        options = self._render_options(message, index)
-        new = self._broadcast.subscribe_video(index, fps, options, request.t)
-        others = [view for view in self.views(without=request.old) if view is not new.view]
+    def _video(
+        self, connection: Connection, message: Subscribe, index: int, old: Subscription | None, t: float
+    ) -> _Answer:
+        fps, options = message.fps or self.settings.fps, self._render_options(message, index)
+        new = self.broadcast.subscribe_video(index, fps, options, t)
+        others = [view for view in self.views(without=old) if view is not new.view]
         pixel_rate = sum(v.options.size[0] * v.options.size[1] * v.timeline.fps for v in others)
-        if (error := pixel_rate_error(message.size, fps, self._settings, pixel_rate)) is not None:
+        if (error := pixel_rate_error(message.size, fps, self.settings, pixel_rate)) is not None:
             raise FieldError("fps", error)
         if message.view is not None:
-            new.index = _index_of_view(request)
+            new.index = _index_of_view(connection, old)
         return new, {
             "index": new.index,
             "fps": fps,
             "frame": new.next,
             "size": message.size,
             "view": message.view,
-            "face": self._faces.name(index),
+            "face": self.faces.name(index),
             "media_type": PICTURES[message.format],
         }
 
-    def _frames(self, request: _Request) -> _Answer:
-        message, index, old, fps = request.message, request.index, request.old, request.fps
-        stream = message.stream
+    def _frames(
+        self, connection: Connection, message: Subscribe, index: int, old: Subscription | None, t: float
+    ) -> _Answer:
+        stream, fps = message.stream, message.fps or self.settings.fps
+        encoding = message.encoding or STREAMS[stream].encodings[0]
         fields = self._mesh(index) if stream == "mesh" else {"names": SOURCES[stream].names()}
-        new = self._broadcast.subscribe_frames(
-            stream, request.encoding, index, message.character, fps, request.t
-        )
+        new = self.broadcast.subscribe_frames(stream, encoding, index, message.character, fps, t)
         new.raw = message.asked
         if isinstance(old, FrameSubscription) and old.timeline is new.timeline:
             new.next = max(new.next, old.next)  # no frame twice
@@ -171,13 +148,13 @@ class Subscriptions:
         from realizer.render.cameras import camera_names
         from realizer.render.light import presets
 
-        settings, largest = self._settings, self._settings.max_size
+        settings, largest = self.settings, self.settings.max_size
         if not all(16 <= side <= largest for side in message.size):
             text = f"wanted sides of 16..{largest} pixels, got {list(message.size)} {limit_hint('max_size')}"
             raise FieldError("size", text)
         if message.light is not None and message.light not in presets():
             raise FieldError("light", f"wanted one of {', '.join(presets())}, got {message.light!r}")
-        cameras = camera_names(self._faces.of(index))
+        cameras = camera_names(self.faces.of(index))
         if message.camera is not None and message.camera not in cameras:
             raise FieldError("camera", f"wanted one of {', '.join(cameras)}, got {message.camera!r}")
         background = message.background or settings.background
@@ -197,10 +174,10 @@ class Subscriptions:
     def _mesh(self, index: int) -> dict[str, Any]:
         from realizer.face.surface import face_scale
 
-        face = self._faces.of(index)
+        face = self.faces.of(index)
         scale, offset = face_scale(face)
         return {
-            "face": self._faces.name(index),
+            "face": self.faces.name(index),
             "vertices": len(face.vertices),
             "scale": float(scale),
             "offset": [float(v) for v in offset],
@@ -213,21 +190,16 @@ class Subscriptions:
         views.
         """
         stream, character = message.stream, message.character
-        if stream not in ("audio", "schedule") and character == self._player.characters[0]:
+        if stream not in ("audio", "schedule") and character == self.player.characters[0]:
             character = None
         return stream, character, message.view if stream == "video" else None
 
 
-def _schedule(request: _Request) -> _Answer:
-    name = request.message.character
-    return ScheduleSubscription(None if name is None else request.index, name), {}
-
-
-def _index_of_view(request: _Request) -> int:
+def _index_of_view(connection: Connection, old: Subscription | None) -> int:
     """Return an index for a view's pictures that no other view of its connection has."""
-    if isinstance(request.old, VideoSubscription):
-        return request.old.index
-    others = request.connection.subscriptions.values()
+    if isinstance(old, VideoSubscription):
+        return old.index
+    others = connection.subscriptions.values()
     free = set(range(MAX_CHARACTERS, 256)) - {s.index for s in others if isinstance(s, VideoSubscription)}
     if not free:
         raise FieldError("view", f"wanted at most {256 - MAX_CHARACTERS} views")

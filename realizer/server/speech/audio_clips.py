@@ -16,6 +16,7 @@ from realizer.core.array_types import Int16
 from realizer.core.errors import RealizerError
 from realizer.protocol.messages.speech import SpeechMessage, TimedText
 from realizer.protocol.wire import ClipPiece
+from realizer.server.session.control_fields import FieldError
 from realizer.speech.recorded.viseme_names import sound_of
 from realizer.speech.utterance import Phoneme, Recording, Word
 
@@ -24,12 +25,8 @@ MAX_CLIPS = 1000  # of a session
 MAX_TIMES = 20_000  # words, or phonemes, of one clip
 
 
-class ClipError(RealizerError):
+class ClipError(FieldError):
     """A clip or its annotation is invalid; `where` is the field."""
-
-    def __init__(self, where: str, text: str) -> None:
-        super().__init__(text)
-        self.where = where
 
 
 @dataclass(eq=False)
