@@ -73,7 +73,7 @@ def blend(
     if overridden is not None and overridden[first:last].any():
         faps = [column - len(AU_NAMES()) for column in columns[first:last]]
         replaced = _by_column(overridden[first:last], faps, 68)
-    return AUFrames(times, _by_column(values, columns, len(axis())), rules, replaced, tuple(columns))
+    return AUFrames(times, _by_column(values, columns, len(axis())), rules, replaced)
 
 
 def _visible(channels: Iterable[Channel], times: Float64) -> list[Channel]:

@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import groupby
+from operator import itemgetter
 
 import numpy as np
 
 from realizer.animation.axis import AU_NAMES
-from realizer.animation.group_reduce import GroupReduction
-from realizer.core.array_types import Bool, Float32, Index
+from realizer.core.array_types import Float32, Index
 from realizer.tables.cooccurrence import Rule, Rules, Unit
 
 
@@ -24,50 +25,13 @@ class Terms:
     """Rules that limit a unit to 1 - min(m(a), m(b)), where m is membership in a fuzzy set.
 
     Attributes:
-        weaker: (m,) the row of the limited unit, rising.
-        stronger: (2, m) indices into `rows` of a and b, which may be equal.
+        units: (g,) the rows of the limited units.
+        stronger: (2, m, g) indices into `rows` of a and b, which may be equal; some rules may be repeated.
         rows: (2, k) the rows of both sides of a stronger unit, which may be equal.
         start, low, high: (k, 1) its membership at 0, and the slopes below and above 0.5.
     """
 
-    weaker: Index
-    stronger: Index
-    rows: Index
-    start: Float32
-    low: Float32
-    high: Float32
-
-    def among(self, row: Index) -> Bound | None:
-        """Return the limits among active units, or None if there are none.
-
-        Args:
-            row: (n_au,) the row of each active unit, -1 for other units.
-        """
-        up = row >= 0
-        strong: Bool = up[self.rows[0]] | up[self.rows[1]]
-        terms = np.flatnonzero(up[self.weaker] & strong[self.stronger].all(axis=0))
-        if not len(terms):
-            return None
-        rounds = GroupReduction.of(self.weaker[terms])
-        used, stronger = np.unique(self.stronger[:, terms[rounds.order]], return_inverse=True)
-        one, other = row[self.rows[:, used]]
-        return Bound(
-            row[rounds.groups],
-            rounds,
-            stronger.reshape(2, -1),
-            np.stack([np.where(one < 0, other, one), np.where(other < 0, one, other)]),
-            self.start[used],
-            self.low[used],
-            self.high[used],
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class Bound:
-    """The `Terms` of active units, by their rows; terms are ordered as `rounds`, `units` as its groups."""
-
     units: Index
-    rounds: GroupReduction
     stronger: Index
     rows: Index
     start: Float32
@@ -75,7 +39,7 @@ class Bound:
     high: Float32
 
     def lower(self, left: Float32, aus: Float32) -> None:
-        """Reduce `left` (u, n), in place, to what the intensities `aus` (u, n) allow."""
+        """Reduce `left` (n_au, n), in place, to what the intensities `aus` (n_au, n) allow."""
         value = np.maximum(*aus.take(self.rows, axis=0))  # (k, n): the stronger of two sides
         half = np.minimum(value, np.float32(0.5))
         value -= half
@@ -84,63 +48,47 @@ class Bound:
         half += self.start
         half += value
         degree = np.minimum(*half.take(self.stronger, axis=0))
-        most = self.rounds.reduced(degree, np.maximum)
-        left[self.units] = np.minimum(left[self.units], 1 - most)
+        left[self.units] = np.minimum(left[self.units], 1 - degree.max(axis=0, initial=0))
 
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """The rules among active units, by their rows.
+    """Rules as arrays.
 
     `taking` reduces movement; `holding` reduces the score alone, by units whose appearance includes another
     one (the lips part when the jaw drops); `opposed` is (2, k).
     """
 
-    taking: Bound | None
-    holding: Bound | None
+    taking: Terms
+    holding: Terms
     opposed: Index
 
     def moving(self, requested: Float32) -> Float32:
-        """Return the part (u, n) of requested intensities that moves the face, scored or not."""
-        if self.taking is None and not self.opposed.size:
-            return requested
+        """Return the part (n_au, n) of requested intensities that moves the face, scored or not."""
         left = requested.copy()
-        if self.opposed.size:
-            pairs = requested.take(self.opposed, axis=0)  # (2, k, n)
-            pairs -= np.minimum(*pairs)
-            left[self.opposed] = pairs
-        if self.taking is not None:
-            self.taking.lower(left, requested)
+        pairs = requested.take(self.opposed, axis=0)  # (2, k, n)
+        pairs -= np.minimum(*pairs)
+        left[self.opposed] = pairs
+        self.taking.lower(left, requested)
         return left
 
     def scored(self, requested: Float32, moving: Float32) -> Float32:
-        """Return the part (u, n) of `moving` (u, n) that a FACS coder would score."""
-        if self.holding is None:
-            return moving
+        """Return the part (n_au, n) of `moving` (n_au, n) that a FACS coder would score."""
         left = moving.copy()
         self.holding.lower(left, requested)
         return left
 
 
-# Sessions repeat a few sets of units; each entry takes 5 kB.
-@lru_cache(maxsize=512)
-def bounds(rules: Rules, live: tuple[int, ...]) -> Bounds:
-    """Return the rules among the units in rows `live`, rising, which are the ones that may differ from 0."""
-    taking, holding, opposed = _compile(rules)
-    row = np.full(len(AU_NAMES()), -1)
-    row[list(live)] = np.arange(len(live))
-    return Bounds(taking.among(row), holding.among(row), row[opposed[:, (row[opposed] >= 0).all(axis=0)]])
-
-
 @lru_cache(maxsize=8)
-def _compile(rules: Rules) -> tuple[Terms, Terms, Index]:
+def bounds(rules: Rules) -> Bounds:
+    """Return rules as arrays for all action units."""
     opposed = [
         (row, _rows(rule.stronger[0].au, side)[0])
         for rule in rules.rules
         if rule.kind == "opposition"
         for row, side in _sides(rule.weaker)
     ]
-    return (
+    return Bounds(
         _terms([rule for rule in rules.rules if rule.kind in ("domination", "exclusion")], rules),
         _terms([rule for rule in rules.rules if rule.kind == "inclusion"], rules),
         np.array(opposed, np.intp).reshape(-1, 2).T,
@@ -160,11 +108,17 @@ def _terms(chosen: list[Rule], rules: Rules) -> Terms:
         for row, side in _sides(rule.weaker)
     )
     distinct = list(dict.fromkeys(member for _, pair in lines for member in pair))
+    terms = {
+        row: [tuple(map(distinct.index, pair)) for _, pair in own]
+        for row, own in groupby(lines, itemgetter(0))
+    }
+    most = max(map(len, terms.values()), default=0)
+    stronger = [own + own[:1] * (most - len(own)) for own in terms.values()]
     sets = np.array([degrees for _, degrees in distinct], np.float32).reshape(-1, 3)
     at_0, at_half, at_1 = (sets[:, i : i + 1] for i in range(3))
     return Terms(
-        np.array([row for row, _ in lines], np.intp),
-        np.array([[distinct.index(m) for m in pair] for _, pair in lines], np.intp).reshape(-1, 2).T,
+        np.array(list(terms), np.intp),
+        np.array(stronger, np.intp).reshape(len(terms), most, 2).T,
         np.array([rows for rows, _ in distinct], np.intp).reshape(-1, 2).T,
         at_0,
         2 * (at_half - at_0),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from realizer.animation.axis import AU_NAMES
-from realizer.animation.cooccurrence import Bounds, bounds
+from realizer.animation.cooccurrence import bounds
 from realizer.core.array_types import Bool, Float32, Float64, Int32
 from realizer.tables.cooccurrence import Rules
 
@@ -25,14 +24,12 @@ class AUFrames:
             FAPU that do not come from AUs, mask channels 0..1.
         rules: co-occurrence rules; None for none.
         overridden: (n, 68) float32, 0..1: how far AUs do not contribute to a FAP; None for 0 everywhere.
-        columns: the columns that may differ from 0, rising; None to look for them when they are needed.
     """
 
     times: Float64
     values: Float32
     rules: Rules | None = None
     overridden: Float32 | None = None
-    columns: tuple[int, ...] | None = None
 
     @classmethod
     def concatenate(cls, windows: Sequence[AUFrames]) -> AUFrames:
@@ -43,33 +40,17 @@ class AUFrames:
             overridden = np.concatenate(
                 [n if w.overridden is None else w.overridden for w, n in zip(windows, none, strict=True)]
             )
-        columns = None
-        if all(window.columns is not None for window in windows):
-            columns = tuple(sorted({column for window in windows for column in window.moving_columns}))
         return cls(
             np.concatenate([window.times for window in windows]),
             np.concatenate([window.values for window in windows]),
             windows[0].rules,
             overridden,
-            columns,
         )
 
     def part(self, first: int, last: int) -> AUFrames:
         """Return frames `first` .. `last - 1`."""
         overridden = None if self.overridden is None else self.overridden[first:last]
-        return AUFrames(self.times[first:last], self.values[first:last], self.rules, overridden, self.columns)
-
-    @cached_property
-    def moving_columns(self) -> tuple[int, ...]:
-        """The columns that may differ from 0, rising."""
-        if self.columns is not None:
-            return self.columns
-        return tuple(np.flatnonzero(self.values.any(axis=0)).tolist())
-
-    @cached_property
-    def moving_aus(self) -> tuple[int, ...]:
-        """The AUs among `moving_columns`."""
-        return self.moving_columns[: bisect_left(self.moving_columns, len(AU_NAMES()))]
+        return AUFrames(self.times[first:last], self.values[first:last], self.rules, overridden)
 
     @property
     def before_rules(self) -> Float32:
@@ -79,33 +60,15 @@ class AUFrames:
     @property
     def aus(self) -> Float32:
         """(n, n_au) float32, 0..1: the AUs that the face shows; columns named by `AU_NAMES()`."""
-        if self._bounds is None:
+        if self.rules is None:
             return self.before_rules
-        whole = np.zeros((len(self.times), len(AU_NAMES())), np.float32)
-        whole[:, self.moving_aus] = self._bounds.scored(self._rows_before_rules, self.moving_rows).T
-        return whole
+        return bounds(self.rules).scored(self.before_rules.T, self.moving).T
 
-    @property
+    @cached_property
     def moving(self) -> Float32:
         """(n_au, n) float32, 0..1: the AUs that move the face, scored by a FACS coder or not."""
-        whole = np.zeros((len(AU_NAMES()), len(self.times)), np.float32)
-        whole[list(self.moving_aus)] = self.moving_rows
-        return whole
-
-    @cached_property
-    def moving_rows(self) -> Float32:
-        """(u, n) float32: the rows of `moving` that are `moving_aus`."""
-        return (
-            self._rows_before_rules if self._bounds is None else self._bounds.moving(self._rows_before_rules)
-        )
-
-    @cached_property
-    def _rows_before_rules(self) -> Float32:
-        return self.values.T.take(self.moving_aus, axis=0)
-
-    @cached_property
-    def _bounds(self) -> Bounds | None:
-        return None if self.rules is None else bounds(self.rules, self.moving_aus)
+        requested = self.before_rules.T
+        return requested if self.rules is None else bounds(self.rules).moving(requested)
 
     @property
     def faps(self) -> Float32:

@@ -97,7 +97,7 @@ def measured(one: Player, seconds: float = SECONDS, repeats: int = REPEATS) -> S
         at.append(time.perf_counter())
         frames = blend(channels, times, one.rules, idle)
         at.append(time.perf_counter())
-        _ = frames.moving_rows
+        _ = frames.moving
         at.append(time.perf_counter())
         to_fap(frames).integers()
         at.append(time.perf_counter())

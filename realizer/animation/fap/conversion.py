@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache
 
 import numpy as np
 
 from realizer import tables
-from realizer.animation.axis import AU_NAMES, axis, mask_channel
+from realizer.animation.axis import axis, mask_channel
 from realizer.animation.fap.au_fap_mapping import FapMapping, standard
-from realizer.animation.fap.piecewise_matrix import LOWERS, RAISES, AuFapRows, PiecewiseMatrix
 from realizer.animation.frames import AUFrames, FAPFrames
-from realizer.core.array_types import Float32, Index
+from realizer.core.array_types import Float32
 
 # Columns (FAP - 1) of upper and lower lid, by side; 1024 is the full aperture (IRISD0).
 LIDS = ((18, 20), (19, 21))
@@ -37,100 +35,33 @@ def to_fap(frames: AUFrames, mapping: FapMapping | None = None) -> FAPFrames:
     Returns:
         n frames; the mask is the same for all frames of one mapping.
     """
-    count = len(AU_NAMES())
-    live = frames.moving_columns
-    given = tuple(column - count for column in live if count <= column < count + 68)
-    demand = (mapping or standard()).matrix
-    plan = _plan(demand, frames.moving_aus, given)
-    aus = frames.moving_rows
-    raised, lowered = plan.asking.evaluate(aus)
-    values = np.zeros((len(plan.faps), len(frames.times)), np.float32)
-    values[: len(raised)] = raised
-    for upper, lids, closed in plan.lids:
-        # What opens the eye fades as its upper lid closes, so that wide eyes can blink.
-        left = 1 - np.minimum(raised[upper] / closed, 1)
-        for lid in lids:
-            lowered[lid] *= left
-    values[: len(lowered)] -= lowered
-    for unit, other, fap, value in plan.combinations:
+    matrix, aus = (mapping or standard()).matrix, frames.moving
+    raised, lowered, turned = matrix.evaluate(aus)
+    for upper, lower in LIDS:
+        if matrix.closed[upper] > 0:
+            # What opens the eye fades as its upper lid closes, so that wide eyes can blink.
+            lowered[[upper, lower]] *= 1 - np.minimum(raised[upper] / matrix.closed[upper], 1)
+    values = raised - lowered + turned
+    for unit, other, fap, value in _combinations():
         values[fap] += value * np.minimum(aus[unit], aus[other])
-    for upper, lower in plan.gaps:
+    for upper, lower in LIDS:
         np.minimum(values[lower], APERTURE - values[upper], out=values[lower])
-    if (lips := mask_channel("lips").column) in live:
-        values *= 1.0 - plan.own * frames.values[:, lips]
+    own, least, most = _limits()
+    values *= 1.0 - own * frames.values[:, mask_channel("lips").column]
     if frames.overridden is not None:
-        values *= 1.0 - frames.overridden.T[plan.faps]
-    if given:
-        values[plan.given] += frames.faps.T[list(given)]
-    np.maximum(values, plan.least, out=values)
-    np.minimum(values, plan.most, out=values)
+        values *= 1.0 - frames.overridden.T
+    values += frames.faps.T
+    np.clip(values, least, most, out=values)
     # FAPs outside the mapping that a client sets directly belong to the mask too.
-    mask = demand.mask.copy()
-    if len(plan.beyond):
-        mask[plan.faps[plan.beyond]] = values[plan.beyond].any(axis=1)
-    whole = np.zeros((68, len(frames.times)), np.float32)
-    whole[plan.faps] = values
-    return FAPFrames(frames.times, np.ascontiguousarray(whole.T), mask)
+    mask = matrix.mask | values.any(axis=1)
+    return FAPFrames(frames.times, np.ascontiguousarray(values.T), mask)
 
 
-@dataclass(frozen=True, eq=False)
-class _Plan:
-    """The conversion prepared for a set of AUs and FAPs; other attributes than `faps` hold rows of `faps`.
-
-    Attributes:
-        asking: the functions from AUs to FAPs.
-        faps: (f,) the columns (FAP - 1) that change, those of `asking` first.
-        lids: for each eye that may close: the upper lid, the lids that AUs open, and how far it closes.
-        combinations: (unit, other, fap, value) of pairs of AUs that add a value of their own.
-        gaps: upper and lower lid of each eye.
-        given: the FAPs that do not come from AUs.
-        beyond: the FAPs outside the mask of the mapping.
-        own, least, most: (f, 1) the part that speech owns, least and greatest value.
-    """
-
-    asking: AuFapRows
-    faps: Index
-    lids: tuple[tuple[int, list[int], np.float32], ...]
-    combinations: tuple[tuple[int, int, int, float], ...]
-    gaps: tuple[tuple[int, int], ...]
-    given: Index
-    beyond: Index
-    own: Float32
-    least: Float32
-    most: Float32
-
-
-# Sessions repeat a few sets of units; each entry takes 10 kB.
-@lru_cache(maxsize=512)
-def _plan(demand: PiecewiseMatrix, live: tuple[int, ...], given: tuple[int, ...]) -> _Plan:
-    asking = demand.among(live)
-    unit = {column: row for row, column in enumerate(live)}
-    together = [row for row in _combinations() if row[0] in unit and row[1] in unit]
-    moved = {*asking.faps.tolist(), *given, *(fap for *_, fap, _ in together)}
-    eyes = [pair for pair in LIDS if not moved.isdisjoint(pair)]
-    moved |= {lid for pair in eyes for lid in pair}
-    faps = [*asking.faps.tolist(), *sorted(moved - {*asking.faps.tolist()})]
-    row = {fap: k for k, fap in enumerate(faps)}
-    limits = ((row.speech_owns, row.least, row.most) for row in tables.faps())
-    own, least, most = np.array(list(limits), np.float32)[faps].T[:, :, None]
-    return _Plan(
-        asking=asking,
-        faps=np.array(faps, np.intp),
-        lids=tuple(
-            (row[pair[0]], lids, demand.closed[pair[0]])
-            for pair in eyes
-            if demand.closed[pair[0]] > 0
-            and 3 * pair[0] + RAISES in asking.sides
-            and (lids := [row[lid] for lid in pair if 3 * lid + LOWERS in asking.sides])
-        ),
-        combinations=tuple((unit[one], unit[other], row[fap], value) for one, other, fap, value in together),
-        gaps=tuple((row[upper], row[lower]) for upper, lower in eyes),
-        given=np.array([row[fap] for fap in given], np.intp),
-        beyond=np.array([row[fap] for fap in faps if not demand.mask[fap]], np.intp),
-        own=own,
-        least=least,
-        most=most,
-    )
+@cache
+def _limits() -> Float32:
+    """Return (3, 68, 1): the part of each FAP that speech owns, its least and its greatest value."""
+    limits = [(row.speech_owns, row.least, row.most) for row in tables.faps()]
+    return np.array(limits, np.float32).T[:, :, None]
 
 
 @cache

@@ -176,13 +176,6 @@ def test_blend_adds_a_document_to_idle_motion() -> None:
     np.testing.assert_array_equal(np.delete(both, NOD.column, 1), np.delete(alone, NOD.column, 1))
 
 
-@given(many)
-def test_blend_names_all_columns_that_differ_from_0(given: list[Channel]) -> None:
-    frames = blend(given, TIMES)
-    assert frames.columns is not None
-    assert not np.delete(frames.values, frames.columns, axis=1).any()
-
-
 def test_blend_shares_the_eyes_between_gazes() -> None:
     left = [still(GAZE, 0.6, Layer.GAZE), still(mask_channel("eyes"), 1.0, Layer.GAZE)]
     up = [still(au(63)[0], 0.4, Layer.GAZE), still(mask_channel("eyes"), 1.0, Layer.GAZE)]
