@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
 
@@ -40,82 +40,46 @@ class Motion:
 
     Attributes:
         columns: (m,) the columns that move.
-        keys: (s, k) seconds at which each direction of head rotation reaches its poses.
-        poses: (m, k) 0..1: the columns in these poses.
+        keys, lengths: (s, k) seconds at which each direction of head rotation reaches its poses, and from
+            each to the next one.
+        poses, steps: (m, k) 0..1: the columns in these poses, and their differences to the next one.
         way: (m,) the direction of head rotation that moves each column.
         jumps: (j,) seconds at which saccades start.
         durations: (j,) seconds of saccades.
-        points: (e, j) 0..1: the points of fixation, added to the last e columns.
+        points, leaps: (e, j) 0..1: the points of fixation, added to the last e columns, and their differences
+            to the one before.
     """
 
     columns: tuple[int, ...]
     keys: Float64
+    lengths: Float64
     poses: Float64
+    steps: Float64
     way: Index
     jumps: Float64
     durations: Float64
     points: Float64
+    leaps: Float64
 
     def at(self, times: Float64) -> Float64:
         """Return the columns, (m, n) 0..1, at times (n,), not falling, within the span."""
-        keys, ends = self._ends
-        frames = _frames(keys, ends, times)
-        sways, at_points = frames[: self.keys.size], frames[self.keys.size :]
-        shape = (len(self.keys), len(times))
-        passed = np.empty(shape)
-        passed[:] = times
-        passed -= self.keys.repeat(sways).reshape(shape)
-        passed /= self._lengths.repeat(sways).reshape(shape)
-        moved = smooth(passed).take(self.way, axis=0)
-        sways = sways.reshape(self.keys.shape).take(self.way, axis=0).ravel()
-        moved *= self._steps.repeat(sways).reshape(moved.shape)
-        moved += self.poses.repeat(sways).reshape(moved.shape)
+        last = np.array([_latest(keys, times) for keys in self.keys])
+        way = np.arange(len(self.keys))[:, None]
+        part = smooth((times - self.keys[way, last]) / self.lengths[way, last])[self.way]
+        column, last = np.arange(len(self.columns))[:, None], last[self.way]
+        moved: Float64 = part * self.steps[column, last] + self.poses[column, last]
+        last = _latest(self.jumps, times)
         # The minimum-jerk curve is symmetric, so the remaining part of a saccade, from 1 to 0, suffices.
-        to_go = self._arrivals.repeat(at_points)
-        to_go -= times
-        to_go /= self.durations.repeat(at_points)
-        np.maximum(to_go, 0.0, out=to_go)
+        to_go = np.maximum((self.jumps[last] + self.durations[last] - times) / self.durations[last], 0.0)
         eyes = moved[-len(self.points) :]
-        eyes += self.points.repeat(at_points, axis=1)
-        eyes -= smooth(to_go) * self._leaps.repeat(at_points, axis=1)
+        eyes += self.points[:, last]
+        eyes -= smooth(to_go) * self.leaps[:, last]
         return moved
 
-    @cached_property
-    def _ends(self) -> tuple[Float64, Index]:
-        """All keys, those of saccades last, and the index of the last key of each kind."""
-        keys = np.concatenate([self.keys.ravel(), self.jumps])
-        return keys, np.append(np.arange(1, len(self.keys) + 1) * self.keys.shape[1], len(keys)) - 1
 
-    @cached_property
-    def _arrivals(self) -> Float64:
-        """(j,) seconds at which the eyes reach each point."""
-        arrivals: Float64 = self.jumps + self.durations
-        return arrivals
-
-    @cached_property
-    def _leaps(self) -> Float64:
-        """(e, j) the differences of successive points."""
-        return np.diff(self.points, prepend=self.points[:, :1])
-
-    @cached_property
-    def _lengths(self) -> Float64:
-        """(s, k) seconds from each pose to the next one."""
-        return np.diff(self.keys, append=self.keys[:, -1:] + 1.0)
-
-    @cached_property
-    def _steps(self) -> Float64:
-        """(m, k) the differences of successive poses."""
-        return np.diff(self.poses, append=self.poses[:, -1:])
-
-
-def _frames(keys: Float64, ends: Index, times: Float64) -> Index:
-    """Return (k,) at how many of the times (n,) each key is the latest; a first key also counts before it."""
-    first = times.searchsorted(keys)
-    first[ends[:-1] + 1] = first[0] = 0
-    frames = np.empty_like(first)
-    np.subtract(first[1:], first[:-1], out=frames[:-1])
-    frames[ends] = len(times) - first[ends]
-    return frames
+def _latest(keys: Float64, times: Float64) -> Index:
+    """Return (n,) the latest key at each time; the first one also counts before it."""
+    return np.maximum(keys.searchsorted(times, "right") - 1, 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,16 +123,20 @@ def _motion(seed: int, sways: tuple[int, int], jumps: tuple[int, int]) -> Motion
     looks = [(10, 11 + kind, most) for kind, most in enumerate(SACCADE.values())]
     times, aims = _poses(seed, looks, jumps, SACCADE_PERIOD)
     leaps = np.hypot(*np.diff(aims, prepend=aims[:, :1]))
-    points = dict(pair for sides, row in zip(SACCADE, aims, strict=True) for pair in _turn(sides, row))
-    columns = (*(column for column in poses if column not in points), *points)
+    looks_at = dict(pair for sides, row in zip(SACCADE, aims, strict=True) for pair in _turn(sides, row))
+    columns = (*(column for column in poses if column not in looks_at), *looks_at)
+    values, points = np.array([poses[column][1] for column in columns]), np.array(list(looks_at.values()))
     return Motion(
         columns,
         keys,
-        np.array([poses[column][1] for column in columns]),
+        np.diff(keys, append=keys[:, -1:] + 1.0),
+        values,
+        np.diff(values, append=values[:, -1:]),
         np.array([poses[column][0] for column in columns]),
         times[0],
         SACCADE_LEAST + SACCADE_DEGREE * leaps,
-        np.array(list(points.values())),
+        points,
+        np.diff(points, prepend=points[:, :1]),
     )
 
 

@@ -57,7 +57,8 @@ def test_idle_eyes_compensate_the_sway_of_the_head() -> None:
 
 def test_idle_eyes_move_in_saccades() -> None:
     motion = idle_face(0, 60, 1).motion
-    eyes = replace(motion, poses=np.zeros_like(motion.poses))  # a head that keeps still
+    still = np.zeros_like(motion.poses)
+    eyes = replace(motion, poses=still, steps=still)  # a head that keeps still
     most = np.array([tables.by_number()[int(AU_NAMES()[column])].degrees for column in motion.columns[-4:]])
     for start, lasts in zip(motion.jumps[3:50], motion.durations[3:50], strict=True):
         times = start + lasts * np.arange(-0.25, 1.26, 0.05)
