@@ -95,20 +95,22 @@ def samples(channels: Sequence[Channel], times: Float64) -> Samples:
         channels: m channels.
         times: (n,) seconds, not falling.
     """
-    by_curve: dict[str | None, list[int]] = {}  # None: linear ones with many keys
+    # By curve; linear channels with many keys apart, together if they share their key times, as lips do.
+    groups: dict[tuple[str, int, bool], list[int]] = {}
     changed: list[int] = []
     for i, channel in enumerate(channels):
         many = channel.curve == "linear" and len(channel.times) >= MANY_KEYS
-        by_curve.setdefault(None if many else channel.curve, []).append(i)
+        key = ("", id(channel.times), channel.keeps_last) if many else (channel.curve, 0, False)
+        groups.setdefault(key, []).append(i)
         if channel.gains or channel.crossfade is not None or channel.until < np.inf:
             changed.append(i)
     found: list[Samples] = []
-    for curve, rows in by_curve.items():
+    for (curve, _, _), rows in groups.items():
         group = [channels[i] for i in rows]
-        if curve is None:
-            found.append(_interpolated(np.array(rows), group, times))
-        else:
+        if curve:
             found.append(_between(np.array(rows), group, times, CURVES[curve]))
+        else:
+            found.append(_interpolated(np.array(rows), group, times))
     whole = found[0] if len(found) == 1 else _joined(found)
     return _changed(whole, channels, changed, times) if changed else whole
 
@@ -120,37 +122,13 @@ def _joined(parts: Sequence[Samples]) -> Samples:
 
 
 def _interpolated(numbers: Index, channels: Sequence[Channel], times: Float64) -> Samples:
-    """Sample linear channels with many keys at a cost independent of their number.
-
-    Channels that share the array of their key times, as the lips of a speech do, are computed together.
-    """
-    groups: dict[tuple[int, bool], list[int]] = {}
-    for i, channel in enumerate(channels):
-        groups.setdefault((id(channel.times), channel.keeps_last), []).append(i)
-    return _joined([_together(numbers[rows], [channels[i] for i in rows], times) for rows in groups.values()])
-
-
-def _together(numbers: Index, channels: Sequence[Channel], times: Float64) -> Samples:
-    """Sample linear channels with the same key times."""
-    keys, end = channels[0].times, len(channels[0].times) - 1
+    """Sample linear channels with the same many key times at a cost independent of their number."""
+    keys = channels[0].times
     first = int(times.searchsorted(keys[0]))
     last = len(times) if channels[0].keeps_last else int(times.searchsorted(keys[-1], "right"))
-    before = keys.searchsorted(times[first:last], "right") - 1
-    after = np.minimum(before + 1, end)
-    length = keys[after] - keys[before]
-    length[before == end] = 1.0
-    # Only the visible part of a long speech.
-    seen = slice(before[0], after[-1] + 1) if last > first else slice(0, 0)
-    values = np.array([channel.values[seen] for channel in channels])
-    at = values.take(before - seen.start, axis=1)
-    step = values.take(after - seen.start, axis=1)
-    step -= at
-    step /= length
-    step *= times[first:last] - keys[before]
-    at += step
-    frames = np.empty(at.shape, np.intp)
-    frames[:] = np.arange(first, last)
-    return Samples(numbers, np.full(len(channels), last - first), frames.ravel(), at.ravel())
+    values = np.array([np.interp(times[first:last], keys, channel.values) for channel in channels])
+    frames = np.tile(np.arange(first, last), len(channels))
+    return Samples(numbers, np.full(len(channels), last - first), frames, values.ravel())
 
 
 def _ranges(first: Index, counts: Index) -> Index:
