@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from bml_schema import Activate, Interrupt, ParameterValueChange
 from realizer.animation.channel import Channel
 from realizer.core.array_types import Float64
 from realizer.expressions.library import Library, builtin
@@ -42,39 +43,8 @@ class PlanningContext:
     face_inputs: Callable[[], Sequence[str] | None] = lambda: None
 
 
-@dataclass(frozen=True)
-class Interrupt:
-    """End a block, or its behaviours that are in `include` (None: all) and not in `exclude`."""
-
-    block: str
-    include: frozenset[str] | None = None
-    exclude: frozenset[str] = frozenset()
-
-
-@dataclass(frozen=True)
-class Activate:
-    """Start a preplanned block."""
-
-    block: str
-
-
-@dataclass(frozen=True)
-class Change:
-    """Change a parameter of a behaviour to `to`, from `initial` (None: from its present value), by a curve.
-
-    The change is instant if `curve` is None, otherwise from start to end of the changing behaviour.
-    """
-
-    block: str
-    behaviour: str
-    parameter: str
-    to: float
-    initial: float | None = None
-    curve: str | None = None
-
-
-# Executed when the behaviour starts.
-BlockCommand = Interrupt | Activate | Change
+# What a behaviour does to other blocks and behaviours when it starts.
+BlockCommand = Interrupt | Activate | ParameterValueChange
 
 
 @dataclass(frozen=True)
@@ -97,7 +67,7 @@ class BehaviourKind:
             `timing(...).points`. By default the face does not move.
         check: (node, context) -> faults: unknown lexeme or AU, no such target. Called before timing.
         speech_request: (node, context) -> the request to the voice, or None. Only for speech.
-        command: node -> its command to other blocks and behaviours, executed when it starts.
+        command: node -> its command to other blocks and behaviours.
         stretch: (node, context) -> Timing of a rigid behaviour that can stretch if nothing else helps, or
             None.
         sound: (node, context) -> its sound from start to end, or None.

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from bml_schema import Activate, Interrupt, ParameterValueChange
 from realizer.animation.channel import Gain
-from realizer.behaviours.kind import Activate, BlockCommand, Change, Interrupt
+from realizer.behaviours.kind import BlockCommand
 from realizer.playback.active_block import ActiveBlock
 from realizer.playback.timeline import BlockTimeline
 
@@ -38,54 +39,57 @@ def execute(blocks: Blocks, playing: ActiveBlock, behaviour: str, act: BlockComm
     match act:
         case Interrupt():
             _interrupt(blocks, act, now)
-        case Activate(block):
-            if not blocks.activate(block, now):
-                raise CommandError(f"target: wanted a block that was preplanned and waits, got {block!r}")
-        case Change():
-            until = playing.start + float(playing.schedule.times[behaviour][-1])
-            _change(blocks, act, now, until)
+        case Activate():
+            if not blocks.activate(act.target, now):
+                raise CommandError(
+                    f"target: wanted a block that was preplanned and waits, got {act.target!r}"
+                )
+        case ParameterValueChange():
+            _change(blocks, act, now, playing.start + float(playing.schedule.times[behaviour][-1]))
 
 
 def _interrupt(blocks: Blocks, act: Interrupt, now: float) -> None:
-    target = blocks.timeline.blocks.find(act.block)
+    target = blocks.timeline.blocks.find(act.target)
     if target is None:
-        if not blocks.revoke(act.block, now) and not blocks.has_seen(act.block):
-            raise CommandError(f"target: wanted a block, got {act.block!r}, of which nothing was heard")
+        if not blocks.revoke(act.target, now) and not blocks.has_seen(act.target):
+            raise CommandError(f"target: wanted a block, got {act.target!r}, of which nothing was heard")
         return
     named = set(target.schedule.times)
-    if act.include is not None and (strange := act.include - named):
-        raise CommandError(f"include: no behaviour {sorted(strange)[0]!r} plays in {act.block}")
-    chosen = (named if act.include is None else act.include) - act.exclude
+    if strange := set(act.include) - named:
+        raise CommandError(f"include: no behaviour {min(strange)!r} plays in {act.target}")
+    chosen = (set(act.include) or named).difference(act.exclude)
     left = target.unfinished(now)
-    if (act.include is None and not act.exclude) or (left and left <= chosen):
+    if not (act.include or act.exclude) or (left and left <= chosen):
         blocks.timeline.stop(target, now)
     elif left & chosen:
         blocks.timeline.cut(target, left & chosen, now)
 
 
-def _change(blocks: Blocks, act: Change, now: float, until: float) -> None:
-    target = blocks.timeline.blocks.find(act.block)
-    if target is None or act.behaviour not in target.unfinished(now) or not target.has_begun:
-        raise CommandError(f"target: wanted a behaviour that plays, got {act.block}:{act.behaviour}")
-    node = target.block[act.behaviour]
+def _change(blocks: Blocks, act: ParameterValueChange, now: float, end: float) -> None:
+    """Change a parameter linearly if the document gives an end and wants that, otherwise at once."""
+    block, behaviour = act.target
+    target = blocks.timeline.blocks.find(block)
+    if target is None or behaviour not in target.unfinished(now) or not target.has_begun:
+        raise CommandError(f"target: wanted a behaviour that plays, got {block}:{behaviour}")
+    node = target.block[behaviour]
     known = target.kinds[node.tag].parameters
-    if act.parameter not in known:
+    if act.param_id not in known:
         names = ", ".join(sorted(known)) or "none"
-        raise CommandError(f"paramId: {act.block}:{act.behaviour} has {names}, got {act.parameter!r}")
-    usual = known[act.parameter]
+        raise CommandError(f"paramId: {block}:{behaviour} has {names}, got {act.param_id!r}")
+    usual = known[act.param_id]
     unscaled = float(getattr(node, usual) if isinstance(usual, str) else usual)
     if unscaled <= 0.0:
-        raise CommandError(
-            f"{act.parameter}: wanted one that was above 0, got {act.block}:{act.behaviour} at 0"
-        )
-    sound = act.parameter == "volume"
-    if act.to < 0 or (act.initial or 0) < 0:
-        raise CommandError(f"{act.parameter}: wanted 0 or more, got {min(act.to, act.initial or 0):g}")
+        raise CommandError(f"{act.param_id}: wanted one that was above 0, got {block}:{behaviour} at 0")
+    initial, to = act.trajectory.initial_value, act.trajectory.target_value
+    least = min(to, initial or 0)
+    if least < 0:
+        raise CommandError(f"{act.param_id}: wanted 0 or more, got {least:g}")
+    sound = act.param_id == "volume"
     reached = now + AT_ONCE[sound]
-    gains = [] if act.initial is None else [Gain(now, reached, act.initial / unscaled)]
-    if act.curve is None or until <= reached:
-        gains = [Gain(now, reached, act.to / unscaled)]
+    gains = [] if initial is None else [Gain(now, reached, initial / unscaled)]
+    if act.trajectory.type != "linear" or "end" not in act.syncs or end <= reached:
+        gains = [Gain(now, reached, to / unscaled)]
     else:
-        gains.append(Gain(reached if gains else now, until, act.to / unscaled, act.curve))
-    target.scale(act.behaviour, gains, sound=sound)
+        gains.append(Gain(reached if gains else now, end, to / unscaled, "linear"))
+    target.scale(behaviour, gains, sound=sound)
     blocks.timeline.mark_changed()

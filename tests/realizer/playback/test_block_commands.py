@@ -125,6 +125,15 @@ def test_change_at_once_does_not_jump() -> None:
     assert np.abs(np.diff(played.aus.aus, axis=0)).max() < 0.2
 
 
+def test_change_is_even_only_with_an_end() -> None:
+    linear, instant = (
+        change("amount", f'type="{type}" targetValue="0.1"', 'start="1"') for type in ("linear", "instant")
+    )
+    np.testing.assert_array_equal(play(SMILE, linear).aus.aus, play(SMILE, instant).aus.aus)
+    to_the_end = change("amount", 'type="instant" targetValue="0.1"', 'start="1" end="3"')
+    np.testing.assert_array_equal(play(SMILE, to_the_end).aus.aus, play(SMILE, instant).aus.aus)
+
+
 def test_change_starts_with_the_initial_value() -> None:
     linear = change("amount", 'type="linear" initialValue="1" targetValue="0.5"', 'start="1" end="3"')
     plain, played = play(SMILE), play(SMILE, linear)
