@@ -99,7 +99,7 @@ class PiecewiseMatrix:
                 raises[fap - 1].append((column, hinges))
             if min(values) < 0:
                 lowers[fap - 1].append((column, [(knot, -slope) for knot, slope in hinges]))
-        return cls(*map(Polylines.of, (raises, lowers, turns)), closed, mask)
+        return cls(Polylines.of(raises), Polylines.of(lowers), Polylines.of(turns), closed, mask)
 
     def evaluate(self, aus: Float32) -> tuple[Float32, Float32, Float32]:
         """Return, (68, n) each, how far AUs (n_au, n) raise, lower and turn each FAP.
