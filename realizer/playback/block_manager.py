@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import islice
 
-from bml_schema import Block, Feedback
+from bml_schema import Block
 from realizer.behaviours.kind import BehaviourKind, BlockCommand, PlanningContext
 from realizer.playback import block_links
 from realizer.playback.active_block import ActiveBlock, Dependency
@@ -60,7 +60,6 @@ class BlockManager:
 
     Args:
         kinds: tag -> BehaviourKind.
-        characters: the blocks change their base states; shared with the caller.
         veto: (block, its schedule) -> why it is refused, or None.
 
     Attributes:
@@ -72,20 +71,35 @@ class BlockManager:
     def __init__(
         self,
         kinds: Mapping[str, BehaviourKind],
-        characters: Sequence[Character],
         veto: Callable[[Block, Schedule], str | None] = lambda block, schedule: None,
     ) -> None:
         self.kinds = kinds
         self._veto = veto
-        self.timeline = BlockTimeline(kinds, characters)
+        self._characters: list[Character] = [Character(None)]
+        self.timeline = BlockTimeline(kinds, self._characters)
         self.blocks = self.timeline.blocks
         self.reports = self.timeline.reports
         self._announced: dict[str, AnnouncedBlock] = {}
 
     # blocks in ----------------------------------------------------------------------------------
 
-    def announce(self, block: Block, character: int, now: float) -> None:
-        """Acknowledge a block, once."""
+    def character_index(self, id: str | None) -> int:
+        """Return the index of a character, 0 for None; a new one is added."""
+        if id is None:
+            return 0
+        for index, character in enumerate(self._characters):
+            if character.id == id:
+                return index
+        if self._characters[0].id is None:
+            # The first name in a session is the name of its first face.
+            self._characters[0].id = id
+            return 0
+        self._characters.append(Character(id))
+        return len(self._characters) - 1
+
+    def announce(self, block: Block, now: float) -> None:
+        """Acknowledge a block, once: planning has begun. `accept` does it if it was not done before."""
+        character = self.character_index(block.character_id)
         if block.id in self._announced or self._in_use(block, character):
             return
         self._announced[block.id] = AnnouncedBlock(block)
@@ -93,15 +107,20 @@ class BlockManager:
         self.reports.add(acknowledgement(block, now if start == FOREVER else start))
 
     def withdraw(self, block: Block, now: float) -> None:
-        """Remove a block that was announced, and report its end."""
+        """Remove an announced block that will not be submitted, and report its end."""
         announced = self._announced.pop(block.id, None) or AnnouncedBlock(block)
         if not announced.is_revoked:
             self._revoke(announced, now)
 
-    def submit(self, block: Block, character: int, context: PlanningContext, now: float) -> Schedule:
+    def refuse(self, warning: Warning, now: float, character: str | None = None) -> None:
+        """Report a document, block or behaviour that cannot be played."""
+        self.reports.warn(warning, character)
+
+    def accept(self, block: Block, context: PlanningContext, now: float) -> Schedule:
         """Plan a block and accept or refuse it."""
+        character = self.character_index(block.character_id)
         self.advance(now)
-        self.announce(block, character, now)
+        self.announce(block, now)
         try:
             if self._in_use(block, character):
                 text = f"block id {block.id!r} is still in use: wanted an id of no block that plays or waits"
@@ -156,34 +175,18 @@ class BlockManager:
         for event in self.timeline.events.due(now):
             self._handle_event(event, self.blocks[event.block])
 
-    def due(self, now: float) -> list[Feedback]:
-        self.advance(now)
-        return self.reports.take_all()
-
     def next_deadline(self) -> float | None:
+        """Return when `due` next returns something; None if nothing plays or waits; past for at once."""
         return float("-inf") if self.reports else self.timeline.events.next
 
     def is_idle(self, now: float = -FOREVER) -> bool:
-        """Whether nothing plays, waits, is announced or pending, and nothing that ended is still visible.
+        """Whether nothing plays, waits or is visible, so that a snapshot holds the whole state.
 
         Args:
-            now: blocks that were invisible by then count as gone, though they may still affect blinks and
-                nods.
+            now: blocks that have ended by then do not count, though they affect idle motion for some seconds.
         """
         seen = any(not playing.is_done or playing.invisible_after > now for playing in self.blocks.all())
         return not (seen or self._announced or self.reports)
-
-    def has_due(self, now: float, before: float) -> bool:
-        """Whether `due(now)` or `forget(before)` would do something."""
-        due = self.timeline.events.next
-        return (due is not None and due <= now) or self.blocks.first_invisible < before or bool(self.reports)
-
-    def forget(self, before: float) -> bool:
-        """Drop blocks that are invisible after a time; return whether there were any."""
-        gone = self.blocks.forget(before)
-        for playing in gone:
-            self.timeline.events.drop(playing)
-        return bool(gone)
 
     def _handle_event(self, event: Event, playing: ActiveBlock) -> None:
         block, time = playing.block, event.time
@@ -242,8 +245,16 @@ class BlockManager:
         announced.change_state(BlockEvent.STOP)
         self.reports.add(progress(announced.block, "end", now, announced.state))
 
-    def stop_all(self, now: float, ids: Collection[str] | None) -> list[str]:
-        """Stop these blocks, or all; return the ids of those that played or waited."""
+    def stop(self, now: float, block_ids: Iterable[str] | None = None) -> list[str]:
+        """End blocks gracefully: sound fades, the face relaxes to its base without a jump.
+
+        Args:
+            block_ids: None for all that play or wait.
+
+        Returns:
+            The ids of the blocks that were stopped.
+        """
+        ids = None if block_ids is None else set(block_ids)
         self.advance(now)
         stopped = [p for p in self.blocks.active() if ids is None or p.block.id in ids]
         # The last first, so that no block is planned again because its dependency was stopped.
@@ -270,12 +281,11 @@ class BlockManager:
         return True
 
     def anticipate(self, id: str, syncs: Mapping[str, float], now: float) -> None:
-        """Change the expected times of points; sync points that are tied to them follow.
+        """Set the expected times of the points `anticipators:id:sync`; sync points tied to them follow.
 
         Args:
-            id: of an anticipator; references name its points as `anticipators:id:sync`.
             syncs: sync -> seconds on the session clock; a time that is too soon becomes the earliest
-                possible.
+                possible. A point that has passed stays where it was.
         """
         self.advance(now)
         tied = [p for p in self.blocks.active() if p.start < FOREVER and id in anticipators_of(p.block)]
@@ -290,13 +300,17 @@ class BlockManager:
                 [playing, *self.timeline.linked_blocks(playing, now)], playing.start, now
             )
 
-    def update_speech(self, id: str, behaviour: str, utterance: Utterance, now: float) -> bool:
-        """Replace an utterance by its real timing; return False if the speech neither plays nor waits.
+    def update_speech_timing(self, block: str, behaviour: str, utterance: Utterance, now: float) -> bool:
+        """Replace an utterance by one with its real timing while it is spoken; the rest of the block follows.
 
-        Points that have passed stay, and the rest of the block follows.
+        Args:
+            utterance: the complete utterance. Points that have passed stay where they were.
+
+        Returns:
+            False if the speech neither plays nor waits.
         """
         self.advance(now)
-        playing = self.blocks.find(id)
+        playing = self.blocks.find(block)
         if playing is None or behaviour not in playing.plan.timings:
             return False
         if playing.start == FOREVER:  # it is planned when its start is known

@@ -27,9 +27,8 @@ from realizer.expressions.library import library_of
 from realizer.playback.active_block import ScheduledSpeech
 from realizer.playback.block_manager import BlockManager
 from realizer.playback.block_states import BlockEvent, State, next_state
-from realizer.playback.block_store import BlockStore
 from realizer.playback.character import RELAX, Character
-from realizer.scheduling.timing import Schedule, Warning
+from realizer.scheduling.timing import Schedule
 from realizer.speech.utterance import Recording, SpeechRequest, Utterance
 from realizer.tables.cooccurrence import load_rules
 
@@ -39,7 +38,7 @@ HISTORY = 1.0  # s
 NEAR = 5.0  # s
 
 
-class Player:
+class Player(BlockManager):
     """The blocks of one session and their animation.
 
     Args:
@@ -51,7 +50,7 @@ class Player:
         veto: (block, its schedule) -> why it is refused, or None.
 
     Attributes:
-        version: increases whenever frames change that may have been computed before.
+        blocks: the blocks, for reading only.
     """
 
     def __init__(
@@ -64,7 +63,7 @@ class Player:
         face_inputs: Callable[[int], Sequence[str]] | None = None,
         veto: Callable[[Block, Schedule], str | None] = lambda block, schedule: None,
     ) -> None:
-        self.kinds = kinds
+        super().__init__(kinds, veto)
         self._face_inputs = face_inputs
         self.context = PlanningContext(
             scene=options.scene,
@@ -78,12 +77,11 @@ class Player:
         self.prosody = options.prosody
         self.history = history
         self.rules = load_rules(options.cooccurrence)
-        self._characters: list[Character] = [Character(None)]
-        self._manager = BlockManager(kinds, self._characters, veto)
 
     @property
     def version(self) -> int:
-        return self._manager.timeline.version
+        """Increases whenever frames change that may have been computed before."""
+        return self.timeline.version
 
     # documents ----------------------------------------------------------------------------------
 
@@ -100,10 +98,6 @@ class Player:
                 requests[node.id] = say
         return requests
 
-    def announce(self, block: Block, now: float) -> None:
-        """Acknowledge a block: planning has begun. `submit` does it if it was not done before."""
-        self._manager.announce(block, self._character(block.character_id), now)
-
     def submit(self, block: Block, now: float, utterances: Mapping[str, Utterance] | None = None) -> Schedule:
         """Plan a block and play it as its composition says.
 
@@ -114,73 +108,19 @@ class Player:
 
         Returns:
             The schedule; `schedule.failed` if the whole block was refused. If it has `lengths`, more of the
-            block
-            fits with other utterances: submit it again with utterances of these lengths
-                (`speech.duration_fit`), or
-            with the same ones with a `stretch` of (1, 1).
+            block fits with other utterances: submit it again with utterances of these lengths
+            (`speech.duration_fit`), or with the same ones with a `stretch` of (1, 1).
         """
-        character = self._character(block.character_id)
+        character = self.character_index(block.character_id)
         takes = (
             self.context.face_inputs if self._face_inputs is None else partial(self._face_inputs, character)
         )
         world = replace(self.context, utterances=dict(utterances or {}), face_inputs=takes)
-        return self._manager.submit(block, character, world, now)
-
-    def refuse(self, warning: Warning, now: float, character: str | None = None) -> None:
-        """Report a document, block or behaviour that cannot be played."""
-        self._manager.reports.warn(warning, character)
-
-    def stop(self, now: float, block_ids: Iterable[str] | None = None) -> list[str]:
-        """End blocks gracefully: sound fades, the face relaxes to its base without a jump.
-
-        Args:
-            block_ids: None for all that play or wait.
-
-        Returns:
-            The ids of the blocks that were stopped.
-        """
-        return self._manager.stop_all(now, None if block_ids is None else set(block_ids))
-
-    def withdraw(self, block: Block, now: float) -> None:
-        """Remove an announced block that will not be submitted; its end is reported."""
-        self._manager.withdraw(block, now)
-
-    @property
-    def blocks(self) -> BlockStore:
-        """The blocks themselves, for reading only."""
-        return self._manager.blocks
-
-    @property
-    def active_count(self) -> int:
-        """The number of playing and waiting blocks."""
-        return len(self._manager.blocks.active())
+        return self.accept(block, world, now)
 
     def set_scene(self, scene: Mapping[str, Position] | None) -> None:
         """Set the positions of targets for documents that are planned from now on."""
         self.context = replace(self.context, scene=scene)
-
-    def anticipate(self, id: str, syncs: Mapping[str, float], now: float) -> None:
-        """Set the expected times of the points `anticipators:id:sync`; sync points tied to them follow.
-
-        Args:
-            syncs: sync -> seconds on the session clock. A point that has passed stays where it was.
-        """
-        self._manager.anticipate(id, syncs, now)
-
-    def forget_anticipator(self, id: str) -> None:
-        """Drop an anticipator that no active block is tied to."""
-        self._manager.blocks.drop_anticipators([id])
-
-    def update_speech_timing(self, block: str, behaviour: str, utterance: Utterance, now: float) -> bool:
-        """Replace an utterance by one with its real timing while it is spoken; the rest of the block follows.
-
-        Args:
-            utterance: the complete utterance. Points that have passed stay where they were.
-
-        Returns:
-            False if the speech neither plays nor waits.
-        """
-        return self._manager.update_speech(block, behaviour, utterance, now)
 
     def set_direct(self, values: Mapping[str, float | None], now: float, character: int = 0) -> None:
         """Hold AUs (0..1) and FAPs (FAPU) by name until they are changed; None releases one.
@@ -189,7 +129,7 @@ class Player:
             KeyError: no such AU or FAP.
         """
         self._characters[character].set_direct(values, now)
-        self._manager.timeline.mark_changed()
+        self.timeline.mark_changed()
 
     def direct_names(self, character: int = 0) -> tuple[str, ...]:
         """Return the names of the AUs and FAPs that are held directly, or have just been released."""
@@ -205,41 +145,33 @@ class Player:
             KeyError: no such AU or FAP.
         """
         self._characters[character].set_emotion(values, now)
-        self._manager.timeline.mark_changed()
+        self.timeline.mark_changed()
 
     # feedback -----------------------------------------------------------------------------------
 
     def due(self, now: float) -> list[Feedback]:
         """Return feedback that is due, in the order of report, each message once."""
         forgettable = now - self.history - RELAX - AFTERMATH
-        if not self._manager.has_due(now, forgettable):
+        due = self.timeline.events.next
+        is_due = due is not None and due <= now
+        if not (is_due or self.blocks.first_invisible < forgettable or self.reports):
             return []
-        out = self._manager.due(now)
-        forgotten = self._manager.forget(forgettable)
-        if forgotten:
+        self.advance(now)
+        out = self.reports.take_all()
+        if forgotten := self.blocks.forget(forgettable):
+            for playing in forgotten:
+                self.timeline.events.drop(playing)
             for character in self._characters:
                 character.forget(now - self.history)
         return out
 
-    def next_deadline(self) -> float | None:
-        """Return when `due` next returns something; None if nothing plays or waits; past for at once."""
-        return self._manager.next_deadline()
-
     def next_change(self) -> float:
         """Return when `due` will next report or forget something; infinite for never."""
-        first = self._manager.next_deadline()
-        forgets = self._manager.blocks.first_invisible + self.history + RELAX + AFTERMATH
+        first = self.next_deadline()
+        forgets = self.blocks.first_invisible + self.history + RELAX + AFTERMATH
         return forgets if first is None else min(first, forgets)
 
     # state --------------------------------------------------------------------------------------
-
-    def is_idle(self, now: float = float("-inf")) -> bool:
-        """Whether nothing plays, waits or is visible, so that a snapshot holds the whole state.
-
-        Args:
-            now: blocks that have ended by then do not count, though they affect idle motion for some seconds.
-        """
-        return self._manager.is_idle(now)
 
     @property
     def character_states(self) -> tuple[Character, ...]:
@@ -254,8 +186,8 @@ class Player:
             past, expected: as of `blocks.snapshot`.
         """
         self._characters[:] = characters
-        self._manager.blocks.restore(past, expected)
-        self._manager.timeline.mark_changed()
+        self.blocks.restore(past, expected)
+        self.timeline.mark_changed()
 
     # frames -------------------------------------------------------------------------------------
 
@@ -263,10 +195,6 @@ class Player:
     def characters(self) -> list[str | None]:
         """Ids of the characters; the first is the default of documents without characterId."""
         return [c.id for c in self._characters]
-
-    def character_index(self, character: str | None) -> int:
-        """Return the index of a character in `characters`; a new one is added."""
-        return self._character(character)
 
     def frames(self, times: Float64, character: int = 0) -> AUFrames:
         """Return the frames of a face at any times; a pure function of what was submitted, live and offline.
@@ -287,7 +215,7 @@ class Player:
             times: as for `frames`, at least one.
         """
         first, last = float(times[0]), float(times[-1])
-        blocks = self._manager.blocks.of_character(character)
+        blocks = self.blocks.of_character(character)
         own = self._characters[character].channels()
         channels = [c for p in blocks for c in p.moving_channels()] + own
         if not self.idle:
@@ -309,24 +237,20 @@ class Player:
     @property
     def end(self) -> float:
         """When the last block has ended, and relaxed if it was cut off; 0 without blocks."""
-        return max(
-            (p.invisible_after for p in self._manager.blocks.all() if p.end < float("inf")), default=0.0
-        )
+        return max((p.invisible_after for p in self.blocks.all() if p.end < float("inf")), default=0.0)
 
     def speech(self) -> tuple[ScheduledSpeech, ...]:
         """Return past and future utterances, in order of their start."""
-        return tuple(
-            sorted((s for p in self._manager.blocks.all() for s in p.speech.values()), key=lambda s: s.start)
-        )
+        return tuple(sorted((s for p in self.blocks.all() for s in p.speech.values()), key=lambda s: s.start))
 
     def latest(self, schedule: Schedule) -> Schedule:
         """Return the present schedule of a block, given the one that `submit` returned."""
-        return self._manager.blocks.latest(schedule)
+        return self.blocks.latest(schedule)
 
     def state(self, now: float) -> dict[str, Any]:
         """Return the playing blocks, the visible AUs and the values of each layer, as plain data."""
         blocks: list[dict[str, Any]] = []
-        for p in self._manager.blocks.active():
+        for p in self.blocks.active():
             if p.end <= now:
                 continue
             starts = p.state is State.LURKING and p.start <= now
@@ -354,21 +278,6 @@ class Player:
                 layers[layer.name.lower()] = {"aus": aus, "faps": faps}
         visible = _up(blend(channels, times, self.rules, idle))
         return {"character": self._characters[character].id, "aus": visible, "layers": layers}
-
-    # inside -------------------------------------------------------------------------------------
-
-    def _character(self, wanted: str | None) -> int:
-        if wanted is None:
-            return 0
-        for index, character in enumerate(self._characters):
-            if character.id == wanted:
-                return index
-        if self._characters[0].id is None:
-            # The first name in a session is the name of its first face.
-            self._characters[0].id = wanted
-            return 0
-        self._characters.append(Character(wanted))
-        return len(self._characters) - 1
 
 
 def _up(frames: AUFrames) -> dict[str, float]:

@@ -241,7 +241,7 @@ class Submission:
         self._player.stop(t, blocks)
 
     def _limit_error(self, block: Block) -> str | None:
-        busy = len(self.pending) + self._player.active_count
+        busy = len(self.pending) + len(self._player.blocks.active())
         return block_limit_error(block, self._settings, busy, self._player.characters)
 
     def _internal(self, block: Block, t: float) -> None:

@@ -120,7 +120,7 @@ class SessionHost:
                 "sessions": len(sessions),
                 "connections": len(self._clients),
                 "blocks_waiting": sum(len(session.submission.pending) for session in sessions),
-                "blocks_playing": sum(session.player.active_count for session in sessions),
+                "blocks_playing": sum(len(session.player.blocks.active()) for session in sessions),
                 "unsent_bytes": sum(client.unsent_bytes for client in self._clients.values()),
                 "memory_bytes": memory(),
             },

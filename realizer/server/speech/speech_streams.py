@@ -211,7 +211,7 @@ class SpeechStreams:
         return ref if chunk is None else replace(ref, block=chunk)
 
     def _forget(self, id: str) -> None:
-        self._player.forget_anticipator(self._speeches.pop(id).anticipator)
+        self._player.blocks.drop_anticipators([self._speeches.pop(id).anticipator])
 
     def _anticipate(self, speech: SpeechStream, end: float, t: float) -> None:
         speech.end = end

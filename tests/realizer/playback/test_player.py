@@ -232,7 +232,7 @@ def test_player_forgets_what_is_past_in_a_long_session() -> None:
     for i in range(50):
         submit(player, SMILE, f"b{i}", now=10.0 * i)
         player.due(10.0 * i + 5)
-    assert len(player._manager.blocks.all()) <= 2
+    assert len(player.blocks.all()) <= 2
     assert player.state(500.0)["blocks"] == []
 
 

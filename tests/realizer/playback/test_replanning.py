@@ -138,7 +138,7 @@ def test_affected_blocks_are_connected_by_future_points() -> None:
     stage.send("b", '<head id="n" lexeme="NOD" start="a:f:end"/>')
     stage.send("c", FACE.format(""))
     new = stage.block("x", '<wait id="w" start="b:n:end"/>')
-    alive = stage.player._manager.blocks.active()
+    alive = stage.player.blocks.active()
     assert [p.block.id for p in affected_blocks(new, alive, 0.0)] == ["a", "b"]
     assert affected_blocks(new, alive, 60.0) == []
     assert affected_blocks(stage.block("y", FACE.format("")), alive, 0.0) == []
