@@ -27,11 +27,16 @@ _NAME = rb"(?:[\w.\x80-\xff-]{1,64}:)?bml(?=[\s/>])"
 _MARK = re.compile(rb"<!--|<!\[CDATA\[|<!DOCTYPE|<\?|<" + _NAME + rb"|</" + _NAME)
 # An end of the data that more data may turn into a mark; no mark is longer.
 _COMING = re.compile(rb"<[^\s<>]{0,79}\Z")
-_CLOSERS = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>"}
+# Constructs -> their ends, and how many bytes of an end may have arrived. "[" is the subset in a DOCTYPE.
+_ENDS = {
+    b"<!--": (re.compile(rb"-->"), 2),
+    b"<![CDATA[": (re.compile(rb"\]\]>"), 2),
+    b"<?": (re.compile(rb"\?>"), 1),
+    b"<!DOCTYPE": (re.compile(rb"[<>\[]"), 0),
+    b"[": (re.compile(rb"\]\s{0,16}>"), 17),
+}
 _IN_TAG = re.compile(rb"[<>\"']")
 _IN_VALUE = {b'"': re.compile(rb'[<"]'), b"'": re.compile(rb"[<']")}
-_IN_DOCTYPE = re.compile(rb"[<>\[]")
-_END_OF_SUBSET = re.compile(rb"\]\s{0,16}>")
 _EDGE = re.compile(rb"[<>]")
 _ID = re.compile(rb"""\sid\s*=\s*(?:"([^"<]{1,256})"|'([^'<]{1,256})')""")
 _BLANKS = b" \t\r\n\xef\xbb\xbf"  # and the bytes of a BOM
@@ -83,13 +88,7 @@ class DocumentFramer:
         """Parse up to the next mark, or the end of the open construct. Return False if data is missing."""
         if not self._hidden:
             return self._to_mark()
-        if self._hidden in _CLOSERS:
-            return self._past(_CLOSERS[self._hidden])
-        if self._hidden == b"<!DOCTYPE":
-            return self._in_doctype()
-        if self._hidden == b"[":
-            return self._in_subset()
-        return self._in_tag()
+        return self._past() if self._hidden in _ENDS else self._in_tag()
 
     def _to_mark(self) -> bool:
         match = _MARK.search(self._data, self._parsed)
@@ -103,7 +102,7 @@ class DocumentFramer:
         self._report_stray()
         self._parsed, self._opened = end, start
         mark = match[0]
-        if mark in _CLOSERS or mark == b"<!DOCTYPE":
+        if mark in _ENDS:
             if self._document < 0 and mark == b"<![CDATA[":
                 self._fault("got <![CDATA[ outside a document")
             self._hidden = mark
@@ -136,45 +135,25 @@ class DocumentFramer:
             self._end()
         return True
 
-    def _past(self, closer: bytes) -> bool:
+    def _past(self) -> bool:
         """Parse to the end of a comment or the like. Give up one longer than a document may be."""
-        last = self._opened + len(self._hidden) + self._limit
-        at = self._data.find(closer, self._parsed, last)
-        if at >= 0:
-            self._parsed, self._hidden = at + len(closer), b""
+        closer, kept = _ENDS[self._hidden]
+        opener = b"<!DOCTYPE" if self._hidden == b"[" else self._hidden
+        last = self._opened + len(opener) + self._limit
+        match = closer.search(self._data, self._parsed, last)
+        if match is not None:
+            self._parsed, self._hidden = match.end(), b"[" if match[0] == b"[" else b""
+            if match[0] == b"<":
+                self._parsed = match.start()
+                if self._document < 0:
+                    self._fault("wanted an end of <!DOCTYPE, got <")
             return True
-        return self._not_yet(last, len(closer) - 1)
-
-    def _not_yet(self, last: int, kept: int) -> bool:
-        """Wait for the end of a construct, or give the construct up at `last`."""
         if len(self._data) < last:
-            self._parsed = max(self._parsed, len(self._data) - kept)  # part of the closer may be there
+            self._parsed = max(self._parsed, len(self._data) - kept)
             return False
         if self._document < 0:
-            opener = "<!DOCTYPE" if self._hidden == b"[" else self._hidden.decode()
-            self._fault(f"wanted an end of {opener} within {self._limit} bytes")
+            self._fault(f"wanted an end of {opener.decode()} within {self._limit} bytes")
         self._parsed, self._hidden = last, b""
-        return True
-
-    def _in_doctype(self) -> bool:
-        last = self._opened + len(self._hidden) + self._limit
-        match = _IN_DOCTYPE.search(self._data, self._parsed, last)
-        if match is None:
-            return self._not_yet(last, 0)
-        self._parsed = match.end()
-        self._hidden = b"[" if match[0] == b"[" else b""
-        if match[0] == b"<":
-            self._parsed = match.start()
-            if self._document < 0:
-                self._fault("wanted an end of <!DOCTYPE, got <")
-        return True
-
-    def _in_subset(self) -> bool:
-        last = self._opened + len(b"<!DOCTYPE") + self._limit
-        match = _END_OF_SUBSET.search(self._data, self._parsed, last)
-        if match is None:
-            return self._not_yet(last, 17)
-        self._parsed, self._hidden = match.end(), b""
         return True
 
     def _end(self) -> None:
