@@ -42,7 +42,7 @@ from realizer.server.session.effects import Send
 from realizer.server.session.session import Session
 from realizer.server.transports.message_formats import Disconnect, Inbound
 from realizer.server.transports.xface.attachments import prepare
-from realizer.server.transports.xface.reader import Content, Fault, TaskReader
+from realizer.server.transports.xface.reader import Fault, TaskReader
 from realizer.server.transports.xface.tasks import ABLE, UNABLE, Answer, TaskRunner
 from realizer.server.transports.xface.wire import Task, pack_task, read_notes
 from realizer.speech.silent import SilentVoice
@@ -211,7 +211,7 @@ def task_streams() -> tuple[bytes, ...]:
 def tasks(seed: int, mutant: bytes) -> None:
     """Check that broken tasks are found however the stream is cut, and that a player answers them."""
     random, reader, whole = Random(seed), TaskReader(LIMIT), TaskReader(LIMIT)
-    found: list[Task | Content | Fault] = []
+    found: list[Task | Fault] = []
     at = 0
     while at < len(mutant):
         size = random.choice((1, 7, 100, 1000, 10_000))

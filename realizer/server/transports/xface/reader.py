@@ -11,14 +11,6 @@ UNREAD = Task("")
 
 
 @dataclass(frozen=True, slots=True)
-class Content:
-    """The bytes that follow a task and that it announces."""
-
-    task: Task
-    data: bytes
-
-
-@dataclass(frozen=True, slots=True)
 class Fault:
     """A span of the stream that is no task.
 
@@ -62,21 +54,20 @@ class TaskReader:
         self._data = bytearray()
         self._looked = 0  # the open task has no end before it
         self._lost = False  # inside a span whose fault is reported
-        self._content: Task | None = None  # the task whose content follows
-        self._size = 0  # bytes of that content
+        self._size = 0  # bytes of a file that follow a task and are skipped
 
-    def feed(self, data: bytes) -> list[Task | Content | Fault]:
+    def feed(self, data: bytes) -> list[Task | Fault]:
         """Return what `data` completes, in order."""
         self._data += data
-        items: list[Task | Content | Fault] = []
+        items: list[Task | Fault] = []
         while self._step(items):
             pass
         return items
 
-    def _step(self, items: list[Task | Content | Fault]) -> bool:
+    def _step(self, items: list[Task | Fault]) -> bool:
         """Parse the next item. Return False if data is missing."""
-        if self._content is not None:
-            return self._take_content(items)
+        if self._size:
+            return self._skip_content()
         if self._lost:
             return self._skip()
         if (passed := _PASSED.match(self._data)) is not None:
@@ -93,7 +84,7 @@ class TaskReader:
             return self._give_up(f"wanted <task name=...>, got {shown!r}", items)
         return self._in_task(items)
 
-    def _in_task(self, items: list[Task | Content | Fault]) -> bool:
+    def _in_task(self, items: list[Task | Fault]) -> bool:
         start = _START.match(self._data)
         if start is None:
             bound = _BOUND.search(self._data, 5)
@@ -119,7 +110,7 @@ class TaskReader:
         self._tell(start[1], bytes(self._data[start.end() : end.start()]), end.end(), items)
         return True
 
-    def _tell(self, tag: bytes, body: bytes, end: int, items: list[Task | Content | Fault]) -> None:
+    def _tell(self, tag: bytes, body: bytes, end: int, items: list[Task | Fault]) -> None:
         self._drop(end)
         task = replace(_head(tag), params=_params(body.decode("utf-8", "replace")))
         if not task.name:
@@ -133,23 +124,21 @@ class TaskReader:
         if not (size.isascii() and size.isdecimal() and len(size) < 12 and 0 < int(size) <= self._limit):
             items.append(Fault(f"{FOLLOWED}: wanted 1..{self._limit} bytes to follow, got {size[:20]!r}"))
             return
-        self._content, self._size = task, int(size)
+        self._size = int(size)
 
-    def _take_content(self, items: list[Task | Content | Fault]) -> bool:
-        assert self._content is not None
-        nul = self._data[:1] == b"\0"  # the terminator of the task; no sound file begins so
-        if len(self._data) < self._size + nul:
+    def _skip_content(self) -> bool:
+        size = self._size + (self._data[:1] == b"\0")  # the terminator of the task; no sound file begins so
+        if len(self._data) < size:
             return False
-        items.append(Content(self._content, bytes(self._data[nul : self._size + nul])))
-        self._drop(self._size + nul)
-        self._content = None
+        self._drop(size)
+        self._size = 0
         return True
 
     @property
     def _too_large(self) -> str:
         return f"wanted a task of at most {self._limit} bytes, got more"
 
-    def _give_up(self, text: str, items: list[Task | Content | Fault], tag: bytes = b"") -> bool:
+    def _give_up(self, text: str, items: list[Task | Fault], tag: bytes = b"") -> bool:
         """Report a fault; `tag` is the rest of the start tag of the task that has it."""
         items.append(Fault(text, _head(tag)))
         self._lost = True

@@ -14,9 +14,9 @@ from realizer.server.runtime.session_registry import JoinError
 from realizer.server.transports.message_formats import Disconnect, Inbound
 from realizer.server.transports.tcp_listener import TcpTransport, session_name
 from realizer.server.transports.xface.attachments import Attachment, prepare
-from realizer.server.transports.xface.reader import Content, Fault, TaskReader
+from realizer.server.transports.xface.reader import Fault, TaskReader
 from realizer.server.transports.xface.tasks import ERROR, Answer, TaskRunner
-from realizer.server.transports.xface.wire import Task
+from realizer.server.transports.xface.wire import Status, Task, pack_note
 
 log = logging.getLogger(__name__)
 
@@ -84,8 +84,6 @@ class XfaceTransport(TcpTransport):
                         link.do(link.tasks.accept(item))
                         attachment = await self._prepared(item)
                         link.do(link.tasks.run(item, attachment, loop.time()))
-                    case Content():
-                        pass  # of a task that was refused
                 if link.has_left:
                     return
                 await limiter.pause(
@@ -119,7 +117,7 @@ class _SessionLink:
         """Subscribe to feedback, and greet the client."""
         self._number = number
         self._sessions.receive(number, FEEDBACK)
-        self._writer.write(self.tasks.greeting)
+        self._writer.write(pack_note("CONNECTION_OK", self.tasks.owner, 0, Status.UNKNOWN))
 
     def do(self, answers: Iterable[Answer]) -> None:
         """Carry out the answers of the task runner, in order."""

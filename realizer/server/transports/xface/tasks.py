@@ -80,11 +80,6 @@ class TaskRunner:
         self._scripts: list[_RunningTask] = []
         self._count = 0
 
-    @property
-    def greeting(self) -> bytes:
-        """The first message to a client, which waits for it."""
-        return pack_note("CONNECTION_OK", self.owner, 0, Status.UNKNOWN)
-
     def accept(self, task: Task) -> Iterator[Answer]:
         """Yield the answers to a task that has arrived, before it runs."""
         if task.name not in ABLE | UNABLE:
