@@ -6,7 +6,7 @@ import logging
 import re
 from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from bml_schema import Block, BMLError, BMLSizeError, Speech, read
 from realizer.behaviours.registry import VOCABULARY
@@ -24,13 +24,6 @@ from realizer.speech.utterance import SpeechRequest
 log = logging.getLogger(__name__)
 
 _BLOCK_ID = re.compile(r"<(?:\w+:)?bml\b[^<>]*?\bid\s*=\s*[\"']([^\"'<>]{1,256})[\"']")
-
-
-@dataclass(frozen=True, slots=True)
-class CancelledBlock:
-    """A block that was stopped after its document arrived and before it was read."""
-
-    block: Block
 
 
 class DocumentQueue:
@@ -69,7 +62,12 @@ class DocumentQueue:
         else:
             self._cancelled |= dict.fromkeys(blocks, self._received)
 
-    def next(self) -> Block | CancelledBlock | Warning | None:
+    def is_cancelled(self, block: Block) -> bool:
+        """Return whether the block that `next` returned last is cancelled."""
+        number = self._received - len(self._unread) + 1
+        return number <= max(self._all_cancelled, self._cancelled.get(block.id, 0))
+
+    def next(self) -> Block | Warning | None:
         """Return the next block or the warning that replaces it; None if the queue is empty."""
         while self._unread:
             try:
@@ -79,9 +77,7 @@ class DocumentQueue:
                 self._unread.popleft()
                 return Warning("<no id>", "PARSING_FAILURE", "internal error while reading")
             if isinstance(item, Block):
-                number = self._received - len(self._unread) + 1
-                cancelled = number <= max(self._all_cancelled, self._cancelled.get(item.id, 0))
-                return CancelledBlock(item) if cancelled else item
+                return item
             if item is not None:
                 refused = parse_warning(item)
                 if isinstance(item, BMLSizeError):  # too many behaviours: `put` has counted the bytes
@@ -137,13 +133,14 @@ class Submission:
 
     def parse_next(self, t: float) -> bool:
         """Prepare the next block of a speech or of the queue. Return False if there is none."""
-        item = self.speeches.next() or self.queue.next()
+        if (chunk := self.speeches.next()) is not None:
+            self._prepare(chunk, t)
+            return True
+        item = self.queue.next()
         if isinstance(item, Warning):
             self.refuse(item, t)
-        elif isinstance(item, CancelledBlock):
-            self._prepare(item.block, t, cancelled=True)
         elif item is not None:
-            self._prepare(item, t)
+            self._prepare(item, t, cancelled=self.queue.is_cancelled(item))
         return item is not None
 
     def stop(self, blocks: Collection[str] | None, t: float) -> set[str]:
@@ -164,7 +161,9 @@ class Submission:
 
     def _prepare(self, block: Block, t: float, *, cancelled: bool = False) -> None:
         """Request the speech of a block and acknowledge it. It is planned when nothing is missing."""
-        if (fault := self._limit_error(block)) is not None:
+        busy = len(self.pending) + len(self._player.blocks.active())
+        fault = block_limit_error(block, self._settings, busy, self._player.characters)
+        if fault is not None:
             self.refuse(Warning(block.id, "CANNOT_CREATE_BEHAVIOR", fault), t, block.character_id)
             return
         try:
@@ -239,10 +238,6 @@ class Submission:
         """End blocks, whether they play already or not."""
         self.withdraw([w for w in self.pending.blocks if w.block.id in blocks], t)
         self._player.stop(t, blocks)
-
-    def _limit_error(self, block: Block) -> str | None:
-        busy = len(self.pending) + len(self._player.blocks.active())
-        return block_limit_error(block, self._settings, busy, self._player.characters)
 
     def _internal(self, block: Block, t: float) -> None:
         """Log a bug with its traceback, and refuse the block."""

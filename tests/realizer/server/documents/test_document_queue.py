@@ -10,7 +10,6 @@ from realizer.core.settings import Settings
 from realizer.scheduling.timing import Warning
 from realizer.server.documents import document_queue
 from realizer.server.documents.document_queue import (
-    CancelledBlock,
     DocumentQueue,
     block_limit_error,
     size_error,
@@ -25,7 +24,7 @@ SSML = (
 WAIT = '<bml id="{}"><wait id="w" duration="1"/></bml>'
 
 
-def read(queue: DocumentQueue) -> list[Block | CancelledBlock | Warning]:
+def read(queue: DocumentQueue) -> list[Block | Warning]:
     found = []
     while (item := queue.next()) is not None:
         found.append(item)
@@ -53,7 +52,11 @@ def test_document_queue_refuses_a_long_message_with_its_block_id() -> None:
 
 def names(queue: DocumentQueue) -> str:
     """Return the ids in order, those of cancelled blocks in brackets."""
-    return " ".join(f"({i.block.id})" if isinstance(i, CancelledBlock) else i.id for i in read(queue))
+    found = []
+    while (item := queue.next()) is not None:
+        cancelled = isinstance(item, Block) and queue.is_cancelled(item)
+        found.append(f"({item.id})" if cancelled else item.id)
+    return " ".join(found)
 
 
 def test_document_queue_cancels_only_what_has_arrived() -> None:
