@@ -12,6 +12,7 @@ from urllib.parse import parse_qs, unquote
 
 from realizer.core.errors import FaceError, RealizerError
 from realizer.core.settings import Settings
+from realizer.server.http.page_tools import ToolError, export_pose, preview_emotion
 
 JSON = "application/json; charset=utf-8"
 TEXT = "text/plain; charset=utf-8"
@@ -63,32 +64,27 @@ class HttpSite:
             from realizer.server.http.vocabulary import vocabulary
 
             return HttpResponse(200, JSON, vocabulary())
-        if path in ("/feeling.json", "/pose.fap"):
-            return self._tool(path, {name: values[-1] for name, values in parse_qs(query).items()})
+        asked = {name: values[-1] for name, values in parse_qs(query).items()}
         try:
+            if path == "/feeling.json":
+                return HttpResponse(200, JSON, preview_emotion(asked.get("of", "")).encode())
+            if path == "/pose.fap":
+                pose = export_pose(asked.get("set", ""), asked.get("face"), self._settings)
+                headers = (("Content-Disposition", 'attachment; filename="pose.fap"'),)
+                return HttpResponse(200, "text/x-fap", pose.encode(), headers)
             if path == "/look.json":
-                name = parse_qs(query).get("face", ["default"])[0]
-                return HttpResponse(200, JSON, _look(name, self._settings.light, self._settings.background))
+                name, settings = asked.get("face", "default"), self._settings
+                return HttpResponse(200, JSON, _look(name, settings.light, settings.background))
             if path.startswith("/faces/"):
                 glb = _glb(path.removeprefix("/faces/").removesuffix(".glb"))
                 return HttpResponse(200, "model/gltf-binary", glb, (("Cache-Control", "no-cache"),))
+        except ToolError as error:
+            return HttpResponse(400, TEXT, f"{error}\n".encode())
         except FaceError as error:
             return HttpResponse(404, TEXT, f"{error}\n".encode())
         except RealizerError as error:
             return HttpResponse(500, TEXT, f"{error}\n".encode())
         return self._file("index.html" if path == "/" else path[1:])
-
-    def _tool(self, path: str, query: dict[str, str]) -> HttpResponse:
-        from realizer.server.http import page_tools
-
-        try:
-            if path == "/feeling.json":
-                return HttpResponse(200, JSON, page_tools.preview_emotion(query.get("of", "")).encode())
-            pose = page_tools.export_pose(query.get("set", ""), query.get("face"), self._settings)
-            headers = (("Content-Disposition", 'attachment; filename="pose.fap"'),)
-            return HttpResponse(200, "text/x-fap", pose.encode(), headers)
-        except page_tools.ToolError as error:
-            return HttpResponse(400, TEXT, f"{error}\n".encode())
 
     def _file(self, name: str) -> HttpResponse:
         """Return a file of the page. Only names in its folder are accepted, so that no path can leave it."""
