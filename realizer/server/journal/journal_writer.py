@@ -88,7 +88,14 @@ class JournalWriter:
             JournalError: the entry cannot be written to the journal.
         """
         entry = Entry(at, kind, number, body)
-        self._append_to_journal(entry)
+        if self._journal is not None:
+            self._journal.add(self._session, entry)
+            self._failing = False
+            self._entries += 1
+            self._bytes += len(entry.body)
+            if self._entries % ENDLESS == 0:
+                words = "session %s: %d entries in its journal and no checkpoint: some block always plays or"
+                log.warning(f"{words} waits", self._session, self._entries)
         self._record(lambda recorder: recorder.add(self._session, entry))
 
     def try_append(self, at: float, kind: Kind, number: int = 0, body: str | bytes = "") -> None:
@@ -97,15 +104,14 @@ class JournalWriter:
         Raises:
             TakenOver: another process has taken the session over.
         """
-        entry = Entry(at, kind, number, body)
         try:
-            self._append_to_journal(entry)
+            self.append(at, kind, number, body)
         except TakenOver:
             raise
         except JournalError as error:
             self._log_failure(error)
             self._entries = ENTRIES  # a checkpoint makes the missing entry unnecessary
-        self._record(lambda recorder: recorder.add(self._session, entry))
+            self._record(lambda recorder: recorder.add(self._session, Entry(at, kind, number, body)))
 
     def compact(self, parts: Mapping[str, str | None]) -> bool:
         """Write a checkpoint. Return False if that fails; another one is due soon.
@@ -130,20 +136,6 @@ class JournalWriter:
         for log_ in (self._journal, self._recorder):
             if log_ is not None:
                 log_.end(self._session)
-
-    def _append_to_journal(self, entry: Entry) -> None:
-        if self._journal is None:
-            return
-        self._journal.add(self._session, entry)
-        self._failing = False
-        self._entries += 1
-        self._bytes += len(entry.body)
-        if self._entries % ENDLESS == 0:
-            log.warning(
-                "session %s: %d entries in its journal and no checkpoint: some block always plays or waits",
-                self._session,
-                self._entries,
-            )
 
     def _record(self, write: Callable[[RecordingFolder], None]) -> None:
         """Write to the recording. Stop at the first error: a recording with a gap cannot be replayed."""

@@ -1,15 +1,6 @@
 """A session: it takes documents, control messages and the time, and returns effects.
 
-It opens no sockets and reads no clock. The path of a document from the socket to its schedule:
-
-    transports.websocket.connection  reads the message, not faster than a client may send
-    runtime.session_host             finds the session of the connection
-    Session.receive                  publishes due feedback, writes the journal
-    documents.document_queue         stores the text; parses one document a tick, checks limits, acknowledges
-    documents.pending_blocks         holds the block until its speech and its predecessors are ready
-                                     and requests its speech by effects `Speak`, for runtime.engines
-    Session.on_speech                takes the voice's answer; the next tick submits the block
-    playback.player                  resolves, schedules and places the block; its feedback becomes due
+It opens no sockets and reads no clock.
 """
 
 from __future__ import annotations
@@ -208,51 +199,52 @@ class Session:
 
     def _dispatch(self, connection: Connection, message: str | bytes, t: float) -> bool:
         """Handle a message, or reply with an error. Return whether it was written to the journal."""
-        if isinstance(message, bytes):
-            return self._receive_sound(connection, message, t)
-        if (text := message.lstrip("\ufeff \t\r\n")).startswith("{"):
-            control = parse_control(text)
-            if isinstance(control, ErrorMessage):
-                self.reply(connection.id, control)
+        control: Control | None = None
+        if isinstance(message, str) and (text := message.lstrip("\ufeff \t\r\n")).startswith("{"):
+            parsed = parse_control(text)
+            if isinstance(parsed, ErrorMessage):
+                self.reply(connection.id, parsed)
                 return False
-            return self._receive_control(connection, control, message, t)
-        ending = "the service is ending and takes no more documents" if self.ending else None
-        refused = ending or self._write_journal(t, "text", connection, message)
-        if refused is None:
-            self.submission.enqueue(message, t)
+            if isinstance(parsed, PASSING):
+                self._handle_passing(connection, parsed, t)
+                return False
+            control = parsed
+        is_bml = control is None and isinstance(message, str)
+        ending = "the service is ending and takes no more documents" if self.ending and is_bml else None
+        kind: Kind = "text" if isinstance(message, str) else "sound"
+        if (refused := ending or self._write_journal(t, kind, connection, message)) is not None:
+            if is_bml:
+                # Without a number: the message is not in the journal, and a session that is restored from the
+                # journal must number all other feedback in the same way.
+                id = block_id_of(str(message))
+                warning = WarningFeedback(id=id, type="CANNOT_CREATE_BEHAVIOR", text=refused)
+                for client in self._connections.values():
+                    self._send_feedback(client, [warning.to_xml()])
+            else:
+                self.reply(connection.id, ErrorMessage(code="journal", message=refused))
+        elif isinstance(message, bytes):
+            self._add_sound(connection, message)
+        elif control is not None:
+            self._handle(connection, control, t)
         else:
-            # Without a number: the message is not in the journal, and a session that is restored from the
-            # journal must number all other feedback in the same way.
-            warning = WarningFeedback(id=block_id_of(message), type="CANNOT_CREATE_BEHAVIOR", text=refused)
-            for client in self._connections.values():
-                self._send_feedback(client, [warning.to_xml()])
+            self.submission.enqueue(message, t)
         return refused is None
 
-    def _receive_sound(self, connection: Connection, message: bytes, t: float) -> bool:
-        if (refused := self._write_journal(t, "sound", connection, message)) is not None:
-            self.reply(connection.id, ErrorMessage(code="journal", message=refused))
-            return False
+    def _add_sound(self, connection: Connection, message: bytes) -> None:
         try:
             self.clips.add_chunk(unpack_clip(message))
         except WireError as error:
             self.reply(connection.id, ErrorMessage(code="unsupported", message=str(error)))
         except ClipError as error:
             self.reply(connection.id, ErrorMessage(code="clip", message=str(error), where=error.where))
-        return True
 
-    def _receive_control(self, connection: Connection, control: Control, message: str, t: float) -> bool:
-        if isinstance(control, PASSING):
-            known = self.player.characters
-            self._handle(connection, control, t)
-            for name in self.player.characters:
-                if name not in known:  # their order matters: the first is the default
-                    self.log_entry(t, "text", connection.id, json.dumps({"type": "character", "id": name}))
-            return False
-        if (refused := self._write_journal(t, "text", connection, message)) is not None:
-            self.reply(connection.id, ErrorMessage(code="journal", message=refused))
-            return False
+    def _handle_passing(self, connection: Connection, control: Control, t: float) -> None:
+        """Handle a message that is not written to the journal, except for the characters that it adds."""
+        known = self.player.characters
         self._handle(connection, control, t)
-        return True
+        for name in self.player.characters:
+            if name not in known:  # their order matters: the first is the default
+                self.log_entry(t, "text", connection.id, json.dumps({"type": "character", "id": name}))
 
     def _handle(self, connection: Connection, control: Control, t: float) -> None:
         match control:
@@ -481,7 +473,7 @@ class Session:
             # Open speeches and slow clients are checked with every frame, schedules with all feedback: then
             # the deadline cannot be cached.
             slow = any(connection.is_slow for connection in self._connections.values())
-            shown = streams.active and streams.has_schedule_subscribers
+            shown = streams.active and bool(streams.schedule_subscribers)
             if not (self.has_documents or slow or self.submission.speeches.open_ids or shown):
                 self._next_other = other
         next_frame = streams.next_frame if streams.active else math.inf

@@ -26,7 +26,7 @@ from realizer.server.streams.connection import (
     VideoSubscription,
     VideoView,
 )
-from realizer.server.streams.frame_windows import SOURCES, FrameSubscription
+from realizer.server.streams.frame_windows import SOURCES, FrameSubscription, first_frame_at
 
 # A subscription and the fields of the reply `subscribed`.
 _Answer = tuple[Subscription, dict[str, Any]]
@@ -138,9 +138,9 @@ class Subscriptions:
         stream, fps = message.stream, message.fps or self.settings.fps
         encoding = message.encoding or STREAMS[stream].encodings[0]
         fields = self._mesh(index) if stream == "mesh" else {"names": SOURCES[stream].names()}
-        new = self.broadcast.subscribe_frames(stream, encoding, index, message.character, fps, t)
-        new.raw = message.asked
-        if isinstance(old, FrameSubscription) and old.timeline is new.timeline:
+        timeline, first = self.broadcast.timeline(index, fps), first_frame_at(t, fps)
+        new = FrameSubscription(stream, encoding, timeline, index, message.character, first, message.asked)
+        if isinstance(old, FrameSubscription) and old.timeline is timeline:
             new.next = max(new.next, old.next)  # no frame twice
         return new, fields | {"index": index, "fps": fps, "frame": new.next}
 
