@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -128,8 +129,7 @@ class _CharacterRecorder:
         """Return all frames; the first one is at time 0."""
         self._store_window()
         joined = AUFrames.concatenate(self._parts)
-        times = np.arange(len(joined.times)) / self._fps
-        return AUFrames(times, joined.values, joined.rules, joined.overridden)
+        return replace(joined, times=np.arange(len(joined.times)) / self._fps)
 
     def _store_window(self) -> None:
         """Store the captured frames of the window: the plan may change long before its end."""
@@ -137,5 +137,5 @@ class _CharacterRecorder:
             first, last = (frame - self._window.first for frame in (self._begin, self._next))
             part = self._window.aus.part(first, last)
             overridden = None if part.overridden is None else part.overridden.copy()
-            self._parts.append(AUFrames(part.times, part.values.copy(), part.rules, overridden))
+            self._parts.append(replace(part, values=part.values.copy(), overridden=overridden))
         self._window = None

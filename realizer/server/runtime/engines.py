@@ -5,8 +5,9 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -74,14 +75,12 @@ class Engines:
     def draw(self, order: Draw) -> bytes | RealizerError:
         """Draw and encode a picture. Return the error if that fails."""
         try:
-            slot, options = self._acquire(order), order.options
-            try:
+            options = order.options
+            with self._renderer(order) as renderer:
                 try:
-                    return slot.renderer.encoded(order.pose, options.form, options.quality)
+                    return renderer.encoded(order.pose, options.form, options.quality)
                 except RenderError:  # the next call starts the process again if it has died
-                    return slot.renderer.encoded(order.pose, options.form, options.quality)
-            finally:
-                self._release(slot)
+                    return renderer.encoded(order.pose, options.form, options.quality)
         except RealizerError as error:
             return error
         except Exception as error:
@@ -104,8 +103,9 @@ class Engines:
                 self._voices[name] = find_voice(name)
             return self._voices[name]
 
-    def _acquire(self, order: Draw) -> _RendererSlot:
-        """Return the renderer of a picture, until `_release`.
+    @contextmanager
+    def _renderer(self, order: Draw) -> Iterator[Renderer]:
+        """Open the renderer of a picture, for one thread.
 
         Raises:
             RenderError: too many others are in use.
@@ -135,7 +135,14 @@ class Engines:
             slot.used = now
         if removed is not None:
             removed.renderer.close()
-        return slot
+        try:
+            yield slot.renderer
+        finally:
+            with self._lock:
+                slot.busy -= 1
+                slot.used = self._clock()
+                if not slot.begun:
+                    slot.begun, self._begun = True, slot.used
 
     def _least_recent(self, now: float) -> tuple[str, RenderOptions]:
         """Return the key of the idle renderer that was used the longest ago."""
@@ -150,13 +157,6 @@ class Engines:
                 "drawn already: wanted one of them, or fewer"
             )
         return min(idle, key=lambda key: idle[key])
-
-    def _release(self, slot: _RendererSlot) -> None:
-        with self._lock:
-            slot.busy -= 1
-            slot.used = self._clock()
-            if not slot.begun:
-                slot.begun, self._begun = True, slot.used
 
     def _report(self, error: str) -> None:
         if error not in self._reported:

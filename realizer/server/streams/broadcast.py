@@ -128,6 +128,7 @@ class Broadcast:
 
     Attributes:
         active: whether there is a subscription; without one nothing is ever due.
+        schedule_subscribers: the subscriptions to the stream `schedule`, with their connections.
     """
 
     def __init__(self, player: Player, faces: CharacterFaces) -> None:
@@ -140,7 +141,7 @@ class Broadcast:
         self._schedules = ScheduleStream(player.blocks)
         self._fanouts: list[Fanout] = []
         self._audio_subscribers: list[tuple[Connection, AudioSubscription]] = []
-        self._schedule_subscribers: list[tuple[Connection, ScheduleSubscription]] = []
+        self.schedule_subscribers: list[tuple[Connection, ScheduleSubscription]] = []
         self._video_subscribers: list[VideoSubscription] = []
         self.active = False
 
@@ -152,13 +153,6 @@ class Broadcast:
                 self.player, index, fps, lambda: self._faces.of(index), lambda: self._faces.mapping(index)
             )
         return timeline
-
-    def subscribe_frames(
-        self, stream: str, encoding: str, index: int, name: str | None, fps: float, now: float
-    ) -> FrameSubscription:
-        """Return a subscription to a stream of frames from `now` on."""
-        timeline = self.timeline(index, fps)
-        return FrameSubscription(stream, encoding, timeline, index, name, first_frame_at(now, fps))
 
     def subscribe_audio(self, index: int | None, rate: int, now: float) -> AudioSubscription:
         """Return a subscription to the sound of one character or all from `now` on."""
@@ -188,7 +182,7 @@ class Broadcast:
     def set_subscribers(self, connections: Iterable[Connection]) -> None:
         """Set the connections whose subscriptions are served."""
         frames: dict[FrameTimeline, list[tuple[Connection, FrameSubscription]]] = {}
-        self._schedule_subscribers, self._audio_subscribers, self._video_subscribers = [], [], []
+        self.schedule_subscribers, self._audio_subscribers, self._video_subscribers = [], [], []
         for connection in connections:
             for s in connection.subscriptions.values():
                 if isinstance(s, FrameSubscription):
@@ -196,12 +190,12 @@ class Broadcast:
                 elif isinstance(s, AudioSubscription):
                     self._audio_subscribers.append((connection, s))
                 elif isinstance(s, ScheduleSubscription):
-                    self._schedule_subscribers.append((connection, s))
+                    self.schedule_subscribers.append((connection, s))
                 else:
                     self._video_subscribers.append(s)
         self._fanouts = [Fanout(timeline, members) for timeline, members in frames.items()]
         self.active = bool(
-            frames or self._schedule_subscribers or self._audio_subscribers or self._video_subscribers
+            frames or self.schedule_subscribers or self._audio_subscribers or self._video_subscribers
         )
 
     def send_due(self, now: float, effects: list[Effect]) -> None:
@@ -234,11 +228,6 @@ class Broadcast:
         return FrameRun(connection.id, s, packed, zero, until)
 
     @property
-    def has_schedule_subscribers(self) -> bool:
-        """Whether the stream `schedule` has subscribers."""
-        return bool(self._schedule_subscribers)
-
-    @property
     def next_frame(self) -> float:
         """The time of the next frame; infinity without subscribers."""
         return min([fanout.next / fanout.timeline.fps for fanout in self._fanouts], default=math.inf)
@@ -248,20 +237,20 @@ class Broadcast:
         """The time of the next packet, picture or schedule; infinity if there is none."""
         times = [packets_due(s) for _, s in self._audio_subscribers]
         times.append(self.video.next(self._video_subscribers))
-        if self._schedule_subscribers:
+        if self.schedule_subscribers:
             changed = self._schedules.has_changes()
-            times += [s.retry_at for _, s in self._schedule_subscribers if s.needs_full_update or changed]
+            times += [s.retry_at for _, s in self.schedule_subscribers if s.needs_full_update or changed]
         return min(times)
 
     # inside -------------------------------------------------------------------------------------
 
     def _send_schedules(self, now: float, effects: list[Effect]) -> None:
         """Send changed blocks to subscribers that know the rest, all blocks to the others."""
-        if not self._schedule_subscribers:
+        if not self.schedule_subscribers:
             self._schedules.reset()
             return
         changes = self._schedules.changes()
-        for connection, s in self._schedule_subscribers:
+        for connection, s in self.schedule_subscribers:
             changed = [text for character, text in changes if s.index in (None, character)]
             if connection.is_slow:
                 # The full update that is sent later includes these changes.

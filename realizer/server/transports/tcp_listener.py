@@ -66,11 +66,6 @@ class TcpTransport(ABC):
             writer.transport.abort()
         await asyncio.gather(*self._clients, return_exceptions=True)
 
-    @property
-    @abstractmethod
-    def startup_lines(self) -> tuple[str, ...]:
-        """As of `Transport`."""
-
     @abstractmethod
     async def _handle(self, host: str, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Serve the client at an IP address until it leaves."""
