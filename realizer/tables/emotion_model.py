@@ -7,9 +7,6 @@ from dataclasses import dataclass
 from functools import cache
 
 from realizer import tables
-from realizer.core.errors import TableError
-
-FILE = "emotion_model.toml"
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,16 +37,7 @@ class EmotionModel:
 
 @cache
 def emotion_model() -> EmotionModel:
-    """Return the model.
-
-    Raises:
-        TableError: an invalid value.
-    """
-    table = tables.toml_table(FILE)
+    """Return the model."""
+    table = tables.toml_table("emotion_model.toml")
     recognition = table["recognition"] | {"strengths": tuple(table["recognition"]["strengths"])}
-    model = EmotionModel(**table["wheel"], chosen=table["chosen"], **recognition)
-    if not (0 <= model.core < model.base and model.least_length > 0 and model.absent > 0):
-        raise TableError(f"{FILE}, recognition: wanted 0 <= core < base, and lengths above 0, got {model}")
-    if not model.strengths or min(model.strengths) <= 0:
-        raise TableError(f"{FILE}, recognition: wanted strengths above 0, got {model.strengths}")
-    return model
+    return EmotionModel(**table["wheel"], chosen=table["chosen"], **recognition)

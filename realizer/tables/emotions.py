@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cache
 
 from realizer import tables
-from realizer.core.errors import TableError
 from realizer.tables.lexemes import face_lexemes, read_aus
 from realizer.tables.wheel_words import ring
 
@@ -38,12 +37,7 @@ def emotion_faces() -> Mapping[str, EmotionFace]:
     found = {}
     for emotion, row in tables.toml_table(FILE)["face"].items():
         lexeme = row.get("lexeme", "")
-        if lexeme and lexeme not in face_lexemes():
-            raise TableError(f"{FILE}, face.{emotion}, lexeme: wanted a face lexeme, got {lexeme!r}")
-        if bool(lexeme) == ("aus" in row):
-            raise TableError(f"{FILE}, face.{emotion}: wanted lexeme or aus, got {row}")
-        place = f"{FILE}, face.{emotion}"
-        aus = face_lexemes()[lexeme].aus if lexeme else read_aus(row["aus"], place)
+        aus = face_lexemes()[lexeme].aus if lexeme else read_aus(row["aus"], f"{FILE}, face.{emotion}")
         found[emotion] = EmotionFace(emotion, lexeme, aus)
     return found
 
@@ -51,9 +45,8 @@ def emotion_faces() -> Mapping[str, EmotionFace]:
 @cache
 def archetypes() -> tuple[Archetype, ...]:
     """Return the emotions with a lexeme, by angle."""
-    found = []
-    for place in ring("plutchik").values():
-        if place.activation is None or not emotion_faces()[place.name].lexeme:
-            raise TableError(f"{FILE}, face.{place.name}: wanted a lexeme, and an activation on the wheel")
-        found.append(Archetype(emotion_faces()[place.name].lexeme, place.angle, place.activation))
-    return tuple(found)
+    return tuple(
+        Archetype(emotion_faces()[place.name].lexeme, place.angle, place.activation)
+        for place in ring("plutchik").values()
+        if place.activation is not None
+    )

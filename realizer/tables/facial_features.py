@@ -6,9 +6,6 @@ from dataclasses import dataclass
 from functools import cache
 
 from realizer import tables
-from realizer.core.errors import TableError
-
-FILE = "facial_features.csv"
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,12 +44,8 @@ class Row:
 def facial_features() -> tuple[FacialFeature, ...]:
     """Return the 15 features, f1 first."""
     features = []
-    for row in tables.csv_rows(FILE, Row):
-        try:
-            signed = [int(fap) for fap in row.faps.split()]
-            also = tuple(int(fap) for fap in row.also.split())
-        except ValueError:
-            raise TableError(f"{FILE}, f{row.feature}: wanted FAP numbers, got {row.faps!r}") from None
-        signs = {abs(fap): 1 if fap > 0 else -1 for fap in signed}
+    for row in tables.csv_rows("facial_features.csv", Row):
+        signs = {abs(fap): 1 if fap > 0 else -1 for fap in map(int, row.faps.split())}
+        also = tuple(map(int, row.also.split()))
         features.append(FacialFeature(row.feature, row.first, row.second, row.growth, row.unit, signs, also))
     return tuple(features)

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
 from typing import Any, Literal
 
 from realizer import tables
-from realizer.core.errors import TableError
-from realizer.tables.emotional_words import CATEGORIES
-from realizer.tables.templates import templates
 
-FILE = "knowledge.toml"
 Role = Literal["speaker", "listener"]
 By = Literal["before", "after", "around", "with"]
-SENTENCES = ("question", "exclamation")
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,53 +103,27 @@ class Knowledge:
 @cache
 def knowledge() -> Knowledge:
     """Return the built-in rules."""
-    table = tables.toml_table(FILE)
+    table = tables.toml_table("knowledge.toml")
     return Knowledge(
         {
-            "speaker": tuple(_placing(row, "speaker") for row in table["speaker"]),
-            "listener": tuple(_placing(row, "listener") for row in table["listener"]),
+            "speaker": tuple(_placing(row) for row in table["speaker"]),
+            "listener": tuple(_placing(row) for row in table["listener"]),
         },
         tuple(_company(row) for row in table["company"]),
-        {_template(name, "apart"): float(seconds) for name, seconds in table["apart"].items()},
+        table["apart"],
         float(table["pace"]["speaker"]),
         float(table["pace"]["listener"]),
         _moods(table["mood"]),
     )
 
 
-def _placing(row: Mapping[str, Any], role: str) -> PlacementRule:
-    place = f"{FILE}, {role}"
-    _check_keys(row, PlacementRule, place)
-    for category in (row["when"], *row.get("unless", ())):
-        if category not in (*SENTENCES, *CATEGORIES):
-            known = ", ".join((*SENTENCES, *CATEGORIES))
-            raise TableError(f"{place}: wanted one of {known}, got {category!r}")
-    show = tuple(_template(name, place) for name in row["show"])
-    return PlacementRule(row["when"], show, row["says"], tuple(row.get("unless", ())), row.get("keep", False))
+def _placing(row: Mapping[str, Any]) -> PlacementRule:
+    lists = {name: tuple(row[name]) for name in ("show", "unless") if name in row}
+    return PlacementRule(**{**row, **lists})
 
 
 def _company(row: Mapping[str, Any]) -> CompanionRule:
-    values = dict(row)
-    values["other"] = _template(values.pop("is"), f"{FILE}, company")
-    values["of"] = _template(values["of"], f"{FILE}, company")
-    _check_keys(values, CompanionRule, f"{FILE}, company of {values['of']}")
-    if values["by"] not in ("before", "after", "around", "with"):
-        raise TableError(
-            f"{FILE}, company of {values['of']}, by: wanted before, after, around or with; got {values['by']}"
-        )
-    return CompanionRule(**values)
-
-
-def _check_keys(row: Mapping[str, Any], kind: type, place: str) -> None:
-    known = {f.name for f in fields(kind)}
-    if unknown := row.keys() - known:
-        raise TableError(f"{place}: wanted keys {', '.join(sorted(known))}; got {', '.join(unknown)}")
-
-
-def _template(name: str, place: str) -> str:
-    if name.upper() not in templates():
-        raise TableError(f"{place}: wanted a template, got {name!r}")
-    return name.lower()
+    return CompanionRule(**{"other" if name == "is" else name: value for name, value in row.items()})
 
 
 def _moods(rows: Mapping[str, Any]) -> dict[str, Mood]:

@@ -58,9 +58,9 @@ def head_lexemes() -> Mapping[str, HeadLexeme]:
     return {
         name: HeadLexeme(
             name,
-            ready=_pose(name, row, "ready"),
-            stroke=_pose(name, row, "stroke"),
-            back=_pose(name, row, "back"),
+            ready={int(au): float(degrees) for au, degrees in row["ready"].items()},
+            stroke={int(au): float(degrees) for au, degrees in row["stroke"].items()},
+            back={int(au): float(degrees) for au, degrees in row["back"].items()},
             decay=float(row["decay"]),
             eyes=float(row["eyes"]),
         )
@@ -71,13 +71,7 @@ def head_lexemes() -> Mapping[str, HeadLexeme]:
 def _rows(part: str) -> dict[str, Mapping[str, Any]]:
     """Return the rows of a part; `same_as` is replaced by the row it refers to."""
     rows: Mapping[str, Mapping[str, Any]] = tables.toml_table(FILE)[part]
-    resolved = {}
-    for name, row in rows.items():
-        same = row.get("same_as", name)
-        if same not in rows:
-            raise TableError(f"{FILE}, {part}.{name}, same_as: wanted another {part} lexeme, got {same!r}")
-        resolved[name] = rows[same]
-    return resolved
+    return {name: rows[row.get("same_as", name)] for name, row in rows.items()}
 
 
 def read_aus(cells: Mapping[str, float], place: str) -> dict[tuple[int, str], float]:
@@ -100,18 +94,3 @@ def read_aus(cells: Mapping[str, float], place: str) -> dict[tuple[int, str], fl
             raise TableError(f"{place}, {cell}: wanted an intensity above 0 and to 1, got {amount}")
         aus[au.au, SIDES[match[2]]] = float(amount)
     return aus
-
-
-def _pose(name: str, row: Mapping[str, Any], pose: str) -> dict[int, float]:
-    known = tables.by_number()
-    degrees = {}
-    for cell, angle in row[pose].items():
-        au = known.get(int(cell)) if cell.isdigit() else None
-        if au is None or not au.degrees:
-            raise TableError(f"{FILE}, head.{name}, {pose}: wanted a rotation such as 54, got {cell!r}")
-        if not 0 < angle <= au.degrees:
-            raise TableError(
-                f"{FILE}, head.{name}, {pose}, {cell}: wanted 0..{au.degrees:g} degrees, got {angle}"
-            )
-        degrees[au.au] = float(angle)
-    return degrees

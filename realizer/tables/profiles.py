@@ -1,15 +1,11 @@
-"""The FAP ranges of emotions (`profiles_*.csv`, `vocabularies.toml`, `fap_statistics.csv`)."""
+"""The FAP ranges of emotions (`profiles_*.csv`, `fap_statistics.csv`)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 
 from realizer import tables
-from realizer.core.errors import TableError
-
-VOCABULARIES = "vocabularies.toml"
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,19 +60,3 @@ def own_ranges() -> tuple[OwnRange, ...]:
 def statistics() -> tuple[Statistic, ...]:
     """Return the statistics, by emotion and FAP."""
     return tables.csv_rows("fap_statistics.csv", Statistic)
-
-
-@cache
-def vocabularies(raw: bool = False) -> Mapping[str, frozenset[int]]:
-    """Return emotion -> FAPs that its expressions may move (Raouzaiou et al. 2002, table 2).
-
-    Args:
-        raw: whether to return the table as printed, not corrected.
-    """
-    table = tables.toml_table(VOCABULARIES)
-    found = {}
-    for emotion, faps in (table["raw"] if raw else table["raw"] | table["corrected"]).items():
-        if not all(isinstance(fap, int) and 3 <= fap <= 68 for fap in faps):
-            raise TableError(f"{VOCABULARIES}, {emotion}: wanted FAP numbers 3..68, got {faps}")
-        found[emotion] = frozenset(faps)
-    return found

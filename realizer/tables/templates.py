@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 from realizer import tables
-from realizer.core.errors import TableError
 from realizer.tables.lexemes import read_aus
 from realizer.tables.timing import gaps
 
@@ -51,28 +51,13 @@ def templates() -> Mapping[str, Template]:
     return {name: _template(name, row) for name, row in tables.toml_table(FILE).items()}
 
 
-def _template(name: str, row: Mapping[str, object]) -> Template:
-    place = f"{FILE}, {name}"
-    ranges: dict[str, tuple[float, float] | None] = {}
-    for key in ("possible", "probable"):
-        cell = row.get(key)
-        if cell is None:
-            ranges[key] = None
-        elif isinstance(cell, list) and len(cell) == 2 and 0 <= cell[0] < cell[1]:
-            ranges[key] = (float(cell[0]), float(cell[1]))
-        else:
-            raise TableError(f"{place}, {key}: wanted [least, most] in seconds, got {cell}")
-    frames, deviation, features, aus = (row.get(k) for k in ("frames", "deviation", "features", "aus"))
-    if not (isinstance(frames, int) and frames > 0 and isinstance(deviation, int | None)):
-        raise TableError(f"{place}: wanted whole frames, got {frames} and deviation {deviation}")
-    if not (isinstance(features, str) and isinstance(aus, dict)):
-        raise TableError(f"{place}: wanted features and aus")
+def _template(name: str, row: Mapping[str, Any]) -> Template:
     return Template(
         name,
-        features,
-        read_aus(aus, f"{place}, aus"),
-        frames * FRAME,
-        None if deviation is None else deviation * FRAME,
-        ranges["possible"],
-        ranges["probable"],
+        row["features"],
+        read_aus(row["aus"], f"{FILE}, {name}, aus"),
+        row["frames"] * FRAME,
+        row["deviation"] * FRAME if "deviation" in row else None,
+        tuple(row["possible"]) if "possible" in row else None,
+        tuple(row["probable"]) if "probable" in row else None,
     )

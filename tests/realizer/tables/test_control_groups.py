@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import pytest
-
 from realizer import tables
-from realizer.core.errors import TableError
 from realizer.tables import control_groups
 
 
@@ -20,12 +17,3 @@ def test_fap_regions_are_the_groups_of_the_standard() -> None:
     groups = {row.fap: row.group for row in tables.faps()}
     for region in control_groups.fap_regions():
         assert len({groups[fap] for fap in region.members}) == 1
-
-
-def test_regions_refuse_missing_and_repeated_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
-    text = tables.text_of(control_groups.FILE).replace("[61, 62, 63, 64]", "[61, 62, 63, 63]", 1)
-    monkeypatch.setattr(tables, "toml_table", lambda name: tables.read_toml(text, name))
-    control_groups.fap_regions.cache_clear()
-    with pytest.raises(TableError, match=r"regions.toml, fap: .* \[63, 64\]"):
-        control_groups.fap_regions()
-    control_groups.fap_regions.cache_clear()

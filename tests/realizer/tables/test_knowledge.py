@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import pytest
 
-from realizer.tables.knowledge import knowledge
+from realizer.tables.emotional_words import CATEGORIES
+from realizer.tables.knowledge import By, knowledge
 from realizer.tables.templates import templates
 
 
@@ -16,7 +19,15 @@ def test_knowledge_names_the_source_of_every_rule() -> None:
 def test_knowledge_uses_only_templates() -> None:
     shown = {name for rules in knowledge().placings.values() for rule in rules for name in rule.show}
     shown |= {name for company in knowledge().companies for name in (company.of, company.other)}
-    assert {name.upper() for name in shown} <= set(templates())
+    assert {name.upper() for name in shown | knowledge().apart.keys()} <= set(templates())
+    assert all(name.islower() for name in shown | knowledge().apart.keys())
+
+
+def test_knowledge_places_expressions_at_known_sentences_and_words() -> None:
+    rules = [rule for rules in knowledge().placings.values() for rule in rules]
+    known = {"question", "exclamation", *CATEGORIES}
+    assert {category for rule in rules for category in (rule.when, *rule.unless)} <= known
+    assert {company.by for company in knowledge().companies} <= set(get_args(By))
 
 
 def test_knowledge_has_the_four_expressions_of_listeners() -> None:

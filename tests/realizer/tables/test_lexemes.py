@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from realizer.core.errors import TableError
-from realizer.tables import au_to_fap
-from realizer.tables.lexemes import face_lexemes, head_lexemes, read_aus
+from realizer.tables import au_to_fap, by_number
+from realizer.tables.lexemes import HeadLexeme, face_lexemes, head_lexemes, read_aus
 
 BROWS = tuple(f"{way}_{brow}" for way in ("RAISE", "LOWER") for brow in ("BROWS", "LEFT_BROW", "RIGHT_BROW"))
 CORNERS = tuple(
@@ -42,6 +42,12 @@ def test_face_lexemes_of_one_side_mirror_those_of_the_other(name: str) -> None:
 def test_face_lexemes_use_action_units_that_move_faps(name: str) -> None:
     moved = {row.au for row in au_to_fap()}
     assert {au for au, _ in face_lexemes()[name].aus} <= moved
+
+
+@pytest.mark.parametrize("lexeme", head_lexemes().values(), ids=lambda lexeme: lexeme.name)
+def test_head_lexemes_turn_within_the_degrees_of_action_units(lexeme: HeadLexeme) -> None:
+    for pose in (lexeme.ready, lexeme.stroke, lexeme.back):
+        assert all(0 < degrees <= by_number()[au].degrees for au, degrees in pose.items())
 
 
 def test_read_aus_parses_sides() -> None:

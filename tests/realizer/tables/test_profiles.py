@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from realizer.tables.profiles import published_ranges, statistics, vocabularies
+from realizer.tables import toml_table
+from realizer.tables.profiles import published_ranges, statistics
 from tests import own_profiles
 
 
@@ -30,6 +31,13 @@ def test_published_ranges_with_misprints_contradict_the_statistics() -> None:
         stat = measured[row.emotion, row.fap]
         assert (row.low, row.high) == (stat.mean - stat.deviation, stat.mean + stat.deviation)
         assert (row.raw_low, row.raw_high) != (row.low, row.high)
+
+
+def vocabularies(raw: bool = False) -> dict[str, set[int]]:
+    """Return emotion -> FAPs that its expressions may move (Raouzaiou et al. 2002, table 2)."""
+    table = toml_table("vocabularies.toml")
+    rows = table["raw"] if raw else table["raw"] | table["corrected"]
+    return {emotion: set(faps) for emotion, faps in rows.items()}
 
 
 def test_vocabularies_have_every_verified_fap() -> None:

@@ -24,6 +24,10 @@ def test_gaps_have_the_points_of_the_element(name: str) -> None:
     assert row.points[-1] == "end"
     assert len(row.gaps) == len(row.points) - 1
     assert any(row.points == tuple(cls.sync_points) for cls in nodes)
+    for gap in (*row.gaps, *([row.strokes] if row.strokes else ())):
+        assert gap.preferred >= gap.least >= 0
+        assert gap.stiffness > 0
+        assert gap.source
 
 
 def test_gaps_of_measured_holds_give_the_evident_durations() -> None:
