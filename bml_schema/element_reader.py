@@ -35,7 +35,6 @@ from bml_schema.nodes import (
     extension,
 )
 from bml_schema.sync_refs import Names, SyncRef, read_sync_ref
-from bml_schema.unknown_attributes import describe_unknown
 from bml_schema.values import describe_mismatch
 
 Vocabulary = Mapping[str, type[Behaviour]]
@@ -44,7 +43,8 @@ Vocabulary = Mapping[str, type[Behaviour]]
 _DRAFTS = frozenset({"http://www.mindmakers.org/projects/BML"})
 _SSML = "application/ssml+xml"
 _OURS = (f"{{{CORE}}}", f"{{{EXTENSIONS}}}")
-_KNOWN = (*_OURS, f"{{{BMLA}}}", f"{{{BMLT}}}", f"{{{OWN}}}")
+_OWN = (*_OURS, f"{{{OWN}}}")  # not BMLA and BMLT: they have more attributes than this package knows
+_KNOWN = (*_OWN, f"{{{BMLA}}}", f"{{{BMLT}}}")
 _PARTS: Mapping[str, type[Synchronize | Before | After]] = {c.tag: c for c in (Synchronize, Before, After)}
 _SYNC, _DESCRIPTION = Sync.tag, Description.tag
 # Elements of the core that are no behaviours.
@@ -148,11 +148,31 @@ class ElementReader:
         return values
 
     def describe_unknown(
-        self, shape: NodeSchema, element: etree._Element, foreign: Iterable[str], timed: bool
+        self, shape: NodeSchema, element: etree._Element, names: Iterable[str], timed: bool
     ) -> str:
-        """Return the message about attributes that the schema does not have, or ""."""
+        """Return one message about all attributes without a meaning, or "".
+
+        A misspelling such as `amout="1"` would otherwise go unnoticed. Attributes of other namespaces are
+        kept without a message.
+
+        Args:
+            names: Clark names of attributes that the schema does not have.
+            timed: sync points are attributes of the element.
+        """
+        names = (name for name in names if name not in shape.old)
+        wrong = [name for name in names if name[0] != "{" or name.startswith(_OWN)]
+        if not wrong:
+            return ""
         suggest = did_you_mean if self.names is None else self.names.suggest
-        return describe_unknown(shape, element, foreign, timed, suggest)
+        known = [name for name in shape.attributes if name[0] != "{"]
+        if timed:
+            known += shape.sync_points
+        around = element.getparent() if shape.timed and not timed else None
+        where = "" if around is None else f" inside <{local(str(around.tag))}>"
+        texts = [f"{name}: no attribute of <{shape.name}>{where}, so it does nothing" for name in wrong]
+        # The list of known attributes comes once, before the last suggestion.
+        texts[-1] += f"; known are {', '.join(known)}" if known else "; there are none"
+        return "; ".join(text + suggest(local(name), known) for text, name in zip(texts, wrong, strict=True))
 
     def children(self, shape: NodeSchema, element: etree._Element, values: dict[str, Any]) -> None:
         """Read child elements into the fields of `values`."""
