@@ -41,10 +41,6 @@ class _GroupProblem:
         start[self.number[nodes]] = clusters.at[nodes]
         return start
 
-    def keep(self, clusters: RigidClusters) -> tuple[Float64, list[int] | None]:
-        """Return feasible times near the present positions, or the numbers of a cycle of inequalities."""
-        return feasible_start(self.quadratic, self.start(clusters))
-
     def link(self, model: Model, k: int) -> Link:
         """Return inequality k in terms of the problem."""
         if k < len(self.gaps):
@@ -84,7 +80,7 @@ def solve_groups(model: Model, clusters: RigidClusters, groups: Sequence[Group])
         problem = _group_problem(model, clusters, groups)
         x = active_set(problem.quadratic, problem.start(clusters))
     if x is None:
-        level, _ = problem.keep(clusters)
+        level, _ = feasible_start(problem.quadratic, problem.start(clusters))
         x = optimum(problem.quadratic, level)
     clusters.at[problem.points] = x[problem.number[model.root[problem.points]]] + model.shift[problem.points]
     return []
@@ -92,12 +88,13 @@ def solve_groups(model: Model, clusters: RigidClusters, groups: Sequence[Group])
 
 def _impossible(model: Model, clusters: RigidClusters, group: Group) -> list[Link] | None:
     """Return why a group violates its inequalities, or None if it can satisfy them with shorter gaps."""
-    group_problem = _group_problem(model, clusters, [group])
-    _, cycle = group_problem.keep(clusters)
-    if cycle and _yield_to_stated(model, group_problem.gaps):
-        group_problem = _group_problem(model, clusters, [group])
-        _, cycle = group_problem.keep(clusters)
-    return [group_problem.link(model, k) for k in cycle] if cycle else None
+    while True:
+        problem = _group_problem(model, clusters, [group])
+        _, cycle = feasible_start(problem.quadratic, problem.start(clusters))
+        if not cycle:
+            return None
+        if not _yield_to_stated(model, problem.gaps):
+            return [problem.link(model, k) for k in cycle]
 
 
 def _group_problem(model: Model, clusters: RigidClusters, groups: Sequence[Group]) -> _GroupProblem:

@@ -221,6 +221,7 @@ def _forces(pull: list[float], beside: dict[int, list[tuple[int, int]]], quadrat
 def _interior_point(quadratic: Quadratic) -> tuple[Float64, Float64, Float64] | None:
     """Return Clarabel's solution x (m,), with force and slack of each inequality, or None if it fails."""
     import clarabel
+    from scipy.sparse import csc_array
 
     m = quadratic.size
     # Points of one class move together.
@@ -230,24 +231,14 @@ def _interior_point(quadratic: Quadratic) -> tuple[Float64, Float64, Float64] | 
     a = a / a.max(initial=1e-9)
     rows = np.flatnonzero(quadratic.u != quadratic.v)
     u, v, w = quadratic.u[rows], quadratic.v[rows], quadratic.w[rows]
-    # Node 0 is fixed at 0, so every column is one lower; Clarabel takes the upper triangle.
+    # Node 0 is fixed at 0, so its row and column are left out; Clarabel takes the upper triangle.
     low, high = np.minimum(gi, gj), np.maximum(gi, gj)
-    upper = _Sparse(
-        np.concatenate([low, gi, gj]) - 1,
-        np.concatenate([high, gi, gj]) - 1,
-        np.concatenate([-a, a, a]) * 2.0,
-        m - 1,
-        m - 1,
-    )
+    ends = np.concatenate([low, gi, gj]), np.concatenate([high, gi, gj])
+    upper = csc_array((np.concatenate([-a, a, a]) * 2.0, ends), shape=(m, m))[1:, 1:]
     linear = 2.0 * (np.bincount(gi, a * d, m) - np.bincount(gj, a * d, m))[1:]
-    count = np.arange(len(rows))
-    matrix = _Sparse(
-        np.concatenate([count, count]),
-        np.concatenate([u, v]) - 1,
-        np.concatenate([np.ones(len(rows)), -np.ones(len(rows))]),
-        len(rows),
-        m - 1,
-    )
+    ones, count = np.ones(len(rows)), np.arange(len(rows))
+    ends = np.concatenate([count, count]), np.concatenate([u, v])
+    matrix = csc_array((np.concatenate([ones, -ones]), ends), shape=(len(rows), m))[:, 1:]
     cones = [clarabel.NonnegativeConeT(len(rows))]
     settings = clarabel.DefaultSettings()
     settings.verbose = False
@@ -264,21 +255,3 @@ def _interior_point(quadratic: Quadratic) -> tuple[Float64, Float64, Float64] | 
             force[rows], room[rows] = solution.z, solution.s
             return np.concatenate([[0.0], solution.x]), force, room
     return None
-
-
-class _Sparse:
-    """A compressed-column matrix for Clarabel; importing SciPy's would take a third of a second.
-
-    Entries with a negative row or column are left out, entries at the same place are added.
-    """
-
-    has_canonical_format = True
-
-    def __init__(self, row: Index, column: Index, value: Float64, rows: int, columns: int) -> None:
-        keep = (row >= 0) & (column >= 0)
-        place, number = np.unique(column[keep] * rows + row[keep], return_inverse=True)
-        self.data = np.bincount(number, value[keep], len(place)).tolist()
-        self.indices = (place % rows).tolist() if rows else []
-        self.indptr = np.searchsorted(place, np.arange(columns + 1) * rows).tolist()
-        self.shape = (rows, columns)
-        self.nnz = len(place)
