@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -67,28 +68,17 @@ def plan(
         builder.add_problems()
         builder.time()
         schedule, *moved = builder.schedule(start, outside, tuple(existing_claims), others)
-    except _NeedsStretch as stretch:
-        return Plan(block, Schedule(block.id, {}, {}, start=start, lengths=stretch.lengths))
-    except _RequiredPartFailed as failed:
-        warning = replace(failed.warning, id=block.id)
-        return Plan(block, Schedule(block.id, {}, {}, start=start, warnings=(warning,), failed=True))
+    except _NoPlan as why:
+        return Plan(block, Schedule(block.id, {}, {}, start=start, **why.schedule))
     return Plan(builder.block, schedule, builder.expand(schedule), builder.claims, builder.timings, moved)
 
 
-class _RequiredPartFailed(Exception):
-    """Something required cannot be played: the block is refused with this warning."""
+class _NoPlan(Exception):
+    """The block cannot be planned so; `schedule` has why, as fields of Schedule."""
 
-    def __init__(self, warning: Warning) -> None:
-        super().__init__(warning.text)
-        self.warning = warning
-
-
-class _NeedsStretch(Exception):
-    """More of the block can be played if speech lasts longer or shorter."""
-
-    def __init__(self, lengths: Mapping[str, Mapping[str, float]]) -> None:
-        super().__init__(str(lengths))
-        self.lengths = lengths
+    def __init__(self, **schedule: Any) -> None:
+        super().__init__(str(schedule))
+        self.schedule = schedule
 
 
 class _PlanBuilder:
@@ -107,7 +97,7 @@ class _PlanBuilder:
         for problem in self.block.problems:
             warning = Warning(problem.id, problem.type, str(problem))
             if problem.fatal:
-                raise _RequiredPartFailed(warning)
+                self.refuse(warning)
             self.warnings.append(warning)
 
     def time(self) -> None:
@@ -150,7 +140,7 @@ class _PlanBuilder:
                 replace(w, text=self.with_place(self.behaviour_of(w), w.text)) for w in schedule.warnings
             ]
             if schedule.failed:
-                raise _RequiredPartFailed(warnings[0])
+                self.refuse(warnings[0])
             gone = self.timings.keys() - schedule.times.keys()
             self.drop([(self.behaviour_of(w), w) for w in warnings if self.behaviour_of(w) in gone])
             self.warnings += [w for w in warnings if self.behaviour_of(w) not in gone]
@@ -178,7 +168,7 @@ class _PlanBuilder:
         outside: Callable[[SyncRef], float | None],
         rigid: Schedule,
     ) -> None:
-        """Raise _NeedsStretch if speech at another rate lets more behaviours fit."""
+        """Raise _NoPlan with lengths if speech at another rate lets more behaviours fit."""
         flexible = dict(own.timings)
         for node in self.block.behaviours:
             if (
@@ -215,7 +205,7 @@ class _PlanBuilder:
             if np.abs(at[b] - natural[b]).max() > SAME
         }
         if lengths:
-            raise _NeedsStretch(lengths)
+            raise _NoPlan(lengths=lengths)
 
     def drop(self, gone: Iterable[tuple[str, Warning]]) -> None:
         """Drop behaviours and the references to them, with one warning each that names both."""
@@ -224,20 +214,22 @@ class _PlanBuilder:
             return
         for id in (node.id for node in self.block.behaviours if node.id in dropped):
             if id in self.block.required:
-                warning = dropped[id]
-                raise _RequiredPartFailed(replace(warning, text=f"{warning.text} (required {id})"))
+                self.refuse(dropped[id], f" (required {id})")
         self.block, lost, fatal = without(self.block, dropped.keys())
         for id, warning in dropped.items():
             self.timings.pop(id, None)
             if id in fatal:
-                raise _RequiredPartFailed(
-                    replace(warning, text=f"{warning.text} (a required constraint names {id})")
-                )
+                self.refuse(warning, f" (a required constraint names {id})")
             if names := lost.get(id):
                 warning = replace(warning, text=f"{warning.text}; with it went {listed(names)}")
             # Earlier warnings about it do not matter any more.
             self.warnings = [w for w in self.warnings if w.id != warning.id]
             self.warnings.append(warning)
+
+    def refuse(self, warning: Warning, more: str = "") -> NoReturn:
+        """Refuse the block because something required cannot be played."""
+        warning = replace(warning, id=self.original.id, text=warning.text + more)
+        raise _NoPlan(warnings=(warning,), failed=True)
 
     def behaviour_of(self, warning: Warning) -> str:
         """Return the behaviour that a warning is about, or ""."""
