@@ -34,12 +34,7 @@ def smooth(u: Float64) -> Float64:
     return rest
 
 
-def linear(u: Float64) -> Float64:
-    """Return the straight line from 0 to 1."""
-    return u
-
-
-CURVES: Mapping[str, Callable[[Float64], Float64]] = {"linear": linear, "smooth": smooth}
+CURVES: Mapping[str, Callable[[Float64], Float64]] = {"linear": lambda u: u, "smooth": smooth}
 
 
 class Samples(NamedTuple):

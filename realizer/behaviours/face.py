@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import TypeAlias
 
 import numpy as np
@@ -18,7 +18,6 @@ from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
 Part: TypeAlias = FaceLexeme | FaceFacs
-Compound: TypeAlias = Face | FaceShift
 
 POINTS = ("start", "attackPeak", "relax", "end")
 # s; duration from an overshoot to the sustained value, at most half of the hold.
@@ -57,15 +56,6 @@ def expand_shift(node: FaceShift, times: Float64, context: PlanningContext) -> t
     return pose_channels.keep_base(values, times, node.id)
 
 
-def check_part(node: Part, context: PlanningContext) -> tuple[Fault, ...]:
-    """Return faults: an unknown lexeme or AU is fatal; a side of an AU without sides is not."""
-    return _faults((node,), context)
-
-
-def check_compound(node: Compound, context: PlanningContext) -> tuple[Fault, ...]:
-    return _faults(node.parts, context)
-
-
 def _rise_and_fall(
     values_by_target: Mapping[Target, Mapping[float, float]], times: Float64, source: str
 ) -> tuple[Channel, ...]:
@@ -92,10 +82,11 @@ def _targets(node: Part, context: PlanningContext) -> dict[Target, float]:
     return pose_channels.columns(context.library[node.lexeme].aus, node.amount)
 
 
-def _faults(parts: Iterable[Part], context: PlanningContext) -> tuple[Fault, ...]:
+def check(node: Part | Face | FaceShift, context: PlanningContext) -> tuple[Fault, ...]:
+    """Return faults: an unknown lexeme or AU is fatal; a side of an AU without sides is not."""
     faults = []
     known = tables.by_number()
-    for part in parts:
+    for part in node.parts if isinstance(node, Face | FaceShift) else (node,):
         if isinstance(part, FaceLexeme):
             if part.lexeme not in context.library:
                 faults.append(pose_channels.unknown_word("lexeme", part.lexeme, context.library))
@@ -116,14 +107,14 @@ def _faults(parts: Iterable[Part], context: PlanningContext) -> tuple[Fault, ...
 
 AMOUNT = {"amount": "amount"}
 KINDS = (
-    BehaviourKind(FaceLexeme, timing_of_lexeme, expand_part, check_part, parameters=AMOUNT),
-    BehaviourKind(FaceFacs, table_timing("faceFacs"), expand_part, check_part, parameters=AMOUNT),
-    BehaviourKind(Face, table_timing("face"), expand_face, check_compound, parameters=AMOUNT),
+    BehaviourKind(FaceLexeme, timing_of_lexeme, expand_part, check, parameters=AMOUNT),
+    BehaviourKind(FaceFacs, table_timing("faceFacs"), expand_part, check, parameters=AMOUNT),
+    BehaviourKind(Face, table_timing("face"), expand_face, check, parameters=AMOUNT),
     BehaviourKind(
         FaceShift,
         table_timing("faceShift"),
         expand_shift,
-        check_compound,
+        check,
         claims=claiming("base face"),
         region="face",
     ),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 
 import numpy as np
 
@@ -342,5 +343,4 @@ class ActiveBlock:
 
     def moving_channels(self) -> Iterator[Channel]:
         """Return its channels that are not base states."""
-        for own in self.channels.values():
-            yield from own
+        return chain.from_iterable(self.channels.values())
