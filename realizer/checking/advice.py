@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from bml_schema import BMLA, BMLT, CORE, EXTENSIONS, OWN, Block, Speech, SyncRef
 from bml_schema.node_schema import local, schema_of
 from bml_schema.source import Source
+from bml_schema.tolerant_scanner import Element
 from realizer.checking.explain import near
 from realizer.checking.finding import Finding, Label
 from realizer.knowledge.advice import VisibleExpression, advise
@@ -37,47 +39,52 @@ def advice(file: str, source: Source, block: Block, schedule: Schedule, player: 
     Args:
         schedule: schedule of the block by `player`.
     """
-    advisor = _Advisor(file, source, block)
-    yield from advisor.attributes(block, "/bml", None)
+    yield from _Advisor(file, source, block, block).attributes()
     for node in block.behaviours:
         place = block.places.get(node.id)
         if place is not None:
-            yield from advisor.attributes(node, place.path, place.line)
-            yield from advisor.children(node, place.path, place.line)
-            yield from advisor.units(node, place.path, place.line)
+            advisor = _Advisor(file, source, block, node, place.path, place.line)
+            yield from advisor.attributes()
+            yield from advisor.children()
+            yield from advisor.units()
             if node.id in schedule.times:
-                yield from advisor.muscles(node, place.path, place.line, schedule, player)
+                yield from advisor.muscles(schedule, player)
 
 
+@dataclass(frozen=True)
 class _Advisor:
-    """Makes the findings of a block."""
+    """Makes the findings of an element, `node`: a behaviour or the block itself."""
 
-    def __init__(self, file: str, source: Source, block: Block) -> None:
-        self.file, self.source, self.block = file, source, block
+    file: str
+    source: Source
+    block: Block
+    node: Any
+    path: str = "/bml"
+    line: int | None = None
 
-    def attributes(self, node: Any, path: str, line: int | None) -> Iterator[Finding]:
+    def attributes(self) -> Iterator[Finding]:
         """Yield advice on unknown attributes of BMLA and BMLT that are similar to a known one.
 
         Not all attributes of these languages are known here; unknown attributes of BML are faults.
         """
-        known = schema_of(type(node)).attributes
-        for name in node.unknown_attributes:
+        known = schema_of(type(self.node)).attributes
+        for name in self.node.unknown_attributes:
             space = name.rpartition("}")[0]
             if space[1:] not in (BMLA, BMLT):
                 continue
             choices = [local(other) for other in known if other.rpartition("}")[0] == space]
             meant = near(local(name), choices, 0.75)
-            element = self.source.find(path, line=line, block=self.block.id) if meant else None
+            element = self.element() if meant else None
             if element is None or meant is None or self.source.value_span(element, meant):
                 continue
-            text = f"{local(name)}: no attribute of <{local(node.tag)}>, so it does nothing"
+            text = f"{local(name)}: no attribute of <{local(self.node.tag)}>, so it does nothing"
             label = Label(self.source.attribute_spot(element, name), "does nothing")
-            yield self.finding(node, path, text, label, f'help: did you mean "{meant}"?')
+            yield self.finding(text, label, f'help: did you mean "{meant}"?')
 
-    def children(self, node: Any, path: str, line: int) -> Iterator[Finding]:
+    def children(self) -> Iterator[Finding]:
         """Yield advice on unknown child elements of a behaviour that are similar to a known one."""
-        element = self.source.find(path, line=line, block=self.block.id)
-        known = {local(tag): tag for tag in schema_of(type(node)).by_tag}
+        element = self.element()
+        known = {local(tag): tag for tag in schema_of(type(self.node)).by_tag}
         if element is None or not known:
             return
         for inner in self.source.below(element):
@@ -86,9 +93,9 @@ class _Advisor:
                 continue
             meant = near(name, known, 0.75)
             if meant is not None and self.namespace(inner.name) in KNOWN_SPACES:
-                text = f"<{inner.name}>: no element of <{local(node.tag)}>, so it does nothing"
+                text = f"<{inner.name}>: no element of <{local(self.node.tag)}>, so it does nothing"
                 label = Label(self.source.name_spot(inner), "does nothing")
-                yield self.finding(node, path, text, label, f'help: did you mean "{prefix}:{meant}"?')
+                yield self.finding(text, label, f'help: did you mean "{prefix}:{meant}"?')
 
     def namespace(self, name: str) -> str:
         """Return the namespace of an element name, as declared first for its prefix."""
@@ -96,32 +103,26 @@ class _Advisor:
         found = (self.source.value(e, declared) for e in self.source.elements if declared in e.attributes)
         return next(found, "")
 
-    def units(self, node: Any, path: str, line: int) -> Iterator[Finding]:
+    def units(self) -> Iterator[Finding]:
         """Yield advice on times that are probably milliseconds."""
-        times = [(name, ref.offset) for name, ref in node.syncs.items() if isinstance(ref, SyncRef)]
-        times += [("duration", node.duration)] if hasattr(node, "duration") else []
+        times = [(name, ref.offset) for name, ref in self.node.syncs.items() if isinstance(ref, SyncRef)]
+        times += [("duration", self.node.duration)] if hasattr(self.node, "duration") else []
         for name, seconds in times:
             if abs(seconds) >= LONG:
                 text = f"{name}: {seconds:g} s are {_minutes(abs(seconds))}; BML counts in seconds"
-                spot = self.source.locate(path, name, line=line, block=self.block.id)
                 hint = f"help: if these are milliseconds, write {seconds / 1000:g}"
-                yield self.finding(node, path, text, Label(spot, _minutes(abs(seconds))), hint)
+                yield self.finding(text, self.label(_minutes(abs(seconds)), name), hint)
 
-    def muscles(
-        self, node: Any, path: str, line: int, schedule: Schedule, player: Player
-    ) -> Iterator[Finding]:
+    def muscles(self, schedule: Schedule, player: Player) -> Iterator[Finding]:
         """Yield advice on motion that takes less than a frame or is faster than muscles are."""
-        from dataclasses import replace
-
-        kind, times = player.kinds[node.tag], schedule.times[node.id]
-        seconds = float(times[-1] - times[0])
+        node, times = self.node, schedule.times[self.node.id]
+        kind, seconds = player.kinds[node.tag], float(times[-1] - times[0])
         if not node.syncs or kind.command is not None or kind.speech_request is not None:
             return
         if 0 < seconds < SHORT:
             text = f"lasts {seconds:.3g} s from start to end, less than a frame"
-            spot = self.source.locate(path, line=line, block=self.block.id)
             hint = "help: it may not be seen at all; BML counts in seconds"
-            yield self.finding(node, path, text, Label(spot, "less than a frame"), hint)
+            yield self.finding(text, self.label("less than a frame"), hint)
             return
         if kind.region is None and not node.sync_points[1:-1]:
             return  # no motion: a wait, a sound
@@ -134,14 +135,19 @@ class _Advisor:
             begin, end = timing.points[n : n + 2]
             text = f"{begin} to {end} in {gap:.2g} s; this usually takes {usual:.2g} s"
             name = next((p for p in (end, begin, *node.syncs) if p in node.syncs), "")
-            spot = self.source.locate(path, name, line=line, block=self.block.id)
             hint = f"help: leave {end} or {begin} out, and they are placed where they look natural"
-            yield self.finding(node, path, text, Label(spot, "faster than muscles are"), hint)
+            yield self.finding(text, self.label("faster than muscles are", name), hint)
             return
 
-    def finding(self, node: Any, path: str, text: str, label: Label, note: str) -> Finding:
-        id = self.block.id if isinstance(node, Block) else f"{self.block.id}:{node.id}"
-        return Finding(self.file, ADVICE, id, path, text, text, (label,), (note,))
+    def element(self) -> Element | None:
+        return self.source.find(self.path, line=self.line, block=self.block.id)
+
+    def label(self, text: str, attribute: str = "") -> Label:
+        return Label(self.source.locate(self.path, attribute, line=self.line, block=self.block.id), text)
+
+    def finding(self, text: str, label: Label, note: str) -> Finding:
+        id = self.block.id if isinstance(self.node, Block) else f"{self.block.id}:{self.node.id}"
+        return Finding(self.file, ADVICE, id, self.path, text, text, (label,), (note,))
 
 
 def _minutes(seconds: float) -> str:

@@ -154,5 +154,4 @@ def _workers(how: Options, workers: int, dask: str | None) -> ProcessPool | Dask
 
 
 def _core_count() -> int:
-    """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

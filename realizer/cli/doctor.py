@@ -41,8 +41,8 @@ def _voices() -> Iterator[Finding]:
 
 
 def _film() -> Iterator[Finding]:
-    works = find_spec("av") is not None
-    yield works, "FFmpeg", "PyAV writes films" if works else "pip install 'bml-realizer[film]'"
+    fix = _fix("film")
+    yield fix is None, "FFmpeg", fix or "PyAV writes films"
 
 
 def _node() -> Iterator[Finding]:

@@ -97,7 +97,6 @@ def fit(
 
 
 def _files(output: Path, form: str | None) -> dict[str, Path]:
-    """Return the file of each form."""
     if output.suffix == ".toml":
         if form == "both":
             raise click.BadParameter(f"wanted a folder for two forms, got {output}", param_hint="-o")

@@ -46,7 +46,6 @@ def columns(clip: FAPClip) -> Int32:
 
 
 def _words(numbers: Int32) -> list[list[str]]:
-    """Return numbers (n, k) as text, row by row."""
     words = _small().take(numbers + SMALL, mode="clip")
     others = (numbers < -SMALL) | (numbers > SMALL)
     words[others] = [str(number) for number in numbers[others].tolist()]

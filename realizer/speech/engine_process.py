@@ -13,7 +13,7 @@ import weakref
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from realizer.core.errors import VoiceError
 
@@ -81,8 +81,8 @@ class EngineProcess:
         with self._lock:
             running = self._started()
             try:
-                with running.waiting(self._limit):
-                    head, body = _exchange(running.process, request)
+                with running.waiting():
+                    head, body = _exchange(running, request)
             except (OSError, ValueError) as error:
                 self._stop()
                 raise VoiceError(
@@ -123,8 +123,8 @@ class EngineProcess:
         self._running = running = _Running(process, self._limit)
         self._end = weakref.finalize(self, running.end)
         try:
-            with running.waiting(self._limit):
-                hello = json.loads(_pipe(process.stdout).readline())
+            with running.waiting():
+                hello = json.loads(running.outwards.readline())
         except (OSError, ValueError):
             hello = {"error": "it ended while it started"}
         if "error" in hello:
@@ -147,16 +147,18 @@ class _Running:
     """
 
     def __init__(self, process: subprocess.Popen[bytes], limit: float) -> None:
-        self.process = process
-        self._every = limit / CHECKS
+        assert process.stdin is not None
+        assert process.stdout is not None
+        self.process, self.inwards, self.outwards = process, process.stdin, process.stdout
+        self._limit = limit
         self._deadline = float("inf")  # deadline of the current request
         self._ended = threading.Event()
         threading.Thread(target=self._watch, name="watch", daemon=True).start()
 
     @contextlib.contextmanager
-    def waiting(self, limit: float) -> Iterator[None]:
-        """Limit the time until the end of the block, in seconds."""
-        self._deadline = time.monotonic() + limit
+    def waiting(self) -> Iterator[None]:
+        """Limit the time until the end of the block."""
+        self._deadline = time.monotonic() + self._limit
         try:
             yield
         finally:
@@ -167,31 +169,24 @@ class _Running:
         self._ended.set()
         self.process.kill()
         self.process.wait()
-        for pipe in (self.process.stdin, self.process.stdout):
-            if pipe is not None:
-                with contextlib.suppress(OSError):  # buffered output has no reader
-                    pipe.close()
+        for pipe in (self.inwards, self.outwards):
+            with contextlib.suppress(OSError):  # buffered output has no reader
+                pipe.close()
 
     def _watch(self) -> None:
-        while not self._ended.wait(self._every):
+        while not self._ended.wait(self._limit / CHECKS):
             if time.monotonic() > self._deadline:
                 self.process.kill()
 
 
-def _exchange(process: subprocess.Popen[bytes], request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
-    inwards, outwards = _pipe(process.stdin), _pipe(process.stdout)
-    inwards.write(json.dumps(request).encode() + b"\n")
-    inwards.flush()
-    line = outwards.readline()
+def _exchange(running: _Running, request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
+    running.inwards.write(json.dumps(request).encode() + b"\n")
+    running.inwards.flush()
+    line = running.outwards.readline()
     if not line:
         raise OSError("end of the pipe")
     head: dict[str, Any] = json.loads(line)
-    body = outwards.read(head["bytes"])
+    body = running.outwards.read(head["bytes"])
     if len(body) != head["bytes"]:
         raise OSError("half an answer")
     return head, body
-
-
-def _pipe(pipe: IO[bytes] | None) -> IO[bytes]:
-    assert pipe is not None
-    return pipe

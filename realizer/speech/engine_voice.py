@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from abc import abstractmethod
-from collections import OrderedDict
 from collections.abc import Callable
 from typing import ClassVar
 
@@ -71,29 +70,25 @@ class EngineVoice(BaseVoice):
 
 
 class UtteranceCache:
-    """The latest utterances by request; thread-safe."""
+    """The latest utterances by request, the oldest first; thread-safe."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._utterances: OrderedDict[SpeechRequest, Utterance] = OrderedDict()
-        self._samples = 0
+        self._utterances: dict[SpeechRequest, Utterance] = {}
 
     def get(self, request: SpeechRequest, speak: Callable[[SpeechRequest], Utterance]) -> Utterance:
         """Return the cached utterance of a request, or synthesize it with `speak` and cache it."""
         with self._lock:
             if request in self._utterances:
-                self._utterances.move_to_end(request)
-                return self._utterances[request]
+                self._utterances[request] = utterance = self._utterances.pop(request)
+                return utterance
         utterance = speak(request)
         with self._lock:
-            if (same := self._utterances.pop(request, None)) is not None:  # from another thread
-                self._samples -= _samples(same)
+            self._utterances.pop(request, None)  # from another thread
             self._utterances[request] = utterance
-            self._samples += _samples(utterance)
-            while self._utterances and (len(self._utterances) > MOST or self._samples > MAX_SAMPLES):
-                self._samples -= _samples(self._utterances.popitem(last=False)[1])
+            while len(self._utterances) > MOST or self._samples() > MAX_SAMPLES:
+                del self._utterances[next(iter(self._utterances))]
         return utterance
 
-
-def _samples(utterance: Utterance) -> int:
-    return 0 if utterance.pcm is None else len(utterance.pcm)
+    def _samples(self) -> int:
+        return sum(len(said.pcm) for said in self._utterances.values() if said.pcm is not None)

@@ -137,7 +137,6 @@ def read_script(request: SpeechRequest) -> Script:
 
 
 def _parse(ssml: str) -> tuple[list[Part], list[str]]:
-    """Return the parts and warnings."""
     parts: list[Part] = []
     odd: list[str] = []
     reader = expat.ParserCreate()
