@@ -38,19 +38,9 @@ def realize(
 
     Args:
         documents: BML text, or several texts; all are submitted at t = 0, in order.
-        face: name of a face folder.
-        deformer: "mpeg4" (FAPs) or "au" (action units); None for the face's own choice.
-        fps: frames a second.
         voice: a voice or its name; None for espeak-ng, or the silent voice if that is not installed.
-        scene: target name -> (x, y, z) metres, origin between the eyes.
-        seed: for idle motion; the same seed gives the same frames.
-        idle: blinks and small head motion.
-        language: BCP-47 of speech that does not name its own.
-        media: the folder of the files that documents can name.
-        expressions: a folder of additional expressions that documents can name.
-        cooccurrence: which AUs a face can show together: "on", "off", or a file of rules.
-        prosody: nods, brows, blinks and looks that accompany speech; they need `idle`.
-        mapping: a file with a mapping of AUs to FAPs, used instead of the face's.
+        face, deformer, fps, scene, seed, idle, language, media, expressions, cooccurrence, prosody, mapping:
+            as in `realizer.core.options.PlayOptions`.
 
     Raises:
         FaceError: no such face.

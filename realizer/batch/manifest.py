@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TextIO
 
-from realizer.core.atomic_files import write_text
+from realizer.core.atomic_files import lock, write_text
 from realizer.core.errors import RealizerError
 
 NAME = "manifest.jsonl"
@@ -107,16 +107,9 @@ def _read(path: Path) -> Iterator[Row]:
 @contextmanager
 def _exclusive(path: Path) -> Iterator[None]:
     """Hold an exclusive lock, which also ends with the process."""
-    try:
-        import fcntl
-    except ImportError:  # not POSIX: without a lock
-        yield
-        return
-    with path.open("w") as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
+    with path.open("w") as file:
+        if not lock(file):
             raise BusyError(
                 f"{path.parent}: another batch writes here; wait for it, or choose another folder"
-            ) from None
+            )
         yield

@@ -28,11 +28,9 @@ def explain_conflict(builder: FindingBuilder, warning: Warning, text: str) -> bo
     if warning.clash:
         _conflict(builder, warning.clash, text)
         return True
-    if (astray := _ASTRAY.fullmatch(text)) is None:
-        return False
-    name, constraint, id, line, message = astray.groups()
-    _dangling_reference(builder, name, bool(constraint), id, int(line) if line else builder.line, message)
-    return True
+    if astray := _ASTRAY.fullmatch(text):
+        _dangling_reference(builder, *astray.groups())
+    return astray is not None
 
 
 def _conflict(builder: FindingBuilder, clash: Iterable[Clause], text: str) -> None:
@@ -62,14 +60,14 @@ def _conflict(builder: FindingBuilder, clash: Iterable[Clause], text: str) -> No
 def _dangling_reference(
     builder: FindingBuilder,
     name: str,
-    is_constraint: bool,
+    kind: str | None,
     constraint: str | None,
-    line: int | None,
+    place: str | None,
     message: str,
 ) -> None:
-    """Add a label for a reference to an unknown point."""
-    element = builder.element
-    if element is None and is_constraint:
+    """Add a label for a reference to an unknown point; arguments as in `_ASTRAY`."""
+    element, line = builder.element, int(place) if place else builder.line
+    if element is None and kind:
         element = _constraint(builder, constraint, line)
     elif element is None:
         element = builder.source.named(name, line=line, block=builder.block)

@@ -84,7 +84,7 @@ def batch(
     from realizer.batch.documents import DocumentsError, find
     from realizer.batch.run import batch as run
 
-    with options.usage_errors(DocumentsError):
+    with options.reporting(DocumentsError):
         documents = find(_read_places(places))
     counts: Counter[str] = Counter()
     dropped = 0

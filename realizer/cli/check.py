@@ -14,7 +14,6 @@ import click
 from realizer.cli import options
 from realizer.cli.enrich import language, languages_in, mood, role, warn_unknown_languages, words, words_for
 from realizer.cli.timeline import SUFFIXES, advice_on, faults_in
-from realizer.core.options import PlayOptions
 
 if TYPE_CHECKING:
     from realizer.tables.knowledge import Mood, Role
@@ -65,7 +64,6 @@ def check(
     from realizer.checking.document import check_document
     from realizer.checking.finding import Finding
     from realizer.cli.diagnostics import one_line, render
-    from realizer.playback.player import Player
 
     long = sys.stdout.isatty() if long is None else long
     width = shutil.get_terminal_size((100, 24)).columns
@@ -78,7 +76,7 @@ def check(
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # the terminal's encoding may lack characters of a document
             stream.reconfigure(errors="backslashreplace")
-    chosen = options.settings(media=media, expressions=expressions)
+    chosen = options.settings(language=language, media=media, expressions=expressions)
     lists = words_for(language, words)
     faults = 0
     warned: set[str] = set()
@@ -87,15 +85,7 @@ def check(
             faults += _check_timeline(name, text, chosen.expressions, role, mood)
             continue
         # Each file has a player of its own, so that reports are independent.
-        player = Player(
-            PlayOptions(
-                scene=options.read_scene(scene),
-                idle=False,
-                media=chosen.media,
-                expressions=chosen.expressions,
-                language=lists.language,
-            )
-        )
+        player = options.planning_player(chosen, scene)
         source = Source(text)
         blocks = found = 0
         for part in check_document(name, source, text, player):

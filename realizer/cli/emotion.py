@@ -78,11 +78,11 @@ def emotion(
     options.check_suffix(chart, ".png")
     if output or chart:
         options.check_camera(face, camera)
-    profile = _requested_profile(word, profiles, angle, activation, valence, arousal, bool(chart))
+    profile, shares = _requested_profile(word, profiles, angle, activation, valence, arousal, bool(chart))
     if profile is not None:
         if output is not None:  # before anything is printed: the reader may close the pipe
             _write(profile, seed, output, face, camera)
-        _print_profile(profile, _archetype_shares(profiles, angle, valence, arousal), seed, as_json)
+        _print_profile(profile, shares, seed, as_json)
     elif output is not None or as_json or seed is not None:
         raise click.UsageError("wanted a WORD or a place for --json, --seed and -o; got only --wheel")
     if chart is not None:
@@ -97,9 +97,12 @@ def _requested_profile(
     valence: float | None,
     arousal: float | None,
     wheel_only: bool,
-) -> Profile | None:
-    """Return the profile of the options, or None if only the wheel was requested."""
-    from realizer.emotions.wheel import affect, wheel
+) -> tuple[Profile | None, Mapping[str, float]]:
+    """Return the profile of the options, or None if only the wheel was requested.
+
+    Also return archetype -> share at a place on the wheel.
+    """
+    from realizer.emotions.wheel import affect, blend_weights, wheel
     from realizer.emotions.words import emotion as profile_of
 
     if (valence is None) != (arousal is None):
@@ -109,14 +112,15 @@ def _requested_profile(
     given = sum(option is not None for option in (word, angle, valence))
     if given > 1 or not (given or wheel_only):
         raise click.UsageError("wanted one of WORD, --angle, or --valence with --arousal")
-    with options.usage_errors(ValueError):
+    with options.reporting(ValueError):
         if angle is not None:
-            return wheel(angle, activation, profiles)
+            return wheel(angle, activation, profiles), blend_weights(angle, profiles)
         if valence is not None and arousal is not None:
-            return affect(valence, arousal, profiles)
+            degrees = math.degrees(math.atan2(arousal, valence))
+            return affect(valence, arousal, profiles), blend_weights(degrees, profiles, "affect")
         if word is not None and word.lower().endswith(".txt"):
-            return _read_profile(Path(word))
-        return None if word is None else profile_of(word, profiles)
+            return _read_profile(Path(word)), {}
+        return None if word is None else profile_of(word, profiles), {}
 
 
 def _read_profile(path: Path) -> Profile:
@@ -133,19 +137,6 @@ def _read_profile(path: Path) -> Profile:
         names = ", ".join(profile.name for profile in found[:5])
         raise ValueError(f"{path}: wanted one profile, got {len(found)}{names and ': ' + names}")
     return found[0]
-
-
-def _archetype_shares(
-    profiles: str, angle: float | None, valence: float | None, arousal: float | None
-) -> Mapping[str, float]:
-    """Return archetype -> share at a place on the wheel; empty for a word."""
-    from realizer.emotions.wheel import blend_weights
-
-    if angle is not None:
-        return blend_weights(angle, profiles)
-    if valence is not None and arousal is not None:
-        return blend_weights(math.degrees(math.atan2(arousal, valence)), profiles, "affect")
-    return {}
 
 
 def _print_profile(profile: Profile, shares: Mapping[str, float], seed: int | None, as_json: bool) -> None:

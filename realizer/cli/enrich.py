@@ -74,7 +74,7 @@ def words_for(language: str | None, file: Path | None) -> Words:
     from realizer.knowledge.word_languages import Words
     from realizer.tables.emotional_words import words_of
 
-    with options.usage_errors(TableError):
+    with options.reporting(TableError):
         own = words_of(file) if file is not None else None
     return Words(options.settings(language=language).language, own, everywhere=language is None)
 

@@ -133,7 +133,7 @@ def find(
 def _find_similar(like: Path, library: Sequence[Expression], face: str | None) -> Likeness:
     from realizer.analysis.picture_search import UnknownPictureError, by_picture, read_picture
 
-    with options.usage_errors(UnknownPictureError):
+    with options.reporting(UnknownPictureError):
         return by_picture(read_picture(like), library, None if face is None else [face])
 
 

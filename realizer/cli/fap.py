@@ -136,10 +136,8 @@ def play(file: str, **flags: Any) -> int:
             np.repeat(part, count, axis=0) for part in (clip.values, clip.visemes, clip.expressions)
         )
         clip = replace(clip, values=values, visemes=visemes, expressions=expressions)
-    try:
+    with options.reporting(RealizerError, f"{file}: ", click.ClickException):
         document = document_of(clip, "fap")
-    except RealizerError as error:
-        raise click.ClickException(f"{file}: {error}") from None
     room = MAX_BYTES * len(clip.values) // len(document)
     if room < len(clip.values):
         raise click.ClickException(
@@ -155,10 +153,8 @@ def _read(file: str) -> FAPClip:
     from realizer.outputs.fap_clip_files import read_clip
 
     (content,) = options.read_documents([file])
-    try:
+    with options.reporting(RealizerError, f"{file}: ", click.ClickException):
         return read_clip(content)
-    except RealizerError as error:
-        raise click.ClickException(f"{file}: {error}") from None
 
 
 def _print_notes(file: str, clip: FAPClip) -> None:

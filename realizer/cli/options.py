@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -17,6 +18,7 @@ import click
 if TYPE_CHECKING:  # importing them takes longer than `--help` should
     from realizer.behaviours.kind import Position
     from realizer.core.settings import Settings
+    from realizer.playback.player import Player
     from realizer.scheduling.timing import Warning
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -112,7 +114,7 @@ def settings(**flags: Any) -> Settings:
     """
     from realizer.core.settings import Settings, SettingsError
 
-    with usage_errors(SettingsError):
+    with reporting(SettingsError):
         return Settings.read(flags)
 
 
@@ -138,6 +140,16 @@ def several(*options: Callable[[Any], Any]) -> Callable[[Command], Command]:
 
 strict = click.option("--strict", is_flag=True, help="Exit with 1 if any behaviour was dropped.")
 playback_options = several(voice, scene, media, expressions, strict)
+
+
+def planning_player(chosen: Settings, scene: Path | None) -> Player:
+    """Return a player for schedules only, with the targets of a scene file."""
+    from realizer.core.options import PlayOptions
+    from realizer.playback.player import Player
+
+    names = ("language", "media", "expressions")
+    values = {name: getattr(chosen, name) for name in names}
+    return Player(PlayOptions(scene=read_scene(scene), idle=False, **values))
 
 
 def read_documents(names: Iterable[str]) -> list[bytes]:
@@ -179,7 +191,7 @@ def read_scene(path: str | Path | None) -> dict[str, Position] | None:
 
     if path is None:
         return None
-    with usage_errors(ValueError, f"{path}: "):
+    with reporting(ValueError, f"{path}: "):
         return parse_scene(Path(path).read_text("utf-8"))
 
 
@@ -190,13 +202,19 @@ def check_suffix(path: Path | None, *suffixes: str) -> None:
 
 
 @contextmanager
-def usage_errors(kind: type[Exception], prefix: str = "", option: str | None = None) -> Iterator[None]:
-    """Report errors of a kind as wrong usage, or as a wrong value of an option."""
+def reporting(
+    kind: type[Exception], prefix: str = "", wrong: Callable[[str], click.ClickException] = click.UsageError
+) -> Iterator[None]:
+    """Report errors of a kind to the user, by default as wrong usage."""
     try:
         yield
     except kind as error:
-        text = f"{prefix}{error}"
-        raise click.BadParameter(text, param_hint=option) if option else click.UsageError(text) from None
+        raise wrong(f"{prefix}{error}") from None
+
+
+def bad(option: str | None) -> Callable[[str], click.BadParameter]:
+    """Return the error class for wrong values of an option; None for the option that is being parsed."""
+    return partial(click.BadParameter, param_hint=option)
 
 
 @contextmanager
@@ -276,11 +294,9 @@ def _checked(check: Callable[[str], object], value: str | None, option: str | No
     """Return the value; raises BadParameter with the text of a RenderError of `check`."""
     from realizer.core.errors import RenderError
 
-    try:
+    with reporting(RenderError, wrong=bad(option)):
         if value is not None:
             check(value)
-    except RenderError as error:
-        raise click.BadParameter(str(error), param_hint=option) from None
     return value
 
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from realizer.cli import options
-from realizer.core.options import PlayOptions
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -129,7 +128,7 @@ def writer_for(output: str | None) -> Output | None:
 
     if output in (None, "-"):
         return None
-    with options.usage_errors(ValueError, option="-o"):
+    with options.reporting(ValueError, wrong=options.bad("-o")):
         return output_for(Path(output))
 
 
@@ -177,25 +176,16 @@ def schedule(
     from realizer.charts.write_chart import write_timeline
     from realizer.charts.write_chart import writer_for as chart_writer_for
     from realizer.pipeline import plan
-    from realizer.playback.player import Player
 
     if as_json and as_bml:
         raise click.UsageError("--json, --bml: wanted one of them, got both")
     if detail and not as_json:
         raise click.UsageError("--detail: wanted --json too")
     if plot is not None:
-        with options.usage_errors(ValueError, option="--plot"):
+        with options.reporting(ValueError, wrong=options.bad("--plot")):
             chart_writer_for(plot)
     chosen = options.settings(voice=voice, scene=scene, media=media, expressions=expressions)
-    player = Player(
-        PlayOptions(
-            scene=options.read_scene(chosen.scene),
-            idle=False,
-            language=chosen.language,
-            media=chosen.media,
-            expressions=chosen.expressions,
-        )
-    )
+    player = options.planning_player(chosen, chosen.scene)
     texts = options.read_documents(documents)
     accepted, refused = plan(texts, player, chosen.voice)
     schedules = [_final_schedule(player, planned) for planned in accepted]

@@ -49,15 +49,13 @@ def replay(record: Path, output: str | None, **flags: Any) -> None:
 
     writer = writer_for(output)
     changes = {name: flags.pop(name) for name in ("fps", "face", "voice")}
-    try:
+    with options.reporting(JournalError, wrong=click.ClickException):
         recording = read_recording(record)
         if writer is None or output is None:
             for text in replay_feedback(recording, **changes):
                 click.echo(text)
             return
         realization, _ = replay_recording(recording, **changes)
-    except JournalError as error:
-        raise click.ClickException(str(error)) from None
     drawing = RenderSettings(**flags)
     if writer.suffix in PICTURES:
         options.check_camera(realization.face_name, drawing.camera)

@@ -85,7 +85,7 @@ def serve(config: Path | None, **flags: Any) -> None:
     from realizer.server.serve import serve as start
     from realizer.speech.registry import find_voice
 
-    with options.usage_errors(SettingsError):
+    with options.reporting(SettingsError):
         settings = Settings.read(flags, file=config)
     options.check_camera(settings.face, settings.camera)
     options.check_light(settings.light)

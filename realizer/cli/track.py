@@ -51,7 +51,7 @@ def track(points: str, output: Path, fps: float, profiles: str | None) -> None:
     options.check_suffix(output, ".fap")
     (content,) = options.read_documents([points])
     text = options.decode(content, points, "a table")
-    with options.usage_errors(ValueError):
+    with options.reporting(ValueError):
         moving, rest = read_points(text, points)
         values, seen = faps_from_points(bridge(moving), rest, _fapu(rest, points))
     times = np.arange(len(values)) / fps
@@ -72,10 +72,9 @@ def _fapu(rest: dict[str, Float64], where: str) -> Fapu:
     from realizer.face.features import fapu_of
 
     try:
-        return fapu_of({name: place.astype(np.float32) for name, place in rest.items()}, where)
+        with options.reporting(FaceError):
+            return fapu_of({name: place.astype(np.float32) for name, place in rest.items()}, where)
     except KeyError as missing:
         raise click.UsageError(
             f"{where}: wanted point {missing.args[0]} in frame 0, to measure the face's proportions"
         ) from None
-    except FaceError as error:
-        raise click.UsageError(str(error)) from None

@@ -1,4 +1,4 @@
-"""Atomic writing of files: complete or not at all."""
+"""Atomic writing of files, complete or not at all, and locks on files."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from secrets import token_hex
+from typing import IO, Any
 
 
 @contextmanager
@@ -42,3 +43,16 @@ def write_bytes(path: str | Path, content: bytes) -> None:
 def write_text(path: str | Path, content: str) -> None:
     """Write a whole file as UTF-8 with unchanged line ends, or nothing."""
     write_bytes(path, content.encode("utf-8"))
+
+
+def lock(file: IO[Any]) -> bool:
+    """Take an exclusive lock on a file until it is closed. Return False if another process holds it."""
+    try:
+        import fcntl
+    except ImportError:  # not POSIX: there are no locks
+        return True
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True

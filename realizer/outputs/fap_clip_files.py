@@ -79,27 +79,25 @@ def _from_csv(text: str) -> FAPClip:
     if len(set(head)) < len(head):
         twice = next(name for name in head if head.count(name) > 1)
         raise RealizerError(f"line 1: wanted each column once, got {twice!r} twice")
-    cells = np.empty((len(body), len(head)))
+    column_of = {name: k for k, name in enumerate(head) if name in wanted or name == "time"}
+    cells = np.empty((len(body), len(column_of)))
     for place, (number, row) in enumerate(body):
         if len(row) != len(head):
             raise RealizerError(f"line {number}: wanted {len(head)} cells, got {len(row)}")
-        for column, (name, cell) in enumerate(zip(head, row, strict=True)):
-            known = name in wanted or name == "time"
-            cells[place, column] = _number(cell, f"line {number}, {name}") if known else 0.0
-    column_of = {name: k for k, name in enumerate(head)}
-    fps, notes = _rate(cells[:, column_of["time"]])
+        cells[place] = [_number(row[k], f"line {number}, {name}") for name, k in column_of.items()]
+    columns = dict(zip(column_of, cells.T, strict=True))
+    fps, notes = _rate(columns["time"])
     others = len(head) - 1 - len(wanted)
     if others:
         notes.append(f"{others} columns are not FAPs and are ignored")
     values, mask = np.zeros((len(body), 68)), np.zeros(68, bool)
     for name, fap in numbers.items():
-        if name in wanted:
-            values[:, fap - 1], mask[fap - 1] = cells[:, column_of[name]], True
+        if name in columns:
+            values[:, fap - 1], mask[fap - 1] = columns[name], True
     compound = []
     for fap, names in ((0, VISEME), (1, EXPRESSION)):
-        mask[fap] = any(name in wanted for name in names)
-        found = [cells[:, column_of[name]] if name in wanted else np.zeros(len(body)) for name in names]
-        compound.append(np.stack(found, axis=1))
+        mask[fap] = any(name in columns for name in names)
+        compound.append(np.stack([columns.get(name, np.zeros(len(body))) for name in names], axis=1))
     return FAPClip("", fps, _whole(values), mask, _whole(compound[0]), _whole(compound[1]), tuple(notes))
 
 

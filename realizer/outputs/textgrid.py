@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING
 
@@ -47,15 +47,11 @@ def encode_textgrid(realization: Realization) -> str:
 
 def _intervals(name: str, end: float, spans: Iterable[Span]) -> list[str]:
     """Return an interval tier, in which silence is an interval without text."""
-    whole = list(_filled(end, spans))
-    lines = [*_head("IntervalTier", name, end), f"intervals: size = {len(whole)}"]
-    for k, span in enumerate(whole, 1):
-        lines += [
-            f"intervals [{k}]:",
-            f"    xmin = {_number(span.start)}", f"    xmax = {_number(span.end)}",
-            f"    text = {_quoted(span.text)}",
-        ]  # fmt: skip
-    return lines
+    rows = [
+        (f"xmin = {_number(span.start)}", f"xmax = {_number(span.end)}", f"text = {_quoted(span.text)}")
+        for span in _filled(end, spans)
+    ]
+    return _tier("IntervalTier", name, end, "intervals", rows)
 
 
 def _filled(end: float, spans: Iterable[Span]) -> Iterator[Span]:
@@ -73,18 +69,19 @@ def _filled(end: float, spans: Iterable[Span]) -> Iterator[Span]:
 
 
 def _points(name: str, end: float, points: Iterable[tuple[float, str]]) -> list[str]:
-    together = [
-        (time, " ".join(name for _, name in names))
+    rows = [
+        (f"number = {time}", f"mark = {_quoted(' '.join(name for _, name in names))}")
         for time, names in groupby(points, lambda point: _number(max(point[0], 0.0)))
     ]
-    lines = [*_head("TextTier", name, end), f"points: size = {len(together)}"]
-    for k, (time, names) in enumerate(together, 1):
-        lines += [f"points [{k}]:", f"    number = {time}", f"    mark = {_quoted(names)}"]
+    return _tier("TextTier", name, end, "points", rows)
+
+
+def _tier(kind: str, name: str, end: float, items: str, rows: Sequence[Iterable[str]]) -> list[str]:
+    lines = [f'class = "{kind}"', f"name = {_quoted(name)}", "xmin = 0", f"xmax = {_number(end)}"]
+    lines.append(f"{items}: size = {len(rows)}")
+    for k, row in enumerate(rows, 1):
+        lines += [f"{items} [{k}]:", *(f"    {line}" for line in row)]
     return lines
-
-
-def _head(kind: str, name: str, end: float) -> list[str]:
-    return [f'class = "{kind}"', f"name = {_quoted(name)}", "xmin = 0", f"xmax = {_number(end)}"]
 
 
 def _number(seconds: float) -> str:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from realizer.behaviours.kind import Position
+from realizer.core.atomic_files import lock
 from realizer.core.settings import Settings
 from realizer.server.journal.entry import Entry, JournalError, SavedSession, check_time, quoted
 
@@ -74,7 +75,7 @@ class RecordingFolder:
         try:
             path = next(path for path in self._paths(session, epoch) if not path.exists())
             file = self._files[session] = path.open("xb", buffering=0)
-            _lock(file)
+            lock(file)
             _write(file, json.dumps(head | {"parts": dict(parts)} if parts else head))
         except OSError as error:
             if session in self._files:
@@ -90,7 +91,7 @@ class RecordingFolder:
         except OSError:
             return None
         try:
-            if _lock(file) and (missing := self._missing_entries(read_recording(path), saved)) is not None:
+            if lock(file) and (missing := self._missing_entries(read_recording(path), saved)) is not None:
                 file.seek(path.read_bytes().rfind(b"\n") + 1)
                 file.truncate()
                 self._files[session] = file
@@ -128,19 +129,6 @@ class RecordingFolder:
     def close(self) -> None:
         for session in list(self._files):
             self.end(session)
-
-
-def _lock(file: FileIO) -> bool:
-    """Take an exclusive lock on a file. Return False if another process holds it."""
-    try:
-        import fcntl
-    except ImportError:  # not POSIX: there are no other workers either
-        return True
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    return True
 
 
 def _write(file: FileIO, line: str) -> None:

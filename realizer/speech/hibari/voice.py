@@ -92,11 +92,8 @@ class HibariVoice(EngineVoice):
         parts, placed = runs(script)
         head, _ = self._process.ask({"op": "read", "texts": [run.text for run in parts]})
         track = SpeechBuffer()
-        for k, (run, reading) in enumerate(zip(parts, head["texts"], strict=True)):
-            goes_on = k + 1 < len(parts) and not parts[k + 1].pause
-            self._speak_run(
-                track, run, reading, request.rate, rate, joined=k > 0 and not run.pause, goes_on=goes_on
-            )
+        for k, reading in enumerate(head["texts"]):
+            self._speak_run(track, parts, k, reading, request.rate, rate)
         warnings = [*script.warnings, *_warnings(request, track, hello)]
         return Utterance(
             duration=track.length / rate,
@@ -112,19 +109,17 @@ class HibariVoice(EngineVoice):
     def _speak_run(
         self,
         track: SpeechBuffer,
-        run: ProsodyRun,
+        parts: Sequence[ProsodyRun],
+        index: int,
         reading: Sequence[Sequence[Token]],
         pace: float,
         rate: int,
-        *,
-        joined: bool,
-        goes_on: bool,
     ) -> None:
-        """Synthesize a run and append it to `track`.
-
-        `joined` and `goes_on` are whether it follows the run before, and precedes the run after, without a
-        pause.
-        """
+        """Synthesize the run with this index and append it to `track`."""
+        run = parts[index]
+        # Whether it follows the run before, and precedes the run after, without a pause.
+        joined = index > 0 and not run.pause
+        goes_on = index + 1 < len(parts) and not parts[index + 1].pause
         track.add(np.zeros(round(run.pause * rate), np.int16))
         heard: list[Sound] = []
         tokens: list[Token] = []

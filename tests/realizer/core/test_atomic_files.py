@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from realizer.core.atomic_files import replacing, write_bytes, write_text
+from realizer.core.atomic_files import lock, replacing, write_bytes, write_text
 
 
 def test_write_text_writes_utf8_with_unchanged_line_ends(tmp_path: Path) -> None:
@@ -71,3 +71,11 @@ def test_replacing_leaves_the_old_file_when_the_block_fails(tmp_path: Path) -> N
 def test_replacing_names_the_folder_that_is_missing(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError), replacing(tmp_path / "no" / "x"):
         pass
+
+
+def test_lock_is_exclusive_until_its_file_is_closed(tmp_path: Path) -> None:
+    with (tmp_path / "x").open("w") as first, (tmp_path / "x").open("w") as second:
+        assert lock(first)
+        assert not lock(second)
+        first.close()
+        assert lock(second)
