@@ -165,10 +165,10 @@ def _optional(read: Callable[[Any], T], empty: bool = True) -> Callable[[Any], T
     return lambda value: None if value is None or (empty and value == "") else read(value)
 
 
-def _setting(
+def _row(
     default: Any, read: Callable[[Any], Any], says: str, *, secret: bool = False, empty: bool = True
 ) -> Any:
-    """Return a field of the settings.
+    """Return a row of the table of settings: a field of `Settings`.
 
     Args:
         default: None also makes None a valid value.
@@ -191,133 +191,121 @@ class Settings:
         SettingsError: a value of the wrong kind or out of range.
     """
 
-    host: str = _setting("127.0.0.1", _text, "address to listen on")
-    port: int = _setting(8765, _whole(0, 65535), "port; 0: any free one")
-    workers: int = _setting(1, _whole(1, 64), "number of processes that share the port")
+    host: str = _row("127.0.0.1", _text, "address to listen on")
+    port: int = _row(8765, _whole(0, 65535), "port; 0: any free one")
+    workers: int = _row(1, _whole(1, 64), "number of processes that share the port")
     # An empty token must not open the service by mistake.
-    token: str | None = _setting(
+    token: str | None = _row(
         None,
         _text,
         "password for WebSocket clients; REALIZER_TOKEN hides it from other users; none: no password",
         secret=True,
         empty=False,
     )
-    jwt_key: str | None = _setting(
+    jwt_key: str | None = _row(
         None,
         _key,
         "key of the JWTs that clients may present: PEM file of a public key, or a secret; none: no JWTs",
         secret=True,
         empty=False,
     )
-    jwt_audience: str | None = _setting(None, _text, "required claim aud of a JWT; none: it must have none")
-    origins: tuple[str, ...] = _setting((), _origins, "origins of pages that may connect; *: all")
-    tls_cert: Path | None = _setting(None, _file, "certificate chain in PEM; none: no TLS")
-    tls_key: Path | None = _setting(None, _file, "private key in PEM; none: it is in the file tls_cert")
-    log: str = _setting("text", _word_of("text", "json"), "format of log messages")
+    jwt_audience: str | None = _row(None, _text, "required claim aud of a JWT; none: it must have none")
+    origins: tuple[str, ...] = _row((), _origins, "origins of pages that may connect; *: all")
+    tls_cert: Path | None = _row(None, _file, "certificate chain in PEM; none: no TLS")
+    tls_key: Path | None = _row(None, _file, "private key in PEM; none: it is in the file tls_cert")
+    log: str = _row("text", _word_of("text", "json"), "format of log messages")
     # The URL may contain a password.
-    journal: str | None = _setting(
+    journal: str | None = _row(
         None,
         _text,
         "file or redis://HOST:PORT/N that saves named sessions for a restart; none: not saved",
         secret=True,
     )
-    record: Path | None = _setting(
+    record: Path | None = _row(
         None, _path, "folder for recordings, for `realizer replay`; none: not recorded"
     )
-    asap_ports: tuple[int, int] | None = _setting(
+    asap_ports: tuple[int, int] | None = _row(
         None,
         _ports,
         "ports of ASAP's TCP, such as 7500 7501: BML in, feedback to that port of the client; none: off",
     )
-    xface_port: int | None = _setting(
-        None, _whole(0, 65535), "port for clients of an Xface player; none: off"
-    )
-    xface_player: str | None = _setting(
+    xface_port: int | None = _row(None, _whole(0, 65535), "port for clients of an Xface player; none: off")
+    xface_player: str | None = _row(
         None, _address, "HOST:PORT of an Xface player that shows a session; none: off"
     )
-    xface_player_session: str = _setting(
+    xface_player_session: str = _row(
         "xface-player",
         _matching(r"[A-Za-z0-9._~-]{1,64}", "1..64 letters, digits or . _ ~ -"),
         "session that xface_player shows",
     )
-    xface_player_interval: float = _setting(
+    xface_player_interval: float = _row(
         0.25, _real(0, 60), "seconds between frames for xface_player; it stops at shorter ones"
     )
-    stomp: str | None = _setting(None, _address, "HOST:PORT of a STOMP broker; none: off")
-    stomp_login: str | None = _setting(None, _text, "login for the broker")
-    stomp_password: str | None = _setting(None, _text, "password for the broker", secret=True)
-    stomp_host: str | None = _setting(None, _text, 'virtual host; "/" for RabbitMQ')
-    stomp_json_in: str | None = _setting(
+    stomp: str | None = _row(None, _address, "HOST:PORT of a STOMP broker; none: off")
+    stomp_login: str | None = _row(None, _text, "login for the broker")
+    stomp_password: str | None = _row(None, _text, "password for the broker", secret=True)
+    stomp_host: str | None = _row(None, _text, 'virtual host; "/" for RabbitMQ')
+    stomp_json_in: str | None = _row(
         "/topic/bmlRequests", _optional(_text), "destination of BML in JSON; none: not read"
     )
-    stomp_json_out: str = _setting("/topic/bmlFeedback", _text, "destination of feedback in JSON")
-    stomp_xml_in: str | None = _setting(
+    stomp_json_out: str = _row("/topic/bmlFeedback", _text, "destination of feedback in JSON")
+    stomp_xml_in: str | None = _row(
         "/topic/asap.bml.request", _optional(_text), "destination of BML; none: not read"
     )
-    stomp_xml_out: str = _setting("/topic/asap.bml.feedback", _text, "destination of feedback")
-    stomp_vhmsg: str | None = _setting(
+    stomp_xml_out: str = _row("/topic/asap.bml.feedback", _text, "destination of feedback")
+    stomp_vhmsg: str | None = _row(
         "/topic/DEFAULT_SCOPE", _optional(_text), "destination of VHMSG; none: not read"
     )
-    face: str = _setting("default", _text, "default face of characters")
-    deformer: str | None = _setting(
+    face: str = _row("default", _text, "default face of characters")
+    deformer: str | None = _row(
         None, _word_of("mpeg4", "au"), "what moves faces: mpeg4 or au; none: each face's own choice"
     )
-    voice: str | None = _setting(
+    voice: str | None = _row(
         None, _text, "default voice; see `realizer voices`; none: espeak-ng if installed, else silent"
     )
-    language: str = _setting("en-US", _text, "BCP-47 tag of speech without xml:lang")
-    camera: str = _setting(
+    language: str = _row("en-US", _text, "BCP-47 tag of speech without xml:lang")
+    camera: str = _row(
         "front", _text, "default camera of pictures: front, three-quarter, profile, close, or the face's own"
     )
-    light: str | None = _setting(None, _text, "default light of pictures; none: portrait")
-    background: str | None = _setting(
+    light: str | None = _row(None, _text, "default light of pictures; none: portrait")
+    background: str | None = _row(
         None,
         _matching(r"#[0-9a-fA-F]{6}|transparent", "transparent or a colour such as #d8dde2"),
         "default background of pictures; none: the light's own",
     )
-    fps: float = _setting(25.0, _real(0.01, 240), "default frames per second of streams")
-    scene: Path | None = _setting(None, _path, "file of targets for all sessions: NAME X Y Z, in metres")
-    media: Path | None = _setting(None, _folder, "folder of the files that documents may refer to")
-    expressions: Path | None = _setting(
-        None, _folder, "folder of a user's expressions; none: only built-in ones"
-    )
-    seed: int = _setting(0, _whole(-(2**63), 2**63 - 1), "seed of idle motion")
-    idle: bool = _setting(True, _flag, "blinks and small head motion")
-    cooccurrence: str = _setting(
+    fps: float = _row(25.0, _real(0.01, 240), "default frames per second of streams")
+    scene: Path | None = _row(None, _path, "file of targets for all sessions: NAME X Y Z, in metres")
+    media: Path | None = _row(None, _folder, "folder of the files that documents may refer to")
+    expressions: Path | None = _row(None, _folder, "folder of a user's expressions; none: only built-in ones")
+    seed: int = _row(0, _whole(-(2**63), 2**63 - 1), "seed of idle motion")
+    idle: bool = _row(True, _flag, "blinks and small head motion")
+    cooccurrence: str = _row(
         "on", _switch_or_file, "rules for AUs that no face shows together: on, off, or a file"
     )
-    prosody: bool = _setting(True, _flag, "nods, brows, blinks and glances that accompany speech: on or off")
-    mapping: Path | None = _setting(None, _file, "file that maps AUs to FAPs; none: each face's own mapping")
-    keep: float = _setting(
-        60.0, _real(0, 1e9), "seconds that a named session lives after its last connection"
-    )
-    drain: float = _setting(
-        5.0, _real(0, 3600), "seconds that blocks may go on playing when the service stops"
-    )
-    max_message: int = _setting(16 * 2**20, _whole(1, 2**31), "bytes of one WebSocket message")
-    max_document: int = _setting(2**20, _whole(1, 2**31), "bytes of BML in one message")
-    max_elements: int = _setting(100_000, _whole(1, 10**7), "XML elements in one message")
-    max_behaviours: int = _setting(10_000, _whole(1, 10**6), "behaviours in one block")
-    max_duration: float = _setting(1_800.0, _real(1, 1e9), "planned duration of a block in seconds")
-    max_blocks: int = _setting(
+    prosody: bool = _row(True, _flag, "nods, brows, blinks and glances that accompany speech: on or off")
+    mapping: Path | None = _row(None, _file, "file that maps AUs to FAPs; none: each face's own mapping")
+    keep: float = _row(60.0, _real(0, 1e9), "seconds that a named session lives after its last connection")
+    drain: float = _row(5.0, _real(0, 3600), "seconds that blocks may go on playing when the service stops")
+    max_message: int = _row(16 * 2**20, _whole(1, 2**31), "bytes of one WebSocket message")
+    max_document: int = _row(2**20, _whole(1, 2**31), "bytes of BML in one message")
+    max_elements: int = _row(100_000, _whole(1, 10**7), "XML elements in one message")
+    max_behaviours: int = _row(10_000, _whole(1, 10**6), "behaviours in one block")
+    max_duration: float = _row(1_800.0, _real(1, 1e9), "planned duration of a block in seconds")
+    max_blocks: int = _row(
         1_000,
         _whole(1, 10**6),
         "blocks that play or wait in one session, and messages that wait with further blocks",
     )
-    max_connections: int = _setting(
-        2_000, _whole(1, 10**6), "open connections per address, at each transport"
-    )
-    max_sessions: int = _setting(5_000, _whole(1, 10**6), "sessions of each worker")
-    max_address_sessions: int = _setting(2_000, _whole(1, 10**6), "live sessions that one address has opened")
-    max_size: int = _setting(2048, _whole(16, 16384), "pixels of a picture's longer side")
-    max_pixels: float = _setting(
+    max_connections: int = _row(2_000, _whole(1, 10**6), "open connections per address, at each transport")
+    max_sessions: int = _row(5_000, _whole(1, 10**6), "sessions of each worker")
+    max_address_sessions: int = _row(2_000, _whole(1, 10**6), "live sessions that one address has opened")
+    max_size: int = _row(2048, _whole(16, 16384), "pixels of a picture's longer side")
+    max_pixels: float = _row(
         125e6, _real(256, 1e12), "pixels per second of all pictures of a session: 1920x1080 at 60"
     )
-    max_speech: int = _setting(20_000, _whole(1, 10**7), "characters of one speech in a document")
-    max_rate: float = _setting(
-        500.0, _real(0.1, 1e6), "messages per second that are read from one connection"
-    )
-    max_memory: int | None = _setting(
+    max_speech: int = _row(20_000, _whole(1, 10**7), "characters of one speech in a document")
+    max_rate: float = _row(500.0, _real(0.1, 1e6), "messages per second that are read from one connection")
+    max_memory: int | None = _row(
         None, _whole(64, 10**7), "MB of the process above which no session is opened; none: no limit"
     )
 

@@ -20,7 +20,14 @@ if TYPE_CHECKING:
 # Node numbers; those of the eyes follow.
 FACE, NECK, HEAD = 0, 1, 2
 EYES = ("left_eye", "right_eye")
-MATERIALS = (("face", 0.6), ("eyes", 0.15))  # name, roughness
+MATERIALS = [
+    {
+        "name": name,
+        "doubleSided": True,
+        "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": roughness},
+    }
+    for name, roughness in (("face", 0.6), ("eyes", 0.15))
+]
 NEGLIGIBLE_BEND = 0.01  # smaller changes of a normal, half a degree, are invisible
 
 
@@ -62,6 +69,8 @@ def encode_glb(face: Face, poses: Float32, fps: float) -> bytes:
     meshes = [morphing_mesh(file, face, rest, 0, made)]
     meshes += [rigid_mesh(file, face, ball, name, 1, centre) for ball, name, centre in balls]
     clock = file.add((np.arange(len(poses)) / fps).astype(np.float32), bounds=True)
+    unbound = np.tile(np.eye(4, dtype=np.float32), (2, 1, 1))
+    unbound[1, 3, :3] = -pivot  # glTF stores matrices by columns
     return file.bytes_of(
         {
             "asset": {
@@ -72,9 +81,9 @@ def encode_glb(face: Face, poses: Float32, fps: float) -> bytes:
             "scene": 0,
             "scenes": [{"nodes": [FACE, NECK]}],
             "nodes": nodes,
-            "materials": [_material(*material) for material in MATERIALS[: 2 if balls else 1]],
+            "materials": MATERIALS[: 2 if balls else 1],
             "meshes": meshes,
-            "skins": [{"joints": [NECK, HEAD], "inverseBindMatrices": _unbound(file, pivot)}],
+            "skins": [{"joints": [NECK, HEAD], "inverseBindMatrices": file.add(unbound.reshape(2, 16))}],
             "animations": [file.animation("performance", clock, keys)],
         }
     )
@@ -87,30 +96,6 @@ def quaternions(turns: Float32) -> Float32:
     turned = Rotation.from_euler("YXZ", turns[:, [1, 0, 2]].astype(np.float64)).as_quat()
     out: Float32 = np.where(turned[:, 3:] < 0, -turned, turned).astype(np.float32)
     return out
-
-
-def _unbound(file: GlbFile, pivot: Float32) -> int:
-    """Add the inverse bind matrices of the two joints; glTF stores matrices by columns."""
-    matrices = np.tile(np.eye(4, dtype=np.float32), (2, 1, 1))
-    matrices[1, 3, :3] = -pivot
-    return file.add(matrices.reshape(2, 16))
-
-
-def _material(name: str, roughness: float) -> dict[str, Any]:
-    return {
-        "name": name,
-        "doubleSided": True,
-        "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": roughness},
-    }
-
-
-GLB = Output(
-    ".glb",
-    "model/gltf-binary",
-    "the head, animated: morph targets, head and eyes",
-    lambda realization, _: encode_glb(realization.face, realization.poses, realization.fps),
-    reader="trimesh",
-)
 
 
 def rigid_mesh(
@@ -170,3 +155,12 @@ def _normals(face: Face, vertices: Float32) -> Float32:
     ups: Float32 = normals(face, vertices[None])[0]
     ups[np.abs(ups).sum(axis=1) == 0] = (0, 0, 1)
     return ups
+
+
+GLB = Output(
+    ".glb",
+    "model/gltf-binary",
+    "the head, animated: morph targets, head and eyes",
+    lambda realization, _: encode_glb(realization.face, realization.poses, realization.fps),
+    reader="trimesh",
+)

@@ -16,8 +16,8 @@ from realizer.core.errors import RealizerError
 from realizer.speech.align import features, sphinx
 from realizer.speech.align.alignment import AlignError, Alignment, moved
 from realizer.speech.align.dtw_align import dtw_align
+from realizer.speech.align.features import mono, to_aligner
 from realizer.speech.align.model_align import model_align
-from realizer.speech.align.recording import mono, to_aligner
 from realizer.speech.registry import reference_voice
 from realizer.speech.utterance import Recording, SpeechRequest, Utterance, Voice
 

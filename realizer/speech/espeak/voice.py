@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import importlib.util
-import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from realizer.core.errors import VoiceError
@@ -48,13 +48,8 @@ class EspeakVoice(EngineVoice):
     engine = "espeak-ng"
     description = "espeak-ng speaks over 100 languages; a variant is named as in espeak:en-gb+f3 or espeak:nl"
     worker = ENGINE
-
-    def __init__(
-        self, voice: str | None = None, *, limit: float = 30.0, options: tuple[str, ...] = ()
-    ) -> None:
-        super().__init__(voice, limit=limit, options=options)
-        self._lock = threading.Lock()
-        self._alone: dict[tuple[str, str], tuple[str, ...]] = {}
+    # (voice, word) -> phonemes of the word spoken separately; replaced, never changed.
+    _alone: Mapping[tuple[str, str], tuple[str, ...]] = MappingProxyType({})
 
     @classmethod
     def missing(cls, voice: str | None = None) -> str | None:
@@ -75,15 +70,13 @@ class EspeakVoice(EngineVoice):
 
     def _word_phonemes(self, voice: str, words: Sequence[str]) -> list[tuple[str, ...]]:
         """Return the phonemes of each word spoken separately."""
-        with self._lock:
-            known = dict(self._alone)
+        known = dict(self._alone)
         unknown = sorted({word for word in words if (voice, word) not in known})
         if unknown:
             head, _ = self._process.ask({"op": "phonemes", "voice": voice, "words": unknown})
             for word, ipa in zip(unknown, head["phonemes"], strict=True):
                 known[voice, word] = tuple(ipa)
-            with self._lock:
-                self._alone = known if len(known) <= MAX_CACHED_WORDS else {}
+            self._alone = known if len(known) <= MAX_CACHED_WORDS else {}
         return [known[voice, word] for word in words]
 
 

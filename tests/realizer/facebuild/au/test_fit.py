@@ -124,7 +124,7 @@ def test_fit_command_writes_a_file_for_each_form(
 ) -> None:
     from click.testing import CliRunner
 
-    from realizer.cli.fit import fit
+    from realizer.cli.faces import fit
 
     path, models = fitted
 
@@ -142,7 +142,7 @@ def test_fit_command_writes_a_file_for_each_form(
 def test_fit_command_needs_a_folder_for_two_forms(tmp_path: Path, output: str) -> None:
     from click.testing import CliRunner
 
-    from realizer.cli.fit import fit
+    from realizer.cli.faces import fit
 
     done = CliRunner().invoke(fit, ["default", "--form", "both", "-o", str(tmp_path / output)])
     assert done.exit_code == 2
@@ -152,7 +152,7 @@ def test_fit_command_needs_a_folder_for_two_forms(tmp_path: Path, output: str) -
 def test_fit_command_asks_for_data_without_shapes(tmp_path: Path) -> None:
     from click.testing import CliRunner
 
-    from realizer.cli.fit import fit
+    from realizer.cli.faces import fit
 
     folder = next(info.path for info in list_faces() if info.name == load_face().name)
     copy = Path(shutil.copytree(folder, tmp_path / "bare"))

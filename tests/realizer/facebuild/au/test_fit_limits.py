@@ -107,7 +107,7 @@ def test_watched_places_are_each_vertex_once_on_the_left(face: Face) -> None:
 def test_fit_command_writes_no_model_that_tears_the_face(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    from realizer.cli.fit import fit
+    from realizer.cli.faces import fit
 
     model = torn(read_model(FOLDER / "au_published.toml"))
     monkeypatch.setattr("realizer.facebuild.au.fit.fit_models", lambda *_: {"published": model})

@@ -7,7 +7,7 @@ import pytest
 
 from realizer.speech.align.alignment import Alignment
 from realizer.speech.align.dtw_align import dtw_align
-from realizer.speech.align.recording import mono, to_aligner
+from realizer.speech.align.features import mono, to_aligner
 from realizer.speech.espeak.voice import EspeakVoice
 from realizer.speech.utterance import SpeechRequest, Utterance
 from tests.realizer.speech.align.conftest import TEXT, WRONG, Noisy

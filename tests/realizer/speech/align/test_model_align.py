@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from realizer.speech.align.features import mono, to_aligner
 from realizer.speech.align.model_align import model_align, to_arpabet, to_ipa
-from realizer.speech.align.recording import mono, to_aligner
 from realizer.speech.align.sphinx import install_hint
 from realizer.speech.espeak.voice import EspeakVoice
 from realizer.speech.utterance import SpeechRequest

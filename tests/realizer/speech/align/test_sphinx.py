@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.speech.align.recording import mono, to_aligner
+from realizer.speech.align.features import mono, to_aligner
 from realizer.speech.align.sphinx import align_words, install_hint
 from tests.realizer.speech.align.conftest import TEXT, Noisy
 
