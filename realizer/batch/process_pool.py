@@ -87,14 +87,13 @@ class _WorkerProcess:
         context = get_context("spawn")
         self.pipe, theirs = context.Pipe()
         self._process: SpawnProcess = context.Process(target=_serve, args=(theirs, options), daemon=True)
-        before = {name: os.environ.get(name) for name in SINGLE_THREAD}
-        os.environ.update({name: value or "1" for name, value in before.items()})
+        added = [name for name in SINGLE_THREAD if name not in os.environ]
+        os.environ.update(dict.fromkeys(added, "1"))
         try:
             self._process.start()
         finally:
-            for name, value in before.items():
-                if value is None:
-                    del os.environ[name]
+            for name in added:
+                del os.environ[name]
         theirs.close()
         self.work: tuple[Task, int] | None = None
 

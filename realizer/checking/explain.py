@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any
 
@@ -42,11 +43,11 @@ def finding_of(file: str, source: Source, warning: Warning, vocabulary: Mapping[
     """
     placed = _PLACED.fullmatch(warning.text)
     line, path, text = (int(placed[1]), placed[2] or "", placed[3]) if placed else (None, "", warning.text)
-    builder = FindingBuilder(source, warning.id, line, path)
+    builder = _Sentences(source, warning.id, line, path, vocabulary=vocabulary)
     lost = _LOST.fullmatch(text)
     sentence = lost[1] if lost else text
     if not explain_conflict(builder, warning, sentence):
-        _Sentences(builder, vocabulary).explain(sentence)
+        builder.explain(sentence)
     if lost:
         builder.notes.append(f"note: with it went {lost[2]}")
     return Finding(
@@ -78,28 +79,26 @@ def attributes_of(text: str) -> list[str]:
     return names
 
 
-class _Sentences:
+@dataclass
+class _Sentences(FindingBuilder):
     """Explains warnings of the parser and of behaviour kinds, each about one element."""
 
-    def __init__(self, builder: FindingBuilder, vocabulary: Mapping[str, type[Any]]) -> None:
-        self.builder, self.vocabulary = builder, vocabulary
-        self.source, self.labels, self.notes = builder.source, builder.labels, builder.notes
+    vocabulary: Mapping[str, type[Any]] = field(default_factory=dict)
 
     def explain(self, text: str) -> None:
-        builder = self.builder
-        if builder.element is None and builder.line is None:
+        if self.element is None and self.line is None:
             # A fault of the whole block; of several blocks with this id, the last.
-            builder.element = self.source.document(builder.block)
-            builder.path = "/bml" if builder.element is not None else ""
-        if builder.element is None:
+            self.element = self.source.document(self.block)
+            self.path = "/bml" if self.element is not None else ""
+        if self.element is None:
             self.broken(text)
         else:
-            pieces = [self.piece(piece, builder.element) for piece in _PIECE.split(text)]
-            builder.head = "; ".join(pieces)
+            element = self.element
+            self.head = "; ".join(self.piece(piece, element) for piece in _PIECE.split(text))
 
     def broken(self, text: str) -> None:
         """Explain why a part of a document is not a block."""
-        source, line = self.source, self.builder.line
+        source, line = self.source, self.line
         if line is None:
             return
         bad = source.line(line).find("\N{REPLACEMENT CHARACTER}")
@@ -157,7 +156,7 @@ class _Sentences:
         self.labels.append(Label(self.spot_in(span, message), message))
         if taken := _TAKEN.search(message):
             id = self.source.id(element)
-            first = self.source.named(id, line=int(taken[1]), block=self.builder.block)
+            first = self.source.named(id, line=int(taken[1]), block=self.block)
             if first is not None and first is not element:
                 spot = self.source.locate_in(first, "id")
                 self.labels.append(Label(spot, "the first one is here", primary=False))
@@ -167,7 +166,7 @@ class _Sentences:
     def holder(self, name: str, element: Element) -> None:
         """Label the holder of a resource, "behaviour" or "block:behaviour"."""
         block, _, id = name.rpartition(":")
-        other = self.source.named(id, block=block or self.builder.block)
+        other = self.source.named(id, block=block or self.block)
         if other is not None and other is not element:
             self.labels.append(Label(self.source.name_spot(other), f"{name} is here", primary=False))
 
@@ -230,7 +229,7 @@ class _Sentences:
         return next((cls for tag, cls in self.vocabulary.items() if local(tag) == name), None)
 
     def points_of(self, id: str) -> list[str]:
-        element = self.source.named(id, block=self.builder.block)
+        element = self.source.named(id, block=self.block)
         cls = self.class_of(element) if element else None
         if element is None or cls is None:
             return []

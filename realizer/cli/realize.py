@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from realizer.outputs.output import Output, RenderSettings
-    from realizer.playback.player import Player
     from realizer.realization import Realization
     from realizer.scheduling.timing import Schedule
 
@@ -188,7 +187,9 @@ def schedule(
     player = options.planning_player(chosen, chosen.scene)
     texts = options.read_documents(documents)
     accepted, refused = plan(texts, player, chosen.voice)
-    schedules = [_final_schedule(player, planned) for planned in accepted]
+    # As later documents moved them, but complete if these cut them short.
+    pairs = [(planned, player.latest(planned)) for planned in accepted]
+    schedules = [old if old.times.keys() != new.times.keys() else new for old, new in pairs]
     if any(speaking.utterance.pcm is None for speaking in player.speech()):
         options.warn_no_voice(chosen.voice)
     options.print_warnings(w for w in refused if not any(w in s.warnings for s in schedules))
@@ -213,12 +214,6 @@ def schedule(
         with options.writing(output):
             Path(output).write_text(text, "utf-8")
     return 1 if refused or (strict and any(s.dropped for s in schedules)) else 0
-
-
-def _final_schedule(player: Player, planned: Schedule) -> Schedule:
-    """Return a schedule as later documents moved it, but complete if they cut it short."""
-    latest = player.latest(planned)
-    return latest if latest.times.keys() == planned.times.keys() else planned
 
 
 def _table(planned: Schedule) -> str:

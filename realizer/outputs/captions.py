@@ -60,16 +60,15 @@ def _lines(speaking: ScheduledSpeech) -> Iterator[Span]:
 
 
 class Track:
-    """A subtitle stream of a film."""
+    """A subtitle stream of a film, which players show by default.
+
+    Args:
+        codec: FFmpeg's name: mov_text for MP4, webvtt for WebM.
+        lines: in order.
+        end: of the film, in seconds; later lines are cut.
+    """
 
     def __init__(self, av: Any, film: Any, codec: str, lines: Sequence[Span], end: float) -> None:
-        """Add a stream that players show by default.
-
-        Args:
-            codec: FFmpeg's name: mov_text for MP4, webvtt for WebM.
-            lines: in order.
-            end: of the film, in seconds; later lines are cut.
-        """
         self._av, self._film, self._codec, self._end = av, film, codec, end
         self._left = list(reversed(lines))
         self._stream = film.add_stream(codec)

@@ -57,13 +57,8 @@ def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
     step = math.ceil(realization.fps / PACE)
     frames = range(0, realization.frames, step)
     starts = [frame / realization.fps for frame in frames]
-    size, _ = _picture_size(drawing)
-    with closing(drawing.pictures(realization, size, frames)) as pictures:
+    with closing(drawing.pictures(realization, drawing.size, frames)) as pictures:
         return encode_webp(pictures, starts, starts[-1] + step / realization.fps)
-
-
-def _picture_size(drawing: RenderSettings) -> tuple[tuple[int, int], bool]:
-    return drawing.size, False
 
 
 def _three(number: int) -> bytes:
@@ -75,5 +70,11 @@ def _chunk(name: bytes, content: bytes) -> bytes:
 
 
 WEBP = Output(
-    ".webp", "image/webp", "animated picture without sound", _encode, ("render",), _picture_size, reader="PIL"
+    ".webp",
+    "image/webp",
+    "animated picture without sound",
+    _encode,
+    ("render",),
+    lambda drawing: (drawing.size, False),
+    reader="PIL",
 )

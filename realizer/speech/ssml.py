@@ -129,11 +129,10 @@ def read_script(request: SpeechRequest) -> Script:
     if any(isinstance(part, str) and PICTURES.search(part) for part in parts):
         warnings.append("emoji in the text are not spoken")
         parts = [PICTURES.sub(" ", part) if isinstance(part, str) else part for part in parts]
-    script = Script(tuple(_collapsed(parts)), tuple(warnings))
+    script = Script(tuple(_collapsed(parts)))
     if script.is_silent:
         warnings.append("the text is empty: nothing is spoken")
-        script = Script(script.parts, tuple(warnings))
-    return script
+    return Script(script.parts, tuple(warnings))
 
 
 def _parse(ssml: str) -> tuple[list[Part], list[str]]:
@@ -233,8 +232,5 @@ def write_tag(tag: Tag) -> str:
     if tag.attributes is None:
         return f"</{tag.name}>"
     # quoteattr would choose single quotes for a value with a double one, which engines do not accept.
-    return "".join([f"<{tag.name}", *(f" {k}={_quoted(v)}" for k, v in tag.attributes), ">"])
-
-
-def _quoted(value: str) -> str:
-    return '"' + quoteattr(value.replace('"', " "))[1:-1] + '"'
+    pairs = [(key, quoteattr(value.replace('"', " "))) for key, value in tag.attributes]
+    return "".join([f"<{tag.name}", *(f" {key}={value}" for key, value in pairs), ">"])

@@ -19,6 +19,7 @@ from realizer.speech.utterance import Phoneme, Utterance
 SCORE, SCORE_OF_WORD = (-35.0, 4.0), (-45.0, 8.0)
 UNSTRESSED = {"ʌ": "ə", "ɝ": "ɚ"}
 VOWELS = set("aeiouæɑɔəɚɛɝɪʊʌ")
+FILE = "phonemes_arpabet.csv"
 STRIPPED = str.maketrans("", "", "ːˑˈˌ̩̯̃̍͡ʲʰˀ_-~|")
 
 
@@ -97,15 +98,10 @@ def to_ipa(phone: str) -> str:
 
 
 @cache
-def _rows() -> tuple[Sounded, ...]:
-    return tables.csv_rows("phonemes_arpabet.csv", Sounded)
-
-
-@cache
 def _phones() -> Mapping[str, str]:
-    return {row.ipa: row.arpabet for row in _rows()}
+    return {row.ipa: row.arpabet for row in tables.csv_rows(FILE, Sounded)}
 
 
 @cache
 def _sounds() -> Mapping[str, str]:
-    return {row.arpabet: row.ipa for row in reversed(_rows())}
+    return {row.arpabet: row.ipa for row in reversed(tables.csv_rows(FILE, Sounded))}

@@ -181,10 +181,6 @@ class HibariVoice(EngineVoice):
         return found
 
 
-def _is_latin(letter: str) -> bool:
-    return unicodedata.name(letter, "").startswith("LATIN")
-
-
 def _ends_in_pause(sentence: Sequence[Token]) -> bool:
     signs = signs_of(sentence)[0].rstrip()
     return not sounds([("", signs[-1:], False)], [0, 1, 0])[-1].ipa
@@ -202,7 +198,10 @@ def _warnings(request: SpeechRequest, track: SpeechBuffer, hello: dict[str, Any]
         mute = [
             word
             for first, last, word in track.words
-            if any(map(str.isalpha, word)) and (first == last or not any(map(_is_latin, word)))
+            if any(map(str.isalpha, word))
+            and (
+                first == last or not any(unicodedata.name(letter, "").startswith("LATIN") for letter in word)
+            )
         ]
         if mute:
             more = ", ..." if len(mute) > SHOWN else ""

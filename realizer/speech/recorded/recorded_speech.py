@@ -32,15 +32,23 @@ def utterance_of(request: SpeechRequest, recording: Recording) -> Utterance:
     """
     # Imported here, because loading the aligners takes longer than most texts to speak.
     from realizer.speech.align.aligner import align_recording
+    from realizer.speech.registry import reference_voice
 
     if not recording.words and not recording.phonemes:
         if request.ssml.strip():
             found = align_recording(request, recording)
-            return found if found.phonemes else replace(found, phonemes=_opening(recording))
-        return _utterance(recording, (), _opening(recording), {})
+            return (
+                found
+                if found.phonemes
+                else replace(found, phonemes=by_loudness(recording.pcm, recording.rate))
+            )
+        return _utterance(recording, (), by_loudness(recording.pcm, recording.rate), {})
     words, phonemes = recording.words, recording.phonemes
     if request.ssml.strip() and (request.marks or not words or not phonemes):
-        reference = _reference(request)
+        # Its times only count relatively.
+        reference = reference_voice().say(
+            replace(request, voice=None, rate=1.0, seconds=None, recording=None)
+        )
         own = words or _one_word(phonemes, reference)
         was, now = _knots(reference.words, own)
         marks = {name: float(np.interp(time, was, now)) for name, time in reference.marks.items()}
@@ -52,7 +60,7 @@ def utterance_of(request: SpeechRequest, recording: Recording) -> Utterance:
         words = words or tuple(map(moved, reference.words))
         phonemes = phonemes or tuple(map(moved, reference.phonemes))
         return _utterance(recording, words, phonemes, marks)
-    return _utterance(recording, words, phonemes or _opening(recording), {})
+    return _utterance(recording, words, phonemes or by_loudness(recording.pcm, recording.rate), {})
 
 
 def _utterance(
@@ -75,17 +83,6 @@ def _utterance(
     kept = (replace(w, start=min(w.start, duration), end=min(w.end, duration)) for w in words)
     inside = {name: min(max(time, 0.0), duration) for name, time in marks.items()}
     return Utterance(duration, tuple(kept), tuple(tiled), inside, recording.rate, recording.pcm)
-
-
-def _opening(recording: Recording) -> tuple[Phoneme, ...]:
-    return by_loudness(recording.pcm, recording.rate)
-
-
-def _reference(request: SpeechRequest) -> Utterance:
-    """Return the reference voice's utterance of the same text, whose times only count relatively."""
-    from realizer.speech.registry import reference_voice
-
-    return reference_voice().say(replace(request, voice=None, rate=1.0, seconds=None, recording=None))
 
 
 def _one_word(phonemes: Sequence[Phoneme], reference: Utterance) -> tuple[Word, ...]:
