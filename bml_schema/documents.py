@@ -6,7 +6,7 @@ import codecs
 import re
 from collections import deque
 from collections.abc import Iterator, Mapping
-from itertools import count
+from itertools import count, islice
 
 from lxml import etree
 
@@ -55,21 +55,18 @@ def parse(
         BMLError: no block: not well-formed (BMLSyntaxError), no usable id, too big
             (BMLSizeError), not one document.
     """
-    first: Block | BMLError | None = None
-    for result in read(text, vocabulary, max_bytes=max_bytes, max_behaviours=max_behaviours):
-        if first is not None:
-            raise BMLError("wanted one document, got several") if isinstance(first, Block) else first
-        first = result
-        if isinstance(first, BMLError):
-            break
-    if first is None:
+    found = list(islice(read(text, vocabulary, max_bytes=max_bytes, max_behaviours=max_behaviours), 2))
+    if not found:
         raise BMLSyntaxError("wanted a <bml> document, got an empty text")
-    if isinstance(first, BMLError):
-        raise first
-    if strict and first.problems:
-        problem = first.problems[0]
-        raise BMLError(problem.text, line=problem.line, path=problem.path, block=first.id)
-    return first
+    if isinstance(found[0], BMLError):
+        raise found[0]
+    if len(found) > 1:
+        raise BMLError("wanted one document, got several")
+    block = found[0]
+    if strict and block.problems:
+        problem = block.problems[0]
+        raise BMLError(problem.text, line=problem.line, path=problem.path, block=block.id)
+    return block
 
 
 def read(

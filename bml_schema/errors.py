@@ -11,6 +11,7 @@ import difflib
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 from typing import NamedTuple
 
@@ -61,11 +62,7 @@ class BMLError(Exception):
 
     def __reduce__(self) -> tuple[object, ...]:
         # Errors are pickled (batch workers), and the default does not keep keyword arguments.
-        return _again, (type(self), self.text, self.line, self.path, self.block)
-
-
-def _again(kind: type[BMLError], text: str, line: int | None, path: str, block: str | None) -> BMLError:
-    return kind(text, line=line, path=path, block=block)
+        return partial(type(self), line=self.line, path=self.path, block=self.block), (self.text,)
 
 
 class BMLSizeError(BMLError):

@@ -216,13 +216,13 @@ def parse_feedback(text: str, vocabulary: Mapping[str, type[Behaviour]] = VOCABU
     except UnicodeEncodeError:
         raise BMLSyntaxError("wanted characters XML can hold") from None
     kind = str(root.tag)
-    common: dict[str, Any] = {"character_id": root.get("characterId"), "seq": _seq(root)}
+    seq = _whole(root.get(own("seq"), ""))
+    common: dict[str, Any] = {"character_id": root.get("characterId"), "seq": seq}
     if kind == core("blockProgress"):
-        status = root.get(bmla("status"))
         return BlockProgress(
             id=_needed(root, "id"),
             global_time=_time(root, "globalTime"),
-            status=status,
+            status=root.get(bmla("status")),
             said=root.get(own("said")),
             posix_time=_milliseconds(root),
             **common,
@@ -280,10 +280,6 @@ def _time(source: etree._Element, name: str) -> float:
 def _line(source: etree._Element) -> int:
     line: Any = source.sourceline
     return int(line or 1)
-
-
-def _seq(root: etree._Element) -> int | None:
-    return _whole(root.get(own("seq"), ""))
 
 
 def _milliseconds(source: etree._Element, name: str = "posixTime") -> int | None:

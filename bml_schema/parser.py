@@ -82,7 +82,8 @@ def read_block(
     if wrong_attributes:
         reader.problem(names.block, Fault(wrong_attributes, root), "/bml", root, dropped=False)
     if unknown := elements.describe_unknown(schema_of(Block), root, values["unknown_attributes"], False):
-        reader.report_unknown(names.block, unknown, "/bml", root, root)
+        fault = Fault(unknown, root, CUSTOM_ATTRIBUTE_NOT_SUPPORTED)
+        reader.problem(names.block, fault, "/bml", root, dropped=False)
     for text, parent, path in outline.loose:
         # The text belongs to no behaviour, so the problem is the block's.
         reader.problem(
@@ -225,7 +226,8 @@ class _Reader:
     def report_unknown_attributes(self, id: str, entry: Entry) -> None:
         """Report the unknown attributes of a behaviour or constraint, one Problem for each element."""
         for text, element in self.elements.unknown_attributes:
-            self.report_unknown(id, text, entry.path, element, entry.element)
+            fault = Fault(text, element, CUSTOM_ATTRIBUTE_NOT_SUPPORTED)
+            self.problem(id, fault, entry.path, entry.element, dropped=False)
         self.elements.unknown_attributes.clear()
 
     def constraint(self, entry: Entry) -> Constraint | None:
@@ -264,12 +266,6 @@ class _Reader:
                 text = f"{problem.text}; with it went {listed(lost)}"
                 fatal = problem.fatal or id in remover.fatal
                 self.problems[n] = replace(problem, text=text, lost_references=lost, fatal=fatal)
-
-    def report_unknown(
-        self, id: str, text: str, path: str, element: etree._Element, top: etree._Element
-    ) -> None:
-        fault = Fault(text, element, CUSTOM_ATTRIBUTE_NOT_SUPPORTED)
-        self.problem(id, fault, path, top, dropped=False)
 
     def problem(
         self,

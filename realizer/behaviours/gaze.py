@@ -88,12 +88,8 @@ def _of_head(angle: float, part: float, size: float, eyes: float) -> float:
     return angle - math.copysign(eyes, angle) if abs(angle - head) > eyes else head
 
 
-def timing(node: Gaze, context: PlanningContext) -> Timing:
-    return timing_from_table("gaze", node.influence or "")
-
-
-def timing_of_shift(node: GazeShift, context: PlanningContext) -> Timing:
-    return timing_from_table("gazeShift", node.influence or "")
+def timing(node: Gaze | GazeShift, context: PlanningContext) -> Timing:
+    return timing_from_table("gaze" if isinstance(node, Gaze) else "gazeShift", node.influence or "")
 
 
 def expand(node: Gaze, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
@@ -151,7 +147,5 @@ def _converge(
 # Every influence needs the gaze; a temporary one does not need the base gaze.
 KINDS = (
     BehaviourKind(Gaze, timing, expand, check_target, claims=claiming("gaze")),
-    BehaviourKind(
-        GazeShift, timing_of_shift, expand_shift, check_target, claims=claiming("base gaze"), region="eyes"
-    ),
+    BehaviourKind(GazeShift, timing, expand_shift, check_target, claims=claiming("base gaze"), region="eyes"),
 )

@@ -90,7 +90,8 @@ def expand(node: Speech, times: Float64, context: PlanningContext) -> tuple[Chan
     """Return the channels of lips, jaw and tongue, from the phonemes."""
     utterance, start = context.utterances[node.id], float(times[0])
     parts = utterance.sections or ((0.0, utterance),)
-    return tuple(channel.named(node.id) for at, part in parts for channel in _lips(part, start + at))
+    lips = (channel for at, part in parts for channel in _lips(part, start + at))
+    return tuple(channel.changed({"source": node.id}) for channel in lips)
 
 
 # Utterance -> its start and lips. A long text grows part by part, and the lips of earlier parts are reused.

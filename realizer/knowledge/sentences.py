@@ -41,13 +41,13 @@ class Sentence:
     exclamation: bool = False
 
 
-def sentences(text: str, language: str = "en", rate: float = 1.0) -> tuple[Sentence, ...]:
+def sentences(text: str, language: str = "en") -> tuple[Sentence, ...]:
     """Return the sentences of a text that have words.
 
     Args:
         language: BCP-47 tag; it defines the vowels.
-        rate: 1 is the ordinary rate of 0.2 s per vowel unit.
     """
+    unit = float(syllable_facts()["unit"])  # s of a vowel unit
     if language.replace("_", "-").partition("-")[0].lower() == "el":
         text = text.replace(";", "\u037e")  # the Greek question mark; keyboards write a semicolon
     found: list[Sentence] = []
@@ -58,12 +58,12 @@ def sentences(text: str, language: str = "en", rate: float = 1.0) -> tuple[Sente
         for word, start in words_in(piece):
             if not SPOKEN.search(word):
                 continue
-            now += _pauses(text[at : place + start]) * _unit(rate)
-            length = vowel_units(word, language) * _unit(rate)
+            now += _pauses(text[at : place + start]) * unit
+            length = vowel_units(word, language) * unit
             words.append(SpokenWord(word, place + start, now, now + length))
             now += length
             at = place + start + len(word)
-        now += _pauses(text[at : place + len(piece)] + signs) * _unit(rate)
+        now += _pauses(text[at : place + len(piece)] + signs) * unit
         if words:
             question = any(sign in signs for sign in QUESTION)
             found.append(Sentence(tuple(words), question, any(sign in signs for sign in EXCLAMATION)))
@@ -84,7 +84,3 @@ def _pauses(between: str) -> int:
     phrase = syllable_facts()["phrase"]
     inside = [sign in phrase for sign in between]
     return sum(now and not before for before, now in zip([False, *inside], inside, strict=False))
-
-
-def _unit(rate: float) -> float:
-    return float(syllable_facts()["unit"]) / rate

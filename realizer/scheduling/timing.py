@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -92,9 +92,6 @@ class Clause:
     line: int | None
     text: str
 
-    def to_json(self) -> dict[str, Any]:
-        return {"id": self.id, "line": self.line, "text": self.text}
-
 
 @dataclass(frozen=True)
 class Warning:  # the standard's word
@@ -112,7 +109,7 @@ class Warning:  # the standard's word
         """Return {"id", "type", "text"}, and "clash": [{"id", "line", "text"}] if there is one."""
         known: dict[str, Any] = {"id": self.id, "type": self.type, "text": self.text}
         if self.clash:
-            known["clash"] = [clause.to_json() for clause in self.clash]
+            known["clash"] = [asdict(clause) for clause in self.clash]
         return known
 
 

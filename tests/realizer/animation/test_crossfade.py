@@ -55,7 +55,7 @@ def test_crossfade_keeps_earlier_replacements() -> None:
 
 
 def test_crossfade_inherits_gains() -> None:
-    old = hill(0.0, 0.5, 2.0, 3.0).scaled(Gain(0.6, 1.0, 0.5))
+    old = replace(hill(0.0, 0.5, 2.0, 3.0), gains=(Gain(0.6, 1.0, 0.5),))
     both = crossfade([old], [hill(0.0, 0.5, 3.0, 4.0)], 1.5)
     assert shown(both, np.array([2.5])) == pytest.approx([0.4])
 
