@@ -203,17 +203,17 @@ class Broadcast:
         self._send_schedules(now, effects)
         for connection, s in self._audio_subscribers:
             send_packets(connection, s, now, effects)
-        effects += self.frames_due(now)[0]
+        effects += self.frames_due(now)
         self.video.due(self._video_subscribers, now, effects)
 
-    def frames_due(self, now: float) -> tuple[list[Send], float]:
-        """Return the due frames of fap, au, arkit and mesh, and the time of the next one."""
+    def frames_due(self, now: float) -> list[Send]:
+        """Return the due frames of fap, au, arkit and mesh."""
         sends: list[Send] = []
         for fanout in self._fanouts:
             newest = last_frame_at(now, fanout.timeline.fps)
             if fanout.next <= newest:
                 fanout.send(newest, now, sends)
-        return sends, self.next_frame
+        return sends
 
     def fast_path(self, zero: float, until: float) -> FrameRun | None:
         """Return the packed frames of the only subscriber; None if there are other or more subscribers.
