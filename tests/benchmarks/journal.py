@@ -24,7 +24,7 @@ from pathlib import Path
 from unittest.mock import patch
 
 from realizer.core.settings import Settings
-from realizer.server.journal import Entry, Journal, Log, SavedSession, journal_at
+from realizer.server.journal import Entry, Journal, SavedSession, journal_at
 from realizer.server.journal import journal_writer as thresholds
 from realizer.server.journal.journal_writer import JournalWriter
 from realizer.server.journal.recordings import RecordingFolder
@@ -91,7 +91,9 @@ def opened() -> Session:
     return Session("long", SETTINGS, 0.0, named=True, epoch=0.0)
 
 
-def played(documents: int, apart: float, journal: Journal | None, record: Log | None = None) -> float:
+def played(
+    documents: int, apart: float, journal: Journal | None, record: RecordingFolder | None = None
+) -> float:
     """CPU milliseconds of a document."""
     session = opened()
     session.journal = JournalWriter("long", journal, record)

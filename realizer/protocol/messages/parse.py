@@ -140,7 +140,6 @@ def _is_text(message: object) -> bool:
 
 
 def _explain(errors: list[ErrorDetails]) -> str:
-    """Return what was wanted and what came."""
     first = errors[0]
     got = "nothing" if first["type"] == "missing" else _short(first["input"])
     if first["type"] not in _WANTED:

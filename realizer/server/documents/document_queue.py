@@ -222,7 +222,6 @@ class Submission:
         self._request_speech(pending, requests)
 
     def _request_speech(self, pending: PendingBlock, requests: Mapping[str, SpeechRequest]) -> None:
-        """Request speech from the character's voice."""
         voice = self.voices.get(pending.character) or self._settings.voice
         with_voice = {b: replace(request, voice=request.voice or voice) for b, request in requests.items()}
         self._add_effects(self.tts.request(pending, with_voice))

@@ -64,10 +64,6 @@ class Metrics:
         self.counts: Counter[str] = Counter(dict.fromkeys(COUNTERS, 0))
         self._labels = "" if worker is None else f'worker="{worker}"'
 
-    def record_stopped(self) -> None:
-        """Count a recording that could not be written."""
-        self.counts["records_stopped"] += 1
-
     def text(self, now: Mapping[str, float], more: Mapping[str, int]) -> str:
         """Return all metrics in the text format.
 

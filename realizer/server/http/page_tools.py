@@ -108,6 +108,7 @@ def export_pose(message: str, face: str | None, settings: Settings) -> str:
     """
     import numpy as np
 
+    from realizer.animation.fap.conversion import to_fap
     from realizer.animation.fap.fap_clip import FAPClip
     from realizer.outputs.fap_text import encode
     from realizer.server.session.session import Session
@@ -128,7 +129,7 @@ def export_pose(message: str, face: str | None, settings: Settings) -> str:
                 raise ToolError(f"{reply.get('where', 'set')}: {reply['message']}")
     timeline = session.broadcast.timeline(0, FPS)
     frame = round(SETTLED * FPS)
-    frames = timeline.window(frame, frame).faps
+    frames = to_fap(timeline.window(frame, frame).aus, session.faces.mapping(0))
     clip = FAPClip.of(replace(frames, times=np.zeros(1), values=frames.values[:1]), FPS, "pose")
     return encode(clip)
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from realizer.server.journal.entry import Entry, Journal, JournalError, Log, SavedSession, TakenOver
+from realizer.server.journal.entry import Entry, Journal, JournalError, SavedSession, TakenOver
 
-__all__ = ["Entry", "Journal", "JournalError", "Log", "SavedSession", "TakenOver", "journal_at"]
+__all__ = ["Entry", "Journal", "JournalError", "SavedSession", "TakenOver", "journal_at"]
 
 
 def journal_at(address: str) -> Journal:

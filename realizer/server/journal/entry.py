@@ -133,8 +133,11 @@ def quoted(line: str | bytes) -> str:
     return line[:80] if isinstance(line, str) else line[:80].decode(errors="replace")
 
 
-class Log(Protocol):
-    """A log of session events. Its methods run in the event loop: each takes well under 1 ms."""
+class Journal(Protocol):
+    """A log of sessions from which another process can resume them; it keeps them until they end.
+
+    Its methods but `taken_over` run in the event loop: each takes well under 1 ms.
+    """
 
     def begin(self, session: str, epoch: float) -> None:
         """Add a new session, whose clock is 0 at the POSIX time `epoch`.
@@ -160,10 +163,6 @@ class Log(Protocol):
     def close(self) -> None:
         """Close the log."""
         ...
-
-
-class Journal(Log, Protocol):
-    """A log from which another process can resume sessions; it keeps them until they end."""
 
     def claim(self, session: str) -> SavedSession | None:
         """Take a session over and return it, or None if there is none.

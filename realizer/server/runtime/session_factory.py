@@ -164,5 +164,7 @@ class SessionFactory:
     def _journal_writer(
         self, id: str, journal: Journal | None, saved: SavedSession | None = None
     ) -> JournalWriter:
-        on_stopped = self._metrics.record_stopped
+        def on_stopped() -> None:
+            self._metrics.counts["records_stopped"] += 1
+
         return JournalWriter(id, journal, self._recorder, on_stopped=on_stopped, saved=saved)

@@ -334,7 +334,6 @@ class SessionHost:
         self._apply_effects(session)
 
     async def _check_takeovers(self) -> None:
-        """Disconnect the clients of sessions that another process has taken over."""
         for session in await self._factory.taken_over(self._registry.sessions.values()):
             session.hand_over(TakenOver(session.id))
             self._apply_effects(session)

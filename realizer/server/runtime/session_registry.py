@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import secrets
 import zlib
-from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
@@ -78,7 +77,6 @@ class SessionRegistry:
         self.session_of: dict[int, Session] = {}
         self._visitors: dict[int, Visitor] = {}
         self._opened_by: dict[str, str] = {}  # session -> the address that opened it
-        self._opened_count: Counter[str] = Counter()  # address -> number of sessions it has opened
 
     def check(self, name: str | None, visitor: Visitor = ANYBODY, ends: Session | None = None) -> None:
         """Check whether a connection may join or create a session.
@@ -99,7 +97,7 @@ class SessionRegistry:
             raise JoinError(403, f"session: wanted one that the token is for ({wanted}), got {got}")
         if name in self._opened_by and name in self.sessions:
             return
-        most, opened = self._settings.max_address_sessions, self._opened_count[visitor.address]
+        most, opened = self._settings.max_address_sessions, self._opened_count(visitor.address)
         if ends is not None and self._opened_by.get(ends.id) == visitor.address:
             opened -= 1
         if visitor.address and opened >= most and not self._abandoned(visitor.address):
@@ -132,14 +130,13 @@ class SessionRegistry:
         id = secrets.token_urlsafe(9) if name is None else name
         # A restored session counts against the address of the first client that joins it.
         if id not in self._opened_by or id not in self.sessions:
-            if visitor.address and self._opened_count[visitor.address] >= self._settings.max_address_sessions:
+            if visitor.address and self._opened_count(visitor.address) >= self._settings.max_address_sessions:
                 self._end(self._abandoned(visitor.address)[0])
             if id not in self.sessions:
                 if len(self.sessions) >= self._settings.max_sessions:
                     self._end(self._abandoned()[0])
                 self.sessions[id] = self._make(id, now, name is not None)
             self._opened_by[id] = visitor.address
-            self._opened_count[visitor.address] += 1
         session = self.session_of[connection] = self.sessions[id]
         self._visitors[connection] = visitor
         session.connect(connection, now, seen)
@@ -159,11 +156,7 @@ class SessionRegistry:
         """Remove a session that has ended."""
         if self.sessions.get(session.id) is session:
             del self.sessions[session.id]
-            address = self._opened_by.pop(session.id, None)
-            if address is not None:
-                self._opened_count[address] -= 1
-                if not self._opened_count[address]:
-                    del self._opened_count[address]
+            self._opened_by.pop(session.id, None)
 
     def move_connections(self, session: Session, taken: Iterable[Effect], now: float) -> list[Effect]:
         """Move the connections that change to another session, and return the effects that are left.
@@ -226,6 +219,9 @@ class SessionRegistry:
             if s.empty_since is not None and address in (None, self._opened_by.get(s.id))
         ]
         return [session for *_, session in sorted(abandoned)]
+
+    def _opened_count(self, address: str) -> int:
+        return list(self._opened_by.values()).count(address)
 
     def _end(self, session: Session) -> None:
         session.close()

@@ -88,8 +88,6 @@ def clip_block(clip: str, chunk: Chunk) -> Block:
 
 
 class _Text:
-    """A parser of a chunk's text."""
-
     def __init__(self, chunk: Chunk) -> None:
         self.chunk = chunk
         self.core: list[str] = []  # <text>

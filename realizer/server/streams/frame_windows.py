@@ -14,7 +14,7 @@ from realizer.animation.arkit import ARKIT_NAMES, arkit
 from realizer.animation.axis import AU_NAMES
 from realizer.animation.fap.au_fap_mapping import FapMapping, standard
 from realizer.animation.fap.conversion import to_fap
-from realizer.animation.frames import AUFrames, FAPFrames
+from realizer.animation.frames import AUFrames
 from realizer.animation.pose import poses
 from realizer.core.array_types import Float32, Float64, Int16, Int32
 from realizer.playback.player import Player
@@ -126,19 +126,6 @@ class FrameWindow:
         """Free the AUs, which are several times as large as the streamed frames."""
         self._aus = None
 
-    @property
-    def faps(self) -> FAPFrames:
-        """The FAPs of the frames, in FAPU."""
-        return to_fap(self.aus, self._mapping)
-
-    def rows(self, stream: str, raw: bool = False) -> Float32 | Int32:
-        """Return the (n, k) values of fap, au or arkit, as on the wire.
-
-        Args:
-            raw: whether AUs are wanted as they are before the rules of co-occurrence.
-        """
-        return SOURCES[stream].rows(self.aus, self._mapping, raw)
-
     @cached_property
     def poses(self) -> Float32:
         """(n, k) float32, the values of the face's inputs."""
@@ -161,7 +148,7 @@ class FrameWindow:
         stream, raw = subscription.stream, subscription.raw
         packed = self._packed.get((stream, raw))
         if packed is None:
-            rows = self.rows(stream, raw)
+            rows = SOURCES[stream].rows(self.aus, self._mapping, raw)
             packed = self._packed[stream, raw] = PackedFrames(
                 stream, self.first, self._times, rows, subscription.index
             )

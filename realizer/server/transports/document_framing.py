@@ -157,7 +157,6 @@ class DocumentFramer:
         return True
 
     def _end(self) -> None:
-        """Handle a tag that may end a document."""
         self._give_up()
         if self._document < 0:
             if self._orphans:
@@ -175,7 +174,6 @@ class DocumentFramer:
         self._document = -1
 
     def _give_up(self) -> None:
-        """Drop an open document that has grown too large."""
         if self._document >= 0 and self._parsed - self._document > self._limit:
             self._broken = False
             words = f"wanted at most {self._limit} bytes in a document, got more"

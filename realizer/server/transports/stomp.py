@@ -173,7 +173,6 @@ class StompTransport(ReconnectingTransport):
         self._up.set()
 
     async def _send_queue(self, broker: BrokerConnection) -> None:
-        """Send queued messages until the connection is lost."""
         lost = asyncio.create_task(broker.lost.wait())
         try:
             while not lost.done():
@@ -202,7 +201,6 @@ class StompTransport(ReconnectingTransport):
         broker.drop()
 
     async def _call(self, function: Callable[..., None], *arguments: Any) -> None:
-        """Call a function that blocks in the transport's thread."""
         await self._loop.run_in_executor(self._thread, function, *arguments)
 
 

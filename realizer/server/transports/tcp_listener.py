@@ -7,7 +7,6 @@ import logging
 import re
 import socket
 from abc import ABC, abstractmethod
-from collections import Counter
 
 from realizer.core.settings import limit_hint
 
@@ -34,7 +33,7 @@ class TcpTransport(ABC):
         self._name = name
         self._host = host
         self._most = most
-        self._from: Counter[str] = Counter()  # address -> number of open connections
+        self._from: list[str] = []  # the addresses of the open connections
         self._server: asyncio.Server | None = None
         self._clients: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
 
@@ -76,9 +75,9 @@ class TcpTransport(ABC):
         self._clients[task] = writer
         peer = writer.get_extra_info("peername")
         host = "" if peer is None else peer[0].removeprefix("::ffff:")
-        self._from[host] += 1
+        self._from.append(host)
         try:
-            if self._from[host] > self._most:
+            if self._from.count(host) > self._most:
                 words = (
                     f"{self._most} connections from it are open: wanted fewer {limit_hint('max_connections')}"
                 )
@@ -93,7 +92,5 @@ class TcpTransport(ABC):
             log.exception("%s: %s is disconnected: its connection failed", self._name, host)
         finally:
             writer.transport.abort()
-            self._from[host] -= 1
-            if not self._from[host]:
-                del self._from[host]
+            self._from.remove(host)
             del self._clients[task]

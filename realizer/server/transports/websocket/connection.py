@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import http
 import logging
-from collections import Counter
 from functools import lru_cache
 from urllib.parse import urlsplit
 
@@ -40,12 +39,12 @@ class WebSocketConnections:
         self._settings = settings
         self._access = access
         self._checking = asyncio.Lock()
-        self._from: Counter[str] = Counter()  # address -> number of open WebSockets
+        self._from: list[str] = []  # the addresses of the open WebSockets
 
     def check_room(self, socket: ServerConnection) -> None:
         """Raise JoinError if too many connections of the client's address are open."""
         most = self._settings.max_connections
-        if self._from[address_of(socket)] >= most:
+        if self._from.count(address_of(socket)) >= most:
             words = (
                 f"{most} connections from {address_of(socket)} are open: wanted fewer "
                 f"{limit_hint('max_connections')}"
@@ -61,16 +60,14 @@ class WebSocketConnections:
         except JoinError as error:
             await WebSocketWriter(socket).close(1013, str(error))
             return
-        self._from[address] += 1
+        self._from.append(address)
         try:
             if urlsplit(socket.request.path).path == "/check":
                 await self._check(socket)
             else:
                 await self._serve(socket, socket.request)
         finally:
-            self._from[address] -= 1
-            if not self._from[address]:
-                del self._from[address]
+            self._from.remove(address)
 
     async def _serve(self, socket: ServerConnection, request: Request) -> None:
         client = WebSocketWriter(socket)
@@ -126,7 +123,6 @@ class WebSocketConnections:
         return message, self._access.check_hello(message)
 
     async def _reject(self, socket: ServerConnection, client: WebSocketWriter, error: JoinError) -> None:
-        """Send the error and close."""
         self._sessions.metrics.counts["refused"] += 1
         log.info("refused: %s", error, extra={"address": address_of(socket), "status": error.status})
         forbidden = error.status in (http.HTTPStatus.UNAUTHORIZED, http.HTTPStatus.FORBIDDEN)

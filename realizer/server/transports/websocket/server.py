@@ -196,7 +196,6 @@ def startup_lines(settings: Settings, port: int) -> tuple[str, ...]:
 
 
 def _addresses(settings: Settings, port: int) -> tuple[str, str]:
-    """Return the addresses of the WebSocket and of the page."""
     host = "127.0.0.1" if settings.host in ("", "0.0.0.0", "::") else settings.host
     place, s = f"[{host}]:{port}" if ":" in host else f"{host}:{port}", "s" if settings.tls_cert else ""
     return f"ws{s}://{place}/ws", f"http{s}://{place}/"

@@ -125,7 +125,6 @@ class PlayerLink:
         return pack_task(Task(name, self._owner, self._number, params))
 
     def _ended(self) -> None:
-        """Handle the end of the pending task, or its loss."""
         self._go(State.UPLOADED if self.state is State.UPLOADING else State.READY)
 
     def _log_once(self, words: str) -> None:

@@ -65,7 +65,6 @@ class TaskReader:
         return items
 
     def _step(self, items: list[Task | Fault]) -> bool:
-        """Parse the next item. Return False if data is missing."""
         if self._size:
             return self._skip_content()
         if self._lost:
@@ -146,7 +145,6 @@ class TaskReader:
         return True
 
     def _skip(self) -> bool:
-        """Skip to the end of a span with a fault."""
         bound = _BOUND.search(self._data)
         if bound is None:
             self._drop(max(0, len(self._data) - 5))

@@ -290,7 +290,6 @@ def test_registry_never_exceeds_the_limit_of_an_address(
     registry.remove_expired(2000)
     assert not registry.sessions
     assert not registry._opened_by
-    assert not registry._opened_count
 
 
 def test_worker_of_is_the_first_one_for_other_transports() -> None:
