@@ -6,15 +6,15 @@ import asyncio
 import errno
 import io
 import os
-from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from bml_schema.feedback import BlockProgress
-from realizer.client.message_router import BlockWaiter, ClientError, Frame
+from realizer.client.message_router import ClientError
 from realizer.core.array_types import Int16, UInt8
 from realizer.protocol.wire import WireFrame
 
@@ -23,28 +23,13 @@ RATE = 48_000  # Hz
 LOOK = {"format": "jpeg", "quality": 95}
 
 
-class Camera(Protocol):
-    """The methods of a `Client` that recording needs."""
-
-    @property
-    def errors(self) -> list[dict[str, Any]]: ...
-
-    async def subscribe(self, stream: str, **fields: Any) -> dict[str, Any]: ...
-
-    def frames(self, stream: str) -> AsyncIterator[Frame]: ...
-
-    async def send_and_follow(self, bml: str) -> BlockWaiter: ...
-
-    async def wait_for(self, condition: Callable[[], bool]) -> None: ...
-
-
 async def record(
-    connection: AbstractAsyncContextManager[Camera], path: Path, bml: str, fps: float, look: Mapping[str, Any]
+    connection: AbstractAsyncContextManager[Any], path: Path, bml: str, fps: float, look: Mapping[str, Any]
 ) -> BlockProgress:
     """Play BML and save its last block as a film. Other arguments and errors are those of `Client.film`.
 
     Args:
-        connection: to the session, to be opened and used for this only.
+        connection: a `Client` of the session, to be opened and used for this only.
     """
     from realizer.core.atomic_files import replacing
     from realizer.outputs.film import FORMATS, encode_film
@@ -65,7 +50,7 @@ async def record(
         await camera.wait_for(lambda: bool(pictures) or bool(camera.errors))
         until = await camera.send_and_follow(bml)
         await camera.wait_for(lambda: until.is_finished)
-        end = until.end()
+        end: BlockProgress = until.end()
         assert until.start is not None
         # The last picture is still being drawn.
         await camera.wait_for(lambda: bool(camera.errors) or pictures[-1].time >= end.global_time)
@@ -85,7 +70,7 @@ async def record(
     return end
 
 
-async def _collect(camera: Camera, stream: str, kept: list[WireFrame]) -> None:
+async def _collect(camera: Any, stream: str, kept: list[WireFrame]) -> None:
     async for frame in camera.frames(stream):
         assert isinstance(frame, WireFrame)
         kept.append(frame)

@@ -17,9 +17,9 @@ from realizer.server.session.character_faces import CharacterFaces
 from realizer.server.session.control_fields import FieldError, character_index
 from realizer.server.session.effects import RenderOptions
 from realizer.server.session.feedback_log import FeedbackFilter
+from realizer.server.streams.audio_stream import AudioSubscription
 from realizer.server.streams.broadcast import Broadcast
 from realizer.server.streams.connection import (
-    AudioSubscription,
     Connection,
     ScheduleSubscription,
     Subscription,

@@ -1,8 +1,11 @@
-"""The sound of a player in packets, mixed ahead in blocks."""
+"""The sound of a player in packets, mixed ahead in blocks, and subscriptions to it."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -10,6 +13,8 @@ from realizer.core.array_types import Float32
 from realizer.playback.active_block import ScheduledSpeech
 from realizer.playback.audio_mix import CUT, render_utterance
 from realizer.playback.player import Player
+from realizer.protocol.wire import pack
+from realizer.server.streams.frame_windows import EPSILON
 
 # A sound packet, and how far ahead of its time it is sent.
 PACKET = 0.02  # s
@@ -86,6 +91,55 @@ class AudioStream:
         part = replace(utterance, pcm=pcm, duration=len(pcm) / rate)
         sound = render_utterance(replace(speech, start=speech.start + first, utterance=part), self.rate)
         return sound[(second - first) * self.rate : (second - first + BLOCK) * self.rate]
+
+
+@dataclass(eq=False)
+class AudioSubscription:
+    """A subscription to sound: `next` is the next packet to send, `sent` the last few that were sent."""
+
+    sound: AudioStream
+    index: int
+    next: int
+    version: int
+    sent: deque[tuple[int, bytes | None]] = field(default_factory=lambda: deque(maxlen=8))
+
+    def messages(self, now: float) -> Iterator[tuple[bytes, bool]]:
+        """Yield the messages that are due, each with whether a slow client can do without.
+
+        Packets that a change of plans has made wrong are taken back first.
+        """
+        sound, current = self.sound, math.floor((now + EPSILON) / PACKET)
+        if self.version != sound.player.version:
+            self.version = sound.player.version
+            if (changed := self._changed(current)) is not None:
+                yield self._message(changed, b"", forget=True), False
+                self.next = changed
+        last = math.floor((now + AHEAD + EPSILON) / PACKET)
+        if sound.span() is None or self.next > last:
+            return
+        for number in range(max(self.next, current), last + 1):
+            pcm = sound.packet(number)
+            self.sent.append((number, pcm))
+            if pcm is not None:
+                yield self._message(number, pcm), True
+        self.next = last + 1
+
+    def next_due(self) -> float:
+        """Return the time at which `messages` is due next; infinity if nothing sounds."""
+        if self.version != self.sound.player.version:
+            return -math.inf
+        span = self.sound.span()
+        if span is None or span[1] <= self.next * PACKET:
+            return math.inf
+        return max(self.next * PACKET, math.floor(span[0] / PACKET) * PACKET) - AHEAD
+
+    def _changed(self, current: int) -> int | None:
+        """Return the number of the first packet sent ahead that would differ now, or None."""
+        ahead = sorted((number, pcm) for number, pcm in dict(self.sent).items() if number >= current)
+        return next((number for number, pcm in ahead if self.sound.packet(number) != pcm), None)
+
+    def _message(self, number: int, pcm: bytes, *, forget: bool = False) -> bytes:
+        return pack("audio", number, number * PACKET, pcm, character=self.index, flush=forget)
 
 
 def _end(speech: ScheduledSpeech) -> float:

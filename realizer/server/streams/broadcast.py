@@ -9,10 +9,8 @@ from weakref import WeakValueDictionary
 from realizer.playback.player import Player
 from realizer.server.session.character_faces import CharacterFaces
 from realizer.server.session.effects import Effect, RenderOptions, Send
-from realizer.server.streams.audio_packets import packets_due, send_packets
-from realizer.server.streams.audio_stream import PACKET, AudioStream
+from realizer.server.streams.audio_stream import PACKET, AudioStream, AudioSubscription
 from realizer.server.streams.connection import (
-    AudioSubscription,
     Connection,
     ScheduleSubscription,
     VideoSubscription,
@@ -202,7 +200,11 @@ class Broadcast:
         """Send all that is due to the subscribers of the last `set_subscribers`."""
         self._send_schedules(now, effects)
         for connection, s in self._audio_subscribers:
-            send_packets(connection, s, now, effects)
+            for message, is_sound in s.messages(now):
+                if is_sound and connection.is_slow:
+                    connection.dropped += 1
+                else:
+                    effects.append(Send(connection.id, message))
         effects += self.frames_due(now)
         self.video.due(self._video_subscribers, now, effects)
 
@@ -235,7 +237,7 @@ class Broadcast:
     @property
     def next_other(self) -> float:
         """The time of the next packet, picture or schedule; infinity if there is none."""
-        times = [packets_due(s) for _, s in self._audio_subscribers]
+        times = [s.next_due() for _, s in self._audio_subscribers]
         times.append(self.video.next(self._video_subscribers))
         if self.schedule_subscribers:
             changed = self._schedules.has_changes()

@@ -2,29 +2,17 @@
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass, field
 
 from realizer.server.session.effects import RenderOptions
 from realizer.server.session.feedback_log import FeedbackFilter
-from realizer.server.streams.audio_stream import AudioStream
+from realizer.server.streams.audio_stream import AudioSubscription
 from realizer.server.streams.frame_windows import FrameSubscription, FrameTimeline
 
 # With more unsent bytes than this a connection misses frames: two thirds of a second of a mesh.
 SLOW = 512 * 1024
 # With more than this it is closed. The client can resume with `seen`.
 STUCK = 32 * 2**20
-
-
-@dataclass(eq=False)
-class AudioSubscription:
-    """A subscription to sound: `next` is the next packet to send, `sent` the last few that were sent."""
-
-    sound: AudioStream
-    index: int
-    next: int
-    version: int
-    sent: deque[tuple[int, bytes | None]] = field(default_factory=lambda: deque(maxlen=8))
 
 
 @dataclass(eq=False)

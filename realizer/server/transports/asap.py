@@ -16,7 +16,7 @@ from collections.abc import Callable
 from typing import cast
 
 from bml_schema import WarningFeedback
-from realizer.core.settings import Settings, limit_hint
+from realizer.core.settings import Settings
 from realizer.server.http.access import RateLimiter
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError
@@ -79,8 +79,7 @@ class AsapTransport(TcpTransport):
         while data := await reader.read(READ):
             for item in framer.feed(data):
                 if isinstance(item, Fault):
-                    text = f"{item.text} {limit_hint('max_document')}" if item.large else item.text
-                    link.warn("PARSING_FAILURE", text, item.block or "<no id>")
+                    link.warn("PARSING_FAILURE", item.text, item.block or "<no id>")
                 elif not self._sessions.receive(number, item):
                     return
                 await limiter.pause(lambda notice: link.warn("IOException", notice))

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from realizer.core.settings import limit_hint
+
 
 @dataclass(frozen=True, slots=True)
 class Fault:
@@ -13,12 +15,10 @@ class Fault:
     Attributes:
         text: why.
         block: the block's id, if it can be read.
-        large: whether it is longer than a document may be.
     """
 
     text: str
     block: str | None = None
-    large: bool = False
 
 
 # The marks at which documents begin and end, and constructs that may hide such marks. The lookahead needs the
@@ -53,7 +53,7 @@ class DocumentFramer:
     cut into reads, and each byte is examined a few times at most.
 
     Args:
-        limit: most bytes of a document, and of a comment between documents.
+        limit: most bytes of a document (the setting max_document), and of a comment between documents.
     """
 
     def __init__(self, limit: int) -> None:
@@ -177,7 +177,8 @@ class DocumentFramer:
         if self._document >= 0 and self._parsed - self._document > self._limit:
             self._broken = False
             words = f"wanted at most {self._limit} bytes in a document, got more"
-            self._fault(words, self._id(self._document + self._limit), large=True)
+            words = f"{words} {limit_hint('max_document')}"
+            self._fault(words, self._id(self._document + self._limit))
             self._orphans += 1
             self._document = -1
 
@@ -200,11 +201,11 @@ class DocumentFramer:
             shown = bytes(self._stray).strip(_BLANKS).decode("utf-8", "replace")
             self._fault(f"wanted <bml>, got {shown!r}")
 
-    def _fault(self, text: str, block: str | None = None, *, large: bool = False) -> None:
+    def _fault(self, text: str, block: str | None = None) -> None:
         """Report a fault, once for each span between good documents."""
         self._stray.clear()
         if not self._broken:
-            self._items.append(Fault(text, block, large))
+            self._items.append(Fault(text, block))
         self._broken = True
 
     def _id(self, end: int) -> str | None:

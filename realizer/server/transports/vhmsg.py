@@ -10,7 +10,6 @@ from urllib.parse import quote, unquote_plus
 from xml.sax.saxutils import quoteattr, unescape
 
 from bml_schema import BlockProgress, PredictionFeedback, WarningFeedback, parse_feedback
-from realizer.core.settings import limit_hint
 from realizer.server.transports.document_framing import DocumentFramer
 from realizer.server.transports.message_formats import Action, Disconnect, Inbound, Message
 
@@ -84,11 +83,7 @@ class Vhmsg:
         documents = [item for item in items if isinstance(item, str)]
         speak = _Speak(agent, recipient, id, set())
         if not documents:
-            faults = [
-                f"{item.text} {limit_hint('max_document')}" if item.large else item.text
-                for item in items
-                if not isinstance(item, str) and "<bml" not in item.text
-            ]
+            faults = [item.text for item in items if not isinstance(item, str) and "<bml" not in item.text]
             speak.error = faults[0] if faults else "wanted a whole <bml> document"
             return list(self._finish(speak))
         actions: list[Action] = []
