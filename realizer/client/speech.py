@@ -53,10 +53,6 @@ class SpeechProgress:
             case WarningFeedback(id=id) if id == self._id:
                 self.refused = feedback.text
 
-    def has_passed(self, sync: str) -> bool:
-        """Return whether a sync was spoken, or never will be."""
-        return sync in self.points or self.is_finished
-
     @property
     def is_finished(self) -> bool:
         return any(reason is not None for reason in (self.end, self.refused, self.fault))
@@ -154,7 +150,7 @@ class Speech:
         Raises:
             ClientError: the speech ended without it or was refused, or the connection has ended.
         """
-        await self._wait(lambda: self.progress.has_passed(sync))
+        await self._wait(lambda: sync in self.progress.points or self.progress.is_finished)
         return self.progress.point(sync)
 
     async def ended(self) -> BlockProgress:

@@ -13,12 +13,7 @@ from realizer.protocol.streams import STREAMS
 PROTOCOL = 1
 
 # Type of a control message -> type of its answer; other messages have none.
-ANSWERS: Mapping[str, str] = {
-    "hello": "welcome",
-    "subscribe": "subscribed",
-    "state": "state",
-    "ping": "pong",
-}
+ANSWERS: Mapping[str, str] = {"hello": "welcome", "subscribe": "subscribed", "state": "state", "ping": "pong"}
 
 # Longest control message: a scene of a few thousand objects.
 MAX_CONTROL = 256 * 1024  # bytes

@@ -5,14 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Mapping
 
-from realizer.server.journal.entry import (
-    Entry,
-    Journal,
-    JournalError,
-    Kind,
-    SavedSession,
-    TakenOver,
-)
+from realizer.server.journal.entry import Entry, Journal, JournalError, Kind, SavedSession, TakenOver
 from realizer.server.journal.recordings import RecordingFolder
 
 log = logging.getLogger(__name__)

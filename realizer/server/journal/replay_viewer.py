@@ -59,15 +59,13 @@ class ReplayViewer:
     @property
     def face_changes(self) -> tuple[FaceChange, ...]:
         """The faces of the first character."""
-        return self._face_changes(self._recorders[0])
+        return tuple(self._recorders[0].face_changes)
 
     def performances(self, count: int) -> dict[str | None, Performance]:
         """Return the first `count` frames of each character; the first one is at time 0."""
         self._capture(self.first + count)
         names = self._session.player.characters
-        return {
-            name: self._performance(recorder) for name, recorder in zip(names, self._recorders, strict=True)
-        }
+        return {name: recorder.performance() for name, recorder in zip(names, self._recorders, strict=True)}
 
     def _capture(self, end: int) -> None:
         player = self._session.player
@@ -77,28 +75,9 @@ class ReplayViewer:
                 self._recorders.append(_CharacterRecorder(self._session, index, self._fps, self.first))
             self._recorders[index].capture(end)
 
-    def _performance(self, recorder: _CharacterRecorder) -> Performance:
-        aus = recorder.frames()
-        changes = self._face_changes(recorder)
-        ends = [*(change.frame for change in changes[1:]), len(aus.times)]
-        faps = [to_fap(aus.part(c.frame, end), c.mapping) for c, end in zip(changes, ends, strict=True)]
-        values = np.concatenate([part.values for part in faps])
-        mask = np.any([part.mask for part in faps], axis=0)
-        return Performance(aus, FAPFrames(aus.times, values, mask))
-
-    def _face_changes(self, recorder: _CharacterRecorder) -> tuple[FaceChange, ...]:
-        mapping = self._session.settings.mapping
-        return tuple(
-            FaceChange(frame - self.first, name, mapping_of(name, mapping)) for frame, name in recorder.faces
-        )
-
 
 class _CharacterRecorder:
-    """The frames of one character so far.
-
-    Attributes:
-        faces: (frame, name) of each face change.
-    """
+    """The frames of one character so far."""
 
     def __init__(self, session: Session, index: int, fps: float, first: int) -> None:
         self._session = session
@@ -109,14 +88,17 @@ class _CharacterRecorder:
         self._parts: list[AUFrames] = []
         self._window: FrameWindow | None = None  # its frames from `_begin` on are not in `_parts` yet
         self._begin = first
-        self.faces: list[tuple[int, str]] = []
+        self._first = first
+        self.face_changes: list[FaceChange] = []
 
     def capture(self, end: int) -> None:
         """Capture all frames before `end`."""
         if self._next >= end:
             return
-        if (face := self._session.faces.name(self._index)) not in (name for _, name in self.faces[-1:]):
-            self.faces.append((self._next, face))
+        face = self._session.faces.name(self._index)
+        if face not in (change.face for change in self.face_changes[-1:]):
+            mapping = mapping_of(face, self._session.settings.mapping)
+            self.face_changes.append(FaceChange(self._next - self._first, face, mapping))
         while self._next < end:
             window = self._timeline.window(self._next, self._next)
             if window is not self._window:
@@ -125,11 +107,18 @@ class _CharacterRecorder:
             assert len(window.aus.times)  # computes the lazy frames now, from this plan
             self._next = min(end, window.end)
 
-    def frames(self) -> AUFrames:
+    def performance(self) -> Performance:
         """Return all frames; the first one is at time 0."""
         self._store_window()
         joined = AUFrames.concatenate(self._parts)
-        return replace(joined, times=np.arange(len(joined.times)) / self._fps)
+        aus = replace(joined, times=np.arange(len(joined.times)) / self._fps)
+        ends = [*(change.frame for change in self.face_changes[1:]), len(aus.times)]
+        faps = [
+            to_fap(aus.part(c.frame, end), c.mapping) for c, end in zip(self.face_changes, ends, strict=True)
+        ]
+        values = np.concatenate([part.values for part in faps])
+        mask = np.any([part.mask for part in faps], axis=0)
+        return Performance(aus, FAPFrames(aus.times, values, mask))
 
     def _store_window(self) -> None:
         """Store the captured frames of the window: the plan may change long before its end."""

@@ -86,7 +86,7 @@ async def aggregate(
             return None
 
     answers = {k: a for k, a in enumerate(await asyncio.gather(*map(ask, range(workers)))) if a}
-    await loop.sock_sendall(client, _combined(answers, lambda texts: _COMBINE[path](texts, workers)))
+    await loop.sock_sendall(client, _combined(answers, path, workers))
 
 
 async def _ask_worker(
@@ -105,7 +105,7 @@ async def _ask_worker(
     return answer
 
 
-def _combined(answers: Mapping[int, bytes], combine: Callable[[Mapping[int, str]], str]) -> bytes:
+def _combined(answers: Mapping[int, bytes], path: str, workers: int) -> bytes:
     """Return one answer for those of the workers, by their numbers: the first refusal if there is one."""
     if not answers:
         return UNAVAILABLE
@@ -113,6 +113,7 @@ def _combined(answers: Mapping[int, bytes], combine: Callable[[Mapping[int, str]
         if not OK.match(answer):
             return answer
     parts = {number: answer.partition(b"\r\n\r\n") for number, answer in answers.items()}
-    body = combine({number: text.decode() for number, (_, _, text) in parts.items()}).encode()
+    texts = {number: text.decode() for number, (_, _, text) in parts.items()}
+    body = _COMBINE[path](texts, workers).encode()
     head, end, _ = next(iter(parts.values()))
     return LENGTH.sub(rb"\g<1>%d" % len(body), head) + end + body

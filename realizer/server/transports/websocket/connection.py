@@ -22,8 +22,8 @@ from realizer.server.http.access import AccessControl, RateLimiter
 from realizer.server.http.jwt_tokens import Grant
 from realizer.server.journal import JournalError
 from realizer.server.runtime.session_host import SessionHost
-from realizer.server.runtime.session_registry import JoinError
-from realizer.server.transports.websocket.request import address_of, headers_of, session_of, visitor_of
+from realizer.server.runtime.session_registry import JoinError, Visitor
+from realizer.server.transports.websocket.request import address_of, headers_of, session_of
 
 log = logging.getLogger(__name__)
 
@@ -70,13 +70,12 @@ class WebSocketConnections:
             self._from.remove(address)
 
     async def _serve(self, socket: ServerConnection, request: Request) -> None:
-        client = WebSocketWriter(socket)
-        hello = None
+        client, hello, address = WebSocketWriter(socket), None, address_of(socket)
         try:
             grant = self._access.request(request.path, headers_of(request), later=True)
             if grant is None:
                 hello, grant = await self._first_message(socket)
-            visitor = visitor_of(socket, grant)
+            visitor = Visitor(address, grant.sessions)
             name, seen = session_of(request)
             self._sessions.check(name, visitor)  # again: the grant of a hello is known only now
             await self._sessions.restore(name, seen)
@@ -87,7 +86,7 @@ class WebSocketConnections:
         except JournalError as error:
             await client.close(1013, str(error))
             return
-        fields = {"connection": number, "session": name, "address": address_of(socket)}
+        fields = {"connection": number, "session": name, "address": address}
         log.info("joined", extra=fields)
         try:
             if hello is not None:

@@ -10,8 +10,7 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from realizer.server.http.http_site import HttpResponse
-from realizer.server.http.jwt_tokens import Grant
-from realizer.server.runtime.session_registry import JoinError, Visitor
+from realizer.server.runtime.session_registry import JoinError
 
 
 def address_of(socket: ServerConnection) -> str:
@@ -26,11 +25,6 @@ def address_of(socket: ServerConnection) -> str:
 def headers_of(request: Request) -> dict[str, str]:
     """Return the headers by lower-case names; of several with one name the last."""
     return {name.lower(): value for name, value in request.headers.raw_items()}
-
-
-def visitor_of(socket: ServerConnection, allowed: Grant | None) -> Visitor:
-    """Return the visitor; without a grant its sessions are not known yet."""
-    return Visitor(address_of(socket), None if allowed is None else allowed.sessions)
 
 
 def query_of(request: Request) -> dict[str, str]:

@@ -25,7 +25,7 @@ from realizer.server.http.access import AccessControl
 from realizer.server.http.http_site import TEXT, HttpResponse, HttpSite
 from realizer.server.http.metrics import MEDIA_TYPE
 from realizer.server.runtime.session_host import SessionHost
-from realizer.server.runtime.session_registry import JoinError
+from realizer.server.runtime.session_registry import JoinError, Visitor
 from realizer.server.transports.websocket.connection import GOODBYE, WebSocketConnections
 from realizer.server.transports.websocket.request import (
     address_of,
@@ -33,7 +33,6 @@ from realizer.server.transports.websocket.request import (
     query_of,
     response_to,
     session_of,
-    visitor_of,
 )
 
 log = logging.getLogger(__name__)
@@ -143,7 +142,9 @@ class WebSocketTransport:
                 if path == "/check":
                     self._access.check_memory()
                 else:
-                    self._sessions.check(session_of(request)[0], visitor_of(connection, grant))
+                    # Without a grant its sessions are not known yet.
+                    visitor = Visitor(address_of(connection), None if grant is None else grant.sessions)
+                    self._sessions.check(session_of(request)[0], visitor)
             except JoinError as error:
                 return self._refused(connection, error)
             return None
