@@ -196,7 +196,10 @@ class Client:
         from realizer.client.record import record
 
         # Another connection, so that the subscriptions of this one stay as they are.
-        return await record(self._connect(_join_url(self.url, self.session)), Path(path), bml, fps, look)
+        parts = urlsplit(self.url)
+        query = [(name, value) for name, value in parse_qsl(parts.query) if name not in ("session", "seen")]
+        url = parts._replace(query=urlencode([*query, ("session", self.session)])).geturl()
+        return await record(self._connect(url), Path(path), bml, fps, look)
 
     async def close(self) -> None:
         """Close the connection."""
@@ -232,10 +235,3 @@ class Client:
             raise ClientError(
                 "the connection has ended" + (f": {self._close_reason}" if self._close_reason else "")
             )
-
-
-def _join_url(url: str, session: str) -> str:
-    """Return the address of another connection to the same session."""
-    parts = urlsplit(url)
-    others = [(name, value) for name, value in parse_qsl(parts.query) if name not in ("session", "seen")]
-    return parts._replace(query=urlencode([*others, ("session", session)])).geturl()

@@ -40,7 +40,9 @@ class PendingConnection:
         try:
             socket = await dial(self._url, compression=None, max_size=None, max_queue=None)
         except InvalidStatus as refused:
-            raise _refusal(refused.response.status_code, bytes(refused.response.body)) from None
+            status, body = refused.response.status_code, bytes(refused.response.body)
+            text = body.decode("utf-8", "replace").strip() or f"the service answers with the status {status}"
+            raise ClientError(text, "token" if status in (401, 403) else "connection") from None
         except WebSocketException as error:
             raise ClientError(f"{self._url}: {error}") from None
         self._client = Client(socket, self._url, lambda url: PendingConnection(url, self._token))
@@ -63,8 +65,3 @@ class PendingConnection:
     def __exit__(self, *_: object) -> None:
         assert self._sync_client is not None
         self._sync_client.close()
-
-
-def _refusal(status: int, body: bytes) -> ClientError:
-    text = body.decode("utf-8", "replace").strip() or f"the service answers with the status {status}"
-    return ClientError(text, "token" if status in (401, 403) else "connection")

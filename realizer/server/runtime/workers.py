@@ -96,11 +96,6 @@ class Workers:
             self._add_task(self._watch(number, control))
         return self
 
-    @property
-    def processes(self) -> list[int]:
-        """The process ids, in order of the workers."""
-        return [child.pid for child, _ in self._children if child.pid is not None]
-
     def stop_accepting(self) -> None:
         """Accept no more connections, and ask the workers to drain and end."""
         self._ending = True

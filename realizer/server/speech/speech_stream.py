@@ -11,13 +11,6 @@ from realizer.server.speech.sentence_splitter import SentenceSplitter, is_senten
 from realizer.server.speech.speech_chunks import Chunk, clip_block, text_block
 
 
-@dataclass(frozen=True, slots=True)
-class _Clip:
-    """A recording that is played after the preceding text."""
-
-    id: str
-
-
 @dataclass(eq=False)
 class SpeechStream:
     """One speech.
@@ -27,7 +20,7 @@ class SpeechStream:
 
     Attributes:
         chunk: the last chunk.
-        unspoken: sentences and clips that are in no block yet.
+        unspoken: sentences and ids of clips that are in no block yet, each with whether it is a clip.
         marks: sync -> id of its chunk's block.
         partial_chunks: ids of blocks that speak only part of a sentence.
         unplanned: ids of blocks that are not planned yet, in order.
@@ -45,7 +38,7 @@ class SpeechStream:
     composition: str
     chunk: Chunk
     splitter: SentenceSplitter = field(default_factory=SentenceSplitter)
-    unspoken: deque[str | _Clip] = field(default_factory=deque)
+    unspoken: deque[tuple[str, bool]] = field(default_factory=deque)
     marks: dict[str, str] = field(default_factory=dict)
     partial_chunks: set[str] = field(default_factory=set)
     unplanned: list[str] = field(default_factory=list)
@@ -61,19 +54,19 @@ class SpeechStream:
 
     def add(self, text: str, clip: str | None) -> None:
         """Add text, and a clip after it."""
-        self.unspoken.extend(self.splitter.feed(text, close=clip is not None))
+        self.unspoken.extend((piece, False) for piece in self.splitter.feed(text, close=clip is not None))
         if clip is not None:
-            self.unspoken.append(_Clip(clip))
+            self.unspoken.append((clip, True))
 
     def close(self) -> None:
         """End the text: its rest is complete."""
-        self.unspoken.extend(self.splitter.feed("", close=True))
+        self.unspoken.extend((piece, False) for piece in self.splitter.feed("", close=True))
         self.is_closed = True
 
     @property
     def unspoken_length(self) -> int:
         """The number of characters that are in no block yet."""
-        return sum(len(one) for one in self.unspoken if isinstance(one, str))
+        return sum(len(text) for text, is_clip in self.unspoken if not is_clip)
 
     # blocks ---------------------------------------------------------------------------------------
 
@@ -92,13 +85,13 @@ class SpeechStream:
 
     def next_chunk(self) -> Block:
         """Return the block of the next sentence or clip."""
-        one = self.unspoken.popleft()
+        one, is_clip = self.unspoken.popleft()
         chunk = self.chunk = replace(self.chunk, number=self.chunk.number + 1, marks=dict(self.marks))
-        block = clip_block(one.id, chunk) if isinstance(one, _Clip) else text_block(one, chunk)
+        block = clip_block(one, chunk) if is_clip else text_block(one, chunk)
         speech = next((node for node in block.behaviours if node.id == self.id), None)
         self.marks |= dict.fromkeys(getattr(speech, "marked", ()), block.id)
         self.unplanned.append(block.id)
-        if isinstance(one, str) and not is_sentence(one) and (self.unspoken or not self.is_closed):
+        if not is_clip and not is_sentence(one) and (self.unspoken or not self.is_closed):
             self.partial_chunks.add(block.id)
         return block
 

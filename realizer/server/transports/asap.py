@@ -130,30 +130,23 @@ class CallBack(asyncio.Protocol):
 
     async def keep_connected(self) -> None:
         """Connect, and reconnect whenever the connection is lost, until cancelled."""
-        loop = asyncio.get_running_loop()
+        loop, pause = asyncio.get_running_loop(), FIRST_RETRY
         try:
-            pause = FIRST_RETRY
             while True:
-                await self._connect(loop)
-                since = loop.time()
-                await self._lost.wait()
-                # A peer that closes at once may be another service: do not call it in quick succession.
-                lasted = loop.time() - since > LAST_RETRY
-                pause = FIRST_RETRY if lasted else min(2 * pause, LAST_RETRY)
+                lasted = False
+                with contextlib.suppress(OSError):  # also TimeoutError
+                    async with asyncio.timeout(ATTEMPT):
+                        await loop.create_connection(lambda: self, *self._target)
+                    since = loop.time()
+                    await self._lost.wait()
+                    # A peer that closes at once may be another service: do not call it in quick succession.
+                    lasted = loop.time() - since > LAST_RETRY
+                pause = FIRST_RETRY if lasted else pause
                 await asyncio.sleep(pause)
+                pause = min(2 * pause, LAST_RETRY)
         finally:
             if self._transport is not None:
                 self._transport.close()
-
-    async def _connect(self, loop: asyncio.AbstractEventLoop) -> None:
-        pause = FIRST_RETRY
-        while True:
-            with contextlib.suppress(OSError):  # also TimeoutError
-                async with asyncio.timeout(ATTEMPT):
-                    await loop.create_connection(lambda: self, *self._target)
-                    return
-            await asyncio.sleep(pause)
-            pause = min(2 * pause, LAST_RETRY)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         transport = cast(asyncio.Transport, transport)  # uvloop's class does not inherit from it

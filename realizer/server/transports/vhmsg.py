@@ -20,13 +20,9 @@ NAME = "bml-realizer"
 
 @dataclass(eq=False)
 class _Speak:
-    """A vrSpeak that has not ended.
+    """A vrSpeak that has not ended, with the ids of its blocks: all that play or wait, and those accepted.
 
-    Attributes:
-        blocks: ids of its blocks that have not ended.
-        planned: ids of its blocks that were accepted.
-        plays: whether any of its behaviours plays.
-        dropped: why the first dropped behaviour was dropped.
+    `dropped` says why the first dropped behaviour was dropped.
     """
 
     agent: str

@@ -41,22 +41,14 @@ MAX_WAITING = 100  # queued tasks of a client
 
 @dataclass(eq=False, slots=True)
 class _RunningTask:
-    """A task whose blocks play, or will.
-
-    Attributes:
-        blocks_left: ids of its blocks that have not ended.
-        clip: that it plays; None for a script.
-        planned: ids of its blocks that were accepted.
-        started: whether a block has started.
-        began: when the first block started, in seconds.
-    """
+    """A task whose blocks play, or will: of a clip, or of a script. `planned` blocks were accepted."""
 
     task: Task
     blocks_left: set[str]
     clip: FAPClip | None = None
     planned: set[str] = field(default_factory=set)
     started: bool = False
-    began: float = 0.0
+    began: float = 0.0  # s
 
 
 class TaskRunner:

@@ -199,11 +199,11 @@ def test_workers_report_the_health_of_all_while_one_hangs(workers: Workers) -> N
             assert whole["workers"] == 2
             each = [await asyncio.to_thread(health, workers, f"?worker={k}") for k in (0, 1)]
             assert [one["connections"] for one in each] == [1, 1]
-            os.kill(workers.processes[1], signal.SIGSTOP)
+            os.kill(workers._children[1][0].pid, signal.SIGSTOP)
             try:
                 left = await until(workers, silent=[1])
             finally:
-                os.kill(workers.processes[1], signal.SIGCONT)
+                os.kill(workers._children[1][0].pid, signal.SIGCONT)
             assert (left["status"], left["connections"]) == ("partly", 1)
 
     played(test())
@@ -213,7 +213,7 @@ def test_workers_leave_a_hanging_worker_out_of_the_sum(
     workers: Workers, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(worker_aggregation, "PATIENCE", 0.5)
-    os.kill(workers.processes[1], signal.SIGSTOP)
+    os.kill(workers._children[1][0].pid, signal.SIGSTOP)
     try:
         whole: dict[str, float] = {}
         while 'realizer_worker_sessions{worker="0"}' not in whole:  # a busy machine may keep it waiting too
@@ -221,7 +221,7 @@ def test_workers_leave_a_hanging_worker_out_of_the_sum(
                 whole = metrics(workers)
             assert 'realizer_worker_sessions{worker="1"}' not in whole
     finally:
-        os.kill(workers.processes[1], signal.SIGCONT)
+        os.kill(workers._children[1][0].pid, signal.SIGCONT)
 
 
 @pytest.mark.slow
@@ -255,11 +255,11 @@ def test_workers_restart_one_that_was_killed_while_others_play(workers: Workers)
             async with connect(f"{url}?session={one_of(1)}") as client:
                 await client.send(NOD.format("b"))
                 await told(client, '"b:start"')
-                killed = workers.processes[1]
+                killed = workers._children[1][0].pid
                 os.kill(killed, signal.SIGKILL)
                 with contextlib.suppress(ConnectionClosed):
                     await told(client, '"b:end"')
-            while workers.processes[1] == killed:
+            while workers._children[1][0].pid == killed:
                 await asyncio.sleep(0)
             await stays.send(NOD.format("c"))
             await told(stays, '"c:end"')
