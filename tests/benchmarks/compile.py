@@ -93,7 +93,7 @@ def measured(one: Player, seconds: float = SECONDS, repeats: int = REPEATS) -> S
     for k in range(repeats + 10):
         times = np.arange(int(seconds * FPS)) / FPS + k * 0.7 / repeats
         at = [time.perf_counter()]
-        channels, idle = one._moving(float(times[0]), float(times[-1]), 0)
+        channels, idle = one.motion(times)
         at.append(time.perf_counter())
         frames = blend(channels, times, one.rules, idle)
         at.append(time.perf_counter())
