@@ -47,8 +47,10 @@ class Terms:
         half *= self.low
         half += self.start
         half += value
-        degree = np.minimum(*half.take(self.stronger, axis=0))
-        left[self.units] = np.minimum(left[self.units], 1 - degree.max(axis=0, initial=0))
+        limited = left[self.units].any(axis=1)  # the others are 0 anyway
+        units = self.units[limited]
+        degree = np.minimum(*half.take(self.stronger[..., limited], axis=0))
+        left[units] = np.minimum(left[units], 1 - degree.max(axis=0, initial=0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -47,11 +47,13 @@ def to_fap(frames: AUFrames, mapping: FapMapping | None = None) -> FAPFrames:
     for upper, lower in LIDS:
         np.minimum(values[lower], APERTURE - values[upper], out=values[lower])
     own, least, most = _limits()
-    values *= 1.0 - own * frames.values[:, mask_channel("lips").column]
+    if (lips := frames.values[:, mask_channel("lips").column]).any():
+        values *= 1.0 - own * lips
     if frames.overridden is not None:
         values *= 1.0 - frames.overridden.T
     values += frames.faps.T
-    np.clip(values, least, most, out=values)
+    np.maximum(values, least, out=values)
+    np.minimum(values, most, out=values)
     # FAPs outside the mapping that a client sets directly belong to the mask too.
     mask = matrix.mask | values.any(axis=1)
     return FAPFrames(frames.times, np.ascontiguousarray(values.T), mask)

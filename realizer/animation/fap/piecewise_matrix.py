@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import groupby
 from typing import TypeAlias
 
@@ -67,15 +68,13 @@ class PiecewiseMatrix:
     """The rows of a mapping, prepared for whole arrays.
 
     Attributes:
-        raises, lowers: what raises each FAP, and what lowers it, negated; a polyline may be in both.
-        turns: rotations, which add up.
+        lines: FAP - 1 -> polylines: what raises each FAP; what lowers it, negated; rotations, which add up. A
+            polyline may both raise and lower.
         closed: (68,) float32, the greatest value of each FAP, at which a lid is closed.
         mask: (68,) True where an AU or speech may use the FAP.
     """
 
-    raises: Polylines
-    lowers: Polylines
-    turns: Polylines
+    lines: tuple[Mapping[int, Sequence[Line]], ...]
     closed: Float32
     mask: Bool
 
@@ -99,18 +98,26 @@ class PiecewiseMatrix:
                 raises[fap - 1].append((column, hinges))
             if min(values) < 0:
                 lowers[fap - 1].append((column, [(knot, -slope) for knot, slope in hinges]))
-        return cls(Polylines.of(raises), Polylines.of(lowers), Polylines.of(turns), closed, mask)
+        return cls((raises, lowers, turns), closed, mask)
 
     def evaluate(self, aus: Float32) -> tuple[Float32, Float32, Float32]:
         """Return, (68, n) each, how far AUs (n_au, n) raise, lower and turn each FAP.
 
         Of several AUs the strongest counts; rotations add up.
         """
-        return (
-            self.raises.evaluate(aus, np.maximum),
-            self.lowers.evaluate(aus, np.maximum),
-            self.turns.evaluate(aus, np.add),
-        )
+        raises, lowers, turns = _polylines(self, tuple(np.flatnonzero(aus.any(axis=1)).tolist()))
+        return raises.evaluate(aus, np.maximum), lowers.evaluate(aus, np.maximum), turns.evaluate(aus, np.add)
+
+
+# Sessions repeat a few sets of units.
+@lru_cache(maxsize=512)
+def _polylines(matrix: PiecewiseMatrix, live: tuple[int, ...]) -> list[Polylines]:
+    """Return the polylines of the units that are not 0."""
+    every = [
+        {fap: [line for line in own if line[0] in live] for fap, own in lines.items()}
+        for lines in matrix.lines
+    ]
+    return [Polylines.of({fap: own for fap, own in lines.items() if own}) for lines in every]
 
 
 def _hinges(pieces: list[AuToFap]) -> tuple[list[tuple[float, float]], list[float]]:
