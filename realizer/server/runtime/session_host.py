@@ -266,7 +266,21 @@ class SessionHost:
                 session.update_backlog(run.connection, waiting)
             self._wake_at(session, run.wake_at)
             return
-        self._work(session, now, read_documents=False)
+        try:
+            frames = session.frames(now)
+        except Exception:
+            self._fail(session)
+            return
+        if frames is None:
+            self._work(session, now, read_documents=False)
+            return
+        effects, due = frames
+        for effect in effects:
+            self._apply_effect(session, effect)
+        for number in session.connections:
+            if (waiting := self._clients[number].unsent_bytes) > SLOW:
+                session.update_backlog(number, waiting)
+        self._wake_at(session, due)
 
     def _read(self) -> None:
         """Parse or plan one document of one session. What is due in others comes before the next one."""

@@ -391,6 +391,28 @@ class Session:
         if not self.closed and self._work(t, read_documents):
             self.log_entry(t, "tick")
 
+    def frames(self, now: float) -> tuple[list[Effect], float] | None:
+        """Return due frames and feedback, and the next deadline; None if `tick` must be called instead.
+
+        This is the fast way for a session in which nothing but frames and feedback is due.
+        """
+        t = now - self.opened
+        if self._next_other is None or t + EPSILON >= self._next_other:
+            return None
+        if t + EPSILON >= self._next_feedback:
+            version = self.player.version
+            self._publish(t)
+            self._next_feedback = self.player.next_change()
+            if self.player.version != version:
+                self._forget_deadline()
+        sends, following = self.broadcast.frames_due(t)
+        effects = [*self.take_effects(), *sends]
+        if self._next_other is None:
+            return effects, self.next_due()
+        other = min(self._next_other, self._next_feedback) + self.opened
+        self.fast_path = self.broadcast.fast_path(self.opened, other)
+        return effects, min(other, following + self.opened)
+
     def compact_journal(self, now: float) -> None:
         """Replace the journal by a checkpoint if it has grown; due feedback is published first."""
         if self.journal.needs_checkpoint and not self.closed:
@@ -454,9 +476,6 @@ class Session:
             shown = streams.active and bool(streams.schedule_subscribers)
             if not (self.has_documents or slow or self.submission.speeches.open_ids or shown):
                 self._next_other = other
-        if self._next_other is not None:
-            until = min(other, self._next_feedback) + self.opened
-            self.fast_path = streams.fast_path(self.opened, until) if streams.active else None
         next_frame = streams.next_frame if streams.active else math.inf
         return min(other, self._next_feedback, next_frame) + self.opened
 
@@ -500,7 +519,7 @@ class Session:
         """
         self._publish(t)
         if self.broadcast.active:
-            self._effects += self.broadcast.frames_due(t)
+            self._effects += self.broadcast.frames_due(t)[0]
 
     def _send_feedback(self, connection: Connection, texts: list[str]) -> None:
         if (filter := connection.feedback) is not None:

@@ -201,17 +201,17 @@ class Broadcast:
                     connection.dropped += 1
                 else:
                     effects.append(Send(connection.id, message))
-        effects += self.frames_due(now)
+        effects += self.frames_due(now)[0]
         self.video.due(self._video_subscribers, now, effects)
 
-    def frames_due(self, now: float) -> list[Send]:
-        """Return the due frames of fap, au, arkit and mesh."""
+    def frames_due(self, now: float) -> tuple[list[Send], float]:
+        """Return the due frames of fap, au, arkit and mesh, and the time of the next one."""
         sends: list[Send] = []
         for fanout in self._fanouts:
             newest = last_frame_at(now, fanout.timeline.fps)
             if fanout.next <= newest:
                 fanout.send(newest, now, sends)
-        return sends
+        return sends, self.next_frame
 
     def fast_path(self, zero: float, until: float) -> FrameRun | None:
         """Return the packed frames of the only subscriber; None if there are other or more subscribers.

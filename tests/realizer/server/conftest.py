@@ -128,8 +128,15 @@ class Driver:
             assert run.wake_at == self.session.next_due()
             self.do(Send(run.connection, data))
             return
-        self.session.tick(self.opened + self.now)
-        self.collect()
+        found = None if self.session.has_documents else self.session.frames(now)
+        if found is None:
+            self.session.tick(self.opened + self.now)
+            self.collect()
+        else:
+            effects, due = found
+            assert due == self.session.next_due()
+            for effect in effects:
+                self.do(effect)
 
     def collect(self) -> None:
         for effect in self.session.take_effects():
