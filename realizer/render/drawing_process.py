@@ -8,15 +8,13 @@ import sys
 import threading
 import weakref
 from functools import cache
+from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from realizer.core.errors import RenderError
-
-if TYPE_CHECKING:
-    from multiprocessing.connection import Connection
-
-    from realizer.render.process_messages import Message, Open
+from realizer.render.backdrop import channels
+from realizer.render.process_messages import Failed, Open, Pixels, connection
 
 DRAW = "REALIZER_DRAW"  # the variable that names a way of drawing
 PATIENCE = 60.0  # s; the longest answer, a first start that compiles, takes about 10
@@ -26,9 +24,6 @@ class DrawingProcess:
     """A drawing process, which opens its canvas while its owner continues."""
 
     def __init__(self, order: Open) -> None:
-        from realizer.render.backdrop import channels
-        from realizer.render.process_messages import Pixels, connection
-
         self._memory = Path(order.memory)
         self._opened = threading.Event()
         try:
@@ -65,15 +60,13 @@ class DrawingProcess:
             self._memory.unlink(missing_ok=True)
         self._opened.set()
 
-    def send(self, message: Message) -> None:
+    def send(self, message: Open | tuple[Any, ...]) -> None:
         try:
             self._orders.send(message)
         except OSError:
             raise self._died() from None
 
     def receive(self) -> Any:
-        from realizer.render.process_messages import Failed
-
         try:
             if not self._answers.poll(PATIENCE):
                 raise RenderError(f"the drawing process gave no picture within {PATIENCE:g} s")

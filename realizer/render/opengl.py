@@ -7,43 +7,23 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.array_types import Float32, UInt8
+from realizer.core.array_types import UInt8
 from realizer.core.errors import RenderError
-from realizer.face.model import Face
-from realizer.render.backdrop import backdrop, channels, over
-from realizer.render.cameras import Camera
-from realizer.render.light import Light
-from realizer.render.shaded_mesh import ShadedMesh
+from realizer.render.backends import Canvas
 
 NO_LIBRARY = "pictures need the render extra: pip install 'bml-realizer[render]'"
 NO_GL = "pictures need OpenGL: install Debian packages libegl1 and libgl1"
 
 
-class OpenGLCanvas:
-    """A head on the graphics card (or its stand-in in software), drawn again and again.
+class OpenGLCanvas(Canvas):
+    """A head on the graphics card (or its stand-in in software).
 
     Belongs to the thread that made it, as its GL context does; one at a time in a process. Light is worked
     out a vertex, in numpy, and drawn flat: four times as fast as a lit shader on a software GL.
     """
 
-    def __init__(
-        self,
-        face: Face,
-        size: tuple[int, int],
-        camera: Camera,
-        light: Light,
-        background: str | None = None,
-    ) -> None:
-        """Open a GL context; `background` as `backdrop` takes it.
-
-        Raises:
-            RenderError: no pyrender or no GL; the text says what to install.
-        """
+    def _open(self) -> None:
         pyrender = _pyrender()
-        self.size = size
-        self._figure = ShadedMesh(face, camera, light)
-        self._backdrop = backdrop(size, light, background)
-        self._channels = channels(background)
         vertices = self._figure.points
         # x y z r g b a, as pyrender lays a primitive of positions and colours out in its one buffer.
         self._interleaved = np.ones((len(vertices), 7), np.float32)
@@ -55,25 +35,22 @@ class OpenGLCanvas:
         )
         self._scene = pyrender.Scene(bg_color=[0.0, 0.0, 0.0, 0.0])
         self._scene.add(pyrender.Mesh([self._head]))
+        camera = self._camera
         lens = pyrender.PerspectiveCamera(yfov=camera.fovy, znear=camera.near, zfar=camera.far)
         self._scene.add(lens, pose=camera.pose)
         self._flags = pyrender.RenderFlags.FLAT
-        self._offscreen = _open(pyrender, size)
-        self._offscreen.render(self._scene, self._flags)  # uploads the buffers that `draw` overwrites
+        self._offscreen = _open(pyrender, self._size)
+        self._offscreen.render(self._scene, self._flags)  # uploads the buffers that are overwritten later
 
-    def draw(self, vertices: Float32, normals: Float32, out: UInt8 | None = None) -> UInt8:
-        """Return (h, w, 3 or 4) uint8, row 0 at the top, of (n, 3) vertices and unit normals; into `out`."""
+    def _pixels(self) -> UInt8:
         from OpenGL import GL
 
-        self._figure.pose(vertices, normals)
         self._interleaved[:, :3] = self._figure.points
         self._interleaved[:, 3:6] = self._figure.colours
         GL.glBindBuffer(GL.GL_ARRAY_BUFFER, self._head._buffers[0])
         GL.glBufferSubData(GL.GL_ARRAY_BUFFER, 0, self._interleaved.nbytes, self._interleaved)
         pixels: UInt8 = self._offscreen.render(self._scene, self._flags)
-        if out is None:
-            out = np.empty((*pixels.shape[:2], self._channels), np.uint8)
-        return over(pixels, self._backdrop, out)
+        return pixels
 
     def close(self) -> None:
         """Free the context."""

@@ -11,13 +11,16 @@ from pathlib import Path
 
 import numpy as np
 
-from realizer.core.array_types import Float32, UInt8
+from realizer.core.array_types import UInt8
 from realizer.face.model import Face
 
 
 @dataclass(frozen=True)
 class Open:
-    """The first message: what to draw, and the file of the shared memory. The answer names the backend."""
+    """The first message: what to draw, and the file of the shared memory. The answer names the backend.
+
+    All others are the name of a method of `worker.FaceDrawer` and its arguments.
+    """
 
     face: str | Face
     size: tuple[int, int]
@@ -31,30 +34,10 @@ class Open:
 
 
 @dataclass(frozen=True)
-class Draw:
-    """Draw poses (n, k) into the slots from `first` on; answered with n."""
-
-    rows: Float32
-    first: int
-
-
-@dataclass(frozen=True)
-class Encode:
-    """Draw one pose (k,); answered with the bytes of a file of that form: "jpeg", "png" or "webp"."""
-
-    row: Float32
-    form: str
-    quality: int
-
-
-@dataclass(frozen=True)
 class Failed:
     """The answer to any message that went wrong; the process ends after it."""
 
     message: str
-
-
-Message = Open | Draw | Encode
 
 
 class Pixels:

@@ -15,10 +15,8 @@ from realizer.core.array_types import Float32, Int32, UInt8
 from realizer.core.errors import RenderError
 
 NO_NUMBA = "pictures without OpenGL need the render extra: pip install 'bml-realizer[render]'"
-# Sample positions in a pixel, a row each: in the middle, or on a rotated grid with no two in
-# one column, as graphics cards place four.
-PLAIN = (0.5,)
-SMOOTH = (0.375, 0.875, 0.125, 0.625)
+# Sample positions in a pixel, a row each: on a rotated grid with no two in one column, as graphics cards do.
+SAMPLES = (0.375, 0.875, 0.125, 0.625)
 THREADS = 4  # at most
 LEAST, MOST = np.float32(0), np.float32(255.5)  # of a tone
 
@@ -26,18 +24,17 @@ LEAST, MOST = np.float32(0), np.float32(255.5)  # of a tone
 class Raster:
     """Memory for pictures of one size, drawn again and again; one thread at a time."""
 
-    def __init__(self, size: tuple[int, int], *, smooth: bool = True) -> None:
-        """Reserve the memory; nothing is compiled.
+    def __init__(self, size: tuple[int, int]) -> None:
+        """Reserve the memory for width, height in pixels; nothing is compiled.
 
-        Args:
-            size: width, height in pixels.
-            smooth: four samples a pixel instead of one.
+        Raises:
+            RenderError: no numba; the text says what to install.
         """
+        self._loops = _compiled()
         width, height = size
-        self._samples = SMOOTH if smooth else PLAIN
         # The samples of a pixel are adjacent, so that a small triangle writes to adjacent memory.
         # Each is one number, nearness above and tone below: the greater one is the nearer one.
-        self._keys = np.zeros((height, width, len(self._samples)), np.uint64)
+        self._keys = np.zeros((height, width, len(SAMPLES)), np.uint64)
         self._picture = np.zeros((height, width), np.uint32)
         # A band of rows for each processor: the loops release Python's lock.
         bands = max(1, min(THREADS, os.cpu_count() or 1, height))
@@ -53,63 +50,37 @@ class Raster:
             nearness: (n,), above 0, more is nearer and straight across the picture: one over the distance.
             triangles: (m, 3); those that are not counter-clockwise as seen are left out.
             colours: (n, 3) sRGB 0..1.
-
-        Raises:
-            RenderError: no numba; the text says what to install.
         """
-        fill, mean, _ = _compiled()
+        fill, mean = self._loops
         points = np.ascontiguousarray(points, np.float64)
         nearness = np.ascontiguousarray(nearness, np.float32)
         tones = np.ascontiguousarray(colours * np.float32(255) + np.float32(0.5), np.float32)
 
         def band(rows: tuple[int, int]) -> None:
             part = slice(*rows)
-            fill(points, nearness, triangles, tones, self._samples, *rows, self._keys)
+            fill(points, nearness, triangles, tones, SAMPLES, *rows, self._keys)
             mean(self._keys[part], self._picture[part])
 
         list(self._pool.map(band, self._bands))
         return self._picture.view(np.uint8).reshape(*self._picture.shape, 4)
-
-    def over(self, behind: UInt8, out: UInt8) -> UInt8:
-        """Lay the last picture over (h, w, 4) opaque pixels, into (h, w, 3); as `backdrop.over`.
-
-        Makes nothing on the way, and shares the rows among the threads.
-        """
-        _, _, lay = _compiled()
-
-        def band(rows: tuple[int, int]) -> None:
-            part = slice(*rows)
-            lay(self._picture[part], behind[part], out[part])
-
-        list(self._pool.map(band, self._bands))
-        return out
 
     def close(self) -> None:
         """End its threads."""
         self._pool.shutdown()
 
 
-def ready() -> str | None:
-    """Return None if `Raster` can draw, or a sentence that says what to install."""
-    try:
-        _compiled()
-    except RenderError as error:
-        return str(error)
-    return None
-
-
 @cache
 def _compiled() -> tuple[Callable[..., None], ...]:
-    """Return the three loops below as machine code, cached on disk if possible, so compiled once."""
+    """Return the two loops below as machine code, cached on disk if possible, so compiled once."""
     try:
         import numba
     except ImportError as error:
         raise RenderError(f"{NO_NUMBA} ({error})") from None
     options: Any = {"nogil": True, "error_model": "numpy"}
     try:
-        return tuple(numba.njit(cache=True, **options)(loop) for loop in (_fill, _mean, _lay))
+        return tuple(numba.njit(cache=True, **options)(loop) for loop in (_fill, _mean))
     except RuntimeError:  # neither our folder nor the user's can be written
-        return tuple(numba.njit(**options)(loop) for loop in (_fill, _mean, _lay))
+        return tuple(numba.njit(**options)(loop) for loop in (_fill, _mean))
 
 
 def _fill(
@@ -222,15 +193,9 @@ def _fill(
 
 
 def _mean(keys: Any, picture: Any) -> None:
-    """Write the mean of each pixel's samples, one or four, all four bytes at once; clear the samples."""
+    """Write the mean of each pixel's four samples, all four bytes at once; clear the samples."""
     height, width = picture.shape
     nothing = np.uint64(0)
-    if keys.shape[2] == 1:
-        for y in range(height):
-            for x in range(width):
-                picture[y, x] = np.uint32(keys[y, x, 0])
-                keys[y, x, 0] = nothing
-        return
     upper, lower, half = np.uint32(0x3F3F3F3F), np.uint32(0x03030303), np.uint32(0x02020202)
     two = np.uint32(2)
     for y in range(height):
@@ -246,23 +211,3 @@ def _mean(keys: Any, picture: Any) -> None:
             )
             rest = (a & lower) + (b & lower) + (c & lower) + (d & lower) + half
             picture[y, x] = quarters + ((rest >> two) & lower)
-
-
-def _lay(picture: Any, behind: Any, out: Any) -> None:
-    """Lay premultiplied pixels over opaque ones."""
-    height, width = picture.shape
-    for y in range(height):
-        for x in range(width):
-            # Signed and all of one kind: what mixes them with unsigned numbers is worked out as floats.
-            pixel = np.int64(picture[y, x])
-            rest = 255 - (pixel >> 24)
-            if rest == 255:
-                for channel in range(3):
-                    out[y, x, channel] = behind[y, x, channel]
-            elif rest == 0:
-                for channel in range(3):
-                    out[y, x, channel] = np.uint8(pixel >> 8 * channel)
-            else:
-                for channel in range(3):
-                    shows = (np.int64(behind[y, x, channel]) * rest + 127) // 255
-                    out[y, x, channel] = min((pixel >> 8 * channel & 255) + shows, 255)

@@ -14,7 +14,9 @@ import numpy as np
 from realizer.core.array_types import Float32, UInt8
 from realizer.core.errors import RenderError
 from realizer.face.model import Face
+from realizer.render.backdrop import channels, colour_of
 from realizer.render.drawing_process import DRAW, DrawingProcess
+from realizer.render.process_messages import Open, Pixels
 
 HALF = 8  # frames in half the shared memory: one half is drawn while the other is used
 HALF_BYTES = 32 << 20  # and at most this much of it
@@ -82,8 +84,6 @@ class Renderer:
             FaceError: no such face.
             RenderError: no GL, no such camera, or the process died; says what to do.
         """
-        from realizer.render.backdrop import channels
-
         rows = self._rows(poses)
         pixels = np.empty((len(rows), self.size[1], self.size[0], channels(self.background)), np.uint8)
         for k, picture in enumerate(self.frames(rows)):
@@ -96,8 +96,6 @@ class Renderer:
         A picture is valid until the next one is requested. Exhaust the iterator, or close it, before
         you ask this renderer for anything else. Errors as `draw`.
         """
-        from realizer.render.process_messages import Draw
-
         rows = self._rows(poses)
         pieces = [rows[i : i + self._half] for i in range(0, len(rows), self._half)]
         with self._lock:
@@ -105,7 +103,7 @@ class Renderer:
             waiting = 0
             try:
                 for k, piece in enumerate(pieces[:2]):
-                    process.send(Draw(piece, k * self._half))
+                    process.send(("draw", piece, k * self._half))
                     waiting += 1
                 for k, piece in enumerate(pieces):
                     process.receive()
@@ -113,7 +111,7 @@ class Renderer:
                     first = k % 2 * self._half
                     yield from process.pixels.array[first : first + len(piece)]
                     if k + 2 < len(pieces):
-                        process.send(Draw(pieces[k + 2], first))
+                        process.send(("draw", pieces[k + 2], first))
                         waiting += 1
             except RenderError:
                 waiting = 0
@@ -132,13 +130,11 @@ class Renderer:
 
         Errors as `draw`.
         """
-        from realizer.render.process_messages import Encode
-
         (row,) = self._rows(np.asarray(pose)[None])
         with self._lock:
             process = self._ready()
             try:
-                process.send(Encode(row, form, quality))
+                process.send(("encode", row, form, quality))
                 encoded: bytes = process.receive()
             except RenderError:
                 self._drop()
@@ -152,8 +148,6 @@ class Renderer:
         Raises:
             RenderError: neither a colour nor "transparent".
         """
-        from realizer.render.backdrop import colour_of
-
         return colour_of(self._background, alpha=self._alpha)
 
     @property
@@ -176,24 +170,10 @@ class Renderer:
 
     def _started(self) -> DrawingProcess:
         if self._process is None:
-            from realizer.render.backdrop import channels
-            from realizer.render.process_messages import Open, Pixels
-
-            slots = 2 * self._half
-            behind = self.background
+            slots, behind = 2 * self._half, self.background
             path = Pixels.create(slots, self.size, channels(behind))
-            order = Open(
-                self.face,
-                self.size,
-                self.camera,
-                path,
-                slots,
-                self.light,
-                self.backend,
-                behind,
-                self.deformer,
-            )
-            self._process = DrawingProcess(order)
+            names = self.light, self.backend, behind, self.deformer
+            self._process = DrawingProcess(Open(self.face, self.size, self.camera, path, slots, *names))
         return self._process
 
     def _ready(self) -> DrawingProcess:

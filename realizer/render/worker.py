@@ -10,17 +10,15 @@ from multiprocessing.connection import Connection
 import numpy as np
 
 from realizer.core.array_types import Float32, UInt8
-from realizer.core.errors import RealizerError
-from realizer.face.model import Face
+from realizer.core.errors import RealizerError, RenderError
+from realizer.face.model import Face, Fapu
 from realizer.render.backdrop import channels
 from realizer.render.backends import open_canvas
 from realizer.render.cameras import camera_for
 from realizer.render.light import preset
-from realizer.render.process_messages import Draw, Failed, Message, Open, Pixels, connection
+from realizer.render.process_messages import Failed, Open, Pixels, connection
 
 BATCH = 16  # frames deformed in one call: enough to spread its fixed cost, few enough to stay in the cache
-
-
 # Pillow's options for a fast stream. PNG of level 1 is a fifth larger than of the default 6.
 FASTEST: Mapping[str, Mapping[str, int]] = {"jpeg": {}, "png": {"compress_level": 1}, "webp": {"method": 0}}
 
@@ -46,12 +44,14 @@ class FaceDrawer:
         )
 
     def draw(self, rows: Float32, first: int) -> int:
+        """Draw poses (n, k) into the slots from `first` on; return n."""
         slots = self.pixels.array[first : first + len(rows)]
         for (vertices, ups), out in zip(shapes(self.face, rows), slots, strict=True):
             self.canvas.draw(vertices, ups, out)
         return len(rows)
 
     def encode(self, row: Float32, form: str, quality: int) -> bytes:
+        """Return the bytes of a picture of a pose (k,), as `encode`."""
         ((vertices, ups),) = shapes(self.face, row[None])
         return encode(self.canvas.draw(vertices, ups), form, quality)
 
@@ -88,21 +88,9 @@ def encode(pixels: UInt8, form: str, quality: int) -> bytes:
     return buffer.getvalue()
 
 
-def answer(artist: FaceDrawer | None, message: Message) -> tuple[FaceDrawer, int | bytes | str]:
-    """Carry out a message."""
-    if isinstance(message, Open):
-        artist = FaceDrawer(message)
-        return artist, artist.backend
-    if artist is None:
-        raise RealizerError(f"wanted Open first, got {type(message).__name__}")
-    if isinstance(message, Draw):
-        return artist, artist.draw(message.rows, message.first)
-    return artist, artist.encode(message.row, message.form, message.quality)
-
-
 def serve(orders: Connection, answers: Connection) -> None:
     """Answer messages until the owner hangs up or dies, or something fails."""
-    artist: FaceDrawer | None = None
+    drawer: FaceDrawer | None = None
     owner = os.getppid()
     while True:
         # A child of the owner may have inherited the pipe and keep it open: check the parent's id, too.
@@ -110,11 +98,16 @@ def serve(orders: Connection, answers: Connection) -> None:
             if os.getppid() != owner:
                 return
         try:
-            message: Message = orders.recv()
+            message = orders.recv()
         except EOFError:
             return
         try:
-            artist, result = answer(artist, message)
+            if drawer is None:
+                drawer = FaceDrawer(message)
+                result = drawer.backend
+            else:
+                name, *arguments = message
+                result = getattr(drawer, name)(*arguments)
         except RealizerError as error:
             answers.send(Failed(str(error)))
             return
@@ -124,11 +117,28 @@ def serve(orders: Connection, answers: Connection) -> None:
         answers.send(result)
 
 
+def triangle() -> Face:
+    """Return a face of three vertices from chin to hairline that knows no FAP."""
+    vertices = np.array([[-0.08, -0.12, 0], [0.08, -0.12, 0], [0, 0.06, 0]], np.float32)
+    return Face(
+        name="triangle",
+        source="",
+        licence="",
+        vertices=vertices,
+        triangles=np.array([[0, 1, 2]], np.int32),
+        colours=np.full((3, 3), 200, np.uint8),
+        occlusion=np.ones(3, np.float32),
+        gloss=np.zeros(3, np.float32),
+        parts={"skin": (0, 3)},
+        feature_points={"2.1": 0, "11.1": 2},
+        points={"2.1": np.array([0, -0.12, 0], np.float32), "11.1": vertices[2]},
+        fapu=Fapu(0.012, 0.064, 0.05, 0.03, 0.05),
+        basis={},
+    )
+
+
 def check(backend: str) -> int:
     """Draw one triangle; print the backend, or return 3 and print what is missing."""
-    from realizer.core.errors import RenderError
-    from realizer.render.probe_triangle import triangle
-
     face = triangle()
     try:
         taken, canvas = open_canvas(face, (16, 16), camera_for(face), preset(), backend=backend)

@@ -82,10 +82,8 @@ def main() -> None:
     line("shade", median(lambda: shader(ups[0]), 100))
     figure = ShadedMesh(face, camera, preset())
     line("shade, with furrows and glints", median(lambda: figure.pose(vertices[4], ups[4]), 60))
-    for smooth in (True, False):
-        own = SoftwareCanvas(face, size, camera, preset(), smooth=smooth)
-        name = "four samples" if smooth else "one sample"
-        line(f"by the processor, {name} a pixel", median(lambda own=own: own.draw(vertices[0], ups[0]), 60))
+    own = SoftwareCanvas(face, size, camera, preset())
+    line("by the processor, four samples a pixel", median(lambda: own.draw(vertices[0], ups[0]), 60))
     picture = own.draw(vertices[0], ups[0])
     if (missing := available("gl")) is None:
         canvas = OpenGLCanvas(face, size, camera, preset())

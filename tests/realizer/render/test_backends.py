@@ -40,6 +40,6 @@ def test_open_canvas_names_both_backends_if_none_works(balls, monkeypatch):
     def missing(*_):
         raise RenderError("not here")
 
-    monkeypatch.setattr(backends, "OPENERS", {"gl": missing, "onboard": missing})
+    monkeypatch.setattr(backends, "_canvas", lambda _: missing)
     with pytest.raises(RenderError, match="not here; or: not here"):
         backends.open_canvas(face, (32, 24), camera_for(face), preset())

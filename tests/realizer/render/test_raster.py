@@ -13,14 +13,14 @@ SIZE = (60, 40)
 RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 
 
-def draw(corners, colours, nearness=1.0, size=SIZE, smooth=True):
+def draw(corners, colours, nearness=1.0, size=SIZE):
     """Triangles of (n, 3, 2) pixels, each of one colour and nearness."""
     corners = np.asarray(corners, float).reshape(-1, 2)
     count = len(corners) // 3
     tones = np.repeat(np.broadcast_to(colours, (count, 3)), 3, axis=0).astype(np.float32)
     near = np.repeat(np.broadcast_to(nearness, count), 3).astype(np.float32)
     triangles = np.arange(3 * count, dtype=np.int32).reshape(-1, 3)
-    return Raster(size, smooth=smooth)(corners, near, triangles, tones).copy()
+    return Raster(size)(corners, near, triangles, tones).copy()
 
 
 BIG = [(5.0, 5.0), (5.0, 35.0), (55.0, 20.0)]  # counter-clockwise, seen with y up
@@ -37,8 +37,7 @@ def test_raster_leaves_out_triangles_seen_from_behind():
     assert not draw([BIG[::-1]], RED).any()
 
 
-def test_raster_smooths_edges_on_demand():
-    assert set(np.unique(draw([BIG], RED, smooth=False)[..., 3])) == {0, 255}
+def test_raster_smooths_edges():
     assert len(np.unique(draw([BIG], RED)[..., 3])) == 5
 
 
@@ -85,18 +84,6 @@ def test_raster_forgets_the_picture_before():
     first = raster(points, near, triangles, np.ones((3, 3), np.float32)).copy()
     raster(points + 3, 5 * near, triangles, np.ones((3, 3), np.float32))
     assert np.array_equal(raster(points, near, triangles, np.ones((3, 3), np.float32)), first)
-
-
-def test_raster_over_equals_backdrop_over():
-    from realizer.render.backdrop import over
-
-    raster = Raster(SIZE)
-    triangles, tones = np.array([[0, 1, 2]], np.int32), np.full((3, 3), 0.7, np.float32)
-    pixels = raster(np.array(BIG), np.ones(3, np.float32), triangles, tones).copy()
-    behind = np.random.default_rng(0).integers(0, 256, (40, 60, 4), np.uint8)
-    behind[..., 3] = 255
-    wanted = over(pixels, behind, np.empty((40, 60, 3), np.uint8))
-    assert np.array_equal(raster.over(behind, np.empty((40, 60, 3), np.uint8)), wanted)
 
 
 def test_raster_leaves_out_what_is_behind_the_lens():

@@ -66,13 +66,6 @@ def test_software_canvas_draws_points_where_they_project(face):
     assert red > blue + 30
 
 
-@pytest.mark.slow
-def test_software_canvas_without_smoothing_has_rough_edges(face):
-    fine = SoftwareCanvas(face, SIZE, camera_for(face), preset()).draw(*pose(face)).astype(int)
-    plain = SoftwareCanvas(face, SIZE, camera_for(face), preset(), smooth=False).draw(*pose(face)).astype(int)
-    assert 0.05 < np.abs(fine - plain).mean() < 2.5
-
-
 def test_software_canvas_draws_into_the_given_memory(face):
     canvas = SoftwareCanvas(face, (64, 48), camera_for(face), preset())
     out = np.zeros((48, 64, 3), np.uint8)

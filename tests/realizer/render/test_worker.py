@@ -13,9 +13,6 @@ import pytest
 from PIL import Image
 
 import realizer
-from realizer.core.errors import RealizerError
-from realizer.render.process_messages import Draw
-from realizer.render.worker import answer
 
 
 def check(tmp_path: Path, site: str, way: str = "auto", **env: str) -> subprocess.CompletedProcess[str]:
@@ -90,8 +87,3 @@ def test_encode_writes_jpeg_by_pillow_without_simplejpeg(tmp_path):
     env = {**os.environ, "PYTHONPATH": str(Path(realizer.__path__[0]).parent)}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, env=env)
     assert np.asarray(Image.open(io.BytesIO(done.stdout))).shape == (20, 30, 3)
-
-
-def test_answer_refuses_pictures_before_open() -> None:
-    with pytest.raises(RealizerError, match="wanted Open first, got Draw"):
-        answer(None, Draw(np.zeros((1, 68), np.float32), 0))

@@ -11,7 +11,7 @@ from realizer.face.au.skin_binding import skin_roots
 from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.face.model import Face
-from realizer.render.probe_triangle import triangle
+from realizer.render.worker import triangle
 from tests.shipped import FACES
 
 
