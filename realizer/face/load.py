@@ -199,11 +199,8 @@ def _model(folder: Path, deformer: str | None) -> Model | None:
             f"make it by `realizer faces fit {folder.name}`"
         )
     from realizer.face.au.file import read_model
-    from realizer.face.au.units import units
 
     model = read_model(folder / file)
-    if strange := sorted({*model.units, *model.degrees} - set(units())):
-        raise FaceError(f"{folder / file}: [AU{strange[0]}]: there is no such unit in the model")
     drawn = chosen.get("aus", list(model.units))
     if not isinstance(drawn, list) or not set(drawn) <= set(model.units):
         known = ", ".join(map(str, sorted(model.units)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from difflib import get_close_matches
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeVar
@@ -10,12 +11,17 @@ from typing import Any, TypeVar
 import numpy as np
 
 from realizer.core.errors import FaceError, TableError
+from realizer.face.au.file import read_model
 from realizer.face.basis import AGAIN, ARRAYS, ROWS, array_faults
+from realizer.face.deform import deform
 from realizer.face.features import INSIDE, Point, fapu_of, read_features
 from realizer.face.load import MESH, folder_of, load_folder, read_head
 from realizer.face.mesh_checks import NEEDED, range_faults, surface_faults, value_faults
 from realizer.face.model import Face
 from realizer.face.npz_file import read_arrays
+from realizer.facebuild.au.measure import read_shapes
+from realizer.facebuild.mpeg4.parameters import FILE, read_setup
+from realizer.facebuild.mpeg4.zones import mask_faults
 from realizer.tables import faps
 from realizer.tables.mappings import own_file, read_mapping
 
@@ -49,7 +55,14 @@ def check_face(name: str = "default", directory: Path | str | None = None) -> tu
     mesh = tried(lambda: read_arrays(folder / "mesh.npz", MESH))
     points = tried(lambda: read_features(folder / "features.csv"))
     stored = tried(lambda: read_arrays(folder / "fields.npz", ARRAYS))
-    tried(lambda: _read_mapping(folder))
+    if own := own_file(folder):
+        tried(lambda: read_mapping(own))
+    zones = folder / FILE
+    setup = tried(lambda: read_setup(zones)) if zones.is_file() else None
+    if (shapes := folder / "au_shapes.npz").is_file():
+        tried(lambda: read_shapes(shapes))
+    for path in sorted(folder.glob("au_*.toml")):
+        tried(lambda path=path: read_model(path))  # type: ignore[misc]
     n = len(mesh["vertices"]) if mesh else None
     values = value_faults(mesh) if mesh else []
     faults += [f"{folder / 'mesh.npz'}: {fault}" for fault in values]
@@ -58,16 +71,14 @@ def check_face(name: str = "default", directory: Path | str | None = None) -> tu
         parts = _part_faults(folder, head["parts"], n)
         faults += _key_faults(folder, head) + parts
     if points:
-        tried(lambda: _fapu(folder, points))
+        places = {key: np.array(point.place, np.float32) for key, point in points.items()}
+        tried(lambda: fapu_of(places, folder / "features.csv"))
         if mesh and not values:
             faults += _point_faults(folder, points, mesh["vertices"], mesh["triangles"])
     if stored and n is not None:
         faults += _stored_faults(folder, stored, n)
-    skin = head["parts"]["skin"] if head and not parts else None
-    for check in (lambda: _zone_faults(folder, skin), lambda: _shape_faults(folder)):
-        faults += tried(check) or []
-    for path in sorted(folder.glob("au_*.toml")):
-        faults += tried(lambda path=path: _model_faults(path)) or []  # type: ignore[misc]
+    if setup and head and not parts:
+        faults += [f"{zones}: {fault}" for fault in mask_faults(setup, head["parts"]["skin"])]
     if mesh and not values and head and not parts:
         ranges = {key: (int(a), int(b)) for key, (a, b) in head["parts"].items()}
         mouth = None if not points else (np.array(points["2.2"].place) + np.array(points["2.3"].place)) / 2
@@ -79,19 +90,7 @@ def check_face(name: str = "default", directory: Path | str | None = None) -> tu
     return tuple(dict.fromkeys(faults))
 
 
-def _read_mapping(folder: Path) -> None:
-    """Read the face's own mapping of action units, if it has one."""
-    if own := own_file(folder):
-        read_mapping(own)
-
-
-def _fapu(folder: Path, points: dict[str, Point]) -> None:
-    fapu_of({key: np.array(p.place, np.float32) for key, p in points.items()}, folder / "features.csv")
-
-
 def _nearest(word: str, words: Any) -> str:
-    from difflib import get_close_matches
-
     near = get_close_matches(word, list(words), n=1)
     return f"; did you mean {near[0]!r}?" if near else f"; there are: {', '.join(words)}"
 
@@ -170,49 +169,7 @@ def _stored_faults(folder: Path, stored: dict[str, Any], n: int) -> list[str]:
     return [f"{folder / 'fields.npz'}: {fault}" for fault in faults]
 
 
-def _zone_faults(folder: Path, skin: Any) -> list[str]:
-    """Return the faults of the face's own zones, if it has any."""
-    from realizer.facebuild.mpeg4.parameters import FILE, read_setup
-
-    path = folder / FILE
-    if not path.is_file():
-        return []
-    setup = read_setup(path)
-    return [
-        f"{path}: mask of FAP {fap}: wanted vertices of the skin, {skin[0]}..{skin[1] - 1}, got "
-        f"{mask.min()}..{mask.max()}; take out the others"
-        for fap, mask in setup.masks.items()
-        if skin and len(mask) and (mask.min() < skin[0] or mask.max() >= skin[1])
-    ]
-
-
-def _model_faults(path: Path) -> list[str]:
-    """Return the faults of a model of action units."""
-    from realizer.face.au.file import read_model
-    from realizer.face.au.units import units
-
-    model = read_model(path)
-    known = ", ".join(map(str, units()))
-    return [
-        f"{path}: [AU{au}]: there is no such unit in the model; wanted one of {known}"
-        for au in (*model.units, *model.degrees)
-        if au not in units()
-    ]
-
-
-def _shape_faults(folder: Path) -> list[str]:
-    """Return the faults of the face's own shapes, if it has any."""
-    from realizer.facebuild.au.measure import read_shapes
-
-    path = folder / "au_shapes.npz"
-    if path.is_file():
-        read_shapes(path)
-    return []
-
-
 def _field_faults(folder: Path, face: Face) -> list[str]:
-    from realizer.face.deform import deform
-
     path = folder / "fields.npz"
     rows = np.zeros((69, 68), np.float32)
     for row in faps()[2:]:

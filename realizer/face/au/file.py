@@ -12,6 +12,7 @@ from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError, TableError
 from realizer.face.au.functions import ANGLE, GAUSSIAN, LOWER
 from realizer.face.au.model import HeadTurn, Model, Motion, Mouth, UnitModel
+from realizer.face.au.units import units
 from realizer.tables import read_toml
 
 HEAD = """\
@@ -143,7 +144,13 @@ class _Reader:
     def unit_number(self, key: str) -> int:
         if not key.removeprefix("AU").isdigit():
             raise FaceError(f"{self.path}: wanted an action unit such as AU12, got {key}")
-        return int(key.removeprefix("AU"))
+        number = int(key.removeprefix("AU"))
+        if number not in units():
+            known = ", ".join(map(str, units()))
+            raise FaceError(
+                f"{self.path}: [AU{number}]: there is no such unit in the model; wanted one of {known}"
+            )
+        return number
 
 
 def _unit(at: _Reader, key: str, table: dict[str, Any]) -> UnitModel:

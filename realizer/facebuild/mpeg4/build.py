@@ -24,7 +24,7 @@ from realizer.facebuild.mpeg4.faceeditor import fitted, read_faceeditor
 from realizer.facebuild.mpeg4.fields import zone_fields
 from realizer.facebuild.mpeg4.landmarks import find_points
 from realizer.facebuild.mpeg4.parameters import FILE, read_setup, write_setup
-from realizer.facebuild.mpeg4.zones import Setup, synchronised
+from realizer.facebuild.mpeg4.zones import Setup, mask_faults, synchronised
 from realizer.tables import faps
 
 FILES = ("face.toml", "mesh.npz", "features.csv", "fields.npz", "recipe.toml", "LICENSE.md", FILE)
@@ -32,7 +32,6 @@ FILES = ("face.toml", "mesh.npz", "features.csv", "fields.npz", "recipe.toml", "
 GROWN = ("brows", "lashes", "beard")  # parts that lie on the skin and follow it
 NEAR = 3  # vertices of the skin that one of theirs follows
 PUPILS = {"3.5", "3.6"}  # points that lie on no skin
-SOFTENED = 1  # times
 
 
 def copy_with_zones(
@@ -112,7 +111,10 @@ def apply_zones(folder: Path, setup: Setup, only: Collection[int] = ()) -> None:
         raise FaceError(
             f"{folder}: no zone for FAP {', '.join(map(str, missing))}; add one to the parameters"
         )
-    whole = _with_masks_of_skin(setup, parts["skin"])
+    if faults := mask_faults(setup, parts["skin"]):
+        raise FaceError(faults[0])
+    # Masks count from the first vertex of the skin there.
+    whole = replace(setup, masks={fap: mask - skin.start for fap, mask in setup.masks.items()})
     made = _softened(zone_fields(whole, at[skin]), whole, at[skin], mesh["triangles"], parts["skin"])
     rows = {fap: with_brows(at, parts, made[fap], np.zeros_like(at)) for fap in chosen}
     if only:
@@ -168,26 +170,9 @@ def _softened(
     fixed = [int(np.argmin(np.linalg.norm(at - np.array(setup.points[name]), axis=1))) for name in ends]
     out = {}
     for fap, field in fields.items():
-        soft = field
-        for _ in range(SOFTENED):
-            soft = 0.5 * soft + 0.5 * np.asarray(mean @ soft)
-            soft[fixed] = field[fixed]
-        out[fap] = soft
+        out[fap] = 0.5 * field + 0.5 * np.asarray(mean @ field)
+        out[fap][fixed] = field[fixed]
     return out
-
-
-def _with_masks_of_skin(setup: Setup, skin: tuple[int, int]) -> Setup:
-    """Return the setup with masks that count from the first vertex of the skin."""
-    first, last = skin
-    masks = {}
-    for fap, mask in setup.masks.items():
-        if len(mask) and (mask.min() < first or mask.max() >= last):
-            raise FaceError(
-                f"mask of FAP {fap}: wanted vertices of the skin, {first}..{last - 1}, got {mask.min()}.."
-                f"{mask.max()}; take out the others"
-            )
-        masks[fap] = mask - first
-    return replace(setup, masks=masks)
 
 
 def with_brows(at: Float64, parts: Mapping[str, tuple[int, int]], field: Float64, row: Float64) -> Float64:

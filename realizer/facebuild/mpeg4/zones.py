@@ -10,13 +10,14 @@ import numpy as np
 
 from realizer.core.array_types import Float64, Int32
 from realizer.core.errors import FaceError
-from realizer.facebuild.mpeg4 import falloff
+from realizer.face.mesh_geometry import mirror_twins
 from realizer.tables import faps
 
 Falloff = Literal["ease", "smooth", "cosine", "linear"]
 FALLOFFS: tuple[Falloff, ...] = ("ease", "smooth", "cosine", "linear")
 Triple = tuple[float, float, float]
-MIRROR = np.array([-1.0, 1.0, 1.0])
+MIN_POWER = 1e-3  # an ease of -100 is the limit where nothing moves
+SAMPLES = 2001  # of a smooth curve
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,12 +74,16 @@ class Zone:
         return np.asarray(self.size * np.array(self.scale))
 
     def influence(self, distance: Any) -> Float64:
-        """Return the influence (n,) at distances (n,), in radii from the middle."""
-        if self.falloff == "ease":
-            return falloff.ease(distance, self.ease)
+        """Return the influence (n,) at distances (n,) in radii from the middle: 1 there, 0 at the edge."""
         if self.falloff == "smooth":
-            return falloff.smooth_curve(distance, self.smooth_centre, self.smooth_side)
-        return falloff.cosine(distance) if self.falloff == "cosine" else falloff.linear(distance)
+            return smooth_curve(distance, self.smooth_centre, self.smooth_side)
+        away = np.clip(distance, 0, 1)
+        if self.falloff == "cosine":  # the raised cosine that Paul 2010 (8.2) names
+            return np.asarray((1 + np.cos(np.pi * away)) / 2, np.float64)
+        if self.falloff == "ease":  # Paul 2010, 4.3.3
+            power = 1 + self.ease / (100 if self.ease <= 0 else 20)
+            away = away ** max(power, MIN_POWER)
+        return np.asarray(1 - away, np.float64)
 
     def mirrored(self, fap: int) -> Zone:
         """Return the mirrored zone, for the FAP of the other side."""
@@ -107,14 +112,44 @@ class Setup:
     whole: frozenset[int] = frozenset()
 
 
-def synchronised(setup: Setup, vertices: Float64 | None = None, margin: float = 5e-4) -> Setup:
+def smooth_curve(distance: Any, centre: float, side: float) -> Float64:
+    """Return a Bezier curve (Paul 2010, 4.3.4): level over `centre` of the zone, `side` past its edge.
+
+    The cubic runs from (0, 1) by (centre, 1) and (1, 0) to (1 + side, 0), so that 0 and 0 is the straight
+    line, and side makes the zone larger by that share of its size. (His figure draws it; the text gives no
+    formula: these control points are ours.)
+
+    Args:
+        centre, side: 0..1.
+    """
+    t = np.linspace(0, 1, SAMPLES)
+    one, two, three = 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3
+    along = one * centre + two + three * (1 + side)
+    height = (1 - t) ** 3 + one
+    return np.asarray(np.interp(np.maximum(distance, 0), along, height, right=0.0), np.float64)
+
+
+def mask_faults(setup: Setup, skin: tuple[int, int]) -> list[str]:
+    """Return a sentence for each mask with vertices beyond the skin's (first, last + 1)."""
+    first, last = skin
+    return [
+        f"mask of FAP {fap}: wanted vertices of the skin, {first}..{last - 1}, got {mask.min()}.."
+        f"{mask.max()}; take out the others"
+        for fap, mask in setup.masks.items()
+        if len(mask) and (mask.min() < first or mask.max() >= last)
+    ]
+
+
+MARGIN = 5e-4  # m that a mask's vertex may lie from the mirror image of its twin
+
+
+def synchronised(setup: Setup, vertices: Float64 | None = None) -> Setup:
     """Return the setup with each synchronised FAP's zone, and its mask, copied to the other side.
 
     Of a pair the FAP with the lower number (the left side) is the one that is copied.
 
     Args:
         vertices: (n, 3) metres; needed where masks have to be mirrored.
-        margin: metres; how far a vertex may lie from the mirror image of its twin.
 
     Raises:
         FaceError: a mask's vertex has no twin.
@@ -125,24 +160,20 @@ def synchronised(setup: Setup, vertices: Float64 | None = None, margin: float = 
             continue
         zones[row.mirror] = zones[row.fap].mirrored(row.mirror)
         if row.fap in masks and vertices is not None:
-            masks[row.mirror] = mirror_mask(masks[row.fap], vertices, margin, row.fap)
+            masks[row.mirror] = mirror_mask(masks[row.fap], vertices, row.fap)
     return replace(setup, zones=zones, masks=masks)
 
 
-def mirror_mask(mask: Int32, vertices: Float64, margin: float, fap: int) -> Int32:
+def mirror_mask(mask: Int32, vertices: Float64, fap: int) -> Int32:
     """Return the mirror images of a mask's vertices, ascending.
 
     Raises:
-        FaceError: one has no twin within the margin.
+        FaceError: one has no twin within `MARGIN`.
     """
-    from scipy.spatial import cKDTree
-
-    found = cKDTree(vertices).query(vertices[mask] * MIRROR)
-    off, twin = np.asarray(found[0]), np.asarray(found[1])
-    if len(mask) and off.max() > margin:
-        lost = int(mask[int(np.argmax(off))])
+    twin = mirror_twins(vertices, MARGIN)[mask]
+    if (twin < 0).any():
         raise FaceError(
-            f"mask of FAP {fap}: vertex {lost} has no twin on the other side within {margin * 1000:.1f} mm; "
-            "the mask can be mirrored on a symmetrical mesh only"
+            f"mask of FAP {fap}: vertex {mask[twin < 0][0]} has no twin on the other side within "
+            f"{MARGIN * 1000:.1f} mm; the mask can be mirrored on a symmetrical mesh only"
         )
-    return np.unique(twin).astype(np.int32)
+    return np.unique(twin)

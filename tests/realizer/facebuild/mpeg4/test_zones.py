@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from realizer.core.errors import FaceError
-from realizer.facebuild.mpeg4.zones import FALLOFFS, Setup, Zone, mirror_mask, synchronised
+from realizer.facebuild.mpeg4.zones import FALLOFFS, Setup, Zone, mirror_mask, smooth_curve, synchronised
 
 
 @pytest.mark.parametrize("falloff", FALLOFFS)
@@ -18,6 +18,26 @@ def test_zone_influence_is_1_in_the_middle_and_0_at_the_edge(falloff: str) -> No
     assert found[[0, -1]] == pytest.approx([1, 0], abs=1e-9)
     assert (np.diff(found) <= 1e-12).all()
     assert not zone.influence(np.array([1.5])).any()
+
+
+@pytest.mark.parametrize(("amount", "power"), [(0, 1), (-50, 0.5), (-80, 0.2), (20, 2), (50, 3.5), (80, 5)])
+def test_zone_with_ease_is_one_less_the_distance_to_a_power(amount: float, power: float) -> None:
+    distance = np.linspace(0, 1, 101)
+    assert np.allclose(Zone(31, "ease", 0.01, ease=amount).influence(distance), 1 - distance**power)
+
+
+def test_smooth_curve_without_smoothing_is_a_straight_line() -> None:
+    distance = np.linspace(0, 1, 101)
+    assert np.allclose(smooth_curve(distance, 0, 0), 1 - distance, atol=1e-6)
+
+
+def test_smooth_curve_levels_the_middle_and_widens_the_edge() -> None:
+    level = smooth_curve(np.array([0, 0.01]), 0.5, 0)
+    assert 1 - level[1] < 0.001
+    past = smooth_curve(np.array([1.0, 1.49, 1.51]), 0, 0.5)
+    assert past[0] > 0.05
+    assert 0 < past[1] < 0.001
+    assert past[2] == 0
 
 
 def test_zone_radii_are_size_times_scale() -> None:
@@ -53,6 +73,6 @@ def test_synchronised_copies_the_left_side() -> None:
 
 def test_mirror_mask_needs_a_twin_of_each_vertex() -> None:
     at = np.array([[1, 0, 0], [-1, 0, 0], [2, 5, 0.0]])
-    assert mirror_mask(np.array([0], np.int32), at, 1e-3, 31).tolist() == [1]
+    assert mirror_mask(np.array([0], np.int32), at, 31).tolist() == [1]
     with pytest.raises(FaceError, match="has no twin"):
-        mirror_mask(np.array([2], np.int32), at, 1e-3, 31)
+        mirror_mask(np.array([2], np.int32), at, 31)
