@@ -12,7 +12,7 @@ from realizer.core.array_types import Float32, Int32
 from realizer.core.errors import FaceError
 from realizer.face.contours import contours_of
 from realizer.face.model import Fapu
-from realizer.face.npz_file import read_arrays
+from realizer.face.reading import read_arrays
 from realizer.tables import faps
 
 FAPS = 68

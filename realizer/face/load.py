@@ -19,7 +19,7 @@ from realizer.face.basis import basis_from
 from realizer.face.features import fapu_of, read_features
 from realizer.face.mesh_checks import range_faults, value_faults
 from realizer.face.model import Face
-from realizer.face.npz_file import read_arrays
+from realizer.face.reading import read_arrays
 from realizer.tables import faps
 
 if TYPE_CHECKING:

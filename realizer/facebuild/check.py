@@ -18,7 +18,7 @@ from realizer.face.features import INSIDE, Point, fapu_of, read_features
 from realizer.face.load import MESH, folder_of, load_folder, read_head
 from realizer.face.mesh_checks import NEEDED, range_faults, surface_faults, value_faults
 from realizer.face.model import Face
-from realizer.face.npz_file import read_arrays
+from realizer.face.reading import read_arrays
 from realizer.facebuild.au.measure import read_shapes
 from realizer.facebuild.mpeg4.parameters import FILE, read_setup
 from realizer.facebuild.mpeg4.zones import mask_faults

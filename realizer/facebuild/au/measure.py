@@ -12,7 +12,7 @@ import numpy as np
 from realizer.core.array_types import Bool, Float64
 from realizer.core.errors import FaceError, TableError
 from realizer.face.au.units import units
-from realizer.face.npz_file import read_arrays
+from realizer.face.reading import read_arrays
 from realizer.tables import read_csv
 
 FINE = 1e-5  # m; the shapes are stored in whole multiples of it

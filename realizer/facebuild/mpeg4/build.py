@@ -16,7 +16,7 @@ from realizer.face.basis import ARRAYS, unpack
 from realizer.face.features import read_features, write_features
 from realizer.face.load import MESH, read_head
 from realizer.face.mesh_geometry import half_edges, neighbour_mean, part_triangles
-from realizer.face.npz_file import read_arrays
+from realizer.face.reading import read_arrays
 from realizer.facebuild.face_files import write_fields
 from realizer.facebuild.mpeg4 import rigid
 from realizer.facebuild.mpeg4.defaults import default_setup, split_sides

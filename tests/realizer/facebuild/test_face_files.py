@@ -10,7 +10,7 @@ import pytest
 
 from realizer.face.basis import ARRAYS, unpack
 from realizer.face.load import MESH
-from realizer.face.npz_file import read_arrays
+from realizer.face.reading import read_arrays
 from realizer.facebuild.face_files import to_bytes, write_fields, write_head, write_mesh
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from realizer.core.errors import FaceError
-from realizer.face.npz_file import read_arrays
+from realizer.face.reading import read_arrays
 
 
 @pytest.fixture
