@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from realizer.core.array_types import Float32
-from realizer.core.errors import FaceError, TableError
+from realizer.core.errors import FaceError
 from realizer.face.model import Fapu
+from realizer.face.reading import face_errors
 from realizer.tables import read_csv
 
 HEAD = """\
@@ -49,15 +50,8 @@ def read_features(path: Path) -> dict[str, Point]:
     Raises:
         FaceError: no such file, a bad row, or a point that is missing or there twice.
     """
-    try:
+    with face_errors(path, "a CSV file with the 84 feature points"):
         rows = read_csv(path.read_text("utf-8"), Point, str(path))
-    except FileNotFoundError:
-        raise FaceError(f"{path}: wanted this file with the 84 feature points, found none") from None
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "bytes that are no UTF-8"
-        raise FaceError(f"{path}: wanted a CSV file with the 84 feature points, got {reason}") from None
-    except TableError as error:
-        raise FaceError(str(error)) from None
     points: dict[str, Point] = {}
     for row in rows:
         if row.feature_point in points:

@@ -19,7 +19,7 @@ from realizer.face.basis import basis_from
 from realizer.face.features import fapu_of, read_features
 from realizer.face.mesh_checks import range_faults, value_faults
 from realizer.face.model import Face
-from realizer.face.reading import read_arrays
+from realizer.face.reading import face_errors, read_arrays
 from realizer.tables import faps
 
 if TYPE_CHECKING:
@@ -135,18 +135,8 @@ def read_head(folder: Path) -> dict[str, Any]:
         FaceError: no such file, not TOML, or a key is missing.
     """
     path = folder / "face.toml"
-    try:
+    with face_errors(path, "a TOML file with name, source, licence and parts"):
         head = tomllib.loads(path.read_text("utf-8"))
-    except FileNotFoundError:
-        raise FaceError(
-            f"{path}: wanted this file with name, source, licence and parts, found none"
-        ) from None
-    except UnicodeDecodeError:
-        raise FaceError(f"{path}: wanted TOML, got bytes that are no UTF-8") from None
-    except OSError as error:
-        raise FaceError(f"{path}: wanted a TOML file, got {error.strerror}") from None
-    except tomllib.TOMLDecodeError as error:
-        raise FaceError(f"{path}: {error}") from None
     for key in ("name", "source", "licence"):
         if not isinstance(head.get(key), str):
             raise FaceError(f'{path}: wanted {key} = "...", got {_head_text(head, key)}')

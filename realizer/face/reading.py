@@ -1,15 +1,35 @@
-"""A checked reader of the .npz files in face folders."""
+"""Checked readers of the files in face folders."""
 
 from __future__ import annotations
 
+import tomllib
 import zipfile
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from realizer.core.errors import FaceError
+from realizer.core.errors import FaceError, TableError
+
+
+@contextmanager
+def face_errors(path: Path, wanted: str) -> Iterator[None]:
+    """Turn what reading a text, CSV or TOML file raises into a FaceError; `wanted` says what it should be."""
+    try:
+        yield
+    except FileNotFoundError:
+        raise FaceError(f"{path}: wanted {wanted}, found none") from None
+    except OSError as error:
+        raise FaceError(f"{path}: wanted {wanted}, got {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise FaceError(f"{path}: wanted {wanted}, got bytes that are no UTF-8") from None
+    except tomllib.TOMLDecodeError as error:
+        raise FaceError(f"{path}: {error}") from None
+    except TableError as error:
+        raise FaceError(str(error)) from None
 
 
 def read_arrays(path: Path, wanted: dict[str, int]) -> dict[str, Any]:

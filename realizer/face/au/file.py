@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float64
-from realizer.core.errors import FaceError, TableError
+from realizer.core.errors import FaceError
 from realizer.face.au.functions import ANGLE, GAUSSIAN, LOWER
 from realizer.face.au.model import HeadTurn, Model, Motion, Mouth, UnitModel
 from realizer.face.au.units import units
+from realizer.face.reading import face_errors
 from realizer.tables import read_toml
 
 HEAD = """\
@@ -76,13 +77,9 @@ def read_model(path: Path) -> Model:
     Raises:
         FaceError: no such file, not TOML, or a value that is missing, of the wrong kind or not finite.
     """
-    try:
+    with face_errors(path, "a model as `realizer faces fit` writes it"):
         text = path.read_text("utf-8")
         table = read_toml(text, str(path))
-    except (OSError, UnicodeDecodeError) as error:
-        raise FaceError(f"{path}: wanted a model as `realizer faces fit` writes it, got {error}") from None
-    except TableError as error:
-        raise FaceError(str(error)) from None
     head = {
         key: next(line.split(":", 1)[1].strip() for line in text.splitlines() if line.startswith(f"# {key}:"))
         for key in ("source", "licence")

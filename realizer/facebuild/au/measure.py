@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from realizer.core.array_types import Bool, Float64
-from realizer.core.errors import FaceError, TableError
+from realizer.core.errors import FaceError
 from realizer.face.au.units import units
-from realizer.face.reading import read_arrays
+from realizer.face.reading import face_errors, read_arrays
 from realizer.tables import read_csv
 
 FINE = 1e-5  # m; the shapes are stored in whole multiples of it
@@ -61,18 +61,14 @@ def read_measurements(path: Path) -> dict[int, UnitMeasurement]:
         FaceError: no such file, a bad row, a number that is not finite, a unit that is not one of her
             displacements, or too few landmarks.
     """
-    try:
+    with face_errors(path, "a CSV file au,x,y,z,dx,dy,dz in metres"):
         rows = read_csv(path.read_text("utf-8"), Landmark, str(path))
-    except (OSError, UnicodeDecodeError) as error:
-        raise FaceError(f"{path}: wanted a CSV file au,x,y,z,dx,dy,dz in metres, got {error}") from None
-    except TableError as error:
-        raise FaceError(str(error)) from None
-    by_unit: dict[int, list[list[float]]] = {}
+    by_unit: dict[int, list[tuple[float, ...]]] = {}
     for row in rows:
         if row.au not in units() or units()[row.au].kind != "displacement":
             known = ", ".join(str(unit.au) for unit in units().values() if unit.kind == "displacement")
             raise FaceError(f"{path}: wanted action units of {known}, got {row.au}")
-        by_unit.setdefault(row.au, []).append([row.x, row.y, row.z, row.dx, row.dy, row.dz])
+        by_unit.setdefault(row.au, []).append(astuple(row)[1:])
     found = {}
     for au, values in sorted(by_unit.items()):
         table = np.array(values, np.float64)

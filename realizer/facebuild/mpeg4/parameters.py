@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
-from dataclasses import fields
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from realizer.core.array_types import Int32
 from realizer.core.errors import FaceError
+from realizer.face.reading import face_errors
 from realizer.facebuild.mpeg4.zones import Setup, Zone
 
 FILE = "mpeg4.toml"
@@ -19,7 +21,6 @@ HEAD = """\
 # size and pivot in metres; points override those of features.csv; a mask's vertices as ranges, last included
 """
 KEYS = ("joined", "synced", "whole", "points", "zone", "masks")
-LISTED = ("scale", "pivot")
 
 
 def read_setup(path: Path) -> Setup:
@@ -28,58 +29,43 @@ def read_setup(path: Path) -> Setup:
     Raises:
         FaceError: no such file, not TOML, an unknown key, or a value of the wrong kind or out of range.
     """
-    try:
+    with face_errors(path, "a TOML file with the deformer's zones"):
         read = tomllib.loads(path.read_text("utf-8"))
-    except FileNotFoundError:
-        raise FaceError(f"{path}: wanted this file with the deformer's zones, found none") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise FaceError(f"{path}: {error}") from None
-    unknown = sorted(set(read) - {"joined", "synced", "whole", "points", "zone", "masks"})
-    if unknown:
-        raise FaceError(
-            f"{path}: wanted joined, synced, whole, points, zone, masks; got {', '.join(unknown)}"
-        )
+    if unknown := sorted(set(read) - set(KEYS)):
+        raise FaceError(f"{path}: wanted {', '.join(KEYS)}; got {', '.join(unknown)}")
     zones: dict[int, Zone] = {}
-    for number, entry in enumerate(_list(path, read, "zone"), 1):
+    for number, entry in enumerate(_entry(path, read, "zone", list), 1):
         zone = _zone(f"{path}: zone {number}", entry)
         if zone.fap in zones:
             raise FaceError(f"{path}: zone {number}: FAP {zone.fap} has one already; delete one of them")
         zones[zone.fap] = zone
     masks: dict[int, Int32] = {}
-    for key, ranges in _dict(path, read, "masks").items():
+    for key, ranges in _entry(path, read, "masks", dict).items():
         for word in key.split():
             masks[_whole(f"{path}: masks: {key!r}", word)] = _expanded(f"{path}: masks: {key!r}", ranges)
-    points = {}
-    for name, place in _dict(path, read, "points").items():
-        points[name] = _triple(f"{path}: points: {name}", place)
-    synced = frozenset(_whole(f"{path}: synced", fap) for fap in _list(path, read, "synced"))
-    whole = frozenset(_whole(f"{path}: whole", fap) for fap in _list(path, read, "whole"))
+    places = _entry(path, read, "points", dict)
+    points = {name: _triple(f"{path}: points: {name}", place) for name, place in places.items()}
+    synced, whole = (
+        frozenset(_whole(f"{path}: {key}", fap) for fap in _entry(path, read, key, list))
+        for key in ("synced", "whole")
+    )
     return Setup(points, zones, masks, synced, bool(read.get("joined", True)), whole)
 
 
-def write_setup(path: Path, setup: Setup, points: bool = False) -> None:
-    """Write the file.
-
-    Args:
-        points: write the feature points too; without them the folder's features.csv counts.
-    """
-    lines = [HEAD + f"joined = {str(setup.joined).lower()}"]
+def write_setup(path: Path, setup: Setup) -> None:
+    """Write the file without feature points: those of the folder's features.csv count."""
+    lines = [HEAD + f"joined = {_toml(setup.joined)}"]
     lines.append(
         f"synced = [{', '.join(map(str, sorted(setup.synced)))}]  # FAPs whose two sides go together"
     )
     if setup.whole:
         lines.append(f"whole = [{', '.join(map(str, sorted(setup.whole)))}]")
-    if points:
-        lines += ["", "[points]"]
-        lines += [f'"{name}" = {_numbers(place)}' for name, place in setup.points.items()]
     plain = {f.name: f.default for f in fields(Zone)}
     for fap in sorted(setup.zones):
         zone = setup.zones[fap]
         lines += ["", "[[zone]]"]
-        for name in plain:
-            value = getattr(zone, name)
-            if value != plain[name]:
-                lines.append(f"{name} = {_toml(value)}")
+        changed = {name: value for name, value in asdict(zone).items() if value != plain[name]}
+        lines += [f"{name} = {_toml(value)}" for name, value in changed.items()]
     if setup.masks:
         lines += ["", "[masks]  # FAPs that share it = vertices"]
         shared: dict[str, list[int]] = {}
@@ -99,35 +85,24 @@ def _zone(where: str, entry: Any) -> Zone:
     for name in ("fap", "falloff", "size"):
         if name not in entry:
             raise FaceError(f"{where}: {name} is missing")
-    values: dict[str, Any] = {}
-    for name, value in entry.items():
-        at = f"{where}: {name}"
-        if name in LISTED:
-            values[name] = _triple(at, value)
-        elif name == "fap":
-            values[name] = _whole(at, value)
-        elif kinds[name] == "bool":
-            if not isinstance(value, bool):
-                raise FaceError(f"{at}: wanted true or false, got {value!r}")
-            values[name] = value
-        elif kinds[name] == "float":
-            values[name] = _number(at, value)
-        else:
-            values[name] = value
+    readers: dict[str, Any] = {"Triple": _triple, "int": _whole, "float": _number, "bool": _truth}
+    values = {
+        name: readers[kinds[name]](f"{where}: {name}", value) if kinds[name] in readers else value
+        for name, value in entry.items()
+    }
     return Zone(**values)
 
 
-def _list(path: Path, read: dict[str, Any], key: str) -> list[Any]:
-    value = read.get(key, [])
-    if not isinstance(value, list):
-        raise FaceError(f"{path}: {key}: wanted a list, got {value!r}")
+def _entry(path: Path, read: dict[str, Any], key: str, kind: type[list[Any]] | type[dict[str, Any]]) -> Any:
+    value = read.get(key, kind())
+    if not isinstance(value, kind):
+        raise FaceError(f"{path}: {key}: wanted a {'list' if kind is list else 'table'}, got {value!r}")
     return value
 
 
-def _dict(path: Path, read: dict[str, Any], key: str) -> dict[str, Any]:
-    value = read.get(key, {})
-    if not isinstance(value, dict):
-        raise FaceError(f"{path}: {key}: wanted a table, got {value!r}")
+def _truth(where: str, value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise FaceError(f"{where}: wanted true or false, got {value!r}")
     return value
 
 
@@ -169,15 +144,7 @@ def _ranges(mask: Int32) -> str:
     return " ".join(str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs)
 
 
-def _numbers(values: Any) -> str:
-    return f"[{', '.join(f'{float(value):.7g}' for value in values)}]"
-
-
 def _toml(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
     if isinstance(value, tuple):
-        return _numbers(value)
-    if isinstance(value, str):
-        return f'"{value}"'
-    return str(value) if isinstance(value, int) else f"{value:.7g}"
+        return f"[{', '.join(f'{float(number):.7g}' for number in value)}]"
+    return f"{value:.7g}" if isinstance(value, float) else json.dumps(value)

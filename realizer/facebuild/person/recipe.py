@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from realizer.core.errors import FaceError
+from realizer.face.reading import face_errors
 from realizer.facebuild.person import makehuman
 from realizer.facebuild.person.hair import style_of
 
@@ -49,12 +50,8 @@ def read_recipe(path: Path, data: Path) -> Recipe:
     Raises:
         FaceError: the file is missing or not TOML, or has faults: all are listed, each with key and reason.
     """
-    try:
+    with face_errors(path, "a recipe (copy the one of another face and change it)"):
         raw = tomllib.loads(path.read_text("utf-8"))
-    except FileNotFoundError:
-        raise FaceError(f"{path}: wanted a recipe; copy the one of another face and change it") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise FaceError(f"{path}: {error}") from None
     known = ("says", *TABLES)
     faults = [f"wanted one of {', '.join(known)}, got {key!r}" for key in raw if key not in known]
     if not isinstance(raw.get("says"), str) or not raw["says"].strip():

@@ -1,14 +1,15 @@
-"""Tests of the reader of .npz files."""
+"""Tests of the readers of files in face folders."""
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from realizer.core.errors import FaceError
-from realizer.face.reading import read_arrays
+from realizer.core.errors import FaceError, TableError
+from realizer.face.reading import face_errors, read_arrays
 
 
 @pytest.fixture
@@ -52,3 +53,19 @@ def test_arrays_of_objects_are_refused(tmp_path: Path) -> None:
     np.savez(tmp_path / "x.npz", a=np.array([{}], object))
     with pytest.raises(FaceError, match="wanted arrays of numbers, got something else"):
         read_arrays(tmp_path / "x.npz", {})
+
+
+@pytest.mark.parametrize(
+    ("raised", "words"),
+    [
+        (FileNotFoundError(), "x: wanted a list, found none"),
+        (PermissionError(13, "Permission denied"), "x: wanted a list, got Permission denied"),
+        (UnicodeDecodeError("utf-8", b"\xff", 0, 1, "bad"), "x: wanted a list, got bytes that are no UTF-8"),
+        (tomllib.TOMLDecodeError("at line 1"), "x: at line 1"),
+        (TableError("x, line 2: wanted 7 cells"), "x, line 2: wanted 7 cells"),
+    ],
+)
+def test_face_errors_name_the_file_and_what_it_should_be(raised: Exception, words: str) -> None:
+    with pytest.raises(FaceError) as caught, face_errors(Path("x"), "a list"):
+        raise raised
+    assert str(caught.value) == words

@@ -14,9 +14,9 @@ from realizer.facebuild.mpeg4.parameters import read_setup, write_setup
 
 def test_read_setup_returns_what_write_setup_wrote(tmp_path: Path) -> None:
     setup = setup_of(folder_of("default"))
-    write_setup(tmp_path / "one.toml", setup, points=True)
+    write_setup(tmp_path / "one.toml", setup)
     again = read_setup(tmp_path / "one.toml")
-    write_setup(tmp_path / "two.toml", again, points=True)
+    write_setup(tmp_path / "two.toml", again)
     assert (tmp_path / "one.toml").read_text() == (tmp_path / "two.toml").read_text()
     assert again.synced == setup.synced
     assert {fap: mask.tolist() for fap, mask in again.masks.items()} == {
@@ -24,6 +24,11 @@ def test_read_setup_returns_what_write_setup_wrote(tmp_path: Path) -> None:
     }
     for fap, zone in setup.zones.items():
         assert again.zones[fap].radii == pytest.approx(zone.radii, rel=1e-6)
+
+
+def test_read_setup_returns_points(tmp_path: Path) -> None:
+    (tmp_path / "points.toml").write_text('[points]\n"2.1" = [0, -0.1, 0.02]\n')
+    assert read_setup(tmp_path / "points.toml").points == {"2.1": (0, -0.1, 0.02)}
 
 
 @pytest.mark.parametrize(
