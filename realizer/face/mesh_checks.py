@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float64, Int32
-from realizer.face.mesh_geometry import edges_of, half_edges, part_triangles
+from realizer.face.mesh_geometry import components, edges_of, half_edges, part_triangles
 
 NEEDED = ("skin", "left_eye", "right_eye")  # parts that every face has
 COLLAR = 1  # the clean cut at the bust's end is the hole that every head may have
@@ -92,20 +92,16 @@ def _turned(triangles: Int32) -> list[str]:
 
 def _holes(vertices: Float64, triangles: Int32, eyes: list[Any], mouth: Any) -> list[str]:
     """Return the rims of the skin beside the bust's end, the lids and the inside of the mouth."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     pairs, counts = edges_of(triangles)
     rim = pairs[counts == 1]
     if not len(rim):
         return []
     names, index = np.unique(rim, return_inverse=True)
     index = index.reshape(-1, 2)
-    graph = coo_matrix((np.ones(len(index)), (index[:, 0], index[:, 1])), (len(names),) * 2)
-    count, label = connected_components(graph, directed=False)
+    label = components(index, len(names))
     lowest = label[int(np.argmin(vertices[names, 1]))]
     open_ = []
-    for k in range(count):
+    for k in range(label.max() + 1):
         mine = names[label == k]
         at = vertices[mine]
         lids = any(np.linalg.norm(at - eye, axis=1).max() < AT_EYE for eye in eyes)
@@ -123,5 +119,5 @@ def _holes(vertices: Float64, triangles: Int32, eyes: list[Any], mouth: Any) -> 
             for vertex, edges, place in open_[:4]
         )
         + (" ..." if len(open_) > 4 else "")
-        + "; close it" * bool(open_)
+        + "; close it"
     ] * bool(open_)

@@ -26,6 +26,20 @@ def edges_of(triangles: Int32) -> tuple[Int32, Any]:
     return pairs, counts
 
 
+def components(edges: Int32, n: int) -> Int32:
+    """Return the number of the connected piece of each of n vertices, (n,), by the edges (k, 2)."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_matrix((np.ones(len(edges), np.int8), tuple(edges.T)), (n, n))
+    return np.asarray(connected_components(graph, directed=False)[1], np.int32)
+
+
+def flat_cross(a: Float64, b: Float64) -> Float64:
+    """Return the cross products (...) of vectors (..., 2)."""
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
 def edge_graph(at: Float64, edges: Int32) -> Any:
     """Return the lengths of edges (k, 2), which may repeat, as a sparse matrix (n, n), each once."""
     from scipy.sparse import csr_matrix

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float32, Int32
+from realizer.face.mesh_geometry import fit_ball
 from realizer.face.model import Face
 from realizer.render.light import Light, unit
 
@@ -65,12 +66,8 @@ class _Ball:
 
     def __init__(self, face: Face, first: int, last: int) -> None:
         points = face.vertices[first:last].astype(np.float64)
-        middle = points.mean(axis=0)
-        # |p - c|^2 = r^2 is linear in c and r^2 - c^2, about the mean for the sake of the numbers.
-        local = points - middle
-        columns = np.hstack([2 * local, np.ones((len(local), 1))])
-        found = np.linalg.lstsq(columns, (local**2).sum(axis=1), rcond=None)[0]
-        centre = found[:3]
+        local = points - points.mean(axis=0)  # for the sake of the numbers
+        centre, _ = fit_ball(local)
         mixture = np.vstack([local.T, np.ones(len(local))])
         self.weights: Float32 = np.linalg.lstsq(mixture, [*centre, 1.0], rcond=None)[0].astype(np.float32)
         # The bulge of the cornea counts, if the eye has one.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from realizer.core.array_types import Float64, Int32
-from realizer.face.mesh_geometry import part_triangles
+from realizer.face.mesh_geometry import flat_cross, part_triangles
 from realizer.face.model import Face
 
 
@@ -28,7 +28,7 @@ def locate_on_skin(
     flat = np.stack([face.vertices @ right, face.vertices[:, 1]], axis=1)
     depth = face.vertices @ towards
     a, b, c = (flat[mine[:, k]] for k in range(3))
-    turn = _cross(b - a, c - a)
+    turn = flat_cross(b - a, c - a)
     corners = flat[mine]
     near = (
         (turn > 1e-12) & (corners.max(axis=1) >= low).all(axis=1) & (corners.min(axis=1) <= high).all(axis=1)
@@ -37,8 +37,8 @@ def locate_on_skin(
     if not len(mine):
         return None
     p = places[:, None]
-    v = _cross(p - a, c - a) / turn
-    w = _cross(b - a, p - a) / turn
+    v = flat_cross(p - a, c - a) / turn
+    w = flat_cross(b - a, p - a) / turn
     inside = (v >= -1e-6) & (w >= -1e-6) & (v + w <= 1 + 1e-6)
     heights = depth[mine[:, 0]] * (1 - v - w) + depth[mine[:, 1]] * v + depth[mine[:, 2]] * w
     best = np.where(inside, heights, -np.inf).argmax(axis=1)
@@ -51,8 +51,3 @@ def locate_on_skin(
         return None
     v, w = v[row, best], w[row, best]
     return hit.astype(np.int32), np.stack([1 - v - w, v, w], axis=1)
-
-
-def _cross(a: Float64, b: Float64) -> Float64:
-    out: Float64 = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-    return out

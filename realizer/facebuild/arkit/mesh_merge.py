@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from realizer.core.array_types import Bool, Float64, Int32
+from realizer.face.mesh_geometry import components, half_edges
 from realizer.facebuild.arkit.scene import Piece
 from realizer.tables.arkit_names import canonical
 
@@ -39,16 +40,34 @@ class Surface:
         """Return the displacement (n, 3) of a shape, or zeros if the head lacks it."""
         return self.moves.get(name, np.zeros_like(self.vertices))
 
+    def total(self, *names: str) -> Float64 | None:
+        """Return the sum of shapes, (n, 3), or None if one is missing."""
+        if any(name not in self.moves for name in names):
+            return None
+        return np.asarray(np.sum([self.moves[name] for name in names], axis=0))
+
+    def centre(self, moves: Iterable[Float64]) -> Float64:
+        """Return the middle (3,) of what shapes (n, 3) move."""
+        weight = np.sum([(move**2).sum(axis=1) for move in moves], axis=0)
+        return np.asarray((self.vertices * weight[:, None]).sum(axis=0) / weight.sum())
+
+    def components(self) -> Int32:
+        """Return the number of the connected piece of each vertex, (n,)."""
+        return components(half_edges(self.triangles), len(self.vertices))
+
     def subset(self, vertices: Any) -> Surface:
         """Return the surface of the given vertices, in their order, with the triangles between them."""
         index = np.asarray(vertices)
         place = np.full(len(self.vertices), -1)
         place[index] = np.arange(len(index))
         corners = place[self.triangles]
+        return self._taken(index, corners[(corners >= 0).all(axis=1)])
+
+    def _taken(self, index: Any, triangles: Any) -> Surface:
         return replace(
             self,
             vertices=self.vertices[index],
-            triangles=corners[(corners >= 0).all(axis=1)].astype(np.int32),
+            triangles=triangles.astype(np.int32),
             colours=self.colours[index],
             piece=self.piece[index],
             textured=self.textured[index],
@@ -88,33 +107,11 @@ def _welded(surface: Surface) -> Surface:
     _, first, group = np.unique(key, axis=0, return_index=True, return_inverse=True)
     group = group.ravel()
     corners = group[surface.triangles]
-    flat = (
-        (corners[:, 0] == corners[:, 1]) | (corners[:, 1] == corners[:, 2]) | (corners[:, 2] == corners[:, 0])
-    )
-    corners = corners[~flat]
+    corners = corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)]
     count = np.bincount(group)[:, None]
     colours = np.stack([np.bincount(group, surface.colours[:, k]) for k in range(3)], 1) / count
-    whole = replace(
-        surface,
-        vertices=surface.vertices[first],
-        triangles=corners.astype(np.int32),
-        colours=colours,
-        piece=surface.piece[first],
-        textured=surface.textured[first],
-        moves={name: move[first] for name, move in surface.moves.items()},
-    )
     # Vertices without a triangle are invisible.
-    return whole.subset(np.unique(corners))
-
-
-def components(triangles: Int32, n: int) -> Int32:
-    """Return the number of the connected piece of each vertex, (n,)."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    a, b = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]]]).T
-    graph = coo_matrix((np.ones(len(a), np.int8), (a, b)), (n, n))
-    return np.asarray(connected_components(graph, directed=False)[1], np.int32)
+    return replace(surface._taken(first, corners), colours=colours).subset(np.unique(corners))
 
 
 def cut(surface: Surface, height: Float64) -> Surface:
@@ -128,13 +125,6 @@ def cut(surface: Surface, height: Float64) -> Surface:
     n = len(surface.vertices)
     flat = Submesh(sp.csr_matrix(sp.eye_array(n)), np.zeros((n, 3)), surface.triangles)
     piece, mix = flat.clipped(height)
-    nearest = np.asarray(mix.argmax(axis=1)).ravel()
-    return replace(
-        surface,
-        vertices=np.asarray(mix @ surface.vertices),
-        triangles=piece.triangles,
-        colours=np.asarray(mix @ surface.colours),
-        piece=surface.piece[nearest],
-        textured=surface.textured[nearest],
-        moves={name: np.asarray(mix @ move) for name, move in surface.moves.items()},
-    )
+    nearest = surface._taken(np.asarray(mix.argmax(axis=1)).ravel(), piece.triangles)
+    moves = {name: np.asarray(mix @ move) for name, move in surface.moves.items()}
+    return replace(nearest, vertices=mix @ surface.vertices, colours=mix @ surface.colours, moves=moves)

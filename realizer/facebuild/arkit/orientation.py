@@ -50,7 +50,7 @@ def pose_of(surface: Surface) -> Pose:
     Raises:
         FaceError: no shape moves anything that has a side.
     """
-    centres = {name: _centre(surface, move) for name, move in surface.moves.items() if move.any()}
+    centres = {name: surface.centre([move]) for name, move in surface.moves.items() if move.any()}
     pairs = [
         (centres[name], centres[name[:-4] + "Right"])
         for name in centres
@@ -100,11 +100,6 @@ def oriented(surface: Surface, pose: Pose) -> Surface:
         moves = {other_side(name): move for name, move in moves.items()}
     at = (surface.vertices - pose.middle) @ pose.turn.T * pose.scale
     return replace(surface, vertices=at, moves=moves)
-
-
-def _centre(surface: Surface, move: Float64) -> Float64:
-    weight = (move**2).sum(axis=1)
-    return np.asarray((surface.vertices * weight[:, None]).sum(axis=0) / weight.sum())
 
 
 def _eyes(centres: dict[str, Float64], swapped: bool) -> Any:

@@ -13,7 +13,7 @@ import numpy as np
 from realizer.core.array_types import Bool, Float64
 from realizer.core.errors import FaceError
 from realizer.face.mesh_geometry import fit_ball
-from realizer.facebuild.arkit.mesh_merge import Surface, components
+from realizer.facebuild.arkit.mesh_merge import Surface
 from realizer.tables import read_csv
 
 ROUND = 0.06  # of its radius: how far an eyeball's vertices may lie off the ball that fits them
@@ -76,7 +76,7 @@ def sort_parts(surface: Surface) -> HeadParts:
         FaceError: no skin that the shapes move, or no eyes.
     """
     n = len(surface.vertices)
-    label = components(surface.triangles, n)
+    label = surface.components()
     named = [part_of(names) for names in surface.names]
     total = np.sum([np.linalg.norm(move, axis=1) for move in surface.moves.values()], axis=0)
     moved = np.bincount(label, total)
@@ -98,7 +98,9 @@ def sort_parts(surface: Surface) -> HeadParts:
     words = []
     if len(parts["glass"]):
         words.append("left out what lies over the eyes to be seen through")
-    parts |= _eyes(surface, parts.pop("eye"))
+    eyes = parts.pop("eye")
+    for name, side in (("left_eye", 1), ("right_eye", -1)):
+        parts[name] = eyes[surface.vertices[eyes, 0] * side > 0]
     painted = not len(parts["left_eye"]) or not len(parts["right_eye"])
     if painted:
         parts |= _painted(surface, parts)
@@ -107,7 +109,8 @@ def sort_parts(surface: Surface) -> HeadParts:
     parts["upper_teeth"], parts["lower_teeth"] = upper, lower
     unsure += doubt
     parts.pop("glass")
-    keep = _bust(surface)
+    # Hands and feet belong to no bust.
+    keep: Bool = (surface.vertices[:, 1] > FLOOR) & (np.abs(surface.vertices[:, 0]) < ASIDE)
     parts = {name: parts[name][keep[parts[name]]].astype(np.int32) for name in ORDER}
     if len(parts["other"]):
         unsure.append(
@@ -127,8 +130,9 @@ def _by_shape(surface: Surface, mine: Any, named: str) -> str:
         return "eye"
     if named == "skin":
         return "skin"
-    mouth = _place(surface, "mouth")
-    if mouth is not None:
+    moves = [move for name, move in surface.moves.items() if name.startswith("mouth") and move.any()]
+    if moves:
+        mouth = surface.centre(moves)
         inside = (np.abs(at[:, 0]) < 0.035) & (at[:, 2] < mouth[2] + 0.006)
         if inside.all() and abs(middle[1] - mouth[1]) < 0.035 and middle[2] > mouth[2] - 0.07:
             return "tongue" if _amount(surface, mine, "tongueOut") > 0.002 else "teeth"
@@ -151,22 +155,8 @@ def ball_behind(at: Float64) -> tuple[Float64, float]:
     return np.array([middle[0], middle[1], at[:, 2].max() - EYEBALL]), EYEBALL
 
 
-def _place(surface: Surface, word: str) -> Float64 | None:
-    """Return the vertices that the shapes with that word move most."""
-    moves = [move for name, move in surface.moves.items() if name.startswith(word) and move.any()]
-    if not moves:
-        return None
-    weight = np.sum([(move**2).sum(axis=1) for move in moves], axis=0)
-    return np.asarray((surface.vertices * weight[:, None]).sum(axis=0) / weight.sum())
-
-
 def _amount(surface: Surface, mine: Any, name: str) -> float:
     return float(np.linalg.norm(surface.move(name)[mine], axis=1).max(initial=0))
-
-
-def _eyes(surface: Surface, mine: Any) -> dict[str, Any]:
-    x = surface.vertices[mine, 0]
-    return {"left_eye": mine[x > 0], "right_eye": mine[x < 0]}
 
 
 def _painted(surface: Surface, parts: dict[str, Any]) -> dict[str, Any]:
@@ -192,7 +182,7 @@ def _teeth(surface: Surface, mine: Any) -> tuple[Any, Any, list[str]]:
     if not len(mine):
         return mine, mine, []
     drop = np.linalg.norm(surface.move("jawOpen")[mine], axis=1)
-    labels = components(surface.subset(mine).triangles, len(mine))
+    labels = surface.subset(mine).components()
     if drop.max() > 0.004:
         mean = np.bincount(labels, drop) / np.bincount(labels)
         lower: Bool = mean[labels] > 0.5 * drop.max()
@@ -205,15 +195,5 @@ def _teeth(surface: Surface, mine: Any) -> tuple[Any, Any, list[str]]:
     height = surface.vertices[mine, 1]
     tops = np.bincount(labels, height) / np.bincount(labels)
     lower = tops[labels] < (height.min() + height.max()) / 2
-    return (
-        mine[~lower],
-        mine[lower],
-        ["jawOpen does not move the teeth: parted by their height, look at them"],
-    )
-
-
-def _bust(surface: Surface) -> Bool:
-    """Return which vertices belong to head and shoulders, (n,); hands and feet do not."""
-    at = surface.vertices
-    keep: Bool = (at[:, 1] > FLOOR) & (np.abs(at[:, 0]) < ASIDE)
-    return keep
+    doubt = "jawOpen does not move the teeth: parted by their height, look at them"
+    return mine[~lower], mine[lower], [doubt]

@@ -58,9 +58,8 @@ def points_of(
 
 def _size(surface: Surface, *names: str) -> Any:
     """Return how far shapes move each vertex, (n,) metres, or None if a shape is missing."""
-    if any(name not in surface.moves for name in names):
-        return None
-    return np.linalg.norm(np.sum([surface.moves[name] for name in names], axis=0), axis=1)
+    total = surface.total(*names)
+    return None if total is None else np.linalg.norm(total, axis=1)
 
 
 def _slit(skin: Surface, points: Mapping[str, Point], first: int) -> dict[str, int]:

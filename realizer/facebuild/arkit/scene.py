@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float64, Int32
-from realizer.core.colours import srgb
+from realizer.core.colours import linear, srgb
 from realizer.core.errors import FaceError
 from realizer.facebuild.arkit.gltf import Gltf
 
@@ -98,10 +98,6 @@ def _matrix(node: dict[str, Any]) -> Float64:
     return out
 
 
-def _name(item: dict[str, Any]) -> str:
-    return str(item.get("name", ""))
-
-
 def _piece(
     gltf: Gltf, node: dict[str, Any], mesh: dict[str, Any], primitive: dict[str, Any], world: Float64,
     worlds: dict[int, Float64], where: str,
@@ -137,7 +133,7 @@ def _piece(
                 raise FaceError(f"{where}: shape {name!r}: wanted finite x, y, z of each move; export again")
             moves[name] = np.einsum("nij,nj->ni", matrices[:, :3, :3], move)
     return Piece(
-        names=(_name(material), _name(mesh), _name(node)),
+        names=(str(material.get("name", "")), str(mesh.get("name", "")), str(node.get("name", ""))),
         vertices=np.einsum("nij,nj->ni", matrices[:, :3, :3], at) + matrices[:, :3, 3],
         triangles=triangles.astype(np.int32),
         colours=colours,
@@ -166,11 +162,8 @@ def _target_names(gltf: Gltf, mesh: dict[str, Any], primitive: dict[str, Any]) -
     """
     targets = primitive.get("targets", [])
     for holder in (mesh, primitive):
-        names = (
-            (holder.get("extras") or {}).get("targetNames")
-            if isinstance(holder.get("extras"), dict)
-            else None
-        )
+        extras = holder.get("extras")
+        names = extras.get("targetNames") if isinstance(extras, dict) else None
         if isinstance(names, list) and len(names) == len(targets):
             return [str(name) for name in names]
     return [
@@ -224,7 +217,7 @@ def _colours(
         if pixels is not None and name in attributes:
             uv = _shifted(gltf.accessor(attributes[name]), shift)
             seen = sample(pixels, uv)
-            light, alpha, textured = light * _linear(seen[:, :3]), alpha * seen[:, 3] / 255, True
+            light, alpha, textured = light * linear(seen[:, :3]), alpha * seen[:, 3] / 255, True
     return np.asarray(srgb(light.astype(np.float32)), np.float64) * 255, textured, float(alpha.mean())
 
 
@@ -237,16 +230,9 @@ def _shifted(uv: Float64, shift: dict[str, Any]) -> Float64:
 
 def sample(pixels: Any, uv: Float64) -> Float64:
     """Return the colours (n, 4) of a repeating picture at texture coordinates (n, 2), interpolated."""
+    from scipy.ndimage import map_coordinates
+
     height, width = pixels.shape[:2]
-    x, y = uv[:, 0] * width - 0.5, uv[:, 1] * height - 0.5
-    left, top = np.floor(x).astype(int), np.floor(y).astype(int)
-    dx, dy = (x - left)[:, None], (y - top)[:, None]
-    rows, columns = (top % height, (top + 1) % height), (left % width, (left + 1) % width)
-    upper = pixels[rows[0], columns[0]] * (1 - dx) + pixels[rows[0], columns[1]] * dx
-    lower = pixels[rows[1], columns[0]] * (1 - dx) + pixels[rows[1], columns[1]] * dx
-    return np.asarray(upper * (1 - dy) + lower * dy)
-
-
-def _linear(colours: Float64) -> Float64:
-    c = np.asarray(colours) / 255
-    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+    at = np.stack([uv[:, 1] * height - 0.5, uv[:, 0] * width - 0.5])
+    channels = np.moveaxis(np.asarray(pixels, np.float64), 2, 0)
+    return np.stack([map_coordinates(channel, at, order=1, mode="grid-wrap") for channel in channels], 1)

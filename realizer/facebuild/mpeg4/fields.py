@@ -17,6 +17,7 @@ import numpy as np
 
 from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
+from realizer.face.mesh_geometry import components
 from realizer.facebuild.mpeg4.zones import Setup, Zone
 from realizer.tables import faps, read_csv
 
@@ -54,7 +55,7 @@ def zone_fields(setup: Setup, vertices: Float64) -> dict[int, Float64]:
         distance[fap] = np.linalg.norm((at - _middle(setup, zone)) / zone.radii, axis=1)
         open_[fap] = _unmasked(setup, zone, n)
     weights = {fap: zone.influence(distance[fap]) * open_[fap] for fap, zone in setup.zones.items()}
-    if setup.joined:
+    if setup.joined and setup.zones:
         weights = _shared(setup, at, distance, open_, weights)
     return {fap: _directed(setup, zone, at, weights[fap]) for fap, zone in setup.zones.items()}
 
@@ -91,12 +92,12 @@ def _shared(
 ) -> dict[int, Float64]:
     """Return the influence of each zone after overlapping neighbours have shared it."""
     links = [pair for pair in _pairs() if pair.one in setup.zones and pair.other in setup.zones]
-    near: dict[int, set[int]] = {fap: set() for fap in setup.zones}
-    for pair in links:
-        near[pair.one].add(pair.other)
-        near[pair.other].add(pair.one)
+    order = sorted(setup.zones)
+    joined = np.array([[order.index(pair.one), order.index(pair.other)] for pair in links], np.int32)
+    label = components(joined.reshape(-1, 2), len(order))
     out = dict(alone)
-    for group in _groups(near):
+    for k in np.flatnonzero(np.bincount(label) > 1):
+        group = [order[i] for i in np.flatnonzero(label == k)]
         envelope = np.max([alone[fap] for fap in group], axis=0)
         for pair in links:
             if pair.one in group:
@@ -125,22 +126,6 @@ def _between(setup: Setup, pair: _Pair, at: Float64) -> Float64:
     radii = one.radii + t[:, None] * (other.radii - one.radii)
     distance = np.linalg.norm((at - a - t[:, None] * along) / radii, axis=1)
     return (1 - t) * one.influence(distance) + t * other.influence(distance)
-
-
-def _groups(near: Mapping[int, set[int]]) -> list[list[int]]:
-    """Return the sets of two or more zones that neighbours join."""
-    left, groups = set(near), []
-    while left:
-        group, todo = set(), [min(left)]
-        while todo:
-            fap = todo.pop()
-            if fap not in group:
-                group.add(fap)
-                todo += near[fap]
-        left -= group
-        if len(group) > 1:
-            groups.append(sorted(group))
-    return groups
 
 
 def _directed(setup: Setup, zone: Zone, at: Float64, weight: Float64) -> Float64:

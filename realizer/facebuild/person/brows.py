@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from realizer.core.array_types import Float64
-from realizer.face.mesh_geometry import vertex_normals
+from realizer.face.mesh_geometry import flat_cross, vertex_normals
 from realizer.facebuild.parts import Part, grid, smooth
 from realizer.facebuild.person.appearance import Appearance
 from realizer.facebuild.person.lids import Lid
@@ -99,11 +99,11 @@ def _laid(skin: Submesh, base: Float64, flat: Float64) -> Submesh:
     inside = ((at[:, :2] > low) & (at[:, :2] < high)).all(axis=1) & (at[:, 2] > -0.03)
     mine = skin.triangles[inside[skin.triangles].any(axis=1)]
     a, b, c = (at[mine[:, k], :2] for k in range(3))
-    turn = _cross(b - a, c - a)
+    turn = flat_cross(b - a, c - a)
     mine, a, b, c, turn = (part[turn > 1e-9] for part in (mine, a, b, c, turn))
     place = flat[:, None]
-    s = _cross(place - a, c - a) / turn
-    t = _cross(b - a, place - a) / turn
+    s = flat_cross(place - a, c - a) / turn
+    t = flat_cross(b - a, place - a) / turn
     # The triangle that holds the place, or else the one that it misses by least; of several the foremost.
     out = np.maximum(np.maximum(-s, -t), np.maximum(s + t - 1, 0))
     best = (out - 0.001 * at[mine, 2].mean(axis=1) / 0.01).argmin(axis=1)
@@ -112,10 +112,6 @@ def _laid(skin: Submesh, base: Float64, flat: Float64) -> Submesh:
     corners, shares = mine[best], np.stack([1 - s - t, s, t], 1)
     pick = sp.csr_matrix((shares.ravel(), (np.repeat(row, 3), corners.ravel())), (len(flat), len(skin)))
     return skin.mixed(pick, np.zeros((0, 3)))
-
-
-def _cross(a: Float64, b: Float64) -> Float64:
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
 def lashes(base: Float64, lid: Lid, centre: Float64, skin: Any, colour: Any, look: Appearance) -> Part:

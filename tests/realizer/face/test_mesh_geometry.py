@@ -8,9 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer.face.mesh_geometry import (
+    components,
     edge_graph,
     edges_of,
     fit_ball,
+    flat_cross,
     half_edges,
     mirror_twins,
     neighbour_mean,
@@ -88,3 +90,12 @@ def test_fit_ball_finds_centre_and_radius(centre: tuple[float, float, float], ra
     found, size = fit_ball(centre + radius * ways)
     assert found == pytest.approx(centre, abs=1e-6)
     assert size == pytest.approx(radius, abs=1e-6)
+
+
+def test_components_are_numbered() -> None:
+    edges = np.array([[0, 1], [1, 2], [3, 4], [5, 3], [2, 6]])
+    assert components(edges, 7).tolist() == [0, 0, 0, 1, 1, 1, 0]
+
+
+def test_flat_cross_is_the_area_between_two_vectors() -> None:
+    assert flat_cross(np.array([[2.0, 0]]), np.array([1.0, 3])).tolist() == [6]

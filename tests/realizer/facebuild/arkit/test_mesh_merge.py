@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.facebuild.arkit.mesh_merge import Surface, components, cut, merge_pieces
+from realizer.facebuild.arkit.mesh_merge import Surface, cut, merge_pieces
 from realizer.facebuild.arkit.scene import Piece
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
@@ -45,10 +45,6 @@ def test_surface_subset_keeps_triangles_between_its_vertices() -> None:
     surface = whole.subset(whole.triangles[0][::-1])
     assert surface.triangles.tolist() == [[2, 1, 0]]
     assert len(surface.move("jawOpen")) == len(surface.colours) == 3
-
-
-def test_components_are_numbered() -> None:
-    assert components(np.array([[0, 1, 2], [3, 4, 5], [2, 1, 6]]), 7).tolist() == [0, 0, 0, 1, 1, 1, 0]
 
 
 def test_cut_ends_the_surface_along_a_straight_line() -> None:
