@@ -88,6 +88,12 @@ def mirror_twins(at: Float64, within: float) -> Int32:
     return np.where(np.asarray(off) < within, twin, -1).astype(np.int32)
 
 
+def nearest_vertex(at: Float64, place: Any, part: tuple[int, int]) -> int:
+    """Return the vertex of a part (first, last + 1) that is nearest to a place (3,)."""
+    first, last = part
+    return first + int(np.argmin(np.linalg.norm(at[first:last] - place, axis=1)))
+
+
 def fit_ball(at: Float64) -> tuple[Float64, float]:
     """Return centre (3,) and radius of the ball that fits vertices (n, 3) best."""
     rows = np.c_[2 * at, np.ones(len(at))]

@@ -38,6 +38,11 @@ class Submesh:
     def __len__(self) -> int:
         return int(self.mix.shape[0])
 
+    def sources(self) -> Int32:
+        """Return the base vertex that each vertex is, (n,); -1 for those that are mixed."""
+        first = self.mix.indices[self.mix.indptr[:-1]]
+        return np.where(np.diff(self.mix.indptr) == 1, first, -1).astype(np.int32)
+
     def positions(self, base: Float64) -> Float64:
         """Return the positions of the vertices, (n, 3) metres."""
         return np.asarray(self.mix @ base) + self.offset

@@ -194,7 +194,7 @@ def _write_mesh(
         part[slice(*ends)] = name
     casts = ~np.isin(part[surface.triangles[:, 0]].astype(str), LINED)
     ups = vertex_normals(at, surface.triangles)
-    sees = occlusion(at, ups, surface.triangles, surface.triangles[casts], DIRECTIONS, CELL)
+    sees = occlusion(at, ups, surface.triangles[casts], DIRECTIONS, CELL)
     light, gloss = 0.25 + 0.75 * sees, np.zeros(n)
     for name, ends in ranges.items():
         gloss[slice(*ends)] = GLOSS[name]

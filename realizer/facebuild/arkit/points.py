@@ -9,7 +9,7 @@ import numpy as np
 
 from realizer.core.array_types import Float64
 from realizer.face.features import Point
-from realizer.face.mesh_geometry import vertex_normals
+from realizer.face.mesh_geometry import nearest_vertex, vertex_normals
 from realizer.facebuild.arkit.mesh_merge import Surface
 from realizer.facebuild.arkit.part_classifier import ball_behind
 from realizer.facebuild.mpeg4.landmarks import find_points
@@ -45,9 +45,7 @@ def points_of(
     points, guesses = find_points(at, surface.triangles, parts)
     if painted:
         for name, pupil in PUPILS.items():
-            begin, end = ranges[name]
-            off = np.linalg.norm(at[begin:end] - points[pupil].place, axis=1)
-            vertex = begin + int(np.argmin(off))
+            vertex = nearest_vertex(at, points[pupil].place, ranges[name])
             points[pupil] = Point(pupil, vertex, *at[vertex])
     first, last = ranges["skin"]
     skin = surface.subset(np.arange(first, last))

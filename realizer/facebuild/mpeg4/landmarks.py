@@ -16,7 +16,7 @@ import numpy as np
 from realizer.core.array_types import Float64, Int32
 from realizer.core.errors import FaceError
 from realizer.face.features import INSIDE, NAMES, Point
-from realizer.face.mesh_geometry import part_triangles, vertex_normals
+from realizer.face.mesh_geometry import nearest_vertex, part_triangles, vertex_normals
 from realizer.facebuild.mpeg4.head_geometry import HeadGeometry, find_anchors
 from realizer.facebuild.mpeg4.rigid import balls
 from realizer.tables import read_csv
@@ -124,12 +124,9 @@ def _settled(
     """Return the vertex of a point, the point itself, and its distance from the skin in metres."""
     at = np.asarray(vertices, np.float64)
 
-    def nearest(part: str) -> int:
-        first, last = parts[part]
-        return first + int(np.argmin(np.linalg.norm(at[first:last] - place, axis=1)))
-
     if name in INSIDE:
-        return nearest("skin" if name == "7.1" or "hair" not in parts else "hair"), _triple(place), 0.0
+        part = "skin" if name == "7.1" or "hair" not in parts else "hair"
+        return nearest_vertex(at, place, parts[part]), _triple(place), 0.0
     if name in PUPILS:
         first, last = parts[PUPILS[name]]
         vertex = first + int(np.argmax(at[first:last, 2]))
@@ -147,7 +144,7 @@ def _settled(
     if name.startswith("4.") and "brows" in parts:
         place = _on_brow(at[slice(*parts["brows"])], place, origin, unit)
     part = "tongue" if name.startswith("6.") and "tongue" in parts else "skin"
-    vertex = nearest(part)
+    vertex = nearest_vertex(at, place, parts[part])
     if name in FACING:
         first, last = parts["skin"]
         right = np.flatnonzero(head.ups[:, 1] * FACING[name] > -0.1)

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from realizer.core.array_types import Float64
+from realizer.core.array_types import Float64, Int32
 from realizer.face.mesh_geometry import flat_cross, vertex_normals
 from realizer.facebuild.parts import Part, grid, smooth
-from realizer.facebuild.person.appearance import Appearance
 from realizer.facebuild.person.lids import Lid
+from realizer.facebuild.person.recipe import Appearance
 from realizer.facebuild.submesh import Submesh, mix_of
 
 ALONG, ACROSS = 26, 7  # vertices of a brow
@@ -57,11 +57,8 @@ def brow(
     across = x[0] + (x[-1] - x[0]) * t + v[:, None] * lean * np.minimum(half / HALF, 1)
     height = middle(np.clip(across, x[0], x[-1])) + reach
     flat = np.stack([side * across.ravel(), height.ravel()], 1)
-    patch = _laid(skin, base, flat)
-    if side > 0:
-        patch = Submesh(patch.mix, patch.offset, grid(ACROSS, ALONG)[:, [0, 2, 1]])
-    else:
-        patch = Submesh(patch.mix, patch.offset, grid(ACROSS, ALONG))
+    sheet = grid(ACROSS, ALONG)
+    patch = _laid(skin, base, flat, sheet[:, [0, 2, 1]] if side > 0 else sheet)
     at = patch.positions(base)
     thick = (1 - np.abs(v[:, None]) ** 2) * np.ones(ALONG)
     thick = thick * smooth(t, 0.0, 0.12) * smooth(t, 1.0, 0.9)
@@ -86,14 +83,13 @@ def brow(
 
 def _spread(skin: Submesh, tints: Float64) -> Float64:
     """Return the skin's tints on the base mesh's vertices, where a vertex is in the skin as it is."""
-    out = np.zeros((skin.mix.shape[1], 3))
-    single = np.diff(skin.mix.indptr) == 1
-    out[skin.mix.indices[skin.mix.indptr[:-1][single]]] = tints[single]
+    out, own = np.zeros((skin.mix.shape[1], 3)), skin.sources()
+    out[own[own >= 0]] = tints[own >= 0]
     return out
 
 
-def _laid(skin: Submesh, base: Float64, flat: Float64) -> Submesh:
-    """Return a submesh over places (n, 2) in the front view, on the skin's foremost triangle there."""
+def _laid(skin: Submesh, base: Float64, flat: Float64, sheet: Int32) -> Submesh:
+    """Return a sheet over places (n, 2) in the front view, on the skin's foremost triangle there."""
     at = skin.positions(base)
     low, high = flat.min(axis=0) - 0.01, flat.max(axis=0) + 0.01
     inside = ((at[:, :2] > low) & (at[:, :2] < high)).all(axis=1) & (at[:, 2] > -0.03)
@@ -111,7 +107,7 @@ def _laid(skin: Submesh, base: Float64, flat: Float64) -> Submesh:
     s, t = s[row, best], t[row, best]
     corners, shares = mine[best], np.stack([1 - s - t, s, t], 1)
     pick = sp.csr_matrix((shares.ravel(), (np.repeat(row, 3), corners.ravel())), (len(flat), len(skin)))
-    return skin.mixed(pick, np.zeros((0, 3)))
+    return skin.mixed(pick, sheet)
 
 
 def lashes(base: Float64, lid: Lid, centre: Float64, skin: Any, colour: Any, look: Appearance) -> Part:

@@ -9,13 +9,12 @@ from realizer.face.mesh_geometry import vertex_normals
 from realizer.facebuild import parts
 from realizer.facebuild.parts import Part, smooth
 from realizer.facebuild.person import clothing, skin_colours
-from realizer.facebuild.person.appearance import appearance_of
 from realizer.facebuild.person.brows import brow, lashes
-from realizer.facebuild.person.hair import hair, scalp_of, shadow, style_of
+from realizer.facebuild.person.hair import hair, shadow, style_of
 from realizer.facebuild.person.lids import Lid
 from realizer.facebuild.person.lips import Lips
 from realizer.facebuild.person.person import Person
-from realizer.facebuild.person.recipe import Recipe
+from realizer.facebuild.person.recipe import Recipe, appearance_of
 from realizer.facebuild.person.scalp import Scalp
 from realizer.facebuild.submesh import Submesh
 
@@ -41,26 +40,25 @@ def assemble(person: Person, lips: Lips, lids: list[Lid], recipe: Recipe) -> lis
     body = Submesh.of_quads(ground.mesh.quads["body"], n)
     body = body.with_triangles((body.positions(at)[:, 1] > person.floor - MARGIN)[body.triangles].all(axis=1))
     body = body.clipped(body.positions(at)[:, 1] - person.floor)[0]
-    own = appearance_of(recipe.look)
+    appearance = appearance_of(recipe.look)
     dressed = clothing.under_collar(
-        body.positions(at), points["2.1"], person.face, own.collar_low, own.collar_point
+        body.positions(at), points["2.1"], person.face, appearance.collar_low, appearance.collar_point
     )
     skin = body.clipped(0.012 - dressed)[0]
     # A vertex more between any two along the lips: they bend most.
-    single = np.diff(skin.mix.indptr) == 1
-    place = np.full(n, -1)
-    place[skin.mix.indices[skin.mix.indptr[:-1][single]]] = np.flatnonzero(single)
+    own, place = skin.sources(), np.full(n, -1)
+    place[own[own >= 0]] = np.flatnonzero(own >= 0)
     skin = skin.threaded([place[ring].tolist() for ring in lips.rings[:RED_RINGS]])
     style = style_of(recipe.hair)
-    scalp = scalp_of(skin, at, points, style)
-    colours, gloss = skin_colours.paint_skin(ground, lips, [lid.rings for lid in lids], look, own)
+    scalp = Scalp(skin, at, points, style.line, style.rise)
+    colours, gloss = skin_colours.paint_skin(ground, lips, [lid.rings for lid in lids], look, appearance)
     roots = shadow(scalp, style, at)[:, None]
     colours = colours * (1 - roots) + np.array(look["hair"], float) * roots
     tints, shine = np.asarray(skin.mix @ colours), np.asarray(skin.mix @ gloss)
     ring = np.where(lips.inside, 0, len(lips.rings) + 2.0)
     for k, loop in enumerate(lips.rings):
         ring[loop] = k
-    strength = own.lips * (1 - 0.25 * own.age)
+    strength = appearance.lips * (1 - 0.25 * appearance.age)
     skin_colours.paint_lips(
         tints,
         shine,
@@ -71,9 +69,9 @@ def assemble(person: Person, lips: Lips, lids: list[Lid], recipe: Recipe) -> lis
         strength,
     )
     made = [Part("skin", skin, skin.positions(at), skin.triangles, tints, shine)]
-    made += [brow(skin, at, tints, points, side, look["brows"], own) for side in (1, -1)]
+    made += [brow(skin, at, tints, points, side, look["brows"], appearance) for side in (1, -1)]
     for lid, (centre, _) in zip(lids, person.balls, strict=True):
-        made.append(lashes(at, lid, centre, look["skin"], look["lashes"], own))
+        made.append(lashes(at, lid, centre, look["skin"], look["lashes"], appearance))
     for name, side, (centre, radius) in zip(("left_eye", "right_eye"), (1, -1), person.balls, strict=True):
         made.append(parts.eyeball(name, centre, radius, look, -side))
     made += _teeth(person, recipe)
@@ -105,8 +103,8 @@ def _decimate_hidden(part: Part, person: Person, scalp: Scalp, stays: Bool) -> P
     """Decimate hidden and plain surface; feature points, lips and the mouth behind them stay."""
     if part.name not in ("skin", "tongue", "shirt") or part.patch is None:
         return part
-    single = np.diff(part.patch.mix.indptr) == 1
-    keep = single & stays[part.patch.mix.indices[part.patch.mix.indptr[:-1]]]
+    own = part.patch.sources()
+    keep = (own >= 0) & stays[own]
     chin = float(person.ground.point("2.1")[1])
     return clothing.decimate_hidden(part, keep, scalp.off_ear(part.vertices) < 0, chin, person.floor)
 
@@ -141,15 +139,9 @@ def _bake(made: list[Part]) -> None:
     count = np.cumsum([0] + [len(part.vertices) for part in made])
     vertices = np.concatenate([part.vertices for part in made])
     ups = np.concatenate([vertex_normals(part.vertices, part.triangles) for part in made])
-    casts = np.concatenate(
-        [
-            part.triangles + first
-            for part, first in zip(made, count, strict=False)
-            if part.name not in SHADOWLESS
-        ]
-    )
+    each = list(zip(made, count, strict=False))
+    casts = np.concatenate([part.triangles + first for part, first in each if part.name not in SHADOWLESS])
     sees = skin_colours.occlusion(vertices, ups, casts)
-    for part, first in zip(made, count, strict=False):
+    for part, first in each:
         if part.occlusion is None:
-            mine = sees[first : first + len(part.vertices)]
-            part.occlusion = 0.25 + 0.75 * mine
+            part.occlusion = 0.25 + 0.75 * sees[first : first + len(part.vertices)]

@@ -34,18 +34,11 @@ def face_fields(ground: Ground, jaw_pivot: Float64) -> tuple[dict[int, Float64],
     fields |= _nose(ground, lips)
     fields |= _ears(ground)
     fields |= _tongue(ground)
-    fields = symmetrize(fields, ground.mesh.mirror())
-    return _without_flips(ground, fields, jaw_pivot), lips
-
-
-def _without_flips(ground: Ground, fields: dict[int, Float64], pivot: Float64) -> dict[int, Float64]:
-    """Return the fields without triangles of the skin that turn over."""
-    quads = ground.mesh.quads["body"]
+    quads, twin = ground.mesh.quads["body"], ground.mesh.mirror()
     near = quads[(ground.at[quads, 1] > LOWEST).all(axis=1)]
     triangles = np.concatenate([near[:, [0, 1, 2]], near[:, [0, 2, 3]]]).astype(np.int32)
-    return without_flips(
-        fields, ground.at, triangles, ground.points, ground.fapu(), pivot, ground.mesh.mirror()
-    )
+    fields = symmetrize(fields, twin)
+    return without_flips(fields, ground.at, triangles, ground.points, ground.fapu(), jaw_pivot, twin), lips
 
 
 def _jaw(ground: Ground, lips: Lips, pivot: Float64) -> dict[int, Float64]:
@@ -101,12 +94,10 @@ def _brows(ground: Ground) -> dict[int, Float64]:
     )
     profile = ground.smoothed(profile * calm[:, None], 2)
     out = {}
-    for side, (names, numbers) in {
-        1: (("4.1", "4.3", "4.5"), (31, 33, 35)),
-        -1: (("4.2", "4.4", "4.6"), (32, 34, 36)),
-    }.items():
-        inner, middle, outer = _stations(at[:, 0] * side, across)
-        for number, name, share in zip(numbers, names, (inner, middle, outer), strict=True):
+    for side, names, numbers in (
+        (1, ("4.1", "4.3", "4.5"), (31, 33, 35)), (-1, ("4.2", "4.4", "4.6"), (32, 34, 36)),
+    ):  # fmt: skip
+        for number, name, share in zip(numbers, names, _stations(at[:, 0] * side, across), strict=True):
             out[number] = scaled(profile * share[:, None], points[name], UP)
     _soften(ground, out, [points[f"4.{k}"] for k in range(1, 7)], [31, 32, 33, 34, 35, 36])
     for number, name, side in ((37, "4.1", 1), (38, "4.2", -1)):
@@ -117,7 +108,7 @@ def _brows(ground: Ground) -> dict[int, Float64]:
     return out
 
 
-def _stations(x: Float64, across: Float64) -> tuple[Float64, Float64, Float64]:
+def _stations(x: Float64, across: Float64) -> list[Float64]:
     """Return the shares (n,) of a side's inner, middle and outer brow at x; 1 at its own station.
 
     A bent strip, not a chain of straight ones: the curve through the stations has no corner anywhere, and at
@@ -129,13 +120,12 @@ def _stations(x: Float64, across: Float64) -> tuple[Float64, Float64, Float64]:
     knots = np.array([-a, a, b, c])
     out = []
     for station in range(3):
-        value = np.zeros(4)
-        value[1 + station] = 1
+        value = np.eye(4)[1 + station]
         slope = np.zeros(4)
         slope[1:3] = (value[2:] - value[:2]) / (knots[2:] - knots[:2])
         spline = CubicHermiteSpline(knots, value, slope * BEND)
         out.append(np.asarray(spline(np.clip(x, -a, c)), np.float64))
-    return out[0], out[1], out[2]
+    return out
 
 
 def _soften(
@@ -148,31 +138,21 @@ def _soften(
         fields[number] = np.tensordot(mixed[:, k], soft, 1)
 
 
-def _halves(ground: Ground, shape: Float64) -> dict[int, Float64]:
-    """Return a shape's left (1) and right (-1) half, joined smoothly at the middle."""
-    return {side: shape * smooth(ground.at[:, 0] * side, -0.008, 0.008)[:, None] for side in (1, -1)}
-
-
 def _cheeks(ground: Ground, lips: Lips) -> dict[int, Float64]:
     points, out = ground.points, {}
     free = (1 - lips.lips)[:, None]
     far = smooth(lips.away, 0.0, 0.032)[:, None]
-    for side, half in _halves(ground, ground.shape("cheekPuff") * far).items():
-        number, name = (39, "5.1") if side > 0 else (40, "5.2")
+    for side, number, name in ((1, 39, "5.1"), (-1, 40, "5.2")):
+        half = ground.shape("cheekPuff") * far * smooth(ground.at[:, 0] * side, -0.008, 0.008)[:, None]
         size = ground.smoothed(np.where(ground.body, np.linalg.norm(half, axis=1), 0), 2)
         # A cheek is blown up from inside the mouth: away from there, not along one line.
         away = ground.at - (ground.point(name) - PUFFED_FROM * np.array([side, 1, 1]))
         away /= np.maximum(np.linalg.norm(away, axis=1), 0.010)[:, None]
         out[number] = scaled(size[:, None] * away, points[name], side * LEFT)
-    for side, (number, name, shape) in {
-        1: (41, "5.3", "cheekSquintLeft"),
-        -1: (42, "5.4", "cheekSquintRight"),
-    }.items():
-        lifted = np.where(ground.body[:, None], ground.shape(shape), 0) * free
+    for side, number, name, word in ((1, 41, "5.3", "Left"), (-1, 42, "5.4", "Right")):
+        lifted = np.where(ground.body[:, None], ground.shape(f"cheekSquint{word}"), 0) * free
         eye = ground.point("3.3" if side > 0 else "3.4")
-        lifted = (
-            lifted * (1 - ground.ellipsoid(eye + np.array([0, 0.004, 0]), (0.026, 0.018, 0.03), 0.2))[:, None]
-        )
+        lifted *= (1 - ground.ellipsoid(eye + np.array([0, 0.004, 0]), (0.026, 0.018, 0.03), 0.2))[:, None]
         mound = ground.ellipsoid(ground.point(name), (0.034, 0.026, 0.036))[:, None] * (UP + 0.35 * FORWARD)
         here = lifted[points[name], 1]
         mixed = mound + 0.5 * (lifted / here if here > 1e-4 else 0)
@@ -205,8 +185,7 @@ def _nose(ground: Ground, lips: Lips) -> dict[int, Float64]:
 
 def _ears(ground: Ground) -> dict[int, Float64]:
     points, out = ground.points, {}
-    for side, names in {1: ("10.1", "10.3", 65, 67), -1: ("10.2", "10.4", 66, 68)}.items():
-        top, back, up, pull = names
+    for side, top, back, up, pull in ((1, "10.1", "10.3", 65, 67), (-1, "10.2", "10.4", 66, 68)):
         centre = (ground.point(top) + ground.point("10.5" if side > 0 else "10.6")) / 2
         reach = ground.ellipsoid(centre + np.array([0.006 * side, 0, -0.004]), (0.024, 0.048, 0.032), 0.60)
         reach = ground.smoothed(reach, 1)[:, None]

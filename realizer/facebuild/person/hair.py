@@ -12,7 +12,7 @@ from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
 from realizer.facebuild.parts import Part, grid, smooth
 from realizer.facebuild.person.scalp import Scalp
-from realizer.facebuild.submesh import Submesh
+from realizer.tables import toml_table
 
 SEED = 11  # of the locks: the same head, the same hair
 FALLS = 6  # rows of what hangs down
@@ -54,9 +54,7 @@ def style_of(table: Mapping[str, Any]) -> Style:
     Raises:
         FaceError: no such style, or no such figure.
     """
-    from realizer.tables import read_toml, text_of
-
-    known = read_toml(text_of("hair.toml"), "hair.toml")
+    known = toml_table("hair.toml")
     name = table.get("style", "short")
     if name not in known["styles"]:
         raise FaceError(f"hair: style: wanted one of {', '.join(known['styles'])}, got {name!r}")
@@ -67,11 +65,6 @@ def style_of(table: Mapping[str, Any]) -> Style:
             raise FaceError(f"hair: wanted one of style, {', '.join(names)}, got {key!r}")
     figures = known["plain"] | {"line": known["line"]["heights"]} | known["styles"][name] | own
     return Style(**figures)
-
-
-def scalp_of(skin: Submesh, base: Float64, points: Mapping[str, Float64], style: Style) -> Scalp:
-    """Return where hair of a style grows."""
-    return Scalp(skin, base, points, style.line, style.rise)
 
 
 def shadow(scalp: Scalp, style: Style, at: Float64) -> Float64:

@@ -6,7 +6,7 @@ import difflib
 import math
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +14,31 @@ from realizer.core.errors import FaceError
 from realizer.face.reading import face_errors
 from realizer.facebuild.person import makehuman
 from realizer.facebuild.person.hair import style_of
+from realizer.tables import toml_table
 
 COLOURS = (
     "skin", "blush", "lips", "mouth", "brows", "lashes", "hair", "shirt", "tongue", "tooth", "root", "gum",
     "pupil", "iris_inner", "iris_middle", "iris_outer", "ring", "white", "corner",
 )  # fmt: skip
 TABLES = ("targets", "colours", "hair", "look")
+
+
+@dataclass(frozen=True, slots=True)
+class Appearance:
+    """Figures of how a person looks, as `realizer/tables/look.toml` explains them."""
+
+    brow_thick: float
+    brow_low: float
+    brow_grey: float
+    brow_cover: float
+    lash: float
+    lips: float
+    flush: float
+    stubble: float
+    freckles: float
+    age: float
+    collar_low: float
+    collar_point: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +50,7 @@ class Recipe:
         targets: shape target -> weight 0..1; `*` in a name stands for both sides.
         colours: what for -> sRGB 0..255.
         hair: the style of the hair, and the figures it changes.
-        look: figures of `realizer.facebuild.person.appearance.Appearance` that differ from the plain ones.
+        look: figures of `Appearance` that differ from the plain ones.
     """
 
     description: str
@@ -71,6 +90,22 @@ def read_recipe(path: Path, data: Path) -> Recipe:
     if faults:
         raise FaceError("\n".join(f"{path}: {fault}" for fault in faults))
     return Recipe(raw["says"], tables["targets"], tables["colours"], tables["hair"], tables["look"])
+
+
+def appearance_of(table: Mapping[str, Any]) -> Appearance:
+    """Return the plain look with the changes of a recipe's [look].
+
+    Raises:
+        FaceError: no such figure, or not a number.
+    """
+    names = [field.name for field in fields(Appearance)]
+    for key, value in table.items():
+        if key not in names:
+            raise FaceError(f"look: wanted one of {', '.join(names)}, got {key!r}")
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise FaceError(f"look: {key}: wanted a number, got {value!r}")
+    plain = toml_table("look.toml")
+    return Appearance(**{name: float(table.get(name, plain[name])) for name in names})
 
 
 def _target_faults(targets: Mapping[str, Any], data: Path) -> list[str]:

@@ -9,9 +9,9 @@ import numpy as np
 
 from realizer.core.array_types import Float64, Int32
 from realizer.facebuild.parts import smooth
-from realizer.facebuild.person.appearance import Appearance
 from realizer.facebuild.person.base_mesh import Ground
 from realizer.facebuild.person.lips import Lips
+from realizer.facebuild.person.recipe import Appearance
 
 
 def paint_skin(
@@ -149,9 +149,8 @@ DIRECTIONS, CELL, BIAS = 192, 0.0013, 0.0026  # rays a vertex; metres of a depth
 
 
 def occlusion(
-    vertices: Float64, normals: Float64, triangles: Int32, blockers: Int32 | None = None,
-    directions: int = DIRECTIONS, cell: float = CELL,
-) -> Float64:  # fmt: skip
+    vertices: Float64, normals: Float64, blockers: Int32, directions: int = DIRECTIONS, cell: float = CELL
+) -> Float64:
     """Return the share of the sky that each vertex sees, 0..1, weighted by the cosine.
 
     Depth pictures of the mesh from many directions replace rays: a vertex that lies deeper than the
@@ -159,10 +158,10 @@ def occlusion(
 
     Args:
         vertices, normals: (n, 3).
-        blockers: triangles that cast shadows; all if None.
+        blockers: (m, 3) triangles that cast shadows.
         directions, cell: how many pictures, and metres of their cells: fewer and larger ones are quicker.
     """
-    cloud = _cover(vertices, triangles if blockers is None else blockers, cell)
+    cloud = _cover(vertices, blockers, cell)
     bias = cell * BIAS / CELL
     # A spiral of evenly spread directions (Fibonacci).
     k = np.arange(directions) + 0.5

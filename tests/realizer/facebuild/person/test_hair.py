@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from realizer.core.errors import FaceError
 from realizer.face.load import load_face
 from realizer.face.mesh_geometry import vertex_normals
-from realizer.facebuild.person.hair import Style, hair, scalp_of, shadow, style_of
+from realizer.facebuild.person.hair import Style, hair, shadow, style_of
 from realizer.facebuild.person.scalp import Scalp
 from realizer.facebuild.submesh import Submesh
 from realizer.tables import read_toml, text_of
@@ -32,7 +32,7 @@ def head() -> tuple[Submesh, np.ndarray, dict[str, np.ndarray]]:
 
 
 def scalp(head: tuple, style: Style) -> Scalp:
-    return scalp_of(*head, style)
+    return Scalp(*head, style.line, style.rise)
 
 
 @pytest.mark.parametrize("name", STYLES)

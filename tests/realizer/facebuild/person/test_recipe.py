@@ -6,7 +6,7 @@ import pytest
 
 from realizer.core.errors import FaceError
 from realizer.face.load import list_faces
-from realizer.facebuild.person.recipe import COLOURS, read_recipe
+from realizer.facebuild.person.recipe import COLOURS, appearance_of, read_recipe
 
 GOOD = "\n".join(
     [
@@ -95,3 +95,22 @@ def test_read_recipe_accepts_every_shipped_recipe(info: object, data: Path) -> N
             target.parent.mkdir(parents=True, exist_ok=True)
             target.touch()
     assert read_recipe(path, data).description
+
+
+def test_appearance_of_an_empty_table_is_plain() -> None:
+    plain, own = appearance_of({}), appearance_of({"stubble": 0.7})
+    assert (plain.stubble, own.stubble) == (0.0, 0.7)
+    assert own.lips == plain.lips
+
+
+@pytest.mark.parametrize(
+    ("table", "says"),
+    [
+        ({"beard": 1}, "wanted one of brow_thick"),
+        ({"lips": "red"}, "lips: wanted a number"),
+        ({"age": True}, "age"),
+    ],
+)
+def test_appearance_of_refuses_what_is_no_figure(table: dict[str, object], says: str) -> None:
+    with pytest.raises(FaceError, match=says):
+        appearance_of(table)
