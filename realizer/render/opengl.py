@@ -9,7 +9,7 @@ import numpy as np
 
 from realizer.core.array_types import UInt8
 from realizer.core.errors import RenderError
-from realizer.render.backends import Canvas
+from realizer.render.canvas import Canvas
 
 NO_LIBRARY = "pictures need the render extra: pip install 'bml-realizer[render]'"
 NO_GL = "pictures need OpenGL: install Debian packages libegl1 and libgl1"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from realizer.core.array_types import UInt8
-from realizer.render.backends import Canvas
+from realizer.render.canvas import Canvas
 from realizer.render.raster import Raster
 
 

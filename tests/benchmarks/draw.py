@@ -26,9 +26,9 @@ from realizer.outputs.film import FORMATS, RATE, encode_film
 from realizer.render import Renderer, available
 from realizer.render.backends import BACKENDS
 from realizer.render.cameras import camera_for
+from realizer.render.canvas import ShadedMesh
 from realizer.render.light import Shader, preset
 from realizer.render.opengl import OpenGLCanvas
-from realizer.render.shaded_mesh import ShadedMesh
 from realizer.render.software import SoftwareCanvas
 from realizer.render.worker import encode
 

@@ -110,7 +110,7 @@ def write_face(
 
 
 def _mend(rows: dict[int, Float64], skin: Part, points: dict[str, Point], person: Person) -> None:
-    """Mend triangles of the skin (the first part) that turn over: the base mesh's, and those cut from them."""
+    """Mend triangles of the skin (the first part) that turn over: the base mesh's, and those cut out."""
     n = len(skin.vertices)
     twin = mirror_twins(skin.vertices, PAIRED)
     alone = twin < 0

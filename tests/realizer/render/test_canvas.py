@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from realizer.render.cameras import camera_for
+from realizer.render.canvas import ShadedMesh
 from realizer.render.light import Shader, preset
-from realizer.render.shaded_mesh import ShadedMesh
 
 
 def test_shaded_mesh_has_the_lit_head_at_its_vertices(balls):
