@@ -97,7 +97,7 @@ def _holes(vertices: Float64, triangles: Int32, eyes: list[Any], mouth: Any) -> 
     if not len(rim):
         return []
     names, index = np.unique(rim, return_inverse=True)
-    index = index.reshape(-1, 2)
+    index = index.reshape(-1, 2).astype(np.int32)
     label = components(index, len(names))
     lowest = label[int(np.argmin(vertices[names, 1]))]
     open_ = []
