@@ -72,13 +72,19 @@ def mix(model: Model, at: Float64, values: Mapping[int, float], thing: Thing = "
     elif thing in ("left eye", "right eye"):
         for au in _turns(model, values, "eyes"):
             angle = values[au] * np.radians(model.degrees[au])
-            moved = turned(moved, known[au].axis, angle, model.eyes[thing == "right eye"])
+            moved = turned(moved, axis_of(known[au].turn), angle, model.eyes[thing == "right eye"])
     # Which part of the neck follows is a matter of the neutral face: an open jaw does not leave its head.
     share = model.head.density(at)[:, None]
     for au in _turns(model, values, "head"):
         angle = values[au] * np.radians(model.degrees[au])
-        moved = moved + share * (turned(moved, known[au].axis, angle, model.head.pivot) - moved)
+        moved = moved + share * (turned(moved, axis_of(known[au].turn), angle, model.head.pivot) - moved)
     return np.asarray(moved)
+
+
+def axis_of(turn: str) -> tuple[float, float, float]:
+    """Return the unit vector that a turn such as "-z" goes about, right-handed."""
+    x, y, z = (float(f"{turn[0]}1") if letter == turn[1] else 0.0 for letter in "xyz")
+    return x, y, z
 
 
 def _turns(model: Model, values: Mapping[int, float], kind: str) -> list[int]:

@@ -146,22 +146,11 @@ def _curve(begin: tuple[float, float], end: tuple[float, float]) -> tuple[tuple[
 
 
 def _dashes(begin: tuple[float, float], end: tuple[float, float], colour: str, tip: str) -> list[Path]:
-    """Return a dashed line."""
     (x0, y0), (x1, y1) = begin, end
     count = max(1, round(math.hypot(x1 - x0, y1 - y0) / 6))
-    step = ((x1 - x0) / count, (y1 - y0) / count)
-    return [
-        Path(
-            (
-                (x0 + k * step[0], y0 + k * step[1]),
-                (x0 + (k + 0.55) * step[0], y0 + (k + 0.55) * step[1]),
-            ),
-            colour,
-            1.1,
-            tip=tip,
-        )
-        for k in range(count)
-    ]
+    dx, dy = (x1 - x0) / count, (y1 - y0) / count
+    ends = (((x0 + k * dx, y0 + k * dy), (x0 + (k + 0.55) * dx, y0 + (k + 0.55) * dy)) for k in range(count))
+    return [Path(points, colour, 1.1, tip=tip) for points in ends]
 
 
 def _words(link: Link) -> str:

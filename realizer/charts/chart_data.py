@@ -17,11 +17,8 @@ from realizer.scheduling.timing import Schedule, Timing, Warning
 def charts_of(cast: BlockStore, schedules: Iterable[Schedule]) -> list[BlockChart]:
     """Return the charts of a player's blocks, one for each schedule that `submit` returned."""
     playing = {id(p.first_schedule): p for p in cast.all()}
-    out = []
-    for schedule in schedules:
-        known = playing.get(id(schedule))
-        out.append(_refused(schedule) if known is None else chart_of(known, cast.schedule_of))
-    return out
+    found = ((schedule, playing.get(id(schedule))) for schedule in schedules)
+    return [_refused(s) if known is None else chart_of(known, cast.schedule_of) for s, known in found]
 
 
 def chart_of(playing: ActiveBlock, schedule_of: Callable[[str], Schedule | None]) -> BlockChart:
@@ -59,22 +56,20 @@ def _behaviour_row(
         Point(name, time, None if start is None else start + time)
         for name, time in zip(names, times, strict=True)
     )
-    place = playing.block.places.get(node.id)
     utterance = playing.context.utterances.get(node.id)
-    words = utterance.words if utterance is not None else ()
+    spans = (
+        WordSpan(times[0] + w.start, times[0] + w.end, w.text)
+        for w in (utterance.words if utterance is not None else ())
+    )
     return BehaviourRow(
         node.id,
         node.tag.rpartition("}")[2],
-        place.line if place is not None else None,
+        _element(playing.block.places.get(node.id))[1],
         node.id in playing.block.required,
         points,
         _gaps(names, times, playing.plan.timings.get(node.id)),
         links,
-        tuple(
-            WordSpan(times[0] + w.start, times[0] + w.end, w.text)
-            for w in words
-            if times[0] + w.start < times[-1]
-        ),
+        tuple(span for span in spans if span.start < times[-1]),
     )
 
 
@@ -108,47 +103,27 @@ def _dropped(warning: Warning, block: Block, schedule: Schedule) -> Dropped | No
     if id in schedule.times if problem is None else not problem.dropped:
         return None
     place = Place(problem.line, problem.path) if problem is not None else block.places.get(id or warning.id)
-    return Dropped(
-        id or warning.id,
-        _element(place),
-        place.line if place is not None else None,
-        warning.type,
-        warning.text,
-    )
+    return Dropped(id or warning.id, *_element(place), warning.type, warning.text)
 
 
-def _element(place: Place | None) -> str | None:
-    """Return the name of an element."""
+def _element(place: Place | None) -> tuple[str | None, int | None]:
+    """Return the name of an element, and its line."""
     if place is None:
-        return None
-    return place.path.rpartition("/")[2].partition("[")[0].rpartition(":")[2] or None
+        return None, None
+    return place.path.rpartition("/")[2].partition("[")[0].rpartition(":")[2] or None, place.line
 
 
 def _cut(playing: ActiveBlock, id: str) -> Dropped:
     """Return a behaviour that was cut off before it began."""
-    place, state = playing.block.places.get(id), playing.state.value
+    element, line = _element(playing.block.places.get(id))
     when = "" if playing.stopped_at is None else f" at {playing.stopped_at:.3f} s"
     # A block that waited is without it by now.
     tag = next((node.tag for node in playing.block.behaviours if node.id == id), None)
-    return Dropped(
-        id,
-        _element(place) if tag is None else tag.rpartition("}")[2],
-        place.line if place is not None else None,
-        state,
-        f"cut off{when}, before it began",
-    )
+    element = element if tag is None else tag.rpartition("}")[2]
+    return Dropped(id, element, line, playing.state.value, f"cut off{when}, before it began")
 
 
 def _refused(schedule: Schedule) -> BlockChart:
-    """Return the chart of a block that failed."""
     gone = tuple(Dropped(w.id, None, None, w.type, w.text) for w in schedule.warnings)
-    return BlockChart(
-        schedule.block,
-        schedule.character,
-        "FAILED",
-        schedule.start,
-        schedule.start,
-        (),
-        gone,
-        schedule.warnings,
-    )
+    start, warnings = schedule.start, schedule.warnings
+    return BlockChart(schedule.block, schedule.character, "FAILED", start, start, (), gone, warnings)

@@ -23,19 +23,11 @@ GROUPS = {
     "gaze": ("gaze", "gazeShift"),
     "head": ("head", "headDirectionShift"),
     "face": (
-        "face",
-        "faceFacs",
-        "faceLexeme",
-        "faceShift",
-        "facekeyframe",
-        "faps",
-        "fapFile",
-        "timeline",
-        "blink",
+        "face", "faceFacs", "faceLexeme", "faceShift", "facekeyframe", "faps", "fapFile", "timeline", "blink",
     ),
     "mood": ("emotion", "expression", "mood", "idle"),
     "body": ("gesture", "pointing", "posture", "postureShift", "locomotion"),
-}
+}  # fmt: skip
 QUIET = ("IN_PREP", "LURKING", "IN_EXEC", "DONE")  # states that a chart need not name
 
 
@@ -72,7 +64,8 @@ def _block(
     ground = len(picture.shapes)
     tied = _linked_points(block)
     current = ""
-    for group, line in sorted(((_group(line), line) for line in block.rows), key=lambda row: _rank(row[0])):
+    order = [*GROUPS, "other"]
+    for group, line in sorted(((_group(r), r) for r in block.rows), key=lambda row: order.index(row[0])):
         if group != current:
             if current:
                 picture.add(Path(((8, y), (scale.right, y)), GRID, 1.0))
@@ -144,7 +137,3 @@ def _linked_points(block: BlockChart) -> dict[str, set[str]]:
 
 def _group(line: BehaviourRow) -> str:
     return next((group for group, elements in GROUPS.items() if line.element in elements), "other")
-
-
-def _rank(group: str) -> int:
-    return [*GROUPS, "other"].index(group)

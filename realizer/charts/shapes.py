@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import unicodedata
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
@@ -120,14 +121,9 @@ def cut(text: str, size: float, room: float) -> str:
     """Return as much of a text as fits, with dots if some is missing; "" if not even one letter fits."""
     if width_of(text, size) <= room:
         return text
-    low, high = 0, len(text)
-    while low < high:
-        middle = (low + high + 1) // 2
-        if width_of(text[:middle].rstrip() + DOTS, size) <= room:
-            low = middle
-        else:
-            high = middle - 1
-    return text[:low].rstrip() + DOTS if low else ""
+    counts = range(len(text) + 1)
+    fits = bisect_right(counts, room, 1, key=lambda count: width_of(text[:count].rstrip() + DOTS, size)) - 1
+    return text[:fits].rstrip() + DOTS if fits else ""
 
 
 def cut_inside(text: str, size: float, room: float) -> str:

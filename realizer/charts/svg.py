@@ -18,8 +18,7 @@ def svg(picture: Picture) -> str:
         f"<title>{escape(_printable(picture.title))}</title>",
         f'<rect width="{width}" height="{height}" fill="{picture.paper}"/>',
     ]
-    lines += [_shape(shape) for shape in picture.shapes if not isinstance(shape, Text)]
-    lines += [_text(shape) for shape in picture.shapes if isinstance(shape, Text)]
+    lines += map(_shape, sorted(picture.shapes, key=lambda shape: isinstance(shape, Text)))
     return "\n".join([*lines, "</svg>", ""])
 
 

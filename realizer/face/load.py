@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from realizer.core.array_types import Float32
 from realizer.core.errors import FaceError
 from realizer.core.registry import Registry
 from realizer.face.basis import basis_from
@@ -162,7 +161,6 @@ def _places(directory: Path | str | None) -> Iterator[Path]:
 
 
 def _deformer_override(deformer: str | None) -> str | None:
-    """Return the deformer that overrides face.toml, or None."""
     chosen = deformer or os.environ.get(DEFORMER) or None
     if chosen not in (None, *DEFORMERS):
         where = "deformer" if deformer else DEFORMER
@@ -230,8 +228,8 @@ def load_folder(folder: Path, deformer: str | None) -> Face:
         vertices=vertices,
         triangles=np.ascontiguousarray(mesh["triangles"], np.int32),
         colours=np.ascontiguousarray(mesh["colours"], np.uint8),
-        occlusion=_unit(mesh["occlusion"]),
-        gloss=_unit(mesh["gloss"]),
+        occlusion=np.asarray(mesh["occlusion"], np.float32) / np.float32(255),
+        gloss=np.asarray(mesh["gloss"], np.float32) / np.float32(255),
         parts=parts,
         feature_points=feature_points,
         points=places,
@@ -241,8 +239,3 @@ def load_folder(folder: Path, deformer: str | None) -> Face:
         inputs=_model_inputs(model),
         model=model,
     )
-
-
-def _unit(stored: Any) -> Float32:
-    """Return bytes 0..255 as 0..1."""
-    return (np.asarray(stored, np.float32) / 255).astype(np.float32)

@@ -9,6 +9,17 @@ import numpy as np
 from realizer.core.array_types import Float64, Int32
 
 
+def grid(rows: int, columns: int, closed: bool = False) -> Int32:
+    """Return the triangles of a sheet of rows x columns vertices; `closed` joins last column and first."""
+    last = columns if closed else columns - 1
+    r, c = np.meshgrid(np.arange(rows - 1), np.arange(last), indexing="ij")
+    a = (r * columns + c).ravel()
+    b = (r * columns + (c + 1) % columns).ravel()
+    return np.concatenate(
+        [np.stack([a, a + columns, b], 1), np.stack([b, a + columns, b + columns], 1)]
+    ).astype(np.int32)
+
+
 def part_triangles(triangles: Int32, part: tuple[int, int]) -> Int32:
     """Return the triangles (k, 3) of a part (first, last + 1), with vertices counted from its first."""
     first, last = part

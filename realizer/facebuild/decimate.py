@@ -76,10 +76,8 @@ class _Surface:
             for gone, kept in pairs:
                 touched |= self._pull(gone, kept)
             for other in touched:
-                if self.free[other] and self.around[other]:
-                    again = self._best(other)
-                    if again:
-                        heapq.heappush(queue, again)
+                if self.free[other] and self.around[other] and (again := self._best(other)):
+                    heapq.heappush(queue, again)
         left = np.array([face for face in self.faces if face is not None], np.int32)
         used, inverse = np.unique(left, return_inverse=True)
         return used, inverse.reshape(-1, 3).astype(np.int32)
@@ -121,16 +119,10 @@ class _Surface:
             before = _cross(*(self.at[i] for i in face))
             corners = [self.at[u if i == v else i] for i in face]
             after = _cross(*corners)
-            long = max(
-                _square(corners[0], corners[1]),
-                _square(corners[1], corners[2]),
-                _square(corners[2], corners[0]),
-            )
+            long = max(_square(corners[k - 1], corners[k]) for k in range(3))
             size, old = _length(after), _length(before)
-            if (
-                size < FLAT * long
-                or sum(x * y for x, y in zip(before, after, strict=True)) < TURN * size * old
-            ):
+            along = sum(x * y for x, y in zip(before, after, strict=True))
+            if size < FLAT * long or along < TURN * size * old:
                 return False
         return True
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float64, Int32
+from realizer.face.mesh_geometry import grid
 from realizer.facebuild.submesh import Submesh
 
 
@@ -37,32 +38,15 @@ class Part:
         light = None if self.occlusion is None else self.occlusion[index]
         fields = {number: moves[index] for number, moves in self.fields.items()}
         return Part(
-            self.name,
-            patch,
-            self.vertices[index],
-            triangles,
-            self.colours[index],
-            self.gloss[index],
-            light,
+            self.name, patch, self.vertices[index], triangles, self.colours[index], self.gloss[index], light,
             fields,
-        )
+        )  # fmt: skip
 
 
 def smooth(x: Any, low: Any, high: Any) -> Any:
     """Return 0 below low, 1 above high, smooth between (Perlin's cubic); falls where high < low."""
     t = np.clip((np.asarray(x, float) - low) / (high - low), 0, 1)
     return t * t * (3 - 2 * t)
-
-
-def grid(rows: int, columns: int, closed: bool = False) -> Int32:
-    """Return the triangles of a sheet of rows x columns vertices; `closed` joins last column and first."""
-    last = columns if closed else columns - 1
-    r, c = np.meshgrid(np.arange(rows - 1), np.arange(last), indexing="ij")
-    a = (r * columns + c).ravel()
-    b = (r * columns + (c + 1) % columns).ravel()
-    return np.concatenate(
-        [np.stack([a, a + columns, b], 1), np.stack([b, a + columns, b + columns], 1)]
-    ).astype(np.int32)
 
 
 PUPIL, IRIS = 2.05, 6.35  # mm, radii on the ball
@@ -84,16 +68,8 @@ def eyeball(name: str, centre: Float64, radius: float, look: dict[str, list[floa
     turn = np.arange(SEGMENTS) * 2 * np.pi / SEGMENTS
     points, colours = [np.array([[0, 0, 1.0]])], [np.array([look["pupil"]], float)]
     for k, angle in enumerate(angles):
-        points.append(
-            np.stack(
-                [
-                    np.sin(angle) * np.cos(turn),
-                    np.sin(angle) * np.sin(turn),
-                    np.full(SEGMENTS, np.cos(angle)),
-                ],
-                1,
-            )
-        )
+        around = np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn)
+        points.append(np.stack([*around, np.full(SEGMENTS, np.cos(angle))], 1))
         base = np.array(look[names[k]] if k < len(names) else look["white"], float)
         ring = np.repeat(base[None], SEGMENTS, 0)
         if k < len(names) and names[k].startswith("iris"):
@@ -110,14 +86,8 @@ def eyeball(name: str, centre: Float64, radius: float, look: dict[str, list[floa
         [np.zeros(SEGMENTS, int), 1 + np.arange(SEGMENTS), 1 + (np.arange(SEGMENTS) + 1) % SEGMENTS], 1
     )
     sheet = grid(len(angles), SEGMENTS, closed=True) + 1
-    part = Part(
-        name,
-        None,
-        vertices,
-        np.concatenate([fan, sheet]).astype(np.int32),
-        np.concatenate(colours),
-        np.full(len(vertices), 1.0),
-    )
+    triangles = np.concatenate([fan, sheet]).astype(np.int32)
+    part = Part(name, None, vertices, triangles, np.concatenate(colours), np.full(len(vertices), 1.0))
     # Dilation: the pupil's edge moves out, the iris gives way up to its rim.
     out = np.hypot(ball[:, 0], ball[:, 1]) * radius * 1000
     edge = flat[0]  # the outermost ring that is black
@@ -158,11 +128,7 @@ def teeth(name: str, front: Float64, width: float, depth: float, colours: dict[s
     at = 0.0
     for k, size in enumerate(sizes):
         size /= 1000
-        stations += [
-            (at, k, True),
-            (at + 0.18 * size, k, False),
-            (at + 0.82 * size, k, False),
-        ]
+        stations += [(at, k, True), (at + 0.18 * size, k, False), (at + 0.82 * size, k, False)]
         at += size
     stations.append((at, len(sizes) - 1, True))
     side = [(-s, k, gap) for s, k, gap in stations[:0:-1]] + stations
@@ -192,13 +158,8 @@ def teeth(name: str, front: Float64, width: float, depth: float, colours: dict[s
             (height - (0.0016 if gap else 0), 0.0004, gum),
             (height + 0.0045, 0.0002, gum * 0.85),
         ):
-            rows.append(
-                [
-                    front[0] + px + normal[0] * (dn - back),
-                    front[1] + up * dy,
-                    front[2] + pz + normal[1] * (dn - back),
-                ]
-            )
+            x_out = front[0] + px + normal[0] * (dn - back)
+            rows.append([x_out, front[1] + up * dy, front[2] + pz + normal[1] * (dn - back)])
             tints.append(tint)
     vertices = np.array(rows)
     triangles = grid(len(side), len(SHADES))

@@ -59,7 +59,7 @@ def sheet(
     notes = notes if notes is not None else [()] * len(pictures)
     cells = [Cell((p,), title, lines) for p, title, lines in zip(pictures, titles, notes, strict=True)]
     form = _Form(cells)
-    columns = columns or columns_for(len(cells), form.width, form.height)
+    columns = columns or min(len(cells), max(1, round((1.5 * len(cells) * form.height / form.width) ** 0.5)))
     return _page([Group("", cells, columns)], form, columns, None)
 
 
@@ -78,12 +78,6 @@ def album(groups: Sequence[Group], legend: UInt8 | None = None, caption: str = "
     columns = max(2, 2 * round(WIDE / (form.width + GAP) / 2))
     most = max(min(group.columns or columns, len(group.cells)) for group in groups)
     return _page(groups, form, min(columns, max(2, most)), (caption, legend))
-
-
-def columns_for(count: int, width: int, height: int) -> int:
-    """Return the number of columns that make the whole about 3:2."""
-    best: float = (1.5 * count * height / width) ** 0.5
-    return min(count, max(1, round(best)))
 
 
 class _Form:

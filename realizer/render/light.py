@@ -13,6 +13,7 @@ import numpy as np
 from realizer.core.array_types import Float32, UInt8
 from realizer.core.colours import linear, srgb
 from realizer.core.errors import RenderError, TableError
+from realizer.tables import toml_table
 
 LIGHT = "REALIZER_LIGHT"
 LAMPS = ("key", "fill", "rim")
@@ -71,17 +72,15 @@ class Light:
         """Return the table as plain numbers; lamp directions have length 1."""
         table = asdict(self)
         for name in LAMPS:
+            table[name] = {part: list(values) for part, values in table[name].items()}
             table[name]["direction"] = [round(float(x), 6) for x in unit(table[name]["direction"])]
-        return {k: list(v) if isinstance(v, tuple) else _lists(v) for k, v in table.items()}
+        return {k: list(v) if isinstance(v, tuple) else v for k, v in table.items()}
 
 
 @cache
 def presets() -> Mapping[str, Light]:
     """Return the lights of `realizer/tables/lights.toml`, by name."""
-    from realizer.tables import read_toml, text_of
-
-    table = read_toml(text_of("lights.toml"), "lights.toml")
-    return {name: _light(name, values) for name, values in table.items()}
+    return {name: _light(name, values) for name, values in toml_table("lights.toml").items()}
 
 
 def preset(name: str | None = None) -> Light:
@@ -179,7 +178,3 @@ def _affine(lamp: Lamp) -> tuple[Float32, Float32]:
     wrap = np.asarray(lamp.wrap)
     scale = np.asarray(lamp.colour) / (1 + wrap)
     return np.outer(unit(lamp.direction), scale).astype(np.float32), (scale * wrap).astype(np.float32)
-
-
-def _lists(value: Any) -> Any:
-    return {k: list(v) for k, v in value.items()} if isinstance(value, dict) else value

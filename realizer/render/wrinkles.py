@@ -14,8 +14,10 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float32, Float64, Int32
+from realizer.face.mesh_geometry import grid
 from realizer.face.model import Face
 from realizer.render.surface_points import locate_on_skin
+from realizer.tables import toml_table
 
 STEP = 0.03  # of ES0, along a furrow
 LIFT = 0.006  # of ES0, above the skin: 0.4 mm, or the strip sinks where the skin is curved
@@ -73,7 +75,8 @@ class Wrinkles:
         for strip in drawn:
             for drive, tone in zip(strip.drives, strip.tones, strict=True):
                 self._tone[first : first + len(tone), place[drive]] += tone
-            triangles.append(_grid(len(strip.corners) // len(ACROSS), strip.turned) + first)
+            sheet = grid(len(strip.corners) // len(ACROSS), len(ACROSS)) + first
+            triangles.append(sheet[:, ::-1] if strip.turned else sheet)
             first += len(strip.corners)
         self.triangles: Int32 = _joined(triangles, (0, 3)).astype(np.int32)
         self.count = first
@@ -127,9 +130,7 @@ class _Strip:
 
 @cache
 def _table() -> dict[str, Any]:
-    from realizer.tables import read_toml, text_of
-
-    return read_toml(text_of("wrinkles.toml"), "wrinkles.toml")
+    return toml_table("wrinkles.toml")
 
 
 def _strip(face: Face, line: dict[str, Any], drives: dict[str, Any], side: int, size: float) -> _Strip | None:
@@ -170,16 +171,16 @@ def _strip(face: Face, line: dict[str, Any], drives: dict[str, Any], side: int, 
     found = locate_on_skin(face, spread.reshape(-1, 2), right, towards, COARSE * size)
     if found is None:
         return None
-    ends = [drives[name] for name in line["drives"]]
-    made = [_drive(face, [twin[p] for p in drive["between"]], drive) for drive in ends]
+    made = []
+    for drive in (drives[name] for name in line["drives"]):
+        a, b = sorted(face.feature_points[twin[p]] for p in drive["between"])
+        rest = max(float(np.linalg.norm(face.vertices[a] - face.vertices[b])), 1e-6)
+        made.append(_Drive(a, b, rest, drive["from"], drive["full"]))
     tone = (
         _profile(line["depth"], line["lit"])[None]
         * _taper(where / along[-1], bool(line.get("meets")))[:, None]
     )
-    tones = []
-    for k in range(len(made)):
-        share = np.interp(where, along, np.eye(len(made))[k])
-        tones.append((tone * share[:, None]).ravel())
+    tones = [(tone * np.interp(where, along, own)[:, None]).ravel() for own in np.eye(len(made))]
     turn = np.cross(np.append(tangent[0], 0), np.append(across[0], 0))[2]
     return _Strip(*found, tuple(made), tuple(tones), bool(turn < 0))
 
@@ -236,26 +237,11 @@ def _taper(t: Float64, meets: bool) -> Float64:
     return out
 
 
-def _drive(face: Face, pair: list[str], drive: dict[str, Any]) -> _Drive:
-    a, b = sorted(face.feature_points[p] for p in pair)
-    rest = max(float(np.linalg.norm(face.vertices[a] - face.vertices[b])), 1e-6)
-    return _Drive(a, b, rest, drive["from"], drive["full"])
-
-
 def _twin(face: Face, name: str) -> str:
     """Return the mirrored feature point in the same group."""
     flipped = np.asarray(face.points[name], float) * (-1, 1, 1)
     group = [p for p in face.points if p.split(".")[0] == name.split(".")[0] and p in face.feature_points]
     return min(group, key=lambda p: float(np.linalg.norm(np.asarray(face.points[p], float) - flipped)))
-
-
-def _grid(rows: int, turned: bool) -> Int32:
-    """Return the triangles of a strip of `rows` x len(ACROSS) points."""
-    width = len(ACROSS)
-    corner = (np.arange(rows - 1)[:, None] * width + np.arange(width - 1)).ravel()
-    a, b, c, d = corner, corner + 1, corner + width, corner + width + 1
-    out = np.concatenate([np.stack([a, c, b], 1), np.stack([b, c, d], 1)])
-    return (out[:, ::-1] if turned else out).astype(np.int32)
 
 
 def _joined(parts: list[Any], empty: tuple[int, int]) -> Any:

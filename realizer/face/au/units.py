@@ -32,15 +32,6 @@ class Unit:
         """Its number, then those of the units that move the face as it does."""
         return self.au, *map(int, self.also.split())
 
-    @property
-    def axis(self) -> tuple[float, float, float]:
-        """Unit vector that a turn goes about, right-handed; (0, 0, 0) for a displacement."""
-        if not self.turn:
-            return 0.0, 0.0, 0.0
-        sign = -1.0 if self.turn[0] == "-" else 1.0
-        x, y, z = (sign if letter == self.turn[1] else 0.0 for letter in "xyz")
-        return x, y, z
-
 
 @cache
 def units() -> dict[int, Unit]:

@@ -19,8 +19,8 @@ import numpy as np
 
 from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
+from realizer.face.glb_file import BINARY_CHUNK, JSON_CHUNK
 
-MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
 KINDS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 # Required extensions that this reader supports; they change only how surfaces look.
@@ -130,17 +130,16 @@ class Gltf:
         values = self._strided(accessor.get("bufferView"), start, KINDS[kind], count, width, where)
         sparse = accessor.get("sparse")
         if sparse:
-            size = sparse["count"]
-            places, given = sparse["indices"], sparse["values"]
-            index_kind = KINDS.get(places.get("componentType"), "<u4")
-            rows = self._strided(
-                places["bufferView"], places.get("byteOffset", 0), index_kind, size, 1, where
-            ).ravel()
+
+            def stored(part: dict[str, Any], kind: str, width: int) -> Any:
+                start = part.get("byteOffset", 0)
+                return self._strided(part["bufferView"], start, kind, sparse["count"], width, where)
+
+            places = sparse["indices"]
+            rows = stored(places, KINDS.get(places.get("componentType"), "<u4"), 1).ravel()
             if len(rows) and rows.max() >= count:
                 raise FaceError(f"{self.path}: {where}: sparse: wanted rows 0..{count - 1}, got {rows.max()}")
-            values[rows] = self._strided(
-                given["bufferView"], given.get("byteOffset", 0), KINDS[kind], size, width, where
-            )
+            values[rows] = stored(sparse["values"], KINDS[kind], width)
         out = values.astype(np.float64)
         if accessor.get("normalized") and kind != 5126:
             out = np.maximum(out / np.iinfo(KINDS[kind]).max, -1.0)

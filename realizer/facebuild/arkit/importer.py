@@ -64,8 +64,6 @@ class Report:
 
 @dataclass(frozen=True, eq=False)
 class _Head:
-    """A head that has been read, stood up and parted."""
-
     surface: Surface
     ranges: dict[str, tuple[int, int]]
     painted: bool

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import permutations, product
 from typing import Any
 
 import numpy as np
@@ -127,16 +126,10 @@ def _turn(
 
 def _snapped(turn: Float64) -> Float64 | None:
     """Return the nearest of the 24 axis-aligned rotations, or None if it is far."""
-    best = max(
-        (
-            np.array(
-                [[s * (k == axis) for k in range(3)] for axis, s in zip(order, signs, strict=True)], float
-            )
-            for order in permutations(range(3))
-            for signs in product((1, -1), repeat=3)
-        ),
-        key=lambda m: float(np.trace(m @ turn.T)) if np.linalg.det(m) > 0 else -9.0,
-    )
+    from scipy.spatial.transform import Rotation
+
+    aligned = np.rint(Rotation.create_group("O").as_matrix()) + 0.0  # without zeros below zero
+    best: Float64 = max(aligned, key=lambda m: float(np.trace(m @ turn.T)))
     return best if min((best * turn).sum(axis=1)) > SNAP else None
 
 

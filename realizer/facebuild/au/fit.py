@@ -15,7 +15,7 @@ from realizer.face.au.units import units
 from realizer.face.model import Face
 from realizer.facebuild.au.fit_limits import FURTHEST, WatchedPlaces, furthest, watched_places
 from realizer.facebuild.au.measure import UnitMeasurement
-from realizer.facebuild.au.solve import STILL, Fit, FitResult
+from realizer.facebuild.au.solve import STILL, Fit
 from realizer.tables import action_units
 
 FORMS = ("published", "extended")  # one or two Gaussians; up to four
@@ -86,7 +86,7 @@ def fit_models(
             fitted[form][au] = unit
             ratios.append(f"{_row(unit, one, mouth).ratio:.3f}")
         say(f"AU{au}: e/d_max {', '.join(ratios)}")
-    by_number = {row.au: row for row in action_units()}
+    degrees = {row.au: row.degrees for row in action_units()}
     left, right = (_triple(centre) for _, centre in face.basis["eyes"])
     head = _head(face)
     return {
@@ -99,11 +99,7 @@ def fit_models(
             eyes=(left, right),
             jaw=jaw,
             units=fitted[form],
-            degrees={
-                unit.au: by_number[unit.au].degrees
-                for unit in units().values()
-                if unit.kind != "displacement"
-            },
+            degrees={au: degrees[au] for au, unit in units().items() if unit.kind != "displacement"},
         )
         for form in forms
     }
@@ -192,13 +188,11 @@ def _fit_motion(
     found = {"published": fit.published()}
     if "extended" in forms:
         found["extended"] = fit.extended(found["published"])
-    return {form: _motion(origin, found[form], size) for form in forms}
-
-
-def _motion(origin: Float64, found: FitResult, size: float) -> Motion:
-    gaussians = found.gaussians.copy()
-    gaussians[:, 0] *= size
-    return Motion(origin, gaussians, found.alpha, found.beta)
+    metres = np.r_[size, np.ones(9)]
+    return {
+        form: Motion(origin, found[form].gaussians * metres, found[form].alpha, found[form].beta)
+        for form in forms
+    }
 
 
 def _head(face: Face) -> HeadTurn:

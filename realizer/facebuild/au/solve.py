@@ -35,34 +35,21 @@ class Free:
 
 def mirrored_angles() -> tuple[Free, Free]:
     """Return mirror symmetric angles: alpha is a right angle plus an odd function of x, beta even in x."""
-    alpha = np.zeros((ANGLE, 7))
     start = np.zeros(ANGLE)
-    for column, row in enumerate((0, 1, 2, 5, 12, 13, 15)):  # xx, yy, zz, yz times x; xy, xz; x
-        alpha[row, column] = 1
     start[6], start[18] = 1, np.pi / 2
-    beta = np.zeros((ANGLE, 13))
-    for column, row in enumerate((0, 1, 2, 5, 7, 8, 9, 10, 11, 14, 16, 17, 18)):
-        beta[row, column] = 1
+    alpha = np.eye(ANGLE)[:, [0, 1, 2, 5, 12, 13, 15]]  # xx, yy, zz, yz times x; xy, xz; x
+    beta = np.eye(ANGLE)[:, [0, 1, 2, 5, 7, 8, 9, 10, 11, 14, 16, 17, 18]]
     return Free(alpha, start), Free(beta, np.zeros(ANGLE))
 
 
 def mirrored_gaussians(layout: str) -> Free:
     """Return the parameters of Gaussians: `p` is a pair, one a side; `c` is central: "pc" are three."""
-    blocks = []
-    for kind in layout:
-        if kind == "p":
-            twin = np.diag([1.0, -1, 1, 1, 1, -1, 1, -1, 1, 1])
-            blocks.append(np.concatenate([np.eye(GAUSSIAN), twin]))
-        else:
-            middle = np.eye(GAUSSIAN)
-            blocks.append(middle[:, [0, 2, 3, 4, 6, 8, 9]])
-    rows = sum(len(block) for block in blocks)
-    matrix = np.zeros((rows, sum(block.shape[1] for block in blocks)))
-    row = column = 0
-    for block in blocks:
-        matrix[row : row + len(block), column : column + block.shape[1]] = block
-        row, column = row + len(block), column + block.shape[1]
-    return Free(matrix, np.zeros(rows))
+    from scipy.linalg import block_diag
+
+    pair = np.concatenate([np.eye(GAUSSIAN), np.diag([1.0, -1, 1, 1, 1, -1, 1, -1, 1, 1])])
+    middle = np.eye(GAUSSIAN)[:, [0, 2, 3, 4, 6, 8, 9]]
+    matrix = block_diag(*(pair if kind == "p" else middle for kind in layout))
+    return Free(matrix, np.zeros(len(matrix)))
 
 
 PUBLISHED, EXTENDED = ("c", "cc", "p"), ("pp", "pcc")  # layouts tried from the start, others by growth

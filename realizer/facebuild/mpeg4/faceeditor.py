@@ -85,9 +85,8 @@ def read_faceeditor(path: Path) -> Setup:
         words = (element.text or "").split()
         if not all(word.isdecimal() for word in words):
             raise FaceError(f"{path}: vertex-mask of FAP {element.get('fap')}: wanted indices of vertices")
-        vertices[_fap(path, element, element.get("fap"))] = np.unique(np.array(words, np.int64)).astype(
-            np.int32
-        )
+        mask = np.unique(np.array(words, np.int64)).astype(np.int32)
+        vertices[_fap(path, element, element.get("fap"))] = mask
     synced = frozenset(_fap(path, syncs, word) for word in (syncs.text or "").split())
     return Setup(points, zones, vertices, synced, whole=frozenset(whole))
 
@@ -101,7 +100,7 @@ def write_faceeditor(path: Path, setup: Setup) -> tuple[str, ...]:
     from xml.sax.saxutils import quoteattr
 
     def line(depth: int, tag: str, values: Mapping[str, Any], closed: bool = True) -> str:
-        inside = "".join(f" {key}={quoteattr(_text(value))}" for key, value in values.items())
+        inside = "".join(f" {key}={quoteattr(str(value).lower())}" for key, value in values.items())
         return f"{'  ' * depth}<{tag}{inside}{'/>' if closed else '>'}"
 
     lost = []
@@ -183,15 +182,12 @@ def _element_of(zone: Zone) -> tuple[str, float, dict[str, float]]:
         return "ease-deformer", zone.size, {"ease": zone.ease if zone.falloff == "ease" else 0.0}
     if zone.falloff == "cosine":
         return "smooth-deformer", zone.size * AS_SIZE, {"smooth-center": AS_SMOOTH, "smooth-side": AS_SMOOTH}
-    return (
-        "smooth-deformer",
-        zone.size,
-        {"smooth-center": 100 * zone.smooth_centre, "smooth-side": 100 * zone.smooth_side},
-    )
+    smooth = {"smooth-center": 100 * zone.smooth_centre, "smooth-side": 100 * zone.smooth_side}
+    return "smooth-deformer", zone.size, smooth
 
 
 def _zone(path: Path, element: Element, fap: int) -> Zone:
-    number = {name: _number(path, element, name) for name in ("size", "scalex", "scaley", "scalez")}
+    size, x, y, z = (_number(path, element, name) for name in ("size", "scalex", "scaley", "scalez"))
     rest: dict[str, Any] = {
         key: _truth(path, element, name)
         for key, name in (("use_mask", "use-vertex-mask"), ("invert_mask", "invert-vertex-mask"))
@@ -204,9 +200,8 @@ def _zone(path: Path, element: Element, fap: int) -> Zone:
             "smooth_centre": _number(path, element, "smooth-center") / 100,
             "smooth_side": _number(path, element, "smooth-side") / 100,
         }
-    scale = (number["scalex"], number["scaley"], number["scalez"])
     try:
-        return Zone(fap, size=number["size"], scale=scale, **rest)
+        return Zone(fap, size=size, scale=(x, y, z), **rest)
     except FaceError as error:
         raise FaceError(f"{path}: {error}") from None
 
@@ -243,10 +238,6 @@ def _fap(path: Path, element: Element, text: str | None) -> int:
     if text is None or not text.strip().isdecimal() or not 3 <= int(text) <= 68:
         raise FaceError(f"{path}: <{element.tag}>: wanted a FAP from 3 to 68, got {text!r}")
     return int(text)
-
-
-def _text(value: Any) -> str:
-    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _doctype() -> str:

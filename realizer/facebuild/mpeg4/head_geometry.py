@@ -82,9 +82,8 @@ def _profile(head: HeadGeometry) -> dict[str, Float64]:
     bridge = np.flatnonzero((heights > heights[tip] + 0.1) & (heights < 0.4) & np.isfinite(front))
     if len(bridge):
         out["bridge"] = place(int(bridge[np.argmin(front[bridge])]))
-    below = np.flatnonzero((heights < heights[tip]) & (heights > heights[tip] - 1.6) & np.isfinite(front))[
-        ::-1
-    ]
+    reach = (heights < heights[tip]) & (heights > heights[tip] - 1.6)
+    below = np.flatnonzero(reach & np.isfinite(front))[::-1]
     if len(below) < 20:
         return out
     z = np.convolve(np.pad(front[below], 2, mode="edge"), kernel, "valid")
@@ -114,7 +113,6 @@ def _opening(head: HeadGeometry, centre: Float64, side: str) -> dict[str, Float6
     size = 1.25 * head.radius
     x = centre[0] + np.linspace(-size, size, GRID)
     y = centre[1] + np.linspace(-size, size, GRID)
-    covered: Bool = np.zeros((GRID, GRID), bool)
     depth = np.full((GRID, GRID), -np.inf)
     at, tri = head.skin, head.triangles
     mine = tri[

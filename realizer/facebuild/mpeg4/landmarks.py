@@ -109,7 +109,7 @@ def find_points(
     guesses = []
     for name, place, away in zip(names, places, np.atleast_1d(far), strict=True):
         vertex, at, off = _settled(name, place * unit + origin, vertices, parts, head, origin, unit)
-        out[name] = Point(name, vertex, *at)
+        out[name] = Point(name, vertex, *at.tolist())
         lost = name in CORNER_POINTS and "l_corner" not in found
         vague = away > NEAR or off > OFF * unit or lost or name.startswith(ROUND)
         if vague and name not in PUPILS and name not in TEETH:
@@ -120,17 +120,17 @@ def find_points(
 def _settled(
     name: str, place: Float64, vertices: Float64, parts: Mapping[str, tuple[int, int]],
     head: HeadGeometry, origin: Float64, unit: float,
-) -> tuple[int, tuple[float, float, float], float]:  # fmt: skip
+) -> tuple[int, Float64, float]:  # fmt: skip
     """Return the vertex of a point, the point itself, and its distance from the skin in metres."""
     at = np.asarray(vertices, np.float64)
 
     if name in INSIDE:
         part = "skin" if name == "7.1" or "hair" not in parts else "hair"
-        return nearest_vertex(at, place, parts[part]), _triple(place), 0.0
+        return nearest_vertex(at, place, parts[part]), place, 0.0
     if name in PUPILS:
         first, last = parts[PUPILS[name]]
         vertex = first + int(np.argmax(at[first:last, 2]))
-        return vertex, _triple(at[vertex]), 0.0
+        return vertex, at[vertex], 0.0
     if name in TEETH and TEETH[name][0] in parts:
         part, way = TEETH[name]
         first, last = parts[part]
@@ -140,7 +140,7 @@ def _settled(
         )
         chosen = np.flatnonzero(middle) if middle.any() else np.arange(len(mine))
         vertex = first + int(chosen[np.argmax(way * mine[chosen, 1])])
-        return vertex, _triple(at[vertex]), 0.0
+        return vertex, at[vertex], 0.0
     if name.startswith("4.") and "brows" in parts:
         place = _on_brow(at[slice(*parts["brows"])], place, origin, unit)
     part = "tongue" if name.startswith("6.") and "tongue" in parts else "skin"
@@ -149,7 +149,7 @@ def _settled(
         first, last = parts["skin"]
         right = np.flatnonzero(head.ups[:, 1] * FACING[name] > -0.1)
         vertex = first + int(right[np.argmin(np.linalg.norm(at[first:last][right] - place, axis=1))])
-    return vertex, _triple(at[vertex]), float(np.linalg.norm(at[vertex] - place))
+    return vertex, at[vertex], float(np.linalg.norm(at[vertex] - place))
 
 
 def _on_brow(brows: Float64, place: Float64, origin: Float64, unit: float) -> Float64:
@@ -160,8 +160,3 @@ def _on_brow(brows: Float64, place: Float64, origin: Float64, unit: float) -> Fl
     x = float(np.clip(place[0], mine[:, 0].min(), mine[:, 0].max()))
     near = mine[np.abs(mine[:, 0] - x) < 0.06 * unit]
     return np.asarray(near.mean(axis=0)) if len(near) else place
-
-
-def _triple(place: Float64) -> tuple[float, float, float]:
-    x, y, z = (float(v) for v in place)
-    return x, y, z

@@ -9,8 +9,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from realizer.core.array_types import Float64, Int32
-from realizer.face.mesh_geometry import flat_cross, vertex_normals
-from realizer.facebuild.parts import Part, grid, smooth
+from realizer.face.mesh_geometry import flat_cross, grid, vertex_normals
+from realizer.facebuild.parts import Part, smooth
 from realizer.facebuild.person.lids import Lid
 from realizer.facebuild.person.recipe import Appearance
 from realizer.facebuild.submesh import Submesh, mix_of

@@ -135,7 +135,6 @@ def _tongue(person: Person, recipe: Recipe) -> Part:
 
 
 def _bake(made: list[Part]) -> None:
-    """Bake the occlusion of every part that has none."""
     count = np.cumsum([0] + [len(part.vertices) for part in made])
     vertices = np.concatenate([part.vertices for part in made])
     ups = np.concatenate([vertex_normals(part.vertices, part.triangles) for part in made])

@@ -10,7 +10,8 @@ import numpy as np
 
 from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
-from realizer.facebuild.parts import Part, grid, smooth
+from realizer.face.mesh_geometry import grid
+from realizer.facebuild.parts import Part, smooth
 from realizer.facebuild.person.scalp import Scalp
 from realizer.tables import toml_table
 
@@ -259,7 +260,6 @@ def _fall(scalp: Scalp, style: Style, at: Float64, drop: Float64, rng: Any) -> t
 
 
 def _bun(centre: Float64, radii: Float64, colour: Any, style: Style) -> Part:
-    """Return a ball of wound hair."""
     rows, columns = 9, 16
     polar = np.linspace(0.02, np.pi - 0.02, rows)[:, None]
     turn = np.linspace(0, 2 * np.pi, columns, endpoint=False)[None]

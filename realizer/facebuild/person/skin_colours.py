@@ -201,9 +201,6 @@ def _cover(vertices: Float64, triangles: Int32, cell: float) -> Float64:
         inside = i + j <= n
         u, v = i[inside] / n, j[inside] / n
         w = 1 - u - v
-        points.append(
-            (a[mine, None] * w[:, None] + b[mine, None] * u[:, None] + c[mine, None] * v[:, None]).reshape(
-                -1, 3
-            )
-        )
+        spread = a[mine, None] * w[:, None] + b[mine, None] * u[:, None] + c[mine, None] * v[:, None]
+        points.append(spread.reshape(-1, 3))
     return np.concatenate(points)

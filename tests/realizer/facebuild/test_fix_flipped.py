@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float64
+from realizer.face.mesh_geometry import grid
 from realizer.facebuild.fix_flipped import flipped_triangles, soften_flips
-from realizer.facebuild.parts import grid
 
 SIDE = 15
 X, Y = np.meshgrid(np.linspace(-7, 7, SIDE), np.linspace(-7, 7, SIDE))

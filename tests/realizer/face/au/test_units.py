@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from realizer.face.au.units import Unit, units
 
 
@@ -16,16 +14,10 @@ def test_units_are_wojdel_s() -> None:
     assert all(table[au].split for au in (10, 16, 18, 22, 25, 27, 28))
     for unit in table.values():
         assert bool(unit.mixture) == (unit.kind == "displacement")
-        assert (np.linalg.norm(unit.axis) == 1) == (unit.kind != "displacement")
+        assert bool(unit.turn) == (unit.kind != "displacement")
 
 
 def test_unit_mixture_has_the_weights_of_face_units() -> None:
     unit = Unit(99, "displacement", False, "", "98 97", "browDown:0.5 eyeBlink:1")
     assert unit.mixture == {"browDown": 0.5, "eyeBlink": 1.0}
     assert unit.names == (99, 98, 97)
-    assert unit.axis == (0.0, 0.0, 0.0)
-
-
-def test_unit_axis_has_sign_and_letter_of_its_turn() -> None:
-    assert Unit(99, "head", False, "-z", "", "").axis == (0.0, 0.0, -1.0)
-    assert Unit(99, "head", False, "+y", "", "").axis == (0.0, 1.0, 0.0)

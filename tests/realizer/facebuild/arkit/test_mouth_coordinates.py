@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from realizer.face.mesh_geometry import grid
 from realizer.facebuild.arkit.mouth_coordinates import Mouth, mouth_of
-from realizer.facebuild.parts import grid
 
 X, Y = np.meshgrid(np.arange(-20, 21) * 0.002, np.arange(-15, 16) * 0.002)
 AT = np.stack([X.ravel(), Y.ravel(), np.zeros(X.size)], 1)

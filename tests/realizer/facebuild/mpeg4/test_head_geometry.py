@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from realizer.face.load import load_face
-from realizer.face.mesh_geometry import vertex_normals
+from realizer.face.mesh_geometry import grid, vertex_normals
 from realizer.facebuild.mpeg4.head_geometry import HeadGeometry, find_anchors, profile_line
 from realizer.facebuild.mpeg4.landmarks import head_of
-from realizer.facebuild.parts import grid
 
 
 def wall(front: np.ndarray) -> HeadGeometry:
