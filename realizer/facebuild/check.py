@@ -69,7 +69,12 @@ def check_face(name: str = "default", directory: Path | str | None = None) -> tu
     parts: list[str] = []
     if head:
         parts = _part_faults(folder, head["parts"], n)
-        faults += _key_faults(folder, head) + parts
+        faults += [
+            f"{folder / 'face.toml'}: {key!r}: there is no such key{_nearest(key, KEYS)}"
+            for key in head
+            if key not in KEYS
+        ]
+        faults += parts
     if points:
         places = {key: np.array(point.place, np.float32) for key, point in points.items()}
         tried(lambda: fapu_of(places, folder / "features.csv"))
@@ -93,14 +98,6 @@ def check_face(name: str = "default", directory: Path | str | None = None) -> tu
 def _nearest(word: str, words: Any) -> str:
     near = get_close_matches(word, list(words), n=1)
     return f"; did you mean {near[0]!r}?" if near else f"; there are: {', '.join(words)}"
-
-
-def _key_faults(folder: Path, head: dict[str, Any]) -> list[str]:
-    return [
-        f"{folder / 'face.toml'}: {key!r}: there is no such key{_nearest(key, KEYS)}"
-        for key in head
-        if key not in KEYS
-    ]
 
 
 def _part_faults(folder: Path, parts: dict[str, Any], n: int | None) -> list[str]:

@@ -84,14 +84,7 @@ def _compiled() -> tuple[Callable[..., None], ...]:
 
 
 def _fill(
-    points: Any,
-    nearness: Any,
-    triangles: Any,
-    colours: Any,
-    samples: Any,
-    begin: int,
-    stop: int,
-    keys: Any,
+    points: Any, nearness: Any, triangles: Any, colours: Any, samples: Any, begin: int, stop: int, keys: Any
 ) -> None:
     """Write each triangle's samples where nothing nearer is: nearness and RGBA in one number.
 

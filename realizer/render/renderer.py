@@ -6,7 +6,6 @@ import os
 import threading
 from collections.abc import Iterator
 from functools import cached_property
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -163,9 +162,7 @@ class Renderer:
     def __enter__(self) -> Renderer:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _started(self) -> DrawingProcess:

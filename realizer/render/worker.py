@@ -30,17 +30,11 @@ class FaceDrawer:
         from realizer.face.load import load_face
 
         self.pixels = Pixels(order.memory, order.slots, order.size, channels(order.background))
-        if isinstance(order.face, str):
-            self.face = load_face(order.face, deformer=order.deformer)
-        else:
-            self.face = order.face
+        face = order.face
+        self.face = load_face(face, deformer=order.deformer) if isinstance(face, str) else face
+        camera, light = camera_for(self.face, order.camera), preset(order.light)
         self.backend, self.canvas = open_canvas(
-            self.face,
-            order.size,
-            camera_for(self.face, order.camera),
-            preset(order.light),
-            order.background,
-            order.backend,
+            self.face, order.size, camera, light, order.background, order.backend
         )
 
     def draw(self, rows: Float32, first: int) -> int:

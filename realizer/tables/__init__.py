@@ -92,9 +92,9 @@ def read_toml(text: str, name: str) -> dict[str, Any]:
         raise TableError(f"{name}: {error}") from None
 
 
-def csv_rows(name: str, row_class: type[Row]) -> tuple[Row, ...]:
-    """Return the rows of a built-in CSV table; arguments and errors as for `read_csv`."""
-    return read_csv(text_of(name), row_class, name)
+def csv_rows(name: str, row_class: type[Row], package: str = __name__) -> tuple[Row, ...]:
+    """Return the rows of a built-in CSV table in a package; arguments and errors as for `read_csv`."""
+    return read_csv(files(package).joinpath(name).read_text("utf-8"), row_class, name)
 
 
 @cache

@@ -56,14 +56,8 @@ def fit_mouth(face: Face) -> Mouth:
     from scipy.optimize import least_squares
 
     points = {name: np.asarray(place, np.float64) for name, place in face.points.items()}
-    line = np.array(
-        [
-            (points["2.2"] + points["2.3"]) / 2,
-            (points["2.6"] + points["2.8"]) / 2,
-            points["2.4"],
-            points["8.3"],
-        ]
-    )
+    middle, half = ((points[upper] + points[lower]) / 2 for upper, lower in (("2.2", "2.3"), ("2.6", "2.8")))
+    line = np.array([middle, half, points["2.4"], points["8.3"]])
     line[0, 0] = 0
     if (np.diff(line[:, 0]) <= 0).any():
         raise FaceError(f"{face.name}: wanted feature points 2.2, 2.6, 2.4 and 8.3 further and further left")

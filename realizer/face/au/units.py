@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from typing import Literal
 
-from realizer.tables import read_csv
+from realizer.tables import csv_rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,5 +35,4 @@ class Unit:
 @cache
 def units() -> dict[int, Unit]:
     """Return number -> unit, ascending."""
-    path = Path(__file__).with_name("units.csv")
-    return {row.au: row for row in read_csv(path.read_text("utf-8"), Unit, path.name)}
+    return {row.au: row for row in csv_rows("units.csv", Unit, __package__)}

@@ -69,10 +69,8 @@ class ShapedSkin:
             return None
         return np.asarray(np.sum([self.moves[name] for name in names], axis=0))
 
-    def smoothed(self, field: Float64, times: int = 1) -> Float64:
-        for _ in range(times):
-            field = np.asarray(self.mean @ field)
-        return field
+    def smoothed(self, field: Float64) -> Float64:
+        return np.asarray(self.mean @ field)
 
     def without(
         self, move: Float64, fields: Mapping[int, Float64 | None], others: tuple[int, ...]
@@ -198,7 +196,7 @@ def _brows(shaped: ShapedSkin) -> dict[int, Float64 | None]:
     move = shaped.move("browInnerUp", "browOuterUpLeft", "browOuterUpRight")
     if move is None:
         return {}
-    move = shaped.smoothed(move * _calm(shaped), 1)
+    move = shaped.smoothed(move * _calm(shaped))
     out: dict[int, Float64 | None] = {}
     for side, line in BROWS.items():
         x = shaped.skin[:, 0] * side
@@ -230,7 +228,7 @@ def _cheeks(shaped: ShapedSkin) -> dict[int, Float64 | None]:
             out[puffed] = shaped.exact(puffed, puff * (half * far)[:, None], BLOWN)
         squint = shaped.move(f"cheekSquint{WORDS[side]}")
         if squint is not None:
-            out[lifted] = shaped.exact(lifted, shaped.smoothed(squint * free * _calm(shaped), 1))
+            out[lifted] = shaped.exact(lifted, shaped.smoothed(squint * free * _calm(shaped)))
     return out
 
 
@@ -240,7 +238,7 @@ def _chin(shaped: ShapedSkin) -> dict[int, Float64 | None]:
     if move is None:
         return {}
     free = smooth(shaped.mouth.away, 0.001, 0.010) * (1 - shaped.mouth.upper)
-    return {18: shaped.exact(18, shaped.smoothed(move * free[:, None], 1))}
+    return {18: shaped.exact(18, shaped.smoothed(move * free[:, None]))}
 
 
 def _lids(shaped: ShapedSkin) -> dict[int, Float64 | None]:

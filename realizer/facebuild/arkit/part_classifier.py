@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from realizer.core.array_types import Bool, Float64
 from realizer.core.errors import FaceError
 from realizer.face.mesh_geometry import fit_ball
 from realizer.facebuild.arkit.mesh_merge import Surface
-from realizer.tables import read_csv
+from realizer.tables import csv_rows
 
 ROUND = 0.06  # of its radius: how far an eyeball's vertices may lie off the ball that fits them
 BALL = (0.006, 0.022)  # m, radii of eyeballs
@@ -52,7 +51,7 @@ class _Rule:
 
 @cache
 def _rules() -> tuple[_Rule, ...]:
-    return read_csv(files(__package__).joinpath("parts.csv").read_text("utf-8"), _Rule, "parts.csv")
+    return csv_rows("parts.csv", _Rule, __package__)
 
 
 def part_of(names: tuple[str, ...]) -> str:

@@ -70,7 +70,9 @@ def fit_models(
     for form in forms:
         if form not in FORMS:
             raise FaceError(f"form: wanted one of {', '.join(FORMS)}, got {form!r}")
-    mouth, jaw = fit_mouth(face), _jaw(face)
+    mouth = fit_mouth(face)
+    y, z = (np.asarray(face.points["2.1"][1:], np.float64) - face.basis["chin"]).tolist()
+    jaw = 0.0, float(y), float(z)
     places, finer = watched_places(face, mouth), watched_places(face, mouth, between=True)
     fitted: dict[str, dict[int, UnitModel]] = {form: {} for form in forms}
     for au, one in measured.items():
@@ -210,11 +212,6 @@ def _head(face: Face) -> HeadTurn:
     found = least_squares(miss, np.array([chin, chin - 0.06, 0.2]), x_scale=[0.01, 0.01, 0.1])
     top, end, tilt = (float(value) for value in found.x)
     return HeadTurn(pivot, top, min(end, top - 1e-3), tilt)
-
-
-def _jaw(face: Face) -> tuple[float, float, float]:
-    y, z = (np.asarray(face.points["2.1"][1:], np.float64) - face.basis["chin"]).tolist()
-    return 0.0, float(y), float(z)
 
 
 def _jaw_degrees(face: Face, unit: UnitModel, mouth: Mouth, jaw: tuple[float, float, float]) -> float:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from typing import Any, Literal
 
 import numpy as np
@@ -13,8 +12,8 @@ import numpy as np
 from realizer.core.array_types import Bool, Float64, Int32
 from realizer.core.errors import FaceError
 from realizer.face.mesh_geometry import edge_graph, half_edges, part_triangles
-from realizer.facebuild.mpeg4.zones import Falloff, Setup, Triple, Zone
-from realizer.tables import faps, read_csv
+from realizer.facebuild.mpeg4.zones import Setup, Triple, Zone
+from realizer.tables import csv_rows, faps
 
 # The FAPs on one side of the slit between lips or lids, and those on the other.
 SLITS = {
@@ -43,7 +42,7 @@ class _Default:
 
 @cache
 def _table() -> tuple[_Default, ...]:
-    return read_csv(files(__package__).joinpath("zones.csv").read_text("utf-8"), _Default, "zones.csv")
+    return csv_rows("zones.csv", _Default, __package__)
 
 
 def default_setup(
@@ -79,10 +78,9 @@ def _zone(row: _Default, points: Mapping[str, Triple]) -> Zone:
     a, b = _place(points, row.from_point), _place(points, row.to_point)
     about = [_place(points, name) for name in row.about.split()]
     pivot = np.mean(about, axis=0) if about else np.zeros(3)
-    falloff: Falloff = row.falloff
     return Zone(
         fap=row.fap,
-        falloff=falloff,
+        falloff=row.falloff,
         size=row.factor * float(np.linalg.norm(b - a)),
         scale=(row.x, row.y, row.z),
         ease=row.ease,

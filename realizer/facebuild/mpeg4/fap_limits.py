@@ -22,7 +22,10 @@ def usual_range(fap: int, sign: int) -> float:
     A lower lip hangs on its jaw: what an action unit asks for as far as it opens the jaw does not count.
     """
     row = faps()[fap - 1]
-    most = max((_unit_value(fap, sign, au) for au in _units()), default=0.0)
+    hangs = fap in ON_JAW and sign < 0
+    most = max(
+        sign * unit.get(fap, 0.0) - (unit.get(OPEN_JAW, 0.0) if hangs else 0.0) for unit in _units().values()
+    )
     if most <= 0:
         most = _face_range(fap)
     return float(min(most, row.most if sign > 0 else -row.least))
@@ -39,8 +42,7 @@ def required_range(fap: int, sign: int) -> float:
 @cache
 def accompanying_faps(fap: int, sign: int) -> dict[int, float]:
     """Return the FAPs of the action unit that uses one FAP most in a direction, or an empty mapping."""
-    strongest = max(_units(), key=lambda au: sign * _units()[au].get(fap, 0.0))
-    whole = _units()[strongest]
+    whole = max(_units().values(), key=lambda unit: sign * unit.get(fap, 0.0))
     return dict(whole) if sign * whole.get(fap, 0.0) > 0 else {}
 
 
@@ -49,11 +51,6 @@ def _face_range(fap: int) -> float:
     if row.direction == "growing":
         return PUPIL
     return EYEBALLS_OUT if row.name.endswith("eyeball") and row.unit == "ES" else REACH[row.unit]
-
-
-def _unit_value(fap: int, sign: int, au: str) -> float:
-    requested = sign * _units()[au].get(fap, 0.0)
-    return requested - _units()[au].get(OPEN_JAW, 0.0) if fap in ON_JAW and sign < 0 else requested
 
 
 @cache

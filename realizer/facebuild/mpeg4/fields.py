@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
 from realizer.face.mesh_geometry import components
 from realizer.facebuild.mpeg4.zones import Setup, Zone
-from realizer.tables import faps, read_csv
+from realizer.tables import csv_rows, faps
 
 # The unit vectors of FAP directions.
 WAYS: dict[str, tuple[float, float, float]] = {
@@ -37,8 +36,7 @@ class _Pair:
 
 @cache
 def _pairs() -> tuple[_Pair, ...]:
-    text = files(__package__).joinpath("neighbours.csv").read_text("utf-8")
-    return read_csv(text, _Pair, "neighbours.csv")
+    return csv_rows("neighbours.csv", _Pair, __package__)
 
 
 def zone_fields(setup: Setup, vertices: Float64) -> dict[int, Float64]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from realizer.face.features import INSIDE, NAMES, Point
 from realizer.face.mesh_geometry import nearest_vertex, part_triangles, vertex_normals
 from realizer.facebuild.mpeg4.head_geometry import HeadGeometry, find_anchors
 from realizer.facebuild.mpeg4.rigid import balls
-from realizer.tables import read_csv
+from realizer.tables import csv_rows
 
 NEAR = 0.22  # eye distances; a point farther than this from all evidence is a guess
 OFF = 0.06  # eye distances; so is one that had to go this far to the skin
@@ -43,8 +42,8 @@ class _Template:
 @cache
 def _template() -> tuple[dict[str, Float64], dict[str, Float64]]:
     """Return feature points and anchors of the template, in eye distances from between the eyes."""
-    text = files(__package__).joinpath("template.csv").read_text("utf-8")
-    rows = {row.name: np.array([row.x, row.y, row.z]) for row in read_csv(text, _Template, "template.csv")}
+    table = csv_rows("template.csv", _Template, __package__)
+    rows = {row.name: np.array([row.x, row.y, row.z]) for row in table}
     points = {name: place for name, place in rows.items() if name[0].isdigit()}
     return points, {name: place for name, place in rows.items() if name not in points}
 

@@ -15,7 +15,7 @@ from realizer.facebuild.parts import smooth
 from realizer.facebuild.person import makehuman
 from realizer.facebuild.person.base_mesh import Ground
 from realizer.facebuild.person.lips import close_lips
-from realizer.tables import read_csv
+from realizer.tables import csv_rows
 from realizer.tables.arkit_names import other_side
 
 MIRROR = np.array([-1.0, 1.0, 1.0])
@@ -118,10 +118,8 @@ def _joint(mesh: makehuman.BaseMesh, at: Float64, name: str) -> Float64:
 
 def _landmarks(mesh: makehuman.BaseMesh, at: Float64) -> dict[str, int]:
     """Return feature point -> base vertex; those on the tongue are located."""
-    path = Path(__file__).with_name("hm08_landmarks.csv")
-    points = {
-        row.feature_point: row.vertex for row in read_csv(path.read_text("utf-8"), _Landmark, path.name)
-    }
+    table = csv_rows("hm08_landmarks.csv", _Landmark, __package__)
+    points = {row.feature_point: row.vertex for row in table}
     mine = np.unique(mesh.quads["helper-tongue"])
     tongue = at[mine]
     top = mine[tongue[:, 1] > np.median(tongue[:, 1])]
