@@ -97,8 +97,8 @@ def _holes(vertices: Float64, triangles: Int32, eyes: list[Any], mouth: Any) -> 
     if not len(rim):
         return []
     names, index = np.unique(rim, return_inverse=True)
-    index = index.reshape(-1, 2).astype(np.int32)
-    label = components(index, len(names))
+    index = index.reshape(-1, 2)
+    label = components(index.astype(np.int32), len(names))
     lowest = label[int(np.argmin(vertices[names, 1]))]
     open_ = []
     for k in range(label.max() + 1):
