@@ -6,7 +6,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from realizer.animation.fap.au_fap_mapping import FapMapping, standard
-from realizer.core.errors import FaceError, TableError
+from realizer.face.reading import face_errors
 from realizer.tables.mappings import own_file, read_mapping
 
 
@@ -29,9 +29,7 @@ def mapping_of(face: str = "default", file: Path | None = None) -> FapMapping:
 @lru_cache(maxsize=16)
 def _mapping(folder: Path, file: Path | None) -> FapMapping:
     mapping = standard()
-    try:
-        if own := own_file(folder):
+    if own := own_file(folder):
+        with face_errors(own, "a mapping of action units to FAPs"):
             mapping = mapping.replaced(read_mapping(own), str(own))
-    except TableError as error:
-        raise FaceError(str(error)) from None
     return mapping.replaced(read_mapping(file), str(file)) if file else mapping

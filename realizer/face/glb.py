@@ -35,22 +35,13 @@ def to_glb(face: Face) -> bytes:
     }
     indices = file.add(face.triangles.astype("<u4").ravel(), target=ELEMENT_ARRAY_BUFFER)
     scale, offset = face_scale(face)
+    rights, look = f"{face.licence}; {face.source}", {"metallicFactor": 0.0, "roughnessFactor": 0.6}
     document = {
-        "asset": {
-            "version": "2.0",
-            "generator": "bml-realizer",
-            "copyright": f"{face.licence}; {face.source}",
-        },
+        "asset": {"version": "2.0", "generator": "bml-realizer", "copyright": rights},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": [{"name": face.name, "mesh": 0}],
-        "materials": [
-            {
-                "name": "face",
-                "doubleSided": True,
-                "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.6},
-            }
-        ],
+        "materials": [{"name": "face", "doubleSided": True, "pbrMetallicRoughness": look}],
         "meshes": [
             {
                 "name": face.name,

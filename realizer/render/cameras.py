@@ -72,12 +72,8 @@ class Camera:
         pose[:3, :4] = np.stack([right, np.cross(back, right), back, self.position], axis=1)
         return pose
 
-    def project(self, points: Any, size: tuple[int, int]) -> Float64:
-        """Return pixels (n, 2), x to the right and y down from the top left corner, of points (n, 3)."""
-        return self.see(points, size)[0]
-
     def see(self, points: Any, size: tuple[int, int]) -> tuple[Float64, Float64]:
-        """Return pixels (n, 2) as `project`, and metres straight ahead (n,), of points (n, 3) in metres."""
+        """Return pixels (n, 2) from the top left corner, y down, and metres ahead (n,), of points (n, 3)."""
         width, height = size
         right, up, back = (
             self.pose[:3, :3].T @ (np.asarray(points, np.float64) - self.position).reshape(-1, 3).T

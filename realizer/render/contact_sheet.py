@@ -105,7 +105,10 @@ class _Form:
         y += height + 2
         pen.text((x + 2, y), _cut(cell.title, self.title, self.width), INK, self.title)
         y += int(self.large * 1.5)
-        for line in _fold(cell.notes, self.lines):
+        notes, more = cell.notes[: self.lines], len(cell.notes) - self.lines
+        if more > 0:
+            notes = [*notes[:-1], f"{notes[-1]} +{more}"]
+        for line in notes:
             pen.text((x + 2, y), _cut(line, self.note, self.width), FAINT, self.note)
             y += int(self.small * 1.3)
 
@@ -142,12 +145,6 @@ def _page(groups: Sequence[Group], form: _Form, columns: int, top: tuple[str, UI
     for cell, x, at in places:
         form.put(image, pen, cell, x, at)
     return np.asarray(image)
-
-
-def _fold(lines: Sequence[str], most: int) -> list[str]:
-    if len(lines) <= most:
-        return list(lines)
-    return [*lines[: most - 1], f"{lines[most - 1]} +{len(lines) - most}"]
 
 
 def _font(size: int) -> Font:

@@ -38,7 +38,7 @@ class DrawingProcess:
             self._popen.stdin.close()
             self._popen.stdout.close()
             self.pid = self._popen.pid
-            self._end = weakref.finalize(
+            self.end = weakref.finalize(
                 self, _end, self._popen, self._orders, self._answers, self._opened, self._memory
             )
             self.send(order)
@@ -76,9 +76,6 @@ class DrawingProcess:
         if isinstance(answer, Failed):
             raise RenderError(answer.message)
         return answer
-
-    def end(self) -> None:
-        self._end()
 
     def _died(self) -> RenderError:
         try:

@@ -102,7 +102,10 @@ def hair(scalp: Scalp, style: Style, look: Mapping[str, Any]) -> list[Part]:
     # A strand that passes close by the hairline, above an ear, is thin there too.
     beside = scalp.high(ground.reshape(-1, 3)).reshape(off.shape)
     off = np.where(hangs > 0, off, np.minimum(off, np.maximum(beside, 0) + 0.0005))
-    lock = _locks(rng, n)
+    # The brightness of locks a few columns wide around the head, -1..1.
+    raw = rng.uniform(-1, 1, n)
+    lock = raw + 0.5 * (np.roll(raw, 1) + np.roll(raw, -1))
+    lock = lock / np.abs(lock).max()
     thick = np.interp(off, *np.array(style.thick, float).T)
     side = 1 - (1 - style.sides) * smooth(np.abs(ways[..., 0]), 0.35, 0.85)
     thick = thick * side * (1 + style.crown * smooth(ways[..., 1], 0.3, 0.9) * (1 - ways[..., 0] ** 2))
@@ -222,13 +225,6 @@ def _beginnings(scalp: Scalp, style: Style, pole: Float64, turn: Float64, edge: 
     return np.where(
         count > 0, np.maximum(0.5 * count + 0.25 * (np.roll(count, 1) + np.roll(count, -1)), 0.02), 0
     )
-
-
-def _locks(rng: Any, n: int) -> Float64:
-    """Return the brightness of locks a few columns wide around the head, (n,) -1..1."""
-    raw = rng.uniform(-1, 1, n)
-    soft = raw + 0.5 * (np.roll(raw, 1) + np.roll(raw, -1))
-    return np.asarray(soft / np.abs(soft).max())
 
 
 def _fall(scalp: Scalp, style: Style, at: Float64, drop: Float64, rng: Any) -> tuple[Float64, Float64]:

@@ -43,7 +43,9 @@ class Lid:
         # The ring is widest a little above the corner where the lids meet.
         inner, outer = (ground.points[name] for name in (("3.11", "3.7") if side > 0 else ("3.8", "3.12")))
         self.inner, self.outer = inner, outer
-        one, other = self._halves(edge, inner, outer)
+        turned = edge[edge.index(inner) :] + edge[: edge.index(inner)]
+        cut = turned.index(outer)
+        one, other = turned[: cut + 1], [inner, *turned[: cut - 1 : -1]]
         self.upper, self.lower = (one, other) if at[one, 1].mean() > at[other, 1].mean() else (other, one)
         names = ("3.1", "3.3") if side > 0 else ("3.2", "3.4")
         self.aperture = float(at[ground.points[names[0]], 1] - at[ground.points[names[1]], 1])
@@ -80,12 +82,6 @@ class Lid:
             known |= set(inwards)
             front = list(inwards)
         return leader, lining
-
-    @staticmethod
-    def _halves(ring: list[int], inner: int, outer: int) -> tuple[list[int], list[int]]:
-        turned = ring[ring.index(inner) :] + ring[: ring.index(inner)]
-        cut = turned.index(outer)
-        return turned[: cut + 1], [inner, *turned[: cut - 1 : -1]]
 
     def gap(self, x: Float64) -> Float64:
         """Return the distance between the lids at x in metres, 0 beyond the corners."""

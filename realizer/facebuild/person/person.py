@@ -75,10 +75,11 @@ def person_of(data: Path, targets: Mapping[str, float]) -> Person:
     at = _relaxed(Ground(mesh, at, points, shape))
     ground = Ground(mesh, close_lips(Ground(mesh, at, points, shape)), points, shape)
     face = float(ground.point("11.1")[1] - ground.point("2.1")[1])
+    balls = (fit_ball(at[np.unique(mesh.quads[f"helper-{side}-eye"])]) for side in "lr")
     arch = np.ptp(at[np.unique(mesh.quads["helper-upper-teeth"])], axis=0)
     return Person(
         ground=ground,
-        balls=tuple(_ball(at[np.unique(mesh.quads[f"helper-{side}-eye"])]) for side in "lr"),
+        balls=tuple((centre, radius - EYE_INSET) for centre, radius in balls),
         face=face,
         jaw_pivot=_joint(mesh, at, "joint-mouth") + np.array([0, 0.002, 0.006]),
         head_pivot=_joint(mesh, at, "joint-head") + NOD * face,
@@ -105,11 +106,6 @@ def _relaxed(ground: Ground) -> Float64:
     for _ in range(RELAXED):
         at = at + near * (ground.smoothed(at) - at)
     return at
-
-
-def _ball(shell: Float64) -> tuple[Float64, float]:
-    centre, radius = fit_ball(shell)
-    return centre, radius - EYE_INSET
 
 
 def _joint(mesh: makehuman.BaseMesh, at: Float64, name: str) -> Float64:
