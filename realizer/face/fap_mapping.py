@@ -29,7 +29,7 @@ def mapping_of(face: str = "default", file: Path | None = None) -> FapMapping:
 @lru_cache(maxsize=16)
 def _mapping(folder: Path, file: Path | None) -> FapMapping:
     mapping = standard()
-    if own := own_file(folder):
-        with face_errors(own, "a mapping of action units to FAPs"):
+    with face_errors(folder, "one mapping of action units to FAPs"):
+        if own := own_file(folder):
             mapping = mapping.replaced(read_mapping(own), str(own))
     return mapping.replaced(read_mapping(file), str(file)) if file else mapping

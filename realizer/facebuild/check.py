@@ -55,7 +55,7 @@ def check_face(name: str = "default", directory: Path | str | None = None) -> tu
     mesh = tried(lambda: read_arrays(folder / "mesh.npz", MESH))
     points = tried(lambda: read_features(folder / "features.csv"))
     stored = tried(lambda: read_arrays(folder / "fields.npz", ARRAYS))
-    if own := own_file(folder):
+    if own := tried(lambda: own_file(folder)):
         tried(lambda: read_mapping(own))
     zones = folder / FILE
     setup = tried(lambda: read_setup(zones)) if zones.is_file() else None

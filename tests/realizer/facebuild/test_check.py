@@ -105,6 +105,10 @@ BROKEN: dict[str, tuple[Callable[[Path], object], tuple[str, ...]]] = {
         lambda f: rewrite(f / "fields.npz", start=lambda a: a[:-1]),
         ("fields.npz: start: wanted",),
     ),
+    "two mappings": (
+        lambda f: [(f / f"au_to_fap.{form}").touch() for form in ("csv", "txt")],
+        ("wanted one of au_to_fap.txt and au_to_fap.csv, got both",),
+    ),
     "a mask out of range": (masked, ("mpeg4.toml", "wanted vertices of the skin", "999990")),
     "zones that are no zones": (
         lambda f: (f / "mpeg4.toml").write_text("# source: x\n# units: y\n# licence: z\nzone = 7\n") and None,
