@@ -48,7 +48,11 @@ class Manifest:
             BusyError: another batch writes here.
         """
         self.folder.mkdir(parents=True, exist_ok=True)
-        with _exclusive(self.folder / LOCK):
+        with (self.folder / LOCK).open("w") as file:
+            if not lock(file):
+                raise BusyError(
+                    f"{self.folder}: another batch writes here; wait for it, or choose another folder"
+                )
             self._rows = {row["document"]: row for row in _read(self.path)}
             self._file = self.path.open("a", encoding="utf-8")
             # End a line that a crash has cut short.
@@ -102,14 +106,3 @@ def _read(path: Path) -> Iterator[Row]:
             continue
         if isinstance(row, dict) and {"document", "key", "status", "outputs"} <= row.keys():
             yield row
-
-
-@contextmanager
-def _exclusive(path: Path) -> Iterator[None]:
-    """Hold an exclusive lock, which also ends with the process."""
-    with path.open("w") as file:
-        if not lock(file):
-            raise BusyError(
-                f"{path.parent}: another batch writes here; wait for it, or choose another folder"
-            )
-        yield

@@ -79,7 +79,7 @@ def fingerprint(options: Options) -> str:
             files = (p for p in root.rglob(f"*{suffix}") if not APART & {*p.relative_to(root).parts})
             _add(digest, root, files)
     for folder in (folder_of(options.face), *options.files.values()):
-        _add(digest, folder, _inside(folder))
+        _add(digest, folder, iter([folder]) if folder.is_file() else filter(Path.is_file, folder.rglob("*")))
     for name in ENGINES:
         try:
             digest.update(f"{name} {version(name)}\n".encode())
@@ -91,10 +91,6 @@ def fingerprint(options: Options) -> str:
 def key_of(text: bytes, mark: str) -> str:
     """Return the key of a document for the fingerprint `mark`, 64 hexadecimal digits."""
     return hashlib.sha256(mark.encode() + b"\n" + text).hexdigest()
-
-
-def _inside(path: Path) -> Iterator[Path]:
-    return iter([path]) if path.is_file() else (p for p in path.rglob("*") if p.is_file())
 
 
 def _add(digest: hashlib._Hash, root: Path, files: Iterator[Path]) -> None:

@@ -85,7 +85,8 @@ def batch(
     from realizer.batch.run import batch as run
 
     with options.reporting(DocumentsError):
-        documents = find(_read_places(places))
+        lines = (list(filter(str.strip, sys.stdin.read().splitlines())) if p == "-" else [p] for p in places)
+        documents = find(place for listed in lines for place in listed)
     counts: Counter[str] = Counter()
     dropped = 0
     pool = _workers(how, min(workers or _core_count(), len(documents)), dask)
@@ -133,14 +134,6 @@ def _options(formats: tuple[str, ...], flags: dict[str, Any]) -> Options:
         light=chosen.light,
         background=chosen.background,
     )
-
-
-def _read_places(places: tuple[str, ...]) -> list[str]:
-    """Return the places; `-` is replaced by the lines of standard input."""
-    found: list[str] = []
-    for place in places:
-        found += [line for line in sys.stdin.read().splitlines() if line.strip()] if place == "-" else [place]
-    return found
 
 
 def _workers(how: Options, workers: int, dask: str | None) -> ProcessPool | DaskCluster:

@@ -13,7 +13,6 @@ import click
 from realizer.cli import options
 
 if TYPE_CHECKING:
-    from realizer.analysis.picture_search import Likeness
     from realizer.expressions.expression import Expression
 
 MIN_LIKE = 0.4  # least cosine of the best match; the motion of an idle head reaches 0.3
@@ -113,8 +112,11 @@ def find(
     elif units is not None:
         matches = by_action_units(units, library)
     else:
+        from realizer.analysis.picture_search import UnknownPictureError, by_picture, read_picture
+
         assert like is not None
-        likeness = _find_similar(like, library, face)
+        with options.reporting(UnknownPictureError):
+            likeness = by_picture(read_picture(like), library, None if face is None else [face])
         face, matches = likeness.face, [pair for pair in likeness.matches if pair[1] > 0]
         if matches and matches[0][1] < MIN_LIKE:
             matches = []
@@ -128,13 +130,6 @@ def find(
     elif output is not None:
         _draw(expressions_found, scores, output, face or "default")
     return 0 if matches else 1
-
-
-def _find_similar(like: Path, library: Sequence[Expression], face: str | None) -> Likeness:
-    from realizer.analysis.picture_search import UnknownPictureError, by_picture, read_picture
-
-    with options.reporting(UnknownPictureError):
-        return by_picture(read_picture(like), library, None if face is None else [face])
 
 
 def _check_picture(output: Path | None, face: str) -> None:

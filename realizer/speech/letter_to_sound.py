@@ -45,16 +45,17 @@ def vowel_units(word: str, language: str) -> int:
 def letters_to_phonemes(word: str, language: str) -> tuple[str, ...]:
     """Return the approximate IPA of a word by the longest groups of letters in the table, left to right."""
     facts = _facts(language)
-    return tuple(ipa for part in _parts(word, facts) for ipa in _sounded(part, _subtag(language)))
+    return tuple(ipa for part in _parts(word, facts) for ipa in _sounded(part, subtag(language)))
 
 
-def _subtag(language: str) -> str:
+def subtag(language: str) -> str:
+    """Return the first part of a BCP-47 tag, in lower case."""
     return re.split("[-_]", language)[0].lower()
 
 
 def _facts(language: str) -> Mapping[str, Any]:
     languages: Mapping[str, Mapping[str, Any]] = syllable_facts()["languages"]
-    return languages.get(_subtag(language), languages[GENERIC])
+    return languages.get(subtag(language), languages[GENERIC])
 
 
 def _parts(word: str, facts: Mapping[str, Any]) -> list[str]:

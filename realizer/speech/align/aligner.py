@@ -18,6 +18,7 @@ from realizer.speech.align.alignment import AlignError, Alignment, moved
 from realizer.speech.align.dtw_align import dtw_align
 from realizer.speech.align.features import mono, to_aligner
 from realizer.speech.align.model_align import model_align
+from realizer.speech.letter_to_sound import subtag
 from realizer.speech.registry import reference_voice
 from realizer.speech.utterance import Recording, SpeechRequest, Utterance, Voice
 
@@ -88,7 +89,7 @@ def align_request(
     warnings = reference.warnings
     found = None
     if aligner == "pocketsphinx" or (
-        aligner is None and _english(request.language) and not sphinx.install_hint()
+        aligner is None and subtag(request.language) == "en" and not sphinx.install_hint()
     ):
         found = model_align(heard, duration, reference)
         if found is None:
@@ -116,10 +117,6 @@ def _unusable_reason(aligner: str | None, voice: Voice | None) -> str | None:
     if aligner == "pocketsphinx":
         return sphinx.install_hint()
     return espeak.install_hint() if aligner == "espeak" and voice is None else None
-
-
-def _english(language: str) -> bool:
-    return language.replace("_", "-").split("-")[0].lower() == "en"
 
 
 def uniform_align(sound: Float32, duration: float, reference: Utterance) -> Alignment:

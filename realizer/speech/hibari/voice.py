@@ -25,7 +25,7 @@ from realizer.speech.hibari.times import (
     trim_to_sound,
     word_spans,
 )
-from realizer.speech.letter_to_sound import syllable_facts
+from realizer.speech.letter_to_sound import subtag, syllable_facts
 from realizer.speech.speech_buffer import SpeechBuffer, cut
 from realizer.speech.ssml import Script
 from realizer.speech.utterance import STRETCH, SpeechRequest, Utterance, Word
@@ -188,7 +188,7 @@ def _ends_in_pause(sentence: Sequence[Token]) -> bool:
 
 def _warnings(request: SpeechRequest, track: SpeechBuffer, hello: dict[str, Any]) -> list[str]:
     found = []
-    if request.language.lower().replace("_", "-").split("-")[0] != "en":
+    if subtag(request.language) != "en":
         found.append(f"hibari speaks English only: {request.language!r} is read as English")
     if not hello["durations"]:
         found.append("this hibari does not report the durations of its phonemes: their times are estimated")
