@@ -123,7 +123,7 @@ def test_deformers_give_sessions_the_meshes_of_films(faces: dict[str, Face]) -> 
     face = faces["au"]
     player = Player(PlayOptions(idle=True, seed=3))
     window = FrameTimeline(player, 0, 25, lambda: face).window(0, 20)
-    assert window.poses.shape == (window.count, len(face.inputs))
+    assert window.poses.shape == (window.end - window.first, len(face.inputs))
     meshes = quantise(face, deform(face, window.poses[:30]))
     for row in (0, 29, 7, 8):  # in any order
         assert np.array_equal(window.mesh(row), meshes[row])
