@@ -178,18 +178,26 @@ class PredictionFeedback:
 Feedback = BlockProgress | SyncPointProgress | WarningFeedback | PredictionFeedback
 
 
-def prediction_of(node: Behaviour, block: str, times: Mapping[str, float]) -> Behaviour:
+def prediction_of(node: Behaviour, block: str, times: Mapping[str, float], late: float = 0.0) -> Behaviour:
     """Return a behaviour for predictionFeedback: its id is "block:behaviour", each sync point a plain number.
 
     Args:
         node: as parsed; descriptions, priority and unknown attributes and children are left out.
         block: id of its block.
         times: sync point -> seconds from block start. "stroke:n" has no attribute form and is left out.
+        late: seconds by which it is later than its references into other blocks say; the attribute
+            `realizer:late`.
     """
     syncs = {p: SyncRef(offset=round(times[p], 6)) for p in node.sync_points if p in times}
     id = f"{block}:{node.id}"
     node = replace(
-        node, id=id, syncs=syncs, descriptions=(), unknown_attributes={}, unknown_children=(), priority=0.0
+        node,
+        id=id,
+        syncs=syncs,
+        descriptions=(),
+        unknown_attributes={f"{{{OWN}}}late": f"{late:.3g}"} if late else {},
+        unknown_children=(),
+        priority=0.0,
     )
     if isinstance(node, Speech):
         refs = {p: SyncRef(offset=round(time, 6)) for p, time in times.items() if p not in node.sync_points}

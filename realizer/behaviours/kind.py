@@ -31,6 +31,7 @@ class PlanningContext:
         clips: id -> sound of a client, which documents name as `clip:ID`.
         library: the expressions that documents can name.
         face_inputs: () -> the inputs of the character's face (`Face.inputs`), or None if unknown.
+        grace: seconds by which a behaviour may come too late for its references into other blocks.
     """
 
     scene: Mapping[str, Position] | None = None
@@ -41,6 +42,7 @@ class PlanningContext:
     clips: Mapping[str, Recording] = field(default_factory=dict)
     library: Library = field(default_factory=builtin)
     face_inputs: Callable[[], Sequence[str] | None] = lambda: None
+    grace: float = 0.0
 
 
 # What a behaviour does to other blocks and behaviours when it starts.

@@ -67,7 +67,7 @@ def settings_of(*rows: tuple[str, str]) -> Callable[[options.Command], options.C
 @options.prosody
 @options.cooccurrence
 @options.mapping
-@settings_of(("keep", "N"), ("drain", "N"), *((name, "N") for name in LIMITS))
+@settings_of(("grace", "N"), ("keep", "N"), ("drain", "N"), *((name, "N") for name in LIMITS))
 @click.option("--config", type=options.FILE, help="TOML file of settings: fps = 30 means --fps 30.")
 def serve(config: Path | None, **flags: Any) -> None:
     """Run the service: play BML from clients, and stream frames, sound and feedback back.

@@ -25,6 +25,7 @@ class PlayOptions:
         cooccurrence: rules for AUs that no face shows together: "on" (built in), "off", or a file.
         prosody: whether nods, brows, blinks and glances accompany speech; needs `idle`.
         mapping: file that maps AUs to FAPs and overrides the face's mapping.
+        grace: seconds by which a behaviour may come too late for its references into other blocks.
 
     Raises:
         ValueError: `fps` is not a number above 0.
@@ -42,6 +43,7 @@ class PlayOptions:
     cooccurrence: str = "on"
     prosody: bool = True
     mapping: Path | None = None
+    grace: float = 0.5
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.fps) and self.fps > 0):

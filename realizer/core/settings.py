@@ -284,6 +284,11 @@ class Settings:
     )
     prosody: bool = _row(True, _flag, "nods, brows, blinks and glances that accompany speech: on or off")
     mapping: Path | None = _row(None, _file, "file that maps AUs to FAPs; none: each face's own mapping")
+    grace: float = _row(
+        0.5,
+        _real(0, 60),
+        "seconds by which a behaviour may come too late for its references into other blocks",
+    )
     keep: float = _row(60.0, _real(0, 1e9), "seconds that a named session lives after its last connection")
     drain: float = _row(5.0, _real(0, 3600), "seconds that blocks may go on playing when the service stops")
     max_message: int = _row(16 * 2**20, _whole(1, 2**31), "bytes of one WebSocket message")

@@ -69,7 +69,7 @@ class ActiveBlock:
         plan: its schedule has the start, which is inf while unknown (the block was not activated).
         context: the context of its planning.
         character: index of its character.
-        number: order of acceptance.
+        number: order of arrival, from 1.
         order: at one instant it reports before blocks of a higher order.
         not_before: its earliest start, seconds on the session clock.
         dependencies: blocks that it waits for; empty once it has started.

@@ -15,8 +15,10 @@ from realizer.scheduling.timing import Schedule
 FOREVER = float("inf")
 
 
-def dependencies(block: Block, character: int, alive: Collection[ActiveBlock]) -> list[Dependency]:
-    """Return the blocks that a block waits for: for APPEND all of its character, and those of BMLA's lists.
+def dependencies(
+    block: Block, character: int, number: int, alive: Collection[ActiveBlock]
+) -> list[Dependency]:
+    """Return the blocks that a block waits for: for APPEND all earlier of its character, and BMLA's lists.
 
     Of blocks that wait for each other only the last is returned, because it ends when all of them have.
     """
@@ -24,7 +26,12 @@ def dependencies(block: Block, character: int, alive: Collection[ActiveBlock]) -
         p
         for p in alive
         if p.block.id in block.append_after
-        or (block.composition == "APPEND" and p.character == character and p.start < FOREVER)
+        or (
+            block.composition == "APPEND"
+            and p.character == character
+            and p.number < number
+            and p.start < FOREVER
+        )
     ]
     before = {id(wait.block) for p in named for wait in p.dependencies if not wait.subsiding}
     waits = [Dependency(p) for p in named if id(p) not in before]
@@ -43,14 +50,23 @@ def blocks_to_end(block: Block, character: int, alive: Iterable[ActiveBlock]) ->
 
 
 def existing_claims(
-    character: int, alive: Iterable[ActiveBlock], without: Iterable[ActiveBlock] = ()
+    character: int, number: float, alive: Iterable[ActiveBlock], without: Iterable[ActiveBlock] = ()
 ) -> list[ResourceClaim]:
-    """Return the claims of the blocks of a character, on the session clock."""
+    """Return the claims that a block of a character gives way to, on the session clock.
+
+    They are those of blocks that play, and of earlier ones that wait and whose start is known.
+
+    Args:
+        number: of the block, by order of arrival.
+    """
     gone = {id(p) for p in without}
     return [
         claim
         for p in alive
-        if p.plan.claims and p.character == character and p.start < FOREVER and id(p) not in gone
+        if p.plan.claims
+        and p.character == character
+        and (p.has_begun or (p.number < number and p.start < FOREVER))
+        and id(p) not in gone
         for claim in p.plan.claims
     ]
 

@@ -22,7 +22,7 @@ from realizer.playback.feedback_events import (
     sync_progress,
 )
 from realizer.playback.replanning import anticipators_of, lead_time
-from realizer.playback.timeline import BlockTimeline
+from realizer.playback.timeline import Arrival, BlockTimeline
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.utterance import Utterance
 
@@ -36,12 +36,14 @@ class AnnouncedBlock:
     """A block that was announced and has not arrived, with the commands that it received so far.
 
     Attributes:
+        number: order of arrival.
         state: IN_PREP, or REVOKED after it was ended and reported.
         activated: it does not wait for activation.
         dependencies: blocks that were placed before it.
     """
 
     block: Block
+    number: int
     state: State = State.IN_PREP
     activated: bool = False
     dependencies: list[Dependency] = field(default_factory=list)
@@ -102,13 +104,13 @@ class BlockManager:
         character = self.character_index(block.character_id)
         if block.id in self._announced or self._in_use(block, character):
             return
-        self._announced[block.id] = AnnouncedBlock(block)
+        self._announced[block.id] = AnnouncedBlock(block, self.blocks.new_number())
         start = max([now, *(w.until for w in self._dependencies(block, character))])
         self.reports.add(acknowledgement(block, now if start == FOREVER else start))
 
     def withdraw(self, block: Block, now: float) -> None:
         """Remove an announced block that will not be submitted, and report its end."""
-        announced = self._announced.pop(block.id, None) or AnnouncedBlock(block)
+        announced = self._announced.pop(block.id, None) or AnnouncedBlock(block, 0)
         if not announced.is_revoked:
             self._revoke(announced, now)
 
@@ -129,14 +131,15 @@ class BlockManager:
         except _Rejection as refused:
             self._announced.pop(block.id, None)
             return self._refuse(block, refused.warning, now)
-        announced = self._announced.get(block.id) or AnnouncedBlock(block)
+        announced = self._announced[block.id]
         if announced.is_revoked:
-            self._announced.pop(block.id, None)
+            del self._announced[block.id]
             return Schedule(block.id, {}, {}, start=now, failed=True)
         ended = block_links.blocks_to_end(block, character, self.blocks.active())
         pending = block.preplan and not announced.activated
         start = FOREVER if pending else max([now, *(w.until for w in waits)])
-        planned, others = self.timeline.plan(block, character, context, start, now, waits=waits, ended=ended)
+        arrival = Arrival(block, character, announced.number, context)
+        planned, others = self.timeline.plan(arrival, start, now, waits=waits, ended=ended)
         if planned.schedule.lengths:
             return planned.schedule
         self._announced.pop(block.id, None)
@@ -149,9 +152,7 @@ class BlockManager:
         for name in block.interrupt:
             self.revoke(name, now)
         state = next_state(announced.state, BlockEvent.PREPLAN if pending else BlockEvent.PLAN)
-        playing = ActiveBlock(
-            planned, self.kinds, context, character, self.blocks.next_number, now, waits, state
-        )
+        playing = ActiveBlock(planned, self.kinds, context, character, announced.number, now, waits, state)
         playing.apply_plan(planned, playing.earliest)  # it may have ended its own dependencies
         self.blocks.add(playing)
         self.timeline.place(playing)
@@ -165,6 +166,7 @@ class BlockManager:
         for warning in planned.schedule.warnings:
             self.reports.warn(warning, block.character_id)
         self.timeline.retime(others, planned.other_schedules, now)
+        self.timeline.trim(planned.trims, now)
         self.timeline.update_followers(playing, now)
         return planned.schedule
 
@@ -198,6 +200,8 @@ class BlockManager:
                     if (act := self.kinds[node.tag].command) is not None:
                         self._act(playing, event.name, act(node), time)
             case Phase.START:
+                if self.timeline.resolve_conflicts(playing, time):
+                    return  # its start is due again, or it was stopped
                 playing.change_state(BlockEvent.START)
                 playing.dependencies.clear()
                 self.reports.add(progress(block, "start", time, playing.state))
@@ -317,9 +321,7 @@ class BlockManager:
             utterances = {**playing.context.utterances, behaviour: utterance}
             playing.context = replace(playing.context, utterances=utterances)
             return True
-        playing.update_speech(behaviour, utterance, now)
-        self.timeline.mark_changed()
-        self.timeline.reschedule([playing, *self.timeline.linked_blocks(playing, now)], playing.start, now)
+        self.timeline.update_speech(playing, behaviour, utterance, now)
         return True
 
     # starts -------------------------------------------------------------------------------------
@@ -345,11 +347,10 @@ class BlockManager:
         return waits, waiting
 
     def _dependencies(self, block: Block, character: int) -> list[Dependency]:
-        announced = self._announced.get(block.id)
-        placed_before = (
-            [w for w in announced.dependencies if not w.block.is_done] if announced is not None else []
-        )
-        return block_links.dependencies(block, character, self.blocks.active()) + placed_before
+        announced = self._announced[block.id]
+        placed_before = [w for w in announced.dependencies if not w.block.is_done]
+        waits = block_links.dependencies(block, character, announced.number, self.blocks.active())
+        return waits + placed_before
 
     def _in_use(self, block: Block, character: int) -> bool:
         """Whether its id belongs to a playing or waiting block that it does not end."""

@@ -12,7 +12,7 @@ from bml_schema import Block, SyncRef, without
 from bml_schema.dropped_references import listed
 from realizer.animation.channel import Channel
 from realizer.behaviours.kind import BehaviourKind, PlanningContext
-from realizer.playback.resources import ResourceClaim, claims, conflicts
+from realizer.playback.resources import ResourceClaim, after_interrupts, claims, conflicts, interrupts, trims
 from realizer.scheduling import Member, schedule_together
 from realizer.scheduling.timing import Schedule, Timing, Warning
 from realizer.speech.utterance import WARP
@@ -34,6 +34,7 @@ class Plan:
         claims: the exclusive resources of its behaviours, on the clock of `schedule.start`.
         timings: the timings that its behaviours prefer.
         other_schedules: the new schedules of the other blocks, each from its own start.
+        trims: (block, behaviour) -> when a speech that plays has to end, which cuts its closing silence.
     """
 
     block: Block
@@ -42,6 +43,7 @@ class Plan:
     claims: Sequence[ResourceClaim] = ()
     timings: Mapping[str, Timing] = field(default_factory=dict)
     other_schedules: Sequence[Schedule] = ()
+    trims: Mapping[tuple[str, str], float] = field(default_factory=dict)
 
 
 def plan(
@@ -53,6 +55,7 @@ def plan(
     outside: Callable[[SyncRef], float | None] = lambda ref: None,
     existing_claims: Iterable[ResourceClaim] = (),
     others: Sequence[Member] = (),
+    may_stretch: bool = True,
 ) -> Plan:
     """Schedule a block and expand it; drop with one warning each what cannot be played.
 
@@ -62,15 +65,24 @@ def plan(
         outside: sync points of other blocks -> seconds from this block's start, None if unknown.
         existing_claims: claims of earlier blocks of this character, on the session clock.
         others: playing blocks that are tied to this one: solved with it, seconds from this block's start.
+        may_stretch: whether the plan may require speech of other lengths.
     """
-    builder = _PlanBuilder(block, kinds, context)
+    builder = _PlanBuilder(block, kinds, context, may_stretch)
     try:
         builder.add_problems()
         builder.time()
         schedule, *moved = builder.schedule(start, outside, tuple(existing_claims), others)
     except _NoPlan as why:
         return Plan(block, Schedule(block.id, {}, {}, start=start, **why.schedule))
-    return Plan(builder.block, schedule, builder.expand(schedule), builder.claims, builder.timings, moved)
+    return Plan(
+        builder.block,
+        schedule,
+        builder.expand(schedule),
+        builder.claims,
+        builder.timings,
+        moved,
+        builder.trims,
+    )
 
 
 class _NoPlan(Exception):
@@ -84,13 +96,21 @@ class _NoPlan(Exception):
 class _PlanBuilder:
     """A block while it is planned: its remaining behaviours, and the warnings so far."""
 
-    def __init__(self, block: Block, kinds: Mapping[str, BehaviourKind], context: PlanningContext) -> None:
+    def __init__(
+        self,
+        block: Block,
+        kinds: Mapping[str, BehaviourKind],
+        context: PlanningContext,
+        may_stretch: bool,
+    ) -> None:
+        self.may_stretch = may_stretch
         self.original = self.block = block
         self.kinds = kinds
         self.context = context
         self.timings: dict[str, Timing] = {}
         self.warnings: list[Warning] = []
         self.claims: tuple[ResourceClaim, ...] = ()
+        self.trims: dict[tuple[str, str], float] = {}
 
     def add_problems(self) -> None:
         """Add the warnings of the parser."""
@@ -129,13 +149,22 @@ class _PlanBuilder:
         existing_claims: Sequence[ResourceClaim],
         others: Sequence[Member],
     ) -> list[Schedule]:
-        """Step 3: solve for the times, again without conflicting behaviours until none is left."""
+        """Step 3: solve for the times, again without conflicting behaviours until none is left.
+
+        Speeches that overlap a little are placed one after the other, if the document and the voice allow it.
+        """
+        sequences: list[tuple[str | float, str | float]] = []
+        may_sequence = True
         while True:
             priorities = {node.id: node.priority for node in self.block.behaviours if node.priority}
-            own = Member(self.block, self.timings, priorities=priorities)
-            schedule, *moved = schedule_together([own, *others], outside=outside)
+            own = Member(self.block, self.timings, priorities=priorities, sequences=tuple(sequences))
+            schedule, *moved = schedule_together([own, *others], outside=outside, grace=self.context.grace)
             if schedule.failed or len(schedule.times) < len(self.timings):
-                self.try_stretching(own, others, outside, schedule)
+                if self.may_stretch:
+                    self.try_stretching(own, others, outside, schedule)
+                if sequences:
+                    sequences, may_sequence = [], False
+                    continue
             warnings = [
                 replace(w, text=self.with_place(self.behaviour_of(w), w.text)) for w in schedule.warnings
             ]
@@ -147,9 +176,15 @@ class _PlanBuilder:
             character, all_warnings = self.block.character_id, tuple(self.warnings)
             schedule = replace(schedule, start=start, character=character, warnings=all_warnings)
             self.claims = tuple(claims(self.block, schedule, self.kinds, self.context))
-            lost = conflicts(self.claims, existing_claims, start)
+            left = after_interrupts(existing_claims, interrupts(self.block, schedule, self.kinds))
+            lost = conflicts(self.claims, left, start)
             if not lost:
+                self.trims = dict(trims(self.claims, left))
                 return [schedule, *moved]
+            wanted = {pair for conflict in lost if (pair := conflict.sequence) is not None}
+            if may_sequence and wanted.difference(sequences):
+                sequences = [*sequences, *wanted.difference(sequences)]
+                continue
             losers = ((loss.claim.behaviour, str(loss)) for loss in lost)
             self.drop((id, self.warning("CANNOT_CREATE_BEHAVIOR", id, text)) for id, text in losers)
 
@@ -179,7 +214,9 @@ class _PlanBuilder:
         could = {b: timing for b, timing in flexible.items() if timing is not own.timings[b]}
         if not could:
             return
-        stretched = schedule_together([replace(own, timings=flexible), *others], outside=outside)[0]
+        stretched = schedule_together(
+            [replace(own, timings=flexible), *others], outside=outside, grace=self.context.grace
+        )[0]
         if stretched.failed or len(stretched.times) <= len(rigid.times):
             return
         at = {b: stretched.times[b] - stretched.times[b][0] for b in could if b in stretched.times}
@@ -194,7 +231,9 @@ class _PlanBuilder:
             for rate in sorted({round(float(r), 9) for r in rates}, key=lambda r: abs(r - 1.0)):
                 evened = replace(own.timings[b], preferred=gaps * rate)
                 fits = schedule_together(
-                    [replace(own, timings={**own.timings, b: evened}), *others], outside=outside
+                    [replace(own, timings={**own.timings, b: evened}), *others],
+                    outside=outside,
+                    grace=self.context.grace,
                 )[0]
                 if not fits.failed and len(fits.times) > most:
                     most = len(fits.times)

@@ -22,12 +22,11 @@ class BlockStore:
     """The blocks of a session while they are active or visible, and the schedules of past ones.
 
     Attributes:
-        next_number: number of the next block.
         first_invisible: when the first ended block becomes invisible; infinite if there is none.
     """
 
     def __init__(self) -> None:
-        self.next_number = 0
+        self._next_number = 0
         self.first_invisible = FOREVER
         self._blocks: dict[int, ActiveBlock] = {}  # by number, in order of acceptance
         self._active: dict[str, ActiveBlock] = {}  # by id; those that are not done
@@ -36,10 +35,14 @@ class BlockStore:
         self._points = 0  # of `_past`
         self._anticipated = Schedule(ANTICIPATORS, {}, {})
 
+    def new_number(self) -> int:
+        """Return the number of a block that has just arrived."""
+        self._next_number += 1
+        return self._next_number
+
     def add(self, playing: ActiveBlock) -> None:
         """Add an accepted block."""
         self._blocks[playing.number] = self._active[playing.block.id] = playing
-        self.next_number += 1
 
     def end(self, playing: ActiveBlock) -> None:
         """End a block, so that its id can be used again."""

@@ -79,7 +79,8 @@ def prediction(
         character_id=block.character_id,
         blocks=(times,),
         behaviours=tuple(
-            [prediction_of(block[id], block.id, syncs) for id, syncs in (behaviours or {}).items()]
+            prediction_of(block[id], block.id, syncs, schedule.late.get(id, 0.0))
+            for id, syncs in (behaviours or {}).items()
         ),
     )
 

@@ -72,6 +72,7 @@ class Player(BlockManager):
             media=options.media,
             clips={} if clips is None else clips,
             library=library_of(options.expressions),
+            grace=options.grace,
         )
         self.idle = options.idle
         self.prosody = options.prosody
@@ -97,6 +98,11 @@ class Player(BlockManager):
             ):
                 requests[node.id] = say
         return requests
+
+    def resources(self, block: Block) -> frozenset[str]:
+        """Return what the behaviours of a block need that one behaviour at a time can have."""
+        known = ((self.kinds[node.tag], node) for node in block.behaviours if node.tag in self.kinds)
+        return frozenset[str]().union(*(kind.claims(node, self.context) for kind, node in known))
 
     def submit(self, block: Block, now: float, utterances: Mapping[str, Utterance] | None = None) -> Schedule:
         """Plan a block and play it as its composition says.

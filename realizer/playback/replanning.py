@@ -96,6 +96,7 @@ def member(playing: ActiveBlock, origin: float, now: float) -> Member:
         earliest=max(delay, now - origin),
         passed_times=passed,
         is_fixed=True,
+        late=playing.schedule.late,
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from graphlib import TopologicalSorter
 
 from bml_schema import Block
@@ -19,11 +19,23 @@ from realizer.playback.character import Character
 from realizer.playback.event_queue import EventQueue
 from realizer.playback.feedback_events import Reports, prediction, progress
 from realizer.playback.replanning import affected_blocks, member
-from realizer.playback.resources import claims, conflicts
+from realizer.playback.resources import ResourceClaim, after_interrupts, claims, conflicts, interrupts
 from realizer.scheduling import schedule_together
 from realizer.scheduling.timing import Schedule, Warning
+from realizer.speech.duration_fit import shortened
+from realizer.speech.utterance import Utterance
 
 FOREVER = float("inf")
+
+
+@dataclass(frozen=True)
+class Arrival:
+    """A block to be planned, the index of its character, and its number by order of arrival."""
+
+    block: Block
+    character: int
+    number: int
+    context: PlanningContext
 
 
 class BlockTimeline:
@@ -51,48 +63,64 @@ class BlockTimeline:
 
     def plan(
         self,
-        block: Block,
-        character: int,
-        context: PlanningContext,
+        arrival: Arrival,
         start: float,
         now: float,
         *,
         waits: Collection[Dependency] = (),
         ended: Collection[ActiveBlock] = (),
         alone: bool = False,
+        may_stretch: bool = True,
     ) -> tuple[Plan, list[ActiveBlock]]:
         """Plan a block beside the active ones; return the plan, and the blocks that are solved with it.
 
         While its start is unknown, it is planned as if it started now, and does not move other blocks.
+        Conflicts with other blocks are resolved when it starts, not while it waits.
 
         Args:
             waits: its dependencies.
             ended: the blocks that it ends.
             alone: sync points of other blocks are fixed.
+            may_stretch: whether the plan may require speech of other lengths.
         """
+        block, character = arrival.block, arrival.character
         known = start < FOREVER
         origin = start if known else now
         alive = [p for p in self.blocks.active() if p not in ended and p.block.id != block.id]
         others = affected_blocks(block, alive, now, waits) if known and not alone else []
         schedule_of = block_links.with_stops(self.blocks.schedule_of, ended, now)
+        existing = self._existing_claims(character, arrival.number, alive) if start <= now else ()
         planned = plan_block(
             block,
             self.kinds,
-            context,
+            arrival.context,
             start=origin,
             outside=block_links.external_times(schedule_of, origin, self.blocks.first_schedule_of),
-            existing_claims=block_links.existing_claims(character, alive),
+            existing_claims=existing,
             others=[member(p, origin, now) for p in others],
+            may_stretch=may_stretch,
         )
         if planned.other_schedules and self._conflict(others, planned.other_schedules):
-            return self.plan(block, character, context, start, now, waits=waits, ended=ended, alone=True)
+            return self.plan(
+                arrival, start, now, waits=waits, ended=ended, alone=True, may_stretch=may_stretch
+            )
         return planned, others
+
+    def _existing_claims(
+        self, character: int, number: int, alive: Sequence[ActiveBlock]
+    ) -> list[ResourceClaim]:
+        """Return the claims that a block gives way to, after the interrupts that others will make."""
+        promised = (
+            cut for p in alive if p.start < FOREVER for cut in interrupts(p.block, p.schedule, self.kinds)
+        )
+        return after_interrupts(block_links.existing_claims(character, number, alive), promised)
 
     def _conflict(self, blocks: Sequence[ActiveBlock], schedules: Sequence[Schedule]) -> bool:
         """Whether blocks with new times would conflict with the claims of the others."""
         for playing, schedule in zip(blocks, schedules, strict=True):
             at = replace(schedule, start=playing.start)
-            existing = block_links.existing_claims(playing.character, self.blocks.active(), blocks)
+            active = self.blocks.active()
+            existing = block_links.existing_claims(playing.character, FOREVER, active, blocks)
             if conflicts(claims(playing.block, at, self.kinds, playing.context), existing):
                 return True
         return False
@@ -150,42 +178,60 @@ class BlockTimeline:
             return False
         self.events.drop(playing)
         self._withdraw_shifts(playing, playing.shifts.keys(), now)
-        planned = playing.plan
+        planned: Plan | None = playing.plan
         others: list[ActiveBlock] = []
-        if start < FOREVER and (playing.start == FOREVER or named or self._conflicts_at(playing, start)):
-            planned, others = self.plan(
-                playing.block,
-                playing.character,
-                playing.context,
-                start,
-                now,
-                waits=playing.dependencies,
-                alone=bool(after),
-            )
-            if planned.schedule.failed:
-                self.reports.warn(planned.schedule.warnings[0], playing.block.character_id)
-                self.stop(playing, now)
-                return False
-            known = {w.id for w in playing.schedule.warnings}
-            for warning in planned.schedule.warnings:
-                if warning.id not in known:
-                    self.reports.warn(warning, playing.block.character_id)
+        if start < FOREVER and (playing.start == FOREVER or named):
+            planned, others = self._replan(playing, start, now, alone=bool(after))
+        if planned is None:
+            return False
         playing.apply_plan(planned, start)
         self.place(playing)
         self.predict(playing, now)
         if others:
             self.retime(others, planned.other_schedules, now)
+        self.trim(planned.trims, now)
         return True
 
-    def _conflicts_at(self, playing: ActiveBlock, start: float) -> bool:
-        """Whether the claims of a block with another start would conflict with those of other blocks."""
-        if not playing.plan.claims:
-            return False
-        delay = start - playing.start
-        wanted = [claim.shifted(delay) for claim in playing.plan.claims]
-        return bool(
-            conflicts(wanted, block_links.existing_claims(playing.character, self.blocks.active(), [playing]))
+    def resolve_conflicts(self, playing: ActiveBlock, now: float) -> bool:
+        """Drop what a block that starts now needs and playing blocks have; return whether there was anything.
+
+        Its start event is due again then, or the block was stopped.
+        """
+        active = self.blocks.active()
+        others = [p for p in active if p is not playing]
+        own_interrupts = interrupts(playing.block, playing.schedule, self.kinds)
+        existing = after_interrupts(
+            self._existing_claims(playing.character, playing.number, others), own_interrupts
         )
+        if not conflicts(playing.plan.claims, existing):
+            return False
+        self.events.drop(playing)
+        self._withdraw_shifts(playing, playing.shifts.keys(), now)
+        planned, _ = self._replan(playing, playing.start, now, alone=True)
+        if planned is not None:
+            playing.apply_plan(planned, playing.start)
+            self.place(playing)
+            self.predict(playing, now)
+            self.trim(planned.trims, now)
+        return True
+
+    def _replan(
+        self, playing: ActiveBlock, start: float, now: float, *, alone: bool
+    ) -> tuple[Plan | None, list[ActiveBlock]]:
+        """Plan a waiting block again, and report new warnings; stop it and return None if it is refused."""
+        arrival = Arrival(playing.block, playing.character, playing.number, playing.context)
+        planned, others = self.plan(
+            arrival, start, now, waits=playing.dependencies, alone=alone, may_stretch=False
+        )
+        if planned.schedule.failed:
+            self.reports.warn(planned.schedule.warnings[0], playing.block.character_id)
+            self.stop(playing, now)
+            return None, []
+        known = {w.id for w in playing.schedule.warnings}
+        for warning in planned.schedule.warnings:
+            if warning.id not in known:
+                self.reports.warn(warning, playing.block.character_id)
+        return planned, others
 
     def retime(self, blocks: Sequence[ActiveBlock], schedules: Sequence[Schedule], now: float) -> None:
         """Change the times of blocks, each from its own start, and move their followers."""
@@ -203,6 +249,24 @@ class BlockTimeline:
             self.mark_changed()
             self.predict(playing, now, changed)
             self.update_followers(playing, now)
+
+    def trim(self, ends: Mapping[tuple[str, str], float], now: float) -> None:
+        """Cut the closing silence of speeches that play.
+
+        Args:
+            ends: (block, behaviour) -> its new end, seconds on the session clock.
+        """
+        for (block, behaviour), end in ends.items():
+            playing = self.blocks.find(block)
+            if playing is not None and behaviour in playing.plan.timings:
+                speech = playing.speech[behaviour]
+                self.update_speech(playing, behaviour, shortened(speech.utterance, end - speech.start), now)
+
+    def update_speech(self, playing: ActiveBlock, behaviour: str, utterance: Utterance, now: float) -> None:
+        """Replace the utterance of a speech; its points that have passed stay, and the rest follows."""
+        playing.update_speech(behaviour, utterance, now)
+        self.mark_changed()
+        self.reschedule([playing, *self.linked_blocks(playing, now)], playing.start, now)
 
     def linked_blocks(self, playing: ActiveBlock, now: float) -> list[ActiveBlock]:
         """Return the other blocks that are solved together with one."""

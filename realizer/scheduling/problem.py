@@ -67,6 +67,8 @@ class Member:
             `earliest`.
         is_fixed: its behaviours are never dropped, because it plays already.
         priorities: behaviour id -> priority, 0 if absent; in a conflict the lowest is dropped.
+        late: behaviour id -> seconds by which it is later than its references into other blocks say.
+        sequences: pairs of which the first ends before the second starts; behaviour ids, or fixed times.
     """
 
     block: Block
@@ -76,6 +78,8 @@ class Member:
     passed_times: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     is_fixed: bool = False
     priorities: Mapping[str, float] = field(default_factory=dict)
+    late: Mapping[str, float] = field(default_factory=dict)
+    sequences: Sequence[tuple[str | float, str | float]] = ()
 
 
 @dataclass(slots=True)
@@ -89,6 +93,7 @@ class Problem:
         earliest: (behaviours,) seconds, the earliest start of each.
         owner: (points,) behaviour number of each point; -1 for the block's start.
         faults: invalid parts with the reason: a reference to a sync point that does not exist.
+        external: the parts that refer to other blocks, of the new block.
     """
 
     behaviours: list[Part] = field(default_factory=list)
@@ -99,6 +104,7 @@ class Problem:
     equalities: list[Relation] = field(default_factory=list)
     orders: list[Relation] = field(default_factory=list)
     faults: list[tuple[Part, str]] = field(default_factory=list)
+    external: list[Part] = field(default_factory=list)
 
     def add(self, part: Part, timing: Timing, earliest: float = 0.0) -> int:
         """Add a behaviour; return the number of its first point."""
@@ -184,9 +190,10 @@ def problem_of(
         if node.id in member.passed_times:
             _pass(problem, member, part, start, points, member.passed_times[node.id])
         resolver = resolvers[member.block.id]
+        late = member.late.get(node.id, 0.0)
         for sync, ref in node.references:
             try:
-                if (target := resolver.point(ref)) is None:
+                if (target := resolver.point(ref, late)) is None:
                     continue
                 if sync not in points:
                     raise LookupError(f"{node.id} has no {sync}, only {', '.join(points)}")
@@ -197,7 +204,10 @@ def problem_of(
                 continue  # the other end may have moved since
             words = (f"{part.name}:{sync}", "=", ref)
             problem.equalities.append(Relation(start + points.index(sync), *target, part, words))
+            if not resolver.is_own(ref) and member is members[0]:
+                problem.external.append(part)
     for member in members:
+        _add_sequences(problem, member, first)
         for order, constraint in enumerate(member.block.constraints):
             _add_constraint(problem, resolvers[member.block.id], constraint, order)
     return problem
@@ -223,6 +233,32 @@ def _pass(
             problem.orders.append(Relation(ORIGIN, first + i, member.earliest, part, words))
 
 
+def _add_sequences(problem: Problem, member: Member, first: Mapping[tuple[str, str], int]) -> None:
+    """Add an order for each pair of `member.sequences`; it goes with the later behaviour of the two."""
+    for pair in member.sequences:
+        behaviours = [(member.block.id, name) for name in pair if isinstance(name, str)]
+        if any(name not in first for name in behaviours):
+            continue
+        numbers = [problem.owner[first[name]] for name in behaviours]
+        earlier, later = pair
+        u = v = ORIGIN
+        seconds = 0.0
+        if isinstance(earlier, str):
+            n = numbers[0]
+            u = problem.first[n] + len(problem.timings[n].points) - 1
+            left = f"{earlier}:end"
+        else:
+            seconds, left = earlier, f"{earlier:.3f}"
+        if isinstance(later, str):
+            v = problem.first[numbers[-1]]
+            right = f"{later}:start"
+        else:
+            seconds, right = -later, f"{later:.3f}"
+        problem.orders.append(
+            Relation(u, v, seconds, problem.behaviours[max(numbers)], (right, "not before", left))
+        )
+
+
 def _add_constraint(
     problem: Problem, resolver: _ReferenceResolver, constraint: Constraint, order: int
 ) -> None:
@@ -241,11 +277,14 @@ def _add_constraint(
         is_constraint=True,
         names=frozenset(f"{block.id}:{name}" for name in named),
     )
+    late = max((member.late.get(name, 0.0) for name in named if name is not None), default=0.0)
+    if not member.is_fixed and not all(map(resolver.is_own, constraint.references)):
+        problem.external.append(part)
     try:
         for piece in constraint.parts:
-            members = [(*resolver.required_point(ref), ref) for ref in piece.refs]
+            members = [(*resolver.required_point(ref, late), ref) for ref in piece.refs]
             target = piece.refs[0] if isinstance(piece, Synchronize) else piece.ref
-            r, target_offset = resolver.required_point(target)
+            r, target_offset = resolver.required_point(target, late)
             for x, offset, ref in members:
                 if isinstance(piece, Before):
                     words = (ref, "not after", target)
@@ -276,9 +315,9 @@ class _ReferenceResolver:
     def is_own(self, ref: SyncRef) -> bool:
         return ref.block is None or ref.block == self.member.block.id
 
-    def required_point(self, ref: SyncRef) -> tuple[int, float]:
+    def required_point(self, ref: SyncRef, late: float = 0.0) -> tuple[int, float]:
         """Return the point of a reference, as `point`; raise LookupError if its behaviour is absent."""
-        point = self.point(ref)
+        point = self.point(ref, late)
         if point is None:
             raise LookupError(f"{ref} is not known")
         return point
@@ -290,16 +329,20 @@ class _ReferenceResolver:
             raise LookupError(f"{ref} is not known here, or its time is not known yet")
         return float(time)
 
-    def point(self, ref: SyncRef) -> tuple[int, float] | None:
+    def point(self, ref: SyncRef, late: float = 0.0) -> tuple[int, float] | None:
         """Return the point of a reference, or None if its behaviour is absent.
+
+        Args:
+            late: seconds by which points of other blocks are taken as later.
 
         Raises:
             LookupError: there is no such sync point; the message has the existing ones.
         """
         member = self.member if ref.block is None else self.members.get(ref.block)
         name = ref.behaviour
-        if member is None or (name == "bml" and not self.is_own(ref)):
-            return ORIGIN, self.external_time(ref)
+        is_own = self.is_own(ref)
+        if member is None or (name == "bml" and not is_own):
+            return ORIGIN, self.external_time(ref) + late
         if name is None:
             return ORIGIN, member.start + ref.offset
         if name == "bml":
@@ -308,9 +351,9 @@ class _ReferenceResolver:
             return ORIGIN, member.start + ref.offset
         first = self.first.get((member.block.id, name))
         if first is None:
-            return None if self.is_own(ref) else (ORIGIN, self.external_time(ref))
+            return None if is_own else (ORIGIN, self.external_time(ref) + late)
         sync = ref.sync if ref.index is None else f"{ref.sync}:{ref.index}"
         points = member.timings[name].points
         if sync not in points:
             raise LookupError(f"{ref}: {name} has no {sync}, only {', '.join(points)}")
-        return first + points.index(sync), ref.offset
+        return first + points.index(sync), ref.offset + (0.0 if is_own else late)

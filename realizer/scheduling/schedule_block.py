@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from math import inf
+from typing import TYPE_CHECKING, NamedTuple
 
 from realizer.core.array_types import Float64
 from realizer.scheduling.explain import choose, fault_warning, refusal, warning_of
+from realizer.scheduling.model import TIGHT
 from realizer.scheduling.problem import Member, Part, Problem, problem_of
 from realizer.scheduling.solve import Solution, solve
 from realizer.scheduling.timing import Schedule, Timing, Warning
+from realizer.scheduling.union_find import UnionFind
 
 if TYPE_CHECKING:
     from bml_schema import Block, SyncRef
@@ -44,28 +48,40 @@ def schedule_block(
 
 
 def schedule_together(
-    members: Sequence[Member], *, outside: Callable[[SyncRef], float | None] = lambda ref: None
+    members: Sequence[Member],
+    *,
+    outside: Callable[[SyncRef], float | None] = lambda ref: None,
+    grace: float = 0.0,
 ) -> list[Schedule]:
     """Return the sync times of a new block and of playing blocks, solved together.
+
+    Behaviours that would have to start before their block, because a point of another block that they refer
+    to has just passed, start as soon as they can and keep their lengths, if that is within `grace`.
 
     Args:
         members: the new block first; past points of the others are fixed, all else may move.
         outside: a reference into a block that is no member -> seconds on the members' clock.
+        grace: seconds.
 
     Returns:
         A schedule for each member, from its own start. If the new block fails, only its own.
     """
     new = members[0].block
     problem = problem_of(members, outside)
-    warnings: list[Warning] = []
-    while True:
-        found = _attempt(problem, new.id)
-        if isinstance(found, Solution):
-            break
-        if isinstance(found, Warning):
-            return [Schedule(new.id, {}, {}, warnings=(found,), failed=True, character=new.character_id)]
-        warnings += (warning for _, warning in found)
-        problem = problem.without(part for part, _ in found)
+    outcome = _settle(problem, new.id)
+    late: dict[str, float] = {}
+    if grace > 0 and outcome.warnings and problem.external:
+        late = _lateness(problem, new.id)
+        in_time = {behaviour: seconds for behaviour, seconds in late.items() if seconds <= grace}
+        if in_time:
+            members = [replace(members[0], late=in_time), *members[1:]]
+            outcome = _settle(problem_of(members, outside), new.id)
+    warnings = tuple(
+        _with_lateness(w, late.get(w.id.removeprefix(f"{new.id}:"), 0.0), grace) for w in outcome.warnings
+    )
+    if outcome.solution is None:
+        return [Schedule(new.id, {}, {}, warnings=warnings[-1:], failed=True, character=new.character_id)]
+    problem, found = outcome.problem, outcome.solution
     number = {part.id: n for n, part in enumerate(problem.behaviours)}
     schedules = []
     for member in members:
@@ -83,12 +99,76 @@ def schedule_together(
                 {name: member.timings[name].points for name in times},
                 times,
                 start=member.start,
-                warnings=tuple(warnings) if member is members[0] else (),
+                warnings=warnings if member is members[0] else (),
                 cost=found.cost,
+                late={name: seconds for name, seconds in member.late.items() if name in times},
                 character=member.block.character_id,
             )
         )
     return schedules
+
+
+class _Outcome(NamedTuple):
+    """The solution of a problem without the parts that were dropped, or None if all of it is refused."""
+
+    solution: Solution | None
+    problem: Problem
+    warnings: Sequence[Warning]
+
+
+def _settle(problem: Problem, block: str) -> _Outcome:
+    """Solve a problem, again without the parts that cannot be placed, until all that is left fits."""
+    warnings: list[Warning] = []
+    while True:
+        found = _attempt(problem, block)
+        if isinstance(found, Solution):
+            return _Outcome(found, problem, warnings)
+        if isinstance(found, Warning):
+            return _Outcome(None, problem, [*warnings, found])
+        warnings += (warning for _, warning in found)
+        problem = problem.without(part for part, _ in found)
+
+
+def _lateness(problem: Problem, block: str) -> dict[str, float]:
+    """Return behaviour -> seconds by which it starts too early if its references into other blocks hold.
+
+    Behaviours that are tied to each other are late together, so that they keep their distances.
+    """
+    own = {n: part for n, part in enumerate(problem.behaviours) if part.id.startswith(f"{block}:")}
+    groups = UnionFind(len(problem.behaviours))
+    for relation in problem.equalities:
+        u, v = problem.owner[relation.u], problem.owner[relation.v]
+        if u in own and v in own:
+            groups.tie(u, v, 0.0)
+    named = {part.id for part in problem.external}.union(*(part.names for part in problem.external))
+    tied = {groups.find(n) for n, part in own.items() if part.id in named}
+    own = {n: part for n, part in own.items() if groups.find(n) in tied}
+    anytime = replace(problem, earliest=[-inf if n in own else t for n, t in enumerate(problem.earliest)])
+    outcome = _settle(anytime, block)
+    if outcome.solution is None:
+        return {}
+    starts = {
+        part.id: float(outcome.solution.time[first])
+        for part, first in zip(outcome.problem.behaviours, outcome.problem.first, strict=True)
+    }
+    late: dict[int, float] = {}
+    for n, part in own.items():
+        too_early = problem.earliest[n] - starts.get(part.id, inf)
+        late[groups.find(n)] = max(late.get(groups.find(n), 0.0), too_early)
+    return {
+        part.id.removeprefix(f"{block}:"): seconds
+        for n, part in own.items()
+        if (seconds := late[groups.find(n)]) > TIGHT
+    }
+
+
+def _with_lateness(warning: Warning, late: float, grace: float) -> Warning:
+    """Return the warning about a dropped behaviour with how late it was, if it was too late."""
+    if late <= grace:
+        return warning
+    return replace(
+        warning, text=f"{warning.text}; it comes {late:.3g} s too late, and the grace is {grace:g} s"
+    )
 
 
 def _attempt(problem: Problem, block: str) -> Solution | list[tuple[Part, Warning]] | Warning:

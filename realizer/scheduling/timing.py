@@ -127,6 +127,7 @@ class Schedule:
         failed: the whole block was refused (a required part cannot hold); times is empty then.
         lengths: speech -> its points, with "end" -> seconds from its start that would let more of the block
             fit. If there are any, the block was not planned: plan it again with speech of these lengths.
+        late: behaviour id -> seconds by which it is later than its references into other blocks say.
     """
 
     block: str
@@ -137,6 +138,7 @@ class Schedule:
     cost: float = 0.0
     failed: bool = False
     lengths: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    late: Mapping[str, float] = field(default_factory=dict)
     character: str | None = field(default=None, compare=False)
 
     @cached_property

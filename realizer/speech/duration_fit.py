@@ -106,6 +106,20 @@ def stretched(utterance: Utterance, times: Mapping[str, float]) -> Utterance:
     )
 
 
+def shortened(utterance: Utterance, end: float) -> Utterance:
+    """Return an utterance that ends at `end` seconds, which cuts its closing pause."""
+    if utterance.pcm is not None:
+        end = int(end * utterance.sample_rate + 1e-6) / utterance.sample_rate
+    return replace(
+        utterance,
+        duration=end,
+        words=tuple(replace(w, end=min(w.end, end)) for w in utterance.words),
+        phonemes=tuple(replace(p, end=min(p.end, end)) for p in utterance.phonemes if p.start < end),
+        marks={name: min(time, end) for name, time in utterance.marks.items()},
+        pcm=None if utterance.pcm is None else utterance.pcm[: round(end * utterance.sample_rate)],
+    )
+
+
 def allow_small_warp(utterance: Utterance) -> Utterance:
     """Return an utterance that may only be resampled a little, not synthesized again."""
     return replace(utterance, stretch=WARP if utterance.duration else (1.0, 1.0))

@@ -108,6 +108,12 @@ class Utterance:
     stretch: tuple[float, float] = (1.0, 1.0)
     sections: tuple[tuple[float, Utterance], ...] = ()
 
+    @property
+    def silent_from(self) -> float:
+        """When its closing pause begins; its duration if it has none, or is not complete yet."""
+        last = self.phonemes[-1] if self.phonemes and not self.sections else None
+        return self.duration if last is None or last.ipa or last.end < self.duration else last.start
+
 
 def tile(starts: Iterable[tuple[float, str, int]], end: float, rate: float = 1.0) -> tuple[Phoneme, ...]:
     """Return phonemes without gaps, each until the next starts; adjacent pauses are joined.

@@ -7,6 +7,7 @@ import re
 from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
+from math import inf
 
 from bml_schema import Block, BMLError, BMLSizeError, Speech, read
 from realizer.behaviours.registry import VOCABULARY
@@ -24,6 +25,10 @@ from realizer.speech.utterance import SpeechRequest
 log = logging.getLogger(__name__)
 
 _BLOCK_ID = re.compile(r"<(?:\w+:)?bml\b[^<>]*?\bid\s*=\s*[\"']([^\"'<>]{1,256})[\"']")
+
+
+# The present of a session stands still for at most so long, while the documents of a message are planned.
+STANDSTILL = 0.1  # s
 
 
 class DocumentQueue:
@@ -64,8 +69,7 @@ class DocumentQueue:
 
     def is_cancelled(self, block: Block) -> bool:
         """Return whether the block that `next` returned last is cancelled."""
-        number = self._received - len(self._unread) + 1
-        return number <= max(self._all_cancelled, self._cancelled.get(block.id, 0))
+        return self.message <= max(self._all_cancelled, self._cancelled.get(block.id, 0))
 
     def next(self) -> Block | Warning | None:
         """Return the next block or the warning that replaces it; None if the queue is empty."""
@@ -86,6 +90,11 @@ class DocumentQueue:
             self._unread.popleft()
         self._cancelled.clear()
         return None
+
+    @property
+    def message(self) -> int:
+        """The number of the message that is read, or was read last."""
+        return self._received - max(len(self._unread) - 1, 0)
 
     def clear(self) -> None:
         """Remove all messages."""
@@ -115,6 +124,21 @@ class Submission:
         self._settings = settings
         self._player = player
         self._add_effects = add_effects
+        self._message = 0
+        self._instant = -inf
+
+    def now(self, t: float) -> float:
+        """Return the present, which stands still while the documents of one message are planned."""
+        return self._instant if self._instant <= t <= self._instant + STANDSTILL else t
+
+    def work(self, t: float) -> bool:
+        """Plan a block that is ready, or else read one. Return False if there is none."""
+        t = self.now(t)
+        done = self._plan_next(t) or self._parse_next(t)
+        unread = bool(self.queue) and self.queue.message == self._message
+        if not unread and not any(w.message == self._message and w.is_ready for w in self.pending.blocks):
+            self._instant = -inf
+        return done
 
     @property
     def has_work(self) -> bool:
@@ -131,7 +155,7 @@ class Submission:
         if (refused := self.queue.put(text)) is not None:
             self.refuse(refused, t)
 
-    def parse_next(self, t: float) -> bool:
+    def _parse_next(self, t: float) -> bool:
         """Prepare the next block of a speech or of the queue. Return False if there is none."""
         if (chunk := self.speeches.next()) is not None:
             self._prepare(chunk, t)
@@ -140,7 +164,7 @@ class Submission:
         if isinstance(item, Warning):
             self.refuse(item, t)
         elif item is not None:
-            self._prepare(item, t, cancelled=self.queue.is_cancelled(item))
+            self._prepare(item, t, self.queue.message, cancelled=self.queue.is_cancelled(item))
         return item is not None
 
     def stop(self, blocks: Collection[str] | None, t: float) -> set[str]:
@@ -159,7 +183,7 @@ class Submission:
         self.withdraw(pending, t)
         return {w.block.id for w in pending}
 
-    def _prepare(self, block: Block, t: float, *, cancelled: bool = False) -> None:
+    def _prepare(self, block: Block, t: float, message: int = 0, *, cancelled: bool = False) -> None:
         """Request the speech of a block and acknowledge it. It is planned when nothing is missing."""
         busy = len(self.pending) + len(self._player.blocks.active())
         fault = block_limit_error(block, self._settings, busy, self._player.characters)
@@ -170,7 +194,8 @@ class Submission:
             block = self.speeches.with_links(block)
             requests = self._player.speech_requests(block)
             character = self._player.character_index(block.character_id)
-            pending = self.pending.add(block, character, t)
+            resources = self._player.resources(block)
+            pending = self.pending.add(block, character, t, message=message, resources=resources)
             pending.is_incomplete = self.speeches.awaits_sync
             pending.is_streaming = self.speeches.is_streaming(block)
             self._player.announce(block, t)
@@ -182,11 +207,13 @@ class Submission:
         else:
             self._request_speech(pending, requests)
 
-    def plan_next(self, t: float) -> bool:
+    def _plan_next(self, t: float) -> bool:
         """Plan the first block that is ready. Return False if there is none."""
         pending = self.pending.first_ready()
         if pending is None:
             return False
+        if pending.message != self._message or t != self._instant:
+            self._message, self._instant = pending.message, t
         try:
             pending.block = self.speeches.with_links(pending.block)
             schedule = self._player.submit(pending.block, t, pending.utterances)

@@ -31,6 +31,9 @@ class PendingBlock:
     """A block in preparation.
 
     Attributes:
+        message: number of the message that it came with; 0 for a part of a streamed speech.
+        number: order of arrival.
+        resources: what it needs that one behaviour at a time can have, such as "voice" and "gaze".
         requests: ids of requests without an answer.
         utterances: behaviour -> its synthesized speech.
         predecessors: blocks in preparation that must be planned first.
@@ -42,6 +45,9 @@ class PendingBlock:
     block: Block
     character: int
     waiting_since: float
+    message: int = 0
+    number: int = 0
+    resources: frozenset[str] = frozenset()
     requests: set[int] = field(default_factory=set)
     utterances: dict[str, Utterance] = field(default_factory=dict)
     predecessors: set[PendingBlock] = field(default_factory=set)
@@ -65,26 +71,40 @@ class PendingBlocks:
 
     def __init__(self) -> None:
         self.blocks: list[PendingBlock] = []
+        self._added = 0
 
     def __len__(self) -> int:
         return len(self.blocks)
 
-    def add(self, block: Block, character: int, now: float) -> PendingBlock:
+    def add(
+        self,
+        block: Block,
+        character: int,
+        now: float,
+        *,
+        message: int = 0,
+        resources: frozenset[str] = frozenset(),
+    ) -> PendingBlock:
         """Add a block, which waits for its speech and for the earlier blocks it depends on.
 
         It depends on blocks whose sync points it names, on those it follows, on one with its own id, on a
-        replacing block of its character, and, if it is appended, on all blocks of its character. A replacing
-        block depends on none: it ends those that `replaced_by` returns. Blocks that must follow this one
-        depend on it.
+        replacing block of its character, on blocks of its character that need the voice or the gaze as it
+        does, and, if it is appended, on all blocks of its character. A replacing block depends on none: it
+        ends those that `replaced_by` returns. Blocks that must follow this one depend on it.
         """
         ids = {ref.block for ref in references(block)} | {*block.append_after, *block.chunk_after, block.id}
 
         def is_predecessor(other: PendingBlock) -> bool:
             in_order = block.composition == "APPEND" or other.block.composition == "REPLACE"
+            # A block that waits for the rest of a streamed speech may wait for long: nobody waits for it.
+            if other.block.id not in block.interrupt and not other.is_incomplete(other.block):
+                in_order |= not resources.isdisjoint(other.resources)
             return other.block.id in ids or (other.character == character and in_order)
 
         earlier = self.blocks if block.composition != "REPLACE" else []
-        pending = PendingBlock(block, character, now, predecessors=set(filter(is_predecessor, earlier)))
+        self._added += 1
+        pending = PendingBlock(block, character, now, message, self._added, resources)
+        pending.predecessors = set(filter(is_predecessor, earlier))
         for other in self.blocks:
             is_successor = other.block.id in (*block.prepend_before, *block.chunk_before)
             if is_successor and other not in pending.predecessors:
@@ -97,12 +117,8 @@ class PendingBlocks:
         return next((w for w in self.blocks if w.is_ready), None)
 
     def replaced_by(self, pending: PendingBlock) -> list[PendingBlock]:
-        """Return the blocks of the same character that arrived no later than a replacing block."""
-        return [
-            w
-            for w in self.blocks
-            if w.character == pending.character and w.waiting_since <= pending.waiting_since
-        ]
+        """Return the blocks of the same character that arrived before a replacing block."""
+        return [w for w in self.blocks if w.character == pending.character and w.number < pending.number]
 
     def remove(self, blocks: Iterable[PendingBlock]) -> None:
         """Remove blocks. Other blocks no longer wait for them, and answers to their requests are ignored."""

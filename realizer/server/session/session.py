@@ -431,6 +431,8 @@ class Session:
         """
         while (due := self.player.next_deadline()) is not None and due < t and not self.closed:
             due = max(due, since)
+            if self.submission.now(due) < due:
+                return  # it was published when the documents of a message had been planned
             before(due)
             self._publish(due)
 
@@ -448,7 +450,7 @@ class Session:
         # frames are sent in between.
         if not read_documents:
             return False
-        done = self.submission.plan_next(t) or self.submission.parse_next(t)
+        done = self.submission.work(t)
         if self.submission.speeches.advance(t) or done:
             self._publish(t)
             return True
@@ -501,6 +503,7 @@ class Session:
 
     def _publish(self, t: float) -> None:
         """Number the feedback that is due and send it to its subscribers."""
+        t = self.submission.now(t)
         texts: list[str] = []
         while due := self.player.due(t + EPSILON):
             for event in due:

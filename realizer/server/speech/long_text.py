@@ -12,6 +12,7 @@ import numpy as np
 from realizer.core.array_types import Int16
 from realizer.playback.audio_mix import resample
 from realizer.server.speech.sentence_splitter import TAG, SentenceSplitter, is_sentence
+from realizer.speech.duration_fit import shortened
 from realizer.speech.ssml import NAMED
 from realizer.speech.utterance import Phoneme, SpeechRequest, Utterance, Word
 
@@ -172,14 +173,4 @@ def trim_final_pause(part: Utterance) -> Utterance:
     last = part.phonemes[-1] if part.phonemes else None
     if last is None or last.ipa or last.end - last.start <= COMMA:
         return part
-    end = last.start + COMMA
-    if part.pcm is not None:
-        end = round(end * part.sample_rate) / part.sample_rate
-    return replace(
-        part,
-        duration=end,
-        words=tuple(replace(w, end=min(w.end, end)) for w in part.words),
-        phonemes=(*part.phonemes[:-1], replace(last, end=end)),
-        marks={name: min(time, end) for name, time in part.marks.items()},
-        pcm=None if part.pcm is None else part.pcm[: round(end * part.sample_rate)],
-    )
+    return shortened(part, last.start + COMMA)

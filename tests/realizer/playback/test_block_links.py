@@ -29,7 +29,7 @@ def alive(
     id: str, character: int = 0, start: float = 0.0, waits: list[Dependency] | None = None
 ) -> ActiveBlock:
     made = ActiveBlock(
-        plan(block(id), KINDS, PlanningContext()), KINDS, PlanningContext(), character, 0, start, waits or []
+        plan(block(id), KINDS, PlanningContext()), KINDS, PlanningContext(), character, 1, start, waits or []
     )
     made.apply_plan(made.plan, start)
     return made
@@ -46,13 +46,16 @@ def test_dependencies_of_append_are_only_the_last_of_a_chain() -> None:
     other = alive("d", character=1)
     never = alive("e", start=float("inf"))
     everyone = [first, second, apart, other, never]
-    assert ids(dependencies(block("x", 'composition="APPEND"'), 0, everyone)) == [("b", False), ("c", False)]
+    assert ids(dependencies(block("x", 'composition="APPEND"'), 0, 2, everyone)) == [
+        ("b", False),
+        ("c", False),
+    ]
 
 
 def test_dependencies_on_the_end_and_the_subsiding_are_both_named() -> None:
     first = alive("a")
     second = alive("b", waits=[Dependency(first, subsiding=True)])
-    assert len(dependencies(block("x", 'composition="APPEND"'), 0, [first, second])) == 2
+    assert len(dependencies(block("x", 'composition="APPEND"'), 0, 2, [first, second])) == 2
 
 
 def test_all_dependencies_follow_any_chain() -> None:
@@ -64,7 +67,7 @@ def test_all_dependencies_follow_any_chain() -> None:
 def test_dependencies_by_list_are_of_any_character_and_known() -> None:
     everyone = [alive("a"), alive("b", character=1), alive("c")]
     said = 'bmla:appendAfter="b,nobody" bmla:chunkAfter="c"'
-    assert ids(dependencies(block("x", said), 0, everyone)) == [("b", False), ("c", True)]
+    assert ids(dependencies(block("x", said), 0, 2, everyone)) == [("b", False), ("c", True)]
 
 
 def test_followers_are_named_with_their_kind_of_dependency() -> None:
@@ -80,8 +83,8 @@ def test_blocks_to_end_are_replaced_or_interrupted() -> None:
 
 def test_existing_claims_are_those_of_the_others_of_a_character() -> None:
     everyone = [alive("a"), alive("b", start=5.0), alive("c", character=1)]
-    assert [(c.block, c.begin) for c in existing_claims(0, everyone)] == [("a", 0.0), ("b", 5.0)]
-    assert [c.block for c in existing_claims(0, everyone, without=everyone[:1])] == ["b"]
+    assert [(c.block, c.begin) for c in existing_claims(0, 2, everyone)] == [("a", 0.0), ("b", 5.0)]
+    assert [c.block for c in existing_claims(0, 2, everyone, without=everyone[:1])] == ["b"]
 
 
 SCHEDULES = {

@@ -16,7 +16,7 @@ from realizer.playback.block_store import PAST, BlockStore
 def added(cast: BlockStore, id: str, start: float = 0.0, character: int = 0) -> ActiveBlock:
     block = parse(f'<bml id="{id}"><wait id="w" duration="1"/></bml>')
     planned = plan(block, KINDS, PlanningContext(), start=start)
-    made = ActiveBlock(planned, KINDS, PlanningContext(), character, cast.next_number, start)
+    made = ActiveBlock(planned, KINDS, PlanningContext(), character, cast.new_number(), start)
     made.apply_plan(made.plan, start)
     cast.add(made)
     return made

@@ -12,16 +12,16 @@ from realizer.behaviours.registry import KINDS
 from realizer.playback.active_block import ActiveBlock, Dependency
 from realizer.playback.block_states import BlockEvent, State
 from realizer.playback.character import Character
-from realizer.playback.timeline import BlockTimeline
+from realizer.playback.timeline import Arrival, BlockTimeline
 
 
 def taken_in(
     course: BlockTimeline, id: str, after: ActiveBlock | None = None, state: State = State.LURKING
 ) -> ActiveBlock:
     block = parse(f'<bml id="{id}"><wait id="w" duration="2"/></bml>')
-    planned, _ = course.plan(block, 0, PlanningContext(), 0.0, 0.0)
+    planned, _ = course.plan(Arrival(block, 0, 1, PlanningContext()), 0.0, 0.0)
     waits = [] if after is None else [Dependency(after)]
-    made = ActiveBlock(planned, KINDS, PlanningContext(), 0, course.blocks.next_number, 0.0, waits, state)
+    made = ActiveBlock(planned, KINDS, PlanningContext(), 0, course.blocks.new_number(), 0.0, waits, state)
     made.apply_plan(planned, made.earliest)
     course.blocks.add(made)
     course.place(made)
