@@ -24,6 +24,7 @@ Keys of a .toml; all but `says` and `proves` are optional:
     equal      groups of sync points that fall together; these two compare sync points of one block
     [lasts]    "behaviour:sync..behaviour:sync" = seconds
     [predicted] "block:behaviour:sync" = seconds from block start, as the last prediction that names it has it
+    [late]     "block:behaviour" = seconds, its attribute realizer:late in that prediction
 
     log        everything that was told, in this order, of those kinds that the list names. An entry is
                "KIND ID [WORD] [SECONDS [SECONDS]]" with seconds of the session clock:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from bml_schema import Block, BMLError, Feedback, PredictionFeedback, WarningFeedback, parse_feedback, read
+from bml_schema.nodes import own
 from realizer.animation.axis import AU_NAMES
 from realizer.animation.fap.conversion import to_fap
 from realizer.behaviours.registry import VOCABULARY
@@ -19,7 +20,7 @@ from realizer.core.options import PlayOptions
 from realizer.playback.active_block import ScheduledSpeech
 from realizer.playback.feedback_events import parse_warning
 from realizer.playback.player import Player
-from realizer.playback.speaking import synthesize
+from realizer.playback.speaking import submit_with_speech
 from realizer.scheduling.timing import Schedule
 from realizer.speech.silent import SilentVoice
 from realizer.tables import faps
@@ -98,6 +99,14 @@ class Played:
                             return float(part.ref.offset)
         raise KeyError(point)
 
+    def late(self, name: str) -> float:
+        """Return `realizer:late` in the last prediction that names the behaviour; 0 if it is not late."""
+        for feedback in reversed(self.feedback):
+            for node in feedback.behaviours if isinstance(feedback, PredictionFeedback) else ():
+                if node.id == name:
+                    return float(node.unknown_attributes.get(own("late"), 0.0))
+        raise KeyError(name)
+
 
 def play(
     case: Case,
@@ -142,9 +151,7 @@ def play(
                 player.announce(item, time)
             case Step.PLAN, Block():
                 played.blocks.append(item)
-                played.schedules[item.id] = player.submit(
-                    item, time, synthesize(player.speech_requests(item), voice)
-                )
+                played.schedules[item.id] = submit_with_speech(player, item, voice, time)
             case Step.SEND, BMLError():
                 player.refuse(parse_warning(item), time)
     hear(player, played, now, math.inf, punctual)
@@ -180,10 +187,10 @@ def shown(player: Player, instants: Iterable[Instant]) -> dict[Instant, dict[str
     by_character: dict[str | None, list[Instant]] = {}
     for instant in sorted(set(instants), key=lambda i: i.time):
         by_character.setdefault(instant.character, []).append(instant)
-    for character, own in by_character.items():
+    for character, seen in by_character.items():
         index = player.character_index(character) if character else 0
-        frames = player.frames(np.array([instant.time for instant in own]), index)
-        for instant, aus, values in zip(own, frames.aus, to_fap(frames).values, strict=True):
+        frames = player.frames(np.array([instant.time for instant in seen]), index)
+        for instant, aus, values in zip(seen, frames.aus, to_fap(frames).values, strict=True):
             face = dict(zip(AU_NAMES(), map(float, aus), strict=True))
             face |= {n[:-1]: v for n, v in face.items() if n[-1] == "L" and v == face[f"{n[:-1]}R"]}
             out[instant] = face | {row.name: float(v) for row, v in zip(faps(), values, strict=True)}

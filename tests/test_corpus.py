@@ -71,6 +71,8 @@ def check_schedule(case: Case, played: Played) -> None:
         assert last - first == pytest.approx(seconds, abs=within), span
     for point, time in wanted.get("predicted", {}).items():
         assert played.predicted(point) == pytest.approx(time, abs=within), point
+    for name, seconds in wanted.get("late", {}).items():
+        assert played.late(name) == pytest.approx(seconds, abs=within), name
 
 
 def check_log(case: Case, played: Played) -> None:
