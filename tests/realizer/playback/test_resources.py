@@ -2,10 +2,23 @@
 
 from __future__ import annotations
 
+import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.playback.resources import PASSES, ResourceClaim, conflicts
+from bml_schema import Interrupt, parse
+from realizer.behaviours.registry import KINDS, VOCABULARY
+from realizer.playback.resources import (
+    PASSES,
+    ResourceClaim,
+    ResourceConflict,
+    after_interrupts,
+    conflicts,
+    interrupts,
+    trims,
+)
+from realizer.scheduling.timing import Schedule
 
 
 def claim(
@@ -81,3 +94,63 @@ def test_conflicts_leave_compatible_claims_and_name_winners(
     left = [c for c in wanted if c.behaviour not in gone]
     assert not any(a.conflicts_with(b) for a in left for b in left if a is not b)
     assert all(loss.winner in left and loss.claim.conflicts_with(loss.winner) for loss in found)
+
+
+def spoken(name: str, begin: float, end: float, silent_from: float, block: str) -> ResourceClaim:
+    return ResourceClaim("voice", begin, end, block, name, silent_from=silent_from)
+
+
+def test_conflicts_allow_another_block_to_speak_in_a_closing_silence() -> None:
+    old = spoken("old", 0, 2, 1.7, "a")
+    assert lost([claim("new", 1.7, 3)], [old]) == []
+    assert lost([claim("new", 1.6, 3)], [old]) == ["new"]
+    assert lost([spoken("one", 0, 2, 1.7, "b"), claim("two", 1.8, 3, rank=1)]) == ["two"]
+
+
+def test_trims_end_a_closing_silence_where_the_new_speech_begins() -> None:
+    old = [spoken("old", 0, 2, 1.7, "a"), spoken("later", 5, 6, 6, "a")]
+    assert dict(trims([claim("new", 1.8, 3)], old)) == {("a", "old"): 1.8}
+    assert dict(trims([claim("new", 1.8, 3, what="gaze")], old)) == {}
+
+
+@pytest.mark.parametrize(
+    ("winner", "loser", "sequence"),
+    [
+        (claim("a", 0, 2), claim("b", 1.8, 3), ("a", "b")),
+        (claim("a", 1.8, 3), claim("b", 0, 2), ("b", "a")),
+        (claim("a", 10, 12, block="x"), claim("b", 11.8, 13), (2.0, "b")),
+        (spoken("a", 10, 12, 11.9, "x"), claim("b", 11.8, 13), (pytest.approx(1.9), "b")),
+        (claim("a", 11.8, 13, block="x"), claim("b", 10, 12), ("b", pytest.approx(1.8))),
+        (claim("a", 0, 2), claim("b", 1.6, 3), None),  # they overlap by more
+        (claim("a", 0, 2), claim("b", 0, 0.2), None),  # one is within the other
+        (claim("a", 0, 2), claim("b", 1.8, 1.9), None),
+        (claim("a", 0, 2, what="gaze"), claim("b", 1.8, 3, what="gaze"), None),
+    ],
+)
+def test_conflict_has_a_sequence_if_speeches_overlap_a_little(winner, loser, sequence) -> None:
+    start = 10.0 if max(winner.end, loser.end) > 9 else 0.0
+    assert ResourceConflict(loser, winner, start).sequence == sequence
+
+
+def test_after_interrupts_claims_end_when_their_behaviours_do() -> None:
+    held = [
+        claim("s", 0, 5, block="a"),
+        claim("g", 3, 5, what="gaze", block="a"),
+        claim("s", 0, 5, block="b"),
+    ]
+
+    def left(**parts: tuple[str, ...]) -> list[tuple[str, str, float]]:
+        act = Interrupt(id="i", target="a", **parts)
+        return [(c.block, c.behaviour, c.end) for c in after_interrupts(held, [(2.0, act)])]
+
+    assert left() == [("a", "s", 2.0), ("b", "s", 5)]
+    assert left(include=("g",)) == [("a", "s", 5), ("b", "s", 5)]
+    assert left(exclude=("g",)) == [("a", "s", 2.0), ("a", "g", 5), ("b", "s", 5)]
+
+
+def test_interrupts_are_at_the_start_of_their_behaviours() -> None:
+    bmla = 'xmlns:bmla="http://www.asap-project.org/bmla"'
+    text = f'<bml id="b" {bmla}><bmla:interrupt id="i" target="a" start="2"/></bml>'
+    schedule = Schedule("b", {"i": ("start", "end")}, {"i": np.array([2.0, 2.0])}, start=10.0)
+    ((time, act),) = interrupts(parse(text, VOCABULARY), schedule, KINDS)
+    assert (time, act.target) == (12.0, "a")

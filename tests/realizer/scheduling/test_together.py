@@ -197,3 +197,67 @@ def test_schedule_together_fails_the_new_block_alone() -> None:
     assert [s.block for s in found] == ["b"]
     assert found[0].failed
     assert "all of this is required" in found[0].warnings[0].text
+
+
+def late(seconds: float, body: str, timings: dict[str, Timing], grace: float = 0.5) -> Schedule:
+    """Return the schedule of a block of which all references into other blocks passed some seconds ago."""
+    new = member(block("new", body), timings)
+    return schedule_together([new], outside=lambda ref: ref.offset - seconds, grace=grace)[0]
+
+
+@given(st.floats(0.001, 0.5))
+def test_schedule_together_keeps_the_lengths_of_what_is_late(seconds: float) -> None:
+    body = '<wait id="a" start="old:w:end"/><wait id="b" start="a:end"/><wait id="c"/>'
+    found = late(seconds, body, {name: lasting(1.0) for name in "abc"})
+    assert found.at("a", "start") == pytest.approx(0.0, abs=1e-9)
+    assert found.at("a", "end") == pytest.approx(1.0)
+    assert found.at("b", "start") == pytest.approx(1.0)
+    assert dict(found.late) == pytest.approx({"a": seconds, "b": seconds})
+    assert not found.warnings
+
+
+def test_schedule_together_drops_what_is_later_than_the_grace() -> None:
+    found = late(0.62, '<wait id="a" start="old:w:end"/>', {"a": lasting(1.0)})
+    assert not found.times
+    assert not found.late
+    assert "0.62 s too late, and the grace is 0.5 s" in found.warnings[0].text
+
+
+def test_schedule_together_drops_what_is_late_without_grace() -> None:
+    found = late(0.01, '<wait id="a" start="old:w:end"/>', {"a": lasting(1.0)}, grace=0.0)
+    assert not found.times
+
+
+def test_schedule_together_moves_late_constraints_too() -> None:
+    body = """<wait id="a"/><wait id="b"/><constraint>
+    <synchronize><sync ref="a:end"/><sync ref="old:w:end"/></synchronize>
+    <synchronize><sync ref="a:start"/><sync ref="b:start"/></synchronize></constraint>"""
+    found = late(-0.9, body, {"a": lasting(1.0, least=1.0), "b": lasting(1.0)})
+    assert found.at("a", "start") == found.at("b", "start") == pytest.approx(0.0, abs=1e-9)
+    assert dict(found.late) == pytest.approx({"a": 0.1, "b": 0.1})
+
+
+def test_schedule_together_keeps_a_late_block_late_when_it_is_solved_again() -> None:
+    own = block("old", '<wait id="a" start="x:y:end"/>')
+    plays = member(own, {"a": lasting(1.0)}, start=0.0, is_fixed=True, late={"a": 0.2})
+    new = member(block("new", '<wait id="w" start="old:a:end"/>'), {"w": lasting(1.0)})
+    found = schedule_together([new, plays], outside=lambda ref: -0.2)
+    assert [s.at(name, "start") for s, name in zip(found, "wa", strict=True)] == pytest.approx([1.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("sequence", "times"),
+    [
+        (("a", "b"), {"a": 0.0, "b": 1.0}),
+        ((0.7, "b"), {"a": 0.0, "b": 0.7}),
+        (("a", 0.4), {"b": 0.0}),
+        (("a", "nobody"), {"a": 0.0, "b": 0.0}),
+    ],
+)
+def test_schedule_together_places_sequences_one_after_the_other(
+    sequence: tuple[str | float, str | float], times: dict[str, float]
+) -> None:
+    timings = {name: lasting(1.0, least=1.0) for name in "ab"}
+    new = member(block("new", '<wait id="a"/><wait id="b"/>'), timings, sequences=(sequence,))
+    found = schedule_together([new])[0]
+    assert {name: found.at(name, "start") for name in found.times} == pytest.approx(times)

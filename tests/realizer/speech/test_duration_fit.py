@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer.animation.lips.lip_sync import lip_channels
-from realizer.speech.duration_fit import speak_to_length, stretched, with_volumes
+from realizer.speech.duration_fit import shortened, speak_to_length, stretched, with_volumes
 from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import WARP, Phoneme, SpeechRequest, Utterance, Word
 
@@ -180,3 +180,15 @@ def test_with_volumes_keeps_times_and_phonemes(text: str, count: int) -> None:
     said = with_volumes(say, Utterance(count * 0.2, words, sounds, {}))
     assert [(p.start, p.end, p.ipa) for p in said.phonemes] == [(p.start, p.end, p.ipa) for p in sounds]
     assert {p.volume for p in said.phonemes} <= {1.0, 1.4}
+
+
+def test_shortened_utterance_loses_its_closing_pause() -> None:
+    pause = Phoneme(0.8, 1.2, "")
+    pcm = np.ones(1200, np.int16)
+    whole = Utterance(1.2, (Word(0.0, 0.8, "oh"),), (Phoneme(0.0, 0.8, "o"), pause), {"m": 1.1}, 1000, pcm)
+    assert whole.silent_from == 0.8
+    short = shortened(whole, 0.9001)
+    assert (short.duration, len(short.pcm), short.marks["m"]) == (0.9, 900, 0.9)
+    assert [p.end for p in short.phonemes] == [0.8, 0.9]
+    assert [w.end for w in short.words] == [0.8]
+    assert shortened(whole, 0.5).silent_from == 0.5

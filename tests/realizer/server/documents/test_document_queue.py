@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import pytest
 
-from bml_schema import Block, parse
+from bml_schema import Block, BlockProgress, WarningFeedback, parse
 from realizer.behaviours.registry import VOCABULARY
 from realizer.core.settings import Settings
 from realizer.scheduling.timing import Warning
 from realizer.server.documents import document_queue
 from realizer.server.documents.document_queue import (
+    STANDSTILL,
     DocumentQueue,
     block_limit_error,
     size_error,
 )
 from realizer.server.documents.limits import MAX_CHARACTERS
+from tests.realizer.server.conftest import Driver, spoken
 
 SPEECH = '<bml id="b"><speech id="s"><text>{}</text></speech></bml>'
 SSML = (
@@ -172,3 +174,39 @@ def test_size_error_counts_bytes_and_elements() -> None:
     )
     words = size_error(text, Settings(max_elements=2))
     assert words == "wanted at most 2 elements in a message, got 3 (REALIZER_MAX_ELEMENTS sets it)"
+
+
+def test_submission_plans_all_documents_of_a_message_for_one_instant() -> None:
+    driver = Driver()
+    driver.now = 1.0
+    first = '<bml id="a"><head id="n" lexeme="NOD"/></bml>'
+    second = '<bml id="b"><head id="m" lexeme="SHAKE" start="a:n:start"/></bml>'
+    driver.session.receive(1, first + second, driver.opened + driver.now)
+    while driver.session.has_documents:
+        driver.now += 0.01
+        driver.wake()
+    client = driver.run(5.0)
+    starts = {f.id: f.global_time for f in client.feedback if isinstance(f, BlockProgress)}
+    assert starts["a:start"] == starts["b:start"]
+    assert "late" not in "".join(text for text in client.messages if isinstance(text, str))
+
+
+def test_submission_goes_on_after_a_standstill() -> None:
+    driver = Driver()
+    nod = '<bml id="{}"><head id="n" lexeme="NOD"/></bml>'
+    driver.session.receive(1, nod.format("a") + nod.format("b"), driver.opened)
+    while driver.session.has_documents:
+        driver.now += 2 * STANDSTILL
+        driver.wake()
+    starts = {f.id: f.global_time for f in driver.run(5.0).feedback if isinstance(f, BlockProgress)}
+    assert starts["b:start"] - starts["a:start"] > STANDSTILL
+
+
+def test_submission_drops_the_gaze_of_a_newer_block_whatever_the_voice_takes() -> None:
+    driver = Driver(mute=True)
+    driver.send('<bml id="a"><speech id="s"><text>Hi</text></speech><gaze id="g" target="x"/></bml>')
+    driver.send('<bml id="b"><gaze id="g" target="y"/><wait id="w" duration="1"/></bml>')
+    driver.run(0.3)
+    driver.say(driver.spoken[0].id, spoken())
+    warnings = [f.id for f in driver.run(5.0).feedback if isinstance(f, WarningFeedback)]
+    assert warnings == ["b:g"]

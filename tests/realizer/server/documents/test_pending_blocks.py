@@ -38,6 +38,7 @@ def pending(speaking: PendingBlock) -> PendingBlocks:
     """A block "a" that waits for the answer to request 1."""
     blocks = PendingBlocks()
     blocks.blocks.append(speaking)
+    speaking.number = 0
     speaking.requests.add(1)
     return blocks
 
@@ -325,3 +326,27 @@ def test_tts_requests_finish_or_cut_off_every_text_in_any_order(acts) -> None:
     faults = [f.text for f in client.feedback if isinstance(f, WarningFeedback)]
     assert not [text for text in faults if "internal" in text]
     assert driver.send({"type": "state"}).of("state")[-1]["blocks"] == []
+
+
+def test_add_waits_for_an_earlier_block_that_needs_the_same(pending, speaking) -> None:
+    speaking.resources = frozenset({"voice", "gaze"})
+
+    def waits(text: str, needs: str, character: int = 0) -> bool:
+        added = pending.add(block(text), character, 1.0, resources=frozenset({needs}))
+        pending.remove([added])
+        return speaking in added.predecessors
+
+    assert waits('<bml id="b"/>', "gaze")
+    assert not waits('<bml id="b"/>', "head")
+    assert not waits('<bml id="b"/>', "gaze", character=1)
+    bmla = 'xmlns:bmla="http://www.asap-project.org/bmla"'
+    assert not waits(f'<bml id="b" {bmla} bmla:interrupt="a"/>', "gaze")
+    speaking.is_incomplete = lambda block: True
+    assert not waits('<bml id="b"/>', "gaze")
+
+
+def test_replaced_by_returns_the_blocks_that_arrived_before(pending) -> None:
+    new = pending.add(block('<bml id="r" composition="REPLACE"/>'), 0, 1.0)
+    pending.add(block('<bml id="later"/>'), 0, 1.0)
+    pending.add(block('<bml id="other"/>'), 1, 1.0)
+    assert [w.block.id for w in pending.replaced_by(new)] == ["a"]
