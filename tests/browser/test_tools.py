@@ -307,6 +307,18 @@ def test_page_changes_the_voice(page) -> None:  # type: ignore[no-untyped-def]
     )
 
 
+def test_feedback_is_listed_in_order_of_its_times(page) -> None:  # type: ignore[no-untyped-def]
+    wait = '<bml id="{}"{}><wait id="w" duration="0.6"/></bml>'
+    appended = [wait.format(id, ' composition="APPEND"') for id in ("second", "third")]
+    page.fill("#document", "\n".join([wait.format("first", ""), *appended]))
+    page.click("#play")
+    page.wait_for_selector("#log li:has-text('third ends')")
+    times = [float(text) for text in page.locator("#log time").all_text_contents() if text]
+    assert times == sorted(times)
+    planned = page.locator("#log li.plan span").all_text_contents()
+    assert any(text.startswith("third is planned, ") and text.endswith(" s") for text in planned)
+
+
 def test_feedback_is_filtered_by_kind_and_words(page) -> None:  # type: ignore[no-untyped-def]
     page.fill("#document", NOD.format("told"))
     page.click("#play")

@@ -7,6 +7,7 @@ export class Log {
   constructor(list, filter, kinds) {
     this.list = list;
     this.last = 0;
+    this.now = null; // the time of the last event: predictions are of the future
     this.filter = filter;
     filter.oninput = () => this.sift();
     for (const box of kinds) box.onchange = () => this.list.classList.toggle(`no-${box.value}`, !box.checked);
@@ -17,6 +18,7 @@ export class Log {
     this.last = seq || this.last;
     const id = element.getAttribute("id");
     const time = element.getAttribute("globalTime");
+    if (time !== null) this.now = time;
     switch (element.localName) {
       case "blockProgress": {
         const [, block, what] = id.match(/^(.*):(start|end)$/);
@@ -29,8 +31,8 @@ export class Log {
       case "predictionFeedback":
         for (const block of element.children) {
           if (block.localName !== "bml" || !block.hasAttribute("globalEnd")) continue;
-          const length = block.getAttribute("globalEnd") - block.getAttribute("globalStart");
-          this.line("plan", block.getAttribute("globalStart"), `${block.getAttribute("id")} is planned, ${length.toFixed(2)} s`, element);
+          const [start, end] = ["globalStart", "globalEnd"].map((name) => Number(block.getAttribute(name)).toFixed(2));
+          this.line("plan", this.now, `${block.getAttribute("id")} is planned, ${start} to ${end} s`, element);
         }
     }
   }
