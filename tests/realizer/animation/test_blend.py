@@ -130,8 +130,18 @@ def test_blend_masks_idle_motion_but_not_other_motion() -> None:
 
 def lid_of(taking: Channel, draw: float, time: float) -> float:
     """Return how far a lid is shut if a blink with this draw is due from 1 to 1.3 s."""
+    nothing, second = np.zeros((1, 1)), np.ones((1, 1))
     still = Motion(
-        (NOD.column,), ONE[None], np.zeros((1, 1)), np.zeros(1, int), ONE, np.ones(1), np.zeros((1, 1))
+        (NOD.column,),
+        keys=ONE[None],
+        lengths=second,
+        poses=nothing,
+        steps=nothing,
+        way=np.zeros(1, int),
+        jumps=ONE,
+        durations=np.ones(1),
+        points=nothing,
+        leaps=nothing,
     )
     idle = Idle(Blinks(np.array([1.0]), np.array([draw])), still)
     return float(blend([taking], np.array([time]), idle=idle).values[0, au(45)[0].column])
