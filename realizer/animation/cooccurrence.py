@@ -40,6 +40,13 @@ class Terms:
 
     def lower(self, left: Float32, aus: Float32) -> None:
         """Reduce `left` (n_au, n), in place, to what the intensities `aus` (n_au, n) allow."""
+        live = aus.any(axis=1)
+        acting = live[self.rows].any(axis=0) | (self.start[:, 0] > 0)
+        # A unit that is 0 cannot be reduced, and a rule without movement reduces nothing.
+        limited = live[self.units] & acting[self.stronger].all(axis=0).any(axis=0)
+        if not limited.any():
+            return
+        units = self.units[limited]
         value = np.maximum(*aus.take(self.rows, axis=0))  # (k, n): the stronger of two sides
         half = np.minimum(value, np.float32(0.5))
         value -= half
@@ -47,8 +54,6 @@ class Terms:
         half *= self.low
         half += self.start
         half += value
-        limited = left[self.units].any(axis=1)  # the others are 0 anyway
-        units = self.units[limited]
         degree = np.minimum(*half.take(self.stronger[..., limited], axis=0))
         left[units] = np.minimum(left[units], 1 - degree.max(axis=0, initial=0))
 
