@@ -33,14 +33,15 @@ def realize(
     cooccurrence: str = "on",
     prosody: bool = True,
     mapping: Path | None = None,
+    grace: float = 0.5,
 ) -> Realization:
     """Play BML documents from start to end, without a clock.
 
     Args:
         documents: BML text, or several texts; all are submitted at t = 0, in order.
         voice: a voice or its name; None for espeak-ng, or the silent voice if that is not installed.
-        face, deformer, fps, scene, seed, idle, language, media, expressions, cooccurrence, prosody, mapping:
-            as in `realizer.core.options.PlayOptions`.
+        face, deformer, fps, scene, seed, idle, language, media, expressions, cooccurrence, prosody, mapping,
+            grace: as in `realizer.core.options.PlayOptions`.
 
     Raises:
         FaceError: no such face.
@@ -61,6 +62,7 @@ def realize(
         cooccurrence=cooccurrence,
         prosody=prosody,
         mapping=mapping,
+        grace=grace,
     )
     texts = [documents] if isinstance(documents, str | bytes) else documents
     return pipeline.play(texts, options, voice)

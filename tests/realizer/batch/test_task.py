@@ -21,6 +21,7 @@ OTHER = {
     "language": "nl",
     "cooccurrence": "off",
     "prosody": False,
+    "grace": 0.1,
     "size": (64, 64),
     "camera": "close",
     "light": "evening",
