@@ -11,7 +11,7 @@ from realizer.behaviours.kind import BehaviourKind, PlanningContext
 from realizer.behaviours.table_timing import timing_from_table
 from realizer.scheduling.timing import Timing
 
-# 1/s^2; a stated duration is stiffer than any gap of the table.
+# 1/s^2; a stated duration is stiffer than the gaps of the table, but for a blink's.
 STATED = 1000.0
 
 
