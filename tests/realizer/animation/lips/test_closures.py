@@ -79,6 +79,41 @@ def test_closure_mask_separates_closures_from_bites(pair: tuple[str, str], one: 
     assert times[first].mean() < times[second].mean()
 
 
+def shown(kinds: str, length: float, quiet: str = "") -> tuple[Float64, Bool, Bool]:
+    """Return the masks of closures without a sound between them, every millisecond.
+
+    Args:
+        quiet: which of the sounds only move the tongue.
+    """
+    sounds = [("t" if str(k) in quiet else ipa, length) for k, ipa in enumerate(kinds)]
+    track = track_of(phonemes(PAUSE, *sounds, PAUSE))
+    times = np.arange(0, 1 + len(kinds) * length, 0.001)
+    assert track is not None
+    return (times, *closure_mask(track, times))
+
+
+@given(st.text("pf", min_size=2, max_size=5), st.floats(0.03, 0.08))
+def test_closure_mask_moves_closures_and_bites_apart(kinds: str, length: float) -> None:
+    """The first one begins earlier than without the others if the next is of the other kind; else as then."""
+    for first, edge, other, way in ((0, 0, 1, -1), (len(kinds) - 1, -1, -2, 1)):
+        quiet = "".join(str(k) for k in range(len(kinds)) if k != first)
+        here, alone = (
+            times[closed | bitten][edge]
+            for times, closed, bitten in (shown(kinds, length), shown(kinds, length, quiet))
+        )
+        if kinds[edge] != kinds[other]:
+            assert way * (here - alone) > 0.002
+        else:
+            assert here == pytest.approx(alone, abs=1e-6)
+
+
+@pytest.mark.parametrize("kinds", ["pf", "fp"])
+@given(st.floats(0.03, 0.06))
+def test_closure_mask_of_a_bite_lasts_longer_beside_a_closure(kinds: str, length: float) -> None:
+    _, closed, bitten = shown(kinds, length)
+    assert bitten.sum() > closed.sum()
+
+
 def test_lip_weight_lasts_from_the_first_sound_to_the_last() -> None:
     times, lips = taken(PAUSE, ("a", 0.1), ("t", 0.1), ("a", 0.1), PAUSE)
     assert lips[0] == lips[-1] == 0
