@@ -22,6 +22,10 @@ def paths(picture, colour: str) -> list[Path]:
     return [s for s in picture.shapes if isinstance(s, Path) and s.colour == colour and s.tip]
 
 
+def dots(picture) -> list[Box]:
+    return [s for s in picture.shapes if isinstance(s, Box) and s.fill == LINK and s.tip]
+
+
 @pytest.mark.parametrize("offset", ["", "+0.5", "-0.25"])
 def test_draw_links_curves_to_the_point_that_follows(lines, offset: str) -> None:
     picture, scale, by_id = drawn(lines, TIED.format(f'stroke="w:end{offset}"', ""))
@@ -31,6 +35,37 @@ def test_draw_links_curves_to_the_point_that_follows(lines, offset: str) -> None
     assert curve.points[-1][0] == pytest.approx(scale.x(stroke))
     texts = [s.text for s in picture.shapes if isinstance(s, Text)]
     assert (offset in texts) or not offset
+
+
+FIRST = """<bml id="b"><wait id="w" start="n:end" duration="1"/><head id="n" lexeme="NOD"/></bml>"""
+
+
+@pytest.mark.parametrize("document", [TIED.format('stroke="w:end"', ""), FIRST], ids=["down", "up"])
+def test_draw_links_ends_a_reference_in_an_arrow_of_its_curve(lines, document: str) -> None:
+    picture, _, _ = drawn(lines, document)
+    (curve,) = paths(picture, LINK)
+    begin, end = curve.points[0], curve.points[-1]
+    (arrow,) = [s for s in picture.shapes if isinstance(s, Path) and s.fill == LINK and s.points[0] == end]
+    back = {y for _, y in arrow.points[1:]}
+    assert all(abs(y - begin[1]) < abs(end[1] - begin[1]) for y in back)
+    assert [s.x + s.width / 2 for s in dots(picture)] == pytest.approx([begin[0]])
+
+
+def test_draw_links_ends_a_synchronize_in_dots(lines) -> None:
+    said = '<constraint><synchronize ref="w:end"><sync ref="n:stroke"/></synchronize></constraint>'
+    picture, _, _ = drawn(lines, TIED.format("", said))
+    (curve,) = paths(picture, LINK)
+    ends = sorted([curve.points[0], curve.points[-1]])
+    assert sorted((s.x + s.width / 2, s.y + s.height / 2) for s in dots(picture)) == [
+        pytest.approx(end) for end in ends
+    ]
+    assert not [s for s in picture.shapes if isinstance(s, Path) and s.fill == LINK and s.points[0] in ends]
+
+
+def test_draw_links_draws_no_arrow_to_itself(lines) -> None:
+    picture, _, _ = drawn(lines, '<bml id="b"><head id="n" lexeme="NOD" end="n:start+2"/></bml>')
+    assert not paths(picture, LINK)
+    assert not dots(picture)
 
 
 def test_draw_links_pins_a_point_at_a_time(lines) -> None:
