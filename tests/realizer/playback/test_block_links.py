@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from bml_schema import Block, SyncRef, parse
 from realizer.behaviours.kind import PlanningContext
@@ -16,6 +18,7 @@ from realizer.playback.block_links import (
     existing_claims,
     external_times,
     followers,
+    with_stops,
 )
 from realizer.playback.block_planner import plan
 from realizer.scheduling.timing import Schedule
@@ -109,3 +112,17 @@ SCHEDULES = {
 )
 def test_external_times_are_known_for_known_points(ref: SyncRef, time: float | None) -> None:
     assert external_times(SCHEDULES.get, 10.0)(ref) == time
+
+
+@given(st.floats(0, 20))
+def test_with_stops_nothing_of_a_stopped_block_is_later(now: float) -> None:
+    stopped = with_stops(SCHEDULES.get, [alive("a")], now)("a")
+    assert stopped is not None
+    at, planned = (stopped.start + stopped.times["h"], SCHEDULES["a"].start + SCHEDULES["a"].times["h"])
+    assert at == pytest.approx(np.minimum(planned, max(now, stopped.start)))
+
+
+def test_with_stops_the_other_blocks_go_on() -> None:
+    schedule_of = with_stops(SCHEDULES.get, [alive("a"), alive("nobody")], 11.0)
+    assert schedule_of("p") is SCHEDULES["p"]
+    assert schedule_of("nobody") is None
