@@ -51,7 +51,7 @@ def plan(documents: Documents, player: Player, voice: Voice | str | None = None)
                 refused += schedules[-1].warnings if schedules[-1].failed else ()
             else:
                 refused.append(parse_warning(item))
-                player.refuse(refused[-1], 0.0)
+                player.refuse(refused[-1])
     return schedules, refused
 
 

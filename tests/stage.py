@@ -153,7 +153,7 @@ def play(
                 played.blocks.append(item)
                 played.schedules[item.id] = submit_with_speech(player, item, voice, time)
             case Step.SEND, BMLError():
-                player.refuse(parse_warning(item), time)
+                player.refuse(parse_warning(item))
     hear(player, played, now, math.inf, punctual)
     for id, schedule in played.schedules.items():
         played.schedules[id] = player.latest(schedule)

@@ -114,7 +114,7 @@ class BlockManager:
         if not announced.is_revoked:
             self._revoke(announced, now)
 
-    def refuse(self, warning: Warning, now: float, character: str | None = None) -> None:
+    def refuse(self, warning: Warning, character: str | None = None) -> None:
         """Report a document, block or behaviour that cannot be played."""
         self.reports.warn(warning, character)
 

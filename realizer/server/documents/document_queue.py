@@ -150,10 +150,10 @@ class Submission:
         """Whether no document is being read or prepared and no speech is open."""
         return not (self.queue or len(self.pending) or len(self.speeches) or len(self.tts))
 
-    def enqueue(self, text: str, t: float) -> None:
+    def enqueue(self, text: str) -> None:
         """Add a message with documents to the queue, or refuse it."""
         if (refused := self.queue.put(text)) is not None:
-            self.refuse(refused, t)
+            self.refuse(refused)
 
     def _parse_next(self, t: float) -> bool:
         """Prepare the next block of a speech or of the queue. Return False if there is none."""
@@ -162,7 +162,7 @@ class Submission:
             return True
         item = self.queue.next()
         if isinstance(item, Warning):
-            self.refuse(item, t)
+            self.refuse(item)
         elif item is not None:
             self._prepare(item, t, self.queue.message, cancelled=self.queue.is_cancelled(item))
         return item is not None
@@ -188,7 +188,7 @@ class Submission:
         busy = len(self.pending) + len(self._player.blocks.active())
         fault = block_limit_error(block, self._settings, busy, self._player.characters)
         if fault is not None:
-            self.refuse(Warning(block.id, "CANNOT_CREATE_BEHAVIOR", fault), t, block.character_id)
+            self.refuse(Warning(block.id, "CANNOT_CREATE_BEHAVIOR", fault), block.character_id)
             return
         try:
             block = self.speeches.with_links(block)
@@ -200,7 +200,7 @@ class Submission:
             pending.is_streaming = self.speeches.is_streaming(block)
             self._player.announce(block, t)
         except Exception:
-            self._internal(block, t)
+            self._internal(block)
             return
         if cancelled:
             self.withdraw([pending], t)
@@ -223,7 +223,7 @@ class Submission:
                 schedule = self._player.submit(pending.block, t, pending.utterances)
         except Exception:
             self.pending.remove([pending])
-            self._internal(pending.block, t)
+            self._internal(pending.block)
             return True
         if schedule.lengths:
             self._request_again(pending, schedule.lengths, t)
@@ -265,15 +265,15 @@ class Submission:
         self.withdraw([w for w in self.pending.blocks if w.block.id in blocks], t)
         self._player.stop(t, blocks)
 
-    def _internal(self, block: Block, t: float) -> None:
+    def _internal(self, block: Block) -> None:
         """Log a bug with its traceback, and refuse the block."""
         log.exception("session %s: block %s failed", self._name, block.id)
         warning = Warning(block.id, "EXECUTION_EXCEPTION", "internal error while planning this block")
-        self.refuse(warning, t, block.character_id)
+        self.refuse(warning, block.character_id)
 
-    def refuse(self, warning: Warning, t: float, character: str | None = None) -> None:
+    def refuse(self, warning: Warning, character: str | None = None) -> None:
         """Publish a warning about a block that is not accepted."""
-        self._player.refuse(warning, t, character)
+        self._player.refuse(warning, character)
         self.speeches.on_refused(warning.id)
 
 

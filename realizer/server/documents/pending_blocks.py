@@ -255,7 +255,7 @@ class TtsRequests:
         # The warnings of earlier parts have been published.
         for fault in request.utterance.warnings[len(before.warnings) :]:
             warning = Warning(f"{block}:{behaviour}", "CUSTOM_ATTRIBUTE_NOT_SUPPORTED", f"speech: {fault}")
-            self._player.refuse(warning, t, playing.block.character_id)
+            self._player.refuse(warning, playing.block.character_id)
         return True
 
 

@@ -227,7 +227,7 @@ class Session:
         elif control is not None:
             self._handle(connection, control, t)
         else:
-            self.submission.enqueue(message, t)
+            self.submission.enqueue(message)
         return refused is None
 
     def _add_sound(self, connection: Connection, message: bytes) -> None:
