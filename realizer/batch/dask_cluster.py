@@ -56,7 +56,7 @@ class DaskCluster:
 
         def submit(task: Task) -> Any:
             key = f"realizer-{task.key}-{task.name}"
-            future = self._client.submit(perform, self.options, task, key=key, pure=False)
+            future = self._client.submit(perform, self.options, task, key=key)
             waiting[future] = task
             return future
 
