@@ -6,6 +6,7 @@ import asyncio
 import json
 import logging
 from collections.abc import Awaitable, Callable
+from pathlib import Path
 from urllib.parse import quote, unquote
 
 import pytest
@@ -16,6 +17,7 @@ from bml_schema.feedback import BlockProgress, Feedback, WarningFeedback, parse_
 from realizer.core.settings import Settings
 from realizer.server.serve import Server
 from realizer.server.transports.stomp import StompTransport
+from tests.realizer.server.transports.conftest import free_port
 
 pytestmark = pytest.mark.xdist_group("brokers")
 
@@ -446,3 +448,42 @@ def test_stomp_gives_up_a_port_that_says_nothing(monkeypatch: pytest.MonkeyPatch
     with caplog.at_level(logging.WARNING):
         asyncio.run(run())
     assert "no broker at" in caplog.messages[0]
+
+
+def alone(test: Callable[[Server], Awaitable[None]], **settings) -> None:
+    """Run a test against a service whose broker never comes."""
+    serving(test, f"127.0.0.1:{free_port()}", ready=False, **settings)
+
+
+def test_stomp_joins_once_although_another_process_has_its_session(tmp_path: Path) -> None:
+    where = str(tmp_path / "journal.db")
+
+    async def test(server: Server) -> None:
+        async with Server(Settings(port=0, voice="silent", journal=where)) as other:
+            for url in (server.url, other.url):  # the second one takes it over
+                async with connect(f"{url}?session=stomp-json") as viewer:
+                    await viewer.send(WAIT.format("b", 0))
+                    while 'id="b:end"' not in str(await viewer.recv()):
+                        pass
+            while server._sessions.health()["connections"]:
+                await asyncio.sleep(0)
+            transport_of(server)._links[0].receive(WAIT.format("c", 60))
+            assert server._sessions.health() == {"sessions": 1, "connections": 1}
+            while not server._sessions.busy:
+                await asyncio.sleep(0)
+
+    alone(test, journal=where)
+
+
+def test_stomp_begins_a_new_session_after_one_that_fails(caplog) -> None:
+    async def test(server: Server) -> None:
+        link = transport_of(server)._links[0]
+        link.receive(WAIT.format("b", 60))
+        (session,) = server._sessions._registry.sessions.values()
+        server._sessions._fail(session)
+        assert server._sessions.health() == {"sessions": 0, "connections": 0}
+        for id in ("c", "d"):
+            link.receive(WAIT.format(id, 60))
+            assert server._sessions.health() == {"sessions": 1, "connections": 1}
+
+    alone(test)
