@@ -215,6 +215,17 @@ def test_player_that_comes_back_is_found_again(monkeypatch: pytest.MonkeyPatch) 
     playing(test)
 
 
+def test_player_that_is_gone_leaves_the_session() -> None:
+    async def test(server: Server, player: Player) -> None:
+        await hold(server, '{"type":"set","faps":{"open_jaw":500}}')
+        await player.until(lambda: {3: 500} in player.shown)
+        player.close()
+        while server._sessions.health()["connections"]:
+            await asyncio.sleep(0.01)
+
+    playing(test)
+
+
 @pytest.mark.parametrize("lost", ["a session that fails", "a player that reads nothing"])
 def test_player_reconnects_after(lost: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reconnecting, "FIRST_RETRY", 0.01)
