@@ -144,6 +144,15 @@ def test_viewer_frames_last_until_set_values_are_reached(tmp_path: Path) -> None
     assert brow[-1] < 0.05
 
 
+def test_viewer_frames_last_until_a_shift_is_complete(tmp_path: Path) -> None:
+    smile = '<faceShift id="f" {}><faceLexeme id="l" lexeme="SMILE"/></faceShift>'
+    for name, timing in (("begun", 'start="0" end="3"'), ("not begun", 'start="2" end="3"')):
+        doings = [(0.5, f'<bml id="b">{smile.format(timing)}</bml>'), (1.5, '{"type": "stop"}')]
+        record, _ = recorded(tmp_path / name, doings, 2.0)
+        duration = replay_recording(record)[0].duration
+        assert duration == pytest.approx(3.5 if name == "begun" else 2.0, abs=0.1), name
+
+
 def test_viewer_hears_a_speech_until_it_was_cut_off(tmp_path: Path) -> None:
     rate = 8000
     pcm = np.random.default_rng(1).integers(-9000, 9000, 3 * rate).astype("<i2")
