@@ -46,3 +46,10 @@ def test_assemble_puts_teeth_behind_the_lips(ground: Ground, parts: list[Part]) 
     for part in parts:
         if part.name.endswith("teeth"):
             assert part.vertices[:, 2].max() < ground.point("2.2")[2]
+
+
+def test_assemble_puts_the_lower_teeth_inside_the_upper_ones(parts: list[Part]) -> None:
+    upper, lower = (next(p.vertices for p in parts if p.name == f"{row}_teeth") for row in ("upper", "lower"))
+    assert np.ptp(lower[:, 0]) < np.ptp(upper[:, 0])
+    assert lower[:, 2].max() < upper[:, 2].max()
+    assert lower[:, 1].min() < upper[:, 1].min()

@@ -59,3 +59,13 @@ def test_lid_fields_leave_the_other_side_and_the_mouth(ground: Ground) -> None:
     made = lid_fields(ground)
     assert not made[19][ground.at[:, 0] < -0.001].any()
     assert not made[21][ground.at[:, 1] < -0.05].any()
+
+
+def test_lid_fields_move_what_lies_behind_their_own_edge(ground: Ground, mask_lids: list[Lid]) -> None:
+    made, lid = lid_fields(ground), mask_lids[0]
+    leader, _ = lid.followers(ground)
+    for fap, mine, other in ((19, lid.upper, lid.lower), (21, lid.lower, lid.upper)):
+        moved = np.linalg.norm(made[fap], axis=1)
+        for ring in lid.rings[1:4]:
+            own, theirs = ([v for v in ring if leader[v] in edge[4:-4]] for edge in (mine, other))
+            assert moved[own].min() > 4 * moved[theirs].max()

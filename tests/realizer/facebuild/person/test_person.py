@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from realizer.facebuild.person.base_mesh import Ground
 from realizer.facebuild.person.makehuman import BaseMesh
-from realizer.facebuild.person.person import Person, identity
+from realizer.facebuild.person.person import Person, _landmarks, identity
 
 pytestmark = pytest.mark.xdist_group("mask")
 AT = np.array([[3, 1, 0], [-3, 1, 0], [4, 1, 0], [-4, 1, 0], [0, -2, 1], [2, -2, 0], [-2, -2, 0.0]])
@@ -57,3 +58,12 @@ def test_person_turns_whole_above_the_jaw_and_not_below_the_neck(person: Person)
     middle = np.flatnonzero(person.ground.body & (at[:, 0] == 0) & (at[:, 1] < -0.05))
     order = np.argsort((at[:, 1] + 0.3 * at[:, 2])[middle])
     assert (np.diff(turns[middle[order]]) >= 0).all()
+
+
+def test_landmarks_on_the_tongue_are_its_tip_its_top_and_its_sides(ground: Ground) -> None:
+    at = ground.at.copy()
+    tongue = np.unique(ground.mesh.quads["helper-tongue"])
+    at[tongue, 1] -= 0.2 * np.abs(at[tongue, 0])
+    found = _landmarks(ground.mesh, at)
+    for name in ("6.1", "6.2", "6.3", "6.4"):
+        assert found[name] == ground.points[name], name
