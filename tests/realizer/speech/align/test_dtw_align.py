@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from realizer.speech.align.alignment import Alignment
-from realizer.speech.align.dtw_align import dtw_align
+from realizer.speech.align.dtw import States
+from realizer.speech.align.dtw_align import _adaptation, dtw_align
 from realizer.speech.align.features import mono, to_aligner
 from realizer.speech.espeak.voice import EspeakVoice
 from realizer.speech.utterance import SpeechRequest, Utterance
@@ -51,3 +54,17 @@ def test_dtw_align_puts_unexpected_pauses_between_words(voice: EspeakVoice, sent
     found = aligned(sentence, pcm, voice.say(SpeechRequest(TEXT)))
     assert np.abs(starts(found) - onsets).max() < 0.1
     assert found.words[2].end < onsets[3] - 1.8
+
+
+@given(st.integers(1, 60), st.floats(-2, 2))
+def test_adaptation_is_nearly_the_identity_unless_much_speech_differs(frames: int, off: float) -> None:
+    ours = np.random.default_rng(frames).normal(size=(frames + 1, 4))
+    pause = np.arange(frames + 1) == 0
+    states = States(ours, pause, np.arange(frames + 1) * 0.02)
+    same = np.eye(5)[:, :4]
+    assert _adaptation(ours, states, np.arange(frames + 1)) == pytest.approx(same, abs=1e-9)
+    way = np.repeat(np.arange(1, frames + 1), 400)
+    likened = np.hstack([ours, np.ones((frames + 1, 1))]) @ _adaptation(ours[way] + off, states, way)
+    assert likened[1:] == pytest.approx(ours[1:] + off, abs=0.15 * abs(off) + 1e-9)
+    few = _adaptation(ours[:2] + off, states, np.array([0, 1]))
+    assert np.abs(few - same).max() < abs(off) / 4 + 1e-9
