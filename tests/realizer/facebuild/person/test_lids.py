@@ -69,3 +69,12 @@ def test_lid_fields_move_what_lies_behind_their_own_edge(ground: Ground, mask_li
         for ring in lid.rings[1:4]:
             own, theirs = ([v for v in ring if leader[v] in edge[4:-4]] for edge in (mine, other))
             assert moved[own].min() > 4 * moved[theirs].max()
+
+
+def test_lid_fields_move_the_corners_with_the_edge_too(ground: Ground, mask_lids: list[Lid]) -> None:
+    made, lid = lid_fields(ground), mask_lids[0]
+    leader, _ = lid.followers(ground)
+    for fap, edge in ((19, lid.upper), (21, lid.lower)):
+        moved = np.linalg.norm(made[fap], axis=1)
+        share = [moved[v] / moved[leader[v]] for v in lid.rings[2] if leader[v] in edge[1:-1]]
+        assert min(share) > 0.6 * max(share)
