@@ -153,6 +153,14 @@ def test_viewer_frames_last_until_a_shift_is_complete(tmp_path: Path) -> None:
         assert duration == pytest.approx(3.5 if name == "begun" else 2.0, abs=0.1), name
 
 
+def test_viewer_frames_last_until_the_last_block_that_begins(tmp_path: Path) -> None:
+    bmla = 'xmlns:bmla="http://www.asap-project.org/bmla"'
+    never = f'<bml id="n" {bmla} bmla:preplan="true"><head id="h" lexeme="NOD"/></bml>'
+    smile = '<bml id="b"><faceLexeme id="f" lexeme="SMILE" end="3"/></bml>'
+    record, _ = recorded(tmp_path, [(0.5, never), (0.6, smile)], 1.5)
+    assert replay_recording(record)[0].duration == pytest.approx(3.6, abs=0.1)
+
+
 def test_viewer_hears_a_speech_until_it_was_cut_off(tmp_path: Path) -> None:
     rate = 8000
     pcm = np.random.default_rng(1).integers(-9000, 9000, 3 * rate).astype("<i2")
