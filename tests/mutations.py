@@ -44,10 +44,16 @@ OPERATORS = {
 }  # fmt: skip
 # Messages for people, and calls that release something that nobody waits for.
 UNSEEN = re.compile(r"(log|logging|warnings|gc)\.|.*\.(close|cancel|shutdown|kill|flush)$|print$")
+# Errors, whose texts are for people too.
+ERRORS = re.compile(r"(\w+\.)*\w*Error$")
 # Arguments that only speed, memory or the look of a text depend on.
 TUNING = {"maxsize", "maxlen", "timeout", "indent", "stacklevel", "max_workers", "limit", "ndigits"}
 # Numbers and sums there are a matter of taste: where a curl lies, how thick a line is.
 TASTE = re.compile("realizer/(charts|facebuild/person)/")
+# Numbers so small only keep rounding errors and divisions by 0 out: any other would do.
+TOLERANCE = 5e-6
+# Limits of pydantic for what clients send; those beyond BOUND only keep nonsense out.
+LIMITS, BOUND = {"ge", "gt", "le", "lt", "min_length", "max_length"}, 100
 NO_CODE = {"annotation", "returns", "decorator_list", "bases"}
 
 
@@ -105,7 +111,9 @@ def mutations(path: str, source: bytes) -> Iterator[Mutation]:
                 yield instead(test, f"not {ast.unparse(test)}")
             case ast.Constant(value=bool() as value):
                 yield instead(node, str(not value))
-            case ast.Constant(value=int() | float() as value) if not TASTE.match(path):
+            case ast.Constant(value=int() | float() as value) if not (
+                TASTE.match(path) or _is_tolerance(value)
+            ):
                 yield instead(node, str(value + 1 if isinstance(value, int) else 2 * value or 1.0))
             case ast.AugAssign():
                 yield instead(node, "pass")
@@ -121,6 +129,10 @@ def _end(node: ast.expr | ast.stmt) -> tuple[int, int]:
     assert node.end_lineno is not None
     assert node.end_col_offset is not None
     return node.end_lineno, node.end_col_offset
+
+
+def _is_tolerance(value: float) -> bool:
+    return 0 < value < TOLERANCE
 
 
 def _nodes(tree: ast.AST) -> Iterator[ast.AST]:
@@ -140,15 +152,22 @@ def _is_unseen(node: ast.AST) -> bool:
             return True
         case ast.Expr(value=ast.Call(func=func)):
             return bool(UNSEEN.match(ast.unparse(func)))
+        case ast.Call(func=func):
+            return bool(ERRORS.match(ast.unparse(func)))
         case ast.If(test=test):
             return bool(re.search("TYPE_CHECKING|__name__", ast.unparse(test)))
         case ast.ExceptHandler(type=ast.expr() as kind):
             return "ImportError" in ast.unparse(kind)
-        case ast.keyword(arg=str() as name):
-            return name in TUNING
+        case ast.keyword(arg=str() as name, value=value):
+            return name in TUNING or (name in LIMITS and _is_bound(value))
         case ast.FunctionDef(name=name):
             return name == "__repr__"
     return False
+
+
+def _is_bound(value: ast.expr) -> bool:
+    number = value.operand if isinstance(value, ast.UnaryOp) else value
+    return isinstance(number, ast.Constant) and isinstance(number.value, int | float) and number.value > BOUND
 
 
 def _is_sequence(node: ast.AST) -> bool:

@@ -48,6 +48,9 @@ def f(x: "1 + 1" = None) -> "0":
         ("a(b)", ["pass"]),
         ("a.close()", []),
         ("a(maxsize=3, b=3)", ["pass", "a(maxsize=3, b=4)"]),
+        ("x = a + 1e-9, 1e-5", ["x = a - 1e-9, 1e-5", "x = a + 1e-9, 2e-05"]),
+        ("x = F(ge=0, le=-1e4, b=1e4)", ["x = F(ge=1, le=-1e4, b=1e4)", "x = F(ge=0, le=-1e4, b=20000.0)"]),
+        ("return AnError(a or b, 1)", []),
     ],
 )
 def test_mutations_of_a_line(source: str, wanted: list[str]) -> None:
