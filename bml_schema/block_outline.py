@@ -118,7 +118,7 @@ class BlockOutline:
             elif tag == Description.tag:
                 # It may name points that the core text does not have.
                 marks += [m.get("name", "").strip() for m in child.iterdescendants("{*}mark")]
-        return Points(names.union(m for m in marks if ":" not in m)) if marks else kind.points
+        return Points(names.union(m for m in marks if ":" not in m and m != "bml")) if marks else kind.points
 
 
 def flat(tree: list[Entry | list[Entry]]) -> list[Entry]:

@@ -14,7 +14,7 @@ from lxml import etree
 
 from bml_schema.behaviours import Speech, SpeechText, Sync
 from bml_schema.canonical import MAX_ATTRIBUTES, attributes, canonical
-from bml_schema.errors import Fault, did_you_mean, quoted
+from bml_schema.errors import CUSTOM_ATTRIBUTE_NOT_SUPPORTED, Fault, did_you_mean, quoted
 from bml_schema.escape import escape
 from bml_schema.node_schema import Attribute, NodeSchema, local, schema_of
 from bml_schema.nodes import (
@@ -66,15 +66,15 @@ class ElementReader:
     Attributes:
         vocabulary: Clark tag -> node class.
         names: what references can name; None disables the check.
-        unknown_attributes: (message, element) for unknown attributes; the caller reports and clears them.
+        remarks: faults that cost no behaviour, such as unknown attributes; the caller clears them.
     """
 
-    __slots__ = ("names", "unknown_attributes", "vocabulary")
+    __slots__ = ("names", "remarks", "vocabulary")
 
     def __init__(self, vocabulary: Vocabulary, names: Names | None = None) -> None:
         self.vocabulary = vocabulary
         self.names = names
-        self.unknown_attributes: list[tuple[str, etree._Element]] = []
+        self.remarks: list[Fault] = []
 
     def tag(self, element: etree._Element) -> str:
         """Return the Clark tag; without namespace or in a draft's it is core, or extension for faceFacs."""
@@ -141,7 +141,7 @@ class ElementReader:
         if faults:
             raise Fault("; ".join([*faults, unknown] if unknown else faults), element)
         if unknown:
-            self.unknown_attributes.append((unknown, element))
+            self.remarks.append(Fault(unknown, element, CUSTOM_ATTRIBUTE_NOT_SUPPORTED))
         if shape.timed:
             values["syncs"] = syncs
             values["unknown_attributes"] = foreign
@@ -223,15 +223,22 @@ class ElementReader:
 
     def mixed(self, shape: NodeSchema, element: etree._Element) -> Iterator[Any]:
         """Read text := (characters | sync)*, with whitespace as written."""
-        if element.text:
-            yield element.text
+        text = element.text or ""
         for child in element:
             spec = shape.by_tag.get(self.tag(child))
             if spec is None:
                 raise Fault(f"wanted text and {shape.listed}, got <{local(str(child.tag))}>", child)
-            yield self.node(spec[1], child)
-            if child.tail:
-                yield child.tail
+            if child.get("id", "").strip() == "bml":
+                says = 'id: "bml" means the block in references, so this <sync> does nothing'
+                self.remarks.append(Fault(says, child))
+            else:
+                if text:
+                    yield text
+                yield self.node(spec[1], child)
+                text = ""
+            text += child.tail or ""
+        if text:
+            yield text
 
     def text(self, element: etree._Element) -> str:
         if len(element):

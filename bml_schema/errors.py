@@ -78,7 +78,7 @@ class Problem:
     """A part of a document that was dropped while parsing; it becomes one BML warning.
 
     Attributes:
-        id: "block:behaviour" ("block:path" for a behaviour without id), a constraint's id, or the block's.
+        id: "block:behaviour" ("block:path" for a behaviour without id), "block:constraint", or the block's.
         type: BML warning type, such as PARSING_FAILURE.
         text: expected and actual value, without the place; str(problem) includes the place.
         line, path: position of the fault.

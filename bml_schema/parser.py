@@ -199,13 +199,13 @@ class _Reader:
                 )
             node: Behaviour = self.elements.node(cls, element, timed=True)
         except Fault as fault:
-            self.elements.unknown_attributes.clear()  # it is dropped anyway
+            self.elements.remarks.clear()  # it is dropped anyway
             id = entry.id if 0 < len(entry.id) <= _MAX_ID else entry.path
             self.problem(f"{self.names.block}:{id}", fault, entry.path, element, entry.required)
             return None
         self.places[node.id] = Place(self.line(element), entry.path)
-        if self.elements.unknown_attributes:
-            self.report_unknown_attributes(f"{self.names.block}:{node.id}", entry)
+        if self.elements.remarks:
+            self.report_remarks(f"{self.names.block}:{node.id}", entry)
         return node
 
     def unknown(self, entry: Entry) -> Fault:
@@ -223,12 +223,11 @@ class _Reader:
             )
         return Fault(f"no behaviour <{name}> in BML 1.0{hint}", element, BEHAVIOR_TYPE_NOT_SUPPORTED)
 
-    def report_unknown_attributes(self, id: str, entry: Entry) -> None:
-        """Report the unknown attributes of a behaviour or constraint, one Problem for each element."""
-        for text, element in self.elements.unknown_attributes:
-            fault = Fault(text, element, CUSTOM_ATTRIBUTE_NOT_SUPPORTED)
+    def report_remarks(self, id: str, entry: Entry) -> None:
+        """Report faults that cost no behaviour, one Problem for each element."""
+        for fault in self.elements.remarks:
             self.problem(id, fault, entry.path, entry.element, dropped=False)
-        self.elements.unknown_attributes.clear()
+        self.elements.remarks.clear()
 
     def constraint(self, entry: Entry) -> Constraint | None:
         """Return the node of an entry, or None, with a Problem, if it is dropped."""
@@ -236,13 +235,17 @@ class _Reader:
         try:
             values = self.elements.constraint(element)
         except Fault as fault:
-            self.elements.unknown_attributes.clear()
-            id = entry.id if 0 < len(entry.id) <= _MAX_ID else self.names.block
-            self.problem(id, fault, entry.path, element, entry.required)
+            self.elements.remarks.clear()
+            self.problem(self.warned(entry.id), fault, entry.path, element, entry.required)
             return None
-        self.report_unknown_attributes(values.get("id") or self.names.block, entry)
+        self.report_remarks(self.warned(values.get("id")), entry)
         place = Place(self.line(element), entry.path)
         return Constraint(**values, required=entry.required, place=place)
+
+    def warned(self, constraint: str | None) -> str:
+        """Return the id of warnings about a constraint, which may have none."""
+        known = constraint and len(constraint) <= _MAX_ID
+        return f"{self.names.block}:{constraint}" if known else self.names.block
 
     # References to dropped behaviours
 

@@ -37,7 +37,8 @@ def _conflict(builder: FindingBuilder, clash: Iterable[Clause], text: str) -> No
     """Add a label for every line that takes part, and notes for other requirements."""
     builder.path = builder.path or "/bml"
     for clause in clash:
-        of_behaviour = ":" in clause.id
+        own = _constraint(builder, clause.id.partition(":")[2], clause.line)
+        of_behaviour = ":" in clause.id and (own is None or own.name.rpartition(":")[2] != "constraint")
         stated = _STATED.fullmatch(clause.text)
         # The order of the points of a behaviour is implied; only equalities are in the document.
         if stated is None or clause.line is None or (of_behaviour and stated[2] != "="):
@@ -47,9 +48,9 @@ def _conflict(builder: FindingBuilder, clash: Iterable[Clause], text: str) -> No
         if of_behaviour:
             spot = _in_behaviour(builder, left, clause.line)
         else:
-            spot = _in_constraint(builder, clause.id, (right, left), clause.line)
-            own = _constraint(builder, clause.id, clause.line) if clause.id == builder.id else None
-            builder.path = builder.source.path(own) if own is not None else builder.path
+            spot = _in_constraint(builder, own, (right, left), clause.line)
+            if own is not None and clause.id == builder.id:
+                builder.path = builder.source.path(own)
         builder.labels.append(Label(spot, clause.text.replace(" is ", " ", 1)))
     cannot = _CANNOT.match(text)
     builder.head = cannot[0] if cannot else "these cannot all hold"
@@ -102,14 +103,14 @@ def _in_behaviour(builder: FindingBuilder, point: str, line: int) -> Spot:
 def _constraint(builder: FindingBuilder, id: str | None, line: int | None) -> Element | None:
     """Return a constraint by its id, or the first one on a line."""
     found = builder.source.named(id, line=line) if id else None
-    if found is None and line is not None:
+    if found is None and not id and line is not None:
         on = (e for e in builder.source.on_line(line) if e.name.rpartition(":")[2] == "constraint")
         found = next(on, None)
     return found
 
 
-def _in_constraint(builder: FindingBuilder, id: str | None, refs: tuple[str, ...], line: int) -> Spot:
-    source, found = builder.source, _constraint(builder, id, line)
+def _in_constraint(builder: FindingBuilder, found: Element | None, refs: tuple[str, ...], line: int) -> Spot:
+    source = builder.source
     if found is None:
         return source.whole_line(line)
     wanted = ["".join(str(ref).split()) for ref in refs]

@@ -23,7 +23,7 @@ class Part:
     """A part of a document that can be dropped: a behaviour or a constraint.
 
     Attributes:
-        id: for warnings, "block:behaviour" or a constraint's own id or its block's.
+        id: for warnings, "block:behaviour" or "block:constraint"; of a constraint without an id, its block's.
         name: for sentences, "nod1"; "" for a constraint without an id.
         order: position in the document, among its own kind.
         line: the line in the document, or None if unknown.
@@ -269,7 +269,7 @@ def _add_constraint(
         return
     place = block.places.get(constraint.id) if constraint.id else constraint.place
     part = Part(
-        constraint.id or block.id,
+        f"{block.id}:{constraint.id}" if constraint.id else block.id,
         constraint.id or "",
         constraint.required or member.is_fixed,
         order=order,

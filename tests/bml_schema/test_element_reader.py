@@ -135,7 +135,7 @@ def test_constraint_with_a_fault_goes_alone(inside: str, said: str, path: str) -
     assert [b.id for b in block.behaviours] == ["a"]
     assert not block.constraints
     (problem,) = block.problems
-    assert (problem.id, problem.type, problem.text) == ("c", "PARSING_FAILURE", said)
+    assert (problem.id, problem.type, problem.text) == ("b:c", "PARSING_FAILURE", said)
     assert problem.path == f"/bml/constraint[1]{path}"
     assert not problem.fatal
 
@@ -264,7 +264,7 @@ def test_unknown_attributes_of_a_block_and_a_constraint_are_reported() -> None:
     )
     assert [(p.id, p.path, p.type) for p in block.problems] == [
         ("b", "/bml", TYPE),
-        ("c", "/bml/constraint[1]", TYPE),
+        ("b:c", "/bml/constraint[1]", TYPE),
     ]
     assert len(block.constraints) == 1
 

@@ -98,12 +98,12 @@ def test_clauses_are_in_the_json_of_a_warning() -> None:
     )
     found = schedule(body, {"a": lasting(1.0), "b": lasting(1.0)})
     (warning,) = found.to_json()["warnings"]
-    assert warning["id"] == "same"
+    assert warning["id"] == "b1:same"
     assert warning["type"] == "IMPOSSIBLE_TO_SCHEDULE"
     assert sorted(warning["clash"], key=lambda clause: clause["line"]) == [
         {"id": "b1:a", "line": 2, "text": "a:start = 1"},
         {"id": "b1:b", "line": 3, "text": "b:start = 2"},
-        {"id": "same", "line": 4, "text": "a:start = b:start"},
+        {"id": "b1:same", "line": 4, "text": "a:start = b:start"},
     ]
     for clause in warning["clash"]:
         assert clause["text"] in warning["text"]

@@ -125,8 +125,8 @@ def test_minimal_cycles_prefer_the_short_of_two_cycles() -> None:
     )
     found = schedule(body, {name: lasting(1.0, least=1.0) for name in "abcd"})
     short, long = found.warnings
-    assert (short.id, long.id) == ("l", "k")
-    assert [clause.id for clause in short.clash] == ["k", "l"]
+    assert (short.id, long.id) == ("b1:l", "b1:k")
+    assert [clause.id for clause in short.clash] == ["b1:k", "b1:l"]
     # Three waits, the references between them, and the constraint on the first and the last.
     assert len(long.clash) == 7
 
