@@ -21,6 +21,7 @@ from realizer.core.array_types import Float64
 FILE = "gaze.toml"
 NUMBER = r"\s*([+-]?(?:\d+\.?\d*|\.\d+))\s*"
 POINT = re.compile(",".join([NUMBER] * 3))
+_SIGNS = re.compile(r"[\s_-]")
 # Degrees of yaw, positive to the left, and of pitch, positive up.
 Turn = tuple[float, float]
 # Part -> the AUs of (yaw to the left, to the right), (pitch up, down).
@@ -44,6 +45,12 @@ def limited(turn: Turn, most: Turn) -> Turn:
     return max(-most_yaw, min(most_yaw, yaw)), max(-most_pitch, min(most_pitch, pitch))
 
 
+def known_direction(target: str) -> Turn | None:
+    """Return yaw and pitch of a target that needs no scene: LEFT, UPLEFT, CAMERA ..., or None."""
+    found: Sequence[float] | None = facts()["targets"].get(_SIGNS.sub("", target).upper())
+    return None if found is None else (found[0], found[1])
+
+
 def position(target: str, context: PlanningContext) -> Position | None:
     """Return the position of a target, "x,y,z" or a name of the scene in any case, in metres; or None."""
     if match := POINT.fullmatch(target):
@@ -59,9 +66,12 @@ def position(target: str, context: PlanningContext) -> Position | None:
 def angles(target: str, context: PlanningContext) -> tuple[float, float, float]:
     """Return yaw (positive to the left), pitch (positive up) and inward turn of each eye, degrees.
 
-    An unknown target, and one between the eyes, is straight ahead and far away.
+    An unknown target, and one between the eyes, is straight ahead and far away; a direction is far away.
     """
-    x, y, z = position(target, context) or (0.0, 0.0, 0.0)
+    place = position(target, context)
+    if place is None and (direction := known_direction(target)) is not None:
+        return *direction, 0.0
+    x, y, z = place or (0.0, 0.0, 0.0)
     distance = math.sqrt(x * x + y * y + z * z)
     if distance < 1e-6:
         return 0.0, 0.0, 0.0
@@ -71,11 +81,16 @@ def angles(target: str, context: PlanningContext) -> tuple[float, float, float]:
     return yaw, pitch, inward
 
 
+def is_known(target: str, context: PlanningContext) -> bool:
+    """Return whether a target is a point, in the scene, or needs none."""
+    return position(target, context) is not None or known_direction(target) is not None
+
+
 def check_target(node: Gaze | GazeShift | HeadDirectionShift, context: PlanningContext) -> tuple[Fault, ...]:
     """Return NO_SUCH_TARGET, not fatal, for a name that is not in a declared scene."""
-    target = node.target
-    if context.scene is None or position(target, context) is not None:
+    if context.scene is None or is_known(node.target, context):
         return ()
+    target = node.target
     near = difflib.get_close_matches(target, list(context.scene), n=3) or sorted(context.scene)[:5]
     wanted = f"one of {', '.join(near)}" if near else 'a point such as "0,0,1", as the scene is empty'
     return (

@@ -9,10 +9,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bml_schema import BMLA, BMLT, CORE, EXTENSIONS, OWN, Block, Speech, SyncRef
+from bml_schema import (
+    BMLA,
+    BMLT,
+    CORE,
+    EXTENSIONS,
+    OWN,
+    Block,
+    Gaze,
+    GazeShift,
+    HeadDirectionShift,
+    Speech,
+    SyncRef,
+)
 from bml_schema.node_schema import local, schema_of
 from bml_schema.source import Source
 from bml_schema.tolerant_scanner import Element
+from realizer.behaviours.gaze_targets import is_known
 from realizer.checking.explain import near
 from realizer.checking.finding import Finding, Label
 from realizer.knowledge.advice import VisibleExpression, advise
@@ -47,6 +60,7 @@ def advice(file: str, source: Source, block: Block, schedule: Schedule, player: 
             yield from advisor.attributes()
             yield from advisor.children()
             yield from advisor.units()
+            yield from advisor.target(player)
             if node.id in schedule.times:
                 yield from advisor.muscles(schedule, player)
 
@@ -112,6 +126,17 @@ class _Advisor:
                 text = f"{name}: {seconds:g} s are {_minutes(abs(seconds))}; BML counts in seconds"
                 hint = f"help: if these are milliseconds, write {seconds / 1000:g}"
                 yield self.finding(text, self.label(_minutes(abs(seconds)), name), hint)
+
+    def target(self, player: Player) -> Iterator[Finding]:
+        """Yield advice on a target that only a scene can declare, if there is no scene."""
+        if player.context.scene is not None or not isinstance(
+            self.node, Gaze | GazeShift | HeadDirectionShift
+        ):
+            return
+        if not is_known(self.node.target, player.context):
+            text = f"target: there is no scene, so {self.node.target!r} is taken as straight ahead"
+            hint = "help: declare it with --scene, or use LEFT, RIGHT, UP, DOWN, CAMERA, USER or a point"
+            yield self.finding(text, self.label("not declared", "target"), hint)
 
     def muscles(self, schedule: Schedule, player: Player) -> Iterator[Finding]:
         """Yield advice on motion that takes less than a frame or is faster than muscles are."""

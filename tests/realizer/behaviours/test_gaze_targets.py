@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+import numpy as np
 import pytest
 
-from realizer.behaviours.kind import PlanningContext
+from realizer.behaviours.gaze_targets import angles, known_direction
+from realizer.behaviours.kind import PlanningContext, Position
 from tests.realizer.behaviours.elements import SCENE, check, gaze, total
+
+Scene = Mapping[str, Position] | None
 
 
 def test_position_finds_names_of_the_scene_in_any_case() -> None:
@@ -32,3 +38,31 @@ def test_check_target_suggests_names_for_an_unknown_one(element: str) -> None:
 def test_check_target_suggests_a_point_in_an_empty_scene() -> None:
     (fault,) = check('<gaze id="x" target="cup"/>', PlanningContext(scene={}))
     assert "0,0,1" in fault.text
+
+
+@pytest.mark.parametrize(
+    ("target", "left", "up"),
+    [
+        ("LEFT", 1, 0),
+        ("right", -1, 0),
+        ("UP", 0, 1),
+        ("DOWN", 0, -1),
+        ("UPLEFT", 1, 1),
+        ("down_right", -1, -1),
+        ("LeftUp", 1, 1),
+        ("CAMERA", 0, 0),
+        ("User", 0, 0),
+    ],
+)
+@pytest.mark.parametrize("scene", [None, {"cup": (0.0, 0.0, 1.0)}])
+def test_known_direction_needs_no_scene(target: str, left: int, up: int, scene: Scene) -> None:
+    context = PlanningContext(scene=scene)
+    assert not check(f'<gaze id="x" target="{target}"/>', context)
+    yaw, pitch, inward = angles(target, context)
+    assert (np.sign(yaw), np.sign(pitch), inward) == (left, up, 0)
+
+
+def test_known_direction_gives_way_to_a_scene_with_its_name() -> None:
+    context = PlanningContext(scene={"camera": (1.0, 0.0, 1.0)})
+    assert known_direction("CAMERA") == (0, 0)
+    assert angles("CAMERA", context)[0] == pytest.approx(45)

@@ -56,6 +56,13 @@ def test_advice_is_given_on_times_in_another_unit(behaviour: str, head: str, hel
     assert finding.notes == (help,)
 
 
+@pytest.mark.parametrize("element", ["gaze", "gazeShift", "headDirectionShift"])
+def test_advice_is_given_on_a_target_without_a_scene(element: str) -> None:
+    (finding,) = advised(f'<bml id="a"><{element} id="n" target="person"/></bml>')
+    assert finding.head == "target: there is no scene, so 'person' is taken as straight ahead"
+    assert advised(f'<bml id="a"><{element} id="n" target="UPLEFT"/></bml>') == []
+
+
 def check(tmp_path: Path, body: str, *options: str) -> Result:
     document = tmp_path / "d.bml"
     document.write_text(HEAD + body + "\n</bml>", "utf-8")
