@@ -115,7 +115,8 @@ class _PlanBuilder:
     def add_problems(self) -> None:
         """Add the warnings of the parser."""
         for problem in self.block.problems:
-            warning = Warning(problem.id, problem.type, str(problem))
+            of_constraint = "/constraint[" in problem.path
+            warning = Warning(problem.id, problem.type, str(problem), constraint=of_constraint)
             if problem.fatal:
                 self.refuse(warning)
             self.warnings.append(warning)

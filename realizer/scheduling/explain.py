@@ -31,7 +31,7 @@ def warning_of(clash: Conflict, dropped: Part) -> Warning:
     else:
         reason = _reason(clash, dropped)
         text = f"{name} cannot be placed: {in_words(clash)}; {name} was dropped because {reason}"
-    return Warning(dropped.id, IMPOSSIBLE, text, clauses(clash))
+    return Warning(dropped.id, IMPOSSIBLE, text, clauses(clash), dropped.is_constraint)
 
 
 def refusal(block: str, clash: Conflict) -> Warning:
@@ -43,7 +43,8 @@ def refusal(block: str, clash: Conflict) -> Warning:
 def fault_warning(part: Part, text: str) -> Warning:
     """Return the warning for a reference to something that does not exist."""
     name = part.name or "a constraint"
-    return Warning(part.id, IMPOSSIBLE, f"{name} was dropped{_placed(part, part.line)}: {text}")
+    said = f"{name} was dropped{_placed(part, part.line)}: {text}"
+    return Warning(part.id, IMPOSSIBLE, said, constraint=part.is_constraint)
 
 
 def in_words(clash: Conflict) -> str:

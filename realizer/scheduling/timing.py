@@ -95,15 +95,16 @@ class Clause:
 
 @dataclass(frozen=True)
 class Warning:  # the standard's word
-    """One BML warning: `id` is a block or "block:behaviour", `type` is of the standard's list.
+    """One BML warning: `id` is a block, "block:behaviour" or "block:constraint", `type` the standard's.
 
-    `clash`: the minimal conflict that is the reason, if any.
+    `clash`: the minimal conflict that is the reason, if any. `constraint`: it is about a constraint.
     """
 
     id: str
     type: str
     text: str
     clash: tuple[Clause, ...] = ()
+    constraint: bool = False
 
     def to_json(self) -> dict[str, Any]:
         """Return {"id", "type", "text"}, and "clash": [{"id", "line", "text"}] if there is one."""
@@ -164,6 +165,7 @@ class Schedule:
             w.id
             for w in self.warnings
             if w.id.startswith(prefix)
+            and not w.constraint
             and (w.type == "PARSING_FAILURE" or w.id.removeprefix(prefix) not in self.times)
         )
 

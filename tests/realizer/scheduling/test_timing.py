@@ -91,3 +91,8 @@ def test_schedule_json_has_the_times_from_block_start() -> None:
         "w": {"start": 0.0, "end": 1.5},
     }
     assert (data["block"], data["start"], data["end"], len(data["warnings"])) == ("b1", 10.0, 13.0, 4)
+
+
+def test_schedule_does_not_count_dropped_constraints_as_behaviours() -> None:
+    gone = Warning("b:c", "IMPOSSIBLE_TO_SCHEDULE", "constraint c cannot be kept", constraint=True)
+    assert Schedule("b", {}, {}, warnings=(gone,)).dropped == ()
