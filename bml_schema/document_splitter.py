@@ -23,8 +23,17 @@ _CLOSERS = {
     "<!DOCTYPE": re.compile(r"\]\s*>"),
 }
 _BLANKS = " \t\r\n\ufeff"
-# Allowed between documents; SmartBody wraps documents in <act>.
-_BETWEEN = re.compile(rf"(?:[{_BLANKS}]|</?act(?=[\s/>])[^<>]*>|</?participant(?=[\s/>])[^<>]*>)*+")
+# Elements around documents: SmartBody's, and Greta's, in which <fml> says what the documents are for.
+WRAPPERS = ("act", "fml-apml")
+WRAPPER_TAG = re.compile(rf"<({'|'.join(WRAPPERS)})(?=[\s/>])")
+# Allowed between documents.
+_BETWEEN = re.compile(
+    rf"(?:[{_BLANKS}]|</?(?:{'|'.join(WRAPPERS)}|participant)(?=[\s/>])[^<>]*>|"
+    r"<fml(?=[\s/>])[^<>]*+>(?:(?<=/>)|(?:[^<]|<(?!/fml))*+</fml\s*>))*+"
+)
+_EMPTY_DOCTYPE = re.compile(
+    r"""<!DOCTYPE\s+fml-apml(?:\s+SYSTEM\s+(?:"[^"<]*"|'[^'<]*'))?\s*(?:\[\s*\])?\s*>"""
+)
 
 
 class DocumentSpan(NamedTuple):
@@ -80,6 +89,11 @@ def _marks(text: str, first: int, last: int) -> Iterator[_Mark]:
             yield _Mark("doctype", start, offset)
         elif closer is not None and opener != "<![CDATA[":
             yield _Mark("skip", start, offset)
+
+
+def without_doctype(text: str) -> str:
+    """Return the text with blanks for Greta's <!DOCTYPE fml-apml>, which declares no entities."""
+    return _EMPTY_DOCTYPE.sub(lambda found: re.sub(r"\S", " ", found[0]), text)
 
 
 def document_spans(text: str, first: int = 0, last: int | None = None) -> Iterator[DocumentSpan]:

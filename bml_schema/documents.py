@@ -7,14 +7,24 @@ import re
 from collections import deque
 from collections.abc import Iterator, Mapping
 from itertools import count, islice
+from typing import Any
 
 from lxml import etree
 
-from bml_schema.document_splitter import NEXT, DocumentSpan, document_spans
+from bml_schema.dialects.translator import is_core, made_ids, translate
+from bml_schema.document_splitter import (
+    NEXT,
+    WRAPPER_TAG,
+    WRAPPERS,
+    DocumentSpan,
+    document_spans,
+    without_doctype,
+)
 from bml_schema.errors import BMLError, BMLSizeError, BMLSyntaxError, quoted
 from bml_schema.node_schema import local
 from bml_schema.nodes import Behaviour, Block
 from bml_schema.parser import MAX_BEHAVIOURS, read_block
+from bml_schema.undeclared_prefixes import read_undeclared
 from bml_schema.vocabulary import VOCABULARY
 
 MAX_BYTES = 1 << 20  # of one document; an hour of speech with a nod on every word is a third of it
@@ -38,6 +48,7 @@ def parse(
     strict: bool = False,
     max_bytes: int = MAX_BYTES,
     max_behaviours: int = MAX_BEHAVIOURS,
+    strict_bml: bool = False,
 ) -> Block:
     """Return the block of a text that holds exactly one document.
 
@@ -47,6 +58,7 @@ def parse(
         vocabulary: Clark tag -> node class; extensions add theirs.
         strict: raise the first Problem.
         max_bytes, max_behaviours: limits of a document.
+        strict_bml: read BML 1.0 only, no dialects and nothing that is only nearly BML.
 
     Returns:
         The block; `problems` has what was dropped from it.
@@ -55,7 +67,10 @@ def parse(
         BMLError: no block: not well-formed (BMLSyntaxError), no usable id, too big
             (BMLSizeError), not one document.
     """
-    found = list(islice(read(text, vocabulary, max_bytes=max_bytes, max_behaviours=max_behaviours), 2))
+    results = read(
+        text, vocabulary, max_bytes=max_bytes, max_behaviours=max_behaviours, strict_bml=strict_bml
+    )
+    found = list(islice(results, 2))
     if not found:
         raise BMLSyntaxError("wanted a <bml> document, got an empty text")
     if isinstance(found[0], BMLError):
@@ -76,20 +91,28 @@ def read(
     max_bytes: int = MAX_BYTES,
     max_behaviours: int = MAX_BEHAVIOURS,
     max_documents: int = MAX_DOCUMENTS,
+    strict_bml: bool = False,
+    block_ids: Iterator[str] | None = None,
 ) -> Iterator[Block | BMLError]:
     """Yield the blocks of a text with any number of documents, in order.
 
     After a broken stretch reading continues at the next `<bml`. Lines are counted over the whole text.
 
+    Args:
+        text, vocabulary, max_bytes, max_behaviours, strict_bml: as for `parse`.
+        max_documents: the rest of the text is not read.
+        block_ids: the ids of documents in a dialect that have none; those of one session must differ.
+
     Yields:
         A Block for each document, a BMLError for each stretch without one. Raises nothing.
     """
-    data, roots = _whole(text, max_bytes)
+    reader = _Reader(vocabulary, max_behaviours, strict_bml, block_ids or made_ids())
+    data, wrapper, roots = _whole(text, max_bytes, strict_bml)
     if 0 < len(roots) <= max_documents:
-        begins = _begins(data)
+        reader.wrapper, begins = wrapper, _begins(data)
         for root in roots:
             try:
-                yield read_block(root, vocabulary, begins=begins, max_behaviours=max_behaviours)
+                yield reader.read(root, begins)
             except BMLError as wrong:
                 yield wrong
         return
@@ -98,11 +121,14 @@ def read(
     except BMLError as wrong:
         yield wrong
         return
+    text = text if strict_bml else without_doctype(text)
     try:
         spans = list(document_spans(text))
     except BMLError as wrong:
         yield wrong
         return
+    if spans and not strict_bml and (around := WRAPPER_TAG.search(text, 0, spans[0].start)):
+        reader.wrapper = around[1]
     line = 1
     counted = 0
     broken = False  # the stretch before was broken XML: all text up to the next document is part of it
@@ -121,7 +147,7 @@ def read(
         if broken and stretch.fault and not stretch.tag:
             continue
         try:
-            block = _block(text, stretch, line, vocabulary, max_bytes, max_behaviours)
+            block = _block(text, stretch, line, reader, max_bytes)
         except BMLError as wrong:
             broken = isinstance(wrong, BMLSyntaxError)
             if not (broken and stretch.start < reported):
@@ -139,34 +165,35 @@ def read(
             yield block
 
 
-def _whole(text: str | bytes, max_bytes: int) -> tuple[bytes, list[etree._Element]]:
-    """Return the bytes of a text and its documents if it is sound, otherwise no documents.
+def _whole(text: str | bytes, max_bytes: int, strict_bml: bool) -> tuple[bytes, str, list[etree._Element]]:
+    """Return the bytes of a text, its wrapper and its documents if it is sound, otherwise no documents.
 
     Most texts are one sound document, and are parsed in one pass. All others take the slow way, which
     explains.
     """
     if len(text) > max_bytes:
-        return b"", []
+        return b"", "", []
     if isinstance(text, str):
         try:
             data = text.encode()
         except UnicodeEncodeError:
-            return b"", []
+            return b"", "", []
     elif _ENCODING.match(text.removeprefix(codecs.BOM_UTF8).lstrip()):
-        return b"", []
+        return b"", "", []
     else:
         data = text
     if len(data) > max_bytes or b"<!DOCTYPE" in data:
-        return data, []
+        return data, "", []
     try:
         root = etree.fromstring(data, _PARSER)
     except etree.XMLSyntaxError:
-        return data, []
+        return data, "", []
     name = local(str(root.tag))
     if name == "bml":
-        return data, [root]
+        return data, "", [root]
     # SmartBody's messages: <act><participant/><bml>..</bml></act>.
-    return data, [child for child in root if local(str(child.tag)) == "bml"] if name == "act" else []
+    wrapped = name == "act" or (name in WRAPPERS and not strict_bml)
+    return data, name, [child for child in root if local(str(child.tag)) == "bml"] if wrapped else []
 
 
 def _begins(data: bytes) -> dict[tuple[int, str], int]:
@@ -184,9 +211,69 @@ def _begins(data: bytes) -> dict[tuple[int, str], int]:
     return begins
 
 
-def _block(
-    text: str, stretch: DocumentSpan, line: int, vocabulary: Vocabulary, max_bytes: int, max_behaviours: int
-) -> Block:
+class _Reader:
+    """Reads the documents of one text, as BML 1.0 or as a dialect of it.
+
+    Attributes:
+        wrapper: local name of the element around the documents, or "".
+    """
+
+    def __init__(
+        self, vocabulary: Vocabulary, max_behaviours: int, strict_bml: bool, block_ids: Iterator[str]
+    ) -> None:
+        self.vocabulary = vocabulary
+        self.max_behaviours = max_behaviours
+        self.strict_bml = strict_bml
+        self.block_ids = block_ids
+        self.wrapper = ""
+
+    def read(
+        self,
+        root: etree._Element,
+        begins: Mapping[tuple[int, str], int],
+        *,
+        lines_before: int = 0,
+        notes: tuple[str, ...] = (),
+    ) -> Block:
+        """Read the block of a <bml> element; raise BMLError if there is none."""
+
+        def block(notes: tuple[str, ...]) -> Block:
+            return read_block(
+                root,
+                self.vocabulary,
+                lines_before=lines_before,
+                begins=begins,
+                max_behaviours=self.max_behaviours,
+                lenient=not self.strict_bml,
+                notes=notes,
+            )
+
+        if self.strict_bml:
+            return block(notes)
+        plain: Block | BMLError | None = None
+        if not self.wrapper and is_core(root):
+            # Nearly all documents are BML 1.0; one with faults may use words of a dialect.
+            try:
+                plain = block(notes)
+            except BMLError as wrong:
+                plain = wrong
+            if isinstance(plain, Block) and not plain.problems:
+                return plain
+        for node in root.iter() if begins else ():
+            # The names by which lines are found may change.
+            any_node: Any = node
+            line = any_node.sourceline
+            any_node.sourceline = begins.get((line, local(str(node.tag))), line)
+        begins = {}
+        said = translate(root, self.wrapper, self.block_ids)
+        if said or plain is None:
+            return block((*notes, said) if said else notes)
+        if isinstance(plain, BMLError):
+            raise plain
+        return plain
+
+
+def _block(text: str, stretch: DocumentSpan, line: int, reader: _Reader, max_bytes: int) -> Block:
     named = _ID.search(stretch.tag)
     id = (named[1] or named[2]) if named else None
     if stretch.fault:
@@ -196,10 +283,16 @@ def _block(
         raise BMLSizeError(
             f"wanted at most {max_bytes} bytes in a document, got {len(data)}", line=line, block=id
         )
-    root = element(data, lines_before=line - 1, block=id)
-    return read_block(
-        root, vocabulary, lines_before=line - 1, begins=_begins(data), max_behaviours=max_behaviours
-    )
+    notes: tuple[str, ...] = ()
+    try:
+        root = element(data, lines_before=line - 1, block=id)
+    except BMLSyntaxError:
+        found = None if reader.strict_bml else read_undeclared(data, reader.vocabulary)
+        if found is None:
+            raise
+        root, note = found
+        notes = (note,)
+    return reader.read(root, _begins(data), lines_before=line - 1, notes=notes)
 
 
 _PARSER = etree.XMLParser(

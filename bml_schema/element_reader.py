@@ -21,6 +21,7 @@ from bml_schema.nodes import (
     BMLA,
     BMLT,
     CORE,
+    DRAFTS,
     EXTENSIONS,
     OWN,
     After,
@@ -31,21 +32,21 @@ from bml_schema.nodes import (
     Description,
     Required,
     Synchronize,
+    bmla,
     core,
     extension,
 )
 from bml_schema.sync_refs import Names, SyncRef, read_sync_ref
-from bml_schema.values import describe_mismatch
+from bml_schema.values import NUMBER, describe_mismatch
 
 Vocabulary = Mapping[str, type[Behaviour]]
 
-# Documents from before the standard name no namespace, or the draft's.
-_DRAFTS = frozenset({"http://www.mindmakers.org/projects/BML"})
 _SSML = "application/ssml+xml"
 _OURS = (f"{{{CORE}}}", f"{{{EXTENSIONS}}}")
 _OWN = (*_OURS, f"{{{OWN}}}")  # not BMLA and BMLT: they have more attributes than this package knows
 _KNOWN = (*_OWN, f"{{{BMLA}}}", f"{{{BMLT}}}")
 _PARTS: Mapping[str, type[Synchronize | Before | After]] = {c.tag: c for c in (Synchronize, Before, After)}
+_IN_BMLA = f"{{{BMLA}}}"
 _SYNC, _DESCRIPTION = Sync.tag, Description.tag
 # Elements of the core that are no behaviours.
 _INNER = {c.tag for c in (Block, Required, Constraint, Description, SpeechText, Sync, *_PARTS.values())}
@@ -53,11 +54,11 @@ _INNER = {c.tag for c in (Block, Required, Constraint, Description, SpeechText, 
 
 @lru_cache(maxsize=1000)
 def _standard(raw: str) -> tuple[str, str]:
-    """Return the core tag of an element of the core or a draft, and the extension tag of that name or ""."""
+    """Return the core tag of an element of the core or a draft, and the tag of that name elsewhere or ""."""
     space, name = raw[1:].split("}") if raw.startswith("{") else ("", raw)
-    if space in _DRAFTS or not space or space == CORE:
+    if space in DRAFTS or not space or space == CORE:
         return core(name), extension(name)
-    return raw, ""
+    return raw, bmla(name) if space == BMLT else ""  # documents confuse the two
 
 
 class ElementReader:
@@ -66,14 +67,16 @@ class ElementReader:
     Attributes:
         vocabulary: Clark tag -> node class.
         names: what references can name; None disables the check.
+        lenient: what is not BML 1.0 is read where its meaning is plain.
         remarks: faults that cost no behaviour, such as unknown attributes; the caller clears them.
     """
 
-    __slots__ = ("names", "remarks", "vocabulary")
+    __slots__ = ("lenient", "names", "remarks", "vocabulary")
 
-    def __init__(self, vocabulary: Vocabulary, names: Names | None = None) -> None:
+    def __init__(self, vocabulary: Vocabulary, names: Names | None = None, *, lenient: bool = True) -> None:
         self.vocabulary = vocabulary
         self.names = names
+        self.lenient = lenient
         self.remarks: list[Fault] = []
 
     def tag(self, element: etree._Element) -> str:
@@ -81,8 +84,10 @@ class ElementReader:
         raw: Any = element.tag
         if raw in _INNER or raw in self.vocabulary:
             return cast("str", raw)
-        known, extended = _standard(raw)
-        return extended if extended in self.vocabulary and known not in self.vocabulary else known
+        known, elsewhere = _standard(raw)
+        if elsewhere not in self.vocabulary or known in self.vocabulary:
+            return known
+        return elsewhere if self.lenient or not elsewhere.startswith(_IN_BMLA) else known
 
     # element := attributes children
 
@@ -127,10 +132,13 @@ class ElementReader:
                 else:
                     values[spec.field] = spec.read(text)
             except ValueError as wrong:
+                if spec is not None and self.lenient and (folded := spec.value.fold(text)) is not None:
+                    values[spec.field] = folded
+                    continue
                 # The message about a reference is complete already.
                 reason = wrong if spec is None or spec.read is None else _unwanted(spec, text)
                 faults.append(f"{local(name)}: {reason}")
-        if shape.old:
+        if shape.old and self.lenient:
             faults += _drafts(shape, values, foreign)
         if shape.timed and not timed and "id" not in element.attrib:
             values["id"] = ""  # a part of <face> has no timing, so its id is optional
@@ -159,7 +167,8 @@ class ElementReader:
             names: Clark names of attributes that the schema does not have.
             timed: sync points are attributes of the element.
         """
-        names = (name for name in names if name not in shape.old)
+        old = shape.old if self.lenient else ()
+        names = (name for name in names if name not in old)
         wrong = [name for name in names if name[0] != "{" or name.startswith(_OWN)]
         if not wrong:
             return ""
@@ -172,7 +181,10 @@ class ElementReader:
         texts = [f"{name}: no attribute of <{shape.name}>{where}, so it does nothing" for name in wrong]
         # The list of known attributes comes once, before the last suggestion.
         texts[-1] += f"; known are {', '.join(known)}" if known else "; there are none"
-        return "; ".join(text + suggest(local(name), known) for text, name in zip(texts, wrong, strict=True))
+        kinds = [_of_the_kind(shape, known, element.get(name, "")) for name in wrong]
+        return "; ".join(
+            text + suggest(local(name), kind) for text, name, kind in zip(texts, wrong, kinds, strict=True)
+        )
 
     def children(self, shape: NodeSchema, element: etree._Element, values: dict[str, Any]) -> None:
         """Read child elements into the fields of `values`."""
@@ -230,7 +242,7 @@ class ElementReader:
                 raise Fault(f"wanted text and {shape.listed}, got <{local(str(child.tag))}>", child)
             if child.get("id", "").strip() == "bml":
                 says = 'id: "bml" means the block in references, so this <sync> does nothing'
-                self.remarks.append(Fault(says, child))
+                self.remarks.append(Fault(says, child, CUSTOM_ATTRIBUTE_NOT_SUPPORTED))
             else:
                 if text:
                     yield text
@@ -248,6 +260,8 @@ class ElementReader:
     # description := any XML
 
     def description(self, element: etree._Element) -> Description:
+        if self.lenient and {"priority", "level"}.isdisjoint(element.keys()):
+            element.set("priority", "1")
         values = self.attributes(schema_of(Description), element, False)
         if values["type"] == _SSML:
             speak = [c for c in element if local(str(c.tag)) == "speak"]
@@ -271,7 +285,10 @@ class ElementReader:
         return values
 
     def constraint_part(self, element: etree._Element) -> Synchronize | Before | After:
-        cls = _PARTS.get(self.tag(element))
+        tag = self.tag(element)
+        cls = _PARTS.get(tag)
+        if cls is None and self.lenient and tag == core("synchronise"):
+            cls = Synchronize
         if cls is None:
             got = local(str(element.tag))
             raise Fault(f"wanted <synchronize>, <before> or <after>, got <{got}>", element)
@@ -312,3 +329,13 @@ def _drafts(shape: NodeSchema, values: dict[str, Any], foreign: dict[str, str]) 
 
 def _unwanted(spec: Attribute, text: str) -> str:
     return describe_mismatch(spec.value.wanted, text, quoted(text))
+
+
+def _of_the_kind(shape: NodeSchema, known: Iterable[str], value: str) -> list[str]:
+    """Return the attributes that a value can be meant for: words are no times, and times no words."""
+    time = ":" in value or NUMBER.fullmatch(value.strip()) is not None
+    return [
+        name
+        for name in known
+        if time or (name in shape.attributes and shape.attributes[name].value.low is None)
+    ]

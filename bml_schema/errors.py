@@ -22,6 +22,8 @@ PARSING_FAILURE = "PARSING_FAILURE"
 BEHAVIOR_TYPE_NOT_SUPPORTED = "BEHAVIOR_TYPE_NOT_SUPPORTED"
 CUSTOM_BEHAVIOR_NOT_SUPPORTED = "CUSTOM_BEHAVIOR_NOT_SUPPORTED"
 CUSTOM_ATTRIBUTE_NOT_SUPPORTED = "CUSTOM_ATTRIBUTE_NOT_SUPPORTED"
+# A type of our own: the document is in a dialect, and the text says how it was read.
+NOT_BML_1_0 = "NOT_BML_1_0"
 
 
 class Place(NamedTuple):
@@ -124,11 +126,11 @@ def quoted(value: str) -> str:
 _MAX_CHOICES = 500  # difflib is slow; this many take about a millisecond
 
 
-def did_you_mean(word: str, choices: Iterable[str]) -> str:
+def did_you_mean(word: str, choices: Iterable[str], cutoff: float = 0.6) -> str:
     """Return `, did you mean "nod1"?` if one of the first 500 choices is close, else ""."""
     if len(word) > _LONGEST_SHOWN:
         return ""
     near = difflib.get_close_matches(
-        word, [c for c in islice(choices, _MAX_CHOICES) if len(c) <= _LONGEST_SHOWN], n=1
+        word, [c for c in islice(choices, _MAX_CHOICES) if len(c) <= _LONGEST_SHOWN], n=1, cutoff=cutoff
     )
     return f', did you mean "{near[0]}"?' if near else ""

@@ -12,6 +12,8 @@ from bml_schema.sync_refs import SyncRef
 from bml_schema.values import block_name, block_names, flag, integer, name, number, one_of, word
 
 CORE = "http://www.bml-initiative.org/bml/bml-1.0"
+# Documents from before the standard name no namespace, or the draft's.
+DRAFTS = frozenset({"http://www.mindmakers.org/projects/BML"})
 EXTENSIONS = "http://www.bml-initiative.org/bml/coreextensions-1.0"
 BMLA = "http://www.asap-project.org/bmla"
 BMLT = "http://hmi.ewi.utwente.nl/bmlt"
@@ -64,7 +66,7 @@ class Description(Part):
 
     tag = core("description")
 
-    priority: int = attribute(integer(-(2**31), 2**31 - 1))
+    priority: int = attribute(integer(-(2**31), 2**31 - 1), old="level")
     type: str = attribute(word)
     content: str = ""
 
@@ -194,7 +196,7 @@ class Block:
 
     id: str = attribute(block_name)
     character_id: str | None = attribute(word, default=None)
-    composition: str = attribute(one_of(*COMPOSITIONS, any_case=True), default="MERGE")
+    composition: str = attribute(one_of(*COMPOSITIONS), default="MERGE")
     append_after: tuple[str, ...] = attribute(block_names, default=(), name=bmla("appendAfter"))
     chunk_after: tuple[str, ...] = attribute(block_names, default=(), name=bmla("chunkAfter"))
     prepend_before: tuple[str, ...] = attribute(block_names, default=(), name=bmla("prependBefore"))

@@ -7,7 +7,7 @@ Unknown attributes are reported too, and nothing is dropped because of them.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import count
 from types import MappingProxyType
@@ -23,6 +23,7 @@ from bml_schema.errors import (
     BEHAVIOR_TYPE_NOT_SUPPORTED,
     CUSTOM_ATTRIBUTE_NOT_SUPPORTED,
     CUSTOM_BEHAVIOR_NOT_SUPPORTED,
+    NOT_BML_1_0,
     BMLError,
     BMLSizeError,
     Fault,
@@ -49,6 +50,8 @@ def read_block(
     lines_before: int = 0,
     begins: Mapping[tuple[int, str], int] = MappingProxyType({}),
     max_behaviours: int = MAX_BEHAVIOURS,
+    lenient: bool = True,
+    notes: Sequence[str] = (),
 ) -> Block:
     """Read the block of a <bml> element.
 
@@ -58,17 +61,19 @@ def read_block(
         lines_before: number of lines in the text before the part that lxml parsed.
         begins: (line where a start tag ends, its local name) -> line where it begins, if they differ.
         max_behaviours: the limit of behaviours and constraints together.
+        lenient: what is not BML 1.0 is read where its meaning is plain.
+        notes: what was read as something else; they become one Problem of the block.
 
     Raises:
         BMLError: not a <bml>, no usable id, or too many behaviours.
     """
-    elements = ElementReader(vocabulary)
+    elements = ElementReader(vocabulary, lenient=lenient)
     lines = _Lines(lines_before, begins)
     line = lines.of(root)
     if elements.tag(root) != Block.tag:
         raise BMLError(f"wanted <bml> in namespace {CORE}, got {quoted(str(root.tag))}", line=line)
     try:
-        values, wrong_attributes = _block_attributes(root, line)
+        values, wrong_attributes = _block_attributes(root, line, lenient)
     except Fault as wrong:
         raise BMLError(wrong.text, line=line, path="/bml") from None
     names = elements.names = Names(values["id"])
@@ -79,6 +84,8 @@ def read_block(
     if len(entries) > max_behaviours:
         text = f"wanted at most {max_behaviours} behaviours and constraints in a block, got {len(entries)}"
         raise BMLSizeError(text, line=line, path="/bml", block=names.block)
+    if notes:
+        reader.problem(names.block, Fault("; ".join(notes), root, NOT_BML_1_0), "/bml", root, dropped=False)
     if wrong_attributes:
         reader.problem(names.block, Fault(wrong_attributes, root), "/bml", root, dropped=False)
     if unknown := elements.describe_unknown(schema_of(Block), root, values["unknown_attributes"], False):
@@ -125,7 +132,7 @@ def read_behaviour(element: etree._Element, vocabulary: Vocabulary) -> Behaviour
     return replace(node, id=id)
 
 
-def _block_attributes(root: etree._Element, line: int) -> tuple[dict[str, Any], str]:
+def _block_attributes(root: etree._Element, line: int, lenient: bool) -> tuple[dict[str, Any], str]:
     """Return attribute values by field, and a message about faults; raise BMLError for a fault in the id."""
     known = schema_of(Block).attributes
     values: dict[str, Any] = {"unknown_attributes": {}}
@@ -144,6 +151,9 @@ def _block_attributes(root: etree._Element, line: int) -> tuple[dict[str, Any], 
             else:
                 values[spec.field] = spec.value.read(text)
         except ValueError:
+            if lenient and (folded := spec.value.fold(text)) is not None:
+                values[spec.field] = folded
+                continue
             fault = f"{local(name)}: {describe_mismatch(spec.value.wanted, text, quoted(text))}"
             if name == "id":
                 raise BMLError(fault, line=line, path="/bml") from None
@@ -218,9 +228,10 @@ class _Reader:
         if elsewhere:
             hint = f", but one in the namespace {elsewhere[0][1:].partition('}')[0]}"
         else:
-            hint = self.names.suggest(
-                name, [local(t) for t in self.elements.vocabulary if t.startswith(standard)]
-            )
+            known = [t for t in self.elements.vocabulary if t.startswith(standard)]
+            around = [local(t) for t in known if name in schema_of(self.elements.vocabulary[t]).by_local]
+            hint = f", it stands inside <{'> or <'.join(around)}>" if around else ""
+            hint = hint or self.names.suggest(name, map(local, known), 0.7)
         return Fault(f"no behaviour <{name}> in BML 1.0{hint}", element, BEHAVIOR_TYPE_NOT_SUPPORTED)
 
     def report_remarks(self, id: str, entry: Entry) -> None:

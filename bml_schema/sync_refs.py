@@ -68,12 +68,12 @@ class Names:
     points: dict[str, Points | None] = field(default_factory=dict)
     suggestions: int = 10  # "did you mean" is slow, and a document may have many faults
 
-    def suggest(self, word: str, choices: Iterable[str]) -> str:
+    def suggest(self, word: str, choices: Iterable[str], cutoff: float = 0.6) -> str:
         """Return `, did you mean ...?` or "", and always "" after ten suggestions for one document."""
         if self.suggestions <= 0:
             return ""
         self.suggestions -= 1
-        return did_you_mean(word, choices)
+        return did_you_mean(word, choices, cutoff)
 
 
 def read_sync_ref(text: str, names: Names | None = None) -> SyncRef:

@@ -39,6 +39,15 @@ class Value:
     low: float | None = None
     high: float | None = None
 
+    def fold(self, text: str) -> Any:
+        """Return the value of a word in another case, or None."""
+        for folded in (text.upper(), text.lower()) if self.words or self.type == "boolean" else ():
+            try:
+                return self.read(folded)
+            except ValueError:
+                pass
+        return None
+
 
 def decimal(value: float) -> str:
     """Format a number without exponent so that it reads back as the same float; ValueError for NaN."""
@@ -83,14 +92,12 @@ def _reader(
     return read
 
 
-def one_of(*words: str, any_case: bool = False) -> Value:
-    """Return the Value of a closed set of words; with any_case, "merge" is read as MERGE."""
+def one_of(*words: str) -> Value:
+    """Return the Value of a closed set of words."""
     known = frozenset(words)
 
     def read(text: str) -> str:
         text = text.strip()
-        if any_case:
-            text = text.upper()
         if text not in known:
             raise ValueError(text)
         return text

@@ -34,6 +34,7 @@ def realize(
     prosody: bool = True,
     mapping: Path | None = None,
     grace: float = 0.5,
+    strict_bml: bool = False,
 ) -> Realization:
     """Play BML documents from start to end, without a clock.
 
@@ -41,7 +42,7 @@ def realize(
         documents: BML text, or several texts; all are submitted at t = 0, in order.
         voice: a voice or its name; None for espeak-ng, or the silent voice if that is not installed.
         face, deformer, fps, scene, seed, idle, language, media, expressions, cooccurrence, prosody, mapping,
-            grace: as in `realizer.core.options.PlayOptions`.
+            grace, strict_bml: as in `realizer.core.options.PlayOptions`.
 
     Raises:
         FaceError: no such face.
@@ -63,6 +64,7 @@ def realize(
         prosody=prosody,
         mapping=mapping,
         grace=grace,
+        strict_bml=strict_bml,
     )
     texts = [documents] if isinstance(documents, str | bytes) else documents
     return pipeline.play(texts, options, voice)
@@ -74,6 +76,7 @@ def schedule(
     voice: Voice | str | None = None,
     scene: Mapping[str, Position] | None = None,
     media: Path | None = None,
+    strict_bml: bool = False,
 ) -> Schedule:
     """Return the sync times of one BML document, without animation.
 
@@ -82,6 +85,6 @@ def schedule(
         VoiceError: the named voice is not installed.
     """
     player = Player(PlayOptions(scene=scene, idle=False, media=media))
-    block = parse(document, VOCABULARY)
+    block = parse(document, VOCABULARY, strict_bml=strict_bml)
     with open_voice(voice) as speaker:
         return submit_with_speech(player, block, speaker)

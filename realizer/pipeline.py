@@ -18,7 +18,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from math import inf
 from typing import TYPE_CHECKING
 
-from bml_schema import Block, read
+from bml_schema import Block, made_ids, read
 from realizer.animation.blend import blend
 from realizer.animation.fap.conversion import to_fap
 from realizer.animation.frames import AUFrames
@@ -44,8 +44,10 @@ Planned = tuple[list[Schedule], list[Warning]]
 def plan(documents: Documents, player: Player, voice: Voice | str | None = None) -> Planned:
     """Submit documents at 0 s; return the schedules of their blocks, and a warning for each refused part."""
     schedules, refused = list[Schedule](), list[Warning]()
+    block_ids, strict = made_ids(), player.strict_bml
+    texts = (read(text, VOCABULARY, strict_bml=strict, block_ids=block_ids) for text in documents)
     with open_voice(voice) as speaker:
-        for item in (item for text in documents for item in read(text, VOCABULARY)):  # 1 parse
+        for item in (item for blocks in texts for item in blocks):  # 1 parse
             if isinstance(item, Block):
                 schedules.append(submit_with_speech(player, item, speaker))  # 2 time, 3 schedule, 4 expand
                 refused += schedules[-1].warnings if schedules[-1].failed else ()

@@ -46,8 +46,8 @@ def check_document(file: str, source: Source, text: bytes | str, player: Player)
         player: plays all blocks, so that blocks may refer to earlier ones.
     """
     voice = SilentVoice()
-    items = list(read(text, VOCABULARY))
-    for item, whole in zip(items, without_faults(source, items), strict=True):
+    items = list(read(text, VOCABULARY, strict_bml=player.strict_bml))
+    for item, whole in zip(items, without_faults(source, items, player.strict_bml), strict=True):
         if isinstance(item, Block):
             utterances = synthesize(player.speech_requests(item), voice)
             schedule, warnings = check_block(item, player, utterances)
@@ -105,11 +105,14 @@ def located_warning(block: Block, id: str, type: str, text: str) -> Warning:
     return Warning(f"{block.id}:{id}", type, text if place is None else place.with_place(text))
 
 
-def without_faults(source: Source, items: Sequence[Block | BMLError]) -> list[Block | None]:
+def without_faults(
+    source: Source, items: Sequence[Block | BMLError], strict_bml: bool = False
+) -> list[Block | None]:
     """Parse a text again without the attributes for which behaviours were dropped.
 
     Args:
         items: the results of parsing the text.
+        strict_bml: how they were read.
 
     Returns:
         A block for each item, or None if there is nothing more to find.
@@ -123,7 +126,7 @@ def without_faults(source: Source, items: Sequence[Block | BMLError]) -> list[Bl
     for start, end in spans:
         parts += [source.text[last:start], re.sub(r"[^\n]", " ", source.text[start:end])]
         last = end
-    again = list(read("".join(parts) + source.text[last:], VOCABULARY))
+    again = list(read("".join(parts) + source.text[last:], VOCABULARY, strict_bml=strict_bml))
     if len(again) != len(items):
         return [None] * len(items)
     return [item if isinstance(item, Block) else None for item in again]

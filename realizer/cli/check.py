@@ -26,6 +26,7 @@ MAX_ADVICE = 20  # per block: one mistake is often repeated all over a document
 @options.scene
 @options.media
 @options.expressions
+@options.strict_bml
 @role
 @mood
 @language
@@ -42,6 +43,7 @@ def check(
     scene: Path | None,
     media: Path | None,
     expressions: Path | None,
+    strict_bml: bool | None,
     role: Role,
     mood: Mood | None,
     language: str | None,
@@ -76,7 +78,7 @@ def check(
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # the terminal's encoding may lack characters of a document
             stream.reconfigure(errors="backslashreplace")
-    chosen = options.settings(language=language, media=media, expressions=expressions)
+    chosen = options.settings(language=language, media=media, expressions=expressions, strict_bml=strict_bml)
     lists = words_for(language, words)
     faults = 0
     warned: set[str] = set()

@@ -138,8 +138,14 @@ def several(*options: Callable[[Any], Any]) -> Callable[[Command], Command]:
     return add
 
 
+strict_bml = click.option(
+    "--strict-bml/--lenient-bml",
+    default=None,
+    help="Read documents as BML 1.0 only, or also as its drafts and the dialects of other realizers.  "
+    "[default: --lenient-bml]",
+)
 strict = click.option("--strict", is_flag=True, help="Exit with 1 if any behaviour was dropped.")
-playback_options = several(voice, scene, media, expressions, strict)
+playback_options = several(voice, scene, media, expressions, strict_bml, strict)
 
 
 def planning_player(chosen: Settings, scene: Path | None) -> Player:
@@ -147,7 +153,7 @@ def planning_player(chosen: Settings, scene: Path | None) -> Player:
     from realizer.core.options import PlayOptions
     from realizer.playback.player import Player
 
-    names = ("language", "media", "expressions")
+    names = ("language", "media", "expressions", "strict_bml")
     values = {name: getattr(chosen, name) for name in names}
     return Player(PlayOptions(scene=read_scene(scene), idle=False, **values))
 

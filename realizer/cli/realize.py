@@ -158,6 +158,7 @@ def schedule(
     scene: Path | None,
     media: Path | None,
     expressions: Path | None,
+    strict_bml: bool | None,
     strict: bool,
 ) -> int:
     """Print the time of every sync point, in seconds from the start of its block.
@@ -183,7 +184,9 @@ def schedule(
     if plot is not None:
         with options.reporting(ValueError, wrong=options.bad("--plot")):
             chart_writer_for(plot)
-    chosen = options.settings(voice=voice, scene=scene, media=media, expressions=expressions)
+    chosen = options.settings(
+        voice=voice, scene=scene, media=media, expressions=expressions, strict_bml=strict_bml
+    )
     player = options.planning_player(chosen, chosen.scene)
     texts = options.read_documents(documents)
     accepted, refused = plan(texts, player, chosen.voice)
@@ -197,7 +200,7 @@ def schedule(
         options.print_warnings(planned.warnings)
     charts = charts_of(player.blocks, accepted) if detail or plot is not None else []
     if as_bml:
-        text = _as_documents(texts, schedules)
+        text = _as_documents(texts, schedules, player.strict_bml)
     elif as_json:
         rows: Any = [s.to_json() for s in schedules]
         if detail:
@@ -228,12 +231,14 @@ def _table(planned: Schedule) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _as_documents(texts: Iterable[bytes], schedules: Iterable[Schedule]) -> str:
+def _as_documents(texts: Iterable[bytes], schedules: Iterable[Schedule], strict_bml: bool) -> str:
     """Return the documents with the times of their schedules, without refused blocks."""
-    from bml_schema import Block, read, with_absolute_times, write
+    from bml_schema import Block, made_ids, read, with_absolute_times, write
     from realizer.behaviours.registry import VOCABULARY
 
-    blocks = [item for text in texts for item in read(text, VOCABULARY) if isinstance(item, Block)]
+    ids = made_ids()
+    read_texts = (read(text, VOCABULARY, strict_bml=strict_bml, block_ids=ids) for text in texts)
+    blocks = [item for items in read_texts for item in items if isinstance(item, Block)]
     pairs = zip(blocks, schedules, strict=True)
     return "".join(
         write(with_absolute_times(block, planned.behaviours))

@@ -67,6 +67,7 @@ def settings_of(*rows: tuple[str, str]) -> Callable[[options.Command], options.C
 @options.prosody
 @options.cooccurrence
 @options.mapping
+@options.strict_bml
 @settings_of(("grace", "N"), ("keep", "N"), ("drain", "N"), *((name, "N") for name in LIMITS))
 @click.option("--config", type=options.FILE, help="TOML file of settings: fps = 30 means --fps 30.")
 def serve(config: Path | None, **flags: Any) -> None:

@@ -26,6 +26,7 @@ class PlayOptions:
         prosody: whether nods, brows, blinks and glances accompany speech; needs `idle`.
         mapping: file that maps AUs to FAPs and overrides the face's mapping.
         grace: seconds by which a behaviour may come too late for its references into other blocks.
+        strict_bml: whether documents are read as BML 1.0 only, without dialects.
 
     Raises:
         ValueError: `fps` is not a number above 0.
@@ -44,6 +45,7 @@ class PlayOptions:
     prosody: bool = True
     mapping: Path | None = None
     grace: float = 0.5
+    strict_bml: bool = False
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.fps) and self.fps > 0):

@@ -284,6 +284,7 @@ class Settings:
     )
     prosody: bool = _row(True, _flag, "nods, brows, blinks and glances that accompany speech: on or off")
     mapping: Path | None = _row(None, _file, "file that maps AUs to FAPs; none: each face's own mapping")
+    strict_bml: bool = _row(False, _flag, "read documents as BML 1.0 only, without dialects")
     grace: float = _row(
         0.5,
         _real(0, 60),

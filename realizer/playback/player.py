@@ -76,6 +76,7 @@ class Player(BlockManager):
         )
         self.idle = options.idle
         self.prosody = options.prosody
+        self.strict_bml = options.strict_bml
         self.history = history
         self.rules = load_rules(options.cooccurrence)
 

@@ -182,6 +182,7 @@ def test_speech_text_keeps_its_language() -> None:
         ("<text><sync/></text>", "id: wanted a name"),
         ("<text>a <b>c</b></text>", "wanted text and <sync>, got <b>"),
         ("Hello", 'wanted elements, got the text "Hello", put it into <text>'),
+        ("<text/>Hello", 'wanted elements, got the text "Hello", put it into <text>'),
         ("<txt>Hello</txt>", "wanted <text>, got <txt>"),
     ],
 )

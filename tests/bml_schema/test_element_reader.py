@@ -33,6 +33,13 @@ def described(description: str) -> Block:
     return only(f"<head id='h' lexeme='NOD'>{description}</head>")
 
 
+def test_description_needs_a_priority_in_strict_bml() -> None:
+    text = "<bml id='b'><head id='h' lexeme='NOD'><description type='x'/></head></bml>"
+    assert [d.priority for d in parse(text)["h"].descriptions] == [1]
+    (problem,) = parse(text, strict_bml=True).problems
+    assert problem.text == "priority: wanted a whole number -2147483648..2147483647, got none"
+
+
 def test_description_of_any_type_is_kept_as_text() -> None:
     block = described(
         '<description priority="1" type="x/y"> a &lt; <q xmlns="urn:q" k="1"><r/></q> b </description>'
@@ -51,7 +58,7 @@ def test_description_of_ssml_is_exactly_the_speak_element() -> None:
 @pytest.mark.parametrize(
     ("description", "said"),
     [
-        ("<description type='x'/>", "priority: wanted a whole number"),
+        ("<description priority='one' type='x'/>", "priority: wanted a whole number"),
         ("<description priority='1'/>", "type: wanted a word, got none"),
         ("<description priority='high' type='x'/>", 'got "high"'),
         ("<description priority='1' type='application/ssml+xml'>Hi</description>", "wanted one <speak>"),

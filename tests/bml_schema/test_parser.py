@@ -38,12 +38,12 @@ def test_parser_reads_composition_in_any_case(word: str) -> None:
 
 
 def test_parser_takes_an_unknown_composition_as_merge_with_a_problem() -> None:
-    block = only("<wait id='w'/>", "id='b' composition='BLEND'")
+    block = only("<wait id='w'/>", "id='b' composition='SIDEWAYS'")
     assert block.composition == "MERGE"
     assert len(block.behaviours) == 1
     (problem,) = block.problems
     assert (problem.id, problem.type, problem.fatal) == ("b", "PARSING_FAILURE", False)
-    assert problem.text == 'composition: wanted MERGE, APPEND or REPLACE, got "BLEND"; taken as MERGE'
+    assert problem.text == 'composition: wanted MERGE, APPEND or REPLACE, got "SIDEWAYS"; taken as MERGE'
 
 
 LISTS = {

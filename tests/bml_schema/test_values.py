@@ -73,10 +73,14 @@ def test_integer_is_digits_in_range(text: str) -> None:
         integer(1, 100).read(text)
 
 
-def test_one_of_is_case_sensitive_by_default() -> None:
+def test_one_of_is_case_sensitive_and_folds_on_request() -> None:
     with pytest.raises(ValueError, match="left"):
         one_of("LEFT", "RIGHT").read("left")
-    assert one_of("LEFT", "RIGHT", any_case=True).read("left") == "LEFT"
+    assert one_of("LEFT", "RIGHT").fold("left") == "LEFT"
+    assert one_of("linear", "instant").fold("Linear") == "linear"
+    assert flag.fold("TRUE") is True
+    assert one_of("LEFT", "RIGHT").fold("up") is None
+    assert string.fold("x") is None
     assert one_of("LEFT", "RIGHT", "BOTH").wanted == "LEFT, RIGHT or BOTH"
     assert one_of("ONLY").wanted == "ONLY"
 

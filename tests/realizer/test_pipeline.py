@@ -119,7 +119,7 @@ def test_play_passes_the_golden_values_between_steps(
 
     builder = block_planner._PlanBuilder
     run_read = pipeline.read
-    monkeypatch.setattr(pipeline, "read", lambda *args: list(run_read(*args)))
+    monkeypatch.setattr(pipeline, "read", lambda *args, **options: list(run_read(*args, **options)))
     note("parse", pipeline, "read", read)
     note("time", builder, "time", lambda _, own: {b: rounded(t.preferred) for b, t in own.timings.items()})
     note("schedule", builder, "schedule", lambda got, *_: {b: rounded(t) for b, t in got[0].times.items()})

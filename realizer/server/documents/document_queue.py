@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from math import inf
 
-from bml_schema import Block, BMLError, BMLSizeError, Speech, read
+from bml_schema import Block, BMLError, BMLSizeError, Speech, made_ids, read
 from realizer.behaviours.registry import VOCABULARY
 from realizer.core.settings import Settings, limit_hint
 from realizer.playback.feedback_events import parse_warning
@@ -37,6 +37,7 @@ class DocumentQueue:
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
         self._unread: deque[Iterator[Block | BMLError]] = deque()
+        self._block_ids = made_ids()  # for documents of dialects that have none
         self._received = 0  # number of the last message
         self._all_cancelled = 0  # all blocks up to this message are cancelled
         self._cancelled: dict[str, int] = {}  # id of a block -> cancelled up to this message
@@ -53,7 +54,14 @@ class DocumentQueue:
         if (too_large := size_error(text, limits)) is not None:
             return Warning(block_id_of(text), "PARSING_FAILURE", too_large)
         self._unread.append(
-            read(text, VOCABULARY, max_bytes=limits.max_document, max_behaviours=limits.max_behaviours)
+            read(
+                text,
+                VOCABULARY,
+                max_bytes=limits.max_document,
+                max_behaviours=limits.max_behaviours,
+                strict_bml=limits.strict_bml,
+                block_ids=self._block_ids,
+            )
         )
         self._received += 1
         return None

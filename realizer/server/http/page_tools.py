@@ -40,7 +40,14 @@ def lint(text: str, settings: Settings) -> str:
         return json.dumps({"faults": [], "skipped": words})
     source = Source(text)
     findings: list[Finding] = []
-    player = Player(PlayOptions(idle=False, media=settings.media, expressions=settings.expressions))
+    player = Player(
+        PlayOptions(
+            idle=False,
+            media=settings.media,
+            expressions=settings.expressions,
+            strict_bml=settings.strict_bml,
+        )
+    )
     for part in check_document("document", source, text, player):
         findings += part.findings
         if part.block is not None and part.schedule is not None:

@@ -188,7 +188,6 @@ BROKEN = {
     "entity": ("<speech id='s'><text>a&nbsp;b</text></speech></bml>", ["&nbsp;"]),
     "ampersand": ("<speech id='s'><text>a & b</text></speech></bml>", ["&"]),
     "twice": ("<head id='a' id='b'/></bml>", ["id", "a"]),
-    "prefix": ("<no:such/></bml>", ["no:such"]),
     "open": ("<speech id='s'>", [">", "speech"]),
 }
 
@@ -269,7 +268,7 @@ def test_check_gives_advice_on_likely_mistakes(case: str, tmp_path: Path) -> Non
     "text",
     [
         '<head id="h" lexeme="NOD" xmlns:o="urn:o" o:amont="1" start="60"/>',
-        '<gaze id="g" target="cup" xmlns:a="http://www.asap-project.org/bmla" a:x="1"/>'
+        '<gaze id="g" target="user" xmlns:a="http://www.asap-project.org/bmla" a:x="1"/>'
         '<speech id="s"><text>Hello</text></speech>',
         '<head id="h" lexeme="NOD" stroke="1"/><face id="f" start="0" end="4"><faceFacs au="1"/></face>',
     ],
@@ -375,3 +374,12 @@ def test_check_ignores_words_of_a_text_that_a_description_replaces(tmp_path: Pat
     ssml = '<description priority="1" type="application/ssml+xml"><speak>Something else</speak></description>'
     said = HEAD + f'<speech id="s"><text>Nonsense.</text>{ssml}</speech></bml>'
     assert "without anger" not in check(tmp_path, said).stderr
+
+
+def test_check_says_how_a_dialect_was_read_and_its_faults_in_strict_bml(tmp_path: Path) -> None:
+    text = '<bml id="b"><head id="h" type="NOD"/><faceFacs id="f" au="4" side="left"/></bml>'
+    (told,) = check(tmp_path, text).stdout.splitlines()
+    assert """NOT_BML_1_0 b: line 1, /bml: read as SmartBody's BML: <head type="NOD"> as lexeme=NOD""" in told
+    head, face = check(tmp_path, text, "--strict-bml").stdout.splitlines()
+    assert "b:h: line 1, /bml/head[1]: lexeme: wanted a word, got none" in head
+    assert "b:f: line 1, /bml/faceFacs[1]: side: wanted LEFT, RIGHT or BOTH" in face

@@ -199,3 +199,29 @@ def test_realize_refuses_visemes_except_for_fap_files(tmp_path: Path) -> None:
         assert done.exit_code == status
         assert path.exists() == (status == 0)
         assert ("wanted a .fap file" in done.stderr) == (status == 2)
+
+
+DIALECT = '<act><bml><head type="NOD"/></bml></act>'
+
+
+@pytest.mark.parametrize("command", ["realize", "schedule"])
+def test_strict_bml_refuses_what_is_read_as_a_dialect_otherwise(tmp_path: Path, command: str) -> None:
+    document = tmp_path / "d.bml"
+    document.write_text(DIALECT)
+    lenient = CliRunner().invoke(cli, [command, str(document), "--strict"], standalone_mode=False)
+    assert lenient.return_value == 0
+    assert "unnamed1: NOT_BML_1_0" in lenient.stderr
+    for options, variables in ((["--strict-bml"], {}), ([], {"REALIZER_STRICT_BML": "1"})):
+        strict = CliRunner().invoke(
+            cli, [command, str(document), *options], env=variables, standalone_mode=False
+        )
+        assert strict.return_value == 1
+        assert "id: wanted one, got none" in strict.stderr
+
+
+def test_schedule_writes_a_dialect_as_bml_1_0(tmp_path: Path) -> None:
+    document = tmp_path / "d.bml"
+    document.write_text(DIALECT)
+    written = CliRunner().invoke(cli, ["schedule", str(document), "--bml"], standalone_mode=False).stdout
+    assert 'id="unnamed1"' in written
+    assert '<head id="head1" lexeme="NOD" start="0"' in written

@@ -58,7 +58,9 @@ def prepare(task: Task, settings: Settings) -> FAPClip | Script | None:
             script = text if "<" in text else unescape(text)
             if (large := size_error(script, settings)) is not None:
                 raise RealizerError(large)
-            items = list(read(script, VOCABULARY, max_bytes=settings.max_document))
+            items = list(
+                read(script, VOCABULARY, max_bytes=settings.max_document, strict_bml=settings.strict_bml)
+            )
             blocks = tuple(item.id for item in items if isinstance(item, Block))
             if not blocks:
                 wrong = next((str(item) for item in items if isinstance(item, BMLError)), "nothing")

@@ -210,3 +210,19 @@ def test_submission_drops_the_gaze_of_a_newer_block_whatever_the_voice_takes() -
     driver.say(driver.spoken[0].id, spoken())
     warnings = [f.id for f in driver.run(5.0).feedback if isinstance(f, WarningFeedback)]
     assert warnings == ["b:g"]
+
+
+def test_document_queue_gives_ids_to_blocks_of_dialects_that_no_other_has() -> None:
+    documents = DocumentQueue(Settings())
+    for _ in range(2):
+        documents.put('<act><bml><head type="NOD"/></bml></act>')
+    found = [documents.next(), documents.next()]
+    assert [block.id for block in found if isinstance(block, Block)] == ["unnamed1", "unnamed2"]
+
+
+def test_document_queue_reads_bml_1_0_only_in_strict_bml() -> None:
+    documents = DocumentQueue(Settings(strict_bml=True))
+    documents.put('<act><bml><head type="NOD"/></bml></act>')
+    refused = documents.next()
+    assert isinstance(refused, Warning)
+    assert "id: wanted one, got none" in refused.text

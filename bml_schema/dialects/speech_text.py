@@ -1,0 +1,118 @@
+"""The text of a speech in a dialect: words beside the elements, and other names for <sync>."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from lxml import etree
+
+from bml_schema.dialects.table import Row, table
+from bml_schema.dialects.values import language_tag
+from bml_schema.node_schema import local
+
+_LANGUAGE = "{http://www.w3.org/XML/1998/namespace}lang"
+_MARKS = {"sync": "id", "tm": "id", "mark": "name"}
+
+
+def translate_speech(speech: Any, apply: Callable[[Row], None], *, words: bool) -> None:
+    """Put the words of a <speech> into its <text>, and read <tm> and <mark> as <sync>.
+
+    Args:
+        apply: takes the rows of the table that were used.
+        words: also if there are only words, which are a fault of a document in no dialect.
+    """
+    elements = table().elements
+    text = next((child for child in speech if local(str(child.tag)) == "text"), None)
+    if text is not None:
+        if _is_marked(text):
+            apply(elements["text"])
+            _rewrite(text, text, apply)
+        return
+    words = words and any(part and not part.isspace() for part in (speech.text, *(c.tail for c in speech)))
+    inside = (e for child in speech if local(str(child.tag)) != "description" for e in child.iter())
+    marked = any(local(str(element.tag)) in _MARKS for element in inside)
+    if not (words or marked or speech.get("text", "").strip()):
+        return
+    apply(elements["speech"])
+    text = etree.Element(str(speech.tag).replace("speech", "text"))
+    text.sourceline = speech.sourceline
+    kept = [child for child in speech if local(str(child.tag)) == "description"]
+    _rewrite(text, speech, apply)
+    if tag := language_tag(speech.get("language") or speech.get("lang") or ""):
+        text.set(_LANGUAGE, tag)
+    del speech[:]
+    speech.text = None
+    for child in (text, *kept):
+        child.tail = None
+        speech.append(child)
+
+
+def _rewrite(text: Any, source: Any, apply: Callable[[Row], None]) -> None:
+    """Give a <text> the words and marks of an element."""
+    content = _Content(str(text.tag).replace("text", "sync"), apply)
+    content.add_text(source.text)
+    for child in source:
+        if local(str(child.tag)) != "description":
+            content.add(child)
+        content.add_text(child.tail)
+    if content.is_empty:
+        content.add_text(source.get("text"))
+    content.write(text)
+
+
+def _is_marked(text: Any) -> bool:
+    return any(local(str(child.tag)) in ("tm", "mark") for child in text)
+
+
+class _Content:
+    """Words and syncs in order."""
+
+    def __init__(self, tag: str, apply: Callable[[Row], None]) -> None:
+        self.tag = tag
+        self.apply = apply
+        self.parts: list[str | Any] = []
+        self.ids: set[str] = set()
+
+    @property
+    def is_empty(self) -> bool:
+        return not any(isinstance(part, str) and part.strip() for part in self.parts)
+
+    def add_text(self, text: str | None) -> None:
+        if text:
+            self.parts.append(text)
+
+    def add(self, element: Any) -> None:
+        """Add an element: a mark as a sync, any other as the words inside it."""
+        name = local(str(element.tag))
+        row = table().elements.get(name)
+        if row is not None:
+            self.apply(row)
+        if name in _MARKS:
+            id = element.get(_MARKS[name], "").strip().rpartition(":")[2]
+            if id and id not in self.ids:
+                self.ids.add(id)
+                sync = etree.Element(self.tag, {k: v for k, v in element.items() if k == "ref"})
+                sync.set("id", id)
+                sync.sourceline = element.sourceline
+                self.parts.append(sync)
+        elif row is None or row.becomes != "-":
+            self.add_text(element.text)
+            for child in element:
+                self.add(child)
+                self.add_text(child.tail)
+
+    def write(self, text: Any) -> None:
+        """Replace the content of <text>."""
+        del text[:]
+        text.text = ""
+        last = None
+        for part in self.parts:
+            if not isinstance(part, str):
+                text.append(part)
+                last = part
+                last.tail = ""
+            elif last is None:
+                text.text += part
+            else:
+                last.tail += part

@@ -1,0 +1,99 @@
+"""The table of dialects: what their elements, attributes and values become in BML 1.0 (`rows.csv`).
+
+Columns:
+
+    dialect    whose word it is: SmartBody, Greta, draft, or any
+    element    its local name; with the prefix sbm: only in SmartBody's namespace; * for every behaviour
+    attribute  "" in the row of the element itself; sbm: is optional
+    value      a pattern, in any case; "" for any value, (none) if the element lacks the attribute
+    becomes    of an element: another name, with attributes behind ": ", or - to remove it, or "" if it stays
+               of an attribute: another name, - to remove it, ! to remove the element, name=value;name=value,
+               @function of `values`, or a|b: the first sync point that the element has; with another name of
+               the element in front of ": " if it changes too
+    says       what a reader should know besides
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Mapping, Sequence
+from fnmatch import translate
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+__all__ = ["Row", "Table", "table"]
+
+FILE = Path(__file__).with_name("rows.csv")
+MISSING = "(none)"
+
+
+class Row(NamedTuple):
+    """One row of the table."""
+
+    dialect: str
+    element: str
+    attribute: str
+    value: str
+    becomes: str
+    says: str
+
+    @property
+    def name(self) -> str:
+        """The element, attribute or value, as a message names it."""
+        inside = " ".join(filter(None, (self.element, self.attribute)))
+        return f'<{inside}="{self.value}">' if self.value not in ("", MISSING) else f"<{inside}>"
+
+
+class Table(NamedTuple):
+    """The rows, by what they are about.
+
+    Attributes:
+        rows: all, in order.
+        elements: name -> its row.
+        attributes: element -> attribute without prefix -> (pattern of the value or None, row), in order.
+        missing: element -> the rows for attributes that it lacks.
+        points: name of a sync point, as it is or in lower case without - and _ -> its row.
+    """
+
+    rows: Sequence[Row]
+    elements: Mapping[str, Row]
+    attributes: Mapping[str, Mapping[str, Sequence[tuple[re.Pattern[str] | None, Row]]]]
+    missing: Mapping[str, Sequence[Row]]
+    points: Mapping[str, Row]
+
+
+def point_row(name: str) -> Row | None:
+    """Return the row of a sync point, or None."""
+    points = table().points
+    return points.get(name) or points.get(squeezed(name))
+
+
+def squeezed(point: str) -> str:
+    """Return the name of a sync point in lower case without - and _."""
+    return point.replace("_", "").replace("-", "").lower()
+
+
+@cache
+def table() -> Table:
+    """Return the table."""
+    lines = [line for line in FILE.read_text("utf-8").splitlines() if not line.startswith("#")]
+    rows = [Row(*cells) for cells in csv.reader(lines[1:])]
+    elements: dict[str, Row] = {}
+    attributes: dict[str, dict[str, list[tuple[re.Pattern[str] | None, Row]]]] = {}
+    missing: dict[str, list[Row]] = {}
+    points: dict[str, Row] = {}
+    for row in rows:
+        if "|" in row.becomes:
+            points[row.attribute] = row
+            points.setdefault(squeezed(row.attribute), row)
+        elif not row.attribute:
+            elements.setdefault(row.element, row)
+        elif row.value == MISSING:
+            missing.setdefault(row.element, []).append(row)
+        else:
+            pattern = re.compile(translate(row.value), re.IGNORECASE) if row.value else None
+            of_element = attributes.setdefault(row.element, {})
+            of_element.setdefault(row.attribute.rpartition(":")[2], []).append((pattern, row))
+    return Table(rows, elements, attributes, missing, points)

@@ -1,0 +1,107 @@
+"""Values of dialects that take more than a row of the table: functions (element, value) -> attributes.
+
+They return None to leave the value as it is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from lxml import etree
+
+from bml_schema.behaviours import DIRECTIONS
+from bml_schema.values import NUMBER, decimal
+
+Attributes = Mapping[str, str]
+
+_JOINTS = ("EYES", "HEAD", "NECK", "CHEST", "BACK")
+_OTHER_JOINTS = {
+    "OPTICAL": "EYES",
+    "CRANIAL": "HEAD",
+    "CERVICAL": "NECK",
+    "THORAX": "CHEST",
+    "LUMBAR": "BACK",
+}
+_INFLUENCES = {"CHEST": "SHOULDER", "BACK": "WAIST"}
+_ORIENTATIONS = {
+    **{name: name for name in ("LEFT", "RIGHT", "UP", "DOWN")},
+    **{f"{y}{x}": f"{y}_{x}" for y in ("UP", "DOWN") for x in ("LEFT", "RIGHT")},
+    "ROLLLEFT": "TILT_LEFT",
+    "ROLLRIGHT": "TILT_RIGHT",
+}
+_POLAR = ("RIGHT", "UPRIGHT", "UP", "UPLEFT", "LEFT", "DOWNLEFT", "DOWN", "DOWNRIGHT")
+_LANGUAGES = {
+    "english": "en",
+    "french": "fr",
+    "german": "de",
+    "italian": "it",
+    "japanese": "ja",
+    "spanish": "es",
+}
+_MOST_STROKES = 100
+
+
+def _number(text: str | None, default: float = 0.0) -> float:
+    text = (text or "").strip()
+    return float(text) if len(text) < 40 and NUMBER.fullmatch(text) else default
+
+
+def _word(text: str) -> str:
+    return "".join(c for c in text.upper() if c.isalpha())
+
+
+def amount(element: etree._Element, value: str) -> Attributes | None:
+    size = _number(value, 0.5)
+    return None if 0 <= size <= 1 else {"amount": decimal(min(abs(size), 1.0))}
+
+
+def repeats(element: etree._Element, value: str) -> Attributes:
+    return {"repetition": str(max(1, min(_MOST_STROKES, round(_number(value, 1)))))}
+
+
+def toss(element: etree._Element, value: str) -> Attributes:
+    return {"lexeme": "TILT_LEFT" if _number(element.get("amount")) >= 0 else "TILT_RIGHT"}
+
+
+def parameterized(element: etree._Element, value: str) -> Attributes:
+    return {"lexeme": "TILT_LEFT" if _number(element.get("x")) <= 0 else "TILT_RIGHT"}
+
+
+def orient(element: etree._Element, value: str) -> Attributes:
+    return {"lexeme": _ORIENTATIONS.get(_word(element.get("direction") or ""), "UP")}
+
+
+def direction(element: etree._Element, value: str) -> Attributes | None:
+    word = _word(value)
+    known = word in DIRECTIONS and not (value.upper() == word and "direction" not in element.attrib)
+    return {"offsetDirection": word} if known else None
+
+
+def joints(element: etree._Element, value: str) -> Attributes:
+    named = [_OTHER_JOINTS.get(word, word) for word in value.upper().split()]
+    found = [joint for joint in _JOINTS if joint in named]
+    return {"influence": _INFLUENCES.get(found[-1], found[-1])} if found else {}
+
+
+def saccade(element: etree._Element, value: str) -> Attributes:
+    steps = round(_number(value) / 45) % len(_POLAR)
+    size = min(_number(element.get("magnitude"), 15.0), 90.0)
+    return {"offsetDirection": _POLAR[steps], "offsetAngle": decimal(math.fabs(size))}
+
+
+def au(element: etree._Element, value: str) -> Attributes:
+    return {"au": value.strip()[2:].strip(" _")}
+
+
+def language_tag(name: str) -> str:
+    """Return the BCP-47 tag of a language, or ""."""
+    name = name.strip()
+    head, *_ = name.split("-")
+    return _LANGUAGES.get(name.lower(), name if head.isalpha() and len(head) in (2, 3) else "")
+
+
+FUNCTIONS: Final[Mapping[str, Callable[[etree._Element, str], Attributes | None]]] = {
+    f.__name__: f for f in (amount, repeats, toss, parameterized, orient, direction, joints, saccade, au)
+}

@@ -1,0 +1,85 @@
+"""Tests of the table of dialects."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from bml_schema.dialects.table import MISSING, Row, squeezed, table
+from bml_schema.dialects.values import FUNCTIONS
+from bml_schema.node_schema import local, schema_of
+from bml_schema.vocabulary import VOCABULARY
+
+ROWS = table().rows
+CLASSES = {local(tag): cls for tag, cls in VOCABULARY.items()}
+# Elements that are children of behaviours, or around documents.
+OTHERS = {"sync", "text", "description", "bml"}
+
+
+def named(row: Row) -> str:
+    return "-".join(row[:4])
+
+
+def test_table_has_each_row_once() -> None:
+    keys = [row[1:4] for row in ROWS]
+    assert sorted(keys) == sorted(set(keys))
+    assert {row.dialect for row in ROWS} == {"SmartBody", "Greta", "draft", "any"}
+
+
+@pytest.mark.parametrize("row", ROWS, ids=named)
+def test_table_row_becomes_something_known(row: Row) -> None:
+    tag, _, becomes = row.becomes.rpartition(": ")
+    element = tag.rpartition(":")[2] or row.element.rpartition(":")[2]
+    if not row.attribute:
+        target = (tag or becomes).rpartition(":")[2]
+        assert target in {"", "-", "{value}", "sync", *CLASSES}
+        return
+    if becomes.startswith("@"):
+        assert becomes[1:] in FUNCTIONS
+        assert row.says, "functions are told in words"
+    elif "|" in becomes:
+        points = {point for cls in CLASSES.values() for point in cls.sync_points}
+        assert set(becomes.split("|")) <= points
+    elif becomes not in ("", "-", "!"):
+        names = [part.partition("=")[0] for part in becomes.split(";")]
+        renamed = {r.element: r.becomes.rpartition(": ")[0] or r.becomes for r in ROWS if not r.attribute}
+        element = renamed.get(element, element).rpartition(":")[2] or element
+        known = CLASSES.get(element)
+        if element not in OTHERS:
+            assert known is not None
+            assert set(names) <= {*schema_of(known).attributes, *known.sync_points}
+
+
+@pytest.mark.parametrize("row", [r for r in ROWS if r.attribute and r.element in CLASSES], ids=named)
+def test_table_leaves_bml_1_0_as_it_is(row: Row) -> None:
+    known = schema_of(CLASSES[row.element]).attributes.get(row.attribute)
+    if known is None or row.value == MISSING:
+        return
+    assert row.value or row.dialect == "any", "a whole attribute of BML 1.0 has another meaning in no dialect"
+    words = known.value.words or (
+        "NOD",
+        "SHAKE",
+        "TILT",
+        "TILT_LEFT",
+        "SMILE",
+        "JOY",
+        "RAISE_BROWS",
+        "SURPRISE",
+    )
+    patterns = table().attributes[row.element][row.attribute]
+    pattern = next(pattern for pattern, other in patterns if other is row)
+    if pattern is not None and row.value != "*:*":
+        assert not [word for word in words if pattern.fullmatch(word)]
+
+
+@pytest.mark.parametrize("point", ["stroke_start", "stroke-start", "strokestart", "strokeStart"])
+def test_squeezed_points_are_alike_however_they_are_spelled(point: str) -> None:
+    assert table().points[squeezed(point)].becomes.startswith("strokeStart|")
+
+
+def test_table_names_rows_for_messages() -> None:
+    names = [row.name for row in ROWS]
+    assert "<head repeats>" in names
+    assert '<head type="NOD">' in names
+    assert all(re.fullmatch(r"<[^<>]+>", name) for name in names)

@@ -1,0 +1,263 @@
+"""Tests of documents in dialects, and of each row of the table."""
+
+from __future__ import annotations
+
+import re
+from itertools import islice
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import pytest
+from lxml import etree
+
+from bml_schema import CORE, Block, BMLError, Gaze, Head, made_ids, parse, read, write
+from bml_schema.dialects.table import MISSING, Row, table
+from bml_schema.dialects.translator import is_core, translate
+from bml_schema.node_schema import local
+from bml_schema.undeclared_prefixes import SMARTBODY
+from bml_schema.vocabulary import VOCABULARY
+from realizer.core.options import PlayOptions
+from realizer.pipeline import plan
+from realizer.playback.player import Player
+from realizer.speech.silent import SilentVoice
+
+DOCUMENTS = Path(__file__).parents[2] / "dialect_documents"
+WRAPPERS = {"act", "participant", "fml-apml", "fml"}
+ROWS = [row for row in table().rows if row.element not in WRAPPERS]
+# Behaviours that need more than an id.
+NEEDS = {
+    "head": 'lexeme="NOD"',
+    "gesture": 'lexeme="BEAT"',
+    "face": 'type="facs" au="1"',
+    "faceLexeme": 'lexeme="SMILE"',
+    "faceFacs": 'au="1"',
+    "lexeme": 'lexeme="SMILE"',
+    "facs": 'au="1"',
+    "gaze": 'target="x"',
+    "gazeShift": 'target="x"',
+    "headDirectionShift": 'target="x"',
+    "locomotion": 'target="x"',
+    "pointing": 'target="x"',
+    "sbm:interrupt": 'act="A"',
+    "saccade": 'direction="45"',
+    "description": 'type="x"',
+}
+# Values that fit an attribute without a pattern; 1 for the rest.
+VALUES = {
+    "direction": "LEFT",
+    "sbm:joint-range": "EYES",
+    "target": "x",
+    "lexeme": "SMILE",
+    "shape": "raise",
+    "influence": "EYES",
+    "modality": "EYES",
+    "offsetDirection": "UP_LEFT",
+    "offsetdirection": "up_left",
+    "amount": "-0.2",
+    "orientation": "UP",
+    "character": "Greta",
+    "text": "Hello",
+    "act": "A",
+}
+
+
+def named(row: Row) -> str:
+    return "-".join(row[:4])
+
+
+def sample(row: Row) -> str:
+    """Return a document in which a row of the table has its element, attribute and value."""
+    strange = {"relax": "gazeShift", "attackPeak": "head", "attack_peak": "head", "priority": "head"}
+    element = strange.get(row.attribute, "face") if row.element == "*" else row.element
+    given = {}
+    if row.attribute and row.value != MISSING:
+        value = row.value.replace("?*", "_1").replace("*", "1" if "AU" in row.value else "")
+        value = {"*": "SMILE" if element != "head" else "TILT", "*:*": "s:end"}.get(row.value, value)
+        given[row.attribute.replace("*", "0")] = value or VALUES.get(row.attribute, "1")
+    if row.element == "*" and not row.attribute:
+        given["start"] = "after(s:end)"
+    if element == "bml":
+        text = "".join(f" {n}={quoteattr(v)}" for n, v in given.items())
+        return f'<act><bml id="b" xmlns:xsi="x"{text}><head type="NOD"/></bml></act>'
+    drafted = row.element == "face" and row.dialect == "draft"
+    needs = "" if row.value == MISSING or drafted else NEEDS.get(element, "")
+    needs = " ".join(n for n in re.findall(r'\S+=".*?"', needs) if n.partition("=")[0] not in given)
+    text = "".join(f" {n}={quoteattr(v)}" for n, v in given.items())
+    if drafted and row.attribute == "type" and row.value != "*":
+        text += ' shape="raise"'
+    inside = f'<{element} id="e" {needs}{text}/>'
+    if element == "face" and row.attribute == "overshoot":
+        inside = f'<face id="e"{text}><lexeme lexeme="SMILE"/></face>'
+    if element in ("lexeme", "facs"):
+        inside = f'<face id="f"><{element} {needs}{text}/></face>'
+    if element in ("tm", "mark", "pitchaccent", "boundary"):
+        inside = f'<speech id="s0">a <{element} id="m" name="m"/>b</speech>'
+    if element == "text":
+        inside = '<speech id="s0"><text>a <tm id="m"/>b</text></speech>'
+    if element == "speech":
+        inside = f'<speech id="e"{text}>Hello</speech>' if row.attribute != "text" else f"<speech{text}/>"
+    if element == "description":
+        inside = f'<head id="e" lexeme="NOD"><description{text} {needs}/></head>'
+    speech = '<speech id="s"><text>Hello</text></speech>'
+    start = f'<act><bml id="b" xmlns:sbm="{SMARTBODY}" xmlns:xsi="x">'
+    return f'{start}{speech}{inside}<head type="NOD"/></bml></act>'
+
+
+@pytest.mark.parametrize("row", ROWS, ids=named)
+def test_translate_uses_each_row_and_drops_nothing(row: Row) -> None:
+    document = sample(row)
+    (block,) = read(document)
+    assert isinstance(block, Block), document
+    assert [p.type for p in block.problems] == ["NOT_BML_1_0"], [p.text for p in block.problems]
+    plain: etree._Element = etree.fromstring(document)[0]
+    assert row in applied(plain), document
+    assert parse(write(block)) == block
+
+
+def applied(root: etree._Element) -> list[Row]:
+    from bml_schema.dialects.translator import _Translation
+
+    translation = _Translation(root)
+    translation.in_dialect = True
+    translation.run()
+    return list(translation.applied)
+
+
+def documents(dialect: str) -> list[str]:
+    text = (DOCUMENTS / f"{dialect}.txt").read_text("utf-8")
+    return [part for part in re.split(r"\n\s*\n", text) if part.startswith("<")]
+
+
+@pytest.mark.parametrize("dialect", ["smartbody", "greta", "draft"])
+def test_translate_lets_most_documents_play_without_a_loss(dialect: str) -> None:
+    """85 % of documents play without dropping a behaviour that a face can show."""
+    whole, found = 0, documents(dialect)
+    assert len(found) >= 40
+    for document in found:
+        schedules, refused = plan([document], Player(PlayOptions(idle=False)), SilentVoice())
+        whole += not refused and not any(schedule.dropped for schedule in schedules)
+    assert whole >= 0.93 * len(found), f"{whole} of {len(found)}"
+
+
+@pytest.mark.parametrize("dialect", ["smartbody", "greta", "draft"])
+def test_translate_is_off_in_strict_bml(dialect: str) -> None:
+    for document in documents(dialect):
+        for block in read(document, strict_bml=True):
+            if isinstance(block, Block):
+                assert not any(p.type == "NOT_BML_1_0" for p in block.problems)
+
+
+def test_translate_leaves_bml_1_0_alone() -> None:
+    text = f'<bml xmlns="{CORE}" id="b"><head id="h" lexeme="NOD" start="1"/></bml>'
+    root = etree.fromstring(text)
+    before = etree.tostring(root)
+    assert is_core(root)
+    assert translate(root, "", made_ids()) == ""
+    assert etree.tostring(root) == before
+    assert parse(f"<act>{text}</act>".replace("<act>", "").replace("</act>", "")).problems == ()
+
+
+def test_translate_leaves_an_act_with_bml_1_0_alone() -> None:
+    (block,) = read(f'<act><bml xmlns="{CORE}" id="b"><head id="h" lexeme="NOD"/></bml></act>')
+    assert isinstance(block, Block)
+    assert not block.problems
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        '<head id="h" lexeme="NOD" amount="7"/>',
+        '<head lexeme="NOD"/>',
+        '<head id="h"/>',
+        '<gaze id="h"/>',
+        '<gazeShift id="h" target="x" ready="s:nothing"/>',
+        '<head id="h" lexeme="NOD" start="w:stroke"/><wait id="w"/>',
+    ],
+)
+def test_translate_does_not_repair_faults_of_plain_bml(body: str) -> None:
+    for space in ("", f'xmlns="{CORE}" '):
+        block = parse(f'<bml {space}id="b">{body}</bml>')
+        assert block.problems
+        assert all(p.type != "NOT_BML_1_0" for p in block.problems)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '<fml-apml><bml><head id="h" lexeme="NOD"/></bml></fml-apml>',
+        '<!DOCTYPE fml-apml SYSTEM "x.dtd" []><fml-apml><bml><head id="h" lexeme="NOD"/></bml></fml-apml>',
+        '<fml-apml><fml><emotion type="joy"/></fml><bml><head id="h" lexeme="NOD" q:x="1"/></bml></fml-apml>',
+        '<act><bml><head id="h" type="NOD"/></bml></act>',
+        '<bml xmlns="http://www.mindmakers.org/projects/BML"><head id="h" lexeme="NOD"/></bml>',
+        '<bml><head id="h" type="NOD"/></bml>',
+    ],
+)
+def test_translate_gives_an_id_to_a_block_in_a_dialect(text: str) -> None:
+    block = parse(text)
+    assert block.id == "unnamed1"
+    assert block["h"] == Head(id="h", lexeme="NOD")
+    with pytest.raises(BMLError):
+        parse(text, strict_bml=True)
+
+
+def test_translate_gives_different_ids_to_the_documents_of_a_text_and_a_session() -> None:
+    ids = made_ids()
+    one = '<act><bml><head type="NOD"/></bml></act>'
+    found = [*read(f"{one}{one}", block_ids=ids), *read(one, block_ids=ids)]
+    assert [b.id for b in found if isinstance(b, Block)] == ["unnamed1", "unnamed2", "unnamed3"]
+    assert list(islice(made_ids(), 2)) == ["unnamed1", "unnamed2"]
+
+
+def test_translate_gives_ids_to_behaviours_that_no_other_has() -> None:
+    block = parse(
+        '<bml id="b"><head type="NOD"/><head id="head1" type="SHAKE"/><head id="head1" type="TILT"/></bml>'
+    )
+    assert [(n.id, getattr(n, "lexeme", "")) for n in block.behaviours] == [
+        ("head2", "NOD"),
+        ("head1", "SHAKE"),
+        ("head3", "TILT"),
+    ]
+
+
+def test_translate_takes_the_character_of_a_participant() -> None:
+    (block,) = read('<act><participant id="brad" role="actor"/><bml><head type="NOD"/></bml></act>')
+    assert isinstance(block, Block)
+    assert block.character_id == "brad"
+
+
+def test_translate_gives_references_the_points_that_are_meant() -> None:
+    face = '<face id="f" type="facs" au="1" ready="0.4" stroke_end="1"/>'
+    block = parse(
+        f'<bml id="b">{face}<gaze id="g" target="x" stroke="f:ready + 0.1" end="after(f:stroke_end)"/></bml>'
+    )
+    assert {p: str(r) for p, r in block["f"].syncs.items()} == {"attackPeak": "0.4", "relax": "1"}
+    assert {p: str(r) for p, r in block["g"].syncs.items()} == {
+        "ready": "f:attackPeak + 0.1",
+        "end": "f:relax",
+    }
+
+
+def test_translate_says_what_was_read_how() -> None:
+    text = '<bml id="b"><head id="h" type="NOD" repeats="2" velocity="1"/><saccade id="s" mode="talk"/></bml>'
+    (problem,) = parse(text).problems
+    assert (problem.id, problem.type, problem.line, problem.path) == ("b", "NOT_BML_1_0", 1, "/bml")
+    assert problem.text == (
+        'read as SmartBody\'s BML: <head type="NOD"> as lexeme=NOD, '
+        "<head repeats> as repetition: rounded and at least 1, "
+        "without <head velocity>, <saccade mode>"
+    )
+
+
+def test_translate_reads_a_dialect_in_the_namespace_of_bml() -> None:
+    block = parse(f'<bml xmlns="{CORE}" id="b"><gaze id="g" target="x" angle="20" direction="LEFT"/></bml>')
+    assert block["g"] == Gaze(id="g", target="x", offset_angle=20.0, offset_direction="LEFT")
+    assert len(block.problems) == 1
+
+
+def test_translate_keeps_the_lines_of_elements() -> None:
+    block = parse('<bml id="b">\n<face id="f"\n type="facs"\n au="1"/>\n<head id="h"\n type="NOD"/></bml>')
+    assert [place.line for place in block.places.values()] == [2, 5]
+
+
+def test_translate_knows_every_behaviour_of_the_table() -> None:
+    assert {"head", "gaze", "face", "speech"} <= {local(tag) for tag in VOCABULARY}
