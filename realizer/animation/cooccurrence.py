@@ -6,8 +6,6 @@ input changes the output by at most twice as much. Domination is eq. 5.2, 5.5, 5
 opposition eq. 5.10.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import groupby
@@ -16,7 +14,7 @@ from operator import itemgetter
 import numpy as np
 
 from realizer.animation.axis import AU_NAMES
-from realizer.core.array_types import Float32, Index
+from realizer.core.array_types import Bool, Float32, Index
 from realizer.tables.cooccurrence import Rule, Rules, Unit
 
 
@@ -40,8 +38,8 @@ class Terms:
 
     def lower(self, left: Float32, aus: Float32) -> None:
         """Reduce `left` (n_au, n), in place, to what the intensities `aus` (n_au, n) allow."""
-        live = aus.any(axis=1)
-        acting = live[self.rows].any(axis=0) | (self.start[:, 0] > 0)
+        live: Bool = (aus != 0).any(axis=1)
+        acting: Bool = live[self.rows].any(axis=0) | (self.start[:, 0] > 0)
         # A unit that is 0 cannot be reduced, and a rule without movement reduces nothing.
         limited = live[self.units] & acting[self.stronger].all(axis=0).any(axis=0)
         if not limited.any():

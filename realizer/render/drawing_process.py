@@ -1,7 +1,5 @@
 """The child process that draws, and the check of what this machine can draw with."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -17,7 +15,7 @@ from realizer.render.backdrop import channels
 from realizer.render.process_messages import Failed, Open, Pixels, connection
 
 DRAW = "REALIZER_DRAW"  # the variable that names a way of drawing
-PATIENCE = 60.0  # s; the longest answer, a first start that compiles, takes about 10
+PATIENCE = 180.0  # s; a first start compiles for about 10, on a busy machine for more than 60
 
 
 class DrawingProcess:
