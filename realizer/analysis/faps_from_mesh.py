@@ -1,7 +1,5 @@
 """FAPs measured on a deformed mesh."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any

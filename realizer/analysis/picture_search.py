@@ -1,7 +1,5 @@
 """Search for expressions that look like a picture of a face (Wojdel 2005, 3.2.2)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache

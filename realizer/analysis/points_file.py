@@ -1,7 +1,5 @@
 """A reader for files of tracked feature points."""
 
-from __future__ import annotations
-
 import csv
 import math
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Fuzzy recognition of emotions from FAPs (Raouzaiou et al. 2002, section 5)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

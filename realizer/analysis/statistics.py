@@ -1,7 +1,5 @@
 """Emotion profiles from statistics or observations of FAPs (Raouzaiou et al. 2002, 3.3)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from typing import Any
 

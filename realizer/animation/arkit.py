@@ -1,7 +1,5 @@
 """Conversion of AU frames to ARKit: weights of its 52 blend shapes, rotations of head and eyes."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from functools import cache

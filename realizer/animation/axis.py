@@ -1,7 +1,5 @@
 """The columns of animation frames: AUs by side, 68 FAPs, mask channels, mixing order of the AUs."""
 
-from __future__ import annotations
-
 from functools import cache, lru_cache
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Step 5 of the pipeline: sampling channels and blending their layers."""
 
-from __future__ import annotations
-
 from bisect import bisect_left
 from collections.abc import Iterable
 from functools import cache

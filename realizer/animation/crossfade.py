@@ -1,7 +1,5 @@
 """Crossfades from channels to their replacements, without a jump."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Sampling of channels: smooth or linear interpolation between keys, zero outside."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple, TypeVar

@@ -1,7 +1,5 @@
 """Conversion of AU frames to the parameters of a face's deformer."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from realizer.animation.axis import AU_NAMES, axis

@@ -1,7 +1,5 @@
 """Execution of tasks on a Dask cluster."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterable, Iterator
 from itertools import islice

@@ -1,7 +1,5 @@
 """Named documents from files, folders, patterns and lists."""
 
-from __future__ import annotations
-
 import glob
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The worker of tasks, which makes the outputs and the manifest row of each, on any machine the same."""
 
-from __future__ import annotations
-
 import hashlib
 import threading
 from collections.abc import Mapping

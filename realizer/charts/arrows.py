@@ -1,7 +1,5 @@
 """Arrows of a chart: links between sync points, and the slack of orders."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 

@@ -1,7 +1,5 @@
 """Chart data of the blocks that play."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable
 

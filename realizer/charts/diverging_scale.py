@@ -1,7 +1,5 @@
 """A diverging colour scale that is safe for red-green colour blindness."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

@@ -1,7 +1,5 @@
 """The legend of a chart."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 

@@ -1,7 +1,5 @@
 """Links between the sync points of a block: their targets, causes and slack."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """The chart of blocks: a row a behaviour, time from left to right."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

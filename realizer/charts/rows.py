@@ -1,7 +1,5 @@
 """The row of one behaviour: names, gaps in colour, sync points, text."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Sequence

@@ -1,7 +1,5 @@
 """The time axis: positions of times and labelled ticks."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass

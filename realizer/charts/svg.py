@@ -1,7 +1,5 @@
 """A chart as SVG."""
 
-from __future__ import annotations
-
 from xml.sax.saxutils import escape, quoteattr
 
 from realizer.charts.shapes import Box, Path, Picture, Shape, Text, width_of

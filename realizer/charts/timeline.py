@@ -3,8 +3,6 @@
 Plots and the stream `schedule` show this same data.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple

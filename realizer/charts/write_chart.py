@@ -1,7 +1,5 @@
 """Writing of charts to files; the suffix selects the format."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 

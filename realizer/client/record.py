@@ -1,7 +1,5 @@
 """Recording of a block as a film, from the streams of pictures and sound."""
 
-from __future__ import annotations
-
 import asyncio
 import errno
 import io

@@ -1,7 +1,5 @@
 """Streaming speech of a client: text that is sent as it is produced, and the feedback of its syncs."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 from collections.abc import Awaitable, Callable, Coroutine

@@ -1,7 +1,5 @@
 """The synchronous client: an asynchronous one in a thread."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
 from collections.abc import AsyncIterator, Coroutine, Iterator, Mapping

@@ -1,7 +1,5 @@
 """The profiles of the archetypal emotions: our own, the published ones, and those as printed."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cache
 from typing import Literal

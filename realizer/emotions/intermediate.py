@@ -1,7 +1,5 @@
 """Profiles between archetypes (Raouzaiou et al. 2002, section 4)."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Reader and writer for profile files in the format of Paul (2010, 6.3)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from realizer.emotions.profile import Profile

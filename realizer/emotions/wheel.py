@@ -1,7 +1,5 @@
 """Continuous profiles over the emotion wheel, or over valence and arousal."""
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_right
 from functools import cache

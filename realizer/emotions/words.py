@@ -1,7 +1,5 @@
 """Profiles for emotion words."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The expression value: action units, meaning and duration."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The library of expressions by name: templates, lexemes and a user's folder."""
 
-from __future__ import annotations
-
 import difflib
 import logging
 from collections.abc import Iterable, Iterator, Mapping

@@ -1,7 +1,5 @@
 """Search of expressions by words or action units, best match first."""
 
-from __future__ import annotations
-
 import difflib
 import re
 from collections.abc import Iterable, Mapping

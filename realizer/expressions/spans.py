@@ -1,7 +1,5 @@
 """The times of the entries of a timeline."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Timelines: tracks of expressions and a mixer, with checks against a library and a face."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal

@@ -1,7 +1,5 @@
 """A reader for timeline files (TOML or JSON) that reports all faults at once."""
 
-from __future__ import annotations
-
 import difflib
 import json
 import re

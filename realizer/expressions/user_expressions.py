@@ -1,7 +1,5 @@
 """A reader for a folder of user expressions (TOML) that reports all faults at once."""
 
-from __future__ import annotations
-
 import difflib
 import math
 import re

@@ -1,7 +1,5 @@
 """The displacement matrices of a face, read from fields.npz."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Coupling of the inner and outer lip contour in FAP rows."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

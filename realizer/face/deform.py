@@ -1,7 +1,5 @@
 """The deformer: a sparse product for displacements, then rigid parts and eyelids."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The mapping of AUs to FAPs that applies to a face, with a user's file on top."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from pathlib import Path
 

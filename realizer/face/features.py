@@ -1,7 +1,5 @@
 """The MPEG-4 feature points and FAPU of a face (`features.csv`)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A face as a binary glTF 2.0 file: rest mesh, normals, colours, parts."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A writer of GLB files from a glTF 2.0 document and arrays."""
 
-from __future__ import annotations
-
 import json
 import struct
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """Checks of a mesh: holes, flipped triangles, values out of range."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

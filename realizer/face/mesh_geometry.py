@@ -1,7 +1,5 @@
 """Edges, neighbours, normals, mirror images and balls of triangle meshes."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

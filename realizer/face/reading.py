@@ -1,7 +1,5 @@
 """Checked readers of the files in face folders."""
 
-from __future__ import annotations
-
 import tomllib
 import zipfile
 import zlib

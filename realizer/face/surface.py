@@ -1,7 +1,5 @@
 """Normals, and 16-bit quantised vertices for streams."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The check of a face folder: every fault, with its file and what to change."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from difflib import get_close_matches
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """A symmetric decimation of meshes."""
 
-from __future__ import annotations
-
 import heapq
 from typing import Any
 

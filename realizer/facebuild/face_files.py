@@ -1,7 +1,5 @@
 """Writers of the files of a face folder: face.toml, mesh.npz and fields.npz."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Removal of triangle flips from displacement fields."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Advice on expressions that are unusual for people (Wojdel 2005, 6.5)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """The rules that place expressions in sentences (Wojdel 2005, 6.5)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Sentences of a text: words, boundaries and estimated times (Wojdel 2005, 6.4.1)."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass

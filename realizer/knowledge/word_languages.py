@@ -1,7 +1,5 @@
 """The languages of texts and their emotional words."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from dataclasses import dataclass

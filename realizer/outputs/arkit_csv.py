@@ -1,7 +1,5 @@
 """The output .arkit.csv: ARKit weights in the layout of the app Live Link Face."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from realizer.animation.arkit import ARKIT_NAMES, ArkitFrames, arkit

@@ -1,7 +1,5 @@
 """Readers and writers of FAP clips as .fap, .csv and .json files."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -1,7 +1,5 @@
 """The registry of outputs: one row for each suffix that can be written."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from realizer.core.registry import Registry

@@ -1,7 +1,5 @@
 """The output .wav: the sound of a realization (16 bit, mono)."""
 
-from __future__ import annotations
-
 import io
 import wave
 

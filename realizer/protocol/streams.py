@@ -4,8 +4,6 @@ The message models, the binary format, the documentation and the constants of re
 A new stream of numbers needs a row here and a source in `realizer.server.streams.frame_windows`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Binary and JSON encoding of stream frames."""
 
-from __future__ import annotations
-
 import json
 import struct
 from collections.abc import Mapping

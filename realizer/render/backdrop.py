@@ -1,7 +1,5 @@
 """The backdrop behind the head, and compositing over it."""
 
-from __future__ import annotations
-
 import os
 import re
 

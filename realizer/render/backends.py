@@ -1,7 +1,5 @@
 """The drawing backends: OpenGL if there is a graphics card, the processor if not."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from realizer.core.errors import RenderError

@@ -1,7 +1,5 @@
 """Cameras: presets, projection of points to pixels."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

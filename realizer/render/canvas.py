@@ -1,7 +1,5 @@
 """The shaded mesh of a frame, and the canvas that draws it."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A false-colour image of the difference between two pictures."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Highlights on the eyes, as vertices that follow each frame."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The lighting model: normals, colours and a table of lamps to sRGB; the page gets the same table."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass

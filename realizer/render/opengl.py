@@ -1,7 +1,5 @@
 """The OpenGL backend; the only importer of pyrender."""
 
-from __future__ import annotations
-
 import os
 from typing import Any
 

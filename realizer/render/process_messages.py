@@ -1,7 +1,5 @@
 """Messages between the drawing process and its owner, and their shared memory."""
 
-from __future__ import annotations
-
 import mmap
 import os
 import tempfile

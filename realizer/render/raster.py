@@ -1,7 +1,5 @@
 """A triangle rasterizer on the processor; the only importer of numba."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """The software backend, which draws on the processor."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from realizer.core.array_types import UInt8

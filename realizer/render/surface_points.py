@@ -1,7 +1,5 @@
 """Points of a face's skin found under pixels, to follow them as it moves."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from realizer.core.array_types import Float64, Int32

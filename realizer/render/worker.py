@@ -1,7 +1,5 @@
 """The drawing process: poses on stdin, pixels in shared memory, files on stdout."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Iterator, Mapping

@@ -4,8 +4,6 @@ Compression is measured on the shape itself, by two feature points that approach
 appear whatever moves a face: FAPs, action units or shapes.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cache

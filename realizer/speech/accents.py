@@ -1,7 +1,5 @@
 """Detection of the phrases of an utterance and of the accents in them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial

@@ -1,7 +1,5 @@
 """The base class of voices."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 
 from realizer.speech.utterance import SpeechRequest, Utterance

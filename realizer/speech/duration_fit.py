@@ -1,7 +1,5 @@
 """Synthesis to a given duration, by speaking rate and a small time stretch."""
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The base class of voices whose engine runs in a process of its own, and a cache of their utterances."""
 
-from __future__ import annotations
-
 import threading
 from abc import abstractmethod
 from collections.abc import Callable

@@ -11,8 +11,6 @@ earlier requests. If so, the engine is loaded once and each request is served by
 without fork, by a new process). Nothing of the realizer is imported, for a fast start and for the licences.
 """
 
-from __future__ import annotations
-
 import ctypes
 import importlib.util
 import json

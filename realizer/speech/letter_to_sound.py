@@ -1,7 +1,5 @@
 """Vowel units and approximate phonemes of written words, by tables for each language."""
 
-from __future__ import annotations
-
 import re
 import unicodedata
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """The registry of voices."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 

@@ -1,7 +1,5 @@
 """The silent voice, which estimates the times of words, marks and phonemes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from realizer.speech.base_voice import BaseVoice

@@ -1,7 +1,5 @@
 """A buffer that joins pieces of speech into one utterance."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """A parser of SSML: text, marks, breaks and tags."""
 
-from __future__ import annotations
-
 import re
 import unicodedata
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,5 @@
 """Detection of boundaries between words that an engine reports as one."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from itertools import pairwise
 

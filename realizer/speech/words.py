@@ -1,7 +1,5 @@
 """A tokenizer of scripts: words with their places, pauses and marks."""
 
-from __future__ import annotations
-
 import re
 import unicodedata
 from collections.abc import Iterator

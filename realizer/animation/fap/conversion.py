@@ -1,7 +1,5 @@
 """Step 6 of the pipeline: the conversion of AU frames to FAP frames."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

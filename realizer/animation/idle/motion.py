@@ -4,8 +4,6 @@ It is a function of (seed, time) alone. Movements are numbered k = 0, 1, 2, ...,
 depend on (seed, kind, k), so that any two windows of time agree where they overlap.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 It is a function of the seed, of utterances and their start times, and of time, not of the requested frames.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, lru_cache

@@ -1,7 +1,5 @@
 """Random numbers that depend on seed, kind and index alone, and are the same on any machine."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Lip closures: times at which sounds close the lips or bite the lower one."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from realizer.animation.lips.dominance import Track

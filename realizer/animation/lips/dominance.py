@@ -3,8 +3,6 @@
 Source: Cohen & Massaro 1993, "Modeling coarticulation in synthetic visual speech".
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

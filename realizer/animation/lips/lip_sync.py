@@ -1,7 +1,5 @@
 """Lip, jaw and tongue channels from phonemes: dominance functions and hard closures."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any

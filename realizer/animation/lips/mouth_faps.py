@@ -1,7 +1,5 @@
 """The FAPs of lips, jaw and tongue that make a mouth shape."""
 
-from __future__ import annotations
-
 from realizer.animation.lips.visemes import SHAPE, coarticulation
 from realizer.core.array_types import Float64
 

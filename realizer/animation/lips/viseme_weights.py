@@ -1,7 +1,5 @@
 """Weights of MPEG-4 (FAP 1) and Oculus visemes over time."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """Conversion of IPA phonemes to mixtures of MPEG-4 visemes, by articulatory features."""
 
-from __future__ import annotations
-
 import unicodedata
 from dataclasses import dataclass, fields
 from functools import cache, lru_cache

@@ -1,7 +1,5 @@
 """The deformer by action units: displacements of vertices, and the rotation of the jaw."""
 
-from __future__ import annotations
-
 from functools import cached_property, lru_cache
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The text file (TOML) of a fitted model: reader and writer."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any

@@ -4,8 +4,6 @@ Parameters stand in plain arrays: the model evaluates and the fit differentiates
 Coordinates are centimetres from the origin of the motion.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The model of a face's action units: functions that displace any point (Wojdel 2005, chapter 4)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

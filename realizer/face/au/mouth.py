@@ -1,7 +1,5 @@
 """The surface that separates the upper and the lower half of a face at the mouth."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from realizer.core.array_types import Bool, Float64, Int32

@@ -1,7 +1,5 @@
 """The vertices that action units move, and the skin that hair and lashes are attached to."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The successive mixer on a mesh: each unit displaces what the units before it left."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Wojdel's 32 action units: their kinds of movement, and the shapes that measure them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from typing import Literal

@@ -1,7 +1,5 @@
 """Measurements of action units on an imported face, for `faces fit`."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from realizer.core.array_types import Float64

@@ -6,8 +6,6 @@ does on that line. So the FAPs that describe the shape reproduce it, and every p
 alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

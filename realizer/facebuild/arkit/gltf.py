@@ -4,8 +4,6 @@ Our own reader: trimesh leaves morph targets out, and pygltflib returns raw byte
 needs (sparse, normalised and strided accessors) would have to be written anyway.
 """
 
-from __future__ import annotations
-
 import base64
 import binascii
 import io

@@ -1,7 +1,5 @@
 """The import of a GLB head with ARKit blend shapes into a face folder, with a report."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any

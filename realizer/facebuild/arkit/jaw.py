@@ -1,7 +1,5 @@
 """The jaw joint and its vertex weights, found from the shape of an opening jaw."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from realizer.core.array_types import Float64

@@ -1,7 +1,5 @@
 """Coordinates around the mouth: along, across, above and below."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise

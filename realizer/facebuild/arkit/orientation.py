@@ -1,7 +1,5 @@
 """Rotation, scale and centre of an imported head, found from what its shapes move."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A classifier of a mesh's parts, by name and by what moves together."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from functools import cache

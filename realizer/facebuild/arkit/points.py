@@ -1,7 +1,5 @@
 """The 84 feature points of an imported head, found by form and by shapes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The surfaces of a glTF scene: vertices, colours and blend shapes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any

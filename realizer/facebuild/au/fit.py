@@ -1,7 +1,5 @@
 """The fit of a face's action unit model to measured displacements (Wojdel 2005, table 4.3)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 

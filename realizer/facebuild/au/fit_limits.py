@@ -5,8 +5,6 @@ table. So no vertex of the face, visible or hidden, may move much further than t
 places between the vertices, where a mesh of another topology may have its own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

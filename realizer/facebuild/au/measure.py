@@ -1,7 +1,5 @@
 """Measurements of action units: a CSV file of landmarks, or the face's own shapes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import astuple, dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Measurements of Wojdel's 22 displacements from the CC0 expression shapes of MakeHuman."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The solver that fits displacement functions to moved points (Wojdel 2005, 4.2.3)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any

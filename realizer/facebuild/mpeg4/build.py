@@ -1,7 +1,5 @@
 """The build of a face's fields.npz from zones of influence."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Collection, Mapping
 from dataclasses import replace

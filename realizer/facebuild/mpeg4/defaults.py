@@ -1,7 +1,5 @@
 """Default parameters of the MPEG-4 deformer for a head without shapes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache

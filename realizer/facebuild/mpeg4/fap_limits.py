@@ -1,7 +1,5 @@
 """The usual range of each FAP: what action units use, or what faces can reach."""
 
-from __future__ import annotations
-
 from functools import cache
 
 from realizer.tables import au_to_fap, faps

@@ -6,8 +6,6 @@ them as far as themselves, without the w that a plain sum makes (Paul 2010, 7.1)
 at the other's feature point, every point moves exactly as its own FAP says, whatever the others do.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """Landmarks that the shape of a head shows by itself, for locating feature points."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ The template's points are carried over: a smooth map takes the places that the t
 lids, profile, mouth corners, ears) to where this head shows them, and each point goes to the nearest skin.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache

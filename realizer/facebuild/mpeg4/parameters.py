@@ -1,7 +1,5 @@
 """The mpeg4.toml of a face folder: reader and writer."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from dataclasses import asdict, fields

@@ -1,7 +1,5 @@
 """The rigid parts of a head: jaw with teeth and tongue, eyeballs, pupils, head and neck."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any

@@ -1,7 +1,5 @@
 """The base mesh with its identity and expression shapes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Meshes of brows and lashes that follow the skin."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

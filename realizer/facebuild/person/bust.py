@@ -1,7 +1,5 @@
 """The assembly of a person's bust from parts, with baked ambient occlusion."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from realizer.core.array_types import Bool, Float64

@@ -1,7 +1,5 @@
 """Clothing cut from and lifted above the body."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

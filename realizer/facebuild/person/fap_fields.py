@@ -3,8 +3,6 @@
 Every field is scaled so that its feature point moves one metre per metre of FAP, in the FAP's direction.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from realizer.core.array_types import Float64

@@ -1,7 +1,5 @@
 """Hair meshes by style: strands from a pole to the hairline and beyond."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any

@@ -1,7 +1,5 @@
 """The eyelids: edges that slide along the eye's opening so that both lids meet."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

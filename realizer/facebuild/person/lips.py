@@ -4,8 +4,6 @@ A place on the lips has two coordinates: u runs from the right corner (-1) over 
 corner (1), w from the inner contour (0: FAPs 4-13) to the outer (1: FAPs 51-60). Every FAP owns a knot.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A person: the base mesh morphed to a recipe, and the measurements on it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache

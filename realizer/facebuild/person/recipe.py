@@ -1,7 +1,5 @@
 """The recipe.toml of a person: shape targets and colours."""
 
-from __future__ import annotations
-
 import difflib
 import math
 import tomllib

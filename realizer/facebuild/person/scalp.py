@@ -1,7 +1,5 @@
 """The scalp: where hair grows, and the height of places above it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Skin colours and baked ambient occlusion."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

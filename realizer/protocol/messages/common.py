@@ -1,7 +1,5 @@
 """Base classes of messages, and types of their fields."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 

@@ -1,7 +1,5 @@
 """Messages of the service: answers, and frames in JSON form."""
 
-from __future__ import annotations
-
 from typing import Any, Literal
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """Control messages of clients, except `speech`."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal
 
 from pydantic import AliasChoices, Field, field_validator

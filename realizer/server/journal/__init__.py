@@ -1,7 +1,5 @@
 """Journals of sessions: another process can resume them, and recordings can be replayed."""
 
-from __future__ import annotations
-
 from realizer.server.journal.entry import Entry, Journal, JournalError, SavedSession, TakenOver
 
 __all__ = ["Entry", "Journal", "JournalError", "SavedSession", "TakenOver", "journal_at"]

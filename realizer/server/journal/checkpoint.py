@@ -1,7 +1,5 @@
 """Checkpoints: the state of a session while no block plays, as parts of a journal."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass

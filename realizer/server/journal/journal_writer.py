@@ -1,7 +1,5 @@
 """The writer of a session's journal and recording."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Mapping
 

@@ -1,7 +1,5 @@
 """Replay of a recording: feedback, frames and sound as its viewers received them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Recordings: a file of JSON lines for each session."""
 
-from __future__ import annotations
-
 import contextlib
 import itertools
 import json

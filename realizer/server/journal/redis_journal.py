@@ -1,7 +1,5 @@
 """The journal in Redis, which several hosts share."""
 
-from __future__ import annotations
-
 import contextlib
 import re
 import secrets

@@ -1,7 +1,5 @@
 """Replay of journal entries into a session."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 
 from realizer.core.errors import RealizerError, VoiceError

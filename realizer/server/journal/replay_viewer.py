@@ -1,7 +1,5 @@
 """The frames of a replayed session, as a live viewer received them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

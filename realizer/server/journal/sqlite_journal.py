@@ -1,7 +1,5 @@
 """The journal in a SQLite file, which the workers of one machine share."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import secrets

@@ -1,7 +1,5 @@
 """The garbage collection policy of the service: full collections are rare."""
 
-from __future__ import annotations
-
 import gc
 
 from realizer.server.documents.limits import memory

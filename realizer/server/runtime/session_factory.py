@@ -1,7 +1,5 @@
 """The factory of sessions: new ones, and those restored from a journal."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import time

@@ -1,7 +1,5 @@
 """The host of sessions in an event loop: delivers messages, carries out effects."""
 
-from __future__ import annotations
-
 import asyncio
 import functools
 import itertools

@@ -1,7 +1,5 @@
 """The registry of sessions by name, with their connections and expiry."""
 
-from __future__ import annotations
-
 import re
 import secrets
 import zlib

@@ -1,7 +1,5 @@
 """Aggregation of the workers' metrics and health."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import logging

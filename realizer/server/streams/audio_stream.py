@@ -1,7 +1,5 @@
 """The sound of a player in packets, mixed ahead in blocks, and subscriptions to it."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from collections.abc import Iterator

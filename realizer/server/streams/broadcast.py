@@ -1,7 +1,5 @@
 """The broadcast of a session: it sends due frames, packets, pictures and schedules to subscribers."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from weakref import WeakValueDictionary

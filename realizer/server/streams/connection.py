@@ -1,7 +1,5 @@
 """The state of one connection of a session: its subscriptions and its place in the feedback log."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from realizer.server.session.effects import RenderOptions

@@ -1,7 +1,5 @@
 """The stream `schedule`: changes of planned blocks as JSON."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, field

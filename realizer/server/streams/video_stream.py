@@ -1,7 +1,5 @@
 """The stream `video`: requests to draw due pictures, and their distribution."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 

@@ -1,7 +1,5 @@
 """Framing of BML documents in a byte stream."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Message formats on a broker: their protocol, plain BML, and Asap's BML in JSON."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field

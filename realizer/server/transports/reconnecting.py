@@ -1,7 +1,5 @@
 """The base of transports that are clients of another program."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import logging

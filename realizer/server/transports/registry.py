@@ -1,7 +1,5 @@
 """The registry of transports beside the WebSocket."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 from realizer.core.registry import Registry

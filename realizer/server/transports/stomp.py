@@ -1,7 +1,5 @@
 """The STOMP transport: a client of a message broker, with a session for each message format."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import logging

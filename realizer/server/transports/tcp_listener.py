@@ -1,7 +1,5 @@
 """The base of transports that listen on a TCP port."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import re

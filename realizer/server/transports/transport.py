@@ -1,7 +1,5 @@
 """The protocols of transports and of their clients."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 

@@ -1,7 +1,5 @@
 """The VHMSG message format: documents in vrSpeak, feedback as vrAgentBML."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Container

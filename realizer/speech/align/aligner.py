@@ -1,7 +1,5 @@
 """Forced alignment of recordings with their text, by the best aligner installed."""
 
-from __future__ import annotations
-
 import logging
 from dataclasses import replace
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """The result of an aligner: words and phonemes with times and a confidence."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

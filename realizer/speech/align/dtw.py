@@ -1,7 +1,5 @@
 """Dynamic time warping of two feature sequences, with optional pauses."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The aligner for any language: dynamic time warping against a voice that speaks the same text."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

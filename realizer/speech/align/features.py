@@ -1,7 +1,5 @@
 """Validation of recordings, and their features by frame: cepstra, loudness and voice activity."""
 
-from __future__ import annotations
-
 from functools import cache
 from math import gcd
 

@@ -1,7 +1,5 @@
 """The aligner for English, which uses the acoustic model of pocketsphinx."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """Phone alignment with pocketsphinx; its only importer."""
 
-from __future__ import annotations
-
 import importlib.util
 import threading
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """A writer of SSML for espeak-ng, with the places of words and marks in it."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Times of words, phonemes and marks from the answers of espeak-ng's process."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any

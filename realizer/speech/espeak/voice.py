@@ -1,7 +1,5 @@
 """The espeak-ng voice; its engine runs in a process of its own."""
 
-from __future__ import annotations
-
 import importlib.util
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

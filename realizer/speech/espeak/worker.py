@@ -9,8 +9,6 @@ process of its own.
     phonemes  {"voice", "words"} -> {"phonemes": [[ipa, ...], ...]}
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import ctypes

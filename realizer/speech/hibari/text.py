@@ -1,7 +1,5 @@
 """Division of a script into runs of text with one prosody, with the places of marks among the words."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 from realizer.speech.ssml import Break, Mark, Script

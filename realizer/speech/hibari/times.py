@@ -1,7 +1,5 @@
 """Times of words and IPA phonemes from hibari's readings and durations."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache

@@ -1,7 +1,5 @@
 """The hibari voice, neural English speech; its model runs in a process of its own."""
 
-from __future__ import annotations
-
 import importlib.util
 import unicodedata
 from collections.abc import Sequence

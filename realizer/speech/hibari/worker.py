@@ -9,8 +9,6 @@ hibari (Apache-2.0) speaks English. Its model has a tensor of durations, which i
 The same request gives the same samples, because the noise of each sentence has a fixed seed.
 """
 
-from __future__ import annotations
-
 import argparse
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Utterances from recordings, by known times, alignment or loudness."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypeVar

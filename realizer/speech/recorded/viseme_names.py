@@ -1,7 +1,5 @@
 """A table from viseme names of other systems to phonemes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """The HTTP request of a WebSocket, and HTTP responses."""
 
-from __future__ import annotations
-
 import http
 from urllib.parse import parse_qsl, urlsplit
 

@@ -1,7 +1,5 @@
 """The WebSocket transport: sessions at /ws, checks at /check, HTTP beside them."""
 
-from __future__ import annotations
-
 import asyncio
 import http
 import logging

@@ -1,7 +1,5 @@
 """Files attached to Xface tasks: scripts, FAP and sound."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from html import unescape
 

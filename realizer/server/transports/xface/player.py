@@ -1,7 +1,5 @@
 """The Xface player transport: a client of a player, which shows the frames of a session."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import logging

@@ -1,7 +1,5 @@
 """The protocol of an Xface player (Paul 2010): states and messages."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Sequence
 from enum import Enum

@@ -1,7 +1,5 @@
 """A parser of Xface messages in a byte stream."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, replace
 

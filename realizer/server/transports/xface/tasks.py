@@ -1,7 +1,5 @@
 """The task runner of an Xface client: tasks to documents, feedback to notifications."""
 
-from __future__ import annotations
-
 import json
 import logging
 from collections import deque

@@ -1,7 +1,5 @@
 """Xface messages: XML and framing."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from enum import IntEnum
