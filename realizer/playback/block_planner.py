@@ -177,7 +177,7 @@ class _PlanBuilder:
             character, all_warnings = self.block.character_id, tuple(self.warnings)
             schedule = replace(schedule, start=start, character=character, warnings=all_warnings)
             self.claims = tuple(claims(self.block, schedule, self.kinds, self.context))
-            left = after_interrupts(existing_claims, interrupts(self.block, schedule, self.kinds))
+            left = after_interrupts(existing_claims, interrupts(self.block, schedule))
             lost = conflicts(self.claims, left, start)
             if not lost:
                 self.trims = dict(trims(self.claims, left))

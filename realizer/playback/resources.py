@@ -116,16 +116,11 @@ def claims(
             yield ResourceClaim(resource, begin, end, block.id, node.id, rank, silent_from)
 
 
-def interrupts(
-    block: Block, schedule: Schedule, kinds: Mapping[str, BehaviourKind]
-) -> Iterator[tuple[float, Interrupt]]:
+def interrupts(block: Block, schedule: Schedule) -> Iterator[tuple[float, Interrupt]]:
     """Yield the interrupts that a block will make, each with its time on the clock of `schedule.start`."""
     for node in block.behaviours:
-        command = kinds[node.tag].command
-        if command is not None and node.id in schedule.times:
-            act = command(node)
-            if isinstance(act, Interrupt):
-                yield schedule.start + float(schedule.times[node.id][0]), act
+        if isinstance(node, Interrupt) and node.id in schedule.times:
+            yield schedule.start + float(schedule.times[node.id][0]), node
 
 
 def after_interrupts(

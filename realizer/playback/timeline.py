@@ -89,7 +89,7 @@ class BlockTimeline:
         alive = [p for p in self.blocks.active() if p not in ended and p.block.id != block.id]
         others = affected_blocks(block, alive, now, waits) if known and not alone else []
         schedule_of = block_links.with_stops(self.blocks.schedule_of, ended, now)
-        existing = self._existing_claims(character, arrival.number, alive) if start <= now else ()
+        existing = self._existing_claims(character, arrival.number, alive, now) if start <= now else ()
         planned = plan_block(
             block,
             self.kinds,
@@ -107,12 +107,11 @@ class BlockTimeline:
         return planned, others
 
     def _existing_claims(
-        self, character: int, number: int, alive: Sequence[ActiveBlock]
+        self, character: int, number: int, alive: Sequence[ActiveBlock], now: float
     ) -> list[ResourceClaim]:
         """Return the claims that a block gives way to, after the interrupts that others will make."""
-        promised = (
-            cut for p in alive if p.start < FOREVER for cut in interrupts(p.block, p.schedule, self.kinds)
-        )
+        known = (p for p in alive if p.start < FOREVER)
+        promised = (cut for p in known for cut in interrupts(p.block, p.schedule) if cut[0] >= now)
         return after_interrupts(block_links.existing_claims(character, number, alive), promised)
 
     def _conflict(self, blocks: Sequence[ActiveBlock], schedules: Sequence[Schedule]) -> bool:
@@ -199,9 +198,9 @@ class BlockTimeline:
         """
         active = self.blocks.active()
         others = [p for p in active if p is not playing]
-        own_interrupts = interrupts(playing.block, playing.schedule, self.kinds)
+        own_interrupts = interrupts(playing.block, playing.schedule)
         existing = after_interrupts(
-            self._existing_claims(playing.character, playing.number, others), own_interrupts
+            self._existing_claims(playing.character, playing.number, others, now), own_interrupts
         )
         if not conflicts(playing.plan.claims, existing):
             return False

@@ -396,3 +396,56 @@ def test_interrupt_of_a_wait_ends_it_at_once(stage: Stage) -> None:
     stage.send("a", wait(2) + wait(1, id="v"))
     stage.send("i", '<bmla:interrupt id="x" target="a" include="w" start="0.3"/>')
     assert "a:end DONE 1" in stage.progress()
+
+
+# order of arrival, and conflicts at the start
+
+
+def warnings(stage: Stage) -> list[str]:
+    return [line for line in stage.until(99) if line[0] == "!"]
+
+
+def interrupt(target: str, at: float) -> str:
+    return f'<bmla:interrupt id="i" target="{target}" start="{at}"/>'
+
+
+def test_claims_end_where_another_block_has_promised_to_interrupt(stage: Stage) -> None:
+    stage.send("a", gaze())
+    stage.send("p", interrupt("a", 1.0) + wait(5))
+    stage.send("b", '<gaze id="g" target="y" start="1.2" end="3"/>', at=0.5)
+    assert warnings(stage) == []
+
+
+def test_claims_of_a_new_block_outlast_an_interrupt_of_its_namesake(stage: Stage) -> None:
+    stage.send("a", gaze())
+    stage.send("p", interrupt("a", 0.5) + wait(9))
+    stage.send("a", gaze(), at=2.0)
+    stage.send("b", gaze("h", "y"), at=2.5)
+    assert warnings(stage) == ["! b:h CANNOT_CREATE_BEHAVIOR"]
+
+
+def test_append_waits_for_blocks_that_were_announced_before(stage: Stage) -> None:
+    stage.send("a", wait(2))
+    late = parse(f'<bml id="b" {BMLA} composition="APPEND">{wait(1)}</bml>')
+    stage.player.announce(late, 0.1)
+    stage.send("c", wait(8), at=0.2)
+    stage.player.submit(late, 0.3)
+    assert "b:start IN_EXEC 2" in stage.until(99)
+
+
+def test_waiting_block_loses_a_claim_only_when_it_starts(stage: Stage) -> None:
+    stage.send("a", wait(1))
+    stage.send("g", '<gaze id="g" target="x" start="0" relax="8" end="9"/>')
+    stage.send("b", gaze("h", "y") + smile(), appendAfter="a")
+    assert not [line for line in stage.log if line[0] == "!"]
+    assert warnings(stage) == ["! b:h CANNOT_CREATE_BEHAVIOR"]
+    assert stage.log.index("! b:h CANNOT_CREATE_BEHAVIOR") < stage.log.index("b:start IN_EXEC 1")
+
+
+def test_waiting_block_that_requires_a_lost_claim_never_starts(stage: Stage) -> None:
+    stage.send("a", wait(1))
+    stage.send("g", '<gaze id="g" target="x" start="0" relax="8" end="9"/>')
+    stage.send("b", f"<required>{gaze('h', 'y')}</required>", appendAfter="a")
+    assert warnings(stage) == ["! b CANNOT_CREATE_BEHAVIOR"]
+    assert "b:end REVOKED 1" in stage.log
+    assert not any(line.startswith("b:start") for line in stage.log)

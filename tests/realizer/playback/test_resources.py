@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bml_schema import Interrupt, parse
-from realizer.behaviours.registry import KINDS, VOCABULARY
+from realizer.behaviours.registry import VOCABULARY
 from realizer.playback.resources import (
     PASSES,
     ResourceClaim,
@@ -152,5 +152,5 @@ def test_interrupts_are_at_the_start_of_their_behaviours() -> None:
     bmla = 'xmlns:bmla="http://www.asap-project.org/bmla"'
     text = f'<bml id="b" {bmla}><bmla:interrupt id="i" target="a" start="2"/></bml>'
     schedule = Schedule("b", {"i": ("start", "end")}, {"i": np.array([2.0, 2.0])}, start=10.0)
-    ((time, act),) = interrupts(parse(text, VOCABULARY), schedule, KINDS)
+    ((time, act),) = interrupts(parse(text, VOCABULARY), schedule)
     assert (time, act.target) == (12.0, "a")
