@@ -9,6 +9,9 @@ import pytest
 from click.testing import CliRunner, Result
 
 from realizer.cli import cli
+from realizer.server import serve
+from realizer.speech.espeak.voice import EspeakVoice
+from realizer.speech.hibari.voice import HibariVoice
 
 GOOD = '<bml id="b"><head id="n" lexeme="NOD" start="0.2" end="0.6"/></bml>'
 
@@ -67,6 +70,33 @@ def test_serve_refuses_an_unknown_camera_light_or_background(args: list[str], wo
     done = run("serve", "--port", "0", *args)
     assert done.exit_code == 2
     assert words in " ".join(done.stderr.split())
+
+
+@pytest.fixture
+def only_silence(monkeypatch: pytest.MonkeyPatch) -> None:
+    for engine in (EspeakVoice, HibariVoice):
+        monkeypatch.setattr(engine, "missing", classmethod(lambda cls, variant=None: f"get {cls.engine}"))
+
+
+@pytest.mark.parametrize("command", ["serve", "realize", "schedule", "batch"])
+def test_warn_no_voice_names_what_to_install_unless_silence_is_asked_for(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, only_silence: None
+) -> None:
+    monkeypatch.setattr(serve, "run", lambda service: service.close())
+    document = tmp_path / "b.bml"
+    document.write_text('<bml id="b"><speech id="s"><text>Hello</text></speech></bml>')
+    output = ["-o", str(tmp_path / "out"), "--format", "fap", "--workers", "1"] if command == "batch" else []
+    names = [] if command == "serve" else [str(document)]
+    for asked in ([], ["--voice", "silent"]):
+        done = CliRunner().invoke(cli, [command, *names, *output, *asked], catch_exceptions=False)
+        assert done.exit_code == 0, done.output
+        words = f"no voice is installed, speech is silent; get {EspeakVoice.engine}"
+        assert (words in done.stderr) == (not asked)
+
+
+@pytest.mark.parametrize("command", ["realize", "schedule"])
+def test_warn_no_voice_only_where_something_is_said(command: str, only_silence: None) -> None:
+    assert "no voice" not in run(command, "-").stderr
 
 
 @pytest.mark.gl
