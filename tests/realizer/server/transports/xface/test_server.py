@@ -372,6 +372,22 @@ def test_xface_loads_files_of_the_media_folder(tmp_path: Path) -> None:
     serving(test, media=tmp_path)
 
 
+def test_xface_reports_a_file_that_cannot_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "clip.fap").write_text(fap(3))
+
+    def unreadable(path: Path) -> bytes:
+        raise PermissionError(13, "Permission denied", str(path))
+
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        async with Client(transport.port) as client:
+            monkeypatch.setattr(Path, "read_bytes", unreadable)
+            client.send(task("LOAD_FAP", 1, 1, "clip.fap") + task("STOP_PLAYBACK", 1, 2))
+            assert await client.statuses(1) == [1, 7, 3]
+            assert await client.statuses(2) == [1, 3]
+
+    serving(test, media=tmp_path)
+
+
 def test_xface_sends_no_notes_to_owner_0() -> None:
     async def test(server: Server, transport: XfaceTransport) -> None:
         async with Client(transport.port) as client:
