@@ -25,6 +25,7 @@ def test_measure_shapes_gives_the_stored_shapes() -> None:
     made = measure_shapes(load_face(), FOLDER, Path(os.environ["REALIZER_HEAD_DATA"]))
     for au, stored in read_shapes(FOLDER / "au_shapes.npz").items():
         assert stored.moves == pytest.approx(made[au].moves, abs=1e-5)
+        assert np.mean(stored.visible == made[au].visible) > 0.99
 
 
 @pytest.mark.parametrize("folder", SHAPED, ids=lambda folder: folder.name)
