@@ -7,6 +7,7 @@ import pytest
 
 from realizer.core.errors import FaceError
 from realizer.face.load import load_face
+from realizer.face.mesh_geometry import part_triangles
 from realizer.face.model import Face
 from realizer.facebuild.mpeg4.defaults import default_setup, split_sides
 from realizer.facebuild.mpeg4.zones import Setup
@@ -70,3 +71,16 @@ def test_split_sides_parts_the_skin_in_two(face: Face, points: Points) -> None:
         assert np.isin(face.feature_points[name], sides[upper])
     for name, lower in (("2.3", "lower_lip"), ("3.3", "lower_lid_left"), ("3.4", "lower_lid_right")):
         assert np.isin(face.feature_points[name], sides[lower])
+
+
+@pytest.mark.parametrize("first", [0, 7])
+def test_split_sides_joins_vertices_at_one_place(face: Face, points: Points, first: int) -> None:
+    """A skin whose triangles share no vertices is parted as one whose triangles do."""
+    begin, end = face.parts["skin"]
+    own = part_triangles(face.triangles, (begin, end)).ravel()
+    torn = np.concatenate([np.zeros((first, 3)), face.vertices[begin:end][own]])
+    loose = np.arange(first, len(torn), dtype=np.int32).reshape(-1, 3)
+    parted = split_sides(torn, loose, points, (first, len(torn)))
+    for name, whole in split_sides(face.vertices.astype(float), face.triangles, points, (begin, end)).items():
+        got, wanted = np.isin(np.arange(first, len(torn)), parted[name]), np.isin(own + begin, whole)
+        assert np.mean(got == wanted) > 0.999, name
