@@ -3,6 +3,8 @@
 `concurrent.futures` does not fit: one dead process breaks its whole pool, and a task cannot be ended.
 """
 
+from __future__ import annotations
+
 import contextlib
 import os
 import signal
