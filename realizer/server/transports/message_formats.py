@@ -87,7 +87,7 @@ class AsapXml:
 
 
 class AsapJson(AsapXml):
-    """URL-encoded XML in JSON: `{"bml": {"content": ...}}` in, `{"feedback": {"content": ...}}` out."""
+    """Read `{"bml": {"content": ...}}` and write `{"feedback": {"content": ...}}`, JSON of URL-encoded XML."""
 
     def _decode(self, body: bytes) -> str:
         wanted = 'wanted {"bml": {"content": "URL-encoded BML"}}, got '

@@ -200,7 +200,7 @@ def test_translate_gives_an_id_to_a_block_in_a_dialect(text: str) -> None:
         parse(text, strict_bml=True)
 
 
-def test_translate_gives_different_ids_to_the_documents_of_a_text_and_a_session() -> None:
+def test_translate_gives_each_document_of_a_session_an_id_of_its_own() -> None:
     ids = made_ids()
     one = '<act><bml><head type="NOD"/></bml></act>'
     found = [*read(f"{one}{one}", block_ids=ids), *read(one, block_ids=ids)]

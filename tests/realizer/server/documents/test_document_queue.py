@@ -202,7 +202,7 @@ def test_submission_goes_on_after_a_standstill() -> None:
     assert starts["b:start"] - starts["a:start"] > STANDSTILL
 
 
-def test_submission_drops_the_gaze_of_a_newer_block_whatever_the_voice_takes() -> None:
+def test_submission_drops_the_gaze_of_a_newer_block_after_a_slow_voice() -> None:
     driver = Driver(mute=True)
     driver.send('<bml id="a"><speech id="s"><text>Hi</text></speech><gaze id="g" target="x"/></bml>')
     driver.send('<bml id="b"><gaze id="g" target="y"/><wait id="w" duration="1"/></bml>')
