@@ -87,7 +87,7 @@ class AsapXml:
 
 
 class AsapJson(AsapXml):
-    """Read `{"bml": {"content": ...}}` and write `{"feedback": {"content": ...}}`, JSON of URL-encoded XML."""
+    """JSON of URL-encoded XML: reads `{"bml": {"content": ...}}`, writes `{"feedback": {"content": ...}}`."""
 
     def _decode(self, body: bytes) -> str:
         wanted = 'wanted {"bml": {"content": "URL-encoded BML"}}, got '
