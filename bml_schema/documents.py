@@ -11,7 +11,8 @@ from typing import Any
 
 from lxml import etree
 
-from bml_schema.dialects.translator import is_core, made_ids, translate
+from bml_schema.dialects.recognition import has_words_of_dialects
+from bml_schema.dialects.translator import is_draft, made_ids, translate
 from bml_schema.document_splitter import (
     NEXT,
     WRAPPER_TAG,
@@ -251,13 +252,13 @@ class _Reader:
         if self.strict_bml:
             return block(notes)
         plain: Block | BMLError | None = None
-        if not self.wrapper and is_core(root):
-            # Nearly all documents are BML 1.0; one with faults may use words of a dialect.
+        if not self.wrapper and not is_draft(root):
+            # Nearly all documents are BML 1.0; what is in a dialect has faults, or words of others.
             try:
                 plain = block(notes)
             except BMLError as wrong:
                 plain = wrong
-            if isinstance(plain, Block) and not plain.problems:
+            if isinstance(plain, Block) and not plain.problems and not has_words_of_dialects(plain):
                 return plain
         for node in root.iter() if begins else ():
             # The names by which lines are found may change.

@@ -18,7 +18,7 @@ from bml_schema.nodes import BMLA, BMLT, CORE, DRAFTS, EXTENSIONS, OWN
 from bml_schema.undeclared_prefixes import SMARTBODY
 from bml_schema.vocabulary import VOCABULARY
 
-__all__ = ["is_core", "made_ids", "translate"]
+__all__ = ["is_draft", "made_ids", "translate"]
 
 _SPACES = {"ext": EXTENSIONS, "bmla": BMLA, "bmlt": BMLT, "realizer": OWN}
 _OURS = frozenset({BMLA, BMLT, OWN})
@@ -30,9 +30,9 @@ _REFERENCE = re.compile(r"\s*([^:\s]+)\s*:\s*([A-Za-z_-]+?)(\s*[+-]\s*[0-9.]+\s*
 _FUNCTION = re.compile(r"\s*(?:after|before)\s*\((.*)\)\s*")
 
 
-def is_core(root: etree._Element) -> bool:
-    """Return whether a document is in the namespace of BML 1.0."""
-    return str(root.tag).startswith(f"{{{CORE}}}")
+def is_draft(root: etree._Element) -> bool:
+    """Return whether a document is in the namespace of a draft."""
+    return str(root.tag).rpartition("}")[0][1:] in DRAFTS
 
 
 def made_ids() -> Iterator[str]:
@@ -82,6 +82,8 @@ class _Translation:
         self.table = table()
         self.applied: dict[Row, None] = {}
         self.in_dialect = False
+        self.used = {e.get("id", "").strip() for e in self._timed()}
+        self.numbers: dict[str, Iterator[int]] = {}
 
     def run(self) -> None:
         self._attributes(self.root, "bml")
@@ -302,8 +304,11 @@ class _Translation:
         return made
 
     def _free_id(self, element: Any) -> str:
-        used = {e.get("id") for e in self._timed()}
-        return next(id for n in count(1) if (id := f"{self._kind(element)}{n}") not in used)
+        kind = self._kind(element)
+        numbers = self.numbers.setdefault(kind, count(1))
+        id = next(id for n in numbers if (id := f"{kind}{n}") not in self.used)
+        self.used.add(id)
+        return id
 
     def add_character(self) -> None:
         """Take the character from SmartBody's <participant>."""

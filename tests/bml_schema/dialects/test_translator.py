@@ -8,11 +8,13 @@ from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from lxml import etree
 
 from bml_schema import CORE, Block, BMLError, Gaze, Head, made_ids, parse, read, write
 from bml_schema.dialects.table import MISSING, Row, table
-from bml_schema.dialects.translator import is_core, translate
+from bml_schema.dialects.translator import is_draft, translate
 from bml_schema.node_schema import local
 from bml_schema.undeclared_prefixes import SMARTBODY
 from bml_schema.vocabulary import VOCABULARY
@@ -42,6 +44,19 @@ NEEDS = {
     "saccade": 'direction="45"',
     "description": 'type="x"',
 }
+# What mutations put into documents.
+PIECES = (
+    "",
+    " ",
+    '"',
+    "x:",
+    'type="NOD" ',
+    'amount="-1e9" ',
+    "<tm id='t'/>",
+    "<head type='TOSS'/>",
+    "s1:stroke_start",
+    "{id}",
+)
 # Values that fit an attribute without a pattern; 1 for the rest.
 VALUES = {
     "direction": "LEFT",
@@ -151,7 +166,7 @@ def test_translate_leaves_bml_1_0_alone() -> None:
     text = f'<bml xmlns="{CORE}" id="b"><head id="h" lexeme="NOD" start="1"/></bml>'
     root = etree.fromstring(text)
     before = etree.tostring(root)
-    assert is_core(root)
+    assert not is_draft(root)
     assert translate(root, "", made_ids()) == ""
     assert etree.tostring(root) == before
     assert parse(f"<act>{text}</act>".replace("<act>", "").replace("</act>", "")).problems == ()
@@ -261,3 +276,27 @@ def test_translate_keeps_the_lines_of_elements() -> None:
 
 def test_translate_knows_every_behaviour_of_the_table() -> None:
     assert {"head", "gaze", "face", "speech"} <= {local(tag) for tag in VOCABULARY}
+
+
+@settings(max_examples=150)
+@given(st.data())
+def test_translate_of_mutated_documents_gives_blocks_that_can_be_written(data: st.DataObject) -> None:
+    text = data.draw(
+        st.sampled_from([d for name in ("smartbody", "greta", "draft") for d in documents(name)])
+    )
+    for _ in range(data.draw(st.integers(1, 3))):
+        first = data.draw(st.integers(0, len(text)))
+        last = data.draw(st.integers(first, min(len(text), first + 30)))
+        piece = data.draw(st.sampled_from(PIECES))
+        text = text[:first] + piece + text[last:]
+    for found in read(text):
+        assert isinstance(found, Block | BMLError)
+        if isinstance(found, Block):
+            assert parse(write(found)) == found
+
+
+def test_translate_takes_linear_time_for_thousands_of_behaviours_without_ids() -> None:
+    many = '<head type="NOD"/><face type="facs" au="1"/>' * 2000
+    (block,) = read(f"<act><bml>{many}</bml></act>")
+    assert isinstance(block, Block)
+    assert len({node.id for node in block.behaviours}) == 4000

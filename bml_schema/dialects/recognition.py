@@ -1,0 +1,58 @@
+"""Recognition of blocks with words of a dialect that are no fault in BML 1.0, such as Greta's lexemes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from fnmatch import translate
+from functools import cache, lru_cache
+
+from bml_schema.behaviours import Face, FaceShift
+from bml_schema.dialects.table import table
+from bml_schema.node_schema import local, schema_of
+from bml_schema.nodes import Behaviour, Block
+from bml_schema.undeclared_prefixes import SMARTBODY
+from bml_schema.vocabulary import VOCABULARY
+
+__all__ = ["has_words_of_dialects"]
+
+_SMARTBODY = f"{{{SMARTBODY}}}"
+
+
+@cache
+def _words() -> Mapping[type[Behaviour], tuple[str, re.Pattern[str]]]:
+    """Return class -> (its field with values of dialects, their pattern)."""
+    classes = {local(tag): cls for tag, cls in VOCABULARY.items()}
+    patterns: dict[tuple[str, str], list[str]] = {}
+    for row in table().rows:
+        cls = classes.get(row.element)
+        spec = schema_of(cls).attributes.get(row.attribute) if cls else None
+        if spec is not None and row.value and row.dialect != "any" and spec.value.type == "string":
+            patterns.setdefault((row.element, spec.field), []).append(translate(row.value))
+    return {
+        classes[name]: (field, re.compile("|".join(found), re.IGNORECASE))
+        for (name, field), found in patterns.items()
+    }
+
+
+@lru_cache(maxsize=1000)
+def _is_word(pattern: re.Pattern[str], value: str) -> bool:
+    return pattern.fullmatch(value) is not None
+
+
+def has_words_of_dialects(block: Block) -> bool:
+    """Return whether a block has words of a dialect."""
+    return _any(block.behaviours)
+
+
+def _any(nodes: Iterable[Behaviour]) -> bool:
+    words = _words()
+    for node in nodes:
+        if (word := words.get(type(node))) is not None and _is_word(word[1], getattr(node, word[0])):
+            return True
+        if any(name.startswith(_SMARTBODY) for name in node.unknown_attributes):
+            return True
+        parts: Sequence[Behaviour] = node.parts if isinstance(node, Face | FaceShift) else ()
+        if parts and _any(parts):
+            return True
+    return False
