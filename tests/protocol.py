@@ -31,7 +31,7 @@ from realizer.protocol.messages.replies import (
     Welcome,
 )
 from realizer.protocol.messages.requests import Subscribe
-from realizer.protocol.streams import KINDS, STREAMS
+from realizer.protocol.streams import JSON_STREAMS, KINDS, STREAMS
 from realizer.protocol.wire import FINAL, FLUSH, VERSION
 from realizer.protocol.wire import HEADER as BYTES
 
@@ -154,7 +154,7 @@ def _operations() -> Iterator[tuple[str, dict[str, Any]]]:
         "error-message",
         "changed",
         "frame",
-        "schedule",
+        *(stream for stream in JSON_STREAMS if not STREAMS[stream].numeric),
         *(stream for stream, _ in _kinds()),
     ):
         yield f"send-{name}", {"action": "send", "channel": channel, "messages": refs([_out(name)])}
@@ -233,7 +233,7 @@ def _cell(text: str) -> str:
 
 
 def constants() -> str:
-    """The part of realizer.js: the version, binary messages, answers of control messages."""
+    """The part of realizer.js: the version, binary messages, streams of JSON, answers of control messages."""
     arrays = {"<i4": "Int32Array", "<f4": "Float32Array", "<i2": "Int16Array", None: "Uint8Array"}
     kinds = [f'  {kind}: ["{row.name}", {arrays[row.dtype]}],' for kind, row in KINDS.items()]
     answers = ", ".join(f'{question}: "{answer}"' for question, answer in ANSWERS.items())
@@ -246,6 +246,7 @@ def constants() -> str:
             "const KINDS = {",
             *kinds,
             "};",
+            f"const JSON_STREAMS = [{', '.join(json.dumps(name) for name in JSON_STREAMS)}];",
             f"const ANSWERS = {{ {answers} }};",
             "",
         ]

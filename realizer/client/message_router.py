@@ -12,6 +12,7 @@ from typing import Any, Protocol
 from bml_schema.feedback import BlockProgress, Feedback, PredictionFeedback, WarningFeedback, parse_feedback
 from realizer.core.errors import RealizerError
 from realizer.protocol.messages.common import ANSWERS
+from realizer.protocol.streams import JSON_STREAMS
 from realizer.protocol.wire import WireFrame, unpack
 
 # Lengths of the queues for iterators slower than the service; older messages are dropped.
@@ -83,7 +84,7 @@ class Router:
             self.queue_of(frame.stream).append(replace(frame, stream_info=description))
         elif message.startswith("{"):
             reply = json.loads(message)
-            if reply["type"] == "schedule" or "values" in reply:
+            if reply["type"] in JSON_STREAMS:
                 self.queue_of(reply["type"]).append(reply)
             else:
                 self._reply(reply)

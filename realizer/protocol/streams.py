@@ -1,7 +1,8 @@
 """The table of streams: names, encodings, options of `subscribe`, and contents of binary messages.
 
 The message models, the binary format, the documentation and the constants of realizer.js are derived from it.
-A new stream of numbers needs a row here and a source in `realizer.server.streams.frame_windows`.
+A new stream of numbers needs a row here and a source in `realizer.server.streams.frame_windows`;
+docs/adding.md lists what another stream needs.
 """
 
 from collections.abc import Mapping
@@ -71,5 +72,7 @@ _ROWS = (
     Stream("schedule", ("json",), ("character",)),
 )  # fmt: skip
 STREAMS: Mapping[str, Stream] = {row.name: row for row in _ROWS}
+# Streams with frames that are JSON messages; `type` is the name of the stream.
+JSON_STREAMS = tuple(row.name for row in _ROWS if "json" in row.encodings)
 # First byte of a binary message -> its stream.
 KINDS: Mapping[int, Stream] = {row.kind: row for row in sorted(_ROWS, key=lambda r: r.kind or 0) if row.kind}

@@ -9,7 +9,7 @@ import pytest
 
 from bml_schema.feedback import BlockPrediction, BlockProgress, PredictionFeedback, WarningFeedback
 from realizer.client.message_router import MAX_FRAMES, BlockWaiter, ClientError, Router
-from realizer.protocol.streams import KINDS
+from realizer.protocol.streams import JSON_STREAMS, KINDS
 from realizer.protocol.wire import WireError, pack
 
 
@@ -72,10 +72,17 @@ def test_router_adds_the_description_of_its_stream_to_a_frame(mail) -> None:
     assert not mail.errors
 
 
-def test_router_treats_json_frames_and_schedules_as_frames(mail) -> None:
-    mail.receive('{"type":"arkit","frame":1,"time":0.04,"values":[0.5]}')
-    mail.receive('{"type":"schedule","time":0,"whole":true,"blocks":[]}')
-    assert {stream: len(kept) for stream, kept in mail.frames.items()} == {"arkit": 1, "schedule": 1}
+@pytest.mark.parametrize("stream", JSON_STREAMS)
+def test_router_treats_messages_of_every_json_stream_as_frames(mail, stream) -> None:
+    mail.receive(json.dumps({"type": stream, "time": 0}))
+    assert {stream: len(kept) for stream, kept in mail.frames.items()} == {stream: 1}
+
+
+def test_router_treats_an_answer_with_values_as_an_answer(mail) -> None:
+    mail.expect_answer("state")
+    mail.receive('{"type":"state","values":[0.5]}')
+    assert mail.answer()["values"] == [0.5]
+    assert not mail.frames
 
 
 def planned(end: float | None) -> PredictionFeedback:

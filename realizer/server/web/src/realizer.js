@@ -34,6 +34,7 @@ const KINDS = {
   5: ["mesh", Int16Array],
   6: ["arkit", Float32Array],
 };
+const JSON_STREAMS = ["fap", "au", "arkit", "schedule"];
 const ANSWERS = { hello: "welcome", subscribe: "subscribed", state: "state", ping: "pong" };
 // end of protocol
 
@@ -207,7 +208,7 @@ export class Realizer {
     if (data instanceof ArrayBuffer) return this.#frame(frameOf(data));
     if (!data.startsWith("{")) return this.#feedback(data);
     const message = JSON.parse(data);
-    if (message.type === "schedule" || Array.isArray(message.values)) return this.#frame(jsonFrameOf(message));
+    if (JSON_STREAMS.includes(message.type)) return this.#frame(jsonFrameOf(message));
     // A new session of the same name: its numbers start again.
     if (message.type === "gap") this.seen = null;
     if (message.type === "subscribed" || message.type === "changed") {
