@@ -33,7 +33,7 @@ FAMILIES: Registry[tuple[BehaviourKind, ...]] = Registry(
         "audio": "realizer.behaviours.audio:KINDS",
         "block_control": "realizer.behaviours.block_control:KINDS",
     },
-    wanted="a tuple of realizer.behaviours.kind.Kind",
+    wanted="a tuple of realizer.behaviours.kind.BehaviourKind",
     accepts=_is_family,
 )
 

@@ -17,6 +17,9 @@ from realizer.core.errors import PluginError
 
 T = TypeVar("T")
 
+# Longer values are not written out in warnings.
+LONGEST = 60
+
 log = logging.getLogger(__name__)
 
 _installed = cache(entry_points)  # reading those of all packages takes 10 ms
@@ -93,8 +96,19 @@ class Registry(Mapping[str, T], Generic[T]):
             reason = f"{type(error).__name__}: {error}"
             raise PluginError(f"{_described(point)} cannot be imported: {reason}") from error
         if not self._accepts(loaded):
-            raise PluginError(f"{_described(point)} cannot be used: wanted {self._wanted}, got {loaded!r}")
+            got = _shortened(loaded)
+            raise PluginError(f"{_described(point)} cannot be used: wanted {self._wanted}, got {got}")
         return loaded
+
+
+def _shortened(value: object) -> str:
+    """Return a value as Python writes it, or only its type if that is long."""
+    text = repr(value)
+    if len(text) <= LONGEST:
+        return text
+    if isinstance(value, tuple):
+        return f"a tuple of {', '.join(dict.fromkeys(type(item).__name__ for item in value))}"
+    return f"an object of the type {type(value).__name__}"
 
 
 def _described(point: EntryPoint) -> str:

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+from pkgutil import iter_modules
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from bml_schema import VOCABULARY as CORE
+from realizer import behaviours
 from realizer.animation.channel import Layer
 from realizer.animation.curves import sample
-from realizer.behaviours.registry import KINDS, VOCABULARY
+from realizer.behaviours.kind import BehaviourKind
+from realizer.behaviours.registry import FAMILIES, KINDS, VOCABULARY
 from tests.realizer.behaviours.elements import ELEMENTS, check, expand, keys, node, timing
 
 
@@ -18,6 +23,23 @@ def test_kinds_cover_every_core_element() -> None:
     # Other behaviours have their class in their own module, or in a plug-in.
     assert {tag: VOCABULARY.get(tag) for tag in CORE} == dict(CORE)
     assert set(KINDS) == set(VOCABULARY)
+
+
+def _is_kind(value: object) -> bool:
+    return isinstance(value, BehaviourKind)
+
+
+def test_families_are_all_modules_with_behaviours() -> None:
+    modules = [import_module(f"{behaviours.__name__}.{m.name}") for m in iter_modules(behaviours.__path__)]
+    families = {m.__name__: m.KINDS for m in modules if any(_is_kind(k) for k in getattr(m, "KINDS", ()))}
+    assert families
+    missing = [name for name, family in families.items() if family not in FAMILIES.values()]
+    assert not missing, f"add rows to realizer/behaviours/registry.py for {', '.join(missing)}"
+
+
+def test_wanted_type_exists() -> None:
+    module, _, name = FAMILIES._wanted.rpartition(" ")[2].rpartition(".")
+    assert getattr(import_module(module), name) is BehaviourKind
 
 
 @pytest.mark.parametrize("element", ELEMENTS)

@@ -71,8 +71,18 @@ def test_registry_imports_a_plugin_when_it_is_used(installed):
         (f"{MODULE}:NUMBER", "NUMBER = ", "cannot be imported: SyntaxError"),
         (f"{MODULE}:NAME", "NUMBER = 7", "cannot be imported: AttributeError"),
         (f"{MODULE}:NUMBER", "NUMBER = 'seven'", "cannot be used: wanted a number, got 'seven'"),
+        (
+            f"{MODULE}:NUMBER",
+            "NUMBER = 'x' * 99",
+            "cannot be used: wanted a number, got an object of the type str",
+        ),
+        (
+            f"{MODULE}:NUMBER",
+            "NUMBER = (7, 'x' * 99, 8)",
+            "cannot be used: wanted a number, got a tuple of int, str",
+        ),
     ],
-    ids=["no module", "fails", "no Python", "no attribute", "another kind"],
+    ids=["no module", "fails", "no Python", "no attribute", "another kind", "a long value", "a long tuple"],
 )
 def test_registry_leaves_out_a_broken_plugin(installed, caplog, value, code, says):
     installed({"bad": value}, code)
