@@ -8,6 +8,7 @@ from functools import cache
 from typing import Any
 
 from realizer import tables
+from realizer.core.errors import TableError
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,10 +38,15 @@ def gaps(element: str, variant: str = "") -> Gaps:
         variant: lexeme or influence, in any case; without an entry, it has the timing of the element.
 
     Raises:
-        KeyError: no such element.
+        TableError: no such element.
     """
     known = all_gaps()
-    return known.get(f"{element}.{variant.upper()}", known[element])
+    row = known.get(f"{element}.{variant.upper()}") or known.get(element)
+    if row is None:
+        raise TableError(
+            f"timing.toml has no row [{element}]: add one, or use timing_from_table with another element"
+        )
+    return row
 
 
 @cache

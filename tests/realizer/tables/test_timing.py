@@ -7,8 +7,9 @@ import re
 import pytest
 
 from realizer.behaviours.registry import VOCABULARY
+from realizer.core.errors import TableError
 from realizer.tables.templates import templates
-from realizer.tables.timing import Gaps, all_gaps
+from realizer.tables.timing import Gaps, all_gaps, gaps
 
 ROWS = all_gaps()
 MEASURED = re.compile(r"Wojdel 2005 table 6\.4, template (\w+) \(?.*?(\d+) frames, sigma (\d+)")
@@ -28,6 +29,13 @@ def test_gaps_have_the_points_of_the_element(name: str) -> None:
         assert gap.preferred >= gap.least >= 0
         assert gap.stiffness > 0
         assert gap.source
+
+
+def test_gaps_say_what_to_do_about_an_element_without_a_row() -> None:
+    with pytest.raises(
+        TableError, match=r"^timing\.toml has no row \[wink\]: add one, or use timing_from_table"
+    ):
+        gaps("wink", "LEFT")
 
 
 def test_gaps_of_measured_holds_give_the_evident_durations() -> None:
