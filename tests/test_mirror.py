@@ -29,7 +29,7 @@ def packages() -> list[str]:
 
 @pytest.mark.parametrize("package", packages())
 def test_each_package_has_its_folder_of_tests(package: str) -> None:
-    assert list((TESTS / package).glob("test_*.py")), f"tests/{package} has no test"
+    assert list((TESTS / package).glob("test_*.py")), f"write tests/{package}/test_NAME.py"
 
 
 def test_no_folder_of_tests_is_without_its_package() -> None:
@@ -62,5 +62,5 @@ def test_each_module_has_a_module_of_tests_of_its_name() -> None:
         for path in sorted(root.rglob("*.py")):
             tests = TESTS / name / path.relative_to(root).with_name(f"test_{path.name}")
             if path.stem not in ("__init__", "__main__") and not tests.is_file() and statements(path) > FEW:
-                missing.append(str(path.relative_to(root.parent)))
-    assert missing == []
+                missing.append(tests.relative_to(TESTS.parent).as_posix())
+    assert not missing, f"write {', '.join(missing)}"
