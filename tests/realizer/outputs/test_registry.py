@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import pytest
 
+from realizer.outputs.output import RenderSettings
 from realizer.outputs.registry import OUTPUTS, output_for
+from realizer.realization import Realization
 
 
 @pytest.mark.parametrize("suffix", OUTPUTS)
@@ -33,6 +36,13 @@ def test_output_for_uses_the_longest_suffix() -> None:
     assert output_for("clip.v2.csv") is OUTPUTS[".csv"]
 
 
-def test_outputs_of_texts_and_sound_have_all_characters() -> None:
-    whole = {suffix for suffix, output in OUTPUTS.items() if output.all_characters}
-    assert whole == {".json", ".wav", ".vtt", ".textgrid"}
+@pytest.mark.parametrize("suffix", [suffix for suffix, one in OUTPUTS.items() if one.picture_size is None])
+def test_outputs_contain_a_second_character_if_they_say_so(realization: Realization, suffix: str) -> None:
+    (performance,), (said,) = realization.characters.values(), realization.speeches
+    two = replace(
+        realization,
+        characters={**realization.characters, "eve": performance},
+        speeches=(said, replace(said, start=0.4, until=1.4, character=1)),
+    )
+    output, settings = OUTPUTS[suffix], RenderSettings()
+    assert (output.encode(two, settings) != output.encode(realization, settings)) == output.all_characters

@@ -21,6 +21,7 @@ from realizer.server.session.effects import Speak
 from realizer.speech import engine_process
 from realizer.speech.espeak.voice import EspeakVoice
 from realizer.speech.hibari.voice import HibariVoice
+from realizer.speech.registry import VOICES
 from realizer.speech.utterance import SpeechRequest, Utterance, Voice
 
 pytestmark = pytest.mark.xdist_group("voices")
@@ -146,7 +147,7 @@ def test_speech_request_has_the_language_of_the_text() -> None:
 
 
 def test_schedule_refuses_an_unknown_voice() -> None:
-    with pytest.raises(VoiceError, match="wanted one of espeak, hibari, silent, got 'nobody'"):
+    with pytest.raises(VoiceError, match=f"wanted one of {', '.join(VOICES)}, got 'nobody'"):
         realizer.schedule(document("<text>one</text>"), voice="nobody")
 
 
