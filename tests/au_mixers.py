@@ -34,7 +34,7 @@ def successive(
 ) -> Float64:
     """Return places moved by one displacement unit after the other: their order matters.
 
-    `successive_mixer.Succession` does it for a whole face, frame by frame.
+    `successive_mixer.SuccessiveMixer` does it for a whole face, frame by frame.
 
     Args:
         at: (n, 3) metres.

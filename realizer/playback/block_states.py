@@ -13,17 +13,17 @@ class State(StrEnum):
     IN_PREP = "IN_PREP"  # announced, and being planned
     PENDING = "PENDING"  # planned, waiting to be activated
     LURKING = "LURKING"  # planned, waiting for its start
-    IN_EXEC = "IN_EXEC"
+    IN_EXEC = "IN_EXEC"  # playing
     SUBSIDING = "SUBSIDING"  # every behaviour is past its relax, some are not past their end
-    DONE = "DONE"
-    INTERRUPTED = "INTERRUPTED"
+    DONE = "DONE"  # ended by itself
+    INTERRUPTED = "INTERRUPTED"  # stopped while it played
     REVOKED = "REVOKED"  # ended before it started
 
 
 class BlockEvent(StrEnum):
     """An event that changes the state of a block."""
 
-    PREPLAN = "preplan"  # it is accepted, and only starts when it is activated
+    PREPLAN = "preplan"  # it is accepted as preplanned, and waits for ACTIVATE
     PLAN = "plan"  # it is accepted
     ACTIVATE = "activate"  # by a behaviour, by another block's onStart, or by the client
     START = "start"

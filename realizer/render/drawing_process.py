@@ -101,7 +101,7 @@ def _end(
     memory.unlink(missing_ok=True)
 
 
-def available(backend: str | None = None) -> str | None:
+def unavailable_reason(backend: str | None = None) -> str | None:
     """Return None if the backend can draw here, or a sentence that says what to install."""
     return available_backend(backend)[1]
 

@@ -23,7 +23,7 @@ from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.face.surface import normals
 from realizer.outputs.film import FORMATS, RATE, encode_film
-from realizer.render import Renderer, available
+from realizer.render import Renderer, unavailable_reason
 from realizer.render.backends import BACKENDS
 from realizer.render.cameras import camera_for
 from realizer.render.canvas import ShadedMesh
@@ -85,7 +85,7 @@ def main() -> None:
     own = SoftwareCanvas(face, size, camera, preset())
     line("by the processor, four samples a pixel", median(lambda: own.draw(vertices[0], ups[0]), 60))
     picture = own.draw(vertices[0], ups[0])
-    if (missing := available("gl")) is None:
+    if (missing := unavailable_reason("gl")) is None:
         canvas = OpenGLCanvas(face, size, camera, preset())
         line("by OpenGL, four samples a pixel", median(lambda: canvas.draw(vertices[0], ups[0]), 60))
         canvas.close()

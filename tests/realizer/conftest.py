@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from realizer.face.model import Face, Fapu
-from realizer.render import available
+from realizer.render import unavailable_reason
 
 
 @pytest.fixture(autouse=True)
 def _skip_without_gl(request: pytest.FixtureRequest) -> None:
     mark = request.node.get_closest_marker("gl")
-    if mark and (missing := available(*mark.args)):
+    if mark and (missing := unavailable_reason(*mark.args)):
         pytest.skip(missing)
 
 

@@ -9,7 +9,7 @@ from realizer.core.array_types import Bool, Float32, Float64
 from realizer.face.au.model import Model, rotation
 from realizer.face.au.mouth import shares
 from realizer.face.au.skin_binding import attached_parts, skin
-from realizer.face.au.successive_mixer import LEAST, Succession
+from realizer.face.au.successive_mixer import LEAST, SuccessiveMixer
 from realizer.face.au.units import units
 from realizer.face.basis import FAPS, JAW_SIN
 from realizer.face.model import Face
@@ -155,11 +155,11 @@ class Moves:
             au, left, right = self._aus[k]
             if shown[left] or shown[right]:
                 values[au] = float(shown[left]), float(shown[right])
-        return self._succession(values)[self.moving].astype(np.float32)
+        return self._successive_mixer(values)[self.moving].astype(np.float32)
 
     @cached_property
-    def _succession(self) -> Succession:
-        return Succession(self._face, self._model)
+    def _successive_mixer(self) -> SuccessiveMixer:
+        return SuccessiveMixer(self._face, self._model)
 
     def _turn_jaw(self, angle: float, vertices: Float32) -> None:
         """Turn the jaw; teeth and tongue follow it (an object's own rotation comes first)."""

@@ -9,20 +9,22 @@ REACH = {"MNS": 250.0, "MW": 150.0, "ENS": 100.0, "ES": 100.0, "IRISD": 300.0, "
 EYEBALLS_OUT = 30.0  # ES: 2 mm
 PUPIL = 150.0  # IRISD: 1.5 mm wider or narrower; half an iris would shut a pupil
 OPEN_JAW = 3
-ROLLED = -0.5  # cosine of a third of a turn: how far lips may roll at full intensity
-ON_JAW = {5, 10, 11, 12, 13, 52, 57, 58, 59, 60}  # what goes down with it: the lower lip and the corners
+ROLLED = -0.5  # lips may turn by 120 degrees at most; its cosine
+ON_JAW = {5, 10, 11, 12, 13, 52, 57, 58, 59, 60}  # what the jaw takes along: the lower lip and the corners
 
 
 @cache
 def usual_range(fap: int, sign: int) -> float:
-    """Return the largest usual value of a FAP alone in a direction (its own unit, positive).
+    """Return how far a FAP usually goes in one direction (sign 1 or -1), in its own unit, positive.
 
-    A lower lip hangs on its jaw: what an action unit asks for as far as it opens the jaw does not count.
+    It is the most that one action unit asks for, or else what faces reach. FAPs in ON_JAW move with the jaw;
+    only what an action unit adds to its movement of the jaw counts.
     """
     row = faps()[fap - 1]
-    hangs = fap in ON_JAW and sign < 0
+    on_jaw = fap in ON_JAW and sign < 0
     most = max(
-        sign * unit.get(fap, 0.0) - (unit.get(OPEN_JAW, 0.0) if hangs else 0.0) for unit in _units().values()
+        sign * unit.get(fap, 0.0) - (unit.get(OPEN_JAW, 0.0) if on_jaw else 0.0)
+        for unit in _faps_of_units().values()
     )
     if most <= 0:
         most = _face_range(fap)
@@ -40,8 +42,8 @@ def required_range(fap: int, sign: int) -> float:
 @cache
 def accompanying_faps(fap: int, sign: int) -> dict[int, float]:
     """Return the FAPs of the action unit that uses one FAP most in a direction, or an empty mapping."""
-    whole = max(_units().values(), key=lambda unit: sign * unit.get(fap, 0.0))
-    return dict(whole) if sign * whole.get(fap, 0.0) > 0 else {}
+    strongest = max(_faps_of_units().values(), key=lambda unit: sign * unit.get(fap, 0.0))
+    return dict(strongest) if sign * strongest.get(fap, 0.0) > 0 else {}
 
 
 def _face_range(fap: int) -> float:
@@ -52,11 +54,11 @@ def _face_range(fap: int) -> float:
 
 
 @cache
-def _units() -> dict[str, dict[int, float]]:
+def _faps_of_units() -> dict[str, dict[int, float]]:
     """Return action unit -> FAP -> value at intensity 1, both sides."""
     out: dict[str, dict[int, float]] = {}
     for row in au_to_fap():
-        mine = out.setdefault(str(row.au), {})
-        if abs(row.fap_to) > abs(mine.get(row.fap, 0.0)):
-            mine[row.fap] = float(row.fap_to)
+        values = out.setdefault(str(row.au), {})
+        if abs(row.fap_to) > abs(values.get(row.fap, 0.0)):
+            values[row.fap] = float(row.fap_to)
     return out

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 
 from realizer.core.errors import RealizerError, VoiceError
 from realizer.server.journal.entry import Entry, SavedSession
-from realizer.server.session.effects import Effect, Speak
+from realizer.server.session.effects import Speak
 from realizer.server.session.session import Session
 from realizer.speech.utterance import Utterance
 
@@ -13,22 +13,22 @@ def replay(
     session: Session,
     entries: Iterable[Entry],
     speak: Callable[[Speak], Utterance | RealizerError],
-    look: Callable[[float], None] = lambda t: None,
-) -> list[Effect]:
+    before_event: Callable[[float], None] = lambda t: None,
+) -> list[Speak]:
     """Replay entries into a session.
 
     Args:
         session: a new one without a journal, opened at 0 of the caller's clock.
-        speak: synthesizes a request again; a voice gives the same result twice.
-        look: is called with the time of each event, before it.
+        speak: synthesizes a request again; it must return what it returned the first time.
+        before_event: is called with the time of each event, before it.
 
     Returns:
         The speech requests that are not answered yet.
     """
     unanswered: dict[int, Speak] = {}
     for entry in entries:
-        session.replay_until(entry.at, look)
-        look(entry.at)
+        session.replay_until(entry.at, before_event)
+        before_event(entry.at)
         match entry.kind:
             case "join":
                 session.connect(entry.number, entry.at)
@@ -38,7 +38,7 @@ def replay(
                 session.receive(entry.number, entry.body, entry.at)
             case "spoken":
                 request = unanswered.pop(entry.number, None)
-                # No block waits for a request from before the checkpoint any more.
+                # A request from before the checkpoint is unknown. No block waits for it: an error will do.
                 speech = None if request is None or entry.body else speak(request)
                 session.on_speech(entry.number, speech or VoiceError(str(entry.body)), entry.at)
             case "tick":
@@ -51,7 +51,7 @@ def replay(
 
 def restore_session(
     session: Session, saved: SavedSession, speak: Callable[[Speak], Utterance | RealizerError]
-) -> tuple[float, list[Effect]]:
+) -> tuple[float, list[Speak]]:
     """Restore a new session from a journal; arguments as of `replay`.
 
     Returns:
@@ -68,7 +68,7 @@ def restore_session(
 def catch_up(session: Session, now: float, seen: int) -> float:
     """Advance a restored session until it has repeated the feedback that a client has already seen.
 
-    The clock that says how much time has passed may belong to another host, or have been set back.
+    Needed because the clock that says how much time has passed may be another host's, or have been set back.
 
     Args:
         now: seconds on the caller's clock.

@@ -18,7 +18,7 @@ from realizer.server.journal.journal_writer import JournalWriter
 from realizer.server.journal.recordings import RecordingFolder, recording_head
 from realizer.server.journal.replay import catch_up, restore_session
 from realizer.server.runtime.session_registry import JoinError
-from realizer.server.session.effects import Effect, Speak
+from realizer.server.session.effects import Speak
 from realizer.server.session.session import Session
 from realizer.server.session.welcome import capabilities_of
 from realizer.speech.utterance import Utterance
@@ -91,7 +91,7 @@ class SessionFactory:
 
     async def restore(
         self, name: str, seen: int, speak: Callable[[Speak], Utterance | RealizerError]
-    ) -> tuple[Session, list[Effect]] | None:
+    ) -> tuple[Session, list[Speak]] | None:
         """Restore a session from the journal, without its connections; None if the journal has none.
 
         Args:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from realizer.render.drawing_process import available, available_backend
+from realizer.render.drawing_process import available_backend, unavailable_reason
 
 
 @pytest.mark.slow
@@ -12,7 +12,7 @@ def test_available_names_the_backend_or_what_to_install():
     way, fix = available_backend()
     assert (way in ("gl", "onboard")) != (way == "")
     assert (fix is None) == (way != "")
-    assert available() == fix
+    assert unavailable_reason() == fix
 
 
 @pytest.mark.gl("onboard")
@@ -21,7 +21,7 @@ def test_available_backend_is_the_requested_one():
 
 
 def test_available_lists_the_known_backends():
-    assert available("vulkan") == "drawing: wanted one of auto, gl, onboard, got 'vulkan'"
+    assert unavailable_reason("vulkan") == "drawing: wanted one of auto, gl, onboard, got 'vulkan'"
 
 
 @pytest.mark.gl("onboard")

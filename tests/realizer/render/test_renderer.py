@@ -17,7 +17,7 @@ from PIL import Image
 
 import realizer
 from realizer.core.errors import RealizerError, RenderError
-from realizer.render import Renderer, available
+from realizer.render import Renderer, unavailable_reason
 
 pytestmark = pytest.mark.xdist_group("render")
 
@@ -213,7 +213,7 @@ def test_renderer_encodes_every_form(renderer, form):
 @pytest.mark.parametrize("way", ["gl", "onboard"])
 @pytest.mark.slow
 def test_renderer_draws_transparent_pictures(way):
-    if missing := available(way):
+    if missing := unavailable_reason(way):
         pytest.skip(missing)
     with Renderer("default", SIZE, background="#000000", backend=way) as renderer:
         black = renderer.draw(rows(2)).astype(int)

@@ -16,7 +16,7 @@ import realizer
 
 
 def check(tmp_path: Path, site: str, way: str = "auto", **env: str) -> subprocess.CompletedProcess[str]:
-    """`available()`'s question, asked on a machine that lacks something."""
+    """`unavailable_reason()`'s question, asked on a machine that lacks something."""
     (tmp_path / "sitecustomize.py").write_text(site)
     paths = os.pathsep.join([str(tmp_path), str(Path(realizer.__path__[0]).parent)])
     return subprocess.run(

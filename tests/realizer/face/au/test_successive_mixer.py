@@ -6,7 +6,7 @@ import pytest
 from realizer.face.au.model import Model
 from realizer.face.au.mouth import shares
 from realizer.face.au.skin_binding import attached_parts, skin
-from realizer.face.au.successive_mixer import Succession
+from realizer.face.au.successive_mixer import SuccessiveMixer
 from realizer.face.load import load_face
 from realizer.face.model import Face
 from tests.au_mixers import successive
@@ -25,7 +25,7 @@ def model(face: Face) -> Model:
 
 @pytest.mark.parametrize("order", [(12, 25), (25, 12), (1, 4, 7), (20, 1, 25, 5)])
 def test_succession_equals_the_reference_mixer(face: Face, order: tuple[int, ...]) -> None:
-    made = Succession(face, model(face))(dict.fromkeys(order, (0.8, 0.8)))
+    made = SuccessiveMixer(face, model(face))(dict.fromkeys(order, (0.8, 0.8)))
     mine, at = skin(face), face.vertices.astype(np.float64)
     upper = shares(face, model(face).mouth)[mine]
     wanted = successive(model(face), at[mine], dict.fromkeys(order, 0.8), upper) - at[mine]
@@ -34,14 +34,14 @@ def test_succession_equals_the_reference_mixer(face: Face, order: tuple[int, ...
 
 
 def test_succession_moves_only_what_units_move(face: Face) -> None:
-    made = Succession(face, model(face))({12: (1, 1), 27: (1, 1)})
+    made = SuccessiveMixer(face, model(face))({12: (1, 1), 27: (1, 1)})
     for part in ("left_eye", "upper_teeth", "lower_teeth", "tongue", "shirt"):
         if part in face.parts:
             assert not made[slice(*face.parts[part])].any(), part
 
 
 def test_succession_moves_brows_and_lashes_with_the_skin(face: Face) -> None:
-    made = Succession(face, model(face))({4: (1, 1), 1: (1, 1), 7: (1, 1)})
+    made = SuccessiveMixer(face, model(face))({4: (1, 1), 1: (1, 1), 7: (1, 1)})
     parts = attached_parts(face)
     assert len(parts) == 2
     for first, last, corners, share in parts:
@@ -50,7 +50,7 @@ def test_succession_moves_brows_and_lashes_with_the_skin(face: Face) -> None:
 
 
 def test_succession_of_one_side_leaves_the_other(face: Face) -> None:
-    made = Succession(face, model(face))({6: (1, 0), 12: (1, 0)})
+    made = SuccessiveMixer(face, model(face))({6: (1, 0), 12: (1, 0)})
     left, right = (face.feature_points[point] for point in ("8.3", "8.4"))
     assert np.linalg.norm(made[left]) > 0.004
     assert np.linalg.norm(made[right]) < 1e-5
@@ -59,12 +59,12 @@ def test_succession_of_one_side_leaves_the_other(face: Face) -> None:
 def test_succession_of_all_units_stays_near_the_face(face: Face) -> None:
     """Off the skin, functions were fitted to nothing: there a unit may not move a place by all they say."""
     units = [au for au in sorted(model(face).units) if au not in (25, 26, 43)]
-    chain = Succession(face, model(face))
+    chain = SuccessiveMixer(face, model(face))
     made = chain(dict.fromkeys(units, (0.5, 0.5)))
     summed = sum(0.5 * chain({au: (1, 1)}) for au in units)
     assert np.linalg.norm(made - summed, axis=1).max() < 0.01
 
 
 def test_succession_of_nothing_moves_nothing(face: Face) -> None:
-    assert not Succession(face, model(face))({}).any()
-    assert not Succession(face, model(face))({12: (0, 0)}).any()
+    assert not SuccessiveMixer(face, model(face))({}).any()
+    assert not SuccessiveMixer(face, model(face))({12: (0, 0)}).any()
