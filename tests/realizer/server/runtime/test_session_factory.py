@@ -77,10 +77,10 @@ def test_factory_begins_a_session_anew_after_an_internal_error(
 ) -> None:
     put = Submission.enqueue
 
-    def faulty(intake: Submission, text: str, t: float) -> None:
+    def faulty(submission: Submission, text: str) -> None:
         if "fault" in text:
             raise ZeroDivisionError
-        put(intake, text, t)
+        put(submission, text)
 
     monkeypatch.setattr(Submission, "enqueue", faulty)
 
