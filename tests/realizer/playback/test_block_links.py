@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from bml_schema import Block, SyncRef, parse
 from realizer.behaviours.kind import PlanningContext
 from realizer.behaviours.registry import KINDS
-from realizer.playback.active_block import ActiveBlock, Dependency
+from realizer.playback.active_block import ActiveBlock, Dependency, State
 from realizer.playback.block_links import (
     all_dependencies,
     blocks_to_end,
@@ -62,9 +62,13 @@ def test_dependencies_on_the_end_and_the_subsiding_are_both_named() -> None:
 
 
 def test_all_dependencies_follow_any_chain() -> None:
-    first = alive("a")
-    second = alive("b", waits=[Dependency(first)])
-    assert all_dependencies([Dependency(second, subsiding=True)]) == {id(first), id(second)}
+    chain = [alive("a")]
+    for name in "bcd":
+        chain.append(alive(name, waits=[Dependency(chain[-1])]))
+    assert all_dependencies([Dependency(chain[2], subsiding=True)]) == set(map(id, chain[:3]))
+    circle = alive("e", waits=[Dependency(chain[3])])
+    chain[0].dependencies.append(Dependency(circle))
+    assert all_dependencies([Dependency(circle)]) == set(map(id, [*chain, circle]))
 
 
 def test_dependencies_by_list_are_of_any_character_and_known() -> None:
@@ -88,6 +92,16 @@ def test_existing_claims_are_those_of_the_others_of_a_character() -> None:
     everyone = [alive("a"), alive("b", start=5.0), alive("c", character=1)]
     assert [(c.block, c.begin) for c in existing_claims(0, 2, everyone)] == [("a", 0.0), ("b", 5.0)]
     assert [c.block for c in existing_claims(0, 2, everyone, without=everyone[:1])] == ["b"]
+
+
+@given(st.booleans(), st.booleans(), st.integers(1, 3))
+def test_existing_claims_of_what_waits_are_of_earlier_blocks_with_a_start(
+    begun: bool, known: bool, number: int
+) -> None:
+    other = alive("a", start=5.0 if known else float("inf"))
+    other.number = 2
+    other.state = State.IN_EXEC if begun else State.LURKING
+    assert bool(existing_claims(0, number, [other])) == (begun or (known and number > 2))
 
 
 SCHEDULES = {
