@@ -75,4 +75,4 @@ STREAMS: Mapping[str, Stream] = {row.name: row for row in _ROWS}
 # Streams with frames that are JSON messages; `type` is the name of the stream.
 JSON_STREAMS = tuple(row.name for row in _ROWS if "json" in row.encodings)
 # First byte of a binary message -> its stream.
-KINDS: Mapping[int, Stream] = {row.kind: row for row in sorted(_ROWS, key=lambda r: r.kind or 0) if row.kind}
+KINDS: Mapping[int, Stream] = dict(sorted((row.kind, row) for row in _ROWS if row.kind))
