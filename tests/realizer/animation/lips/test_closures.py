@@ -129,6 +129,34 @@ def test_lip_weight_is_1_during_the_first_and_last_closure(ipa: str) -> None:
     assert lips[inside].min() == pytest.approx(1, abs=1e-6)
 
 
+@given(st.sampled_from("pfm"), st.floats(0.02, 0.1))
+def test_lip_weight_is_1_while_the_first_and_last_closure_are_held(ipa: str, length: float) -> None:
+    """However short the sound is, the lips are held closed for a frame around its middle."""
+    times, lips = taken(PAUSE, (ipa, length), ("a", 0.1), (ipa, length), PAUSE)
+    half = max(coarticulation()["closure"]["hold"], length) / 2
+    first, last = 0.5 + length / 2, 0.6 + 1.5 * length
+    assert lips[(times > first - half) & (times < last + half)].min() == pytest.approx(1, abs=1e-6)
+
+
+@given(st.floats(0.25, 1))
+def test_lip_weight_begins_and_ends_alike_in_pauses_of_any_length(pause: float) -> None:
+    offsets = np.linspace(-0.2, 0.4, 31)
+
+    def about_the_sound(pause: float) -> Float64:
+        track = track_of(phonemes(("", pause), ("a", 0.2), ("", pause)))
+        assert track is not None
+        return lip_weight(track, np.array([0, *(pause + offsets), 2 * pause + 0.2]))[1:-1]
+
+    assert about_the_sound(pause) == pytest.approx(about_the_sound(2.0))
+
+
+def test_lip_weight_stays_1_in_a_short_pause() -> None:
+    pauses = coarticulation()["pauses"]
+    length = (pauses["absorbed"] + pauses["released"]) / 2
+    times, lips = taken(PAUSE, ("a", 0.5), ("", length), ("a", 0.1), PAUSE)
+    assert (lips[(times > 1.0) & (times < 1.0 + length)] == 1).all()
+
+
 @pytest.mark.parametrize(("length", "free"), [(0.3, False), (0.9, True)])
 def test_lip_weight_is_0_in_a_long_pause(length: float, free: bool) -> None:
     times, lips = taken(PAUSE, ("a", 0.1), ("", length), ("a", 0.1), PAUSE)
