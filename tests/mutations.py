@@ -47,7 +47,7 @@ UNSEEN = re.compile(r"(log|logging|warnings|gc)\.|.*\.(close|cancel|shutdown|kil
 # Errors, whose texts are for people too.
 ERRORS = re.compile(r"(\w+\.)*\w*Error$")
 # Arguments that only speed, memory or the look of a text depend on.
-TUNING = {"maxsize", "maxlen", "timeout", "indent", "stacklevel", "max_workers", "limit", "ndigits"}
+TUNING = {"maxsize", "maxlen", "timeout", "indent", "stacklevel", "max_workers", "limit", "ndigits", "repr"}
 # Numbers and sums there are a matter of taste: where a curl lies, how thick a line is.
 TASTE = re.compile("realizer/(charts|facebuild/person)/")
 # Numbers so small only keep rounding errors and divisions by 0 out: any other would do.
