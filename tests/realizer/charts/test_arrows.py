@@ -62,6 +62,14 @@ def test_draw_links_ends_a_synchronize_in_dots(lines) -> None:
     assert not [s for s in picture.shapes if isinstance(s, Path) and s.fill == LINK and s.points[0] in ends]
 
 
+def test_draw_links_writes_an_offset_beside_the_bar_it_belongs_to(lines) -> None:
+    for sync in ("start", "end"):
+        picture, _, _ = drawn(lines, TIED.format(f'{sync}="w:end+0.5"', ""))
+        (curve,) = paths(picture, LINK)
+        (offset,) = [s for s in picture.shapes if isinstance(s, Text) and s.text == "+0.5"]
+        assert (offset.x < curve.points[-1][0]) == (offset.anchor == "end") == (sync == "end"), sync
+
+
 def test_draw_links_draws_no_arrow_to_itself(lines) -> None:
     picture, _, _ = drawn(lines, '<bml id="b"><head id="n" lexeme="NOD" end="n:start+2"/></bml>')
     assert not paths(picture, LINK)
