@@ -85,7 +85,7 @@ class Vhmsg:
             block, text = _named(document, self._speaks, id, agent)
             speak.blocks.add(block)
             self._speaks[block] = speak
-            actions.append(Inbound(text))
+            actions.append(Inbound(f"<act>{text}</act>"))  # so that it is read as SmartBody's BML
         return actions
 
     def _stop(self, agent: str, id: str) -> list[Action]:

@@ -77,6 +77,13 @@ def test_vhmsg_gives_its_id_to_a_block_without_one(start: str, id: str, characte
     assert (block.id, block.character_id, len(block.behaviours)) == (id, character, 1)
 
 
+def test_vhmsg_lets_documents_be_read_as_those_of_smartbody() -> None:
+    (text,) = spoken(vhmsg(), 'vrSpeak Brad ALL m1 <act><bml><gaze target="table"/></bml></act>')
+    block = parse(text)
+    assert [node.id for node in block.behaviours] == ["gaze1"]
+    assert [p.type for p in block.problems] == ["NOT_BML_1_0"]
+
+
 def test_vhmsg_writes_an_empty_element_and_awkward_names() -> None:
     (text,) = spoken(vhmsg(), 'vrSpeak A"&B ALL m:1/2 <bml/>')
     block = parse(text)
