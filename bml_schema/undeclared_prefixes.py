@@ -92,7 +92,7 @@ def read_undeclared(
                 tag = name
             if tag is None:
                 removed[f"<{prefix}:{name}>"] = None
-                _remove(element)
+                remove_element(element)
                 continue
             element.tag = tag
         if any(":" in key and key[0] != "{" for key in element.attrib):
@@ -132,8 +132,8 @@ def _rename_attributes(
             removed[key] = None
 
 
-def _remove(element: Any) -> None:
-    """Remove an element, but not the text after it."""
+def remove_element(element: Any) -> None:
+    """Remove an element from its parent, but not the text after it."""
     parent, before = element.getparent(), element.getprevious()
     if element.tail and before is not None:
         before.tail = (before.tail or "") + element.tail

@@ -15,7 +15,7 @@ from bml_schema.dialects.table import Row, point_row, squeezed, table
 from bml_schema.dialects.values import FUNCTIONS
 from bml_schema.node_schema import local
 from bml_schema.nodes import BMLA, BMLT, CORE, DRAFTS, EXTENSIONS, OWN
-from bml_schema.undeclared_prefixes import SMARTBODY
+from bml_schema.undeclared_prefixes import SMARTBODY, remove_element
 from bml_schema.vocabulary import VOCABULARY
 
 __all__ = ["is_draft", "made_ids", "translate"]
@@ -168,7 +168,7 @@ class _Translation:
             return True
         if row.becomes == "!":
             self._apply(row)
-            element.getparent().remove(element)
+            remove_element(element)
             return False
         tag, _, becomes = row.becomes.rpartition(": ")
         assignments: list[tuple[str, str]] | None = None
@@ -204,12 +204,7 @@ class _Translation:
         """Apply the row of an element; return whether the element stays."""
         self._apply(row)
         if row.becomes == "-":
-            before, parent = element.getprevious(), element.getparent()
-            if element.tail and before is not None:
-                before.tail = (before.tail or "") + element.tail
-            elif element.tail:
-                parent.text = (parent.text or "") + element.tail
-            parent.remove(element)
+            remove_element(element)
             return False
         tag, colon, _ = row.becomes.partition(": ")
         if colon:
