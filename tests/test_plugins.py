@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -33,6 +35,8 @@ class Quiet(BaseVoice):
     def say(self, request): raise NotImplementedError
 '''
 ADDING = (Path(__file__).parents[1] / "docs" / "adding.md").read_text("utf-8")
+YAWN, PLUGIN = re.findall(r"```python\n(.*?)```", ADDING, re.DOTALL)
+(PROJECT,) = (tomllib.loads(text)["project"] for text in re.findall(r"```toml\n(.*?)```", ADDING, re.DOTALL))
 POINTS = """
 [realizer.behaviours]
 yawn = yawn:KINDS
@@ -51,11 +55,17 @@ mine = plug:FACES
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     site = tmp_path_factory.mktemp("site")
     (site / "plug.py").write_text(CODE)
-    (site / "yawn.py").write_text(ADDING.partition("```python\n")[2].partition("```")[0])
-    info = site / "plug-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: plug\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(POINTS)
+    (site / "yawn.py").write_text(YAWN)
+    (site / "my_plugin.py").write_text(PLUGIN)
+    groups = PROJECT["entry-points"].items()
+    points = "".join(
+        f"[{group}]\n" + "".join(f"{n} = {at}\n" for n, at in rows.items()) for group, rows in groups
+    )
+    for name, text in (("plug", POINTS), (PROJECT["name"], points)):
+        info = site / f"{name.replace('-', '_')}-1.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+        (info / "entry_points.txt").write_text(text)
     (site / "faces" / "eve").mkdir(parents=True)
     (site / "faces" / "eve" / "face.toml").write_text(
         'name = "eve"\nsource = "a test"\nlicence = "MIT"\n[parts]\n'
@@ -79,6 +89,13 @@ def run(site: Path, *arguments: str, document: str = "") -> subprocess.Completed
 def test_plugins_include_the_example_of_the_documentation(site: Path) -> None:
     document = '<bml id="b" xmlns:r="urn:bml-realizer:1"><r:yawn id="y"/></bml>'
     assert "<syncPointProgress" in run(site, "realize", "-", document=document).stdout
+
+
+def test_plugins_include_the_package_of_the_documentation(site: Path, tmp_path: Path) -> None:
+    (document,) = re.findall(r"^echo '(<bml .*)' \|$", ADDING, re.MULTILINE)
+    done = run(site, "realize", "-", "-o", str(tmp_path / "yuck.words"), document=document)
+    assert (tmp_path / "yuck.words").read_text().startswith("0.000 Yuck")
+    assert "sneer" not in done.stderr
 
 
 def test_plugins_bring_a_behaviour_and_an_output(site: Path, tmp_path: Path) -> None:
