@@ -11,7 +11,8 @@ from click.testing import CliRunner, Result
 from realizer.cli import cli
 from realizer.server import serve
 from realizer.speech.espeak.voice import EspeakVoice
-from realizer.speech.hibari.voice import HibariVoice
+from realizer.speech.registry import VOICES
+from realizer.speech.silent import SilentVoice
 
 GOOD = '<bml id="b"><head id="n" lexeme="NOD" start="0.2" end="0.6"/></bml>'
 
@@ -74,7 +75,7 @@ def test_serve_refuses_an_unknown_camera_light_or_background(args: list[str], wo
 
 @pytest.fixture
 def only_silence(monkeypatch: pytest.MonkeyPatch) -> None:
-    for engine in (EspeakVoice, HibariVoice):
+    for engine in [voice for _, voice in VOICES.working() if voice is not SilentVoice]:
         monkeypatch.setattr(engine, "missing", classmethod(lambda cls, variant=None: f"get {cls.engine}"))
 
 
