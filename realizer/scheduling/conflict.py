@@ -10,7 +10,7 @@ from realizer.scheduling.problem import ORIGIN, Part, Problem, Relation
 
 
 @dataclass(frozen=True, slots=True)
-class Gap:
+class LengthBound:
     """The least length of a behaviour between two of its points, or the greatest if `most`."""
 
     part: Part
@@ -39,13 +39,13 @@ class Conflict:
 
     Attributes:
         relations: the equalities and orders, in the order of their chain.
-        gaps: least and greatest lengths, one for each stretch of a behaviour.
-        earliest: the point that starts too early, and its bound in seconds, or None.
-        named: the behaviours of the points, also if they are only referred to.
+        gaps: least and greatest lengths, one for each section of a behaviour.
+        earliest: the point that would come before its earliest time, and that in seconds, or None.
+        named: the behaviours of the points, also those that state none of the relations.
     """
 
     relations: tuple[Relation, ...]
-    gaps: tuple[Gap, ...] = ()
+    gaps: tuple[LengthBound, ...] = ()
     earliest: tuple[Part, str, float] | None = None
     named: tuple[Part, ...] = ()
 
@@ -64,21 +64,21 @@ class ConstraintGraph:
     """A graph of the equalities of a problem, for searching the shortest chains.
 
     Args:
-        unfit: numbers of equalities that are left out.
+        contradicting: numbers of equalities that are left out.
     """
 
-    def __init__(self, problem: Problem, unfit: Iterable[int] = ()) -> None:
+    def __init__(self, problem: Problem, contradicting: Iterable[int] = ()) -> None:
         self.problem = problem
-        self._beside: dict[int, list[tuple[int, Relation]]] = {}
-        left_out = set(unfit)
+        self._neighbours: dict[int, list[tuple[int, Relation]]] = {}
+        left_out = set(contradicting)
         for k, relation in enumerate(problem.equalities):
             if k not in left_out:
-                self._beside.setdefault(relation.u, []).append((relation.v, relation))
-                self._beside.setdefault(relation.v, []).append((relation.u, relation))
+                self._neighbours.setdefault(relation.u, []).append((relation.v, relation))
+                self._neighbours.setdefault(relation.v, []).append((relation.u, relation))
 
-    def loop(self, unfit: int) -> Conflict:
-        """Return the conflict of an equality, by its number, that does not close its loop."""
-        last = self.problem.equalities[unfit]
+    def loop(self, contradicting: int) -> Conflict:
+        """Return the conflict of an equality, by its number, with those that connect its points."""
+        last = self.problem.equalities[contradicting]
         return _conflict(self.problem, [*self._chain(last.u, last.v), last], [])
 
     def cycle(self, links: Sequence[Link]) -> Conflict:
@@ -102,7 +102,7 @@ class ConstraintGraph:
         queue = deque([begin])
         while queue and end not in previous:
             at = queue.popleft()
-            for to, relation in self._beside.get(at, ()):
+            for to, relation in self._neighbours.get(at, ()):
                 if to not in previous:
                     previous[to] = (at, relation)
                     queue.append(to)
@@ -115,7 +115,7 @@ class ConstraintGraph:
 
 
 def _conflict(problem: Problem, relations: Sequence[Relation], links: Sequence[Link]) -> Conflict:
-    gaps: list[Gap] = []
+    gaps: list[LengthBound] = []
     earliest = None
     points = {p for r in relations for p in (r.u, r.v)}
     for link in links:
@@ -129,7 +129,7 @@ def _conflict(problem: Problem, relations: Sequence[Relation], links: Sequence[L
         part, names, first = problem.behaviours[b], problem.timings[b].points, problem.first[b]
         most = link.u > link.v  # a greatest length leads backwards
         begin, end = sorted((link.u - first, link.v - first))
-        gap = Gap(part, names[begin], names[end], abs(link.seconds), most)
+        gap = LengthBound(part, names[begin], names[end], abs(link.seconds), most)
         gaps[-1:] = _joined(gaps[-1], gap) if gaps else [gap]
     if len(gaps) > 1 and len(ring := _joined(gaps[-1], gaps[0])) == 1:
         gaps[0] = ring[0]
@@ -139,15 +139,15 @@ def _conflict(problem: Problem, relations: Sequence[Relation], links: Sequence[L
     return Conflict(tuple(unique.values()), tuple(gaps), earliest, tuple(_once(owners)))
 
 
-def _joined(first: Gap, after: Gap) -> list[Gap]:
+def _joined(first: LengthBound, second: LengthBound) -> list[LengthBound]:
     """Join two successive lengths of a cycle, if they are of one kind and meet."""
-    if first.part is after.part and first.most is after.most:
-        seconds = first.seconds + after.seconds
-        if first.most and first.begin == after.end:
-            return [Gap(first.part, after.begin, first.end, seconds, True)]
-        if not first.most and first.end == after.begin:
-            return [Gap(first.part, first.begin, after.end, seconds)]
-    return [first, after]
+    if first.part is second.part and first.most is second.most:
+        seconds = first.seconds + second.seconds
+        if first.most and first.begin == second.end:
+            return [LengthBound(first.part, second.begin, first.end, seconds, True)]
+        if not first.most and first.end == second.begin:
+            return [LengthBound(first.part, first.begin, second.end, seconds)]
+    return [first, second]
 
 
 def _once(parts: Iterable[Part]) -> list[Part]:

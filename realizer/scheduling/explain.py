@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
-from realizer.scheduling.conflict import Conflict, Gap
+from realizer.scheduling.conflict import Conflict, LengthBound
 from realizer.scheduling.problem import Part, Relation
 from realizer.scheduling.timing import Clause, Warning
 
@@ -100,7 +100,7 @@ def _placed(part: Part, line: int | None) -> str:
     return f" ({', '.join(words)})" if words else ""
 
 
-def _gap(gap: Gap) -> str:
+def _gap(gap: LengthBound) -> str:
     name = gap.part.name
     if gap.most:
         return f"{name} takes at most {_seconds(gap.seconds)} from {gap.begin} to {gap.end}"

@@ -62,14 +62,14 @@ def model_of(problem: Problem) -> Model | list[Conflict]:
     """Return the problem as arrays, or the loops of equalities that do not close."""
     n = len(problem.owner)
     ties = UnionFind(n)
-    unfit = [
+    contradicting = [
         k
         for k, (u, v, seconds, _, _) in enumerate(problem.equalities)
         if abs(ties.tie(u, v, seconds)) > LOOSE
     ]
-    if unfit:
-        web = ConstraintGraph(problem, unfit)
-        return [web.loop(k) for k in unfit]
+    if contradicting:
+        web = ConstraintGraph(problem, contradicting)
+        return [web.loop(k) for k in contradicting]
     named = {p for relation in problem.equalities for p in relation[:2]}
     named.discard(ORIGIN)
     tied = sorted(named)

@@ -10,11 +10,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from realizer.animation.lips.visemes import SHAPE, VISEMES, coarticulation, shape_table, sounds
+from realizer.animation.lips.visemes import SHAPE_COLUMNS, VISEME_COUNT, coarticulation, shape_table, sounds
 from realizer.core.array_types import Bool, Float64, Index
 from realizer.speech.utterance import Phoneme
 
-CLASSES = {"jaw": ("jaw",), "lips": ("upper", "lower"), "shape": SHAPE[3:7], "tongue": SHAPE[7:]}
+CLASSES = {
+    "jaw": ("jaw",),
+    "lips": ("upper", "lower"),
+    "shape": SHAPE_COLUMNS[3:7],
+    "tongue": SHAPE_COLUMNS[7:],
+}
 STRESS = {0: "none", 1: "primary", 2: "secondary"}
 
 
@@ -84,7 +89,7 @@ def track_of(phonemes: Sequence[Phoneme]) -> Track | None:
     ]
     begin, end = np.array([row.begin for row in rows]), np.array([row.end for row in rows])
     middle = (end[:-1] + begin[1:]) / 2  # sounds touch, or extend to the middle of a short pause
-    mix = np.zeros((len(rows), VISEMES))
+    mix = np.zeros((len(rows), VISEME_COUNT))
     for k, row in enumerate(rows):
         for viseme, amount in row.mix:
             mix[k, viseme] = amount
@@ -127,7 +132,7 @@ def dominances(track: Track, times: Float64) -> Iterator[tuple[Index, Float64, t
 
     Yields:
         The sounds, (k, n); their parts, (k, n), which add up to a little less than 1, as the rest belongs to
-        the neutral mouth; the columns of `SHAPE` that the class moves.
+        the neutral mouth; the columns of `SHAPE_COLUMNS` that the class moves.
     """
     facts = coarticulation()
     rule = facts["dominance"]

@@ -11,7 +11,7 @@ from realizer.animation.channel import Channel, Layer
 from realizer.animation.lips.closures import BILABIAL, LABIODENTAL, closure_mask, lip_weight
 from realizer.animation.lips.dominance import CLASSES, Track, dominances, key_times, track_of
 from realizer.animation.lips.mouth_faps import mouth_faps
-from realizer.animation.lips.visemes import SHAPE, coarticulation, shape_table
+from realizer.animation.lips.visemes import SHAPE_COLUMNS, coarticulation, shape_table
 from realizer.core.array_types import Float64
 from realizer.speech.utterance import Phoneme
 
@@ -51,10 +51,10 @@ def lip_channels(phonemes: Sequence[Phoneme], start: float, room: float = 0.0) -
 
 
 def _mouth(track: Track, times: Float64) -> Float64:
-    """Return the weighted mean of the sounds around each time, (10, n) float64; rows as `SHAPE`."""
+    """Return the weighted mean of the sounds around each time, (10, n) float64; rows as `SHAPE_COLUMNS`."""
     target = (track.mix @ shape_table()[0]).T * track.size
-    target[[SHAPE.index(name) for name in OPENING]] *= track.effort
-    mouth = np.empty((len(SHAPE), len(times)))
+    target[[SHAPE_COLUMNS.index(name) for name in OPENING]] *= track.effort
+    mouth = np.empty((len(SHAPE_COLUMNS), len(times)))
     for near, parts, members in dominances(track, times):
         block = _block(members)
         mouth[block] = np.einsum("kn,skn->sn", parts, target[block].take(near, axis=1, mode="clip"))
@@ -63,13 +63,13 @@ def _mouth(track: Track, times: Float64) -> Float64:
 
 def _block(members: Sequence[str]) -> slice:
     """Return the rows of a class of articulators."""
-    return slice(SHAPE.index(members[0]), SHAPE.index(members[-1]) + 1)
+    return slice(SHAPE_COLUMNS.index(members[0]), SHAPE_COLUMNS.index(members[-1]) + 1)
 
 
 def _constrain(mouth: Float64, track: Track, times: Float64, masked: Float64, facts: dict[str, Any]) -> None:
     """Apply closures, limits of speed and smoothing, in place."""
     shapes, _ = shape_table()
-    column = {name: k for k, name in enumerate(SHAPE)}
+    column = {name: k for k, name in enumerate(SHAPE_COLUMNS)}
     closed, bitten = closure_mask(track, times)
     upper, lower, jaw = mouth[column["upper"]], mouth[column["lower"]], mouth[column["jaw"]]
     speed = facts["speed"]["lips"]

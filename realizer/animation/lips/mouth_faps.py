@@ -1,6 +1,6 @@
 """The FAPs of lips, jaw and tongue that make a mouth shape."""
 
-from realizer.animation.lips.visemes import SHAPE, coarticulation
+from realizer.animation.lips.visemes import SHAPE_COLUMNS, coarticulation
 from realizer.core.array_types import Float64
 
 
@@ -8,10 +8,10 @@ def mouth_faps(mouth: Float64) -> dict[int, Float64]:
     """Return the values (n,), in FAPU, of all FAPs that speech moves.
 
     Args:
-        mouth: (n, 10) float64, columns as `SHAPE`.
+        mouth: (n, 10) float64, columns as `SHAPE_COLUMNS`.
     """
     contour = coarticulation()["contour"]
-    part = {name: mouth[:, k] for k, name in enumerate(SHAPE)}
+    part = {name: mouth[:, k] for k, name in enumerate(SHAPE_COLUMNS)}
     # In MPEG-4 FAPs of the upper lip move it down, those of the lower lip up: both are negative when open.
     upper, lower = -part["upper"], -part["lower"]
     values: dict[tuple[int, ...], Float64] = {

@@ -9,7 +9,7 @@ import numpy as np
 from realizer import tables
 from realizer.animation.lips.closures import BILABIAL, LABIODENTAL, closure_mask, lip_weight
 from realizer.animation.lips.dominance import dominances, key_times, track_of
-from realizer.animation.lips.visemes import VISEMES
+from realizer.animation.lips.visemes import VISEME_COUNT
 from realizer.core.array_types import Float64, Int32
 from realizer.speech.utterance import Phoneme
 
@@ -43,22 +43,22 @@ def viseme_weights(phonemes: Sequence[Phoneme], times: Float64) -> Float64:
     Returns:
         (n, 15) float64, 0..1, column = viseme (0 is none); each row adds up to 1.
     """
-    weights = np.zeros((len(times), VISEMES))
+    weights = np.zeros((len(times), VISEME_COUNT))
     weights[:, 0] = 1.0
     track = track_of(phonemes)
     if track is None:
         return weights
     keys = key_times(phonemes)
-    shown = np.zeros((len(keys), VISEMES))
+    shown = np.zeros((len(keys), VISEME_COUNT))
     classes = list(dominances(track, keys))
     for near, parts, _ in classes:
         shown += np.einsum("kn,knv->nv", parts, track.mix[near]) / len(classes)
     for viseme, holds in zip((BILABIAL, LABIODENTAL), closure_mask(track, keys), strict=True):
         # With a transition of one key on either side, as for the lips.
         share = np.convolve(np.pad(holds.astype(float), 1, "edge"), [0.25, 0.5, 0.25], "valid")[:, None]
-        shown = shown * (1 - share) + share * np.eye(VISEMES)[viseme]
+        shown = shown * (1 - share) + share * np.eye(VISEME_COUNT)[viseme]
     shown *= lip_weight(track, keys)[:, None]
-    for viseme in range(1, VISEMES):
+    for viseme in range(1, VISEME_COUNT):
         weights[:, viseme] = np.interp(times, keys, shown[:, viseme], left=0.0, right=0.0)
     weights[:, 0] = np.maximum(1 - weights[:, 1:].sum(axis=1), 0.0)
     return weights

@@ -11,15 +11,28 @@ from realizer import tables
 from realizer.core.array_types import Float64
 from realizer.tables.phonemes import PhonemeFeatures, phoneme_features
 
-VISEMES = 15  # 0 none, 1..14: ISO/IEC 14496-2
+VISEME_COUNT = 15  # 0 none, 1..14: ISO/IEC 14496-2
 ROUNDED = 14  # the viseme of a rounded mouth
 BILABIAL = 1
-SHAPE = ("jaw", "upper", "lower", "width", "push_upper", "push_lower", "corner", "tip", "thrust", "body")
-WEIGHT = ("weight_jaw", "weight_lips", "weight_shape", "weight_tongue")
+SHAPE_COLUMNS = (
+    "jaw",
+    "upper",
+    "lower",
+    "width",
+    "push_upper",
+    "push_lower",
+    "corner",
+    "tip",
+    "thrust",
+    "body",
+)
+WEIGHT_COLUMNS = ("weight_jaw", "weight_lips", "weight_shape", "weight_tongue")
 
 
 @dataclass(frozen=True, slots=True)
 class VisemeRule:
+    """A row of phonemes_visemes.csv; the first that fits counts, and `any` fits all."""
+
     place: str
     manner: str
     viseme: int
@@ -48,11 +61,11 @@ class LipShape:
 
 
 @dataclass(frozen=True, slots=True)
-class Sound:
-    """One articulation inside a phoneme.
+class Articulation:
+    """One articulation in a phoneme.
 
     Attributes:
-        mix: (viseme, part) pairs whose parts add up to 1; () if the sound has no lip shape.
+        mix: (viseme, part) pairs whose parts add up to 1; () if it has no lip shape.
         vowel: whether it is a vowel.
         share: part of the phoneme's time, 0..1.
     """
@@ -76,15 +89,15 @@ def coarticulation() -> dict[str, Any]:
 
 @cache
 def shape_table() -> tuple[Float64, Float64]:
-    """Return shapes (15, 10) in FAPU, columns as `SHAPE`, and weights (15, 4), columns as `WEIGHT`."""
-    assert {f.name for f in fields(LipShape)} >= {*SHAPE, *WEIGHT}
-    shapes = np.array([[getattr(row, name) for name in SHAPE] for row in lip_shapes()], np.float64)
-    weights = np.array([[getattr(row, name) for name in WEIGHT] for row in lip_shapes()], np.float64)
+    """Return shapes (15, 10) in FAPU and weights (15, 4), with SHAPE_COLUMNS and WEIGHT_COLUMNS."""
+    assert {f.name for f in fields(LipShape)} >= {*SHAPE_COLUMNS, *WEIGHT_COLUMNS}
+    shapes = np.array([[getattr(row, name) for name in SHAPE_COLUMNS] for row in lip_shapes()], np.float64)
+    weights = np.array([[getattr(row, name) for name in WEIGHT_COLUMNS] for row in lip_shapes()], np.float64)
     return shapes, weights
 
 
 @lru_cache(maxsize=2048)
-def sounds(ipa: str) -> tuple[Sound, ...]:
+def sounds(ipa: str) -> tuple[Articulation, ...]:
     """Return the articulations of a phoneme string, in order; their shares add up to 1.
 
     A string may hold several sounds ("oʊ", "əl", "ɔːɹ", "tʃ"). Length, stress, tone and diacritics are
@@ -99,12 +112,12 @@ def sounds(ipa: str) -> tuple[Sound, ...]:
             mix = (*((number, part / 2) for number, part in mix), (ROUNDED, 0.5))
         found.append((mix, row.kind == "vowel"))
     consonant = coarticulation()["diphthong"]["consonant"]
-    first = coarticulation()["diphthong"]["first"]
-    times = [1.0 if vowel else consonant for _, vowel in found]
+    first_share = coarticulation()["diphthong"]["first"]
+    lengths = [1.0 if vowel else consonant for _, vowel in found]
     if len(found) == 2 and all(vowel for _, vowel in found):
-        times = [first, 1 - first]
-    whole = sum(times)
-    return tuple(Sound(mix, vowel, t / whole) for (mix, vowel), t in zip(found, times, strict=True))
+        lengths = [first_share, 1 - first_share]
+    whole = sum(lengths)
+    return tuple(Articulation(mix, vowel, t / whole) for (mix, vowel), t in zip(found, lengths, strict=True))
 
 
 def _symbols(ipa: str) -> list[tuple[str, bool]]:

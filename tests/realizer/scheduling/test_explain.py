@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from realizer.scheduling.conflict import Conflict, Gap
+from realizer.scheduling.conflict import Conflict, LengthBound
 from realizer.scheduling.explain import choose, fault_warning, in_words, refusal, warning_of
 from realizer.scheduling.problem import Part, Relation
 from tests.realizer.scheduling.recipes import lasting, schedule
@@ -14,7 +14,7 @@ def behaviour(name: str, **more: object) -> Part:
     return Part(f"b1:{name}", name, **more)  # type: ignore[arg-type]
 
 
-def conflict(*parts: Part, gaps: tuple[Gap, ...] = (), named: tuple[Part, ...] = ()) -> Conflict:
+def conflict(*parts: Part, gaps: tuple[LengthBound, ...] = (), named: tuple[Part, ...] = ()) -> Conflict:
     """A conflict of one equality of each part."""
     relations = [Relation(1, 2, 0.0, part, (f"{part.name}:start", "=", 1)) for part in parts]
     return Conflict(tuple(relations), gaps, None, named or parts)
@@ -76,7 +76,7 @@ def test_in_words_counts_what_cannot_hold() -> None:
     ],
 )
 def test_in_words_of_a_gap(seconds: float, most: bool, words: str) -> None:
-    gap = Gap(behaviour("a"), "start", "end", seconds, most)
+    gap = LengthBound(behaviour("a"), "start", "end", seconds, most)
     assert in_words(conflict(gaps=(gap,))) == f"{words} cannot hold"
 
 

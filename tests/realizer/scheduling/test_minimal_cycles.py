@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from scipy.optimize import linprog
 
 from realizer.core.array_types import Float64
-from realizer.scheduling.conflict import Conflict, Gap
+from realizer.scheduling.conflict import Conflict, LengthBound
 from realizer.scheduling.explain import in_words
 from realizer.scheduling.problem import ORIGIN, Problem, Relation
 from realizer.scheduling.solve import Solution, solve
@@ -41,7 +41,7 @@ def both(relation: Relation) -> list[Edge]:
     ]
 
 
-def place(problem: Problem, gap: Gap, name: str) -> int:
+def place(problem: Problem, gap: LengthBound, name: str) -> int:
     b = problem.behaviours.index(gap.part)
     return problem.first[b] + problem.timings[b].points.index(name)
 

@@ -20,12 +20,12 @@ from realizer.server.transports.xface.wire import Status, Task, pack_note
 
 log = logging.getLogger(__name__)
 
-READ = 64 * 1024  # bytes
-# Bytes of a task: minutes of FAP text, and more than plays as one document.
-LIMIT = 4 * 2**20
+READ_SIZE = 64 * 1024  # bytes
+# The largest task in bytes: enough for minutes of FAP text.
+MAX_TASK = 4 * 2**20
 MAX_CLIENTS = 64  # usually one or two; each may hold a task in memory
-# Characters of an attachment that is parsed at once; larger ones are parsed in a thread, to delay no frames.
-SMALL = 16 * 1024
+# The largest attachment, in characters, that is parsed at once; others are parsed in a thread.
+MAX_INLINE = 16 * 1024
 FEEDBACK = (
     '{"type":"subscribe","stream":"feedback",'
     '"elements":["predictionFeedback","blockProgress","warningFeedback"]}'
@@ -72,18 +72,18 @@ class XfaceTransport(TcpTransport):
     async def _read(
         self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, link: _SessionLink
     ) -> None:
-        parser = TaskReader(min(LIMIT, self._settings.max_message))
+        parser = TaskReader(min(MAX_TASK, self._settings.max_message))
         limiter, loop = RateLimiter(self._settings.max_rate), asyncio.get_running_loop()
-        while data := await reader.read(READ):
+        while data := await reader.read(READ_SIZE):
             for item in parser.feed(data):
                 match item:
                     case Fault(text, task):
                         log.info("xface: client %d: %s", link.tasks.owner, text)
-                        link.do(link.tasks.refuse(task))
+                        link.carry_out(link.tasks.refuse(task))
                     case Task():
-                        link.do(link.tasks.accept(item))
+                        link.carry_out(link.tasks.accept(item))
                         attachment = await self._prepared(item)
-                        link.do(link.tasks.run(item, attachment, loop.time()))
+                        link.carry_out(link.tasks.run(item, attachment, loop.time()))
                 if link.has_left:
                     return
                 await limiter.pause(
@@ -92,8 +92,9 @@ class XfaceTransport(TcpTransport):
                 await writer.drain()  # the client may not read its notifications
 
     async def _prepared(self, task: Task) -> Attachment:
+        """Return what a task needs, or the error."""
         try:
-            if sum(map(len, task.params)) < SMALL and task.name != "LOAD_FAP":
+            if sum(map(len, task.params)) < MAX_INLINE and task.name != "LOAD_FAP":
                 return prepare(task, self._settings)
             loop = asyncio.get_running_loop()
             return await loop.run_in_executor(None, prepare, task, self._settings)
@@ -104,7 +105,7 @@ class XfaceTransport(TcpTransport):
 
 
 class _SessionLink:
-    """The connection of one client to its session; an `Outbound`."""
+    """The connection of one client to its session; it implements `Outbound`."""
 
     def __init__(self, sessions: SessionHost, tasks: TaskRunner, writer: asyncio.StreamWriter) -> None:
         self.tasks = tasks
@@ -119,7 +120,7 @@ class _SessionLink:
         self._sessions.receive(number, FEEDBACK)
         self._writer.write(pack_note("CONNECTION_OK", self.tasks.owner, 0, Status.UNKNOWN))
 
-    def do(self, answers: Iterable[Answer]) -> None:
+    def carry_out(self, answers: Iterable[Answer]) -> None:
         """Carry out the answers of the task runner, in order."""
         for answer in answers:
             match answer:
@@ -127,7 +128,7 @@ class _SessionLink:
                     self.has_left = self.has_left or not self._sessions.receive(self._number, text)
                 case Disconnect():
                     self.has_left = True
-                case note:
+                case bytes() as note:
                     self._writer.write(note)
 
     @property
@@ -138,7 +139,7 @@ class _SessionLink:
         if isinstance(data, str):
             loop = asyncio.get_running_loop()
             # Later, because a message to the session now would call `send` again before this one has ended.
-            loop.call_soon(lambda: self.do(self.tasks.on_feedback(data, loop.time())))
+            loop.call_soon(lambda: self.carry_out(self.tasks.on_feedback(data, loop.time())))
 
     def disconnect(self, code: int, reason: str) -> None:
         log.warning("xface: client %d is disconnected: %s", self.tasks.owner, reason)

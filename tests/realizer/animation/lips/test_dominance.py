@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from realizer.animation.lips.dominance import CLASSES, Track, dominances, key_times, track_of
-from realizer.animation.lips.visemes import SHAPE, coarticulation
+from realizer.animation.lips.visemes import SHAPE_COLUMNS, coarticulation
 from realizer.speech.utterance import Phoneme
 
 
@@ -59,7 +59,7 @@ def test_key_times_cover_all_sounds_at_their_rate() -> None:
 
 
 def test_classes_have_every_column_of_a_mouth_once() -> None:
-    assert [name for members in CLASSES.values() for name in members] == list(SHAPE)
+    assert [name for members in CLASSES.values() for name in members] == list(SHAPE_COLUMNS)
 
 
 def test_dominances_add_up_to_a_little_less_than_1() -> None:

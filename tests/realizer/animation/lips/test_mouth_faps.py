@@ -7,11 +7,11 @@ import pytest
 
 from realizer import tables
 from realizer.animation.lips.mouth_faps import mouth_faps
-from realizer.animation.lips.visemes import SHAPE, shape_table
+from realizer.animation.lips.visemes import SHAPE_COLUMNS, shape_table
 
 
 def shape(**parts: float) -> np.ndarray:
-    return np.array([[parts.get(name, 0.0) for name in SHAPE]])
+    return np.array([[parts.get(name, 0.0) for name in SHAPE_COLUMNS]])
 
 
 def test_mouth_faps_of_an_open_mouth_are_negative_in_both_lips() -> None:
