@@ -34,7 +34,7 @@ def test_loop_is_the_shortest_chain_and_the_equality_that_does_not_fit() -> None
     for u, v in ((1, 5), (5, 3)):
         tie(made, u, v)
     last = tie(made, 3, 1)
-    assert ConstraintGraph(made, unfit=[3]).loop(3).relations == (short, last)
+    assert ConstraintGraph(made, contradicting=[3]).loop(3).relations == (short, last)
 
 
 def test_cycle_connects_its_links_by_equalities() -> None:

@@ -25,7 +25,7 @@ def test_lint_gives_the_place_of_a_fault() -> None:
     (spot,) = fault["spots"]
     line = text.split("\n")[spot["line"] - 1]
     assert line[spot["column"] - 1 :][: spot["length"]] == "NIX"
-    assert "NOD" in fault["text"]
+    assert "NOD" in fault["notes"][0]
     assert told(text.replace("NIX", "NOD")) == []
 
 

@@ -444,7 +444,7 @@ def test_xface_reports_one_error_and_reads_the_next_task(
 def test_xface_refuses_a_task_that_is_too_large(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(xface, "LIMIT", 100_000)
+    monkeypatch.setattr(xface, "MAX_TASK", 100_000)
 
     async def test(server: Server, transport: XfaceTransport) -> None:
         async with Client(transport.port) as client, Client(transport.port) as other:
