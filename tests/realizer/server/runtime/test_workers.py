@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import multiprocessing
 import os
 import signal
 import socket
@@ -315,8 +316,10 @@ def test_workers_that_hang_do_not_keep_the_service_from_ending(
     monkeypatch.setattr("realizer.server.runtime.workers.GRACE", 0.2)
 
     async def test() -> None:
+        others = set(multiprocessing.active_children())
         service = await Workers(Settings(port=0, voice="silent", workers=2, drain=0.0), run_worker).start()
-        children = service.processes
+        started = set(multiprocessing.active_children()) - others
+        children = sorted(child.pid for child in started if child.pid is not None)
         os.kill(children[1], signal.SIGSTOP)
         await service.close()
         for child in children:
