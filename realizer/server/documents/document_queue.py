@@ -42,8 +42,9 @@ class DocumentQueue:
         self._all_cancelled = 0  # all blocks up to this message are cancelled
         self._cancelled: dict[str, int] = {}  # id of a block -> cancelled up to this message
 
-    def __bool__(self) -> bool:
-        return bool(self._unread)
+    def __len__(self) -> int:
+        """Return the number of messages that are not read to their end."""
+        return len(self._unread)
 
     def put(self, text: str) -> Warning | None:
         """Add a message, or return why it is refused."""
@@ -140,11 +141,14 @@ class Submission:
         return self._instant if self._instant <= t <= self._instant + STANDSTILL else t
 
     def work(self, t: float) -> bool:
-        """Plan a block that is ready, or else read one. Return False if there is none."""
-        t = self.now(t)
-        done = self._plan_next(t) or self._parse_next(t)
-        unread = bool(self.queue) and self.queue.message == self._message
-        if not unread and not any(w.message == self._message and w.is_ready for w in self.pending.blocks):
+        """Plan a block that is ready, or else read one. Return False if nothing has changed.
+
+        The end of a message is a change too: it ends the standstill, also in a replay of the journal.
+        """
+        t, unread = self.now(t), len(self.queue)
+        done = self._plan_next(t) or self._parse_next(t) or len(self.queue) < unread
+        is_unread = bool(self.queue) and self.queue.message == self._message
+        if not is_unread and not any(w.message == self._message and w.is_ready for w in self.pending.blocks):
             self._instant = -inf
         return done
 

@@ -141,7 +141,7 @@ def test_checkpoint_writes_a_clip_once_and_deletes_it_with_its_session() -> None
 def test_checkpoint_is_written_while_only_emotions_and_idle_motion_move() -> None:
     journal, apart = Memory(), 0.75  # s; the next block comes before the last one's blinks are past
     session = opened(journal)
-    for k in range(LONG * ENTRIES // 2 + 10):
+    for k in range(LONG * ENTRIES // 3 + 10):  # a text and two ticks each
         play(session, TALK if k % 100 == 0 else WAIT, apart * k, apart * (k + 1))
     assert journal.compacted == 1
     kept = journal.claim("long")
