@@ -102,8 +102,13 @@ class Player(BlockManager):
 
     def resources(self, block: Block) -> frozenset[str]:
         """Return what the behaviours of a block need that one behaviour at a time can have."""
-        known = ((self.kinds[node.tag], node) for node in block.behaviours if node.tag in self.kinds)
-        return frozenset[str]().union(*(kind.claims(node, self.context) for kind, node in known))
+        needed = set[str]()
+        for node in block.behaviours:
+            kind = self.kinds.get(node.tag)
+            # A behaviour with a fault is dropped later, and may have no readable claims.
+            if kind is not None and not any(fault.fatal for fault in kind.check(node, self.context)):
+                needed |= kind.claims(node, self.context)
+        return frozenset(needed)
 
     def submit(self, block: Block, now: float, utterances: Mapping[str, Utterance] | None = None) -> Schedule:
         """Plan a block and play it as its composition says.

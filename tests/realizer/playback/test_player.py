@@ -325,3 +325,10 @@ def test_frames_while_speech_grows_are_those_of_the_playback(
             player.due(float(now))
         seen.append(live.frames(np.array([now])).aus[0, own])
     np.testing.assert_array_equal(np.array(seen), played.frames(times).aus[:, own])
+
+
+def test_resources_leave_out_behaviours_with_faults() -> None:
+    lines = '<FaceInterpolator parts="31">0 zero</FaceInterpolator>'
+    keys = f'<bmlt:facekeyframe id="k" type="FAPS">{lines}</bmlt:facekeyframe>'
+    text = f'<bml id="b" xmlns:bmlt="http://hmi.ewi.utwente.nl/bmlt">{keys}<gaze id="g" target="x"/></bml>'
+    assert Player().resources(parse(text, VOCABULARY)) == {"gaze"}
