@@ -206,10 +206,16 @@ class Submission:
             block = self.speeches.with_links(block)
             requests = self._player.speech_requests(block)
             character = self._player.character_index(block.character_id)
-            resources = self._player.resources(block)
-            pending = self.pending.add(block, character, t, message=message, resources=resources)
-            pending.is_incomplete = self.speeches.awaits_sync
-            pending.is_streaming = self.speeches.is_streaming(block)
+            pending = PendingBlock(
+                block,
+                character,
+                t,
+                message,
+                self._player.resources,
+                is_incomplete=self.speeches.awaits_sync,
+                is_streaming=self.speeches.is_streaming(block),
+            )
+            self.pending.add(pending)
             self._player.announce(block, t)
         except Exception:
             self._internal(block)
@@ -224,8 +230,7 @@ class Submission:
         pending = self.pending.first_ready()
         if pending is None:
             return False
-        if pending.message != self._message or t != self._instant:
-            self._message, self._instant = pending.message, t
+        self._message, self._instant = pending.message, t
         try:
             pending.block = self.speeches.with_links(pending.block)
             schedule = self._player.submit(pending.block, t, pending.utterances)
@@ -240,13 +245,14 @@ class Submission:
         if schedule.lengths:
             self._request_again(pending, schedule.lengths, t)
             return True
+        replaced = self.pending.replaced_by(pending)
         self.pending.remove([pending])
         if schedule.failed:
             self.speeches.on_refused(pending.block.id)
         else:
             self.speeches.on_planned(pending.block.id)
         if pending.block.composition == "REPLACE" and not schedule.failed:
-            self.withdraw(self.pending.replaced_by(pending), t)
+            self.withdraw(replaced, t)
         return True
 
     def _request_again(

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from bml_schema import Block
 from realizer.core.errors import RealizerError, VoiceError
@@ -32,8 +33,7 @@ class PendingBlock:
 
     Attributes:
         message: number of the message that it came with; 0 for a part of a streamed speech.
-        number: order of arrival.
-        resources: what it needs that one behaviour at a time can have, such as "voice" and "gaze".
+        resources_of: block -> what it needs that one behaviour at a time can have ("voice", "gaze").
         requests: ids of requests without an answer.
         utterances: behaviour -> its synthesized speech.
         predecessors: blocks in preparation that must be planned first.
@@ -46,14 +46,18 @@ class PendingBlock:
     character: int
     waiting_since: float
     message: int = 0
-    number: int = 0
-    resources: frozenset[str] = frozenset()
+    resources_of: Callable[[Block], frozenset[str]] = lambda block: frozenset()
     requests: set[int] = field(default_factory=set)
     utterances: dict[str, Utterance] = field(default_factory=dict)
     predecessors: set[PendingBlock] = field(default_factory=set)
     final: bool = False
     is_incomplete: Callable[[Block], bool] = lambda block: False
     is_streaming: bool = False
+
+    @cached_property
+    def resources(self) -> frozenset[str]:
+        """What it needs; asked only while several blocks of a character are pending."""
+        return self.resources_of(self.block)
 
     @property
     def is_ready(self) -> bool:
@@ -71,20 +75,11 @@ class PendingBlocks:
 
     def __init__(self) -> None:
         self.blocks: list[PendingBlock] = []
-        self._added = 0
 
     def __len__(self) -> int:
         return len(self.blocks)
 
-    def add(
-        self,
-        block: Block,
-        character: int,
-        now: float,
-        *,
-        message: int = 0,
-        resources: frozenset[str] = frozenset(),
-    ) -> PendingBlock:
+    def add(self, pending: PendingBlock) -> None:
         """Add a block, which waits for its speech and for the earlier blocks it depends on.
 
         It depends on blocks whose sync points it names, on those it follows, on one with its own id, on a
@@ -92,25 +87,26 @@ class PendingBlocks:
         does, and, if it is appended, on all blocks of its character. A replacing block depends on none: it
         ends those that `replaced_by` returns. Blocks that must follow this one depend on it.
         """
+        block = pending.block
         ids = {ref.block for ref in references(block)} | {*block.append_after, *block.chunk_after, block.id}
 
         def is_predecessor(other: PendingBlock) -> bool:
-            in_order = block.composition == "APPEND" or other.block.composition == "REPLACE"
+            if other.block.id in ids or other.character != pending.character:
+                return other.block.id in ids
+            if block.composition == "APPEND" or other.block.composition == "REPLACE":
+                return True
             # A block that waits for the rest of a streamed speech may wait for long: nobody waits for it.
-            if other.block.id not in block.interrupt and not other.is_incomplete(other.block):
-                in_order |= not resources.isdisjoint(other.resources)
-            return other.block.id in ids or (other.character == character and in_order)
+            if other.block.id in block.interrupt or other.is_incomplete(other.block):
+                return False
+            return not pending.resources.isdisjoint(other.resources)
 
         earlier = self.blocks if block.composition != "REPLACE" else []
-        self._added += 1
-        pending = PendingBlock(block, character, now, message, self._added, resources)
-        pending.predecessors = set(filter(is_predecessor, earlier))
+        pending.predecessors.update(filter(is_predecessor, earlier))
         for other in self.blocks:
             is_successor = other.block.id in (*block.prepend_before, *block.chunk_before)
             if is_successor and other not in pending.predecessors:
                 other.predecessors.add(pending)
         self.blocks.append(pending)
-        return pending
 
     def first_ready(self) -> PendingBlock | None:
         """Return the first block that is ready, or None. The caller removes it once it is planned."""
@@ -118,7 +114,8 @@ class PendingBlocks:
 
     def replaced_by(self, pending: PendingBlock) -> list[PendingBlock]:
         """Return the blocks of the same character that arrived before a replacing block."""
-        return [w for w in self.blocks if w.character == pending.character and w.number < pending.number]
+        earlier = self.blocks[: self.blocks.index(pending)]
+        return [other for other in earlier if other.character == pending.character]
 
     def remove(self, blocks: Iterable[PendingBlock]) -> None:
         """Remove blocks. Other blocks no longer wait for them, and answers to their requests are ignored."""

@@ -30,15 +30,14 @@ def block(text: str) -> Block:
 
 @pytest.fixture
 def speaking() -> PendingBlock:
-    return PendingBlocks().add(block('<bml id="a"><speech id="s"><text>Hi</text></speech></bml>'), 0, 0.0)
+    return PendingBlock(block('<bml id="a"><speech id="s"><text>Hi</text></speech></bml>'), 0, 0.0)
 
 
 @pytest.fixture
 def pending(speaking: PendingBlock) -> PendingBlocks:
     """A block "a" that waits for the answer to request 1."""
     blocks = PendingBlocks()
-    blocks.blocks.append(speaking)
-    speaking.number = 0
+    blocks.add(speaking)
     speaking.requests.add(1)
     return blocks
 
@@ -61,13 +60,14 @@ def pending(speaking: PendingBlock) -> PendingBlocks:
     ],
 )
 def test_add_finds_the_blocks_that_a_block_depends_on(pending, later, character, waits) -> None:
-    added = pending.add(block(later), character, 1.0)
+    added = PendingBlock(block(later), character, 1.0)
+    pending.add(added)
     assert bool(added.predecessors) is waits
     assert (pending.first_ready() is None) is waits
 
 
 def test_first_ready_returns_a_block_after_its_speech_and_predecessors(pending, speaking) -> None:
-    pending.add(block('<bml id="b" composition="APPEND"><wait id="w"/></bml>'), 0, 1.0)
+    pending.add(PendingBlock(block('<bml id="b" composition="APPEND"><wait id="w"/></bml>'), 0, 1.0))
     speaking.add_utterance(1, "s", spoken())
     order = []
     while (ready := pending.first_ready()) is not None:
@@ -332,7 +332,8 @@ def test_add_waits_for_an_earlier_block_that_needs_the_same(pending, speaking) -
     speaking.resources = frozenset({"voice", "gaze"})
 
     def waits(text: str, needs: str, character: int = 0) -> bool:
-        added = pending.add(block(text), character, 1.0, resources=frozenset({needs}))
+        added = PendingBlock(block(text), character, 1.0, resources_of=lambda block: frozenset({needs}))
+        pending.add(added)
         pending.remove([added])
         return speaking in added.predecessors
 
@@ -346,7 +347,7 @@ def test_add_waits_for_an_earlier_block_that_needs_the_same(pending, speaking) -
 
 
 def test_replaced_by_returns_the_blocks_that_arrived_before(pending) -> None:
-    new = pending.add(block('<bml id="r" composition="REPLACE"/>'), 0, 1.0)
-    pending.add(block('<bml id="later"/>'), 0, 1.0)
-    pending.add(block('<bml id="other"/>'), 1, 1.0)
+    pending.add(PendingBlock(block('<bml id="other"/>'), 1, 1.0))
+    pending.add(new := PendingBlock(block('<bml id="r" composition="REPLACE"/>'), 0, 1.0))
+    pending.add(PendingBlock(block('<bml id="later"/>'), 0, 1.0))
     assert [w.block.id for w in pending.replaced_by(new)] == ["a"]
