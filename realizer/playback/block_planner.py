@@ -159,7 +159,7 @@ class _PlanBuilder:
         while True:
             priorities = {node.id: node.priority for node in self.block.behaviours if node.priority}
             own = Member(self.block, self.timings, priorities=priorities, sequences=tuple(sequences))
-            schedule, *moved = schedule_together([own, *others], outside=outside, grace=self.context.grace)
+            schedule, *moved = self.solve(own, others, outside)
             if schedule.failed or len(schedule.times) < len(self.timings):
                 if self.may_stretch:
                     self.try_stretching(own, others, outside, schedule)
@@ -197,6 +197,11 @@ class _PlanBuilder:
             if node.id in schedule.times
         }
 
+    def solve(
+        self, own: Member, others: Sequence[Member], outside: Callable[[SyncRef], float | None]
+    ) -> list[Schedule]:
+        return schedule_together([own, *others], outside=outside, grace=self.context.grace)
+
     def try_stretching(
         self,
         own: Member,
@@ -215,9 +220,7 @@ class _PlanBuilder:
         could = {b: timing for b, timing in flexible.items() if timing is not own.timings[b]}
         if not could:
             return
-        stretched = schedule_together(
-            [replace(own, timings=flexible), *others], outside=outside, grace=self.context.grace
-        )[0]
+        stretched = self.solve(replace(own, timings=flexible), others, outside)[0]
         if stretched.failed or len(stretched.times) <= len(rigid.times):
             return
         at = {b: stretched.times[b] - stretched.times[b][0] for b in could if b in stretched.times}
@@ -231,11 +234,7 @@ class _PlanBuilder:
             rates = np.diff(at[b])[gaps > SHORT] / gaps[gaps > SHORT]
             for rate in sorted({round(float(r), 9) for r in rates}, key=lambda r: abs(r - 1.0)):
                 evened = replace(own.timings[b], preferred=gaps * rate)
-                fits = schedule_together(
-                    [replace(own, timings={**own.timings, b: evened}), *others],
-                    outside=outside,
-                    grace=self.context.grace,
-                )[0]
+                fits = self.solve(replace(own, timings={**own.timings, b: evened}), others, outside)[0]
                 if not fits.failed and len(fits.times) > most:
                     most = len(fits.times)
                     at[b] = natural[b] * rate

@@ -107,12 +107,17 @@ class BlockTimeline:
         return planned, others
 
     def _existing_claims(
-        self, character: int, number: int, alive: Sequence[ActiveBlock], now: float
+        self,
+        character: int,
+        number: int,
+        alive: Sequence[ActiveBlock],
+        now: float,
+        without: Collection[ActiveBlock] = (),
     ) -> list[ResourceClaim]:
-        """Return the claims that a block gives way to, after the interrupts that others will make."""
+        """Return the claims that a block gives way to, after the interrupts that all will make."""
         known = (p for p in alive if p.start < FOREVER)
         promised = (cut for p in known for cut in interrupts(p.block, p.schedule) if cut[0] >= now)
-        return after_interrupts(block_links.existing_claims(character, number, alive), promised)
+        return after_interrupts(block_links.existing_claims(character, number, alive, without), promised)
 
     def _conflict(self, blocks: Sequence[ActiveBlock], schedules: Sequence[Schedule]) -> bool:
         """Whether blocks with new times would conflict with the claims of the others."""
@@ -175,12 +180,32 @@ class BlockTimeline:
         named = {ref.block for ref in playing.external_refs}
         if start == playing.start and after not in named:
             return False
+        is_replanned = start < FOREVER and (playing.start == FOREVER or bool(named))
+        return self._place_again(playing, start, now, is_replanned=is_replanned, alone=bool(after))
+
+    def resolve_conflicts(self, playing: ActiveBlock, now: float) -> bool:
+        """Drop what a block that starts now needs and playing blocks have; return whether there was anything.
+
+        Its start event is due again then, or the block was stopped.
+        """
+        existing = self._existing_claims(
+            playing.character, playing.number, self.blocks.active(), now, without=[playing]
+        )
+        if not conflicts(playing.plan.claims, existing):
+            return False
+        self._place_again(playing, playing.start, now, is_replanned=True, alone=True)
+        return True
+
+    def _place_again(
+        self, playing: ActiveBlock, start: float, now: float, *, is_replanned: bool, alone: bool
+    ) -> bool:
+        """Place a waiting block at a start, planned again or as it is; return False if it is refused."""
         self.events.drop(playing)
         self._withdraw_shifts(playing, playing.shifts.keys(), now)
         planned: Plan | None = playing.plan
         others: list[ActiveBlock] = []
-        if start < FOREVER and (playing.start == FOREVER or named):
-            planned, others = self._replan(playing, start, now, alone=bool(after))
+        if is_replanned:
+            planned, others = self._replan(playing, start, now, alone=alone)
         if planned is None:
             return False
         playing.apply_plan(planned, start)
@@ -189,29 +214,6 @@ class BlockTimeline:
         if others:
             self.retime(others, planned.other_schedules, now)
         self.trim(planned.trims, now)
-        return True
-
-    def resolve_conflicts(self, playing: ActiveBlock, now: float) -> bool:
-        """Drop what a block that starts now needs and playing blocks have; return whether there was anything.
-
-        Its start event is due again then, or the block was stopped.
-        """
-        active = self.blocks.active()
-        others = [p for p in active if p is not playing]
-        own_interrupts = interrupts(playing.block, playing.schedule)
-        existing = after_interrupts(
-            self._existing_claims(playing.character, playing.number, others, now), own_interrupts
-        )
-        if not conflicts(playing.plan.claims, existing):
-            return False
-        self.events.drop(playing)
-        self._withdraw_shifts(playing, playing.shifts.keys(), now)
-        planned, _ = self._replan(playing, playing.start, now, alone=True)
-        if planned is not None:
-            playing.apply_plan(planned, playing.start)
-            self.place(playing)
-            self.predict(playing, now)
-            self.trim(planned.trims, now)
         return True
 
     def _replan(
