@@ -1,4 +1,4 @@
-"""Canonical XML text of an element, independent of the prefixes declared around it."""
+"""Reading and writing of XML: a parser for untrusted text, and the canonical text of an element."""
 
 from __future__ import annotations
 
@@ -10,6 +10,25 @@ from bml_schema.errors import Fault
 from bml_schema.escape import escape, escape_value
 
 _XML = "http://www.w3.org/XML/1998/namespace"
+
+
+def xml_parser(**options: Any) -> etree.XMLParser:
+    """Return a parser that resolves no entities, opens no files and leaves comments out.
+
+    Args:
+        options: further options of lxml's parser, such as `recover`.
+    """
+    return etree.XMLParser(
+        resolve_entities=False,
+        load_dtd=False,
+        no_network=True,
+        dtd_validation=False,
+        huge_tree=False,
+        remove_comments=True,
+        remove_pis=True,
+        encoding="utf-8",
+        **options,
+    )
 
 
 def canonical(element: etree._Element) -> str:

@@ -11,6 +11,7 @@ from typing import Any
 
 from lxml import etree
 
+from bml_schema.canonical import xml_parser
 from bml_schema.dialects.recognition import has_words_of_dialects
 from bml_schema.dialects.translator import is_draft, made_ids, translate
 from bml_schema.document_splitter import (
@@ -253,7 +254,7 @@ class _Reader:
             return block(notes)
         plain: Block | BMLError | None = None
         if not self.wrapper and not is_draft(root):
-            # Nearly all documents are BML 1.0; what is in a dialect has faults, or words of others.
+            # Nearly all documents are BML 1.0. Others have faults, or words that only dialects have.
             try:
                 plain = block(notes)
             except BMLError as wrong:
@@ -296,16 +297,7 @@ def _block(text: str, stretch: DocumentSpan, line: int, reader: _Reader, max_byt
     return reader.read(root, _begins(data), lines_before=line - 1, notes=notes)
 
 
-_PARSER = etree.XMLParser(
-    resolve_entities=False,
-    load_dtd=False,
-    no_network=True,
-    dtd_validation=False,
-    huge_tree=False,
-    remove_comments=True,
-    remove_pis=True,
-    encoding="utf-8",
-)
+_PARSER = xml_parser()
 
 
 def element(data: bytes, *, lines_before: int = 0, block: str | None = None) -> etree._Element:

@@ -8,7 +8,7 @@ from typing import Any
 from lxml import etree
 
 from bml_schema.behaviours import Sync
-from bml_schema.canonical import MAX_ATTRIBUTES
+from bml_schema.canonical import MAX_ATTRIBUTES, xml_parser
 from bml_schema.node_schema import local, schema_of
 from bml_schema.nodes import (
     BMLA,
@@ -59,16 +59,7 @@ def read_undeclared(
     Returns:
         None if the document has another fault.
     """
-    parser = etree.XMLParser(
-        recover=True,
-        resolve_entities=False,
-        load_dtd=False,
-        no_network=True,
-        huge_tree=False,
-        remove_comments=True,
-        remove_pis=True,
-        encoding="utf-8",
-    )
+    parser = xml_parser(recover=True)
     root: Any = etree.fromstring(data, parser)
     undefined = etree.ErrorTypes.NS_ERR_UNDEFINED_NAMESPACE
     if (
