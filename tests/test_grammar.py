@@ -249,7 +249,7 @@ def well_composed(blocks: list[Block], told: list[Feedback]) -> None:
     starts = {f.id.rpartition(":")[0]: (n, f) for n, f in enumerate(told) if started(f)}
     ends = {f.id.rpartition(":")[0]: (n, f) for n, f in enumerate(told) if ended(f)}
     first = next((b.character_id for b in blocks if b.character_id), None)
-    idle: set[str] = set()  # blocks that wait for an activation, themselves or by way of others
+    idle: set[str] = set()  # blocks that wait for an activation, or for a block that does
     for block in blocks:
         if block.preplan or idle & {*block.append_after, *block.chunk_after}:
             idle.add(block.id)

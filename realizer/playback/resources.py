@@ -28,7 +28,7 @@ class ResourceClaim:
         begin, end: seconds; all compared claims are on the same clock.
         block, behaviour: the claimant.
         rank: of two behaviours in one block the one of lower rank wins.
-        silent_from: when its closing silence begins; `end` if it has none.
+        silent_from: when its closing silence begins; infinite for what is no sound.
     """
 
     resource: str
@@ -76,7 +76,8 @@ class ResourceConflict:
     def sequence(self) -> tuple[str | float, str | float] | None:
         """The order of two speeches that overlap only a little, or None.
 
-        Behaviours of the losing block are named; those of others have fixed times, seconds from its start.
+        A behaviour of the losing block is given by its id, one of another block by the time at which it ends
+        or begins, in seconds from the start of the losing block.
         """
         first, second = sorted((self.claim, self.winner), key=lambda c: c.begin)
         own = self.claim.block
