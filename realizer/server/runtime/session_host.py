@@ -5,6 +5,7 @@ import functools
 import itertools
 import logging
 import math
+from collections import deque
 from typing import Any
 
 from realizer.core.settings import Settings
@@ -23,9 +24,15 @@ from realizer.server.transports.transport import Outbound
 
 log = logging.getLogger(__name__)
 
-# Wake-up times are rounded up to whole steps of uvloop's clock, except those so little after a step.
+# Wake-up times are rounded up to whole steps of uvloop's clock, except those so little after a step. A timer of
+# uvloop costs more than many frames: the sessions of a step share one.
 STEP = 0.001  # s
 SLACK = 5e-4  # of a step
+TURN = 0.004  # s; so long sessions are woken before the loop looks for messages again
+# Of the time since documents were last read, so much goes to documents before frames come again. When more is
+# due than can be done, frames are late and documents are still read.
+READING_SHARE = 0.25
+LONGEST_READING = 0.02  # s
 EXPIRY_INTERVAL = 5.0  # s; how often expired sessions and due checkpoints are looked for
 
 
@@ -55,8 +62,12 @@ class SessionHost:
         self._registry = SessionRegistry(self._factory.new, settings, is_local)
         self._engines = Engines(settings.deformer)
         self._clients: dict[int, Outbound] = {}
-        self._timers: dict[Session, tuple[float, asyncio.Handle]] = {}  # wake-up times and their calls
+        self._wakeups: dict[Session, tuple[float, int]] = {}  # times, and the steps they are rounded up to
+        self._steps: dict[int, dict[Session, None]] = {}  # the sessions of a step, which share a timer
+        self._due: deque[tuple[int, Session]] = deque()  # those whose step has come, to be woken in turn
         self._reading: dict[Session, None] = {}  # sessions with documents to parse or plan, in turn
+        self._reader: asyncio.Handle | None = None  # the next call of `_read`
+        self._read_until = -math.inf  # when its last call ended
         self._numbers = itertools.count(1)
         self._expiry_timer: asyncio.TimerHandle | None = None
         self._gc_policy = GcPolicy()
@@ -93,11 +104,8 @@ class SessionHost:
         """End every session and every engine."""
         self._closed = True
         self._reading.clear()
-        for task in (
-            self._expiry_timer,
-            self._takeover_check,
-            *(timer for _, timer in self._timers.values()),
-        ):
+        self._wakeups.clear()
+        for task in (self._expiry_timer, self._takeover_check):
             if task is not None:
                 task.cancel()
         for session in self._registry.sessions.values():
@@ -231,9 +239,9 @@ class SessionHost:
             return
         self._wake_at(session, session.next_due())
         if session.has_documents:
-            if not self._reading:
-                self._loop.call_soon(self._read)
             self._reading.setdefault(session)
+            if self._reader is None:
+                self._reader = self._loop.call_soon(self._read)
 
     def _wake_at(self, session: Session, when: float) -> None:
         """Call `_tick` at a time, instead of the one before; infinite: never.
@@ -241,20 +249,42 @@ class SessionHost:
         A call that is already due stays, or a session that gets messages all the time would never be woken.
         """
         now = self._loop.time()
-        if (known := self._timers.get(session)) is not None:
-            old, timer = known
+        if (known := self._wakeups.get(session)) is not None:
+            old, step = known
             if when < math.inf and (old == when or old <= min(when, now)):
                 return
-            timer.cancel()
-            del self._timers[session]
+            del self._wakeups[session]
+            self._steps.get(step, {}).pop(session, None)
         if when < math.inf and not self._closed:
-            step = math.ceil(max(when, now) / STEP - SLACK) * STEP
-            self._timers[session] = when, self._loop.call_at(step, self._tick, session, when)
+            step = math.ceil(max(when, now) / STEP - SLACK)
+            self._wakeups[session] = when, step
+            if step not in self._steps:
+                self._steps[step] = {}
+                self._loop.call_at(step * STEP, self._wake, step)
+            self._steps[step][session] = None
+
+    def _wake(self, step: int) -> None:
+        """Wake the sessions of a step after those that are still to be woken."""
+        is_idle = not self._due
+        self._due.extend((step, session) for session in self._steps.pop(step))
+        if is_idle:
+            self._tick_due()
+
+    def _tick_due(self) -> None:
+        """Wake sessions for a while. Then messages and documents come before the others."""
+        end = self._loop.time() + TURN
+        while self._due and self._loop.time() <= end:
+            step, session = self._due.popleft()
+            when, own = self._wakeups.get(session, (0.0, None))
+            if own == step:
+                del self._wakeups[session]
+                self._tick(session, when)
+        if self._due:
+            self._loop.call_soon(self._tick_due)
 
     def _tick(self, session: Session, when: float) -> None:
         """Send the frames and the feedback of a session that are due, and do what else is."""
         now = self._loop.time()
-        del self._timers[session]
         self.metrics.late.pending.append(now - when)
         run = session.fast_path
         if run is not None and (data := run.next_message(now)) is not None:
@@ -281,17 +311,20 @@ class SessionHost:
         self._wake_at(session, due)
 
     def _read(self) -> None:
-        """Parse or plan one document of one session. What is due in others comes before the next one."""
-        if not self._reading:
-            return
-        session = next(iter(self._reading))
-        del self._reading[session]
-        if self._reading:
-            self._loop.call_soon(self._read)
-        began, plans = self._loop.time(), session.player.version
-        self._work(session, began, read_documents=True)
-        if session.player.version != plans:
-            self.metrics.planning.pending.append(self._loop.time() - began)
+        """Parse or plan documents, step by step, for their share of the time. Then frames come again."""
+        began = self._loop.time()
+        end = began + min((began - self._read_until) * READING_SHARE, LONGEST_READING)
+        while self._reading:
+            session = next(iter(self._reading))
+            del self._reading[session]
+            began, plans = self._loop.time(), session.player.version
+            self._work(session, began, read_documents=True)
+            self._read_until = self._loop.time()
+            if session.player.version != plans:
+                self.metrics.planning.pending.append(self._read_until - began)
+            if self._read_until >= end:
+                break
+        self._reader = self._loop.call_soon(self._read) if self._reading else None
 
     def _work(self, session: Session, now: float, *, read_documents: bool) -> None:
         for number in session.connections:
