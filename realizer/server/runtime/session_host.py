@@ -24,8 +24,8 @@ from realizer.server.transports.transport import Outbound
 
 log = logging.getLogger(__name__)
 
-# Wake-up times are rounded up to whole steps of uvloop's clock, except those so little after a step. A timer of
-# uvloop costs more than many frames: the sessions of a step share one.
+# Wake-up times are rounded up to whole steps of uvloop's clock, except those so little after a step. A timer
+# of uvloop costs more than many frames: the sessions of a step share one.
 STEP = 0.001  # s
 SLACK = 5e-4  # of a step
 TURN = 0.004  # s; so long sessions are woken before the loop looks for messages again
