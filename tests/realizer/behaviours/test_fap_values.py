@@ -123,7 +123,7 @@ def test_fap_file_warns_of_visemes_that_cannot_be_shown(play, media: Path) -> No
         ("hello", "wanted a header"),
         ("2.1 x 25 1\n" + "0 " * 68 + "\n0\n", "wanted at least two frames, got 1"),
         ("3.1 x 25 1\n", "body animation"),
-        ("#" * (8 * 2**20 + 1), "wanted at most 8 MiB of FAP text"),
+        pytest.param("#" * (8 * 2**20 + 1), "wanted at most 8 MiB of FAP text", id="too-large"),
     ],
 )
 def test_fap_file_that_cannot_be_read_is_dropped(play, media: Path, content: str, says: str) -> None:

@@ -11,14 +11,14 @@ from realizer.render.cameras import camera_for
 from realizer.render.light import preset
 from realizer.render.opengl import OpenGLCanvas
 
-pytestmark = pytest.mark.gl("gl")
+pytestmark = [pytest.mark.gl("gl"), pytest.mark.xdist_group("render")]
 
 SIZE = (320, 240)
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def canvas(balls) -> Iterator[OpenGLCanvas]:
-    """One a test: closing one ends the display of all in the process."""
+    """One for all tests: to open one takes seconds, and to close one ends the display of the process."""
     face, _ = balls
     canvas = OpenGLCanvas(face, SIZE, camera_for(face), preset())
     yield canvas
@@ -91,18 +91,17 @@ def test_opengl_canvas_has_a_soft_neutral_backdrop(canvas, balls):
     assert np.abs(np.diff(picture[:, 3].sum(1))).max() < 30
 
 
-def test_opengl_canvas_does_not_shear_odd_sizes(balls):
-    """Rows of 3 x 101 bytes are no multiple of four, GL's default row alignment."""
-    face, normals = balls
-    canvas = OpenGLCanvas(face, (101, 77), camera_for(face), preset())
-    picture = canvas.draw(face.vertices, normals)
-    canvas.close()
-    columns = np.nonzero(skin(picture))[1]
-    assert columns.mean() == pytest.approx(50, abs=1)
-
-
 def test_opengl_canvas_draws_into_the_given_memory(canvas, balls):
     face, normals = balls
     out = np.zeros((240, 320, 3), np.uint8)
     assert canvas.draw(face.vertices, normals, out) is out
     assert np.array_equal(out, canvas.draw(face.vertices, normals))
+
+
+def test_opengl_canvas_does_not_shear_odd_sizes(canvas, balls):
+    """Rows of 3 x 101 bytes are no multiple of four, GL's default row alignment."""
+    face, normals = balls
+    odd = OpenGLCanvas(face, (101, 77), camera_for(face), preset())
+    picture = odd.draw(face.vertices, normals)
+    columns = np.nonzero(skin(picture))[1]
+    assert columns.mean() == pytest.approx(50, abs=1)

@@ -7,7 +7,7 @@ import pytest
 
 from realizer.render.raster import Raster
 
-pytestmark = pytest.mark.gl("onboard")
+pytestmark = [pytest.mark.gl("onboard"), pytest.mark.xdist_group("render")]
 
 SIZE = (60, 40)
 RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
