@@ -89,7 +89,7 @@ CHANNEL = "A WebSocket is a connection to a session. Sessions are joined or crea
 
 
 def asyncapi() -> dict[str, Any]:
-    """The document, AsyncAPI 3.0.0, from the service's side."""
+    """Return the AsyncAPI 3.0.0 document, from the service's point of view."""
     modes = [(m, "validation") for m in REQUESTS.values()] + [(m, "serialization") for m in REPLIES.values()]
     _, definitions = models_json_schema(
         modes,  # type: ignore[arg-type]
@@ -161,7 +161,7 @@ def _operations() -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 def _out(name: str) -> str:
-    """`state` is both asked for and told."""
+    """Return the name of a reply; `state` and `error` are names of requests or schemas too."""
     return {"state": "state-message", "error": "error-message"}.get(name, name)
 
 
@@ -171,26 +171,36 @@ def _kinds() -> list[tuple[str, str]]:
 
 def _message(model: type[BaseModel], name: str) -> dict[str, Any]:
     first, _, rest = inspect.cleandoc(model.__doc__ or "").partition("\n")
-    said = {"name": name, "summary": first, "payload": {"$ref": f"#/components/schemas/{model.__name__}"}}
-    return said | ({"description": rest.strip()} if rest.strip() else {})
+    message = {"name": name, "summary": first, "payload": {"$ref": f"#/components/schemas/{model.__name__}"}}
+    return message | ({"description": rest.strip()} if rest.strip() else {})
 
 
-def _text(name: str, says: str) -> dict[str, Any]:
-    return {"name": name, "description": says, "contentType": "text/xml", "payload": {"type": "string"}}
+def _text(name: str, description: str) -> dict[str, Any]:
+    return {
+        "name": name,
+        "description": description,
+        "contentType": "text/xml",
+        "payload": {"type": "string"},
+    }
 
 
-def _binary(name: str, says: str) -> dict[str, Any]:
+def _binary(name: str, description: str) -> dict[str, Any]:
     payload = {"type": "string", "format": "binary"}
-    return {"name": name, "description": says, "contentType": "application/octet-stream", "payload": payload}
+    return {
+        "name": name,
+        "description": description,
+        "contentType": "application/octet-stream",
+        "payload": payload,
+    }
 
 
 def render() -> str:
-    """The text of the file."""
+    """Return the text of asyncapi.json."""
     return json.dumps(asyncapi(), indent=1, ensure_ascii=False) + "\n"
 
 
 def tables() -> str:
-    """The part of docs/protocol.md: messages in, streams, messages out."""
+    """Return the tables of docs/protocol.md: requests, streams and replies."""
     lines = ["| in | with | |", "|---|---|---|", f"| text | | {_cell(BML)} |"]
     for name in SUPPORTED:
         model = REQUESTS[name]
@@ -224,7 +234,7 @@ def _examples(model: type[BaseModel]) -> list[dict[str, Any]]:
 
 
 def _first(model: type[BaseModel]) -> str:
-    """The first paragraph of what the model says of itself."""
+    """Return the first paragraph of a model's docstring."""
     return " ".join(inspect.cleandoc(model.__doc__ or "").partition("\n\n")[0].split())
 
 
@@ -233,7 +243,7 @@ def _cell(text: str) -> str:
 
 
 def constants() -> str:
-    """The part of realizer.js: the version, binary messages, streams of JSON, answers of control messages."""
+    """Return the constants of realizer.js: version, binary messages, JSON streams, types of answers."""
     arrays = {"<i4": "Int32Array", "<f4": "Float32Array", "<i2": "Int16Array", None: "Uint8Array"}
     kinds = [f'  {kind}: ["{row.name}", {arrays[row.dtype]}],' for kind, row in KINDS.items()]
     answers = ", ".join(f'{question}: "{answer}"' for question, answer in ANSWERS.items())

@@ -1,4 +1,4 @@
-"""Messages of the service: answers, and frames in JSON form."""
+"""Models of the messages that the service sends as JSON."""
 
 from typing import Any, Literal
 
@@ -10,38 +10,42 @@ from realizer.protocol.messages.common import PROTOCOL, NumericStream, Reply, Se
 class Capabilities(Reply):
     """What the service offers: streams, and the names that documents and messages can use."""
 
-    streams: dict[str, list[str]] = Field(description="stream -> its encodings, the default first")
-    pictures: list[str] = Field(description="formats of the stream video, the default first")
-    fps: float = Field(description="frames a second of streams that name no rate")
-    behaviours: list[str] = Field([], description="elements that a block may contain")
-    lexemes: dict[str, list[str]] = Field({}, description="element -> its lexemes")
-    emotions: list[str] = Field([], description="words of `realizer:emotion`, `realizer:mood` and `set`")
-    expressions: list[str] = Field([], description="names of `realizer:expression`")
-    aus: list[str] = Field([], description="names of action units, with L or R for one side")
-    faces: list[str] = Field([], description="names for `character`")
-    voices: list[str] = Field([], description="names of the voices that are installed")
-    cameras: list[str] = Field([], description="names for `subscribe`")
-    lights: list[str] = Field([], description="names for `subscribe`")
+    streams: dict[str, list[str]] = Field(description="name of a stream -> its encodings, the default first")
+    pictures: list[str] = Field(description="picture formats of the stream video, the default first")
+    fps: float = Field(description="default frames per second of a stream")
+    behaviours: list[str] = Field([], description="behaviour elements that a block may contain")
+    lexemes: dict[str, list[str]] = Field({}, description="behaviour element -> its lexemes")
+    emotions: list[str] = Field(
+        [], description="emotion words for `realizer:emotion`, `realizer:mood` and `set`"
+    )
+    expressions: list[str] = Field([], description="names of expressions for `realizer:expression`")
+    aus: list[str] = Field([], description="names of action units; L or R marks one side")
+    faces: list[str] = Field([], description="names of faces for `character`")
+    voices: list[str] = Field([], description="names of the installed voices")
+    cameras: list[str] = Field([], description="names of cameras for `subscribe`")
+    lights: list[str] = Field([], description="names of lights for `subscribe`")
 
 
 class Limits(Reply):
-    """The limits of the service."""
+    """The largest values that the service accepts."""
 
     message: int = Field(description="bytes of a WebSocket message")
-    document: int = Field(description="bytes of a document")
+    document: int = Field(description="bytes of BML in a message")
     control: int = Field(description="bytes of a control message")
-    elements: int = Field(description="in a message")
-    behaviours: int = Field(description="in a block")
-    duration: float = Field(description="seconds that a block may last")
+    elements: int = Field(description="XML elements in a message")
+    behaviours: int = Field(description="behaviours in a block")
+    duration: float = Field(description="duration of a block in seconds")
     speech: int = Field(description="characters of one speech")
-    blocks: int = Field(description="playing or waiting in a session")
-    characters: int = Field(description="in a session")
-    connections: int = Field(description="from one address")
-    rate: float = Field(description="messages a second from one connection")
+    blocks: int = Field(description="blocks of a session that play or wait")
+    characters: int = Field(description="characters of a session")
+    connections: int = Field(description="open connections of one address")
+    rate: float = Field(description="messages per second from one connection")
     picture: int = Field(description="pixels of a picture's longer side")
-    pixels: float = Field(description="pixels a second of all pictures of a session; shared ones count once")
-    fps: float = Field(description="frames a second")
-    keep: float = Field(description="seconds a named session outlives its connections")
+    pixels: float = Field(
+        description="pixels per second of all pictures of a session; a stream with several viewers counts once"
+    )
+    fps: float = Field(description="frames per second")
+    keep: float = Field(description="seconds that a named session lives after its last connection")
 
 
 class Welcome(Reply):
@@ -57,7 +61,7 @@ class Welcome(Reply):
 
 
 class Subscribed(Reply):
-    """A stream begins at `frame`; the fields describe its values."""
+    """The answer to `subscribe`: the stream begins at `frame`, and the other fields describe its values."""
 
     type: Literal["subscribed"] = "subscribed"
     stream: str
@@ -66,34 +70,38 @@ class Subscribed(Reply):
     index: int = Field(0, description="the low byte of the flags of binary frames")
     fps: float | None = None
     frame: int | None = None
-    names: list[str] | None = Field(None, description="fap, au and arkit: the names of the values")
-    face: str | None = Field(None, description="mesh and video; the rest mesh is at /faces/NAME")
+    names: list[str] | None = Field(None, description="fap, au and arkit: names of the values")
+    face: str | None = Field(
+        None, description="mesh and video: name of the face; GET /faces/NAME has its mesh"
+    )
     vertices: int | None = None
     scale: float | None = Field(None, description="mesh: metres = int16 x scale + offset")
     offset: list[float] | None = None
-    rate: int | None = Field(None, description="audio: samples a second")
+    rate: int | None = Field(None, description="audio: samples per second")
     size: list[int] | None = None
-    view: str | None = Field(None, description="video: the name in `subscribe`; each has its own `index`")
+    view: str | None = Field(
+        None, description="video: the view in `subscribe`; each view has its own `index`"
+    )
     media_type: str | None = None
-    elements: list[str] | None = Field(None, description="feedback: the elements that are sent")
+    elements: list[str] | None = Field(None, description="feedback: names of the elements that are sent")
 
 
 class FaceChanged(Reply):
-    """A character of a `mesh` has another face; the fields describe the values from `frame` on."""
+    """The character of a `mesh` stream got another face; the fields describe the values from `frame` on."""
 
     type: Literal["changed"] = "changed"
     stream: str
-    character: str | None = Field(None, description="the name in `subscribe`")
+    character: str | None = Field(None, description="the character in `subscribe`")
     index: int = Field(0, description="the low byte of the flags of binary frames")
     frame: int
-    face: str = Field(description="the rest mesh is at /faces/NAME")
+    face: str = Field(description="name of the face; GET /faces/NAME has its mesh")
     vertices: int
     scale: float = Field(description="metres = int16 x scale + offset")
     offset: list[float]
 
 
 class BlockState(Reply):
-    """A block that plays, waits or is being prepared."""
+    """The state of a block that plays, waits or is being prepared."""
 
     id: str
     character: str | None = None
@@ -115,10 +123,10 @@ class CharacterState(Reply):
 
     character: str | None = None
     face: str
-    voice: str | None = Field(None, description="default: the service's voice")
-    aus: dict[str, float] = Field(description="the visible values, 0..1, without zeros")
+    voice: str | None = Field(None, description="absent: the service's voice")
+    aus: dict[str, float] = Field(description="visible values of action units, 0..1, without zeros")
     layers: dict[str, LayerState] = Field(
-        {}, description="base, idle, expression, gaze, head, speech, faps, direct: the values of each"
+        {}, description="base, idle, expression, gaze, head, speech, faps or direct -> values of the layer"
     )
 
 
@@ -126,11 +134,11 @@ class VoiceState(Reply):
     """The service's voice."""
 
     name: str | None = None
-    fault: str | None = Field(None, description="why the silent voice replaced it last")
+    fault: str | None = Field(None, description="why the silent voice was last used instead")
 
 
 class StateMessage(Reply):
-    """The blocks that play or wait, and the values of AUs with the layers that they come from."""
+    """The answer to `state`: the blocks that play or wait, and the present faces."""
 
     type: Literal["state"] = "state"
     session: str
@@ -138,7 +146,7 @@ class StateMessage(Reply):
     blocks: list[BlockState]
     characters: list[CharacterState]
     voice: VoiceState
-    connections: int = Field(description="number of connections that share the session")
+    connections: int = Field(description="number of connections to the session")
     dropped: int = Field(description="frames that this connection missed because it was slow")
 
 
@@ -159,17 +167,17 @@ ErrorCode = Literal[
 
 
 class ErrorMessage(Reply):
-    """A control message was refused and has changed nothing."""
+    """The service refused a control message, which has changed nothing."""
 
     type: Literal["error"] = "error"
     code: ErrorCode
-    message: str = Field(description="what was wanted and what came")
+    message: str = Field(description="what was wrong, and what was wanted")
     where: str | None = Field(None, description="message type and field")
-    id: str | None = Field(None, description="id of the speech, if the message was `speech`")
+    id: str | None = Field(None, description="id of the speech of a refused `speech` message")
 
 
 class Gap(Reply):
-    """Feedback after `seen` is not stored any more, or never was; the next one is `first`."""
+    """Feedback after `seen` is not available; the next element has the `seq` `first`."""
 
     type: Literal["gap"] = "gap"
     seen: int
@@ -185,20 +193,22 @@ class Pong(Reply):
 
 
 class FrameMessage(Reply):
-    """A frame of the stream `type` in the encoding JSON."""
+    """One frame of the stream `type` in JSON."""
 
     type: NumericStream
-    frame: int = Field(description="k: sampled at k / fps of the session clock")
+    frame: int = Field(description="number k of the frame, which shows the session clock's instant k / fps")
     time: float = Field(description="seconds on the session clock")
     values: list[float] = Field(description="in the order of `names` in `subscribed`")
     character: str | None = None
 
 
 class ScheduleMessage(Reply):
-    """Schedules of blocks: first of all that play or wait, then of those that change."""
+    """Schedules of blocks: of all blocks in the first message, then of changed blocks."""
 
     type: Literal["schedule"]
     time: float = Field(description="seconds on the session clock")
-    whole: bool = Field(description="whether these are all blocks")
-    blocks: list[dict[str, Any]] = Field(description="state, start, end; sync points, gaps and links")
+    whole: bool = Field(description="whether `blocks` has all blocks that play or wait")
+    blocks: list[dict[str, Any]] = Field(
+        description="state, start, end, sync points, gaps and links of each block"
+    )
     character: str | None = None

@@ -1,4 +1,4 @@
-"""Replies leave out empty fields, and their models describe what is sent."""
+"""Tests of the models of replies."""
 
 from __future__ import annotations
 
