@@ -42,7 +42,7 @@ class Limits(Reply):
     rate: float = Field(description="messages per second from one connection")
     picture: int = Field(description="pixels of a picture's longer side")
     pixels: float = Field(
-        description="pixels per second of all pictures of a session; a stream with several viewers counts once"
+        description="pixels per second of all pictures of a session; a shared stream counts once"
     )
     fps: float = Field(description="frames per second")
     keep: float = Field(description="seconds that a named session lives after its last connection")
