@@ -15,23 +15,25 @@ from realizer.core.settings import Settings
 LIMITS = tuple(f.name for f in fields(Settings) if f.name.startswith("max_"))
 
 
-def setting(name: str, metavar: str, **attributes: Any) -> Callable[[options.Command], options.Command]:
-    """Return the option of a setting, with its description and default; `Settings` checks the value."""
+def setting_option(
+    name: str, metavar: str, **attributes: Any
+) -> Callable[[options.Command], options.Command]:
+    """Return the option for a setting, with its description and default; `Settings` checks the value."""
     field = next(f for f in fields(Settings) if f.name == name)
-    text, _, none = field.metadata["says"].partition("; none: ")
-    default = none if field.default is None else str(field.default).removesuffix(".0")
-    shown = f"  [default: {default}]" if default else ""
-    words = f"{text[0].upper()}{text[1:]}.{shown}"
-    return click.option(f"--{name.replace('_', '-')}", name, metavar=metavar, help=words, **attributes)
+    description, _, unset = field.metadata["description"].partition("; none: ")
+    default = unset if field.default is None else str(field.default).removesuffix(".0")
+    default_note = f"  [default: {default}]" if default else ""
+    text = f"{description[0].upper()}{description[1:]}.{default_note}"
+    return click.option(f"--{name.replace('_', '-')}", name, metavar=metavar, help=text, **attributes)
 
 
-def settings_of(*rows: tuple[str, str]) -> Callable[[options.Command], options.Command]:
-    """Return a decorator that adds the options of several settings, each with its metavar."""
-    return options.several(*(setting(name, metavar) for name, metavar in rows))
+def setting_options(*rows: tuple[str, str]) -> Callable[[options.Command], options.Command]:
+    """Return a decorator that adds the options for several settings: (name, metavar) of each."""
+    return options.several(*(setting_option(name, metavar) for name, metavar in rows))
 
 
 @click.command()
-@settings_of(
+@setting_options(
     ("host", "ADDRESS"),
     ("port", "PORT"),
     ("workers", "N"),
@@ -47,28 +49,28 @@ def settings_of(*rows: tuple[str, str]) -> Callable[[options.Command], options.C
     callback=lambda context, parameter, value: value or None,
     help="Allow pages of this origin, such as https://example.org, to connect; may be repeated.",
 )
-@settings_of(("tls_cert", "FILE"), ("tls_key", "FILE"), ("log", "text|json"))
-@setting("asap_ports", "BML FEEDBACK", nargs=2)
-@settings_of(
+@setting_options(("tls_cert", "FILE"), ("tls_key", "FILE"), ("log", "text|json"))
+@setting_option("asap_ports", "BML FEEDBACK", nargs=2)
+@setting_options(
     ("xface_port", "PORT"), ("xface_player", "HOST:PORT"), ("stomp", "HOST:PORT"), ("journal", "FILE|URL")
 )
-@setting("record", "DIR", type=click.Path(file_okay=False, path_type=Path))
-@setting("face", "NAME")
+@setting_option("record", "DIR", type=click.Path(file_okay=False, path_type=Path))
+@setting_option("face", "NAME")
 @options.deformer
-@setting("camera", "NAME")
+@setting_option("camera", "NAME")
 @options.light
 @options.opaque_background
-@settings_of(("voice", "NAME"), ("fps", "N"))
+@setting_options(("voice", "NAME"), ("fps", "N"))
 @options.scene
 @options.media
 @options.expressions
-@setting("seed", "N")
+@setting_option("seed", "N")
 @click.option("--idle/--no-idle", default=None, help="Blinks and small head motion of an idle face.")
 @options.prosody
 @options.cooccurrence
 @options.mapping
 @options.strict_bml
-@settings_of(("grace", "N"), ("keep", "N"), ("drain", "N"), *((name, "N") for name in LIMITS))
+@setting_options(("grace", "N"), ("keep", "N"), ("drain", "N"), *((name, "N") for name in LIMITS))
 @click.option("--config", type=options.FILE, help="TOML file of settings: fps = 30 means --fps 30.")
 def serve(config: Path | None, **flags: Any) -> None:
     """Run the service: play BML from clients, and stream frames, sound and feedback back.
@@ -83,7 +85,7 @@ def serve(config: Path | None, **flags: Any) -> None:
     """
     from realizer.core.settings import SettingsError
     from realizer.server.serve import run
-    from realizer.server.serve import serve as start
+    from realizer.server.serve import serve as run_service
     from realizer.speech.registry import find_voice
 
     with options.reporting(SettingsError):
@@ -92,4 +94,4 @@ def serve(config: Path | None, **flags: Any) -> None:
     options.check_light(settings.light)
     find_voice(settings.voice).close()  # fails before a transport opens if the voice is not installed
     options.warn_no_voice(settings.voice)
-    run(start(settings))
+    run(run_service(settings))

@@ -166,20 +166,21 @@ def _optional(read: Callable[[Any], T], empty: bool = True) -> Callable[[Any], T
 
 
 def _row(
-    default: Any, read: Callable[[Any], Any], says: str, *, secret: bool = False, empty: bool = True
+    default: Any, read: Callable[[Any], Any], description: str, *, secret: bool = False, empty: bool = True
 ) -> Any:
     """Return a row of the table of settings: a field of `Settings`.
 
     Args:
         default: None also makes None a valid value.
         read: converts and checks a value; raises ValueError with what was wanted.
-        says: description.
+        description: what it sets, and after "; none: " what None means.
         secret: keeps the value out of messages and `repr`.
         empty: whether "" means None for a setting that may be None.
     """
     if default is None:
         read = _optional(read, empty)
-    return field(default=default, repr=not secret, metadata={"read": read, "says": says, "secret": secret})
+    metadata = {"read": read, "description": description, "secret": secret}
+    return field(default=default, repr=not secret, metadata=metadata)
 
 
 # Not a pydantic model: importing pydantic takes longer than planning a document.
@@ -385,10 +386,10 @@ class Settings:
         if unknown := sorted(values.keys() - known):
             wanted = _closest(unknown[0], known) or f"one of {', '.join(sorted(known))}"
             raise SettingsError(f"setting {unknown[0]}: wanted {wanted} ({file})")
-        given = {name: value for name, value in (flags or {}).items() if value is not None}
+        set_flags = {name: value for name, value in (flags or {}).items() if value is not None}
         try:
-            return cls(**values | given)
+            return cls(**values | set_flags)
         except SettingsError as error:
-            if error.setting in given or error.setting not in sources:
+            if error.setting in set_flags or error.setting not in sources:
                 raise
             raise SettingsError(f"{error} ({sources[error.setting]})", error.setting) from None

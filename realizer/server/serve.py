@@ -148,19 +148,19 @@ def _raise_file_limit() -> None:
         import resource
     except ImportError:  # Windows has no such limit
         return
-    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    _, maximum = resource.getrlimit(resource.RLIMIT_NOFILE)
     with contextlib.suppress(ValueError, OSError):
-        resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
+        resource.setrlimit(resource.RLIMIT_NOFILE, (maximum, maximum))
 
 
 class Server:
     """The service inside an event loop: `start`, then `close`; or `async with Server(settings) as server`.
 
     Args:
-        worker: number of this process among several: then connections come by `serve_socket` only.
+        worker: number of this process, if it is one of several; its connections come by `serve_socket` only.
 
     Attributes:
-        transports: the open ones; the WebSocket is the first.
+        transports: the open transports; WebSocket is the first.
     """
 
     def __init__(self, settings: Settings | None = None, worker: int | None = None) -> None:
@@ -204,7 +204,7 @@ class Server:
         except BaseException:
             await self.close()
             raise
-        # In a thread now, not in the event loop when the first large block or arkit client comes.
+        # Warm up in a thread now; otherwise the first large block or arkit client would stop the event loop.
         asyncio.get_running_loop().run_in_executor(None, _warm_up, self.settings)
         return self
 
@@ -244,6 +244,6 @@ class Server:
 
 
 def _warm_up(settings: Settings) -> None:
-    """Load what all sessions share and what takes so long that it would delay frames."""
+    """Load shared data that takes so long to load that it would delay frames."""
     warm_up()
     arkit.warm_up(mapping_of(settings.face, settings.mapping))

@@ -13,8 +13,8 @@ from realizer.core.settings import Settings
 from realizer.server import serve
 
 
-def told(monkeypatch: pytest.MonkeyPatch, *args: str) -> Settings:
-    """The settings that a service would be started with."""
+def settings_of(monkeypatch: pytest.MonkeyPatch, *args: str) -> Settings:
+    """Return the settings that `realizer serve` starts a service with."""
     got: list[Any] = []
     monkeypatch.setattr(serve, "serve", got.append)
     monkeypatch.setattr(serve, "run", lambda service: None)
@@ -29,9 +29,9 @@ LIMITS = [f for f in fields(Settings) if f.name.startswith("max_")]
 
 @pytest.mark.parametrize("limit", LIMITS, ids=lambda f: f.name)
 def test_serve_has_an_option_for_every_limit(limit: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    settings = told(monkeypatch, f"--{limit.name.replace('_', '-')}", "321")
+    settings = settings_of(monkeypatch, f"--{limit.name.replace('_', '-')}", "321")
     assert getattr(settings, limit.name) == 321
-    assert told(monkeypatch) == Settings(voice="silent")
+    assert settings_of(monkeypatch) == Settings(voice="silent")
 
 
 @pytest.mark.parametrize("limit", LIMITS, ids=lambda f: f.name)

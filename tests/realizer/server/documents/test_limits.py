@@ -67,5 +67,5 @@ def test_pixel_rate_error_allows_large_pictures_at_a_low_rate() -> None:
 
 
 def test_limits_have_different_descriptions_in_the_settings() -> None:
-    says = {f.name: f.metadata["says"] for f in fields(Settings) if f.name.startswith("max_")}
-    assert len(says) == len(set(says.values())) == 14
+    descriptions = {f.name: f.metadata["description"] for f in fields(Settings) if f.name.startswith("max_")}
+    assert len(descriptions) == len(set(descriptions.values())) == 14
