@@ -55,15 +55,15 @@ def _mouth(track: Track, times: Float64) -> Float64:
     target = (track.mix @ shape_table()[0]).T * track.size
     target[[SHAPE_COLUMNS.index(name) for name in OPENING]] *= track.effort
     mouth = np.empty((len(SHAPE_COLUMNS), len(times)))
-    for near, parts, members in dominances(track, times):
-        block = _block(members)
-        mouth[block] = np.einsum("kn,skn->sn", parts, target[block].take(near, axis=1, mode="clip"))
+    for near, parts, articulators in dominances(track, times):
+        rows = _rows(articulators)
+        mouth[rows] = np.einsum("kn,skn->sn", parts, target[rows].take(near, axis=1, mode="clip"))
     return mouth
 
 
-def _block(members: Sequence[str]) -> slice:
-    """Return the rows of a class of articulators."""
-    return slice(SHAPE_COLUMNS.index(members[0]), SHAPE_COLUMNS.index(members[-1]) + 1)
+def _rows(articulators: Sequence[str]) -> slice:
+    """Return the rows of neighbouring articulators in `SHAPE_COLUMNS`."""
+    return slice(SHAPE_COLUMNS.index(articulators[0]), SHAPE_COLUMNS.index(articulators[-1]) + 1)
 
 
 def _constrain(mouth: Float64, track: Track, times: Float64, masked: Float64, facts: dict[str, Any]) -> None:
@@ -84,11 +84,11 @@ def _constrain(mouth: Float64, track: Track, times: Float64, masked: Float64, fa
         bitten & ~closed, np.minimum(lower, shapes[LABIODENTAL, column["lower"]] * masked), lower
     )
     jaw[:] = np.where(closed | bitten, np.minimum(jaw, facts["closure"]["jaw"]), jaw)
-    for name, members in CLASSES.items():
+    for name, articulators in CLASSES.items():
         limit = facts["speed"]["jaw" if name == "jaw" else "lips"]
         reach = facts["articulators"][name]["smooth"] * facts["rate"]
-        block = _block(members)
-        mouth[block] = _smooth(_limit_speed(mouth[block], times, limit), reach)
+        rows = _rows(articulators)
+        mouth[rows] = _smooth(_limit_speed(mouth[rows], times, limit), reach)
     # Pressed lips meet, but do not pass through each other.
     least = shapes[BILABIAL, column["upper"]] + shapes[BILABIAL, column["lower"]]
     lower[:] = np.maximum(lower, least - upper)
