@@ -17,10 +17,10 @@ from realizer.scheduling import Member, schedule_together
 from realizer.scheduling.timing import Schedule, Timing, Warning
 from realizer.speech.utterance import WARP
 
-# s; a speech whose points move by no more is not synthesized again.
-SAME = 1e-6
-# s; shorter gaps of a speech are too short to determine its rate.
-SHORT = 0.02
+# s; a speech whose sync points move by no more than this is not synthesized again.
+TIME_TOLERANCE = 1e-6
+# s; the rate of a speech is not computed from shorter gaps.
+MIN_RATE_GAP = 0.02
 
 
 @dataclass(frozen=True)
@@ -29,12 +29,12 @@ class Plan:
 
     Attributes:
         block: without the dropped behaviours and the references to them.
-        schedule: `failed` if something required cannot be played; the other attributes are empty then.
+        schedule: `failed` if a required behaviour cannot be played; the other attributes are then empty.
         channels: behaviour id -> channels in seconds from block start.
         claims: the exclusive resources of its behaviours, on the clock of `schedule.start`.
-        timings: the timings that its behaviours prefer.
-        other_schedules: the new schedules of the other blocks, each from its own start.
-        trims: (block, behaviour) -> when a speech that plays has to end, which cuts its closing silence.
+        timings: behaviour id -> the timing that it prefers.
+        other_schedules: the new schedules of linked blocks, each in seconds from its own start.
+        trims: (block, behaviour) -> when a speech that plays has to end; only its final silence is cut.
     """
 
     block: Block
@@ -52,28 +52,30 @@ def plan(
     context: PlanningContext,
     *,
     start: float = 0.0,
-    outside: Callable[[SyncRef], float | None] = lambda ref: None,
+    external_times: Callable[[SyncRef], float | None] = lambda ref: None,
     existing_claims: Iterable[ResourceClaim] = (),
     others: Sequence[Member] = (),
     may_stretch: bool = True,
 ) -> Plan:
-    """Schedule a block and expand it; drop with one warning each what cannot be played.
+    """Schedule a block and expand it; drop behaviours that cannot be played, with one warning each.
 
     Args:
         context: with the utterances of the block's speech behaviours.
         start: when the block starts, seconds on the session clock.
-        outside: sync points of other blocks -> seconds from this block's start, None if unknown.
+        external_times: returns the time of a sync point of another block, in seconds from this block's
+            start; None if it is unknown.
         existing_claims: claims of earlier blocks of this character, on the session clock.
-        others: playing blocks that are tied to this one: solved with it, seconds from this block's start.
+        others: playing blocks that are linked with this one and solved with it, in seconds from this
+            block's start.
         may_stretch: whether the plan may require speech of other lengths.
     """
     builder = _PlanBuilder(block, kinds, context, may_stretch)
     try:
         builder.add_problems()
-        builder.time()
-        schedule, *moved = builder.schedule(start, outside, tuple(existing_claims), others)
-    except _NoPlan as why:
-        return Plan(block, Schedule(block.id, {}, {}, start=start, **why.schedule))
+        builder.find_timings()
+        schedule, *moved = builder.schedule(start, external_times, tuple(existing_claims), others)
+    except _NoPlan as refusal:
+        return Plan(block, Schedule(block.id, {}, {}, start=start, **refusal.fields))
     return Plan(
         builder.block,
         schedule,
@@ -86,15 +88,15 @@ def plan(
 
 
 class _NoPlan(Exception):
-    """The block cannot be planned so; `schedule` has why, as fields of Schedule."""
+    """The block has no plan; `fields` are the fields of its Schedule that say why."""
 
-    def __init__(self, **schedule: Any) -> None:
-        super().__init__(str(schedule))
-        self.schedule = schedule
+    def __init__(self, **fields: Any) -> None:
+        super().__init__(str(fields))
+        self.fields = fields
 
 
 class _PlanBuilder:
-    """A block while it is planned: its remaining behaviours, and the warnings so far."""
+    """The state of planning one block: its remaining behaviours, and the warnings so far."""
 
     def __init__(
         self,
@@ -121,36 +123,36 @@ class _PlanBuilder:
                 self.refuse(warning)
             self.warnings.append(warning)
 
-    def time(self) -> None:
-        """Step 2: check the behaviours, and get the timings that they prefer."""
-        gone: list[tuple[str, Warning]] = []
+    def find_timings(self) -> None:
+        """Step 2: check the behaviours, and find the timings that they prefer."""
+        dropped: list[tuple[str, Warning]] = []
         context, utterances = self.context, self.context.utterances
         for node in self.block.behaviours:
             kind = self.kinds.get(node.tag)
             if kind is None:
                 text = f"<{node.tag.rpartition('}')[2]}> is not known here"
-                gone.append((node.id, self.warning("BEHAVIOR_TYPE_NOT_SUPPORTED", node.id, text)))
+                dropped.append((node.id, self.warning("BEHAVIOR_TYPE_NOT_SUPPORTED", node.id, text)))
                 continue
             faults = kind.check(node, context)
             fatal = next((fault for fault in faults if fault.fatal), None)
             if fatal is not None:
-                gone.append((node.id, self.warning(fatal.type, node.id, fatal.text)))
+                dropped.append((node.id, self.warning(fatal.type, node.id, fatal.text)))
             elif kind.speech_request is not None and node.id not in utterances:
                 text = "speech: no voice could say it"
-                gone.append((node.id, self.warning("CANNOT_CREATE_BEHAVIOR", node.id, text)))
+                dropped.append((node.id, self.warning("CANNOT_CREATE_BEHAVIOR", node.id, text)))
             else:
                 self.warnings += [self.warning(fault.type, node.id, fault.text) for fault in faults]
                 self.timings[node.id] = kind.timing(node, context)
-        self.drop(gone)
+        self.drop(dropped)
 
     def schedule(
         self,
         start: float,
-        outside: Callable[[SyncRef], float | None],
+        external_times: Callable[[SyncRef], float | None],
         existing_claims: Sequence[ResourceClaim],
         others: Sequence[Member],
     ) -> list[Schedule]:
-        """Step 3: solve for the times, again without conflicting behaviours until none is left.
+        """Step 3: solve for the times, and again without conflicting behaviours until no conflict is left.
 
         Speeches that overlap a little are placed one after the other, if the document and the voice allow it.
         """
@@ -159,10 +161,10 @@ class _PlanBuilder:
         while True:
             priorities = {node.id: node.priority for node in self.block.behaviours if node.priority}
             own = Member(self.block, self.timings, priorities=priorities, sequences=tuple(sequences))
-            schedule, *moved = self.solve(own, others, outside)
+            schedule, *moved = self.solve(own, others, external_times)
             if schedule.failed or len(schedule.times) < len(self.timings):
                 if self.may_stretch:
-                    self.try_stretching(own, others, outside, schedule)
+                    self.try_stretching(own, others, external_times, schedule)
                 if sequences:
                     sequences, may_sequence = [], False
                     continue
@@ -171,22 +173,23 @@ class _PlanBuilder:
             ]
             if schedule.failed:
                 self.refuse(warnings[0])
-            gone = self.timings.keys() - schedule.times.keys()
-            self.drop([(self.behaviour_of(w), w) for w in warnings if self.behaviour_of(w) in gone])
-            self.warnings += [w for w in warnings if self.behaviour_of(w) not in gone]
+            unscheduled = self.timings.keys() - schedule.times.keys()
+            self.drop([(self.behaviour_of(w), w) for w in warnings if self.behaviour_of(w) in unscheduled])
+            self.warnings += [w for w in warnings if self.behaviour_of(w) not in unscheduled]
             character, all_warnings = self.block.character_id, tuple(self.warnings)
             schedule = replace(schedule, start=start, character=character, warnings=all_warnings)
             self.claims = tuple(claims(self.block, schedule, self.kinds, self.context))
-            left = after_interrupts(existing_claims, interrupts(self.block, schedule))
-            lost = conflicts(self.claims, left, start)
-            if not lost:
-                self.trims = dict(trims(self.claims, left))
+            remaining = after_interrupts(existing_claims, interrupts(self.block, schedule))
+            found = conflicts(self.claims, remaining, start)
+            if not found:
+                self.trims = dict(trims(self.claims, remaining))
                 return [schedule, *moved]
-            wanted = {pair for conflict in lost if (pair := conflict.sequence) is not None}
-            if may_sequence and wanted.difference(sequences):
-                sequences = [*sequences, *wanted.difference(sequences)]
+            new_sequences = {pair for conflict in found if (pair := conflict.sequence) is not None}
+            new_sequences -= set(sequences)
+            if may_sequence and new_sequences:
+                sequences += new_sequences
                 continue
-            losers = ((loss.claim.behaviour, str(loss)) for loss in lost)
+            losers = ((conflict.claim.behaviour, str(conflict)) for conflict in found)
             self.drop((id, self.warning("CANNOT_CREATE_BEHAVIOR", id, text)) for id, text in losers)
 
     def expand(self, schedule: Schedule) -> dict[str, tuple[Channel, ...]]:
@@ -198,15 +201,15 @@ class _PlanBuilder:
         }
 
     def solve(
-        self, own: Member, others: Sequence[Member], outside: Callable[[SyncRef], float | None]
+        self, own: Member, others: Sequence[Member], external_times: Callable[[SyncRef], float | None]
     ) -> list[Schedule]:
-        return schedule_together([own, *others], outside=outside, grace=self.context.grace)
+        return schedule_together([own, *others], outside=external_times, grace=self.context.grace)
 
     def try_stretching(
         self,
         own: Member,
         others: Sequence[Member],
-        outside: Callable[[SyncRef], float | None],
+        external_times: Callable[[SyncRef], float | None],
         rigid: Schedule,
     ) -> None:
         """Raise _NoPlan with lengths if speech at another rate lets more behaviours fit."""
@@ -217,56 +220,63 @@ class _PlanBuilder:
                 and (timing := self.kinds[node.tag].stretch(node, self.context)) is not None
             ):
                 flexible[node.id] = timing
-        could = {b: timing for b, timing in flexible.items() if timing is not own.timings[b]}
-        if not could:
+        stretchable = {b: timing for b, timing in flexible.items() if timing is not own.timings[b]}
+        if not stretchable:
             return
-        stretched = self.solve(replace(own, timings=flexible), others, outside)[0]
+        stretched = self.solve(replace(own, timings=flexible), others, external_times)[0]
         if stretched.failed or len(stretched.times) <= len(rigid.times):
             return
-        at = {b: stretched.times[b] - stretched.times[b][0] for b in could if b in stretched.times}
-        natural = {b: np.append(0.0, np.cumsum(own.timings[b].preferred)) for b in at}
-        # A voice has one rate for a whole speech: of the rates of its gaps, the one that lets most fit.
-        most = len(rigid.times)
-        for b in at if len(at) == 1 else ():
-            if could[b].most is None or self.context.utterances[b].stretch == WARP:
+        points = {b: stretched.times[b] - stretched.times[b][0] for b in stretchable if b in stretched.times}
+        natural = {b: np.append(0.0, np.cumsum(own.timings[b].preferred)) for b in points}
+        # Some voices have one rate for a whole speech. Of the rates of the stretched gaps, take the one with
+        # which most behaviours can be scheduled.
+        best_count = len(rigid.times)
+        for b in points if len(points) == 1 else ():
+            if stretchable[b].most is None or self.context.utterances[b].stretch == WARP:
                 continue
             gaps = own.timings[b].preferred
-            rates = np.diff(at[b])[gaps > SHORT] / gaps[gaps > SHORT]
+            rates = np.diff(points[b])[gaps > MIN_RATE_GAP] / gaps[gaps > MIN_RATE_GAP]
             for rate in sorted({round(float(r), 9) for r in rates}, key=lambda r: abs(r - 1.0)):
-                evened = replace(own.timings[b], preferred=gaps * rate)
-                fits = self.solve(replace(own, timings={**own.timings, b: evened}), others, outside)[0]
-                if not fits.failed and len(fits.times) > most:
-                    most = len(fits.times)
-                    at[b] = natural[b] * rate
+                scaled = replace(own.timings[b], preferred=gaps * rate)
+                trial = self.solve(replace(own, timings={**own.timings, b: scaled}), others, external_times)[
+                    0
+                ]
+                if not trial.failed and len(trial.times) > best_count:
+                    best_count = len(trial.times)
+                    points[b] = natural[b] * rate
         lengths = {
-            b: dict(zip(could[b].points[1:], map(float, at[b][1:]), strict=True))
-            for b in at
-            if np.abs(at[b] - natural[b]).max() > SAME
+            b: dict(zip(stretchable[b].points[1:], map(float, points[b][1:]), strict=True))
+            for b in points
+            if np.abs(points[b] - natural[b]).max() > TIME_TOLERANCE
         }
         if lengths:
             raise _NoPlan(lengths=lengths)
 
-    def drop(self, gone: Iterable[tuple[str, Warning]]) -> None:
-        """Drop behaviours and the references to them, with one warning each that names both."""
-        dropped = dict(gone)
+    def drop(self, warnings: Iterable[tuple[str, Warning]]) -> None:
+        """Drop behaviours and the references to them; each one's warning names both.
+
+        Args:
+            warnings: (behaviour id, warning) of each.
+        """
+        dropped = dict(warnings)
         if not dropped:
             return
         for id in (node.id for node in self.block.behaviours if node.id in dropped):
             if id in self.block.required:
                 self.refuse(dropped[id], f" (required {id})")
-        self.block, lost, fatal = without(self.block, dropped.keys())
+        self.block, removed_references, fatal = without(self.block, dropped.keys())
         for id, warning in dropped.items():
             self.timings.pop(id, None)
             if id in fatal:
                 self.refuse(warning, f" (a required constraint names {id})")
-            if names := lost.get(id):
+            if names := removed_references.get(id):
                 warning = replace(warning, text=f"{warning.text}; with it went {listed(names)}")
-            # Earlier warnings about it do not matter any more.
+            # The new warning replaces earlier ones about the behaviour.
             self.warnings = [w for w in self.warnings if w.id != warning.id]
             self.warnings.append(warning)
 
     def refuse(self, warning: Warning, more: str = "") -> NoReturn:
-        """Refuse the block because something required cannot be played."""
+        """Refuse the block because a required behaviour or constraint cannot be played."""
         warning = replace(warning, id=self.original.id, text=warning.text + more)
         raise _NoPlan(warnings=(warning,), failed=True)
 

@@ -95,7 +95,7 @@ class BlockTimeline:
             self.kinds,
             arrival.context,
             start=origin,
-            outside=block_links.external_times(schedule_of, origin, self.blocks.first_schedule_of),
+            external_times=block_links.external_times(schedule_of, origin, self.blocks.first_schedule_of),
             existing_claims=existing,
             others=[member(p, origin, now) for p in others],
             may_stretch=may_stretch,
