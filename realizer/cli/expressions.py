@@ -15,16 +15,18 @@ from realizer.cli import options
 if TYPE_CHECKING:
     from realizer.expressions.expression import Expression
 
-MIN_LIKE = 0.4  # least cosine of the best match; the motion of an idle head reaches 0.3
-picture = click.option(
+# Least cosine of the best match; the motion of an idle head reaches 0.3.
+MIN_SIMILARITY = 0.4
+
+sheet_output = click.option(
     "-o", "--output", metavar="SHEET.png", type=options.OUTPUT, help="Draw the expressions as well."
 )
 
 
-class Units(click.ParamType):  # type: ignore[type-arg]
-    """Action units such as 1,2,12L=0.5, as (AU, side) -> intensity."""
+class ActionUnits(click.ParamType):  # type: ignore[type-arg]
+    """The type of options for action units: converts "1,2,12L=0.5" to (AU, side) -> intensity."""
 
-    name = "units"
+    name = "action units"
 
     def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Any:
         from realizer.core.errors import TableError
@@ -49,7 +51,7 @@ def expressions() -> None:
 
 @expressions.command("list")
 @options.as_json
-@picture
+@sheet_output
 @click.option("--face", default="default", show_default=True, help="Face to draw.")
 @options.expressions
 def list_(as_json: bool, output: Path | None, face: str, expressions: Path | None) -> None:
@@ -65,7 +67,7 @@ def list_(as_json: bool, output: Path | None, face: str, expressions: Path | Non
 
 @expressions.command()
 @click.argument("text", required=False)
-@click.option("--au", "units", type=Units(), metavar="1,2,12L=0.5", help="Search by action units.")
+@click.option("--au", "units", type=ActionUnits(), metavar="1,2,12L=0.5", help="Search by action units.")
 @click.option(
     "--like",
     metavar="IMAGE",
@@ -73,19 +75,21 @@ def list_(as_json: bool, output: Path | None, face: str, expressions: Path | Non
     help="Search by a picture of a built-in face, from the front, in one of the lights of --light.",
 )
 @click.option(
-    "--most", type=click.IntRange(1), default=8, show_default=True, help="Largest number of results."
+    "--limit", type=click.IntRange(1), default=8, show_default=True, help="Largest number of results."
 )
 @options.as_json
-@picture
+@sheet_output
 @click.option(
-    "--face", metavar="NAME", help="Face to draw, and face in the picture.  [default: default, any]"
+    "--face",
+    metavar="NAME",
+    help="Face to draw; also the face in the picture of --like.  [default: default; any with --like]",
 )
 @options.expressions
 def find(
     text: str | None,
     units: Any,
     like: Path | None,
-    most: int,
+    limit: int,
     as_json: bool,
     output: Path | None,
     face: str | None,
@@ -103,7 +107,7 @@ def find(
     from realizer.expressions.library import library_of
     from realizer.expressions.search import by_action_units, by_meaning
 
-    if sum(way is not None for way in (text, units, like)) != 1:
+    if sum(query is not None for query in (text, units, like)) != 1:
         raise click.UsageError("wanted one of TEXT, --au and --like")
     _check_picture(output, face or "default")
     library = list(library_of(options.settings(expressions=expressions).expressions).values())
@@ -116,19 +120,19 @@ def find(
 
         assert like is not None
         with options.reporting(UnknownPictureError):
-            likeness = by_picture(read_picture(like), library, None if face is None else [face])
-        face, matches = likeness.face, [pair for pair in likeness.matches if pair[1] > 0]
-        if matches and matches[0][1] < MIN_LIKE:
+            found = by_picture(read_picture(like), library, None if face is None else [face])
+        face, matches = found.face, [match for match in found.matches if match[1] > 0]
+        if matches and matches[0][1] < MIN_SIMILARITY:
             matches = []
-        options.note(f"{like}: {face}, {likeness.light}{', neutral' if likeness.neutral else ''}")
-    matches = matches[:most]
-    expressions_found, scores = [match[0] for match in matches], [f"{match[1]:.2f}" for match in matches]
-    _print_matches(expressions_found, scores, as_json)
+        options.note(f"{like}: {face}, {found.light}{', neutral' if found.neutral else ''}")
+    matches = matches[:limit]
+    matching, scores = [match[0] for match in matches], [f"{match[1]:.2f}" for match in matches]
+    _print_matches(matching, scores, as_json)
     if not matches:
-        query = repr(text) if text is not None else "this query"
-        click.echo(f"no expression matches {query}; see `realizer expressions list`", err=True)
+        query_text = repr(text) if text is not None else "this query"
+        click.echo(f"no expression matches {query_text}; see `realizer expressions list`", err=True)
     elif output is not None:
-        _draw(expressions_found, scores, output, face or "default")
+        _draw(matching, scores, output, face or "default")
     return 0 if matches else 1
 
 
@@ -139,7 +143,7 @@ def _check_picture(output: Path | None, face: str) -> None:
 
 
 def _print_matches(expressions: Sequence[Expression], scores: Sequence[str], as_json: bool) -> None:
-    """Print expressions with their scores, which are "" if there are none."""
+    """Print expressions with the scores of a search; a score is "" in a plain list."""
     scored = list(zip(expressions, scores, strict=True))
     if as_json:
         rows = [e.to_json() | ({"score": float(score)} if score else {}) for e, score in scored]

@@ -25,8 +25,8 @@ def test_list_has_all_expressions_with_units_and_times() -> None:
 
 
 def test_list_as_json_has_all_fields() -> None:
-    told = {one["name"]: one for one in json.loads(run("list", "--json").stdout)}
-    grief = told["template:grief"]
+    rows = {row["name"]: row for row in json.loads(run("list", "--json").stdout)}
+    grief = rows["template:grief"]
     assert grief["aus"] == {"1": 1.0}
     assert grief["possible"] == [0.25, 4.0]
     assert "Wojdel" in grief["apex"]["source"]
@@ -39,9 +39,9 @@ def test_find_searches_by_words_and_by_action_units() -> None:
 
 
 def test_find_prints_at_most_the_requested_number() -> None:
-    told = json.loads(run("find", "smile", "--most", "2", "--json").stdout)
-    assert len(told) == 2
-    assert told[0]["score"] >= told[1]["score"] > 0
+    rows = json.loads(run("find", "smile", "--limit", "2", "--json").stdout)
+    assert len(rows) == 2
+    assert rows[0]["score"] >= rows[1]["score"] > 0
 
 
 def test_find_includes_a_users_expressions(tmp_path: Path) -> None:
@@ -52,7 +52,7 @@ def test_find_includes_a_users_expressions(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "error"),
     [
         (["find"], "wanted one of TEXT, --au and --like"),
         (["find", "smile", "--au", "1"], "wanted one of TEXT, --au and --like"),
@@ -61,10 +61,10 @@ def test_find_includes_a_users_expressions(tmp_path: Path) -> None:
         (["list", "-o", "sheet.txt"], "sheet.txt: wanted a name that ends in .png"),
     ],
 )
-def test_expressions_refuse_wrong_options(words: list[str], told: str) -> None:
+def test_expressions_refuse_wrong_options(words: list[str], error: str) -> None:
     done = CliRunner().invoke(cli, ["expressions", *words])
     assert done.exit_code == 2
-    assert told in " ".join(done.stderr.split())
+    assert error in " ".join(done.stderr.split())
 
 
 def test_find_without_a_match_exits_with_1() -> None:
