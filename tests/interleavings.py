@@ -30,7 +30,7 @@ from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Utterance
 from tests.mutants import mutants
-from tests.waking import wakes
+from tests.wake_times import next_wake
 
 __all__ = ["BODIES", "CONTROLS", "FILTERS", "HEADS", "NAMES", "Interleaving", "Memory", "no_error", "spoken"]
 
@@ -306,7 +306,7 @@ class Interleaving:
         """Wake sessions when they want to be, each as often as it must be."""
         ticks = 0
         while True:
-            due = [(wakes(s), s) for s in self._hub.sessions.values()]
+            due = [(next_wake(s), s) for s in self._hub.sessions.values()]
             when, session = min(due, key=lambda one: one[0], default=(end + 1, None))
             if session is None or when > end:
                 break
@@ -399,7 +399,7 @@ class Interleaving:
         kept = self._journal.claim(session.id)
         assert kept is not None
         restore_session(other, kept, spoken)
-        while (due := wakes(other)) <= self.now - session.opened:
+        while (due := next_wake(other)) <= self.now - session.opened:
             other.tick(max(due, 0.0))
         first = max(session.feedback_log.first, other.feedback_log.first)
         told, again = session.feedback_log.since(first), other.feedback_log.since(first)

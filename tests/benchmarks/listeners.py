@@ -14,7 +14,7 @@ from heapq import heappop, heappush
 from urllib.parse import urlsplit
 
 import numpy as np
-from packets import greet, masked, messages
+from packets import encode_text, handshake, take_messages
 
 __all__ = ["FPS", "POSIX", "Crowd", "joined"]
 
@@ -52,10 +52,10 @@ def joined(url: str, session: str, plays: bool) -> Peer:
     host, _, port = urlsplit(url).netloc.rpartition(":")
     peer = socket.create_connection((host, int(port)), 20)
     peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    rest = greet(peer, session)
+    rest = handshake(peer, session)
     if plays:
-        peer.sendall(masked(json.dumps(SCENE)))
-        peer.sendall(masked(json.dumps({"type": "subscribe", "stream": "fap", "fps": FPS})))
+        peer.sendall(encode_text(json.dumps(SCENE)))
+        peer.sendall(encode_text(json.dumps({"type": "subscribe", "stream": "fap", "fps": FPS})))
     peer.setblocking(False)
     return Peer(peer, rest)
 
@@ -126,7 +126,7 @@ class Crowd:
             self._frame(peer, data, 8, came)
             return
         peer.data += data
-        for code, payload in messages(peer.data):
+        for code, payload in take_messages(peer.data):
             if code == PING:  # who does not answer is taken for gone
                 peer.socket.sendall(bytes([0x80 | PONG, 0x80 | len(payload)]) + bytes(4) + payload)
             elif code == 2 and payload[0] == 1:
@@ -153,7 +153,7 @@ class Crowd:
         name = f"b{peer.documents}"
         peer.documents += 1
         peer.sent[name] = time.time()
-        peer.socket.sendall(masked(f'<bml id="{name}" composition="REPLACE">{BODY}</bml>'))
+        peer.socket.sendall(encode_text(f'<bml id="{name}" composition="REPLACE">{BODY}</bml>'))
 
 
 PARTS = {"p50": 50, "p99": 99, "most": 100}

@@ -1,4 +1,4 @@
-"""WebSocket messages without a library: a text in, what a client sends out; what came in, messages out."""
+"""Encodes and decodes WebSocket messages without a library, for clients that must cost little."""
 
 from __future__ import annotations
 
@@ -6,35 +6,35 @@ import socket
 import struct
 from collections.abc import Iterator
 
-__all__ = ["HELLO", "greet", "masked", "messages"]
+__all__ = ["HANDSHAKE", "encode_text", "handshake", "take_messages"]
 
-# What a client asks to be let in with; {} is its session.
-HELLO = (
+# The opening request of a client; {} is the name of its session.
+HANDSHAKE = (
     "GET /ws?session={} HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
     "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n\r\n"
 )
 
 
-def greet(one: socket.socket, session: str) -> bytearray:
-    """Ask to be let in, and read that it is so; what has come behind that."""
-    one.sendall(HELLO.format(session).encode())
+def handshake(client: socket.socket, session: str) -> bytearray:
+    """Open a WebSocket on a connected socket; return the bytes that were received after the handshake."""
+    client.sendall(HANDSHAKE.format(session).encode())
     data = bytearray()
     while b"\r\n\r\n" not in data:
-        data += (more := one.recv(4096))
-        assert more, "the service hung up"
+        data += (received := client.recv(4096))
+        assert received, "the service closed the connection"
     assert data.startswith(b"HTTP/1.1 101"), bytes(data)
     return data.partition(b"\r\n\r\n")[2]
 
 
-def masked(text: str) -> bytes:
-    """A text message of less than 64 KiB as a client sends it; the mask is 0, which changes nothing."""
+def encode_text(text: str) -> bytes:
+    """Return the client's frame of a text of less than 64 KiB; its mask is 0, which changes nothing."""
     data = text.encode()
     head = bytes([0x81, 0x80 | len(data)]) if len(data) < 126 else struct.pack(">BBH", 0x81, 0xFE, len(data))
     return head + bytes(4) + data
 
 
-def messages(data: bytearray) -> Iterator[tuple[int, bytes]]:
-    """(opcode, payload) of all that have come whole; they are taken out of `data`."""
+def take_messages(data: bytearray) -> Iterator[tuple[int, bytes]]:
+    """Yield (opcode, payload) of each complete message, and remove these messages from `data`."""
     at = 0
     while len(data) >= at + 2:
         size, head = data[at + 1] & 0x7F, 2

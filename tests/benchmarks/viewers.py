@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 from listeners import POSIX, joined
-from packets import masked, messages
+from packets import encode_text, take_messages
 from sessions import noise, served, spent
 
 FPS = 25
@@ -48,7 +48,7 @@ def watch(url: str, viewers: int, seconds: float, streams: list[str]) -> dict[st
     for peer in peers:
         for stream in streams:
             rate = {} if stream == "audio" else {"fps": FPS}
-            peer.socket.sendall(masked(json.dumps({"type": "subscribe", "stream": stream, **rate})))
+            peer.socket.sendall(encode_text(json.dumps({"type": "subscribe", "stream": stream, **rate})))
     begun, due, documents, zero = time.time(), time.time() + 0.5, 0, None
     measured = begun + EVERY
     while (now := time.time()) < measured + seconds:
@@ -56,7 +56,7 @@ def watch(url: str, viewers: int, seconds: float, streams: list[str]) -> dict[st
             due += EVERY
             documents += 1
             document = f'<bml id="b{documents}" composition="REPLACE">{BODY}</bml>'
-            manager.socket.sendall(masked(document))
+            manager.socket.sendall(encode_text(document))
         for number, _ in poll.poll(0.002):
             peer = by_number[number]
             try:
@@ -64,7 +64,7 @@ def watch(url: str, viewers: int, seconds: float, streams: list[str]) -> dict[st
             except BlockingIOError:
                 continue
             here = time.time()
-            for code, payload in messages(peer.data):
+            for code, payload in take_messages(peer.data):
                 if code == 2:
                     kind, _, _, frame, at = struct.unpack_from("<BBHId", payload)
                     if here >= measured and len(payload) > 16:

@@ -17,7 +17,7 @@ from realizer.protocol.wire import unpack
 from realizer.server.session.effects import Close, Draw, Effect, Send, Speak
 from realizer.server.session.session import Session
 from realizer.speech.utterance import Utterance
-from tests.waking import wakes
+from tests.wake_times import next_wake
 
 NOD = '<bml id="{}"><head id="n" lexeme="NOD"/></bml>'
 TALK = '<bml id="{}"><speech id="s"><text>Hello there</text></speech></bml>'
@@ -115,7 +115,7 @@ class Driver:
 
     def run(self, until: float) -> Client:
         """Tick at every deadline up to `until` (on the session clock)."""
-        while (deadline := wakes(self.session)) <= self.opened + until:
+        while (deadline := next_wake(self.session)) <= self.opened + until:
             self.now = max(self.now, deadline - self.opened)
             self.wake()
         self.now = until

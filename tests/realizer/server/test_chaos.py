@@ -1,4 +1,4 @@
-"""The service while its surroundings fail: engines, the disk, the clock, its clients."""
+"""Tests of the service when engines, the disk, the clock or clients fail."""
 
 from __future__ import annotations
 
@@ -30,10 +30,17 @@ from realizer.core.settings import Settings
 from realizer.protocol.wire import unpack
 from realizer.server.serve import Server
 from realizer.speech.espeak.voice import EspeakVoice
-from tests.benchmarks.packets import masked
-from tests.crowds import at_once, come_and_go, files_open, half_closed, joined, well_told
+from tests.benchmarks.packets import encode_text
+from tests.feedback_log import seq_numbers
+from tests.many_clients import (
+    check_feedback,
+    connect_and_leave,
+    open_files,
+    open_websocket,
+    send_and_half_close,
+    send_simultaneously,
+)
 from tests.realizer.server.conftest import Clock
-from tests.told import numbers
 
 LIMIT = 60  # s; a hung test ends
 WAIT = '<bml id="{}"><wait id="w" duration="{}"/></bml>'
@@ -42,26 +49,26 @@ TALK = '<bml id="{}"><speech id="s"><text>{}</text></speech></bml>'
 
 def serving(test: Callable[[Server], Awaitable[None]], **settings: Any) -> None:
     async def run() -> None:
-        told = {"port": 0, "voice": "silent", **settings}
-        async with asyncio.timeout(LIMIT), Server(Settings(**told)) as server:
+        values = {"port": 0, "voice": "silent", **settings}
+        async with asyncio.timeout(LIMIT), Server(Settings(**values)) as server:
             await test(server)
 
     asyncio.run(run())
 
 
 async def until(client: ClientConnection, last: str) -> list[str]:
-    """Feedback up to the message that has `last` in it."""
-    told = []
+    """Return the feedback up to the message that contains `last`."""
+    feedback = []
     async for message in client:
         if isinstance(message, str) and message.startswith("<"):
-            told.append(message)
+            feedback.append(message)
             if last in message:
-                return told
+                return feedback
     raise AssertionError(f"the connection ended before {last}")
 
 
-async def plays(client: ClientConnection, block: str) -> None:
-    """The client's next block is played to its end."""
+async def play(client: ClientConnection, block: str) -> None:
+    """Send a short block, and wait for its end."""
     await client.send(WAIT.format(block, 0.05))
     await until(client, f'id="{block}:end"')
 
@@ -69,8 +76,8 @@ async def plays(client: ClientConnection, block: str) -> None:
 # engines ----------------------------------------------------------------------------------------
 
 
-def unread(engine: EspeakVoice) -> int:
-    """Bytes of a request that an engine has been sent and has not read."""
+def unread_bytes(engine: EspeakVoice) -> int:
+    """Return how many bytes of a request an engine has not read yet."""
     running = engine._process._running
     assert running is not None
     assert running.process.stdin is not None
@@ -90,30 +97,30 @@ def test_chaos_killed_voice_costs_its_sound_and_one_warning(
             assert engine.pid is not None
             os.kill(engine.pid, signal.SIGSTOP)  # so that it can never answer before it dies
             await client.send(TALK.format("killed", "Two."))
-            while not unread(engine):
+            while not unread_bytes(engine):
                 await asyncio.sleep(0)
             os.kill(engine.pid, signal.SIGKILL)
-            told = await until(client, 'id="killed:end"')
+            killed = await until(client, 'id="killed:end"')
             await client.send('{"type":"subscribe","stream":"audio"}')
             await client.send(TALK.format("next", "Three."))
-            heard, rest = 0, []
+            packets, rest = 0, []
             while not rest or 'id="next:end"' not in rest[-1]:
                 message = await client.recv()
                 if isinstance(message, bytes):
-                    heard += unpack(message).stream == "audio"
+                    packets += unpack(message).stream == "audio"
                 elif message.startswith("<"):
                     rest.append(message)
-        assert heard
-        warnings = ["warningFeedback" in text for text in (*first, *told, *rest)]
+        assert packets
+        warnings = ["warningFeedback" in text for text in (*first, *killed, *rest)]
         assert sum(warnings) == 1
-        assert any("warningFeedback" in text and "killed:s" in text for text in told)
-        assert 'status="DONE"' in told[-1]
-        assert numbers(first + told + rest) == list(range(1, len(warnings) + 1))
+        assert any("warningFeedback" in text and "killed:s" in text for text in killed)
+        assert 'status="DONE"' in killed[-1]
+        assert seq_numbers(first + killed + rest) == list(range(1, len(warnings) + 1))
 
     serving(test, voice="espeak")
-    said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("realizer: ")]
-    assert len(said) == 1
-    assert said[0].endswith("going on without sound")
+    lines = [line for line in capsys.readouterr().err.splitlines() if line.startswith("realizer: ")]
+    assert len(lines) == 1
+    assert lines[0].endswith("going on without sound")
 
 
 @pytest.mark.gl
@@ -137,7 +144,7 @@ def test_chaos_killed_renderer_is_started_again() -> None:
             os.kill(place.renderer.pid, signal.SIGKILL)
             times += [await picture(client) for _ in range(3)]
             assert times == sorted(set(times))
-            await plays(client, "b")
+            await play(client, "b")
 
     serving(test)
 
@@ -147,7 +154,7 @@ def test_chaos_killed_renderer_is_started_again() -> None:
 
 @dataclass
 class Disk:
-    """A place for a journal: `fill` takes all room of it, `free` gives it back."""
+    """A journal on a disk: `fill` uses all of its space, `free` makes room again."""
 
     path: Path
     fill: Callable[[Server], None]
@@ -156,15 +163,15 @@ class Disk:
 
 @pytest.fixture(params=["pages", "tmpfs"])
 def disk(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Disk]:
-    """A file that may not grow, which the database itself sees to; or a disk that is full, where one may."""
+    """A journal that reaches the size limit of its database, or, if mounting is allowed, a full disk."""
     if request.param == "pages":
 
-        def pages(server: Server, most: int) -> None:
+        def limit_pages(server: Server, limit: int) -> None:
             file = server._sessions._factory.journal._file  # type: ignore[union-attr]
             (used,) = file.execute("PRAGMA page_count").fetchone()
-            file.execute(f"PRAGMA max_page_count = {most or used}")
+            file.execute(f"PRAGMA max_page_count = {limit or used}")
 
-        yield Disk(tmp_path / "journal.db", lambda s: pages(s, 0), lambda s: pages(s, 10**6))
+        yield Disk(tmp_path / "journal.db", lambda s: limit_pages(s, 0), lambda s: limit_pages(s, 10**6))
         return
     folder, mount = tmp_path / "disk", shutil.which("mount")
     folder.mkdir()
@@ -186,10 +193,10 @@ def disk(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Disk]:
 def test_chaos_full_disk_refuses_documents_and_lets_the_rest_play(disk: Disk) -> None:
     large = f"<!--{'x' * 20_000}-->"
 
-    async def before(server: Server) -> list[str]:
+    async def send_documents(server: Server) -> list[str]:
         async with connect(f"{server.url}?session=full", max_queue=None) as client:
             await client.send(WAIT.format("plays", 1.0))
-            told = await until(client, 'id="plays:start"')
+            first = await until(client, 'id="plays:start"')
             disk.fill(server)
             await client.send(WAIT.format("late", 0.1) + large)
             refused = await until(client, 'id="late"')
@@ -208,31 +215,31 @@ def test_chaos_full_disk_refuses_documents_and_lets_the_rest_play(disk: Disk) ->
                 refused += await until(client, 'id="plays:end"')
             disk.free(server)
             await client.send(WAIT.format("again", 0.1))
-            return told + refused + await until(client, 'id="again:end"')
+            return first + refused + await until(client, 'id="again:end"')
 
     async def run() -> None:
         settings = Settings(port=0, voice="silent", journal=str(disk.path))
         async with asyncio.timeout(LIMIT):
             async with Server(settings) as server:
-                told = await before(server)
-            ends = [text for text in told if re.search(r'blockProgress.* id="\w+:end"', text)]
+                feedback = await send_documents(server)
+            ends = [text for text in feedback if re.search(r'blockProgress.* id="\w+:end"', text)]
             assert [re.search(r' id="(\w+):end"', text)[1] for text in ends] == ["plays", "again"]  # type: ignore[index]
-            # A refused document is in no journal, and has no number in the feedback.
-            told = [text for text in told if 'id="late"' not in text]
-            assert numbers(told) == list(range(1, len(told) + 1))
+            # A refused document is not in the journal, and its warning has no `seq`.
+            feedback = [text for text in feedback if 'id="late"' not in text]
+            assert seq_numbers(feedback) == list(range(1, len(feedback) + 1))
             async with Server(settings) as server, connect(f"{server.url}?session=full&seen=0") as client:
-                assert await until(client, 'id="again:end"') == told
-                await plays(client, "afterwards")
+                assert await until(client, 'id="again:end"') == feedback
+                await play(client, "afterwards")
 
     asyncio.run(run())
 
 
-async def crowd(server: Server) -> None:
-    """Yield sessions of all names; those left over from the last page take some."""
+async def open_many_sessions(server: Server) -> None:
+    """Open sessions with new names until the journal refuses one; its last page has room for some."""
     for k in range(1000):
-        async with connect(f"{server.url}?session=new-{k}") as one:
-            await one.send('{"type":"ping"}')
-            await one.recv()
+        async with connect(f"{server.url}?session=new-{k}") as client:
+            await client.send('{"type":"ping"}')
+            await client.recv()
 
 
 def test_chaos_session_that_cannot_be_stored_is_refused(disk: Disk) -> None:
@@ -243,13 +250,13 @@ def test_chaos_session_that_cannot_be_stored_is_refused(disk: Disk) -> None:
         ):
             disk.fill(server)
             with pytest.raises(ConnectionClosed) as closed:
-                await crowd(server)
+                await open_many_sessions(server)
             assert closed.value.rcvd is not None
             assert closed.value.rcvd.code == 1013
             assert "journal" in closed.value.rcvd.reason
-            await plays(free, "unnamed sessions need no journal")
+            await play(free, "unnamed sessions need no journal")
             disk.free(server)
-            await plays(client, "b")
+            await play(client, "b")
 
     serving(test, journal=str(disk.path))
 
@@ -261,13 +268,13 @@ def test_chaos_clock_set_back_and_forth_changes_nothing(clock: Clock) -> None:
     async def test(server: Server) -> None:
         async with connect(server.url, max_queue=None) as client:
             await client.send('<bml id="b"><head id="n" lexeme="NOD"/><wait id="w" duration="0.9"/></bml>')
-            told = await until(client, 'id="b:start"')
+            feedback = await until(client, 'id="b:start"')
             for step in (-86400.0, 86400.0, -5.0, 0.0):
                 clock.step = step
-                told += await until(client, "syncPointProgress")
-            told += await until(client, 'id="b:end"')
-            assert numbers(told) == list(range(1, len(told) + 1))
-            progress = [f for f in map(parse_feedback, told) if hasattr(f, "global_time")]
+                feedback += await until(client, "syncPointProgress")
+            feedback += await until(client, 'id="b:end"')
+            assert seq_numbers(feedback) == list(range(1, len(feedback) + 1))
+            progress = [f for f in map(parse_feedback, feedback) if hasattr(f, "global_time")]
             times = [f.global_time for f in progress]
             assert times == sorted(times)
             assert times[-1] - times[0] == pytest.approx(0.9, abs=1e-3)
@@ -285,14 +292,14 @@ def test_chaos_client_under_other_clocks_gets_all_feedback_once(
         async with asyncio.timeout(LIMIT):
             async with Server(kept) as server, connect(f"{server.url}?session=s") as client:
                 await client.send(block)
-                told = await until(client, 'id="b:n:end"')  # long after the client's last message
+                feedback = await until(client, 'id="b:n:end"')  # long after the client's last message
             clock.step = step
-            seen = numbers(told)[-1]
+            seen = seq_numbers(feedback)[-1]
             async with Server(kept) as server, connect(f"{server.url}?session=s&seen={seen}") as client:
-                told += await until(client, 'id="b:end"')
-                await plays(client, "c")
-        assert numbers(told) == list(range(1, len(told) + 1))
-        times = [f.global_time for f in map(parse_feedback, told) if hasattr(f, "global_time")]
+                feedback += await until(client, 'id="b:end"')
+                await play(client, "c")
+        assert seq_numbers(feedback) == list(range(1, len(feedback) + 1))
+        times = [f.global_time for f in map(parse_feedback, feedback) if hasattr(f, "global_time")]
         assert times == sorted(times)
 
     asyncio.run(run())
@@ -301,40 +308,40 @@ def test_chaos_client_under_other_clocks_gets_all_feedback_once(
 # clients ----------------------------------------------------------------------------------------
 
 
-async def emptied(server: Server, files: int) -> None:
+async def wait_for_no_connections(server: Server, files: int) -> None:
     """Wait until there are no connections, and no more open files than before."""
-    while server._sessions.health()["connections"] or files_open(os.getpid()) > files:
+    while server._sessions.health()["connections"] or open_files(os.getpid()) > files:
         await asyncio.sleep(0.01)
 
 
 @pytest.mark.slow
 def test_chaos_two_thousand_connections_leave_nothing_behind() -> None:
     async def test(server: Server) -> None:
-        await asyncio.to_thread(come_and_go, server.port, 10, 10)
-        files = files_open(os.getpid())
-        await emptied(server, files)
-        files = files_open(os.getpid())
-        await asyncio.to_thread(come_and_go, server.port, 2000, 10)
-        await emptied(server, files)
+        await asyncio.to_thread(connect_and_leave, server.port, 10, 10)
+        files = open_files(os.getpid())
+        await wait_for_no_connections(server, files)
+        files = open_files(os.getpid())
+        await asyncio.to_thread(connect_and_leave, server.port, 2000, 10)
+        await wait_for_no_connections(server, files)
         assert server._sessions.health() == {"sessions": 10, "connections": 0}
         async with connect(server.url) as client:
-            await plays(client, "b")
+            await play(client, "b")
 
     serving(test, max_sessions=50)
 
 
 def test_chaos_forty_documents_among_twenty_streams_are_all_played() -> None:
     async def test(server: Server) -> None:
-        for told in await at_once(server.port, 20, 40):
-            well_told(told, 2)
+        for feedback in await send_simultaneously(server.port, 20, 40):
+            check_feedback(feedback, 2)
 
     serving(test)
 
 
 def test_chaos_client_that_closes_its_side_only_is_disconnected() -> None:
     async def test(server: Server) -> None:
-        got = await asyncio.to_thread(half_closed, server.port, "show")
-        assert b"b:end" not in got
+        received = await asyncio.to_thread(send_and_half_close, server.port, "show")
+        assert b"b:end" not in received
         while server._sessions.health()["connections"]:
             await asyncio.sleep(0.01)
         async with connect(f"{server.url}?session=show&seen=0") as again:
@@ -343,7 +350,7 @@ def test_chaos_client_that_closes_its_side_only_is_disconnected() -> None:
     serving(test)
 
 
-def test_chaos_clients_that_send_nothing_or_half_a_word_delay_nobody(
+def test_chaos_clients_without_a_complete_request_delay_nobody(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("realizer.server.transports.websocket.server.OPENING", 3600.0)
@@ -351,14 +358,16 @@ def test_chaos_clients_that_send_nothing_or_half_a_word_delay_nobody(
     async def test(server: Server) -> None:
         silent = [socket.create_connection(("127.0.0.1", server.port)) for _ in range(100)]
         try:
-            for k, one in enumerate(silent):
-                one.sendall((b"", b"GET /ws HT", b"GET /ws HTTP/1.1\r\nHost: x\r\n", b"\x16\x03\x01")[k % 4])
+            for k, client_socket in enumerate(silent):
+                client_socket.sendall(
+                    (b"", b"GET /ws HT", b"GET /ws HTTP/1.1\r\nHost: x\r\n", b"\x16\x03\x01")[k % 4]
+                )
             async with connect(server.url) as client:
-                await plays(client, "b")
+                await play(client, "b")
             await server.close()  # does not wait for them
         finally:
-            for one in silent:
-                one.close()
+            for client_socket in silent:
+                client_socket.close()
 
     serving(test)
 
@@ -366,12 +375,12 @@ def test_chaos_clients_that_send_nothing_or_half_a_word_delay_nobody(
 def test_chaos_client_that_floods_is_warned_and_delays_nobody() -> None:
     async def test(server: Server) -> None:
         async with connect(f"{server.url}?session=other") as other:
-            raw = await asyncio.to_thread(joined, server.port, "flooded")
+            raw = await asyncio.to_thread(open_websocket, server.port, "flooded")
             with raw:
-                flood = masked(WAIT.format("b", 30)) * 3000
+                flood = encode_text(WAIT.format("b", 30)) * 3000
                 sending = asyncio.create_task(asyncio.to_thread(raw.sendall, flood))
                 for k in range(3):
-                    await plays(other, f"b{k}")
+                    await play(other, f"b{k}")
                 async with connect(f"{server.url}?session=flooded&seen=0", max_queue=None) as viewer:
                     await until(viewer, "warningFeedback")
                     await viewer.send('{"type":"ping"}')
@@ -380,6 +389,6 @@ def test_chaos_client_that_floods_is_warned_and_delays_nobody() -> None:
                 raw.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
                 raw.shutdown(socket.SHUT_RDWR)
                 await asyncio.gather(sending, return_exceptions=True)
-            await plays(other, "last")
+            await play(other, "last")
 
     serving(test)

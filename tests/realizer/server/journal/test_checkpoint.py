@@ -31,7 +31,7 @@ from realizer.server.journal.replay import restore_session
 from realizer.server.session.effects import Speak
 from realizer.server.session.session import Session
 from tests.interleavings import BODIES, CONTROLS, HEADS, NAMES, Memory, no_error, spoken
-from tests.waking import wakes
+from tests.wake_times import next_wake
 
 SETTINGS = Settings(voice="silent")
 EPOCH = 1.7e9
@@ -79,7 +79,7 @@ class Run:
         }
 
     def until(self, t: float) -> None:
-        while (due := wakes(self.session)) <= t:
+        while (due := next_wake(self.session)) <= t:
             self.session.tick(max(due, 0.0))
             self.collect()
 

@@ -24,7 +24,7 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import InvalidStatus
 
 from bml_schema.feedback import parse_feedback
-from tests.told import feedback, numbers
+from tests.feedback_log import read_feedback, seq_numbers
 
 CONFIGURATION = Path(__file__).parents[4] / "docker" / "haproxy.cfg"
 LIMIT = 60  # s; a hung test ends
@@ -98,16 +98,16 @@ def test_fleet_repeats_no_feedback_to_a_client_that_comes_back(
             async with connect(url) as client:
                 await client.send(FIRST)
                 await client.send(NEXT)
-                first = await feedback(
+                first = await read_feedback(
                     client, "a:s:m"
                 )  # the second block waits, the first one is in the middle
                 owner, survivor = sorted(nodes, key=Node.sessions, reverse=True)
                 assert (owner.sessions(), survivor.sessions()) == (1, 0)
                 owner.kill()
-                first += await feedback(client, "never")
-            seen = numbers(first)[-1]
+                first += await read_feedback(client, "never")
+            seen = seq_numbers(first)[-1]
             async with connect(f"{url}&seen={seen}") as client:  # the proxy has not found out yet
-                rest = await feedback(client, "b:end")
+                rest = await read_feedback(client, "b:end")
             assert survivor.sessions() == 1
         return first + rest
 
@@ -116,7 +116,7 @@ def test_fleet_repeats_no_feedback_to_a_client_that_comes_back(
             told = asyncio.run(test(at))
         log.seek(0)
         written = log.read()
-    seqs = numbers(told)
+    seqs = seq_numbers(told)
     assert seqs == list(range(1, len(seqs) + 1))
     assert any('id="a:end"' in text for text in told)
     for text in told:

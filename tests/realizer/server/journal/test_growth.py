@@ -17,9 +17,9 @@ from realizer.server.journal.replay import restore_session
 from realizer.server.session.effects import Send, Speak
 from realizer.server.session.feedback_log import LAST
 from realizer.server.session.session import Session
+from tests.feedback_log import seq_numbers
 from tests.interleavings import Memory, spoken
-from tests.told import numbers
-from tests.waking import wakes
+from tests.wake_times import next_wake
 
 SETTINGS = Settings(voice="silent")
 DOCUMENTS = 2_000
@@ -46,7 +46,7 @@ def play(session: Session, message: str | bytes, begin: float, until: float) -> 
                 session.on_speech(effect.id, spoken(effect), now)
                 break
         else:
-            if (due := wakes(session)) > until:
+            if (due := next_wake(session)) > until:
                 return
             now = max(now, due)
             session.tick(now)
@@ -116,7 +116,7 @@ def test_checkpoint_with_less_feedback_than_a_client_missed_sends_a_gap() -> Non
     told = json.loads(gap)
     assert (told["type"], told["seen"]) == ("gap", 1)
     assert told["first"] > 2
-    assert numbers(rest) == list(range(told["first"], again.feedback_log.newest + 1))
+    assert seq_numbers(rest) == list(range(told["first"], again.feedback_log.newest + 1))
 
 
 def test_checkpoint_writes_a_clip_once_and_deletes_it_with_its_session() -> None:

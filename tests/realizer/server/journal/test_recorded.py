@@ -23,8 +23,8 @@ from realizer.server.journal.journal_writer import ENTRIES
 from realizer.server.journal.playback import replay_feedback
 from realizer.server.journal.recordings import read_recording
 from realizer.server.serve import Server
+from tests.feedback_log import read_feedback, seq_numbers
 from tests.programs import serving
-from tests.told import feedback, numbers
 
 LIMIT = 60  # s; a hung test ends
 TALK = """<bml id="talk"><speech id="s"><text>This is cut off in the middle of what is said</text></speech>
@@ -107,7 +107,7 @@ async def until(url: str, last: str, *messages: str) -> list[str]:
     async with asyncio.timeout(LIMIT), connect(url, max_queue=None) as client:
         for message in messages:
             await client.send(message)
-        return await feedback(client, last)
+        return await read_feedback(client, last)
 
 
 @pytest.mark.slow
@@ -120,7 +120,7 @@ def test_recorded_session_is_whole_after_a_takeover(tmp_path: Path) -> None:
     with path.open("a") as broken:
         broken.write('{"at": 1.2, "ki')
     with serving(*options) as (url, _):
-        seen = numbers(first)[-1]
+        seen = seq_numbers(first)[-1]
         rest = asyncio.run(until(f"{url}?session=s&seen={seen}", "two:end", NOD.format("two")))
     assert list(records.iterdir()) == [path]
     assert replay_feedback(read_recording(path))[: len(first + rest)] == first + rest
@@ -142,16 +142,16 @@ def test_recorded_session_begins_anew_where_its_file_is_missing(tmp_path: Path) 
             async with Server(settings("here")) as server, connect(f"{server.url}?session=s") as client:
                 await client.send(setting(aus={"4": 1}))
                 await client.send(NOD.format("one"))
-                first = await feedback(client, "one:end")
+                first = await read_feedback(client, "one:end")
                 for _ in range(ENTRIES):
                     await client.send('{"type": "scene", "objects": null}')
                 while not checked():
                     await client.send('{"type": "ping"}')
                     await client.recv()
                 await client.send(TALK)
-                first += await feedback(client, "talk:start")
+                first += await read_feedback(client, "talk:start")
             async with Server(settings("there")) as server:
-                url = f"{server.url}?session=s&seen={numbers(first)[-1]}"
+                url = f"{server.url}?session=s&seen={seq_numbers(first)[-1]}"
                 return first, await until(url, "two:end", NOD.format("two"))
 
     first, rest = asyncio.run(play())
@@ -159,7 +159,7 @@ def test_recorded_session_begins_anew_where_its_file_is_missing(tmp_path: Path) 
     record = read_recording(path)
     assert "state" in record.parts
     again = replay_feedback(record)
-    begins = numbers(again)[0]
+    begins = seq_numbers(again)[0]
     assert 1 < begins <= len(first)
     assert again[: len(first + rest) - begins + 1] == (first + rest)[begins - 1 :]
     faps = written(path)

@@ -22,9 +22,9 @@ from realizer.server.journal.journal_writer import ENTRIES
 from realizer.server.runtime import session_host
 from realizer.server.serve import Server
 from realizer.server.transports.websocket import connection
+from tests.feedback_log import read_feedback, seq_numbers
 from tests.programs import serving
 from tests.realizer.server.conftest import Clock
-from tests.told import feedback, numbers
 
 LIMIT = 60  # s; a hung test ends
 FIRST = """<bml id="a"><gaze id="g" target="cup" start="0.2" end="1.4"/>
@@ -60,18 +60,18 @@ def test_restored_session_sends_all_feedback_once_and_in_order(where: str) -> No
                     if 'id="a:s:m"' in message:  # the second block waits, the first one is in the middle
                         service.kill()
                         break
-            return told + await feedback(client, "never")
+            return told + await read_feedback(client, "never")
 
     async def after(url: str, seen: int) -> list[str]:
         async with asyncio.timeout(LIMIT), connect(f"{url}?session=killed&seen={seen}") as client:
-            return await feedback(client, "b:end")
+            return await read_feedback(client, "b:end")
 
     with serving("--journal", where) as (url, service):
         first = asyncio.run(before(url, service))
-    seen = numbers(first)[-1]
+    seen = seq_numbers(first)[-1]
     with serving("--journal", where) as (url, _):
         rest = asyncio.run(after(url, seen))
-    seqs = numbers(first + rest)
+    seqs = seq_numbers(first + rest)
     assert seqs == list(range(1, len(seqs) + 1))
     assert any('id="a:end"' in text for text in rest)
     for text in first + rest:
@@ -82,7 +82,7 @@ def test_restored_session_sends_all_feedback_once_and_in_order(where: str) -> No
             await client.send(SCENE)
             await client.send(FIRST)
             await client.send(NEXT)
-            return await feedback(client, "b:end")
+            return await read_feedback(client, "b:end")
 
     with serving("--journal", where) as (url, _):
         undisturbed = asyncio.run(whole(url))
@@ -110,7 +110,7 @@ def test_restored_session_has_the_state_of_its_checkpoint(
         async with asyncio.timeout(LIMIT), connect(f"{url}?session=long", max_queue=None) as client:
             for message in (SCENE, hold, FIRST):
                 await client.send(message)
-            told = await feedback(client, "a:end")
+            told = await read_feedback(client, "a:end")
             for _ in range(ENTRIES):
                 await client.send(SCENE)
             while not in_a_checkpoint(where, "long"):  # the face comes to rest
@@ -118,23 +118,23 @@ def test_restored_session_has_the_state_of_its_checkpoint(
                 await client.recv()
             await client.send(tied)
             await client.send(NEXT.replace("APPEND", "MERGE"))
-            told += await feedback(client, "b:start")
+            told += await read_feedback(client, "b:start")
             service.kill()
-            return told + await feedback(client, "never")
+            return told + await read_feedback(client, "never")
 
     async def after(url: str, seen: int) -> tuple[list[str], list[str], dict[str, float]]:
         async with asyncio.timeout(LIMIT), connect(f"{url}?session=long&seen={seen}") as client:
-            rest = await feedback(client, "b:end")
+            rest = await read_feedback(client, "b:end")
             await client.send('{"type": "state"}')
             state = json.loads(await client.recv())
         async with asyncio.timeout(LIMIT), connect(f"{url}?session=long&seen=0") as client:
-            return rest, await feedback(client, "b:end"), state["characters"][0]["aus"]
+            return rest, await read_feedback(client, "b:end"), state["characters"][0]["aus"]
 
     with serving("--journal", where) as (url, service):
         first = asyncio.run(before(url, service))
     with serving("--journal", where) as (url, _):
-        rest, again, held = asyncio.run(after(url, numbers(first)[-1]))
-    assert numbers(first + rest) == list(range(1, len(first + rest) + 1))
+        rest, again, held = asyncio.run(after(url, seq_numbers(first)[-1]))
+    assert seq_numbers(first + rest) == list(range(1, len(first + rest) + 1))
     assert again == first + rest
     assert held["12L"] == 0.5
     assert not any("warningFeedback" in text for text in again)  # the points of what has gone are known
@@ -177,19 +177,19 @@ def test_restored_sessions_of_fifty_clients_repeat_no_feedback(
             async with connect(f"{url}?session=one-{k}") as client:
                 await client.send(SCENE)
                 await client.send(block.format(k / 50, 1.5 + k / 50))
-                told[k] += await feedback(client, "b:start")
+                told[k] += await read_feedback(client, "b:start")
                 await playing.wait()  # all of them play, each is elsewhere
                 service.kill()
-                told[k] += await feedback(client, "never")
+                told[k] += await read_feedback(client, "never")
 
         async with asyncio.timeout(LIMIT):
             await asyncio.gather(*map(one, told))
 
     async def after(url: str) -> None:
         async def one(k: int) -> None:
-            seen = numbers(told[k])[-1]
+            seen = seq_numbers(told[k])[-1]
             async with connect(f"{url}?session=one-{k}&seen={seen}") as client:
-                told[k] += await feedback(client, "b:end")
+                told[k] += await read_feedback(client, "b:end")
 
         async with asyncio.timeout(LIMIT):
             await asyncio.gather(*map(one, told))
@@ -200,7 +200,7 @@ def test_restored_sessions_of_fifty_clients_repeat_no_feedback(
     with serving("--journal", where) as (url, _):
         asyncio.run(after(url))
     for texts in told.values():
-        seqs = numbers(texts)
+        seqs = seq_numbers(texts)
         assert seqs == list(range(1, len(seqs) + 1))
         assert points(texts) == ["b:start", *(f"b:n:{point}" for point in POINTS), "b:end"]
 
@@ -211,7 +211,7 @@ def test_restored_session_holds_set_values(where: str) -> None:
         async with asyncio.timeout(LIMIT), connect(f"{url}?session=held") as client:
             await client.send(json.dumps({"type": "set", "aus": {"12L": 0.5}}))
             await client.send('<bml id="m"><faceLexeme id="f" lexeme="SMILE" end="0.2"/></bml>')
-            await feedback(client, "m:end")
+            await read_feedback(client, "m:end")
 
     async def state(url: str) -> dict[str, float]:
         async with asyncio.timeout(LIMIT), connect(f"{url}?session=held") as client:
@@ -234,9 +234,9 @@ def test_restored_session_belongs_to_the_last_process(where: str) -> None:
     async def test(one: str, other: str) -> None:
         async with asyncio.timeout(LIMIT), connect(f"{one}?session=torn") as first:
             await first.send(NEXT)
-            await feedback(first, "b:start")
+            await read_feedback(first, "b:start")
             async with connect(f"{other}?session=torn&seen=0") as second:
-                await feedback(second, "b:end")
+                await read_feedback(second, "b:end")
                 with contextlib.suppress(
                     ConnectionClosed
                 ):  # services look regularly: it may be closed already
@@ -303,7 +303,7 @@ def test_restored_session_disconnects_viewers_of_the_old_process(
             connect(f"{one.url}?session=stays") as stays,
         ):
             await watching.send(NEXT)
-            await feedback(watching, "b:end")
+            await read_feedback(watching, "b:end")
             async with connect(f"{other.url}?session=seen") as second:
                 await second.send('{"type": "set", "aus": {"12L": 0.5}}')
                 with pytest.raises(ConnectionClosed) as closed:
@@ -315,7 +315,7 @@ def test_restored_session_disconnects_viewers_of_the_old_process(
                 while await held(back) < 0.5:
                     pass
             await stays.send(NEXT)
-            await feedback(stays, "b:end")
+            await read_feedback(stays, "b:end")
 
     asyncio.run(run())
 
@@ -327,14 +327,14 @@ def test_restored_session_catches_up_for_a_second_client_without_a_gap(clock: Cl
         async with asyncio.timeout(LIMIT):
             async with Server(kept) as server, connect(f"{server.url}?session=s") as client:
                 await client.send(block)
-                told = await feedback(client, "b:n:end")
+                told = await read_feedback(client, "b:n:end")
             clock.step = -3600.0  # what has passed since is not known
             async with Server(kept) as server, connect(f"{server.url}?session=s&seen=1") as first:
-                seen = numbers(told)[-1]
+                seen = seq_numbers(told)[-1]
                 async with connect(f"{server.url}?session=s&seen={seen}") as second:
-                    rest = await feedback(second, "b:end")
-                others = await feedback(first, "b:end")
-        assert numbers(told + rest) == list(range(1, len(told + rest) + 1))
+                    rest = await read_feedback(second, "b:end")
+                others = await read_feedback(first, "b:end")
+        assert seq_numbers(told + rest) == list(range(1, len(told + rest) + 1))
         assert others == told[1:] + rest
 
     asyncio.run(run())
@@ -345,7 +345,7 @@ def test_restored_session_is_not_replaced_by_a_hello(where: str) -> None:
     async def play(url: str) -> list[str]:
         async with asyncio.timeout(LIMIT), connect(f"{url}?session=kept") as client:
             await client.send(NEXT)
-            return await feedback(client, "b:end")
+            return await read_feedback(client, "b:end")
 
     async def resume(url: str) -> list[str]:
         async with asyncio.timeout(LIMIT), connect(url) as client:
@@ -354,7 +354,7 @@ def test_restored_session_is_not_replaced_by_a_hello(where: str) -> None:
             assert refused["code"] == "invalid"
             assert refused["message"].endswith("connect to /ws?session=kept&seen=0 instead")
         async with asyncio.timeout(LIMIT), connect(f"{url}?session=kept&seen=0") as client:
-            return await feedback(client, "b:end")
+            return await read_feedback(client, "b:end")
 
     with serving("--journal", where) as (url, _):
         told = asyncio.run(play(url))

@@ -24,7 +24,7 @@ from realizer.server.session.effects import Send, Speak
 from realizer.server.session.session import Session
 from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.silent import SilentVoice
-from tests.waking import wakes
+from tests.wake_times import next_wake
 
 SETTINGS = Settings(voice="silent", seed=3)
 OPENED = 100.0  # s, on the clock of the host
@@ -66,7 +66,7 @@ def recorded(
     coming: list[tuple[float, str | bytes]] = [(OPENED, watch), *((OPENED + t, doing) for t, doing in doings)]
     now = OPENED
     while now < OPENED + seconds:
-        due = wakes(session)
+        due = next_wake(session)
         soonest = [when for when, _ in (*coming[:1], *answers)]
         now = max(now, min([OPENED + seconds, *soonest, due]))
         now += 0.0 if late is None else late.uniform(0, 0.03)

@@ -21,7 +21,7 @@ from realizer.server.runtime.session_factory import SessionFactory
 from realizer.server.runtime.session_registry import JoinError
 from realizer.server.serve import Server
 from realizer.server.session.session import Session
-from tests.told import feedback, numbers
+from tests.feedback_log import read_feedback, seq_numbers
 
 LIMIT = 60  # s; a hung test ends
 NEXT = '<bml id="b" composition="APPEND"><head id="n" lexeme="SHAKE" end="0.8"/></bml>'
@@ -94,7 +94,7 @@ def test_factory_begins_a_session_anew_after_an_internal_error(
                 assert closed.value.rcvd.code == 1011
             async with connect(f"{server.url}?session=s") as client:
                 await client.send(NEXT)
-                assert numbers(await feedback(client, "b:end"))[0] == 1
+                assert seq_numbers(await read_feedback(client, "b:end"))[0] == 1
 
     asyncio.run(run())
 
@@ -106,7 +106,7 @@ def test_factory_that_cannot_restore_leaves_the_journal_unchanged(
         async with asyncio.timeout(LIMIT):
             async with Server(kept) as server, connect(f"{server.url}?session=s") as client:
                 await client.send(NEXT)
-                told = await feedback(client, "b:end")
+                told = await read_feedback(client, "b:end")
             async with Server(kept) as server:
                 with monkeypatch.context() as here:
                     here.setattr(Session, "receive", None)
@@ -119,7 +119,7 @@ def test_factory_that_cannot_restore_leaves_the_journal_unchanged(
                         "session s cannot be resumed: internal error",
                     )
                 async with connect(f"{server.url}?session=s&seen=0") as client:
-                    assert await feedback(client, "b:end") == told
+                    assert await read_feedback(client, "b:end") == told
 
     asyncio.run(run())
 
@@ -140,10 +140,10 @@ def test_factory_restores_a_session_whose_recording_failed(
         async with asyncio.timeout(LIMIT):
             async with Server(settings) as server, connect(f"{server.url}?session=s") as client:
                 await client.send(NEXT)
-                told = await feedback(client, "b:end")
+                told = await read_feedback(client, "b:end")
                 assert "realizer_records_stopped_total 1" in server._sessions.metrics_text()
             async with Server(settings) as server, connect(f"{server.url}?session=s&seen=0") as client:
-                assert await feedback(client, "b:end") == told
+                assert await read_feedback(client, "b:end") == told
 
     asyncio.run(run())
 

@@ -19,7 +19,7 @@ from realizer.server.session.session import Session
 from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.registry import find_voice
 from realizer.speech.utterance import Voice
-from tests.waking import wakes
+from tests.wake_times import next_wake
 
 NAMES = "abcdefg"
 BODIES = (
@@ -86,7 +86,7 @@ def live(messages: Sequence[str], voice: Voice) -> list[Feedback]:
     for message in messages:
         session.receive(1, message, now)
         collect()
-    while (deadline := wakes(session)) < float("inf"):
+    while (deadline := next_wake(session)) < float("inf"):
         now = max(now, deadline)
         session.tick(now)
         collect()

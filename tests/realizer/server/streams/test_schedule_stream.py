@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tests.waking import wakes
+from tests.wake_times import next_wake
 
 SCHEDULE = {"type": "subscribe", "stream": "schedule"}
 WAIT = '<bml id="{}"{}><wait id="w" duration="{}"/></bml>'
@@ -206,7 +206,7 @@ def test_schedule_stream_does_not_retry_without_changes(driver) -> None:
     driver.send(SCHEDULE)
     driver.session.update_backlog(1, 10**6)
     driver.run(5)
-    assert wakes(driver.session) == math.inf
+    assert next_wake(driver.session) == math.inf
 
 
 def test_schedule_stream_ends_with_unsubscribe(driver) -> None:

@@ -25,7 +25,7 @@ from websockets.exceptions import InvalidStatus
 from realizer.core.settings import Settings
 from realizer.protocol.wire import unpack
 from realizer.server.serve import Server
-from tests.benchmarks.packets import masked
+from tests.benchmarks.packets import encode_text
 from tests.programs import SERVE, running
 
 WAIT = '<bml id="{}"><wait id="w" duration="0.3"/></bml>'
@@ -169,7 +169,7 @@ def test_websocket_drops_frames_only_for_a_viewer_that_never_reads() -> None:
         async with connect(f"{server.url}?session=show") as viewer:
             raw = await asyncio.to_thread(deaf, server)
             subscribe = {"type": "subscribe", "stream": "mesh", "fps": 240}
-            await asyncio.to_thread(raw.sendall, masked(json.dumps(subscribe)))
+            await asyncio.to_thread(raw.sendall, encode_text(json.dumps(subscribe)))
             await ask(viewer, type="subscribe", stream="fap", fps=50)
             numbers = await frames(viewer, 100)
             assert flows(numbers)
@@ -184,7 +184,7 @@ def test_websocket_disconnects_a_client_that_asks_and_never_reads() -> None:
     async def test(server: Server) -> None:
         async with connect(f"{server.url}?session=show") as other:
             raw = await asyncio.to_thread(deaf, server)
-            ping = masked(json.dumps({"type": "ping", "id": "x" * 60_000}))
+            ping = encode_text(json.dumps({"type": "ping", "id": "x" * 60_000}))
 
             def flood() -> None:
                 while True:
