@@ -22,8 +22,8 @@ from bml_schema.node_schema import schema_of
 from realizer.animation.axis import AU_NAMES
 from realizer.animation.curves import gain_at
 from realizer.behaviours.registry import VOCABULARY
-from tests.cases import CASES, Case, Instant, Told
-from tests.stage import Played, play
+from tests.case_player import Played, play
+from tests.cases import CASES, Case, Instant, LogLine
 
 WITHIN = 2e-6  # s; feedback has times to the microsecond
 
@@ -31,10 +31,12 @@ every_case = pytest.mark.parametrize("case", CASES, ids=[case.name for case in C
 
 
 @every_case
-def test_corpus_case_holds(case: Case) -> None:
+def test_corpus_case_plays_as_expected(case: Case) -> None:
     wanted = case.wanted
     assert wanted["says"], "a case says in a sentence what must be true"
-    played = play(case, looks=case.looks, watches=[*case.looks, *case.watches])
+    played = play(
+        case, live_instants=case.live_instants, instants=[*case.live_instants, *case.smooth_instants]
+    )
     texts = [w.text for w in played.warnings]
     if wanted.get("refused"):
         assert len(played.warnings) == 1, texts
@@ -79,41 +81,41 @@ def check_log(case: Case, played: Played) -> None:
     wanted, within = case.wanted, case.wanted.get("within", WITHIN)
     log = "\n".join(map(str, played.log))
     if "log" in wanted:
-        expected = [Told.read(line) for line in wanted["log"]]
+        expected = [LogLine.read(line) for line in wanted["log"]]
         kinds = {line.kind for line in expected}
         got = [line for line in played.log if line.kind in kinds]
-        same = len(got) == len(expected) and all(map(lambda g, e: g.is_as(e, within), got, expected))
+        same = len(got) == len(expected) and all(map(lambda g, e: g.matches(e, within), got, expected))
         assert same, f"wanted\n{chr(10).join(map(str, expected))}\n\ngot\n{chr(10).join(map(str, got))}"
     rest = iter(played.log)
-    for line in map(Told.read, wanted.get("among", ())):
-        assert any(got.is_as(line, within) for got in rest), f"wanted {line} here, got\n{log}"
-    for line in map(Told.read, wanted.get("once", ())):
-        assert sum(got.is_as(line, within) for got in played.log) == 1, f"wanted {line} once, got\n{log}"
-    for line in map(Told.read, wanted.get("never", ())):
-        assert not any(got.is_as(line, within) for got in played.log), f"wanted no {line}, got\n{log}"
+    for line in map(LogLine.read, wanted.get("among", ())):
+        assert any(got.matches(line, within) for got in rest), f"wanted {line} here, got\n{log}"
+    for line in map(LogLine.read, wanted.get("once", ())):
+        assert sum(got.matches(line, within) for got in played.log) == 1, f"wanted {line} once, got\n{log}"
+    for line in map(LogLine.read, wanted.get("never", ())):
+        assert not any(got.matches(line, within) for got in played.log), f"wanted no {line}, got\n{log}"
     if "characters" in wanted:
         assert {f.character_id or "" for f in played.feedback} == set(wanted["characters"])
     if "heard" in wanted:
-        heard = [(s.start, min(s.until, s.start + s.utterance.duration)) for s in played.speaking]
+        heard = [(s.start, min(s.until, s.start + s.utterance.duration)) for s in played.speeches]
         assert heard == [pytest.approx(span, abs=within) for span in wanted["heard"]]
     for time, part in wanted.get("loud", ()):
-        (got,) = gain_at(played.speaking[0].gains, np.array([time]))
+        (got,) = gain_at(played.speeches[0].gains, np.array([time]))
         assert got == pytest.approx(part, abs=1e-4), f"at {time}"
 
 
 def check_faces(case: Case, played: Played) -> None:
-    for instant, face in played.faces.items():
-        assert played.film[instant] == pytest.approx(face, abs=1e-5), "looking back shows the same"
+    for instant, face in played.live_faces.items():
+        assert played.faces[instant] == pytest.approx(face, abs=1e-5), "the same after the end"
     for face in case.wanted.get("face", ()):
-        values = played.faces[Instant(float(face["at"]), face.get("character"))]
+        values = played.live_faces[Instant(float(face["at"]), face.get("character"))]
         for name, value in face["shows"].items():
             least, most = value if isinstance(value, list) else (value - 1e-4, value + 1e-4)
             assert least <= values[name] <= most, f"{name} at {face['at']}"
     for smooth in case.wanted.get("smooth", ()):
-        instants = sorted({i for i in case.watches if i.character == smooth.get("character")})
-        seen = [played.film[i] for i in instants if smooth["from"] <= i.time <= smooth["to"]]
-        names = smooth.get("of") or [name for name in seen[0] if name[0].isdigit()]
-        rows = np.array([[values[name] for name in names] for values in seen])
+        instants = sorted({i for i in case.smooth_instants if i.character == smooth.get("character")})
+        faces = [played.faces[i] for i in instants if smooth["from"] <= i.time <= smooth["to"]]
+        names = smooth.get("of") or [name for name in faces[0] if name[0].isdigit()]
+        rows = np.array([[values[name] for name in names] for values in faces])
         assert np.abs(np.diff(rows, axis=0)).max() <= smooth["most"], names
 
 
@@ -136,45 +138,45 @@ def field_of(node: object, name: str) -> str:
 
 
 def check_meaning(case: Case, played: Played) -> None:
-    """Check that `as_if` is the same in every way, and that `unlike` differs when read and played."""
+    """Check that `as_if` is parsed and played the same, and that `unlike` is not."""
     if not {"as_if", "unlike"} & case.wanted.keys():
         return
-    film = [Instant(float(time)) for time in np.arange(0, min(played.end, 30) + 0.25, 0.1)]
-    here = play(case, watches=film)
+    instants = [Instant(float(time)) for time in np.arange(0, min(played.end, 30) + 0.25, 0.1)]
+    here = play(case, instants=instants)
     if "as_if" in case.wanted:
-        other = play(case, case.wanted["as_if"].encode(), watches=film)
+        other = play(case, case.wanted["as_if"].encode(), instants=instants)
         assert other.blocks == here.blocks
-        assert all(line.is_as(mine, WITHIN) for line, mine in zip(other.log, here.log, strict=True))
-        assert all(other.film[i] == pytest.approx(here.film[i]) for i in film)
+        assert all(line.matches(mine, WITHIN) for line, mine in zip(other.log, here.log, strict=True))
+        assert all(other.faces[i] == pytest.approx(here.faces[i]) for i in instants)
     if "unlike" in case.wanted:
-        other = play(case, case.wanted["unlike"].encode(), watches=film)
+        other = play(case, case.wanted["unlike"].encode(), instants=instants)
         assert other.blocks != here.blocks
-        assert other.log != here.log or any(other.film[i] != pytest.approx(here.film[i]) for i in film)
+        assert other.log != here.log or any(other.faces[i] != pytest.approx(here.faces[i]) for i in instants)
 
 
 @cache
-def plain(case: Case) -> Played:
-    """Return a case, played without a look at its faces."""
+def play_once(case: Case) -> Played:
+    """Play a case without sampling its faces."""
     return play(case)
 
 
 @every_case
-def test_corpus_feedback_keeps_its_laws(case: Case) -> None:
-    """BML 1.0: in the order of time, once each, nothing of a block outside its start and end."""
-    played = plain(case)
+def test_corpus_feedback_is_ordered_and_complete(case: Case) -> None:
+    """BML 1.0: progress is in order of time, occurs once, and lies between start and end of its block."""
+    played = play_once(case)
     clock = 0.0
     start: dict[str, float] = {}  # of the blocks that play
     passed: dict[str, list[str]] = {}
     over: set[str] = set()
     for feedback in played.feedback:
         if isinstance(feedback, BlockProgress | SyncPointProgress):
-            assert feedback.global_time >= clock - WITHIN, f"{feedback.id} was told late"
+            assert feedback.global_time >= clock - WITHIN, f"{feedback.id} is out of order"
             clock = max(clock, feedback.global_time)
         if isinstance(feedback, SyncPointProgress):
             block, rest = feedback.id.split(":", 1)
             assert block in start, f"{feedback.id} outside its block"
             assert feedback.time == pytest.approx(feedback.global_time - start[block], abs=WITHIN)
-            assert rest not in passed[block], f"{feedback.id} was told twice"
+            assert rest not in passed[block], f"{feedback.id} occurs twice"
             passed[block].append(rest)
         elif isinstance(feedback, BlockProgress):
             block, _, point = feedback.id.rpartition(":")
@@ -197,11 +199,11 @@ def test_corpus_feedback_keeps_its_laws(case: Case) -> None:
 
 
 @every_case
-def test_corpus_predictions_are_what_happens(case: Case) -> None:
-    """Of blocks: start and end; of behaviours: every sync point, in the order in which they pass."""
+def test_corpus_predictions_equal_the_progress(case: Case) -> None:
+    """Start and end of blocks, and every sync point of behaviours, come at their predicted times."""
     blocks: dict[str, tuple[float | None, float | None]] = {}
     points: dict[str, dict[str, float]] = {}
-    played = plain(case)
+    played = play_once(case)
     described = {f"{b.id}:{node.id}" for b in played.blocks for node in b.behaviours if node.descriptions}
     for feedback in played.feedback:
         match feedback:
@@ -228,10 +230,10 @@ def predicted_points(node: Behaviour) -> dict[str, float]:
 
 
 @every_case
-def test_corpus_warns_of_nothing_twice(case: Case) -> None:
-    """One warning a behaviour, until its block has ended and its id is free again."""
+def test_corpus_behaviours_have_one_warning(case: Case) -> None:
+    """A behaviour has at most one warning, until its block has ended and its id may be used again."""
     warned: set[str] = set()
-    for feedback in plain(case).feedback:
+    for feedback in play_once(case).feedback:
         if isinstance(feedback, WarningFeedback) and ":" in feedback.id:
             assert feedback.id not in warned, feedback.text
             warned.add(feedback.id)
@@ -239,31 +241,31 @@ def test_corpus_warns_of_nothing_twice(case: Case) -> None:
             warned = {id for id in warned if not id.startswith(feedback.id.removesuffix("end"))}
 
 
-# A change within a hundredth of a second is a jump.
-UNHURRIED = [case for case in CASES if "behaviour.short" not in case.proves]
+# Very short behaviours change as fast as a jump.
+SLOW_CASES = [case for case in CASES if "behaviour.short" not in case.proves]
 
 
-@pytest.mark.parametrize("case", UNHURRIED, ids=[case.name for case in UNHURRIED])
+@pytest.mark.parametrize("case", SLOW_CASES, ids=[case.name for case in SLOW_CASES])
 def test_corpus_faces_never_jump(case: Case) -> None:
-    """When a block starts, is replaced or interrupted, when a point passes and a plan changes."""
-    played = plain(case)
+    """Faces change smoothly when a block starts or is replaced, a sync point passes or a plan changes."""
+    played = play_once(case)
     times = {*case.wanted.get("sent", ()), *(time for line in played.log for time in line.times)}
     around = [(time - 1e-4, time + 1e-4) for time in sorted(times) if time > 0]
     for character in {f.character_id for f in played.feedback}:
-        watches = [Instant(time, character) for pair in around for time in pair]
-        film = play(case, watches=watches).film
-        faces = np.array([[film[instant][au] for au in AU_NAMES()] for instant in watches])
-        jumps = np.abs(faces[1::2] - faces[::2])
+        instants = [Instant(time, character) for pair in around for time in pair]
+        faces = play(case, instants=instants).faces
+        rows = np.array([[faces[instant][au] for au in AU_NAMES()] for instant in instants])
+        jumps = np.abs(rows[1::2] - rows[::2])
         assert not (jumps > 0.02).any(), f"after {around[int(jumps.max(axis=1).argmax())][0]:.3f} s"
 
 
 # A behaviour that is interrupted does not pass all its points.
-STEADY = [case for case in CASES if b"interrupt" not in case.document]
+UNINTERRUPTED = [case for case in CASES if b"interrupt" not in case.document]
 
 
-@pytest.mark.parametrize("case", STEADY, ids=[case.name for case in STEADY])
+@pytest.mark.parametrize("case", UNINTERRUPTED, ids=[case.name for case in UNINTERRUPTED])
 def test_corpus_blocks_pass_every_sync_point_in_order(case: Case) -> None:
-    played = plain(case)
+    played = play_once(case)
     lines = [line for line in played.log if line.kind == "sync"]
     for id, schedule in played.schedules.items():
         if [b.id for b in played.blocks].count(id) > 1:
@@ -277,13 +279,13 @@ def test_corpus_blocks_pass_every_sync_point_in_order(case: Case) -> None:
 
 
 @every_case
-def test_corpus_feedback_does_not_depend_on_how_often_time_passes(case: Case) -> None:
-    """Live and offline agree: `due` at every deadline, or only when something is sent."""
-    punctual, seldom = plain(case), play(case, punctual=False)
+def test_corpus_feedback_does_not_depend_on_the_calls_of_due(case: Case) -> None:
+    """Live and offline agree: `due` is called at every deadline, or only when a document is sent."""
+    punctual, seldom = play_once(case), play(case, punctual=False)
     assert list(map(str, seldom.log)) == list(map(str, punctual.log))
 
 
 @every_case
 def test_corpus_documents_can_be_written_and_read_again(case: Case) -> None:
-    for block in plain(case).blocks:
+    for block in play_once(case).blocks:
         assert parse(write(block), VOCABULARY) == block

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from bml_schema import Block, BMLError, Feedback, PredictionFeedback, WarningFeedback, parse_feedback, read
-from bml_schema.nodes import own
+from bml_schema.nodes import own as own_name
 from realizer.animation.axis import AU_NAMES
 from realizer.animation.fap.conversion import to_fap
 from realizer.behaviours.registry import VOCABULARY
@@ -24,21 +24,21 @@ from realizer.playback.speaking import submit_with_speech
 from realizer.scheduling.timing import Schedule
 from realizer.speech.silent import SilentVoice
 from realizer.tables import faps
-from tests.cases import CORPUS, Case, Instant, Told, told
+from tests.cases import CORPUS, Case, Instant, LogLine, log_lines
 
 __all__ = ["Played", "play"]
 
-MEDIA = CORPUS / "media"  # the files that documents name
-EPOCH = 1_700_000_000.0  # some day on which a session opened
-MOST_STEPS = 10_000  # deadlines of one case
+MEDIA = CORPUS / "media"  # files that documents refer to
+EPOCH = 1_700_000_000.0  # Unix time of the session's start
+MAX_DEADLINES = 10_000  # in one case
 
 
 class Step(Enum):
-    """An action at a time."""
+    """An action of the script that plays a case."""
 
     SEND = auto()
     PLAN = auto()
-    LOOK = auto()
+    SAMPLE = auto()
 
 
 @dataclass
@@ -46,24 +46,24 @@ class Played:
     """The result of playing a case.
 
     Attributes:
-        blocks: those that were read, in order; an id may be used again.
+        blocks: the parsed blocks, in order; several may have the same id.
         schedules: block id -> the final schedule of the last block with that id.
-        feedback: as a client gets it: written as XML and read again.
-        faces: instant -> name of AU or FAP -> value, sampled at that time.
-        film: the same, sampled after the end.
-        speaking: the utterances, in order.
+        feedback: the feedback as a client parses it.
+        live_faces: instant -> name of AU or FAP -> value, sampled while the case plays.
+        faces: the same, sampled after the end.
+        speeches: the utterances, in order.
     """
 
     blocks: list[Block] = field(default_factory=list)
     schedules: dict[str, Schedule] = field(default_factory=dict)
     feedback: list[Feedback] = field(default_factory=list)
+    live_faces: dict[Instant, dict[str, float]] = field(default_factory=dict)
     faces: dict[Instant, dict[str, float]] = field(default_factory=dict)
-    film: dict[Instant, dict[str, float]] = field(default_factory=dict)
-    speaking: tuple[ScheduledSpeech, ...] = ()
+    speeches: tuple[ScheduledSpeech, ...] = ()
 
     @cached_property
-    def log(self) -> list[Told]:
-        return [line for feedback in self.feedback for line in told(feedback)]
+    def log(self) -> list[LogLine]:
+        return [line for feedback in self.feedback for line in log_lines(feedback)]
 
     @property
     def warnings(self) -> list[WarningFeedback]:
@@ -100,11 +100,11 @@ class Played:
         raise KeyError(point)
 
     def late(self, name: str) -> float:
-        """Return `realizer:late` in the last prediction that names the behaviour; 0 if it is not late."""
+        """Return `realizer:late` in the last prediction that names the behaviour; 0 without the attribute."""
         for feedback in reversed(self.feedback):
             for node in feedback.behaviours if isinstance(feedback, PredictionFeedback) else ():
                 if node.id == name:
-                    return float(node.unknown_attributes.get(own("late"), 0.0))
+                    return float(node.unknown_attributes.get(own_name("late"), 0.0))
         raise KeyError(name)
 
 
@@ -112,18 +112,18 @@ def play(
     case: Case,
     document: bytes | None = None,
     *,
-    looks: Sequence[Instant] = (),
-    watches: Sequence[Instant] = (),
+    live_instants: Sequence[Instant] = (),
+    instants: Sequence[Instant] = (),
     punctual: bool = True,
 ) -> Played:
     """Play a case.
 
     Args:
-        document: used instead of the case's own.
-        looks: when to look at a playing face.
-        watches: the instants to sample after the end.
-        punctual: the player is called at each deadline; otherwise only when a document is sent or a face is
-            looked at.
+        document: replaces the case's own document.
+        live_instants: when to sample faces while the case plays.
+        instants: the instants to sample after the end.
+        punctual: whether the player is called at each deadline, or only when a document is sent or a face is
+            sampled.
     """
     wanted = case.wanted
     scene = {name: (x, y, z) for name, (x, y, z) in wanted.get("scene", {}).items()}
@@ -137,16 +137,16 @@ def play(
     ready = [float(time) for time in wanted.get("ready", ())]
     ready += sent[len(ready) :]
     script: list[tuple[float, Step, Any]] = []
-    for here, there, item in zip(sent, ready, items, strict=True):
-        script += [(here, Step.SEND, item), (there, Step.PLAN, item)]
-    script += [(instant.time, Step.LOOK, instant) for instant in looks]
+    for sent_at, ready_at, item in zip(sent, ready, items, strict=True):
+        script += [(sent_at, Step.SEND, item), (ready_at, Step.PLAN, item)]
+    script += [(instant.time, Step.SAMPLE, instant) for instant in live_instants]
     played, voice, now = Played(), SilentVoice(), 0.0
     for time, step, item in sorted(script, key=lambda entry: entry[0]):
-        hear(player, played, now, time, punctual)
+        advance(player, played, now, time, punctual)
         now = time
         match step, item:
-            case Step.LOOK, Instant():
-                played.faces |= shown(player, [item])
+            case Step.SAMPLE, Instant():
+                played.live_faces |= sample_faces(player, [item])
             case Step.SEND, Block():
                 player.announce(item, time)
             case Step.PLAN, Block():
@@ -154,24 +154,24 @@ def play(
                 played.schedules[item.id] = submit_with_speech(player, item, voice, time)
             case Step.SEND, BMLError():
                 player.refuse(parse_warning(item))
-    hear(player, played, now, math.inf, punctual)
+    advance(player, played, now, math.inf, punctual)
     for id, schedule in played.schedules.items():
         played.schedules[id] = player.latest(schedule)
-    played.film = shown(player, watches)
-    played.speaking = player.speech()
+    played.faces = sample_faces(player, instants)
+    played.speeches = player.speech()
     return played
 
 
-def hear(player: Player, played: Played, now: float, until: float, punctual: bool) -> None:
-    """Advance the time, from deadline to deadline."""
-    for _ in range(MOST_STEPS):
+def advance(player: Player, played: Played, now: float, until: float, punctual: bool) -> None:
+    """Advance the time from deadline to deadline, and collect the feedback."""
+    for _ in range(MAX_DEADLINES):
         deadline = player.next_deadline()
         if not punctual or deadline is None or deadline > until:
             break
         now = max(now, deadline)
         collect(player, played, now)
     else:
-        raise AssertionError("it goes on for ever")
+        raise AssertionError(f"more than {MAX_DEADLINES} deadlines")
     collect(player, played, until)
 
 
@@ -181,16 +181,16 @@ def collect(player: Player, played: Played, now: float) -> None:
         played.feedback.append(parse_feedback(text, VOCABULARY))
 
 
-def shown(player: Player, instants: Iterable[Instant]) -> dict[Instant, dict[str, float]]:
-    """Return name of AU ("12" if both sides are equal, "12L", "12R") or FAP -> value, at each instant."""
+def sample_faces(player: Player, instants: Iterable[Instant]) -> dict[Instant, dict[str, float]]:
+    """Return instant -> name of AU ("12L", "12R", "12" if both are equal) or FAP -> value."""
     out: dict[Instant, dict[str, float]] = {}
     by_character: dict[str | None, list[Instant]] = {}
     for instant in sorted(set(instants), key=lambda i: i.time):
         by_character.setdefault(instant.character, []).append(instant)
-    for character, seen in by_character.items():
+    for character, own in by_character.items():
         index = player.character_index(character) if character else 0
-        frames = player.frames(np.array([instant.time for instant in seen]), index)
-        for instant, aus, values in zip(seen, frames.aus, to_fap(frames).values, strict=True):
+        frames = player.frames(np.array([instant.time for instant in own]), index)
+        for instant, aus, values in zip(own, frames.aus, to_fap(frames).values, strict=True):
             face = dict(zip(AU_NAMES(), map(float, aus), strict=True))
             face |= {n[:-1]: v for n, v in face.items() if n[-1] == "L" and v == face[f"{n[:-1]}R"]}
             out[instant] = face | {row.name: float(v) for row, v in zip(faps(), values, strict=True)}
