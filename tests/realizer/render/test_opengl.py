@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cache
 
 import numpy as np
 import pytest
@@ -17,12 +18,21 @@ SIZE = (320, 240)
 
 
 @pytest.fixture(scope="module")
-def canvas(balls) -> Iterator[OpenGLCanvas]:
-    """One for all tests: to open one takes seconds, and to close one ends the display of the process."""
+def canvases(balls) -> Iterator[Callable[[tuple[int, int]], OpenGLCanvas]]:
+    """Canvases by size. To open one takes seconds, and to close one ends the display of the process."""
     face, _ = balls
-    canvas = OpenGLCanvas(face, SIZE, camera_for(face), preset())
-    yield canvas
-    canvas.close()
+
+    @cache
+    def canvas_of(size: tuple[int, int]) -> OpenGLCanvas:
+        return OpenGLCanvas(face, size, camera_for(face), preset())
+
+    yield canvas_of
+    canvas_of(SIZE).close()
+
+
+@pytest.fixture
+def canvas(canvases) -> OpenGLCanvas:
+    return canvases(SIZE)
 
 
 def skin(picture):
@@ -98,10 +108,9 @@ def test_opengl_canvas_draws_into_the_given_memory(canvas, balls):
     assert np.array_equal(out, canvas.draw(face.vertices, normals))
 
 
-def test_opengl_canvas_does_not_shear_odd_sizes(canvas, balls):
+def test_opengl_canvas_does_not_shear_odd_sizes(canvases, balls):
     """Rows of 3 x 101 bytes are no multiple of four, GL's default row alignment."""
     face, normals = balls
-    odd = OpenGLCanvas(face, (101, 77), camera_for(face), preset())
-    picture = odd.draw(face.vertices, normals)
+    picture = canvases((101, 77)).draw(face.vertices, normals)
     columns = np.nonzero(skin(picture))[1]
     assert columns.mean() == pytest.approx(50, abs=1)
