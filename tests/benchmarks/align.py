@@ -1,8 +1,8 @@
-"""How near aligners come to the truth: `python tests/benchmarks/align.py` prints errors of word onsets in ms.
+"""Measures the errors of aligners: `python tests/benchmarks/align.py` prints errors of word onsets in ms.
 
-The truth is what an engine says of its own speech, with noise added; for human speech, which nobody measured,
-what pocketsphinx finds: there only the other aligner is measured. The five recordings are those of Debian's
-package pocketsphinx-testdata; `--recordings DIR` says where they lie.
+Synthetic speech gets noise, and the reference are the times of its engine. For five human recordings
+(Debian's package pocketsphinx-testdata, or `--recordings DIR`) the reference are the times of pocketsphinx,
+so that only the other aligner is measured.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ SENTENCES = {
         "Jutro pójdziemy razem na targ.",
     ),
 }
-# Never a voice that the aligner itself speaks with.
+# Other voices than those that the aligner itself synthesizes.
 VARIANTS = {"en-US": ("en-us+f4", "en-gb+m3", "en-us+f2", "en-us+m7")}
 RATES = (0.85, 1.0, 1.15)
 NOISES = (20.0, 15.0, 25.0)  # dB below the speech
@@ -76,7 +76,7 @@ SILENCE = (0.0, 0.3, 0.6)  # s before and after, with the noise
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """A recording, and when its words begin (None: nobody knows)."""
+    """A recording and the seconds at which its words begin, if they are known."""
 
     language: str
     text: str
@@ -85,29 +85,31 @@ class Sample:
     onsets: np.ndarray | None
 
 
-def spoken(name: str, language: str) -> Iterator[Sample]:
-    """What a voice says, with noise."""
+def synthesize(name: str, language: str) -> Iterator[Sample]:
+    """Yield the sentences of a language as a voice speaks them, with added noise."""
     random = np.random.default_rng(7)
     voice = find_voice(name)
     variants = VARIANTS.get(language, (f"{language}+f2", f"{language}+m3")) if name == "espeak" else (None,)
     for k, text in enumerate(SENTENCES[language]):
-        said = voice.say(
+        utterance = voice.say(
             SpeechRequest(
                 text, language=language, voice=variants[k % len(variants)], rate=RATES[k % len(RATES)]
             )
         )
-        pause = round(SILENCE[k % len(SILENCE)] * said.sample_rate)
-        clean = np.pad(said.pcm.astype(float), pause)
-        loud = np.sqrt((said.pcm.astype(float) ** 2).mean()) / 10 ** (NOISES[k % len(NOISES)] / 20)
-        noisy = 0.5 * (clean + random.normal(0, loud, len(clean)))
-        onsets = np.array([word.start for word in said.words]) + pause / said.sample_rate
+        pause = round(SILENCE[k % len(SILENCE)] * utterance.sample_rate)
+        clean = np.pad(utterance.pcm.astype(float), pause)
+        noise_level = np.sqrt((utterance.pcm.astype(float) ** 2).mean()) / 10 ** (
+            NOISES[k % len(NOISES)] / 20
+        )
+        noisy = 0.5 * (clean + random.normal(0, noise_level, len(clean)))
+        onsets = np.array([word.start for word in utterance.words]) + pause / utterance.sample_rate
         pcm = np.clip(noisy, -32768, 32767).astype(np.int16)
-        yield Sample(language, text, said.sample_rate, pcm, onsets)
+        yield Sample(language, text, utterance.sample_rate, pcm, onsets)
     voice.close()
 
 
-def human(folder: Path) -> Iterator[Sample]:
-    """The recordings and what is said in them."""
+def read_recordings(folder: Path) -> Iterator[Sample]:
+    """Yield the human recordings with their texts."""
     for line in (folder / "transcription").read_text("utf-8").splitlines():
         text, _, name = line.replace("<s>", "").replace("</s>", "").rpartition(" (")
         with wave.open(str(folder / f"{name.rstrip(')')}.wav")) as file:
@@ -115,7 +117,7 @@ def human(folder: Path) -> Iterator[Sample]:
             yield Sample("en-US", text.strip(), file.getframerate(), pcm, None)
 
 
-def found(sample: Sample, text: str, aligner: str | None) -> Alignment | None:
+def try_align(sample: Sample, text: str, aligner: str | None) -> Alignment | None:
     try:
         return align(sample.pcm, sample.rate, text, sample.language, aligner=aligner)
     except RealizerError:
@@ -123,29 +125,29 @@ def found(sample: Sample, text: str, aligner: str | None) -> Alignment | None:
 
 
 def measure(name: str, samples: list[Sample], aligner: str, truth: str = "its own times") -> None:
-    """A line of errors, and one of confidences with the right text and with that of the next recording."""
+    """Print the errors of an aligner, and its confidence with the right text and with another one."""
     errors: list[float] = []
     right: list[float] = []
     wrong: list[float] = []
     failed = 0
-    spent = seconds = 0.0
+    elapsed = seconds = 0.0
     for sample, other in zip(samples, [*samples[1:], samples[0]], strict=True):
         onsets = sample.onsets
         if onsets is None:
-            reference = found(sample, sample.text, "pocketsphinx")
+            reference = try_align(sample, sample.text, "pocketsphinx")
             onsets = np.array([w.start for w in reference.words]) if reference else None
-        found(sample, sample.text, aligner)  # what is loaded and started first does not count
-        began = time.perf_counter()
-        result = found(sample, sample.text, aligner)
-        spent += time.perf_counter() - began
+        try_align(sample, sample.text, aligner)  # the first call includes loading and starting
+        begin = time.perf_counter()
+        result = try_align(sample, sample.text, aligner)
+        elapsed += time.perf_counter() - begin
         seconds += len(sample.pcm) / sample.rate
         if result is None or onsets is None:
             failed += 1
             continue
         errors += list(np.array([w.start for w in result.words]) - onsets)
         right.append(result.confidence)
-        misled = found(sample, other.text, aligner)
-        wrong.append(misled.confidence if misled else 0.0)
+        mismatch = try_align(sample, other.text, aligner)
+        wrong.append(mismatch.confidence if mismatch else 0.0)
     if not errors:
         print(f"{name:<18} {aligner:<13} all {failed} failed")
         return
@@ -154,7 +156,7 @@ def measure(name: str, samples: list[Sample], aligner: str, truth: str = "its ow
         f"{name:<18} {aligner:<13} {len(ms):>4} words  shift {np.median(ms):>4.0f}  "
         f"median {np.median(abs(ms)):>3.0f}  p90 {np.percentile(abs(ms), 90):>3.0f}  "
         f"worst {abs(ms).max():>4.0f}  against {truth}, "
-        f"{failed} of {len(samples)} failed, real-time factor {spent / seconds:.3f}"
+        f"{failed} of {len(samples)} failed, real-time factor {elapsed / seconds:.3f}"
     )
     print(
         f"{'':<18} confidence of the right text {min(right):.2f}..{max(right):.2f}, "
@@ -168,7 +170,7 @@ def main() -> None:
     folder: Path = reader.parse_args().recordings
     for voice in ("espeak", "hibari"):
         try:
-            samples = list(spoken(voice, "en-US"))
+            samples = list(synthesize(voice, "en-US"))
         except RealizerError as error:
             print(f"{voice}: {error}")
             continue
@@ -176,9 +178,9 @@ def main() -> None:
             measure(f"{voice} en-US", samples, aligner)
         if voice == "espeak":
             for language in ("nl", "fr", "de", "pl"):
-                measure(f"espeak {language}", list(spoken(voice, language)), "espeak")
+                measure(f"espeak {language}", list(synthesize(voice, language)), "espeak")
     if (folder / "transcription").is_file():
-        measure("human", list(human(folder)), "espeak", "pocketsphinx")
+        measure("human", list(read_recordings(folder)), "espeak", "pocketsphinx")
     else:
         print(NEEDED.format(folder))
 

@@ -1,4 +1,4 @@
-"""How near Wojdel's model comes to a face's shapes (her table 4.3), on coarser meshes, and at what cost.
+"""Measures the errors of Wojdel's face model (her table 4.3), also on coarser meshes, and its time.
 
 python tests/benchmarks/au_model.py [--face NAME] [--pictures FILE.png] [--meshes FILE.png]
 """
@@ -33,14 +33,14 @@ from realizer.facebuild.au.measure import UnitMeasurement, read_shapes
 from tests.au_mixers import mix
 
 SHOWN = (1, 4, 6, 9, 10, 12, 15, 18, 27, 43)
-HERS = 0.120
+PUBLISHED_ERROR = 0.120
 SIZES = (280, 454, 1762)  # vertices of her figure 4.3
 HAPPY = {6: 0.8, 12: 0.9, 25: 0.7}
 THINGS = {"left_eye": "left eye", "right_eye": "right eye", "lower_teeth": "jaw", "tongue": "jaw"}
 
 
 def frames(shown: list[Mapping[int, float]]) -> AUFrames:
-    """Action units, on both sides, as frames."""
+    """Return frames of action units, the same on both sides."""
     values = np.zeros((len(shown), len(axis())), np.float32)
     for row, aus in zip(values, shown, strict=True):
         for number, amount in aus.items():
@@ -49,7 +49,7 @@ def frames(shown: list[Mapping[int, float]]) -> AUFrames:
 
 
 def pictures(face: Face, views: tuple[str, ...], shapes: Callable[[], list[Any]]) -> np.ndarray:
-    """Rows of pictures of (n, n_vertices, 3) shapes, by view."""
+    """Return pictures of (n, n_vertices, 3) shapes, one row for each view."""
     from realizer.render.backends import open_canvas
     from realizer.render.cameras import camera_for
     from realizer.render.light import preset
@@ -65,7 +65,7 @@ def pictures(face: Face, views: tuple[str, ...], shapes: Callable[[], list[Any]]
 
 
 def front(face: Face) -> tuple[np.ndarray, np.ndarray]:
-    """The skin's vertices, (n, 3) metres, and the triangles of its front, without neck and hair."""
+    """Return the skin's vertices, (n, 3) metres, and the triangles of its front, without neck and hair."""
     first, last = face.parts["skin"]
     at = face.vertices[first:last].astype(np.float64)
     triangles = face.triangles[((face.triangles >= first) & (face.triangles < last)).all(axis=1)] - first
@@ -75,10 +75,10 @@ def front(face: Face) -> tuple[np.ndarray, np.ndarray]:
 def meshes(
     face: Face, model: Model, measured: Mapping[int, UnitMeasurement]
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """The same model on meshes of another topology (her figure 4.3), each with its errors printed.
+    """Return coarser meshes (her figure 4.3), and print the errors of the model on each.
 
-    At the vertices: to what was measured there. Between them: what a triangle's corners make of the places
-    of the fine mesh in it, to where the model takes these.
+    The error at the vertices is the distance to the measured displacement. The error between them is the
+    distance between the displacement that a triangle's corners interpolate and that of the model.
     """
     at, triangles = front(face)
     fine = np.unique(triangles)
@@ -108,7 +108,7 @@ def meshes(
 
 
 def nearest(triangles: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """How far points lie from the nearest of (m, 3, 3) triangles, which it is, and its corners' shares."""
+    """Return the distance of points to the nearest of (m, 3, 3) triangles, its index, and weights."""
     from scipy.spatial import cKDTree
     from trimesh.triangles import closest_point, points_to_barycentric
 
@@ -124,7 +124,7 @@ def nearest(triangles: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 
 def masked(face: Face, index: np.ndarray, corners: np.ndarray) -> tuple[Face, dict[str, tuple[int, int]]]:
-    """A face whose skin is these vertices, with its own eyes and mouth inside."""
+    """Return a face whose skin consists of these vertices, and its parts."""
     first, _ = face.parts["skin"]
     order, parts, triangles = [index + first], {"skin": (0, len(index))}, [corners]
     for part in ("left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue", "brows"):
@@ -137,12 +137,12 @@ def masked(face: Face, index: np.ndarray, corners: np.ndarray) -> tuple[Face, di
     kept = np.concatenate(order)
     arrays = {name: getattr(face, name)[kept] for name in ("vertices", "colours", "occlusion", "gloss")}
     arrays["triangles"] = np.concatenate(triangles).astype(np.int32)
-    # No furrows: they lie on the fine skin.
+    # Wrinkles are left out, because they refer to the fine skin.
     return dataclasses.replace(face, parts=parts, feature_points={}, **arrays), parts
 
 
 def happy(face: Face, model: Model, parts: Mapping[str, tuple[int, int]]) -> np.ndarray:
-    """(1, n_vertices, 3): a smile, object by object, by her mixers."""
+    """Return (1, n_vertices, 3), a smile by the mixers of her model, part by part."""
     out = face.vertices.copy()
     for part, (low, high) in parts.items():
         thing: Any = THINGS.get(part, "fixed" if part == "upper_teeth" else "face")
@@ -151,7 +151,7 @@ def happy(face: Face, model: Model, parts: Mapping[str, tuple[int, int]]) -> np.
 
 
 def cost(face: Face, other: Face) -> None:
-    """What a frame costs by this deformer and by the FAPs'."""
+    """Print the time of a frame with this deformer and with FAPs."""
     rng = np.random.default_rng(0)
     shown = [
         {n: float(a) for n, a in zip(SHOWN, rng.uniform(0, 1, len(SHOWN)), strict=True)} for _ in range(250)
@@ -161,12 +161,12 @@ def cost(face: Face, other: Face) -> None:
         rows = poses(frames(shown), one.inputs)
         for name, count, times in (("a frame of 250", 250, 7), ("a frame alone", 1, 60)):
             deform(one, rows[:count])
-            took = []
+            elapsed = []
             for _ in range(times):
-                began = time.perf_counter()
+                begin = time.perf_counter()
                 deform(one, rows[:count])
-                took.append((time.perf_counter() - began) / count)
-            spent[kind, name] = 1000 * statistics.median(took)
+                elapsed.append((time.perf_counter() - begin) / count)
+            spent[kind, name] = 1000 * statistics.median(elapsed)
     for name in ("a frame of 250", "a frame alone"):
         ours, theirs = spent["au", name], spent["mpeg4", name]
         print(
@@ -188,7 +188,7 @@ def main() -> None:
     measured = read_shapes(folder / "au_shapes.npz")
     for form in ("published", "extended"):
         model = read_model(folder / f"au_{form}.toml")
-        print(f"{face.name}, {form} form (she reports a mean of {HERS:.3f})")
+        print(f"{face.name}, {form} form (she reports a mean of {PUBLISHED_ERROR:.3f})")
         print(table_text(table(model, measured)), end="\n\n")
     coarser = meshes(face, model, measured)
     print()

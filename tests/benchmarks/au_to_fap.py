@@ -1,11 +1,11 @@
-"""How near the table's FAPs come to a face's own action unit shapes.
+"""Compares the FAPs of action units in the table with a face's own action unit shapes.
 
 python tests/benchmarks/au_to_fap.py [--face NAME] [--data FOLDER] [--worst 5]
 
-Each action unit at full intensity on both sides. `cosine`: between the shape and what its FAPs and the MPEG-4
-deformer make of it, over the visible skin of the left half. `ratio`: of their lengths. `cap`: the best cosine
-that any values of the 66 FAPs could reach. `far`: the shape's longest move. Last: where the difference lies.
-With the unpacked CC0 data the shapes are measured anew, with some that a face's folder does not hold.
+Each action unit has full intensity on both sides. `cosine` compares its shape with the result of its FAPs and
+the MPEG-4 deformer, over the visible skin of the left half; `ratio` is the ratio of their lengths. `cap` is
+the best cosine that any values of the 66 FAPs could reach, `far` the longest displacement of the shape. The
+last column says where they differ. With the unpacked CC0 data the shapes are measured again, with a few more.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from realizer.facebuild.au.measure import UnitMeasurement, read_shapes
 from realizer.facebuild.au.shapes import measure_shapes
 from realizer.tables import faps
 
-# Feature points by the part of the face they stand for.
+# Part of the face -> its feature points.
 PARTS = {
     "brows": ("4.1", "4.3", "4.5", "11.1", "11.3"),
     "upper lids": ("3.1", "3.13"),
@@ -45,16 +45,16 @@ PARTS = {
     "chin": ("2.1", "2.10", "2.11"),
     "jaw": ("2.13",),
 }
-WAYS = ("across", "up", "forward")
-AIM = 0.75
-ON_SKIN = 0.95  # of a shape's landmarks; a face that was built anew has shapes of another
+DIRECTIONS = ("across", "up", "forward")
+TARGET = 0.75
+ON_SKIN = 0.95  # least part of the landmarks on the skin; otherwise the shapes belong to another mesh
 # Action units that are not among Wojdel's, and the face units that show them.
-MORE = {14: "mouthDimple:1", 29: "jawForward:1", 33: "cheekPuff:1", 34: "cheekPuff:1"}
+EXTRA_UNITS = {14: "mouthDimple:1", 29: "jawForward:1", 33: "cheekPuff:1", 34: "cheekPuff:1"}
 
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """A face's visible skin on the left half: where it lies, and how FAPs move it.
+    """The visible skin of a face's left half, and how FAPs move it.
 
     Attributes:
         marks: (n,) indices into the shapes' landmarks; vertices: (n,) into the face's vertices.
@@ -86,20 +86,20 @@ class Skin:
         return cls(face, marks.astype(np.int32), (first + nearest).astype(np.int32), part)
 
     def moves(self, rows: Float32) -> Float64:
-        """(n, len(vertices), 3) metres that FAP rows (n, 68) move it."""
+        """Return the displacements by FAP rows (n, 68), (n, len(vertices), 3) metres."""
         moved = deform(self.face, rows)[:, self.vertices]
         return np.asarray(moved - self.face.vertices[self.vertices], np.float64)
 
     def fields(self) -> Float64:
-        """(68, len(vertices), 3) metres that a tenth of each FAP's range moves it."""
+        """Return the displacements by a tenth of each FAP's range, (68, len(vertices), 3) metres."""
         rows = np.zeros((68, 68), np.float32)
         for row in faps():
             rows[row.fap - 1, row.fap - 1] = row.most / 10
         return self.moves(rows)
 
 
-def asked(numbers: list[int]) -> Float32:
-    """(n, 68) FAPs that the table asks for each action unit at full intensity, on both sides."""
+def table_faps(numbers: list[int]) -> Float32:
+    """Return (n, 68), the FAPs of each action unit at full intensity on both sides, by the table."""
     values = np.zeros((len(numbers), len(axis())), np.float32)
     for row, number in zip(values, numbers, strict=True):
         row[[target.column for target in au(number)]] = 1
@@ -107,26 +107,26 @@ def asked(numbers: list[int]) -> Float32:
 
 
 def cosine(a: Float64, b: Float64) -> float:
-    """Of two displacement fields; 0 where one of them is nought."""
+    """Return the cosine between two displacement fields; 0 if one of them is zero."""
     lengths = float(np.linalg.norm(a) * np.linalg.norm(b))
     return float((a * b).sum()) / lengths if lengths else 0.0
 
 
-def even(fields: Float64) -> Float64:
-    """(k, n) one column a pair of mirrored FAPs: what both do with the same value (signs as the mirror's)."""
-    kept = []
+def mirrored_fields(fields: Float64) -> Float64:
+    """Return (k, n), the field of each pair of mirrored FAPs with the same value."""
+    fields_by_pair = []
     for row in faps()[2:]:
         if row.mirror >= row.fap:
             both = fields[row.fap - 1].ravel().copy()
             if row.mirror != row.fap:
                 both += row.sign * fields[row.mirror - 1].ravel()
             if (row.mirror != row.fap or row.sign > 0) and both.any():
-                kept.append(both)
-    return np.array(kept)
+                fields_by_pair.append(both)
+    return np.array(fields_by_pair)
 
 
 def where(skin: Skin, wanted: Float64, got: Float64) -> str:
-    """Where the difference lies that no length mends: parts with a fifth of it or so, and its direction."""
+    """Return the parts of the face that have most of the difference after scaling, and its main direction."""
     length = float((got * got).sum())
     left = wanted - got * (float((wanted * got).sum()) / length if length else 0.0)
     squares = left**2
@@ -134,16 +134,16 @@ def where(skin: Skin, wanted: Float64, got: Float64) -> str:
     shares = {part: float(squares[skin.part == part].sum() / whole) for part in PARTS}
     most = [part for part in sorted(shares, key=lambda k: -shares[k]) if shares[part] >= 0.18][:3]
     ways = squares.sum(axis=0) / whole
-    said = ", ".join(f"{part} {shares[part]:.0%}" for part in most) or "everywhere"
-    return f"{said}; {WAYS[int(ways.argmax())]} {ways.max():.0%}"
+    parts = ", ".join(f"{part} {shares[part]:.0%}" for part in most) or "everywhere"
+    return f"{parts}; {DIRECTIONS[int(ways.argmax())]} {ways.max():.0%}"
 
 
 def shapes_of(face: Face, data: Path | None) -> dict[int, UnitMeasurement]:
-    """A face's shapes as its folder holds them, or measured."""
+    """Return a face's shapes from its folder, or measured in the data."""
     folder = folder_of(face.name)
     if data is None:
         return read_shapes(folder / "au_shapes.npz")
-    more = [replace(units()[1], au=number, shapes=shapes) for number, shapes in MORE.items()]
+    more = [replace(units()[1], au=number, shapes=shapes) for number, shapes in EXTRA_UNITS.items()]
     found = measure_shapes(face, folder, data) | measure_shapes(face, folder, data, more)
     return dict(sorted(found.items()))
 
@@ -159,8 +159,8 @@ def main() -> None:
     face = load_face(chosen.face)
     shapes = shapes_of(face, chosen.data)
     skin = Skin.of(face, next(iter(shapes.values())))
-    base = np.linalg.qr(even(skin.fields()).T)[0]
-    made = skin.moves(asked(list(shapes)))
+    base = np.linalg.qr(mirrored_fields(skin.fields()).T)[0]
+    made = skin.moves(table_faps(list(shapes)))
     print(
         f"{face.name}: {len(shapes)} action units with a shape, {len(skin.vertices)} vertices of visible skin"
     )
@@ -176,7 +176,7 @@ def main() -> None:
         print(f"{number:>4}{found[number]:8.3f}{ratio:7.2f}{cap:6.2f}{far:8.1f}  {where(skin, wanted, got)}")
     worst = sorted(found, key=lambda k: found[k])[: chosen.worst]
     print(
-        f"mean {np.mean(list(found.values())):.3f} (aim {AIM}); worst "
+        f"mean {np.mean(list(found.values())):.3f} (aim {TARGET}); worst "
         + ", ".join(f"AU{number} {found[number]:.3f}" for number in worst)
     )
 

@@ -1,20 +1,19 @@
-"""Prints how much faster than it plays a document is realized: `python tests/benchmarks/batch.py`.
+"""Measures how much faster than real time documents are realized: `python tests/benchmarks/batch.py`.
 
     text to FAP, without speech     nods, expressions, gazes and idle motion; the bytes of the .fap file
     text to FAP, silent voice       the same with sentences whose times come from rules
-    text to FAP, espeak             with espeak-ng, which never says a sentence twice here
-      espeak-ng alone               the floor: the same sentences by the engine in one process, nothing else
-    openfacefx, text to curves      the sentences of the row above it but one, as long as there, by the peer
-    film                            512x512 .mp4 by two workers (`--films 16`, which take a minute)
+    text to FAP, espeak             with espeak-ng; no sentence occurs twice
+      espeak-ng alone               the lower bound: the engine speaks the same sentences in one process
+    openfacefx, text to curves      the sentences of the silent voice with their lengths, by another program
+    film                            512x512 .mp4 by two workers (`--films 16` takes a minute)
 
-Each of documents of 4 s, as a dialogue has them, and of 30 s. By core: by the processor time of this process
-and of the engine that speaks for it, which is what a batch on idle cores takes; less noise: the same, were
-the machine always as calm as at its best in this run; by clock: with whatever else it did. Engine is the part
-of a document that is the engine's process, which forks for each sentence, so that what it says does not
-depend on what it said before. Noise is how much more processor time than at that best a fixed piece of work
-took between the documents, median and nine in ten: at 100 % the machine was half as fast. The peer makes
-15 visemes, blinks, brows and head from text and a length; it reads no BML, plans nothing and blends nothing.
-Measures only; nothing asserts a time.
+The documents last 4 s, as in dialogues, and 30 s. "By core" uses the processor time of this process and of
+the speech engine. "Less noise" is an estimate for a machine that is always as fast as at its best in this
+run. "By clock" uses elapsed time. "Engine" is the time of the engine's process, which forks for each
+sentence, so that speech does not depend on earlier speech. "Noise" is how much more processor time a fixed
+piece of work took between the documents than at its best, as median and 90th percentile: at 100 % the machine
+was half as fast. openfacefx makes 15 visemes, blinks, brows and head from text and a length, without BML,
+planning or blending.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ LENGTHS = (4, 30)  # s, about
 DOCUMENTS = 40
 FILM = 8  # s
 FPS = 25
-ENGLISH = "gmw/en-US"  # the engine's own name of the voice that the documents are said by
+ENGLISH = "gmw/en-US"  # the engine's name of the voice
 SENTENCES = (
     "Good morning, this is number {k} speaking.",
     "I was wondering whether you had seen my {size} {colour} umbrella.",
@@ -57,7 +56,7 @@ COLOURS = ("red", "blue", "green", "yellow", "white", "black", "brown", "grey", 
 
 
 def sentences(k: int, seconds: int) -> list[str]:
-    """One for every 4 s, in no other document."""
+    """Return one sentence for every 4 s; other documents have other sentences."""
     return [
         SENTENCES[turn % len(SENTENCES)].format(
             k=1000 + 100 * turn + k, size=SIZES[(k + turn) % len(SIZES)], colour=COLOURS[k % len(COLOURS)]
@@ -67,7 +66,7 @@ def sentences(k: int, seconds: int) -> list[str]:
 
 
 def document(k: int, seconds: int, *, speech: bool) -> bytes:
-    """About so many seconds of talk or of play, never the same one twice."""
+    """Return a document of about `seconds` seconds with speech or movement; each `k` gives another one."""
     parts = []
     for turn, words in enumerate(sentences(k, seconds)):
         at = 4 * turn + k / 1000
@@ -95,7 +94,7 @@ def tasks(count: int, seconds: int, *, speech: bool) -> Iterator[Task]:
 
 
 def spent_by(pid: int | None) -> float:
-    """Seconds of processor time of a process and of its children that ended; 0 where nobody tells."""
+    """Return the processor seconds of a process and of its ended children; 0 if they are unknown."""
     try:
         fields = Path(f"/proc/{pid}/stat").read_text("utf-8").rpartition(")")[2].split()
     except OSError:
@@ -104,27 +103,27 @@ def spent_by(pid: int | None) -> float:
 
 
 def spent() -> float:
-    """Seconds of processor time of this process, and of its children that ended and theirs."""
+    """Return the processor seconds of this process and of its ended descendants."""
     own = os.times()
     return own.user + own.system + own.children_user + own.children_system
 
 
 def row(name: str, works: Iterator[Callable[[], float]], engine: Callable[[], float] = float) -> float:
-    """Print what each piece of work, which says how many seconds it played, cost; gives the one by core.
+    """Print the speed of pieces of work, which return their seconds of play; return the speed by core.
 
     Args:
-        engine: the processor time of who else works for us, s.
+        engine: returns the processor seconds of the speech engine.
     """
     played: list[float] = []
     own: list[float] = []
-    noise, looking = Noise(), 0.0
-    before, began = engine(), time.perf_counter()
+    noise, noise_seconds = Noise(), 0.0
+    before, begin = engine(), time.perf_counter()
     for work in works:
         own.append(time.process_time())
         played.append(work())
         own[-1] = time.process_time() - own[-1]
-        looking += noise.look()
-    others, clock = (engine() - before) / len(played), time.perf_counter() - began - looking
+        noise_seconds += noise.sample()
+    others, clock = (engine() - before) / len(played), time.perf_counter() - begin - noise_seconds
     used = sum(own) + others * len(played)
     print(
         f"{name:30}{statistics.mean(played):7.1f} s{sum(played) / used:9.0f} x"
@@ -140,30 +139,30 @@ def fap(name: str, voice: str, seconds: int, *, speech: bool) -> float:
 
     def played(task: Task) -> Callable[[], float]:
         def play() -> float:
-            told = worker.perform(task).row
-            assert (told["status"], told["dropped"]) == ("done", []), told
-            return float(told["duration"])
+            result = worker.perform(task).row
+            assert (result["status"], result["dropped"]) == ("done", []), result
+            return float(result["duration"])
 
         return play
 
     first, *rest = (played(task) for task in tasks(DOCUMENTS + 1, seconds, speech=speech))
-    first()  # tables and face are read, the voice has started
+    first()  # reads tables and face, and starts the voice
     cost = row(name, iter(rest), lambda: spent_by(getattr(worker._speaker._voice, "pid", None)))
     worker.close()
     return cost
 
 
 def floor(seconds: int, least: float) -> None:
-    """What espeak-ng takes for the sentences by itself; to be called in a process of its own.
+    """Print the speed of espeak-ng alone; call it in a separate process.
 
     Args:
-        least: of the noise.
+        least: the least time of `Noise` so far.
     """
     Noise.least = least
     engine = load([])
     worker = Worker(Options(formats=(".vtt",), voice="espeak"))
 
-    def said(k: int) -> Callable[[], float]:
+    def speak(k: int) -> Callable[[], float]:
         (task,) = islice(tasks(k + 1, seconds, speech=True), k, None)
         length = float(worker.perform(task).row["duration"])
         texts = [f"<speak>{words}</speak>" for words in sentences(k, seconds)]
@@ -175,33 +174,33 @@ def floor(seconds: int, least: float) -> None:
 
         return say
 
-    works = [said(k) for k in range(1, DOCUMENTS + 1)]
+    works = [speak(k) for k in range(1, DOCUMENTS + 1)]
     worker.close()
     row("  espeak-ng alone", iter(works))
 
 
 def peer(seconds: int, ours: float) -> None:
-    """The same sentences by openfacefx, from text and a length to a clip as JSON."""
+    """Print the speed of openfacefx on the same sentences, from text and a length to a clip as JSON."""
     if find_spec("openfacefx") is None:
-        print("openfacefx is not there: pip install openfacefx")
+        print("openfacefx is not installed: pip install openfacefx")
         return
     openfacefx = import_module("openfacefx")
     worker = Worker(Options(formats=(".vtt",), voice="silent"))
     reader = openfacefx.G2P()
 
-    def made(task: Task, k: int) -> Callable[[], float]:
+    def convert(task: Task, k: int) -> Callable[[], float]:
         length = worker.perform(task).row["duration"]
-        said = sentences(k, seconds)
+        texts = sentences(k, seconds)
 
         def make() -> float:
-            for words in said:
-                track = openfacefx.generate_naive(words, length / len(said), FPS, g2p=reader, gestures=True)
+            for words in texts:
+                track = openfacefx.generate_naive(words, length / len(texts), FPS, g2p=reader, gestures=True)
                 json.dumps(openfacefx.to_dict(track))
             return float(length)
 
         return make
 
-    works = [made(task, k) for k, task in enumerate(tasks(DOCUMENTS + 1, seconds, speech=True))]
+    works = [convert(task, k) for k, task in enumerate(tasks(DOCUMENTS + 1, seconds, speech=True))]
     works[0]()
     theirs = row("openfacefx, text to curves", iter(works[1:]))
     print(f"{'  ours with the silent voice':30}{'':9}{ours / theirs:9.2f} times as fast")
@@ -209,33 +208,33 @@ def peer(seconds: int, ours: float) -> None:
 
 
 def film(count: int) -> None:
-    """From the start of the two workers and of what draws for them, and from when both have one film done."""
-    crew = ProcessPool(Options(formats=(".mp4",), voice="silent", size=(512, 512)), 2)
-    used, began = spent(), time.perf_counter()
-    came: list[tuple[float, float]] = []
+    """Print the speed of films by two workers, with their start and after the first film of each."""
+    pool = ProcessPool(Options(formats=(".mp4",), voice="silent", size=(512, 512)), 2)
+    used, begin = spent(), time.perf_counter()
+    done: list[tuple[float, float]] = []
     noise = Noise()
-    for outcome in crew.perform(tasks(count, FILM, speech=True)):
+    for outcome in pool.perform(tasks(count, FILM, speech=True)):
         assert outcome.row["status"] == "done", outcome.row
-        came.append((time.perf_counter(), outcome.row["duration"]))
-        noise.look()
-    played, used = sum(length for _, length in came), spent() - used
-    going = sum(length for _, length in came[2:]) / (came[-1][0] - came[1][0])
-    print(f"film, 512x512, {FPS} fps, {count} of {came[0][1]:.1f} s by two workers")
-    print(f"{'  by clock, once both are at work':46}{going:6.2f} x")
-    print(f"{'  by clock, with their start':46}{played / (came[-1][0] - began):6.2f} x")
+        done.append((time.perf_counter(), outcome.row["duration"]))
+        noise.sample()
+    played, used = sum(length for _, length in done), spent() - used
+    steady = sum(length for _, length in done[2:]) / (done[-1][0] - done[1][0])
+    print(f"film, 512x512, {FPS} fps, {count} of {done[0][1]:.1f} s by two workers")
+    print(f"{'  by clock, once both work':46}{steady:6.2f} x")
+    print(f"{'  by clock, with their start':46}{played / (done[-1][0] - begin):6.2f} x")
     print(f"{'  by core, with their start':46}{played / used:6.2f} x")
     print(f"{'  noise, median and nine in ten':44}{noise}")
 
 
 def main() -> None:
     reader = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    reader.add_argument("--films", type=int, metavar="N", help="so many films, and no documents")
+    reader.add_argument("--films", type=int, metavar="N", help="measure N films instead of documents")
     films = reader.parse_args().films
     load = os.getloadavg()[0] / (os.cpu_count() or 1)
     calm = Noise()
     for _ in range(1000):
-        calm.look()
-    print(f"load of the machine {load:.1f} a core before it began")
+        calm.sample()
+    print(f"load of the machine {load:.1f} a core before it begin")
     if films:
         film(films)
         return

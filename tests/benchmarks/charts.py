@@ -1,7 +1,7 @@
-"""What timelines cost: `python tests/benchmarks/charts.py` prints medians in milliseconds.
+"""Measures the time of timelines: `python tests/benchmarks/charts.py` prints medians in milliseconds.
 
-The data and JSON of a block are made when it is planned or moved, while others play; a quiet tick is what a
-session pays where somebody follows the stream `schedule` and nothing has changed. On 2 cores, shared:
+A block's data and JSON are made when it is planned or moved, while others play. A quiet tick is the time of
+the stream `schedule` in a tick without changes. On 2 shared cores:
 
     blocks alive     quiet tick   whole state
          5             0.01          0.8
@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import json
 
-from stopwatch import helped, median, noise
+from stopwatch import handle_help, median, noise
 
 from realizer.charts.chart_data import charts_of
 from realizer.charts.picture import timeline
@@ -64,7 +64,7 @@ def picture(count: int) -> None:
 
 
 def main() -> None:
-    helped(__doc__)
+    handle_help(__doc__)
     print(noise())
     for blocks_alive in (5, 100):
         stream(blocks_alive)

@@ -1,13 +1,11 @@
-"""What frames ahead of time cost: `python tests/benchmarks/compile.py [--chart PATH]` prints milliseconds.
+"""Measures the time of frames: `python tests/benchmarks/compile.py [--chart PATH]` prints milliseconds.
 
-10 s at 25 frames a second of one block of nods, expressions, gazes and brows all along, with idle motion, as
-a live session computes them ahead of time, to integers of FAPs. By step: which channels there are, blended,
-the rules of co-occurrence, FAPs. Then how that grows with behaviours and with length; and what each window
-costs while somebody speaks, and just after somebody was interrupted.
+A live session computes frames ahead of time. Here these are 10 s at 25 frames a second of a block of nods,
+expressions, gazes and brows with idle motion, as integers of FAPs. The steps are: collect the channels, blend
+them, apply the rules of co-occurrence, convert to FAPs. Further rows show the growth with the number of
+behaviours and with the length, and the time during speech and after an interrupt.
 
-Medians, and the least, which is what it takes when nothing else goes on. The noise of this machine is by how
-much the same work takes longer than at its best: median and nine in ten. Measures only; nothing asserts a
-time.
+The program prints medians, minima, and the noise of the machine.
 """
 
 from __future__ import annotations
@@ -39,7 +37,7 @@ SECONDS = 10.0
 REPEATS = 300
 STEPS = ("channels", "blend", "rules", "FAPs")
 COLOURS = ("#9aa0aa", "#2156a0", "#7c6bb0", "#0f766e")
-WANTED = {6: 1.0, 20: 2.0}  # ms
+TARGETS = {6: 1.0, 20: 2.0}  # ms
 
 KINDS = (
     '<head id="b{k}" lexeme="NOD" start="{at}"/>',
@@ -53,8 +51,8 @@ SPEECH = (
 )
 
 
-class Spent(NamedTuple):
-    """(k,) milliseconds of each run, by step."""
+class Times(NamedTuple):
+    """(runs, steps) milliseconds."""
 
     steps: Float64
 
@@ -73,7 +71,7 @@ class Spent(NamedTuple):
 
 
 def block(count: int, seconds: float = SECONDS) -> str:
-    """So many behaviours of 1.5 s, one after the other over so many seconds."""
+    """Return a block of `count` behaviours of 1.5 s that begin one after the other."""
     starts = [0.9 * seconds * k / count for k in range(count)]
     body = "".join(
         KINDS[k % 4].format(k=k, at=f"{at:.2f}", end=f"{at + 1.5:.2f}") for k, at in enumerate(starts)
@@ -87,8 +85,8 @@ def player(text: str) -> Player:
     return made
 
 
-def measured(one: Player, seconds: float = SECONDS, repeats: int = REPEATS) -> Spent:
-    """Windows that begin a little later each time, as those of many sessions do; the first do not count."""
+def measure(one: Player, seconds: float = SECONDS, repeats: int = REPEATS) -> Times:
+    """Measure windows that begin at different times, as those of many sessions do."""
     runs = []
     for k in range(repeats + 10):
         times = np.arange(int(seconds * FPS)) / FPS + k * 0.7 / repeats
@@ -102,11 +100,11 @@ def measured(one: Player, seconds: float = SECONDS, repeats: int = REPEATS) -> S
         to_fap(frames).integers()
         at.append(time.perf_counter())
         runs.append(np.diff(at) * 1e3)
-    return Spent(np.array(runs[10:]))
+    return Times(np.array(runs[10:]))
 
 
-def chart(rows: dict[int, Spent]) -> Picture:
-    """A bar for each number of behaviours, its parts the steps."""
+def chart(rows: dict[int, Times]) -> Picture:
+    """Draw a bar for each number of behaviours, divided into the steps."""
     left, scale, high = 120.0, 480.0 / max(spent.whole for spent in rows.values()), 34.0
     title = f"{SECONDS:g} s of frames: milliseconds by step"
     picture = Picture(left + 580.0, 92.0 + high * len(rows), title, PAPER)
@@ -133,19 +131,19 @@ def main() -> None:
     print(f"{noise()}\n")
     print(f"{'':24}" + "".join(f"{step:>10}" for step in STEPS) + f"{'all':>10}{'least':>10}{'wanted':>10}")
 
-    def row(name: str, spent: Spent, wanted: float | None = None) -> Spent:
+    def row(name: str, spent: Times, wanted: float | None = None) -> Times:
         limit = "" if wanted is None else f"< {wanted:g}"
         cells = "".join(f"{value:10.3f}" for value in (*spent.median, spent.whole, spent.least))
         print(f"{name:24}{cells}{limit:>10}")
         return spent
 
-    rows = {n: row(f"{n} behaviours", measured(player(block(n))), WANTED.get(n)) for n in (1, 6, 20, 60)}
-    speaks = player(f'<bml id="b">{SPEECH}</bml>')
-    row("a sentence and a nod", measured(speaks))
-    speaks.stop(1.0)
-    row("cut off after 1 s", measured(speaks))
+    rows = {n: row(f"{n} behaviours", measure(player(block(n))), TARGETS.get(n)) for n in (1, 6, 20, 60)}
+    speaker = player(f'<bml id="b">{SPEECH}</bml>')
+    row("a sentence and a nod", measure(speaker))
+    speaker.stop(1.0)
+    row("stopped after 1 s", measure(speaker))
     one = player(block(6, 60.0))
-    lengths = {s: row(f"6, in all {s:g} s", measured(one, s)) for s in (1.0, 4.0, 10.0, 30.0)}
+    lengths = {s: row(f"6, in all {s:g} s", measure(one, s)) for s in (1.0, 4.0, 10.0, 30.0)}
     a, b = lengths[1.0], lengths[30.0]
     print(f"\na frame more: {1e3 * (b.whole - a.whole) / (29 * FPS):.2f} microseconds")
     for name, found in (("behaviours", rows), ("seconds", lengths)):

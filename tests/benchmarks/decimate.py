@@ -1,4 +1,4 @@
-"""A fine mesh in, the same surface with fewer of its vertices out: places can still be compared."""
+"""Reduces a mesh to fewer of its vertices."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ import numpy.typing as npt
 Float64 = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
 
-BORDER = 30.0  # how much more a border counts than the surface
-EVEN = 1e-5  # of an edge's length squared: flat places get even triangles
+BORDER = 30.0  # weight of a border, relative to the surface
+EVEN = 1e-5  # of an edge's squared length; it makes triangles of flat places even
 
 
 def decimated(at: Float64, triangles: Index, size: int) -> tuple[Index, Index]:
-    """Collapse edges, each into one of its ends, the one that leaves the surface least first.
+    """Collapse edges into one of their ends, in the order of the error that this causes.
 
-    Quadrics of planes as Garland and Heckbert (1997); borders have planes of their own, no triangle turns
-    over and no hole closes.
+    The error is measured by quadrics of planes (Garland and Heckbert 1997). Borders have planes of their
+    own. No triangle turns over, and no hole closes.
 
     Args:
         at: (n, 3) vertices.
         triangles: (m, 3).
-        size: how many vertices are left, where so few can be reached.
+        size: wanted number of vertices; more remain if no further edge can be collapsed.
 
     Returns:
-        (k,) which vertices are left, and (j, 3) triangles of these.
+        (k,) indices of the remaining vertices, and (j, 3) triangles of indices into these.
     """
     faces = {number: tuple(map(int, corners)) for number, corners in enumerate(triangles)}
     around: dict[int, set[int]] = defaultdict(set)
@@ -57,16 +57,20 @@ def decimated(at: Float64, triangles: Index, size: int) -> tuple[Index, Index]:
 
     heap = [(cost(*pair), *pair) for a, b in edges for pair in ((a, b), (b, a))]
     heapq.heapify(heap)
-    left = len(around)
-    while heap and left > size:
+    remaining = len(around)
+    while heap and remaining > size:
         before, gone, kept = heapq.heappop(heap)
         shared = around[gone] & around[kept]
         if not shared or before != cost(gone, kept):
             continue
         near = [{v for number in around[end] for v in faces[number]} - {gone, kept} for end in (gone, kept)]
         opposite = {v for number in shared for v in faces[number]} - {gone, kept}
-        along = len(shared) == 1
-        if near[0] & near[1] != opposite or (gone in border and not along) or (along and kept not in border):
+        on_border = len(shared) == 1
+        if (
+            near[0] & near[1] != opposite
+            or (gone in border and not on_border)
+            or (on_border and kept not in border)
+        ):
             continue
         moved = [number for number in around[gone] if number not in shared]
         if any(_turns(at, faces[number], gone, kept) for number in moved):
@@ -79,7 +83,7 @@ def decimated(at: Float64, triangles: Index, size: int) -> tuple[Index, Index]:
             around[kept].add(number)
         around[gone].clear()
         quadrics[kept] += quadrics[gone]
-        left -= 1
+        remaining -= 1
         for v in {v for number in around[kept] for v in faces[number]} - {kept}:
             heapq.heappush(heap, (cost(v, kept), v, kept))
             heapq.heappush(heap, (cost(kept, v), kept, v))
@@ -95,7 +99,7 @@ def _plane(corners: Float64) -> tuple[Float64, float]:
 
 
 def _turns(at: Float64, corners: tuple[int, ...], gone: int, kept: int) -> bool:
-    """Whether a triangle would turn over, or become a sliver."""
+    """Return whether a triangle would turn over, or become a sliver."""
     before = np.cross(at[corners[1]] - at[corners[0]], at[corners[2]] - at[corners[0]])
     a, b, c = (at[kept if v == gone else v] for v in corners)
     after = np.cross(b - a, c - a)

@@ -1,19 +1,19 @@
-"""What a document costs a live session: `python tests/benchmarks/document.py` prints it part by part.
+"""Measures the time of a document in a live session: `python tests/benchmarks/document.py` prints its parts.
 
-Blocks of cross-linked behaviours (nod, shake, smile, brows, gaze, emotion), each replacing the one before:
+Each document is a block of linked behaviours (nod, shake, smile, brows, gaze, emotion) that replaces the
+previous block:
 
     read      text -> Block
-    plan      Block -> Schedule: what its behaviours have against them and want of time, solved
-    expand    its behaviours -> channels
-    take in   the plan laid on the session clock: channels, events, predictions
-    feedback  all that is told of it until it has ended, each message as numbered text
-    together  all of these
-    stretch   the longest of what nobody can interrupt: reading, or planning to taking in
+    plan      Block -> Schedule: checks, preferred timings, solution
+    expand    behaviours -> channels
+    add       the plan -> channels, events and predictions on the session clock
+    feedback  all feedback of the block, as numbered text
+    total     all of these
+    longest   the longest step that cannot be interrupted: read, or plan to add
 
-Medians over many documents of a session that goes on, in milliseconds; then the least of `couple_lips`, which
-other work on the machine disturbs less. `noise` is how much longer than usual the slowest twentieth took of
-the runs of one piece of work that does nothing else, between the documents. `growth` is the exponent of the
-time in the number of behaviours, from 6 to 60: 1 is linear. Measures only; nothing asserts a time.
+The program prints medians over many documents of one session in milliseconds, and the least total. `noise` is
+how much longer than its median the slowest 5 % of a fixed piece of work take between the documents. `growth`
+is the exponent of the time in the number of behaviours, from 6 to 60: 1 is linear.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from stopwatch import helped
+from stopwatch import handle_help
 
 from bml_schema import Block, read
 from realizer.behaviours.registry import KINDS, VOCABULARY
@@ -35,13 +35,13 @@ from realizer.playback.player import Player
 from realizer.server.session.feedback_log import FeedbackLog
 
 COUNTS = (1, 6, 20, 60)
-PARTS = ("read", "plan", "expand", "take in", "feedback", "together", "stretch")
+PARTS = ("read", "plan", "expand", "add", "feedback", "total", "longest")
 REPEATS = 200
 SCENE = {"cup": (0.2, -0.1, 0.5)}
 
 
 def document(id: str, count: int) -> str:
-    """A block of so many behaviours, in groups of six that follow each other."""
+    """Return a block of `count` behaviours in consecutive groups of six."""
     parts = []
     for n in range(count):
         k = n // 6
@@ -61,20 +61,20 @@ def document(id: str, count: int) -> str:
 
 
 class Costs:
-    """Milliseconds of each part, a number a document."""
+    """Milliseconds of each part of each document."""
 
     def __init__(self) -> None:
         self.spent: dict[str, list[float]] = {}
 
     @contextmanager
     def of(self, part: str) -> Iterator[None]:
-        """Measure what is done within."""
-        began = time.perf_counter()
+        """Measure the time of the statements within `with`."""
+        begin_time = time.perf_counter()
         yield
-        self.spent.setdefault(part, []).append(1e3 * (time.perf_counter() - began))
+        self.spent.setdefault(part, []).append(1e3 * (time.perf_counter() - begin_time))
 
     def combine(self, part: str, of: Callable[..., float], *parts: str) -> None:
-        """A part that is made of others."""
+        """Compute the values of a part from those of others."""
         self.spent[part] = [of(*row) for row in zip(*(self.spent[p] for p in parts), strict=True)]
 
     def median(self, part: str) -> float:
@@ -82,14 +82,14 @@ class Costs:
 
 
 def play(count: int) -> tuple[Costs, int]:
-    """What documents of a size cost, and how many messages tell of one."""
+    """Return the times of documents of a size, and the number of feedback messages of one document."""
     player, log, costs = Player(PlayOptions(scene=SCENE)), FeedbackLog(epoch=1e9), Costs()
-    now, told = 0.0, 0
+    now, message_count = 0.0, 0
     gc.collect()
-    gc.disable()  # a service looks for cycles seldom, and not while it plans
+    gc.disable()  # as in a service, which does not collect garbage while it plans
     for number in range(REPEATS + 10):
         if number == 10:
-            costs.spent.clear()  # now tables are read
+            costs.spent.clear()  # the first documents load tables
         text = document(f"b{number}", count)
         with costs.of("read"):
             (block,) = read(text, VOCABULARY)
@@ -116,28 +116,28 @@ def play(count: int) -> tuple[Costs, int]:
                     break
                 else:
                     now = due
-        told = log.newest - before
+        message_count = log.newest - before
         now += 3.0
         with costs.of("noise"):
             sum(map(math.sqrt, range(10_000)))
     gc.enable()
-    costs.combine("together", lambda *parts: sum(parts), "read", "submit", "feedback")
-    costs.combine("take in", lambda submit, planning: submit - planning, "submit", "planning")
+    costs.combine("total", lambda *parts: sum(parts), "read", "submit", "feedback")
+    costs.combine("add", lambda submit, planning: submit - planning, "submit", "planning")
     costs.combine("plan", lambda planning, expand: planning - expand, "planning", "expand")
-    costs.combine("stretch", max, "read", "submit")
-    return costs, told
+    costs.combine("longest", max, "read", "submit")
+    return costs, message_count
 
 
 def main() -> None:
-    helped(__doc__)
+    handle_help(__doc__)
     print("".join((f"{'behaviours':>10}", *(f"{part:>10}" for part in PARTS), "     least  messages  noise")))
     medians: dict[int, dict[str, float]] = {}
     for count in COUNTS:
-        costs, told = play(count)
+        costs, message_count = play(count)
         medians[count] = {part: costs.median(part) for part in PARTS}
         slowest = statistics.quantiles(costs.spent["noise"], n=20)[-1] / costs.median("noise")
         row = "".join(f"{medians[count][part]:>10.3f}" for part in PARTS)
-        print(f"{count:>10}{row}{min(costs.spent['together']):>10.3f}{told:>10}{slowest - 1:>7.0%}")
+        print(f"{count:>10}{row}{min(costs.spent['total']):>10.3f}{message_count:>10}{slowest - 1:>7.0%}")
     growth = {part: math.log10(medians[60][part] / medians[6][part]) for part in PARTS}
     print(f"{'growth':>10}{''.join(f'{growth[part]:>10.2f}' for part in PARTS)}")
 

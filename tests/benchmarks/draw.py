@@ -1,4 +1,4 @@
-"""What a picture costs: medians in ms a frame, and film in frames a second.
+"""Measures the time of pictures in ms per frame, and of films in frames per second.
 
 python tests/benchmarks/draw.py [--face NAME] [--size 512x512] [--way auto] [--frames 60]
 """
@@ -41,15 +41,15 @@ TEXT = (
 
 
 def film(face: str, size: str) -> tuple[float, float]:
-    """Seconds from a text to its film by the command line, start included; and processor seconds of that."""
+    """Return elapsed and processor seconds from a text to its film by the command line, with its start."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "realizer", "realize", "-", "-q", "--voice", "silent"]
         command += ["--face", face, "--size", size, "-o", str(Path(folder) / "x.mp4")]
-        began, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
+        begin, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
         subprocess.run(command, input=TEXT, text=True, check=True)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
     spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return time.perf_counter() - began, spent
+    return time.perf_counter() - begin, spent
 
 
 def main() -> None:

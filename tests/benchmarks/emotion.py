@@ -1,12 +1,12 @@
-"""What is recognised of what was synthesised, face by face, and how long a word takes.
+"""Measures how often synthesised emotions are recognised on each face, and the time of a word.
 
 python tests/benchmarks/emotion.py [--face NAME ...] [--draws 40]
 
-Each profile is drawn at random, moves the face's mesh, and is recognised from the feature points of the mesh,
-with a noise of one tenth of the range on each measured value (of a FAP that a profile does not move: of its
-class around 0). That the archetypes come back proves that nothing is lost on the way, not that people would
-agree: the ranges are those that made the faces. The last table is the path of the 15 distances of Raouzaiou
-et al. 2002, table 3, which see the outer lips and not the inner ones, and one sum for both lids.
+Random FAPs of each profile move the face's mesh. The emotion is recognised from the feature points of the
+mesh, with noise of a tenth of each FAP's range (for a FAP without a range: of the class "absent"). High rates
+show that nothing is lost between synthesis and recognition, not that people would agree, because both use the
+same ranges. The last table uses the 15 distances of Raouzaiou et al. 2002, table 3, which describe only the
+outer lips, and one sum for both eyelids.
 """
 
 from __future__ import annotations
@@ -35,17 +35,21 @@ Counts = dict[str, Counter[str]]
 
 
 def lengths(profile: Profile) -> np.ndarray:
-    """(68,) the length of the class of each FAP."""
+    """Return (68,), the length of each FAP's range."""
     found = np.full(68, 2 * emotion_model().absent)
     for fap, (low, high) in profile.ranges.items():
         found[fap - 1] = high - low
     return found
 
 
-def through_mesh(
+def recognise_from_mesh(
     face: Face, known: Recogniser, profiles: Sequence[Profile], draws: int, numbered: bool
 ) -> Counts:
-    """Emotion -> what it was taken for, over draws of its profiles; `numbered` names end in a number."""
+    """Return emotion -> recognised emotions of random draws of its profiles.
+
+    Args:
+        numbered: whether the names of profiles end in a number.
+    """
     chance = np.random.default_rng(0)
     found: Counts = {}
     for profile in profiles:
@@ -57,8 +61,10 @@ def through_mesh(
     return found
 
 
-def through_features(face: Face, known: Recogniser, profiles: Sequence[Profile], draws: int) -> Counts:
-    """The same by the 15 features alone, without noise."""
+def recognise_from_distances(
+    face: Face, known: Recogniser, profiles: Sequence[Profile], draws: int
+) -> Counts:
+    """Return emotion -> recognised emotions by the 15 distances alone, without noise."""
     chance = np.random.default_rng(0)
     known = Recogniser([measurable_profile(profile) for profile in known.profiles])
     rest = {name: face.vertices[index] for name, index in face.feature_points.items()}
@@ -73,7 +79,7 @@ def through_features(face: Face, known: Recogniser, profiles: Sequence[Profile],
 
 
 def show(title: str, counts: Counts) -> None:
-    """A row a synthesised emotion, a column a recognised one, per cent."""
+    """Print per cent of recognised emotions (columns) for each synthesised emotion (row)."""
     columns = [*counts, *sorted({got for row in counts.values() for got in row} - set(counts))]
     right = [row[name] / row.total() for name, row in counts.items()]
     print(f"\n{title}: {100 * statistics.mean(right):.1f} % right, the worst {100 * min(right):.0f} %")
@@ -87,7 +93,7 @@ def show(title: str, counts: Counts) -> None:
 
 
 def speed() -> None:
-    """Microseconds a word or place, the slowest and the median."""
+    """Print the time of a word and of a point on the wheel of emotions."""
     spent = []
     for _ in range(20):
         for word in known_words():
@@ -116,13 +122,15 @@ def main() -> None:
         for profiles in ("own", "published"):
             every = [p for numbered in archetypes(profiles).values() for p in numbered.values()]
             known = recogniser(profiles)
-            show(f"{name}, {profiles}, mesh", through_mesh(face, known, every, chosen.draws, True))
+            show(f"{name}, {profiles}, mesh", recognise_from_mesh(face, known, every, chosen.draws, True))
             words = [emotion(word, profiles) for word in rated]
             show(
                 f"{name}, {profiles}, words",
-                through_mesh(face, Recogniser(words), words, chosen.draws, False),
+                recognise_from_mesh(face, Recogniser(words), words, chosen.draws, False),
             )
-            show(f"{name}, {profiles}, 15 features", through_features(face, known, every, chosen.draws))
+            show(
+                f"{name}, {profiles}, 15 features", recognise_from_distances(face, known, every, chosen.draws)
+            )
     speed()
 
 

@@ -1,4 +1,4 @@
-"""How true a face's FAPs are: the 127 displacements by rules and by eye, beside what Paul 2010 gave others.
+"""Scores the 127 FAP displacements of faces by rules and by eye, beside the scores of Paul 2010.
 
 python tests/benchmarks/face.py [--face NAME ...] [--all] [--worst 10]
 """
@@ -20,8 +20,8 @@ BY_EYE = Path(__file__).with_name("fap_scores_by_eye.csv")
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
-    """What one FAP in one direction (1 or -1) looked like, and its score of 3, 2, 1 or 0."""
+class EyeScore:
+    """The score (0 to 3) of one FAP in one direction (1 or -1) by eye, and a note on what was seen."""
 
     face: str
     fap: int
@@ -30,32 +30,34 @@ class Seen:
     seen: str
 
 
-def by_eye(name: str, truths: tuple[FapScore, ...]) -> str:
-    """The mean of what was looked at, weighted as the rules' is; what nobody looked at does not count."""
-    rows = read_csv(BY_EYE.read_text("utf-8"), Seen, BY_EYE.name)
+def by_eye(name: str, results: tuple[FapScore, ...]) -> str:
+    """Return a line with the weighted mean of the scores by eye; FAPs without a score do not count."""
+    rows = read_csv(BY_EYE.read_text("utf-8"), EyeScore, BY_EYE.name)
     scores = {(row.fap, row.direction): row.score for row in rows if row.face == name}
-    seen = [(truth.weight, scores[key]) for truth in truths if (key := (truth.fap, truth.sign)) in scores]
+    seen = [
+        (result.weight, scores[key]) for result in results if (key := (result.fap, result.sign)) in scores
+    ]
     if not seen:
-        return f"{name + ', weighted mean':30}     -   (by eye: not looked at)"
+        return f"{name + ', weighted mean':30}     -   (by eye: no scores)"
     mean = sum(weight * score for weight, score in seen) / sum(weight for weight, _ in seen)
-    return (
-        f"{name + ', weighted mean':30}{mean:6.2f}   (by eye at 512, {len(seen)} of {len(truths)} looked at)"
-    )
+    return f"{name + ', weighted mean':30}{mean:6.2f}   (by eye at 512, {len(seen)} of {len(results)})"
 
 
 def zones_line(name: str) -> str:
-    """The same mesh moved by zones of influence alone, as a head without shapes would be."""
+    """Return a line with the score of the same mesh moved by zones of influence, without its shapes."""
     with TemporaryDirectory() as folder:
         copy_with_zones(folder_of(name), Path(folder) / name)
-        truths = score_faps(load_face(name, Path(folder)))
-    perfect = sum(truth.score == 3 for truth in truths)
-    return f"{name + ', by zones':30}{mean_score(truths):6.2f}   (rules; {perfect} of {len(truths)} at 3)"
+        results = score_faps(load_face(name, Path(folder)))
+    perfect = sum(result.score == 3 for result in results)
+    return f"{name + ', by zones':30}{mean_score(results):6.2f}   (rules; {perfect} of {len(results)} at 3)"
 
 
-def line(truth: FapScore) -> str:
-    shares = "".join(f"{100 * value:9.2f}" for value in truth.faults)
-    sign = "+" if truth.sign > 0 else "-"
-    return f"{truth.fap:3} {sign} {truth.name:22}{truth.usual:8.0f}{shares}{truth.weight:4}{truth.score:7}"
+def line(result: FapScore) -> str:
+    shares = "".join(f"{100 * value:9.2f}" for value in result.faults)
+    sign = "+" if result.sign > 0 else "-"
+    return (
+        f"{result.fap:3} {sign} {result.name:22}{result.usual:8.0f}{shares}{result.weight:4}{result.score:7}"
+    )
 
 
 def main() -> None:
@@ -66,21 +68,21 @@ def main() -> None:
     chosen = options.parse_args()
     for name in chosen.face:
         face = load_face(name)
-        began = time.perf_counter()
-        truths = score_faps(face)
-        spent = time.perf_counter() - began
-        print(f"{name}: {len(truths)} displacements of {len(face.vertices)} vertices in {spent:.1f} s")
+        begin = time.perf_counter()
+        results = score_faps(face)
+        spent = time.perf_counter() - begin
+        print(f"{name}: {len(results)} displacements of {len(face.vertices)} vertices in {spent:.1f} s")
         print(
             f"{'FAP':28}{'usual':>8}{'error %':>9}{'mirror %':>9}{'others %':>9}{'flips %':>9}{'rough %':>9}"
             f"{'w':>4}{'score':>7}"
         )
-        order = sorted(truths, key=lambda t: (t.score, -t.weight, -max(t.error, t.others, t.rough)))
-        for truth in truths if chosen.all else order[: chosen.worst]:
-            print(line(truth))
-        each = ", ".join(f"{k}: {sum(t.score == k for t in truths)}" for k in (3, 2, 1, 0))
+        order = sorted(results, key=lambda t: (t.score, -t.weight, -max(t.error, t.others, t.rough)))
+        for result in results if chosen.all else order[: chosen.worst]:
+            print(line(result))
+        each = ", ".join(f"{k}: {sum(t.score == k for t in results)}" for k in (3, 2, 1, 0))
         print(f"scores {each}")
-        print(f"{name + ', weighted mean':30}{mean_score(truths):6.2f}   (rules)")
-        print(by_eye(name, truths))
+        print(f"{name + ', weighted mean':30}{mean_score(results):6.2f}   (rules)")
+        print(by_eye(name, results))
         print(zones_line(name))
         for peer, score in PEERS.items():
             print(f"{peer:30}{score:6.2f}   (by eye, Paul 2010; FAPs that it lacks count 0)")

@@ -1,11 +1,11 @@
-"""Fit the table of action units and FAPs to a face's own shapes, and say it as rows of the table.
+"""Fits the FAPs of action units to a face's own shapes, and prints them as rows of the table.
 
 python tests/benchmarks/fit_au_to_fap.py [--face NAME] [--data FOLDER] [--au 12 ...] [--write]
 
-For each action unit with a shape: the FAP values, within the bounds of `au_to_fap_bounds.csv` (what the
-published maps and FACS say it may move, and which way), that bring the MPEG-4 deformer nearest to it in
-the least squares over the visible skin of the left half. Lips do not pass through each other, and AU26 parts
-them at least as far as AU25, AU27 as AU26. Rounded, and without what nobody sees.
+For each action unit with a shape, the FAP values minimise the squared error of the MPEG-4 deformer over the
+visible skin of the left half. They lie within the bounds of `au_to_fap_bounds.csv`, which come from published
+maps and from FACS. Lips do not pass through each other; AU26 opens them at least as far as AU25, and AU27 as
+far as AU26. Values are rounded, and invisible ones are left out.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
-from au_to_fap import Skin, asked, cosine, shapes_of
+from au_to_fap import Skin, cosine, shapes_of, table_faps
 from scipy.optimize import Bounds, LinearConstraint, minimize
 
 from realizer import tables
@@ -27,20 +27,19 @@ from realizer.core.array_types import Float32, Float64
 from realizer.face.load import load_face
 from realizer.tables import by_number, faps, read_csv
 
-# Upper and lower lip, one above the other: they part by -(upper + lower).
+# FAPs of the upper and the lower lip; the gap between them is -(upper + lower).
 INNER = ((4, 5), (8, 10))
 LIPS = (*INNER, (51, 52), (55, 57))
-PARTED = {26: 25, 27: 26}  # an action unit that parts the lips at least as far as the other
-STEP = 5.0  # what values are rounded to
-RIDGE = (
-    0.02  # of the mean square of what a FAP moves: of two ways to the same shape, the one that asks for less
-)
-SEEN = 0.04  # of the unit's length: what moves less is left out
+OPENS_AS_FAR = {26: 25, 27: 26}  # action unit -> another one that opens the lips no further
+STEP = 5.0  # values are rounded to multiples of it
+# Of several solutions for the same shape, ridge regression finds the one with the smallest values.
+RIDGE = 0.02  # of the mean square of a FAP's displacements
+MIN_SHARE = 0.04  # of the action unit's displacement; FAPs that contribute less are left out
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A row of bounds.csv; FAPs of the left side stand for both."""
+    """A row of au_to_fap_bounds.csv; FAPs of the left side stand for both sides."""
 
     au: int
     length: float
@@ -50,7 +49,7 @@ class Row:
 
 
 def pair(values: Float64, numbers: list[int]) -> Float32:
-    """(68,) a FAP row of values of `numbers` and their mirrors."""
+    """Return (68,), a FAP row with the values of `numbers` and of their mirrors."""
     row = np.zeros(68, np.float32)
     for number, value in zip(numbers, values, strict=True):
         fap = faps()[number - 1]
@@ -61,27 +60,27 @@ def pair(values: Float64, numbers: list[int]) -> Float32:
 def fit(
     skin: Skin, wanted: Float64, bounds: list[Row], gaps: dict[tuple[int, int], float]
 ) -> dict[int, float]:
-    """FAP -> value at full intensity, within the bounds; lips part by at least `gaps`."""
+    """Return FAP -> value at full intensity, within the bounds; the gaps of the lips are at least `gaps`."""
     numbers = [bound.fap for bound in bounds]
     low, high = np.array([b.least for b in bounds]), np.array([b.most for b in bounds])
     values = np.clip(0.0, low, high).astype(np.float64)
     size = np.array([faps()[number - 1].most / 20 for number in numbers])
     apart = np.array([[-1.0 if n in lips else 0.0 for n in numbers] for lips in gaps]) * size
-    for _ in range(3):  # jaw and lids are not straight: start again from where the last fit came to
+    for _ in range(3):  # jaw and lids are not linear: linearise again at the last fit
         rows = [pair(values, numbers), *(pair(values + size * one, numbers) for one in np.eye(len(size)))]
         moves = skin.moves(np.stack(rows)).reshape(len(rows), -1)
-        fields = moves[1:] - moves[0]  # of a step of `size`
+        fields = moves[1:] - moves[0]  # displacements by a step of `size`
         target = wanted.ravel() - moves[0] + (values / size) @ fields
         limits = LinearConstraint(apart, np.array(list(gaps.values())), np.inf)
         values = np.clip(solve(fields, target, Bounds(low / size, high / size), limits) * size, low, high)
     length = np.linalg.norm(wanted)
-    strong = np.abs(values / size) * np.sqrt(np.diag(fields @ fields.T)) > SEEN * length
-    kept = np.clip(np.where(strong, values, 0.0), low, high)
-    return {n: float(v) for n, v in zip(numbers, np.rint(kept / STEP) * STEP, strict=True) if v}
+    strong = np.abs(values / size) * np.sqrt(np.diag(fields @ fields.T)) > MIN_SHARE * length
+    rounded = np.clip(np.where(strong, values, 0.0), low, high)
+    return {n: float(v) for n, v in zip(numbers, np.rint(rounded / STEP) * STEP, strict=True) if v}
 
 
 def solve(fields: Float64, target: Float64, bounds: Bounds, limits: LinearConstraint) -> Float64:
-    """(k,) how much of each field (k, n) together is nearest to the target (n,)."""
+    """Return (k,), the factors of the fields (k, n) whose sum is nearest to the target (n,)."""
     whole = float(target @ target)
     square, aimed = fields @ fields.T / whole, fields @ target / whole
     square += RIDGE * np.diag(np.diag(square))
@@ -101,16 +100,18 @@ def solve(fields: Float64, target: Float64, bounds: Bounds, limits: LinearConstr
     return np.asarray(found.x, np.float64)
 
 
-def gaps_of(number: int, found: dict[int, dict[int, float]]) -> dict[tuple[int, int], float]:
-    """The least that pairs of lips part."""
-    if number not in PARTED:
+def least_gaps(number: int, found: dict[int, dict[int, float]]) -> dict[tuple[int, int], float]:
+    """Return the least gap of each pair of points on the lips."""
+    if number not in OPENS_AS_FAR:
         return dict.fromkeys(INNER, 0.0)
-    before = found.get(PARTED[number]) or dict(enumerate(asked([PARTED[number]])[0].tolist(), 1))
+    before = found.get(OPENS_AS_FAR[number]) or dict(
+        enumerate(table_faps([OPENS_AS_FAR[number]])[0].tolist(), 1)
+    )
     return {(a, b): -before.get(a, 0.0) - before.get(b, 0.0) for a, b in LIPS}
 
 
 def rows_of(number: int, values: dict[int, float]) -> list[str]:
-    """Rows of the table, both sides."""
+    """Return the rows of the table for both sides."""
     sides = ("L", "R") if by_number()[number].sides else ("",)
     lines = []
     for side in sides:
@@ -124,7 +125,7 @@ def rows_of(number: int, values: dict[int, float]) -> list[str]:
 
 
 def write(new: dict[int, list[str]]) -> None:
-    """Put rows in the place of those that the table has of their action units."""
+    """Replace the rows of action units in the table."""
     path = Path(tables.__file__).with_name("au_to_fap.csv")
     lines = []
     for line in path.read_text("utf-8").splitlines():
@@ -159,9 +160,9 @@ def main() -> None:
             continue
         wanted = shapes[number].moves[skin.marks]
         part = bounds[number][0].length
-        found[number] = fit(skin, part * wanted, bounds[number], gaps_of(number, found))
+        found[number] = fit(skin, part * wanted, bounds[number], least_gaps(number, found))
         row = pair(np.array(list(found[number].values())), list(found[number]))
-        before, after = skin.moves(np.stack([asked([number])[0], row]))
+        before, after = skin.moves(np.stack([table_faps([number])[0], row]))
         near = f"{cosine(wanted, before):.3f} -> {cosine(wanted, after):.3f}"
         ratio = np.linalg.norm(after) / np.linalg.norm(wanted)
         print(f"# AU{number}: cosine {near}, ratio {ratio:.2f}")

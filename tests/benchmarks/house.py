@@ -1,14 +1,14 @@
-"""How the code is built: `python tests/benchmarks/house.py [CHECKOUT ...]` prints a table, a column each.
+"""Measures the structure of the code: `python tests/benchmarks/house.py [CHECKOUT ...]` prints a table.
 
-Counted are Python files of bml_schema, realizer and tests. An import counts wherever it stands, in functions
-and for types only, too; an import from a package is one of its `__init__` unless it names a module. Files
-that reach each other are a circle. A module is tested by tests/PACKAGE/test_MODULE.py. The parameters of
-callbacks of commands are not counted. Below the table: the circles, and the modules of a document's and a
-frame's way.
+The table counts Python files of bml_schema, realizer and tests. All imports count, also those in functions
+and for types; an import from a package counts for its `__init__`, unless it names a module. Files that import
+each other, directly or not, form a circle. The tests of a module are in tests/PACKAGE/test_MODULE.py.
+Parameters of commands do not count. Below the table are the circles, and the paths of a document and of a
+frame.
 
-These are traced (not with --static) in a service: a document's way are its modules of which a function runs
-from the message, one speech, to the first function of realizer/scheduling; a frame's way, those that run in
-the callbacks that send FAPs to one client, for 20 s.
+The paths are traced in a service (not with --static). The path of a document has the modules that run between
+the receipt of a speech and the first function of realizer/scheduling; the path of a frame has those that run
+in the callbacks that send FAPs to one client, for 20 s.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ from pathlib import Path
 from typing import Any
 
 PACKAGES = ("bml_schema", "realizer")
-SERVICE = ("server", "protocol")  # folders of realizer whose modules are on the way
+SERVICE = ("server", "protocol")  # folders of realizer that are counted in the paths
 LONG_NAME = 70
-PART = "  realizer/"  # begins the rows of its folders
+PART = "  realizer/"  # prefix of the rows of its folders
 SPEECH = '<bml id="b"><speech id="s"><text>Hello there.</text></speech></bml>'
 
 
@@ -42,7 +42,7 @@ class Checkout:
         self.root = root
         found = (path for package in (*PACKAGES, "tests") for path in (root / package).rglob("*.py"))
         inside = sorted(path.relative_to(root) for path in found)
-        # Not ours: what npm installs, and faces that a wheel holds.
+        # Without the packages of npm, and the faces in a wheel.
         self.files = [path for path in inside if not {"node_modules", "_faces"} & set(path.parts)]
         self.texts = {path: (root / path).read_text("utf-8") for path in self.files}
         self.trees = {path: ast.parse(text) for path, text in self.texts.items()}
@@ -56,7 +56,7 @@ class Checkout:
 
     @cached_property
     def imports(self) -> dict[Path, set[Path]]:
-        """Which of our files each of them imports."""
+        """File of ours -> the files of ours that it imports."""
         return {path: set(self._imported(path)) - {path} for path in self.ours}
 
     def _imported(self, path: Path) -> Iterable[Path]:
@@ -73,14 +73,14 @@ class Checkout:
 
     @cached_property
     def circles(self) -> list[list[Path]]:
-        """Files that reach each other, the largest group first."""
+        """Groups of files that import each other, the largest group first."""
         reached = {path: _reach(self.imports, path) for path in self.ours}
         groups = {frozenset(p for p in reached[path] if path in reached[p]) for path in self.ours}
         return sorted((sorted(group) for group in groups if len(group) > 1), key=lambda g: (-len(g), g))
 
     @cached_property
     def untested(self) -> list[Path]:
-        """Modules without a test module of their own name."""
+        """Modules without a test module of their name."""
         modules = [path for path in self.ours if path.name not in ("__init__.py", "__main__.py")]
         return [p for p in modules if Path("tests", *p.parts[:-1], f"test_{p.name}") not in self.tests]
 
@@ -153,23 +153,23 @@ def _parameters(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
 
 
 def _command(function: ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
-    """Whether it is the callback of a command."""
+    """Return whether it is the callback of a command."""
     return any(re.search(r"\b(command|group|option)\(", ast.unparse(d)) for d in function.decorator_list)
 
 
-def _most(counts: Mapping[Any, int], most: int = 3) -> str:
-    first = sorted(counts.items(), key=lambda item: (-item[1], str(item[0])))[:most]
+def _most(counts: Mapping[Any, int], limit: int = 3) -> str:
+    first = sorted(counts.items(), key=lambda item: (-item[1], str(item[0])))[:limit]
     return "; ".join(f"{count} {name}" for name, count in first)
 
 
-# What runs --------------------------------------------------------------------------------------------
+# Traces --------------------------------------------------------------------------------------------
 
 
 class Trace:
-    """The files of realizer of which a function runs, in order, until one of the folder `end` does.
+    """Collects the files of realizer whose functions run, in order, until one in the folder `end` runs.
 
     Args:
-        writes: only what runs in a callback of the event loop that writes to a socket.
+        writes: collect only files in callbacks of the event loop that write to a socket.
     """
 
     def __init__(self, root: Path, end: str = "", *, writes: bool = False) -> None:
@@ -179,7 +179,7 @@ class Trace:
         self._root, self._end, self._writes = f"{root / 'realizer'}{os.sep}", end, writes
 
     def __call__(self, frame: Any, event: str, argument: object) -> None:
-        """Take what `sys.setprofile` tells."""
+        """Handle an event of `sys.setprofile`."""
         if event != "call":
             return
         file, name = frame.f_code.co_filename, frame.f_code.co_name
@@ -197,20 +197,20 @@ class Trace:
             self.files |= self._callback
 
 
-async def ways(root: Path) -> dict[str, list[str]]:
-    """Trace a document's way and a frame's way in a service."""
+async def trace_paths(root: Path) -> dict[str, list[str]]:
+    """Trace the paths of a document and of a frame in a service."""
     from virtual_clock import service
     from websockets.asyncio.client import connect
 
-    async with service() as url, connect(url) as talker, connect(url) as viewer:
-        for id in ("first", "b"):  # what only the first document loads is not on the way
+    async with service() as url, connect(url) as sender, connect(url) as viewer:
+        for id in ("first", "b"):  # the first document loads modules that the second does not need
             await asyncio.sleep(1)
             document = Trace(root, "scheduling" + os.sep)
             sys.setprofile(document)
-            await talker.send(SPEECH.replace('"b"', f'"{id}"'))
+            await sender.send(SPEECH.replace('"b"', f'"{id}"'))
             await asyncio.sleep(5)
             sys.setprofile(None)
-        await talker.close()
+        await sender.close()
         await viewer.send('{"type":"subscribe","stream":"fap","fps":25}')
         await asyncio.sleep(3.02)
         frame = Trace(root, writes=True)
@@ -221,7 +221,7 @@ async def ways(root: Path) -> dict[str, list[str]]:
 
 
 def traced(root: Path) -> dict[str, list[str]]:
-    """Return the ways in a checkout, traced by a process of its own."""
+    """Return the paths in a checkout, traced in a separate process."""
     environment = os.environ | {"PYTHONPATH": str(root), "OPENBLAS_NUM_THREADS": "1"}
     command = [sys.executable, str(Path(__file__).resolve()), "--trace", str(root)]
     done = subprocess.run(command, env=environment, cwd=root, stdout=subprocess.PIPE, text=True, check=True)
@@ -237,24 +237,24 @@ def main() -> None:
     parser.add_argument("--static", action="store_true", help="trace nothing")
     parser.add_argument("--untested", action="store_true", help="name the modules without a test")
     parser.add_argument("--trace", action="store_true", help=argparse.SUPPRESS)
-    asked = parser.parse_args()
-    roots = [root.resolve() for root in asked.checkouts]
-    if asked.trace:
+    options = parser.parse_args()
+    roots = [root.resolve() for root in options.checkouts]
+    if options.trace:
         from virtual_clock import run
 
-        print(json.dumps(run(ways(roots[0]))))
+        print(json.dumps(run(trace_paths(roots[0]))))
         return
     checkouts = [Checkout(root) for root in roots]
     tables = [checkout.table() for checkout in checkouts]
     details: list[str] = []
     for root, checkout, table in zip(roots, checkouts, tables, strict=True):
         details += [f"\n{root}: circle of {len(c)}: {', '.join(map(str, c))}" for c in checkout.circles]
-        for way, files in ({} if asked.static else traced(root)).items():
+        for item, files in ({} if options.static else traced(root)).items():
             inside = [file for file in files if file.startswith(SERVICE)]
             count = f"{len(inside)}, elsewhere {len(files) - len(inside)}"
-            table[f"a {way}'s way: modules of the service"] = count
-            details.append(f"\n{root}: a {way}'s way: {', '.join(files)}")
-        if asked.untested:
+            table[f"path of a {item}: modules of the service"] = count
+            details.append(f"\n{root}: path of a {item}: {', '.join(files)}")
+        if options.untested:
             details += [f"{root}: no test of its name: {path}" for path in checkout.untested]
     rows = list(dict.fromkeys(name for table in tables for name in table))
     parts = sorted(row for row in rows if row.startswith(PART))

@@ -1,12 +1,11 @@
-"""Prints what journals cost: time of a document, and bytes and time of a takeover after very many of them.
+"""Measures journals: the time per document, and the size and time of a takeover after many documents.
 
 Run: python -m tests.benchmarks.journal [--documents 10000] [--apart 8] [--kinds SQLite Redis record]
 
-A session plays one document after another on a clock of its own, one each `--apart` seconds, of five
-kinds; its voice is silent. Everything is written to each kind of journal in turn: a file (SQLite), Redis
-where its server is installed, both with checkpoints and without, as they were before there were any; and a
-record, which is never made shorter. What is said of a document and of a takeover is CPU time of this process
-(a Redis server has its own); single calls are as they were seen, with the noise of the machine.
+A session with a simulated clock and a silent voice plays five kinds of documents in turn, one every `--apart`
+seconds. The kinds of journals are a file (SQLite) and Redis, if its server is installed, each with and
+without checkpoints, and a recording, which has no checkpoints. Times of documents and takeovers are CPU times
+of this process, without that of a Redis server; times of single calls are elapsed times.
 """
 
 from __future__ import annotations
@@ -46,8 +45,8 @@ DOCUMENTS = (
 )
 
 
-class Watched:
-    """A journal, and how long each of its calls took."""
+class TimedJournal:
+    """A journal that records the seconds of each call of `add`."""
 
     def __init__(self, journal: Journal) -> None:
         self._journal = journal
@@ -62,93 +61,93 @@ class Watched:
 
 @contextmanager
 def _timed(spent: list[float]) -> Iterator[None]:
-    began = time.perf_counter()
+    begin_time = time.perf_counter()
     yield
-    spent.append(time.perf_counter() - began)
+    spent.append(time.perf_counter() - begin_time)
 
 
 @contextmanager
 def timed_checkpoints() -> Iterator[list[float]]:
-    """Collect the seconds of each checkpoint, from looking at the session to its end on the disk."""
+    """Collect the seconds of each checkpoint, from the state of the session to the written entry."""
     seconds: list[float] = []
     compact = Session._compact
 
     def timed(session: Session, t: float) -> bool:
-        began = time.perf_counter()
+        begin_time = time.perf_counter()
         if done := compact(session, t):
-            seconds.append(time.perf_counter() - began)
+            seconds.append(time.perf_counter() - begin_time)
         return done
 
     with patch.object(Session, compact.__name__, timed):
         yield seconds
 
 
-def spoken(order: Speak) -> Utterance:
+def speak(order: Speak) -> Utterance:
     return speak_to_length(SilentVoice(), order.request)
 
 
-def opened() -> Session:
+def open_session() -> Session:
     return Session("long", SETTINGS, 0.0, named=True, epoch=0.0)
 
 
-def played(
+def play(
     documents: int, apart: float, journal: Journal | None, record: RecordingFolder | None = None
 ) -> float:
-    """CPU milliseconds of a document."""
-    session = opened()
+    """Play documents; return the CPU milliseconds of one."""
+    session = open_session()
     session.journal = JournalWriter("long", journal, record)
     session.journal.begin(0.0)
     session.connect(1, 0.0)
     session.receive(1, '{"type":"scene","objects":{"cup":{"x":0.2,"y":-0.1,"z":0.5}}}', 0.0)
-    began = time.process_time()
+    begin_time = time.process_time()
     for k in range(documents):
         session.receive(1, DOCUMENTS[k % len(DOCUMENTS)].replace("{k}", str(k)), apart * k)
         now = apart * k
         while True:
             for effect in session.take_effects():
                 if isinstance(effect, Speak):
-                    session.on_speech(effect.id, spoken(effect), now)
+                    session.on_speech(effect.id, speak(effect), now)
             due = 0.0 if session.has_documents else session.next_due()
             if due > apart * (k + 1):
                 break
             now = max(now, due)
             session.tick(now)
-    return 1000 * (time.process_time() - began) / documents
+    return 1000 * (time.process_time() - begin_time) / documents
 
 
-def size(kept: SavedSession) -> int:
-    """Bytes that are kept of the session."""
-    return sum(len(entry.line().encode()) for entry in kept.entries) + sum(
-        len(text.encode()) for text in kept.parts.values()
+def size(saved: SavedSession) -> int:
+    """Return the bytes of a saved session."""
+    return sum(len(entry.line().encode()) for entry in saved.entries) + sum(
+        len(text.encode()) for text in saved.parts.values()
     )
 
 
-def report(name: str, where: str, documents: int, apart: float, bare: float) -> None:
-    journal = Watched(journal_at(where))
+def report(name: str, where: str, documents: int, apart: float, no_journal: float) -> None:
+    journal = TimedJournal(journal_at(where))
     with timed_checkpoints() as taken:
-        cost = played(documents, apart, journal)
-    began = time.process_time()
-    kept = journal.take("long")
-    assert kept is not None
-    session = opened()
-    restore_session(session, kept, spoken)
-    took = time.process_time() - began
+        cost = play(documents, apart, journal)
+    begin_time = time.process_time()
+    saved = journal.take("long")
+    assert saved is not None
+    session = open_session()
+    restore_session(session, saved, speak)
+    seconds = time.process_time() - begin_time
     entries = len(journal.adds) / documents
     compacts = ""
     if taken:
         compacts = f"; {len(taken)} checkpoints, {1000 * statistics.median(taken):.1f} ms each (median),"
         compacts += f" {1000 * max(taken):.1f} at most"
     print(
-        f"{name}: {cost - bare:+.2f} ms a document ({entries:.1f} entries,"
-        f" {1e6 * statistics.median(journal.adds):.0f} us each); at the end {len(kept.entries)} entries,"
-        f" {size(kept) / 1000:.0f} kB, taken over in {took:.2f} s{compacts}",
+        f"{name}: {cost - no_journal:+.2f} ms a document ({entries:.1f} entries,"
+        f" {1e6 * statistics.median(journal.adds):.0f} us each); at the end {len(saved.entries)} entries,"
+        f" {size(saved) / 1000:.0f} kB, taken over in {seconds:.2f} s{compacts}",
         flush=True,
     )
 
 
 @contextmanager
 def redis(folder: Path) -> Iterator[str | None]:
-    """The URL of a Redis server of its own that writes each second, as that of docker/ does."""
+    """Start a Redis server that writes once a second, as in docker/; yield its URL, or None without Redis."""
     if (program := shutil.which("redis-server")) is None:
         yield None
         return
@@ -173,33 +172,33 @@ def main() -> None:
     parser.add_argument("--documents", type=int, default=10_000)
     parser.add_argument("--apart", type=float, default=8.0, help="seconds")
     parser.add_argument("--kinds", nargs="+", default=["SQLite", "Redis", "record"])
-    asked = parser.parse_args()
-    documents, apart = asked.documents, asked.apart
+    options = parser.parse_args()
+    documents, apart = options.documents, options.apart
     with tempfile.TemporaryDirectory() as name, ExitStack() as stack:
         folder = Path(name)
         url = stack.enter_context(redis(folder))
-        played(100, apart, None)  # what is loaded late is there
-        bare = played(documents, apart, None)
-        print(f"no journal: {bare:.2f} ms a document", flush=True)
+        play(100, apart, None)  # loads modules and tables
+        no_journal = play(documents, apart, None)
+        print(f"no journal: {no_journal:.2f} ms a document", flush=True)
         never = patch.multiple(thresholds, ENTRIES=10**9, BYTES=10**18)
         for kind, places in (
             ("SQLite", (folder / "whole.db", folder / "short.db")),
             ("Redis", (f"{url}/0", f"{url}/1")),
         ):
-            if kind not in asked.kinds or (kind == "Redis" and url is None):
+            if kind not in options.kinds or (kind == "Redis" and url is None):
                 continue
             with never:
-                report(f"{kind}, no checkpoints", str(places[0]), documents, apart, bare)
-            report(f"{kind}, checkpoints", str(places[1]), documents, apart, bare)
+                report(f"{kind}, no checkpoints", str(places[0]), documents, apart, no_journal)
+            report(f"{kind}, checkpoints", str(places[1]), documents, apart, no_journal)
         for path in sorted(folder.glob("*.db")):
             print(f"{path.name}: {path.stat().st_size / 1000:.0f} kB")
-        if "record" not in asked.kinds:
+        if "record" not in options.kinds:
             return
         record = RecordingFolder(folder / "records", {})
-        cost = played(documents, apart, None, record)
+        cost = play(documents, apart, None, record)
         record.close()
         (path,) = (folder / "records").iterdir()
-        print(f"record: {cost - bare:+.2f} ms a document; {path.stat().st_size / 1000:.0f} kB")
+        print(f"record: {cost - no_journal:+.2f} ms a document; {path.stat().st_size / 1000:.0f} kB")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
-"""What the knowledge of faces costs: `python tests/benchmarks/knowledge.py` prints medians in ms.
+"""Measures rules and expressions: `python tests/benchmarks/knowledge.py` prints medians in ms.
 
-Rules of co-occurrence on 250 frames, and a text of 1,000 words, beside the noise of the machine.
+The program applies the rules of co-occurrence to 250 frames, and adds expressions to a text of 1,000 words.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import random
 
 import numpy as np
-from stopwatch import helped, median, noise
+from stopwatch import handle_help, median, noise
 
 from realizer.animation.axis import AU_NAMES
 from realizer.animation.cooccurrence import bounds
@@ -29,7 +29,7 @@ def apply_rules(aus: Float32) -> Float32:
 
 
 def main() -> None:
-    helped(__doc__)
+    handle_help(__doc__)
     print(noise())
     dice = np.random.default_rng(1)
     every = dice.random((len(AU_NAMES()), 250), np.float32)

@@ -1,8 +1,8 @@
-"""What lips do while a voice speaks: `python -m tests.benchmarks.lips [--voice V] [--faces ada,ben,ida]`.
+"""Measures lip movements of speech: `python -m tests.benchmarks.lips [--voice V] [--faces ada,ben,ida]`.
 
-Sixty sentences in six languages, through the whole of `realize`, measured on the vertices of faces in the
-frames that a client gets at 25 a second, in each of eight phases of that grid. A line for each way of
-speaking (the rate, and what the face shows beside it), then the worst offenders of each kind.
+`realize` plays sixty sentences in six languages. The vertices of faces are measured in frames at 25 a second,
+in each of eight phases of this grid. The program prints a line for each way of speaking (a rate, and an
+expression of the face), then the worst cases of each fault.
 """
 
 from __future__ import annotations
@@ -84,16 +84,14 @@ SENTENCES = {
         La familia viaja en barco por el mar.
         ¿Dónde vive tu amiga Pilar?""",
 }
-STEP, FRAME = 0.005, 0.04  # s: phases of the grid of a client at 25 frames a second
-MEETS = 0.03  # of the mouth-nose separation
-LEAST_WINDOW = 0.06  # s; a shorter sound has a frame no further than this from its middle, whatever the phase
-OVERLAP = (
-    0.02  # of the mouth-nose separation: so far the lip stands before the teeth at least, and shows them
-)
+STEP, FRAME = 0.005, 0.04  # s between two phases, and between two frames of a client
+MAX_GAP = 0.03  # of the mouth-nose separation
+MIN_WINDOW = 0.06  # s; in every phase, it contains a frame near the middle of a shorter sound
+OVERLAP = 0.02  # of the mouth-nose separation, by which a biting lip must cover the teeth
 CLOSING, BITING = "pbm", "fv"
 OPEN = {"a": "aɑ", "e": "eɛ", "i": "i"}
-LONG = 0.06  # s; a vowel that has time to open
-SHOWN = {
+LONG_VOWEL = 0.06  # s; a shorter vowel has no time to open
+EXPRESSIONS = {
     "neutral": "",
     "smile": '<faceLexeme id="x" lexeme="HAPPINESS" amount="0.8" start="0" end="60"/>',
     "anger": '<faceLexeme id="x" lexeme="ANGER" amount="0.8" start="0" end="60"/>',
@@ -103,7 +101,7 @@ SHOWN = {
     "OPEN_MOUTH": '<faceLexeme id="x" lexeme="OPEN_MOUTH" amount="0.8" start="0" end="60"/>',
     "AU22": '<faceFacs id="x" au="22" amount="0.9" start="0" end="60"/>',
 }
-RATES = (80, 120, 250, 350, 450)  # words a minute beside the voice's own
+RATES = (80, 120, 250, 350, 450)  # words a minute
 BML = (
     '<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0" id="b" composition="REPLACE">{shown}'
     '<speech id="s" start="0.5"><text xml:lang="{language}">{text}</text></speech></bml>'
@@ -111,8 +109,8 @@ BML = (
 
 
 @dataclass
-class At:
-    """A voice that speaks at another rate."""
+class VoiceAtRate:
+    """A voice at another rate."""
 
     voice: Voice
     rate: float
@@ -127,7 +125,7 @@ class At:
 
 @dataclass
 class Score:
-    """Of one way of speaking: a line for each sound that should close, and the worst of all."""
+    """The measurements of one way of speaking: (value, place) of each sound or curve."""
 
     closed: list[tuple[float, str]] = field(default_factory=list)
     bitten: list[tuple[float, str]] = field(default_factory=list)
@@ -136,39 +134,39 @@ class Score:
     jolt: list[tuple[float, str]] = field(default_factory=list)
 
     def line(self) -> str:
-        """Pass rates, medians, worst speed and acceleration."""
+        """Return a line with pass rates, medians, and the largest speed and acceleration."""
         opened = " ".join(f"{100 * float(np.median(v or [np.nan])):5.1f}" for v in self.vowels.values())
         rates = " ".join(
             f"{sum(v < limit for v, _ in found):4d}/{len(found):<4d} worst {100 * max(found)[0]:5.1f} %"
-            for found, limit in ((self.closed, MEETS), (self.bitten, 0.0))
+            for found, limit in ((self.closed, MAX_GAP), (self.bitten, 0.0))
             if found
         )
         return f"{rates} | a e i {opened} | {max(self.speed)[0]:6.0f} {max(self.jolt)[0]:8.0f}"
 
 
 def windows(utterance: Utterance, start: float) -> Iterator[tuple[str, float, float, float, str]]:
-    """(IPA, begin, end, length, word) of each phoneme on the clock of the frames, wide enough for a frame."""
+    """Yield (IPA, begin, end, length, word) of each phoneme, widened to contain a frame."""
     words = utterance.words
     for phoneme in utterance.phonemes:
         middle = start + (phoneme.start + phoneme.end) / 2
-        half = max(LEAST_WINDOW, phoneme.end - phoneme.start) / 2
+        half = max(MIN_WINDOW, phoneme.end - phoneme.start) / 2
         inside = (w.text for w in words if w.start <= middle - start < w.end)
         yield phoneme.ipa, middle - half, middle + half, phoneme.end - phoneme.start, next(inside, "")
 
 
 def measure(voice: Voice, mouth: Mouth, shown: str, language: str, text: str, score: Score) -> None:
-    """One sentence, in every phase."""
-    document = BML.format(shown=SHOWN[shown], language=language, text=escape(text))
+    """Measure one sentence in every phase."""
+    document = BML.format(shown=EXPRESSIONS[shown], language=language, text=escape(text))
     played = realize(document, voice=voice, fps=1 / STEP, idle=False, face=mouth.face.name)
-    said = played.speeches[0]
+    speech = played.speeches[0]
     times = played.aus.times
-    keep = times < said.start + said.utterance.duration + 0.2
+    keep = times < speech.start + speech.utterance.duration + 0.2
     times, rows = times[keep], poses(played.aus, mouth.face.inputs)[keep]
     vertices = mouth.vertices(rows)
     gap, bite, path = mouth.gap(vertices), mouth.bite(vertices), mouth.path(vertices)
     phases = round(FRAME / STEP)
     here = f"{mouth.face.name} {language} {text[:24]!r}"
-    for ipa, begin, end, length, word in windows(said.utterance, said.start):
+    for ipa, begin, end, length, word in windows(speech.utterance, speech.start):
         inside = np.flatnonzero((times >= begin - 1e-9) & (times <= end + 1e-9))
         grids = [inside[inside % phases == phase] for phase in range(phases)]
         where = f"{here} {word!r} /{ipa}/ {begin:.3f}-{end:.3f} s"
@@ -176,11 +174,11 @@ def measure(voice: Voice, mouth: Mouth, shown: str, language: str, text: str, sc
             worst = max(float(gap[grid].min()) if len(grid) else np.inf for grid in grids)
             score.closed.append((worst, where))
         elif ipa[:1] in BITING and ipa:
-            # Below 0 where some frame has both: the lip before the teeth, and the teeth seen above it.
+            # Below 0 if in some frame the lip covers the teeth partly, so that they are visible above it.
             worst = max(float((OVERLAP - bite[grid].min(axis=1)).min()) if len(grid) else 1 for grid in grids)
             score.bitten.append((worst, where))
         for name, letters in OPEN.items():
-            if ipa[:1] and ipa[0] in letters and len(ipa.rstrip("ː")) == 1 and length >= LONG:
+            if ipa[:1] and ipa[0] in letters and len(ipa.rstrip("ː")) == 1 and length >= LONG_VOWEL:
                 score.vowels[name].append(float(gap[inside].max()))
     for phase in range(phases):
         steps = np.diff(path[phase::phases], axis=0)
@@ -195,7 +193,7 @@ def measure(voice: Voice, mouth: Mouth, shown: str, language: str, text: str, sc
 
 
 def lines(languages: str | None, every: int) -> list[tuple[str, str]]:
-    """(language, sentence), each `every`th."""
+    """Return each `every`th (language, sentence)."""
     found = [
         (language, line.strip())
         for language, text in SENTENCES.items()
@@ -212,12 +210,12 @@ def main() -> None:
     parser.add_argument("--languages", default=None)
     parser.add_argument("--every", type=int, default=1, help="take each n-th sentence")
     parser.add_argument("--worst", type=int, default=5)
-    parser.add_argument("--only", default="", help="ways of speaking whose name holds this")
+    parser.add_argument("--only", default="", help="only ways of speaking whose name contains this")
     parser.add_argument("--deformer", default=None)
     options = parser.parse_args()
     voice = find_voice(options.voice)
     usual = 175.0
-    ways = [(shown, 1.0) for shown in SHOWN] + [("neutral", rate / usual) for rate in RATES]
+    ways = [(shown, 1.0) for shown in EXPRESSIONS] + [("neutral", rate / usual) for rate in RATES]
     ways += [("surprise", RATES[-1] / usual)]
     speeds = coarticulation()["speed"]
     print(f"{len(lines(options.languages, options.every))} sentences by {voice.name}; limits {speeds}")
@@ -230,10 +228,10 @@ def main() -> None:
                 continue
             score = Score()
             for language, text in lines(options.languages, options.every):
-                measure(At(voice, rate), mouth, shown, language, text, score)
+                measure(VoiceAtRate(voice, rate), mouth, shown, language, text, score)
             print(f"{title:24s} {score.line()}", flush=True)
             for kind, found, limit in (
-                ("open", score.closed, MEETS),
+                ("open", score.closed, MAX_GAP),
                 ("not bitten", score.bitten, 0.0),
                 ("fast", score.speed, speeds["lips"]),
                 ("sharp", score.jolt, np.inf),

@@ -1,4 +1,4 @@
-"""Many clients of a service in one thread, on plain sockets: what comes to them, how late, at what cost."""
+"""Runs many clients of a service in one thread with plain sockets, and measures what they receive."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from urllib.parse import urlsplit
 import numpy as np
 from packets import encode_text, handshake, take_messages
 
-__all__ = ["FPS", "POSIX", "Crowd", "joined"]
+__all__ = ["FPS", "POSIX", "ClientGroup", "open_peer"]
 
 FPS = 25
-CALM = 0.5  # s
+UNMEASURED = 0.5  # s before a measurement
 PING, PONG = 9, 10
 SCENE = {"type": "scene", "objects": {"cup": {"x": 0.2, "y": -0.1, "z": 0.5}}}
 BODY = (
@@ -29,7 +29,7 @@ BODY = (
     '<gaze id="g" target="cup" start="1" end="3"/><realizer:emotion xmlns:realizer="urn:bml-realizer:1" '
     'id="e" name="joy" start="m:start" end="m:end+1"/>'
 )
-# Bytes of a frame of 68 FAPs with its WebSocket header; its number and time stand behind four more.
+# Bytes of a frame of 68 FAPs with its WebSocket header. Number and time follow four bytes of the frame.
 FRAME = 292
 NUMBER = struct.Struct("<Id")
 POSIX = re.compile(rb'globalTime="([0-9.]+)".*?posixTime="([0-9.]+)"')
@@ -41,14 +41,14 @@ class Peer:
 
     socket: socket.socket
     data: bytearray = field(default_factory=bytearray)
-    zero: float | None = None  # posix time of its session's 0
+    zero: float | None = None  # POSIX time of the session's second 0
     sent: dict[str, float] = field(default_factory=dict)
     documents: int = 0
     newest: int | None = None  # number of its newest frame
 
 
-def joined(url: str, session: str, plays: bool) -> Peer:
-    """A connection that has opened and asked for frames."""
+def open_peer(url: str, session: str, plays: bool) -> Peer:
+    """Open a connection, and subscribe to frames if it plays."""
     host, _, port = urlsplit(url).netloc.rpartition(":")
     peer = socket.create_connection((host, int(port)), 20)
     peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -60,28 +60,28 @@ def joined(url: str, session: str, plays: bool) -> Peer:
     return Peer(peer, rest)
 
 
-class Crowd:
-    """Clients that have each a session of their own, get its frames and send it documents.
+class ClientGroup:
+    """Clients with a session each, which receive frames and send documents.
 
     Args:
-        url: where BML goes.
-        sessions: how many.
-        plays: or only listens, to a server whose frames tell POSIX time.
-        every: seconds between two documents of a session; what one asks for takes six.
+        url: address of the service.
+        sessions: number of clients.
+        plays: whether clients send documents, or only listen to a server whose frames have POSIX times.
+        every: seconds between two documents of a session; a document plays for six.
     """
 
     def __init__(self, url: str, sessions: int, plays: bool, every: float = 10.0) -> None:
         chance = random.Random(0)
         self._poll = select.epoll()
         self._peers: dict[int, Peer] = {}
-        self._due: list[tuple[float, int]] = []  # when who sends its next document
+        self._due: list[tuple[float, int]] = []  # (time of the next document, socket)
         self._plays = plays
         self._every = every
         self._late: list[float] = []
         self._answers: list[float] = []
         self._frames = self._missing = 0
         for k in range(sessions):
-            peer = joined(url, f"load-{k}", plays)
+            peer = open_peer(url, f"load-{k}", plays)
             if not plays:
                 peer.zero = 0.0
             self._peers[peer.socket.fileno()] = peer
@@ -90,25 +90,25 @@ class Crowd:
                 heappush(self._due, (time.time() + every * chance.random(), peer.socket.fileno()))
 
     def listen(self, seconds: float) -> dict[str, float]:
-        """Play and listen for some time: what came in it, lateness and answers in ms."""
-        self._go_on(CALM)  # what came while nobody listened is not late
+        """Play and listen for some seconds; return counts, and lateness and response times in ms."""
+        self._run(UNMEASURED)  # frames that waited in the sockets do not count
         self._frames = self._missing = 0
         self._late.clear()
         self._answers.clear()
-        begun, used = time.time(), time.process_time()
-        self._go_on(seconds)
+        begin, used = time.time(), time.process_time()
+        self._run(seconds)
         late, answers = self._late or [0.0], self._answers or [0.0]
         return {
             "frames": self._frames,
             "expected": len(self._peers) * seconds * FPS,
             "missing": self._missing,
-            **{name: 1e3 * float(np.percentile(late, part)) for name, part in PARTS.items()},
+            **{name: 1e3 * float(np.percentile(late, part)) for name, part in PERCENTILES.items()},
             "answers": len(self._answers),
-            **{f"answer_{n}": 1e3 * float(np.percentile(answers, part)) for n, part in PARTS.items()},
-            "load": (time.process_time() - used) / (time.time() - begun),
+            **{f"answer_{n}": 1e3 * float(np.percentile(answers, part)) for n, part in PERCENTILES.items()},
+            "load": (time.process_time() - used) / (time.time() - begin),
         }
 
-    def _go_on(self, seconds: float) -> None:
+    def _run(self, seconds: float) -> None:
         end = time.time() + seconds
         while (now := time.time()) < end:
             for number, _ in self._poll.poll(0.002):
@@ -121,34 +121,34 @@ class Crowd:
             data = peer.socket.recv(8192)
         except BlockingIOError:
             return
-        came = time.time()
-        if len(data) == FRAME and not peer.data:  # nearly always: one frame, whole
-            self._frame(peer, data, 8, came)
+        received = time.time()
+        if len(data) == FRAME and not peer.data:  # the usual case: one complete frame
+            self._frame(peer, data, 8, received)
             return
         peer.data += data
         for code, payload in take_messages(peer.data):
-            if code == PING:  # who does not answer is taken for gone
+            if code == PING:  # clients that do not answer are disconnected
                 peer.socket.sendall(bytes([0x80 | PONG, 0x80 | len(payload)]) + bytes(4) + payload)
             elif code == 2 and payload[0] == 1:
-                self._frame(peer, payload, 4, came)
+                self._frame(peer, payload, 4, received)
             elif code == 1 and payload[:1] == b"<":
                 if (found := POSIX.search(payload)) is not None:
                     peer.zero = float(found[2]) / 1e3 - float(found[1])
                 for name in [name for name in peer.sent if f'"{name}"'.encode() in payload]:
-                    self._answers.append(came - peer.sent.pop(name))
+                    self._answers.append(received - peer.sent.pop(name))
 
-    def _frame(self, peer: Peer, data: bytes, at: int, came: float) -> None:
-        number, when = NUMBER.unpack_from(data, at)
+    def _frame(self, peer: Peer, data: bytes, at: int, received: float) -> None:
+        number, instant = NUMBER.unpack_from(data, at)
         self._frames += 1
         if peer.newest is not None:
             self._missing += number - peer.newest - 1
         peer.newest = number
         if peer.zero is not None:
-            self._late.append(came - when - peer.zero)
+            self._late.append(received - instant - peer.zero)
 
     def _send(self) -> None:
-        when, number = heappop(self._due)
-        heappush(self._due, (when + self._every, number))
+        instant, number = heappop(self._due)
+        heappush(self._due, (instant + self._every, number))
         peer = self._peers[number]
         name = f"b{peer.documents}"
         peer.documents += 1
@@ -156,4 +156,4 @@ class Crowd:
         peer.socket.sendall(encode_text(f'<bml id="{name}" composition="REPLACE">{BODY}</bml>'))
 
 
-PARTS = {"p50": 50, "p99": 99, "most": 100}
+PERCENTILES = {"p50": 50, "p99": 99, "most": 100}

@@ -1,14 +1,14 @@
-"""Lines that a process loads: `python tests/benchmarks/loaded_lines.py [CHECKOUT]` prints them.
+"""Counts the lines that a process loads: `python tests/benchmarks/loaded_lines.py [CHECKOUT]`.
 
     realize             `realizer.realize` of one speech
     realize, a picture  `realizer realize -o x.png`, without the modules of the command line (realizer/cli)
     serve               `realizer.serve` with one client that gets FAPs and has sent one speech
 
-Each is a fresh process; what the processes that draw and speak load is not counted. A module is ours if it
-belongs to bml_schema or realizer; its lines are those of its file.
+Each row is a new process; the processes that draw and speak are not counted. Only modules of bml_schema and
+realizer count, with all lines of their files.
 
     subscribe arkit     CPU milliseconds of the longest callback in the event loop of that service when a
-                        client subscribes to `arkit`, for the first time and for the second; and the lines
+                        client subscribes to `arkit` for the first and for the second time, and the lines
                         that this loads
 """
 
@@ -38,7 +38,7 @@ ARKIT = b"\x06"  # the first byte of its messages
 
 
 def loaded() -> dict[str, int]:
-    """Count the modules of ours that this process has loaded, and their lines."""
+    """Count the modules of bml_schema and realizer in this process, and their lines."""
     files = {
         Path(module.__file__)
         for name, module in list(sys.modules.items())
@@ -48,16 +48,16 @@ def loaded() -> dict[str, int]:
     return {"modules": len(own), "lines": sum(len(file.read_text("utf-8").splitlines()) for file in own)}
 
 
-def tell(what: object) -> None:
-    """Send an answer to the process that measures."""
-    print(f"measured {json.dumps(what)}", flush=True)
+def report(result: object) -> None:
+    """Send a result to the process that measures."""
+    print(f"measured {json.dumps(result)}", flush=True)
 
 
 def realize() -> None:
     import realizer
 
     realizer.realize(SPEECH)
-    tell(loaded())
+    report(loaded())
 
 
 def picture() -> None:
@@ -70,11 +70,11 @@ def picture() -> None:
         try:
             main()
         finally:
-            tell(loaded())
+            report(loaded())
 
 
 def serve() -> None:
-    """Serve; for each SIGUSR1 tell what is loaded, and the longest callback since the one before."""
+    """Serve; at each SIGUSR1 report the loaded modules, and the longest callback since the last SIGUSR1."""
     import realizer
 
     longest = 0.0
@@ -90,13 +90,13 @@ def serve() -> None:
         nonlocal longest
         longest = 0.0
 
-    def asked(loop: asyncio.AbstractEventLoop) -> None:
-        tell({**loaded(), "longest": 1000 * longest})
-        loop.call_soon(reset)  # when this callback, which is long, has been measured
+    def on_signal(loop: asyncio.AbstractEventLoop) -> None:
+        report({**loaded(), "longest": 1000 * longest})
+        loop.call_soon(reset)  # after this callback, which is long
 
     async def main() -> None:
         loop = asyncio.get_running_loop()
-        loop.add_signal_handler(signal.SIGUSR1, asked, loop)
+        loop.add_signal_handler(signal.SIGUSR1, on_signal, loop)
         await realizer.serve(realizer.Settings(port=0))
 
     setattr(Handle, "_run", timed)  # noqa: B010
@@ -110,8 +110,8 @@ WORK = {"realize": realize, "picture": picture, "serve": serve}
 
 
 @contextmanager
-def working(what: str, checkout: Path) -> Iterator[subprocess.Popen[str]]:
-    """A process that does that with a checkout."""
+def start_work(what: str, checkout: Path) -> Iterator[subprocess.Popen[str]]:
+    """Start a process that does a piece of work with a checkout."""
     environment = os.environ | {"PYTHONPATH": str(checkout), "OPENBLAS_NUM_THREADS": "1"}
     command = [sys.executable, str(Path(__file__).resolve()), "--work", what]
     with subprocess.Popen(
@@ -124,7 +124,7 @@ def working(what: str, checkout: Path) -> Iterator[subprocess.Popen[str]]:
 
 
 def answer(process: subprocess.Popen[str], begin: str = "measured ") -> str:
-    """Return the rest of the next line that begins so."""
+    """Return the rest of the next line that begins with `begin`."""
     assert process.stdout is not None
     for line in process.stdout:
         if line.startswith(begin):
@@ -132,11 +132,11 @@ def answer(process: subprocess.Popen[str], begin: str = "measured ") -> str:
     raise SystemExit(f"the process ended with {process.wait()}")
 
 
-def served(checkout: Path) -> list[dict[str, Any]]:
-    """Return what a service tells before, after the first and after the second subscription to arkit."""
+def measure_service(checkout: Path) -> list[dict[str, Any]]:
+    """Return the results of a service before, after the first and after the second subscription to arkit."""
     from websockets.sync.client import connect
 
-    with working("serve", checkout) as process:
+    with start_work("serve", checkout) as process:
         url = answer(process, "listening on ")
 
         def measured() -> dict[str, Any]:
@@ -165,17 +165,17 @@ def main() -> None:
     parser.add_argument("checkout", type=Path, nargs="?", default=root, metavar="CHECKOUT")
     parser.add_argument("--repeats", type=int, default=3, help="services that are started to measure arkit")
     parser.add_argument("--work", choices=WORK, help=argparse.SUPPRESS)
-    asked = parser.parse_args()
-    if asked.work:
-        WORK[asked.work]()
+    options = parser.parse_args()
+    if options.work:
+        WORK[options.work]()
         return
-    checkout = asked.checkout.resolve()
+    checkout = options.checkout.resolve()
     print(f"{'':<22}{'lines':>8}{'modules':>9}")
     for name, what in (("realize", "realize"), ("realize, a picture", "picture")):
-        with working(what, checkout) as process:
+        with start_work(what, checkout) as process:
             found = json.loads(answer(process))
         print(f"{name:<22}{found['lines']:>8,}{found['modules']:>9}", flush=True)
-    services = [served(checkout) for _ in range(asked.repeats)]
+    services = [measure_service(checkout) for _ in range(options.repeats)]
     before, after, _ = services[0]
     print(f"{'serve':<22}{before['lines']:>8,}{before['modules']:>9}")
     first, second = (statistics.median(service[k]["longest"] for service in services) for k in (1, 2))

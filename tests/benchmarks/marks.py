@@ -1,9 +1,8 @@
-"""How exact marks are: `python tests/benchmarks/marks.py` puts 500 of them before words of five languages.
+"""Measures the errors of marks: `python tests/benchmarks/marks.py` puts 500 of them before words.
 
-The truth is the engine's own: the word events that espeak-ng reports with these very samples. A word that it
-merges with the one before has no event of its own place: there the mark is held against the nearest event of
-any word or phoneme. A word that is reported when the nasal before it begins ("one of") counts from its own
-first phoneme.
+The texts have five languages. The reference are the word events that espeak-ng reports with the same samples.
+If espeak-ng merges a word with the previous one, the reference is the nearest event of any word or phoneme.
+If it reports a word at the nasal before it ("one of"), the reference is the word's own first phoneme.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from realizer.speech.utterance import SpeechRequest
 __all__ = ["TEXTS", "Errors", "errors"]
 
 PLACEMENTS = 500
-LIMIT = 5.0  # ms, what is asked for
+LIMIT = 5.0  # ms
 TEXTS: Mapping[str, Sequence[str]] = {
     "en-US": (
         "Hello, I am very pleased to meet you. It is late. We should have been there at seven thirty.",
@@ -57,29 +56,29 @@ Errors = tuple[str, float, bool]  # language, ms, whether the engine reports tha
 
 
 def errors(voice: EspeakVoice, count: int, seed: int = 0) -> Iterator[Errors]:
-    """One for each of `count` marks; a text gets one to four of them at a time."""
+    """Yield the error of each of `count` marks, of which a text gets one to four."""
     draw = random.Random(seed)
-    made = 0
-    while made < count:
+    done = 0
+    while done < count:
         language = draw.choice(sorted(TEXTS))
         text = draw.choice(TEXTS[language])
         document = write_document(read_script(SpeechRequest(text)))
-        chosen = sorted(draw.sample(range(len(document.words)), min(draw.randint(1, 4), count - made)))
+        chosen = sorted(draw.sample(range(len(document.words)), min(draw.randint(1, 4), count - done)))
         places = [document.words[k][1] - len("<speak>") - 1 for k in chosen]
         marked = text
         for n, place in sorted(enumerate(places), reverse=True):
             marked = f'{marked[:place]}<mark name="m{n}"/>{marked[place:]}'
-        said = voice.say(SpeechRequest(marked, tuple(f"m{n}" for n in range(len(chosen))), language))
+        utterance = voice.say(SpeechRequest(marked, tuple(f"m{n}" for n in range(len(chosen))), language))
         reported, begins = _reported(voice, marked, language)
         for n, k in enumerate(chosen):
-            mark = said.marks[f"m{n}"]
+            mark = utterance.marks[f"m{n}"]
             truth = reported.get(k, float(begins[np.abs(begins - mark).argmin()]))
             yield language, 1000 * abs(mark - truth), k in reported
-            made += 1
+            done += 1
 
 
 def _reported(voice: EspeakVoice, text: str, language: str) -> tuple[dict[int, float], Float64]:
-    """As the engine says, in seconds: words by index, and where any word or phoneme begins."""
+    """Return word -> seconds as the engine reports them, and the begins of all words and phonemes."""
     process = voice._process
     hello = process.hello()
     document = write_document(read_script(SpeechRequest(text)))

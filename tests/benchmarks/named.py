@@ -1,11 +1,11 @@
-"""What a recogniser trained on photographs of people calls our faces.
+"""Classifies the emotions of our faces with a recogniser that was trained on photographs of people.
 
 npm install --prefix FOLDER @vladmandic/face-api@1.7.15
 python tests/benchmarks/named.py FOLDER [--face NAME ...] [--chromium PATH] [-o PICTURE]
 
-The network (MIT licence) runs in Chromium. Each face shows each of the six emotions at full intensity, in
-front; printed is how sure the network is of the three names it likes best. It saw photographs, and few of
-disgust, so this is a second opinion and no truth.
+The network (MIT licence) runs in Chromium. Each face shows each of the six emotions at full intensity from
+the front; the program prints the three most probable names. The network was trained on photographs, few of
+which show disgust, so its names are only a second opinion.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ NAME = """async (source) => {
 
 
 def pictures(name: str) -> list[Image.Image]:
-    """The six emotions on a face, SIZE x SIZE each."""
+    """Return pictures of the six emotions on a face, SIZE x SIZE each."""
     values = np.zeros((len(NAMES), len(axis())), np.float32)
     for row, lexeme in zip(values, NAMES, strict=True):
         for (number, side), value in face_lexemes()[lexeme].aus.items():
@@ -69,7 +69,7 @@ def pictures(name: str) -> list[Image.Image]:
 
 @contextmanager
 def recogniser(folder: Path, chromium: str | None) -> Iterator[Page]:
-    """A page of Chromium that has the network; its files come from the folder, nothing from a network."""
+    """Open a page of Chromium with the network, whose files come from the folder."""
 
     def serve(route: Route) -> None:
         file = folder / PACKAGE / route.request.url.removeprefix(HOST)
@@ -91,8 +91,8 @@ def recogniser(folder: Path, chromium: str | None) -> Iterator[Page]:
         browser.close()
 
 
-def named(page: Page, picture: Image.Image) -> dict[str, float]:
-    """Name -> 0..1, the likeliest first; nothing where it sees no face."""
+def classify(page: Page, picture: Image.Image) -> dict[str, float]:
+    """Return name -> probability, the most probable first; {} if the network finds no face."""
     file = io.BytesIO()
     picture.save(file, "PNG")
     source = f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}"
@@ -115,15 +115,15 @@ def main() -> None:
     right = 0
     with recogniser(chosen.folder, chosen.chromium) as page:
         for line, face in enumerate(chosen.face):
-            for column, ((lexeme, meant), picture) in enumerate(
+            for column, ((lexeme, expected), picture) in enumerate(
                 zip(NAMES.items(), pictures(face), strict=True)
             ):
                 sheet.paste(picture, (SIZE * column, SIZE * line))
-                names = list(named(page, picture).items())[:3]
-                right += bool(names) and names[0][0] == meant
-                says = ", ".join(f"{name} {sure:.2f}" for name, sure in names) or "no face"
-                print(f"{face:4} {lexeme:10} {says}", flush=True)
-    print(f"named as meant: {right} of {len(NAMES) * len(chosen.face)}")
+                names = list(classify(page, picture).items())[:3]
+                right += bool(names) and names[0][0] == expected
+                result = ", ".join(f"{name} {probability:.2f}" for name, probability in names) or "no face"
+                print(f"{face:4} {lexeme:10} {result}", flush=True)
+    print(f"recognised: {right} of {len(NAMES) * len(chosen.face)}")
     if chosen.output:
         sheet.save(chosen.output)
 

@@ -1,11 +1,10 @@
-"""What reading costs: `python tests/benchmarks/parse.py` prints medians, with the noise beside them.
+"""Measures the parser and the writer: `python tests/benchmarks/parse.py` prints medians and the noise.
 
-    parse   text -> Block, for documents of cross-linked behaviours of five kinds
-    bare    the same text through lxml.etree.fromstring, in the same run: what no reader above lxml can beat
+    parse   text -> Block, for documents of linked behaviours of five kinds
+    bare    lxml.etree.fromstring of the same text, the lower bound of a parser that uses lxml
     write   Block -> text
 
 `growth` is the exponent of the time in the number of behaviours, from 100 to 10,000: 1 is linear.
-Measures only; nothing asserts a time.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from __future__ import annotations
 import math
 
 from lxml import etree
-from stopwatch import helped, measure, noise
+from stopwatch import handle_help, measure, noise
 
 from bml_schema import CORE, EXTENSIONS, parse, write
 
@@ -21,7 +20,7 @@ COUNTS = (5, 20, 100, 1000, 10_000)
 
 
 def document(count: int) -> str:
-    """Speech, nod, smile, gaze and action unit in turn, each hanging on those before it."""
+    """Return a block of speech, nod, smile, gaze and action unit in turn, each linked to those before it."""
     lines = []
     for n in range(count):
         a, b = f"b{n - 1}", f"b{max(0, n - 2)}"
@@ -40,7 +39,7 @@ def document(count: int) -> str:
 
 
 def main() -> None:
-    helped(__doc__)
+    handle_help(__doc__)
     print(noise())
     print(
         f"{'behaviours':>10}{'parse ms':>10}{'min':>9}{'max':>9}{'bare ms':>10}{'ratio':>7}{'write ms':>10}"

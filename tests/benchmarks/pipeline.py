@@ -1,10 +1,8 @@
-"""What the steps cost: `python tests/benchmarks/pipeline.py` prints medians, with the noise beside them.
+"""Measures the steps of the pipeline: `python tests/benchmarks/pipeline.py` prints medians and the noise.
 
-    parse + schedule   a block of 20 cross-linked behaviours
-    expand to FAP      10 s of frames of that block, all its channels blended and mapped
-    deform             the frames to vertices of the default face
-
-Measures only; nothing asserts a time.
+parse + schedule   a block of 20 cross-linked behaviours
+expand to FAP      10 s of frames of that block: blending, and conversion to FAPs
+deform             the frames to vertices of the default face
 """
 
 from __future__ import annotations
@@ -12,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from stopwatch import helped, measure, noise
+from stopwatch import handle_help, measure, noise
 
 from bml_schema import parse
 from realizer.animation.fap.conversion import to_fap
@@ -24,7 +22,7 @@ from realizer.playback.player import Player
 
 
 def block_of(count: int) -> str:
-    """A block whose behaviours hang on one another: nods, expressions and gazes in a chain with branches."""
+    """Return a block of nods, expressions and gazes that are linked in a chain with branches."""
     parts = ['<faceLexeme id="b0" lexeme="SMILE"/>']
     for i in range(1, count):
         before = f"b{i - 1 if i % 3 else max(0, i - 3)}"
@@ -40,7 +38,7 @@ def block_of(count: int) -> str:
 
 
 def main() -> None:
-    helped(__doc__)
+    handle_help(__doc__)
     print(noise())
     text = block_of(20)
     block = parse(text, VOCABULARY)

@@ -1,12 +1,12 @@
-"""How long schedules take: `python tests/benchmarks/schedule.py` prints medians, and how they grow.
+"""Measures the scheduler: `python tests/benchmarks/schedule.py` prints medians, and their growth.
 
-Parsing and behaviours' timings are not in it: a block and its timings in, a schedule out; the rows of
-sessions are `Player.submit`, which also makes the channels and the feedback. Medians are of time on the
-clock and of the processor's, which other work on the machine disturbs less.
+Most rows measure the schedule of a parsed block with known timings. The rows of sessions measure
+`Player.submit`, which also makes channels and feedback. Medians are of elapsed time and of processor time,
+which other work on the machine disturbs less.
 
-Solvers of the problems with inequalities, compared once, 2026-11 (processor's milliseconds, and how many
-seconds the worst sync point is off; Clarabel 0.11 and PIQP 0.6 to 1e-11, OSQP 1.1 to 1e-7 with polishing,
-DAQP 0.11, which is dense; on a busy machine of 2 cores):
+Solvers of the problems with inequalities were compared in 2026-11 (processor time in milliseconds, and the
+largest error of a sync point in seconds; Clarabel 0.11 and PIQP 0.6 to 1e-11, OSQP 1.1 to 1e-7 with
+polishing, DAQP 0.11, which is dense; on a busy machine with 2 cores):
 
     unknowns              43              203             4,003           310 (31 components)
     guess, exactly        0.44            1.8             40              0.9
@@ -15,10 +15,10 @@ DAQP 0.11, which is dense; on a busy machine of 2 cores):
     PIQP                  0.32  1e-8      1.3   1e-6      28    4e-5      1.2   1e-5
     DAQP                  0.13  2e-14     9.9   9e-13     -               31    7e-16
 
-"Guess" is ours (realizer/scheduling/convex.py): a sparse factorisation of the least squares with what binds
-held as equalities, again until nothing is broken and nothing pulls. It is exact, takes one to three rounds
-here, and needs no library. Some problems without any room make it go round in circles; those go to Clarabel,
-whose answer is made exact in the same way.
+"Guess" is realizer/scheduling/convex.py: it solves sparse least squares with the active inequalities as
+equalities, and updates the active set until all inequalities hold and no multiplier has the wrong sign. It is
+exact, takes one to three rounds here, and needs no library. Some problems without any slack make it cycle;
+those are solved by Clarabel, whose solution is made exact in the same way.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from collections.abc import Callable
 
 import numpy as np
 from plot import exponent
-from stopwatch import helped, noise
+from stopwatch import handle_help, noise
 
 from bml_schema import MAX_BEHAVIOURS, Block, parse
 from realizer.core.options import PlayOptions
@@ -61,7 +61,7 @@ def lengths(n: int) -> list[float]:
 
 
 def typical() -> Work:
-    """A speech with two marks, a nod on one, a face from one to the other, a gaze before, a blink after."""
+    """Return a speech with two marks, with a nod, faces and a gaze that refer to it."""
     body = (
         '<speech id="s"><text>Well <sync id="m1"/> yes <sync id="m2"/> indeed</text></speech>'
         '<head id="n" lexeme="NOD" stroke="s:m1"/><gaze id="g" target="x" end="s:start"/>'
@@ -79,7 +79,7 @@ def typical() -> Work:
 
 
 def linked(n: int) -> Work:
-    """Faces, each tied at its start to the one before, at its end to the one three before: one component."""
+    """Faces, each links at its start to the one before, at its end to the one three before: one component."""
     body = "".join(
         face(
             f"f{k}",
@@ -91,7 +91,7 @@ def linked(n: int) -> Work:
 
 
 def groups(n: int) -> Work:
-    """Groups of five that are tied to each other in two points, no inequality active."""
+    """Return groups of five behaviours with two links each; no inequality is active."""
     body = "".join(
         face(f"f{k}", "" if k % 5 == 0 else f'start="f{k - 1}:attackPeak" end="f{k - k % 5}:end"')
         for k in range(n)
@@ -100,7 +100,7 @@ def groups(n: int) -> Work:
 
 
 def squeezed(n: int) -> Work:
-    """As `linked`, pinned and in so little time that least gaps are reached all along."""
+    """Return the blocks of `linked` with a fixed start and so little time that all gaps are minimal."""
     body = "".join(
         face(
             f"f{k}",
@@ -113,7 +113,7 @@ def squeezed(n: int) -> Work:
 
 
 def tight(n: int) -> Work:
-    """Groups as in `groups`, each with no more time than brings some of its gaps to their least."""
+    """Return the blocks of `groups` with so little time that some gaps are minimal."""
     body = "".join(
         face(
             f"f{k}",
@@ -125,7 +125,7 @@ def tight(n: int) -> Work:
 
 
 def ordered(n: int) -> Work:
-    """A chain of <after>s, all active, that nothing holds: sliding only."""
+    """Return a chain of active <after> constraints without a fixed time."""
     body = "".join(face(f"f{k}") for k in range(n))
     body += "".join(
         f'<constraint><after ref="f{k - 1}:end"><sync ref="f{k}:start"/></after></constraint>'
@@ -135,13 +135,13 @@ def ordered(n: int) -> Work:
 
 
 def loose(n: int) -> Work:
-    """Behaviours that nothing ties."""
+    """Return behaviours without links."""
     body = "".join(face(f"f{k}") for k in range(n))
     return block(body), {f"f{k}": timing(FACE, d) for k, d in enumerate(lengths(n))}
 
 
 def phrases(n: int) -> Work:
-    """One speech of n phrases, two faces a phrase from mark to mark."""
+    """Return a speech of n phrases, with two faces for each phrase, from mark to mark."""
     text = "".join(f'<sync id="m{k}"/> word ' for k in range(n + 1))
     body = f'<speech id="s"><text>{text}</text></speech>'
     body += "".join(face(f"{c}{k}", f'start="s:m{k}" end="s:m{k + 1}"') for k in range(n) for c in "fg")
@@ -153,68 +153,68 @@ def phrases(n: int) -> Work:
 
 
 def clashing(n: int) -> Work:
-    """Pairs that wait for each other: half of the behaviours are dropped."""
+    """Return pairs that wait for each other, so that half of the behaviours are dropped."""
     body = "".join(face(f"f{k}", f'start="f{k ^ 1}:end"') for k in range(n))
     return block(body), {f"f{k}": timing(FACE, d) for k, d in enumerate(lengths(n))}
 
 
-def median(work: Work, least: float = 0.5) -> Spent:
-    """For one schedule; the median of runs that take half a second together, at least five."""
+def median(work: Work, least: float = 0.5) -> Times:
+    """Return the median time of one schedule, over at least five runs and `least` seconds."""
     schedule_block(*work)
-    runs: list[Spent] = []
+    runs: list[Times] = []
     gc.collect()
     while len(runs) < 5 or (sum(clock for clock, _ in runs) < least and len(runs) < 2000):
-        runs.append(spent(lambda: schedule_block(*work)))
-    return middle(runs)
+        runs.append(measure_once(lambda: schedule_block(*work)))
+    return median_of(runs)
 
 
-# Seconds on the clock, and of the processor.
-Spent = tuple[float, float]
+# Elapsed seconds, and processor seconds.
+Times = tuple[float, float]
 
 
-def spent(work: Callable[[], object]) -> Spent:
+def measure_once(work: Callable[[], object]) -> Times:
     clock, processor = time.perf_counter(), time.process_time()
     work()
     return time.perf_counter() - clock, time.process_time() - processor
 
 
-def middle(runs: list[Spent]) -> Spent:
+def median_of(runs: list[Times]) -> Times:
     clocks, processors = zip(*runs, strict=True)
     return statistics.median(clocks), statistics.median(processors)
 
 
-def faces(id: str, tied: str = "") -> Block:
-    """Five faces that hold each other, as one block of a session."""
+def faces(id: str, links: str = "") -> Block:
+    """Return five linked faces, one block of a session."""
     names = ("SMILE", "OPEN_MOUTH", "WIDEN_EYES", "LOWER_BROWS")
-    body = f'<faceLexeme id="f0" lexeme="RAISE_BROWS" {tied}/>'
+    body = f'<faceLexeme id="f0" lexeme="RAISE_BROWS" {links}/>'
     for k, name in enumerate(names, 1):
         ends = f'start="f{k - 1}:attackPeak" end="f0:end + {k / 10}"'
         body += f'<faceLexeme id="f{k}" lexeme="{name}" {ends}/>'
     return block(body, id)
 
 
-def session() -> tuple[Spent, Spent]:
-    """To submit one block: around the 20th of a session and around the 2,000th."""
+def session() -> tuple[Times, Times]:
+    """Return the time of submitting a block, around the 20th and around the 2,000th of a session."""
     player = Player(PlayOptions(idle=False))
-    runs: list[Spent] = []
+    runs: list[Times] = []
     for k in range(2041):
         one, now = faces(f"b{k}"), 4.0 * k
-        runs.append(spent(lambda one=one, now=now: player.submit(one, now)))  # type: ignore[misc]
+        runs.append(measure_once(lambda one=one, now=now: player.submit(one, now)))  # type: ignore[misc]
         player.due(now)
-    return middle(runs[10:51]), middle(runs[1990:2041])
+    return median_of(runs[10:51]), median_of(runs[1990:2041])
 
 
-def added(chained: bool) -> Spent:
-    """To submit a block that is tied to one of 50 that play, which are tied to each other or not."""
-    runs: list[Spent] = []
+def measure_added_block(chained: bool) -> Times:
+    """Return the time of submitting a block that is linked to one of 50 playing blocks."""
+    runs: list[Times] = []
     for _ in range(15):
         player = Player(PlayOptions(idle=False))
         for k in range(50):
             player.submit(faces(f"b{k}", f'start="b{k - 1}:f0:start + 0.05"' if chained and k else ""), 0.0)
         player.due(0.1)
         new = faces("new", 'start="b25:f0:end"')
-        runs.append(spent(lambda player=player, new=new: player.submit(new, 0.1)))  # type: ignore[misc]
-    return middle(runs)
+        runs.append(measure_once(lambda player=player, new=new: player.submit(new, 0.1)))  # type: ignore[misc]
+    return median_of(runs)
 
 
 TABLE: list[tuple[str, Callable[[], Work], float | None]] = [
@@ -228,18 +228,18 @@ TABLE: list[tuple[str, Callable[[], Work], float | None]] = [
     ("2,000 squeezed, inequalities active", lambda: squeezed(2000), 150.0),
     ("2,000 in small groups, each squeezed", lambda: tight(2000), 150.0),
     ("2,000 in a chain of <after>s", lambda: ordered(2000), 150.0),
-    ("2,000 that nothing ties", lambda: loose(2000), 40.0),
+    ("2,000 without links", lambda: loose(2000), 40.0),
     ("speech of 40 phrases, 2 faces each", lambda: phrases(40), 8.0),
     ("200 in clashing pairs", lambda: clashing(200), None),
 ]
 
 
 def main() -> None:
-    helped(__doc__)
+    handle_help(__doc__)
     print(noise())
     print(f"{'work':40} {'median ms':>10} {'processor':>10} {'wanted ms':>10} {'dropped':>8}")
 
-    def row(name: str, found: Spent, wanted: float | None, dropped: int = 0) -> None:
+    def row(name: str, found: Times, wanted: float | None, dropped: int = 0) -> None:
         under = "" if wanted is None else f"< {wanted:g}"
         print(f"{name:40} {found[0] * 1e3:10.3f} {found[1] * 1e3:10.3f} {under:>10} {dropped:8}")
 
@@ -250,8 +250,8 @@ def main() -> None:
     row("20th block of a session", early, None)
     row("2,000th block of a session", late, None)
     print(f"{'2,000th over 20th':40} {late[0] / early[0]:10.2f} {late[1] / early[1]:10.2f} {'< 1.2':>10}")
-    row("one added and tied to one of 50 blocks", added(chained=False), 5.0)
-    row("one added to 50 that are tied in a chain", added(chained=True), None)
+    row("one measure_added_block, linked to one of 50 blocks", measure_added_block(chained=False), 5.0)
+    row("one measure_added_block to 50 that are linked in a chain", measure_added_block(chained=True), None)
     print(f"\n{'growth (slope of log time over log n)':40}")
     sizes = [n for n in (50, 200, 1000, 5000) if n <= MAX_BEHAVIOURS]
     for name, make_n in (

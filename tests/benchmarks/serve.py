@@ -1,4 +1,4 @@
-"""Prints medians over a real socket: a document in to its first feedback, and to the first frame after it.
+"""Measures the time from a document to its first feedback and to the first frame of its plan, over a socket.
 
 Run: python tests/benchmarks/serve.py
 """
@@ -13,7 +13,7 @@ import subprocess
 import sys
 import time
 
-from stopwatch import helped, noise
+from stopwatch import handle_help, noise
 from websockets.asyncio.client import connect
 
 from realizer.protocol.wire import unpack
@@ -29,36 +29,36 @@ DOCUMENTS = {
 
 
 async def measure(url: str, body: str) -> tuple[list[float], list[float], list[float]]:
-    """Milliseconds to the acknowledgement, to the plan, and to the first frame after the plan."""
+    """Return milliseconds to the first feedback, to the block start, and to the first frame after it."""
     first, planned, shown = [], [], []
     chance = random.Random(0)
     async with connect(url, compression=None) as socket:
         await socket.send(json.dumps({"type": "subscribe", "stream": "fap", "fps": FPS}))
         for k in range(ROUNDS):
-            await asyncio.sleep(chance.random() / FPS)  # anywhere between two frames
+            await asyncio.sleep(chance.random() / FPS)  # at a random time between two frames
             start = time.perf_counter()
             await socket.send(f'<bml id="b{k}" composition="REPLACE">{body}</bml>')
-            told: list[float] = []
-            begins = None
+            predictions: list[float] = []
+            block_start = None
             async for message in socket:
                 now = 1000 * (time.perf_counter() - start)
                 if isinstance(message, bytes):
-                    if begins is not None and unpack(message).time >= begins:
+                    if block_start is not None and unpack(message).time >= block_start:
                         shown.append(now)
                         break
                 elif "predictionFeedback" in message and f'"b{k}"' in message:
-                    told.append(now)
+                    predictions.append(now)
                 elif f'"b{k}:start"' in message:
                     planned.append(now)
-                    begins = float(message.partition('globalTime="')[2].partition('"')[0])
-            first.append(told[0])
+                    block_start = float(message.partition('globalTime="')[2].partition('"')[0])
+            first.append(predictions[0])
     return first, planned, shown
 
 
 async def main() -> None:
-    helped(__doc__)
+    handle_help(__doc__)
     print(noise())
-    # In a process of its own: here it would be measured together with its client.
+    # The service is a separate process; otherwise its time would include that of the client.
     command = [sys.executable, "-m", "realizer", "serve", "--port", "0"]
     service = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert service.stdout is not None

@@ -1,13 +1,13 @@
-"""Prints how many sessions one service plays at once: lateness, processor time, memory.
+"""Measures a service with many sessions: lateness, processor time, memory.
 
-Run: python tests/benchmarks/sessions.py [--sessions 1000] [--every 10] [--floor] [serve's own options]
-     python tests/benchmarks/sessions.py --sessions 125,250,500,1000     how it grows
-     python tests/benchmarks/sessions.py --sessions 200 --minutes 30     whether it stays as it is
+Run: python tests/benchmarks/sessions.py [--sessions 1000] [--every 10] [--floor] [options of serve]
+     python tests/benchmarks/sessions.py --sessions 125,250,500,1000     growth
+     python tests/benchmarks/sessions.py --sessions 200 --minutes 30     drift over time
 
-Each session is a WebSocket of its own that gets 25 FAP frames a second and plays documents of head, face,
-gaze and idle motion, which last six seconds, one `--every` ten. The client is a process of its own on plain
-sockets, so that it costs little. `--floor` runs a server beside it that does nothing but send as many bytes
-as often (with the package websockets). Noise is how late this machine wakes a process that does nothing else.
+Each session is a WebSocket that receives 25 FAP frames a second, and plays a document of head, face, gaze and
+idle motion of six seconds every ten seconds. The clients are one process with plain sockets, which costs
+little. `--floor` also measures a server that only sends the same bytes with the package websockets. Noise is
+how late this machine wakes an idle process.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-from listeners import FPS, Crowd
+from listeners import FPS, ClientGroup
 from plot import bars, exponent
 
 
 def noise(seconds: float = 3.0) -> tuple[float, float]:
-    """How late a process is woken that sleeps 5 ms at a time: median and p99, ms."""
+    """Return how late a process wakes from 5 ms of sleep: median and p99 in ms."""
     late = []
     end = time.perf_counter() + seconds
     while (begin := time.perf_counter()) < end:
@@ -40,20 +40,23 @@ def noise(seconds: float = 3.0) -> tuple[float, float]:
 
 
 def processes(parent: int) -> list[int]:
-    """A process and its children's, which are workers; not those it has put a voice in."""
+    """Return a service's process and its workers, without the processes of voices."""
     children = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
     names = {int(c): Path(f"/proc/{c}/cmdline").read_text() for c in children}
     return [parent, *(c for c, name in names.items() if "serve" in name or "spawn_main" in name)]
 
 
-def spent(parent: int) -> float:
-    """Processor seconds, to the nanosecond: what clock ticks sample is wrong of who wakes with them."""
+def processor_seconds(parent: int) -> float:
+    """Return the processor seconds of a service.
+
+    The sampled times of `stat` are wrong for processes that wake at clock ticks; `schedstat` is exact.
+    """
     threads = (t for process in processes(parent) for t in Path(f"/proc/{process}/task").iterdir())
     return sum(int((thread / "schedstat").read_text().split()[0]) for thread in threads) / 1e9
 
 
 def resident(parent: int) -> float:
-    """MB."""
+    """Return the resident memory of a service in MB."""
     total = 0.0
     for process in processes(parent):
         status = Path(f"/proc/{process}/status").read_text()
@@ -62,8 +65,8 @@ def resident(parent: int) -> float:
 
 
 @contextmanager
-def served(command: list[str]) -> Iterator[tuple[str, int]]:
-    """The address and the process of a service that ends with the block."""
+def running_service(command: list[str]) -> Iterator[tuple[str, int]]:
+    """Run a service during the block; yield its address and its process."""
     service = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert service.stdout is not None
     try:
@@ -74,17 +77,17 @@ def served(command: list[str]) -> Iterator[tuple[str, int]]:
 
 
 def floor() -> None:
-    """A server that sends 288 bytes 25 times a second, each connection at times of its own."""
+    """Run a server that sends 288 bytes 25 times a second to each connection."""
     from websockets.asyncio.server import ServerConnection, broadcast, serve
 
     async def handle(connection: ServerConnection) -> None:
         loop, zero = asyncio.get_running_loop(), time.time()
-        begun = loop.time()
+        begin = loop.time()
 
         def send(k: int) -> None:
             broadcast((connection,), struct.pack("<BBHId", 1, 1, 0, k, zero + k / FPS) + bytes(272))
             if connection.close_code is None:
-                loop.call_at(begun + (k + 1) / FPS, send, k + 1)
+                loop.call_at(begin + (k + 1) / FPS, send, k + 1)
 
         send(0)
         await connection.wait_closed()
@@ -97,7 +100,7 @@ def floor() -> None:
     asyncio.run(run())
 
 
-def measured(
+def measure(
     command: list[str],
     sessions: int,
     seconds: float,
@@ -106,8 +109,8 @@ def measured(
     plays: bool,
     every: float = 10.0,
 ) -> Iterator[dict[str, float]]:
-    """What a service does and costs in each of some stretches of so many seconds."""
-    with served(command) as (url, service):
+    """Yield the measurements of a service for each of `times` spans of `seconds` seconds."""
+    with running_service(command) as (url, service):
         me = [sys.executable, __file__, "--load", url, "--sessions", str(sessions), "--seconds", str(seconds)]
         me += ["--warm", str(warm), "--times", str(times), "--every", str(every)]
         me += [] if plays else ["--floor"]
@@ -116,41 +119,41 @@ def measured(
         assert client.stdout is not None
         assert client.stdout.readline().strip() == "measuring"
         for _ in range(times):
-            begun, used = time.time(), spent(service)
-            told = json.loads(client.stdout.readline())
-            told["cpu"] = (spent(service) - used) / (time.time() - begun)
-            told["frame"] = 1e6 * told["cpu"] * seconds / max(told["frames"], 1)
-            told["memory"] = resident(service) - idle
-            yield told
+            begin, used = time.time(), processor_seconds(service)
+            result = json.loads(client.stdout.readline())
+            result["cpu"] = (processor_seconds(service) - used) / (time.time() - begin)
+            result["frame"] = 1e6 * result["cpu"] * seconds / max(result["frames"], 1)
+            result["memory"] = resident(service) - idle
+            yield result
         client.wait()
 
 
-def tell(name: str, sessions: int, told: dict[str, float], plays: bool) -> None:
+def print_result(name: str, sessions: int, result: dict[str, float], plays: bool) -> None:
     print(
-        f"{name}: {sessions} sessions, {told['frames']} frames of {told['expected']:.0f}, "
-        f"{told['missing']} missing\n"
-        f"  lateness ms     p50 {told['p50']:6.2f}  p99 {told['p99']:6.2f}  most {told['most']:6.1f}\n"
-        f"  processor       {told['cpu']:5.0%} of a core, {told['frame']:5.1f} us a frame"
-        f" (the client {told['load']:.0%})\n"
-        f"  memory          {told['memory']:5.0f} MB more than without sessions"
+        f"{name}: {sessions} sessions, {result['frames']} frames of {result['expected']:.0f}, "
+        f"{result['missing']} missing\n"
+        f"  lateness ms     p50 {result['p50']:6.2f}  p99 {result['p99']:6.2f}  most {result['most']:6.1f}\n"
+        f"  processor       {result['cpu']:5.0%} of a core, {result['frame']:5.1f} us a frame"
+        f" (the client {result['load']:.0%})\n"
+        f"  memory          {result['memory']:5.0f} MB more than without sessions"
     )
     if plays:
         print(
-            f"  first feedback  p50 {told['answer_p50']:6.2f}  p99 {told['answer_p99']:6.2f} ms"
-            f" of {told['answers']:.0f} documents"
+            f"  first feedback  p50 {result['answer_p50']:6.2f}  p99 {result['answer_p99']:6.2f} ms"
+            f" of {result['answers']:.0f} documents"
         )
     sys.stdout.flush()
 
 
 def soak(command: list[str], sessions: int, minutes: int, warm: float, every: float) -> None:
-    """Minute by minute, and what the second half has more than the first."""
+    """Print the measurements of each minute, and compare the two halves."""
     print("minute  memory MB  lateness p50    p99 ms  first feedback p50    p99 ms  us a frame")
     rows = []
-    for minute, told in enumerate(measured(command, sessions, 60.0, warm, minutes, True, every), 1):
-        rows.append(told)
+    for minute, result in enumerate(measure(command, sessions, 60.0, warm, minutes, True, every), 1):
+        rows.append(result)
         print(
-            f"{minute:6}  {told['memory']:9.1f}  {told['p50']:12.2f}  {told['p99']:8.2f}"
-            f"  {told['answer_p50']:18.2f}  {told['answer_p99']:8.2f}  {told['frame']:10.1f}",
+            f"{minute:6}  {result['memory']:9.1f}  {result['p50']:12.2f}  {result['p99']:8.2f}"
+            f"  {result['answer_p50']:18.2f}  {result['answer_p99']:8.2f}  {result['frame']:10.1f}",
             flush=True,
         )
     half = len(rows) // 2
@@ -166,46 +169,48 @@ def main() -> None:
     parser.add_argument(
         "--every", type=float, default=10.0, help="seconds between two documents of a session"
     )
-    parser.add_argument("--minutes", type=int, help="for so long, minute by minute")
-    parser.add_argument("--warm", type=float, default=12.0, help="seconds before it is measured")
-    parser.add_argument("--floor", action="store_true", help="a plain server of package websockets beside it")
+    parser.add_argument("--minutes", type=int, help="measure this long, minute by minute")
+    parser.add_argument("--warm", type=float, default=12.0, help="seconds before the measurement")
+    parser.add_argument(
+        "--floor", action="store_true", help="also measure a plain server of the package websockets"
+    )
     parser.add_argument("--load", help=argparse.SUPPRESS)
     parser.add_argument("--times", type=int, default=1, help=argparse.SUPPRESS)
     parser.add_argument("--serve-floor", action="store_true", help=argparse.SUPPRESS)
-    given, rest = parser.parse_known_args()
+    options, rest = parser.parse_known_args()
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
-    if given.serve_floor:
+    if options.serve_floor:
         floor()
         return
-    counts = [int(part) for part in given.sessions.split(",")]
-    if given.load:
-        crowd = Crowd(given.load, counts[0], not given.floor, given.every)
-        crowd.listen(given.warm)
+    counts = [int(part) for part in options.sessions.split(",")]
+    if options.load:
+        crowd = ClientGroup(options.load, counts[0], not options.floor, options.every)
+        crowd.listen(options.warm)
         print("measuring", flush=True)
-        for _ in range(given.times):
-            print(json.dumps(crowd.listen(given.seconds)), flush=True)
+        for _ in range(options.times):
+            print(json.dumps(crowd.listen(options.seconds)), flush=True)
         return
     median, worst = noise()
     print(f"noise of this machine: p50 {median:.2f}, p99 {worst:.2f} ms", flush=True)
     serve = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--voice", "silent", *rest]
-    if given.minutes:
-        soak(serve, counts[0], given.minutes, given.warm, given.every)
+    if options.minutes:
+        soak(serve, counts[0], options.minutes, options.warm, options.every)
         return
     rows: list[dict[str, float]] = []
     for count in counts:
-        rows += measured(serve, count, given.seconds, given.warm, 1, True, given.every)
-        tell("realizer", count, rows[-1], plays=True)
+        rows += measure(serve, count, options.seconds, options.warm, 1, True, options.every)
+        print_result("realizer", count, rows[-1], plays=True)
     if len(counts) > 1:
         for name, unit in (("cpu", "of a core"), ("memory", "MB"), ("p99", "ms late")):
             values = [row[name] for row in rows]
             print(f"{name}, {unit}: grows as sessions ^ {exponent(counts, values):.2f}")
             print(bars(counts, values))
-    if given.floor:
+    if options.floor:
         command = [sys.executable, __file__, "--serve-floor"]
-        (told,) = measured(command, counts[-1], given.seconds, given.warm, 1, plays=False)
-        tell("plain websockets", counts[-1], told, plays=False)
-        print(f"a frame costs {rows[-1]['frame'] / told['frame']:.2f} times what it costs plain websockets")
+        (result,) = measure(command, counts[-1], options.seconds, options.warm, 1, plays=False)
+        print_result("plain websockets", counts[-1], result, plays=False)
+        print(f"a frame costs {rows[-1]['frame'] / result['frame']:.2f} times what it costs plain websockets")
 
 
 if __name__ == "__main__":

@@ -1,15 +1,15 @@
-"""How long speech takes: `python tests/benchmarks/speech.py [VOICE ...]` prints milliseconds, voice by voice.
+"""Measures voices: `python tests/benchmarks/speech.py [VOICE ...]` prints milliseconds for each voice.
 
     start      the first text, with the start of the engine's process
-    sentence   text -> utterance (sound, words, phonemes), and with the lips; the sound can start then
-    paragraph  the same of eight sentences
-    longest    a text as long as a behaviour may say; real-time factors are of the whole path to the lips
-    first      what a session takes from a message to the first packet with sound in it: a sentence of a
-               speech that comes piece by piece, and a document with a text as long as it may be
-    same       how many of 200 repetitions, each spoken anew, give the same samples and times
+    sentence   text -> utterance (sound, words, phonemes), and text -> lip channels
+    paragraph  the same for eight sentences
+    longest    text of the largest allowed length; real-time factors are of the path from text to lip channels
+    first      time from a message to the first packet with sound, for a sentence of a speech that is sent
+               in parts, and for a document with a text of the largest length
+    same       how many of 200 repetitions without a cache give the same samples and times
 
-Measures only; nothing asserts a time. Wanted: a sentence to its lips in 15 ms, a first sound after 30 ms and
-a real-time factor below 0.01 with espeak; below 0.05 with hibari.
+Targets: a sentence to its lip channels in 15 ms, first sound after 30 ms and a real-time factor below 0.01
+with espeak, and below 0.05 with hibari.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ REPEATS = {"espeak": 200, "hibari": 20}
 
 
 def milliseconds(call: Callable[[int], object]) -> tuple[float, float]:
-    """Median and 99th percentile of `ROUNDS` calls."""
+    """Return median and 99th percentile of `ROUNDS` calls."""
     spent = []
     for k in range(ROUNDS):
         begin = time.perf_counter()
@@ -52,14 +52,14 @@ def milliseconds(call: Callable[[int], object]) -> tuple[float, float]:
 
 
 def lips(voice: Voice, text: str) -> Utterance:
-    """The whole path: text to lips."""
-    said = voice.say(SpeechRequest(text))
-    lip_channels(said.phonemes, 0.0)
-    return said
+    """Compute the lip channels of a text, and return its utterance."""
+    utterance = voice.say(SpeechRequest(text))
+    lip_channels(utterance.phonemes, 0.0)
+    return utterance
 
 
 def first_sound(voice: Voice, message: str) -> float:
-    """Milliseconds from a message to the first packet that is not silent."""
+    """Return the milliseconds from a message to the first packet that is not silent."""
     session = Session("benchmark", Settings(), time.perf_counter())
     session.connect(1, time.perf_counter())
     session.receive(1, json.dumps({"type": "subscribe", "stream": "audio"}), time.perf_counter())
@@ -86,23 +86,23 @@ def measure(voice: Voice) -> None:
     lips(voice, "first")
     print(f"{voice.name}: start {1000 * (time.perf_counter() - begin):.0f} ms")
     for name, text in (("sentence", SENTENCE), ("paragraph", PARAGRAPH)):
-        said = lips(voice, text.format("x"))
+        utterance = lips(voice, text.format("x"))
         spoken, worst = milliseconds(lambda k, text=text: voice.say(SpeechRequest(text.format(k))))
         whole, _ = milliseconds(lambda k, text=text: lips(voice, text.format(100 + k)))
         print(
-            f"  {name} of {said.duration:.2f} s, {len(said.phonemes)} phonemes: utterance {spoken:.2f} ms "
-            f"(p99 {worst:.2f}), to the lips {whole:.2f} ms, "
-            f"real-time factor {whole / 1000 / said.duration:.5f}"
+            f"  {name} of {utterance.duration:.2f} s, {len(utterance.phonemes)} phonemes: "
+            f"utterance {spoken:.2f} ms (p99 {worst:.2f}), to the lips {whole:.2f} ms, "
+            f"real-time factor {whole / 1000 / utterance.duration:.5f}"
         )
     text = "".join(LONGEST.format(k) for k in range(MAX_TEXT // len(LONGEST)))[:MAX_TEXT]
     begin = time.perf_counter()
-    said = lips(voice, text)
+    utterance = lips(voice, text)
     spent = time.perf_counter() - begin
     print(
-        f"  longest of {said.duration:.0f} s: {1000 * spent:.0f} ms, "
-        f"real-time factor {spent / said.duration:.5f}"
+        f"  longest of {utterance.duration:.0f} s: {1000 * spent:.0f} ms, "
+        f"real-time factor {spent / utterance.duration:.5f}"
     )
-    if said.pcm is not None:
+    if utterance.pcm is not None:
         for name, message in (
             (
                 "sentence",
@@ -124,10 +124,10 @@ def measure(voice: Voice) -> None:
         first = lips(voice, SENTENCE)
         same = 0
         for _ in range(repeats):
-            vars(voice)["_kept"] = UtteranceCache()  # so that it is spoken anew
-            said = voice.say(SpeechRequest(SENTENCE))
-            same += (said.words, said.phonemes) == (first.words, first.phonemes) and np.array_equal(
-                said.pcm if said.pcm is not None else [], first.pcm if first.pcm is not None else []
+            vars(voice)["_kept"] = UtteranceCache()  # so that it is synthesized again
+            utterance = voice.say(SpeechRequest(SENTENCE))
+            same += (utterance.words, utterance.phonemes) == (first.words, first.phonemes) and np.array_equal(
+                utterance.pcm if utterance.pcm is not None else [], first.pcm if first.pcm is not None else []
             )
         print(f"  same {same} of {repeats}")
     voice.close()
@@ -136,7 +136,7 @@ def measure(voice: Voice) -> None:
 def main() -> None:
     form = argparse.RawDescriptionHelpFormatter
     reader = argparse.ArgumentParser(description=__doc__, formatter_class=form)
-    reader.add_argument("voice", nargs="*", help="all that there are, where none is named")
+    reader.add_argument("voice", nargs="*", help="default: all voices that are installed")
     names = reader.parse_args().voice or [voice.name for voice in voices() if voice.available]
     print(noise())
     for name in names:

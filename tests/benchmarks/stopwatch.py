@@ -1,4 +1,4 @@
-"""What a piece of work takes, and how noisy the machine is meanwhile, for the benchmarks beside this file."""
+"""Measures the time of work and the noise of the machine, for the benchmarks in this folder."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ import statistics
 import time
 from collections.abc import Callable
 
-__all__ = ["Noise", "helped", "measure", "median", "noise"]
+__all__ = ["Noise", "handle_help", "measure", "median", "noise"]
 
-WORK = bytes(1 << 19)  # whose digest takes half a millisecond: what noise is measured by
+WORK = bytes(1 << 19)  # noise is measured by its digest, which takes half a millisecond
 
 
-def helped(says: str | None) -> None:
-    """`--help` of a script without options prints what it says of itself."""
+def handle_help(description: str | None) -> None:
+    """Parse the command line of a script without options; `--help` prints the description."""
     form = argparse.RawDescriptionHelpFormatter
-    argparse.ArgumentParser(description=says, formatter_class=form).parse_args()
+    argparse.ArgumentParser(description=description, formatter_class=form).parse_args()
 
 
 def measure(work: Callable[[], object], least: float = 1.0) -> tuple[float, float, float]:
-    """(median, minimum, maximum) milliseconds of one call, over about `least` seconds.
+    """Return median, minimum and maximum milliseconds of a call, over about `least` seconds.
 
-    The first run, which fills caches, does not count.
+    The first call, which fills caches, does not count.
     """
     work()
     spans: list[float] = []
@@ -33,46 +33,46 @@ def measure(work: Callable[[], object], least: float = 1.0) -> tuple[float, floa
 
 
 def median(work: Callable[[], object], repeats: int = 15) -> float:
-    """Milliseconds; the first run, which fills caches, does not count."""
+    """Return the median milliseconds of a call; the first call, which fills caches, does not count."""
     work()
     return statistics.median(_milliseconds(work) for _ in range(repeats))
 
 
-def noise(looks: int = 500) -> str:
-    """A line that says how much longer a fixed piece of work takes than at its best, by clock."""
-    spans = [_milliseconds(_digest) for _ in range(looks)]
+def noise(samples: int = 500) -> str:
+    """Return a line that says how much longer than at its best a fixed piece of work takes."""
+    spans = [_milliseconds(_digest) for _ in range(samples)]
     tenths, least = statistics.quantiles(spans, n=10), min(spans)
     return (
         f"noise of this machine: the same work takes {tenths[4] / least - 1:.0%} longer than at its best, "
-        f"{tenths[8] / least - 1:.0%} in nine of ten"
+        f"90th percentile {tenths[8] / least - 1:.0%}"
     )
 
 
 class Noise:
-    """What else the machine does to the processor's time between other work: looked at again and again."""
+    """The noise of the machine between other work: how much slower than at its best it is."""
 
     least = float("inf")
 
     def __init__(self) -> None:
-        self._took: list[float] = []
+        self._seconds: list[float] = []
 
-    def look(self) -> float:
-        """Do the work once; s, by clock."""
-        began, used = time.perf_counter(), time.process_time()
+    def sample(self) -> float:
+        """Measure once; return the elapsed seconds of the measurement."""
+        begin, used = time.perf_counter(), time.process_time()
         _digest()
-        self._took.append(time.process_time() - used)
-        Noise.least = min(Noise.least, self._took[-1])
-        return time.perf_counter() - began
+        self._seconds.append(time.process_time() - used)
+        Noise.least = min(Noise.least, self._seconds[-1])
+        return time.perf_counter() - begin
 
     @property
     def factor(self) -> float:
-        """How much slower than at its best the machine was, on average."""
-        return statistics.mean(self._took) / Noise.least
+        """The mean time of the work divided by its least time."""
+        return statistics.mean(self._seconds) / Noise.least
 
     def __str__(self) -> str:
-        """Median and nine in ten, per cent."""
-        tenths = statistics.quantiles(self._took, n=10)
-        return "".join(f"{100 * (took / Noise.least - 1):7.0f} %" for took in (tenths[4], tenths[8]))
+        """Return median and 90th percentile in per cent."""
+        tenths = statistics.quantiles(self._seconds, n=10)
+        return "".join(f"{100 * (seconds / Noise.least - 1):7.0f} %" for seconds in (tenths[4], tenths[8]))
 
 
 def _digest() -> None:
@@ -80,6 +80,6 @@ def _digest() -> None:
 
 
 def _milliseconds(work: Callable[[], object]) -> float:
-    began = time.perf_counter()
+    begin = time.perf_counter()
     work()
-    return 1000 * (time.perf_counter() - began)
+    return 1000 * (time.perf_counter() - begin)

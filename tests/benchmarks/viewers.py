@@ -1,11 +1,11 @@
-"""Prints how late frames come to each of many viewers of one session, and how many do not come.
+"""Measures lateness and loss of frames for each of many viewers of one session.
 
-Run: python tests/benchmarks/viewers.py [--viewers 20] [--seconds 15] [--streams fap mesh audio] [serve's own]
+Run: python tests/benchmarks/viewers.py [--viewers 20] [--seconds 15] [--streams fap mesh audio] [...]
 
-One more connection is the manager: it sends a spoken document with a face every 3 s. Each viewer gets all the
-streams; the client is a process of its own on plain sockets. Lateness is from the time a frame is for to its
-last byte; sound is sent up to 100 ms ahead, which counts as early. Noise is how late this machine wakes a
-process that does nothing else.
+Further options are those of `serve`. One more connection sends a document with speech and an expression every
+3 s. Each viewer receives all streams; the viewers are one process with plain sockets. Lateness is the time
+from a frame's instant to the receipt of its last byte; sound is sent up to 100 ms ahead, so its lateness is
+negative. Noise is how late this machine wakes an idle process.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from collections import defaultdict
 from typing import Any
 
 import numpy as np
-from listeners import POSIX, joined
+from listeners import POSIX, open_peer
 from packets import encode_text, take_messages
-from sessions import noise, served, spent
+from sessions import noise, processor_seconds, running_service
 
 FPS = 25
 EVERY = 3.0  # s between two documents
@@ -36,12 +36,12 @@ BODY = (
 
 
 def watch(url: str, viewers: int, seconds: float, streams: list[str]) -> dict[str, Any]:
-    """Join, subscribe, play, listen: for each viewer and stream its lateness, and the numbers it lacks."""
+    """Connect viewers and play documents; return lateness and missing frames of each viewer and stream."""
     poll = select.epoll()
-    manager = joined(url, "show", False)
-    peers = [joined(url, "show", False) for _ in range(viewers)]
+    manager = open_peer(url, "show", False)
+    peers = [open_peer(url, "show", False) for _ in range(viewers)]
     by_number = {peer.socket.fileno(): peer for peer in (manager, *peers)}
-    came: dict[tuple[int, str], list[tuple[int, float, float]]] = defaultdict(list)
+    received: dict[tuple[int, str], list[tuple[int, float, float]]] = defaultdict(list)
     for peer in (manager, *peers):
         poll.register(peer.socket, select.EPOLLIN)
         peer.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
@@ -49,8 +49,8 @@ def watch(url: str, viewers: int, seconds: float, streams: list[str]) -> dict[st
         for stream in streams:
             rate = {} if stream == "audio" else {"fps": FPS}
             peer.socket.sendall(encode_text(json.dumps({"type": "subscribe", "stream": stream, **rate})))
-    begun, due, documents, zero = time.time(), time.time() + 0.5, 0, None
-    measured = begun + EVERY
+    begin, due, documents, zero = time.time(), time.time() + 0.5, 0, None
+    measured = begin + EVERY
     while (now := time.time()) < measured + seconds:
         if now >= due:
             due += EVERY
@@ -68,23 +68,23 @@ def watch(url: str, viewers: int, seconds: float, streams: list[str]) -> dict[st
                 if code == 2:
                     kind, _, _, frame, at = struct.unpack_from("<BBHId", payload)
                     if here >= measured and len(payload) > 16:
-                        came[number, KINDS[kind]].append((frame, at, here))
-                elif (found := POSIX.search(payload)) is not None:
-                    zero = float(found[2]) / 1e3 - float(found[1])
+                        received[number, KINDS[kind]].append((frame, at, here))
+                elif (match := POSIX.search(payload)) is not None:
+                    zero = float(match[2]) / 1e3 - float(match[1])
     assert zero is not None
-    told = []
+    rows = []
     for peer in peers:
         row: dict[str, Any] = {}
         for stream in streams:
-            frames = came[peer.socket.fileno(), stream]
+            frames = received[peer.socket.fileno(), stream]
             late = [1e3 * (here - at - zero) for _, at, here in frames]
             numbers = [frame for frame, _, _ in frames]
-            # Of sound there is none in silence: only frames can be missing.
+            # Sound has no packets in silence, so that only frames can be missing.
             whole = len(numbers) if stream == "audio" else numbers[-1] - numbers[0] + 1
             parts = [float(v) for v in np.percentile(late, (50, 99, 100))]
             row[stream] = {"frames": len(frames), "missing": whole - len(numbers), "late": parts}
-        told.append(row)
-    return {"viewers": told, "documents": documents}
+        rows.append(row)
+    return {"viewers": rows, "documents": documents}
 
 
 def main() -> None:
@@ -98,17 +98,17 @@ def main() -> None:
         print(json.dumps(watch(arguments.watch, arguments.viewers, arguments.seconds, arguments.streams)))
         return
     print("noise of this machine: p50 {:.2f}, p99 {:.2f} ms".format(*noise()))
-    with served([sys.executable, "-m", "realizer", "serve", "--port", "0", *rest]) as (url, service):
-        me = [sys.executable, __file__, "--watch", url, "--viewers", str(arguments.viewers)]
-        me += ["--seconds", str(arguments.seconds), "--streams", *arguments.streams]
-        begun, used = time.time(), spent(service)
-        told = json.loads(subprocess.run(me, stdout=subprocess.PIPE, text=True, check=True).stdout)
-        share = (spent(service) - used) / (time.time() - begun)
-    count, documents = len(told["viewers"]), told["documents"]
+    with running_service([sys.executable, "-m", "realizer", "serve", "--port", "0", *rest]) as (url, service):
+        command = [sys.executable, __file__, "--watch", url, "--viewers", str(arguments.viewers)]
+        command += ["--seconds", str(arguments.seconds), "--streams", *arguments.streams]
+        begin, used = time.time(), processor_seconds(service)
+        result = json.loads(subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout)
+        share = (processor_seconds(service) - used) / (time.time() - begin)
+    count, documents = len(result["viewers"]), result["documents"]
     print(f"{count} viewers of one session, {documents} documents, the service {share:.0%} of a core; ms")
     heads = [f"   {stream + ': p50':>12} {'p99':>7} {'most':>7} missing" for stream in arguments.streams]
     print(f"{'viewer':>8}" + "".join(heads))
-    for number, row in enumerate(told["viewers"], 1):
+    for number, row in enumerate(result["viewers"], 1):
         cells = [
             f"   {r['late'][0]:12.2f} {r['late'][1]:7.2f} {r['late'][2]:7.1f} {r['missing']:3}/{r['frames']}"
             for r in row.values()

@@ -1,4 +1,4 @@
-"""A service in an event loop whose clock moves only when there is nothing to do: the same run every time.
+"""Runs a service in an event loop with a virtual clock, so that every run is the same.
 
 Used by `compare_checkouts.py` and `house.py`. Only public names of `realizer` are used.
 """
@@ -21,12 +21,12 @@ import realizer
 __all__ = ["VirtualLoop", "run", "service"]
 
 START = 1000.0  # s on the loop's clock
-EPOCH = 1_700_000_000.0  # what `time.time` returns: the service writes it into feedback
-GRACE = 0.002  # s of real time in which bytes that were sent arrive by the loopback device
+EPOCH = 1_700_000_000.0  # result of `time.time`, which feedback contains
+GRACE = 0.002  # s of real time in which bytes arrive on the loopback device
 
 
 class _Selector(selectors.DefaultSelector):
-    """Moves the clock to the next timer instead of waiting for it."""
+    """A selector that moves the clock to the next timer instead of waiting for it."""
 
     loop: VirtualLoop
 
@@ -41,7 +41,7 @@ class _Selector(selectors.DefaultSelector):
 
 
 class VirtualLoop(asyncio.SelectorEventLoop):
-    """An event loop with a clock of its own; what is given to an executor runs at once, in this thread."""
+    """An event loop with a virtual clock; `run_in_executor` calls functions immediately, in this thread."""
 
     def __init__(self) -> None:
         selector = _Selector()
@@ -58,7 +58,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         self._now = max(self._now, self._scheduled[0]._when)  # type: ignore[attr-defined]
 
     def run_in_executor(self, executor: Any, func: Callable[..., Any], *args: Any) -> asyncio.Future[Any]:
-        """Call `func` at once, so that answers come in the order of the questions."""
+        """Call `func` immediately, so that results come in the order of the calls."""
         future = self.create_future()
         try:
             future.set_result(func(*args))
@@ -76,7 +76,7 @@ def run(main: Any) -> Any:
 
 @contextlib.asynccontextmanager
 async def service(**settings: Any) -> AsyncIterator[str]:
-    """Start `realizer.serve` on a free port; yields the URL of its WebSocket; SIGTERM ends it."""
+    """Start `realizer.serve` on a free port, yield the URL of its WebSocket, and end it by SIGTERM."""
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
         task = asyncio.create_task(realizer.serve(realizer.Settings(port=0, **settings)))
