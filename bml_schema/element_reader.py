@@ -1,7 +1,6 @@
-"""The reader of one element in a block: attributes, children, descriptions, constraints.
+"""A recursive descent reader for the elements of a block: attributes, children, descriptions, constraints.
 
-Recursive descent, one function per grammar rule. The first fault is raised as a Fault; the caller decides
-what is dropped with it.
+It raises the first fault as a Fault; the caller decides what is dropped.
 """
 
 from __future__ import annotations
@@ -43,22 +42,22 @@ Vocabulary = Mapping[str, type[Behaviour]]
 
 _SSML = "application/ssml+xml"
 _OURS = (f"{{{CORE}}}", f"{{{EXTENSIONS}}}")
-_OWN = (*_OURS, f"{{{OWN}}}")  # not BMLA and BMLT: they have more attributes than this package knows
+_OWN = (*_OURS, f"{{{OWN}}}")  # without BMLA and BMLT, which have more attributes than the schema
 _KNOWN = (*_OWN, f"{{{BMLA}}}", f"{{{BMLT}}}")
 _PARTS: Mapping[str, type[Synchronize | Before | After]] = {c.tag: c for c in (Synchronize, Before, After)}
 _IN_BMLA = f"{{{BMLA}}}"
 _SYNC, _DESCRIPTION = Sync.tag, Description.tag
-# Elements of the core that are no behaviours.
+# Elements of the core that are not behaviours.
 _INNER = {c.tag for c in (Block, Required, Constraint, Description, SpeechText, Sync, *_PARTS.values())}
 
 
 @lru_cache(maxsize=1000)
 def _standard(raw: str) -> tuple[str, str]:
-    """Return the core tag of an element of the core or a draft, and the tag of that name elsewhere or ""."""
+    """Return the core tag of a core or draft element, and the tag of this name in an extension or ""."""
     space, name = raw[1:].split("}") if raw.startswith("{") else ("", raw)
     if space in DRAFTS or not space or space == CORE:
         return core(name), extension(name)
-    return raw, bmla(name) if space == BMLT else ""  # documents confuse the two
+    return raw, bmla(name) if space == BMLT else ""  # some documents confuse them
 
 
 class ElementReader:
@@ -67,8 +66,8 @@ class ElementReader:
     Attributes:
         vocabulary: Clark tag -> node class.
         names: what references can name; None disables the check.
-        lenient: what is not BML 1.0 is read where its meaning is plain.
-        remarks: faults that cost no behaviour, such as unknown attributes; the caller clears them.
+        lenient: whether other documents than BML 1.0 are read if their meaning is clear.
+        remarks: faults that do not drop a behaviour, such as unknown attributes; the caller clears them.
     """
 
     __slots__ = ("lenient", "names", "remarks", "vocabulary")
@@ -80,7 +79,7 @@ class ElementReader:
         self.remarks: list[Fault] = []
 
     def tag(self, element: etree._Element) -> str:
-        """Return the Clark tag; without namespace or in a draft's it is core, or extension for faceFacs."""
+        """Return the Clark tag; elements without namespace, or of a draft, are core or extension elements."""
         raw: Any = element.tag
         if raw in _INNER or raw in self.vocabulary:
             return cast("str", raw)
@@ -93,31 +92,31 @@ class ElementReader:
 
     def node(self, cls: type[Any], element: etree._Element, *, timed: bool = False) -> Any:
         """Read an element as a node of a class; `timed` nodes have an id and sync points."""
-        shape = schema_of(cls)
-        values = self.attributes(shape, element, timed)
-        if shape.mixed:
-            values[shape.mixed] = tuple(self.mixed(shape, element))
-        elif shape.text:
-            values[shape.text] = self.text(element)
-        elif shape.children or len(element):
-            self.children(shape, element, values)
+        schema = schema_of(cls)
+        values = self.attributes(schema, element, timed)
+        if schema.mixed:
+            values[schema.mixed] = tuple(self.mixed(schema, element))
+        elif schema.text:
+            values[schema.text] = self.text(element)
+        elif schema.children or len(element):
+            self.children(schema, element, values)
         elif (text := element.text) and not text.isspace():
-            self.no_text(element)
+            self.refuse_text(element)
         node: Any = cls(**values)
         if timed and (fault := node.fault()):
             raise Fault(fault, element)
         return node
 
-    def attributes(self, shape: NodeSchema, element: etree._Element, timed: bool) -> dict[str, Any]:
+    def attributes(self, schema: NodeSchema, element: etree._Element, timed: bool) -> dict[str, Any]:
         """Return attribute values by field; raise one Fault that names all faults."""
         values: dict[str, Any] = {}
         syncs: dict[str, SyncRef] = {}
         foreign: dict[str, str] = {}
         faults: list[str] = []
-        known = shape.attributes
-        points = shape.sync_points if timed else ()
+        known = schema.attributes
+        points = schema.sync_points if timed else ()
         if len(element.attrib) > MAX_ATTRIBUTES:
-            attributes(element)  # which refuses them
+            attributes(element)  # raises a Fault
         items: Any = element.items()
         for name, text in items:
             spec = known.get(name)
@@ -131,62 +130,61 @@ class ElementReader:
                     values[spec.field] = read_sync_ref(text, self.names)
                 else:
                     values[spec.field] = spec.read(text)
-            except ValueError as wrong:
+            except ValueError as error:
                 if spec is not None and self.lenient and (folded := spec.value.fold(text)) is not None:
                     values[spec.field] = folded
                     continue
-                # The message about a reference is complete already.
-                reason = wrong if spec is None or spec.read is None else _unwanted(spec, text)
+                # The message about a reference is complete.
+                reason = error if spec is None or spec.read is None else _unwanted(spec, text)
                 faults.append(f"{local(name)}: {reason}")
-        if shape.old and self.lenient:
-            faults += _drafts(shape, values, foreign)
-        if shape.timed and not timed and "id" not in element.attrib:
+        if schema.old and self.lenient:
+            faults += _read_draft_attributes(schema, values, foreign)
+        if schema.timed and not timed and "id" not in element.attrib:
             values["id"] = ""  # a part of <face> has no timing, so its id is optional
-        for s in shape.required:
+        for s in schema.required:
             if s.field not in values and s.name not in element.attrib:
                 faults.append(f"{s.name}: wanted {s.value.wanted}, got none")
-        unknown = self.describe_unknown(shape, element, foreign, timed) if foreign else ""
+        unknown = self.describe_unknown(schema, element, foreign, timed) if foreign else ""
         if faults:
             raise Fault("; ".join([*faults, unknown] if unknown else faults), element)
         if unknown:
             self.remarks.append(Fault(unknown, element, CUSTOM_ATTRIBUTE_NOT_SUPPORTED))
-        if shape.timed:
+        if schema.timed:
             values["syncs"] = syncs
             values["unknown_attributes"] = foreign
         return values
 
     def describe_unknown(
-        self, shape: NodeSchema, element: etree._Element, names: Iterable[str], timed: bool
+        self, schema: NodeSchema, element: etree._Element, names: Iterable[str], timed: bool
     ) -> str:
-        """Return one message about all attributes without a meaning, or "".
+        """Return one message about all unknown attributes, which may be misspelt, or "".
 
-        A misspelling such as `amout="1"` would otherwise go unnoticed. Attributes of other namespaces are
-        kept without a message.
+        Attributes of other namespaces have no message.
 
         Args:
             names: Clark names of attributes that the schema does not have.
-            timed: sync points are attributes of the element.
+            timed: whether sync points are attributes of the element.
         """
-        old = shape.old if self.lenient else ()
+        old = schema.old if self.lenient else ()
         names = (name for name in names if name not in old)
         wrong = [name for name in names if name[0] != "{" or name.startswith(_OWN)]
         if not wrong:
             return ""
         suggest = did_you_mean if self.names is None else self.names.suggest
-        known = [name for name in shape.attributes if name[0] != "{"]
+        known = [name for name in schema.attributes if name[0] != "{"]
         if timed:
-            known += shape.sync_points
-        around = element.getparent() if shape.timed and not timed else None
+            known += schema.sync_points
+        around = element.getparent() if schema.timed and not timed else None
         where = "" if around is None else f" inside <{local(str(around.tag))}>"
-        texts = [f"{name}: no attribute of <{shape.name}>{where}, so it does nothing" for name in wrong]
-        # The list of known attributes comes once, before the last suggestion.
+        texts = [f"{name}: no attribute of <{schema.name}>{where}, so it does nothing" for name in wrong]
+        # The list of known attributes occurs once, before the last suggestion.
         texts[-1] += f"; known are {', '.join(known)}" if known else "; there are none"
-        kinds = [_of_the_kind(shape, known, element.get(name, "")) for name in wrong]
+        kinds = [_of_same_kind(schema, known, element.get(name, "")) for name in wrong]
         return "; ".join(
             text + suggest(local(name), kind) for text, name, kind in zip(texts, wrong, kinds, strict=True)
         )
 
-    def children(self, shape: NodeSchema, element: etree._Element, values: dict[str, Any]) -> None:
+    def children(self, schema: NodeSchema, element: etree._Element, values: dict[str, Any]) -> None:
         """Read child elements into the fields of `values`."""
         nodes_by_field: dict[str, list[Any]] = {}
         descriptions: list[Description] = []
@@ -196,25 +194,25 @@ class ElementReader:
             if not text or text.isspace():
                 text = child.tail
             tag = self.tag(child)
-            spec = shape.by_tag.get(tag)
-            if spec is None and tag == _DESCRIPTION and shape.timed:
+            spec = schema.by_tag.get(tag)
+            if spec is None and tag == _DESCRIPTION and schema.timed:
                 descriptions.append(self.description(child))
                 continue
             if spec is None and tag.startswith(_KNOWN):
                 # Some documents put an extension's children into the core namespace, or into none.
-                spec = shape.by_local.get(local(tag))
+                spec = schema.by_local.get(local(tag))
             if spec is not None:
                 nodes_by_field.setdefault(spec[0].field, []).append(self.node(spec[1], child))
             elif tag.startswith(_OURS):
-                raise Fault(f"wanted {shape.listed}, got <{local(tag)}>", child)
-            elif shape.timed:
+                raise Fault(f"wanted {schema.listed}, got <{local(tag)}>", child)
+            elif schema.timed:
                 others.append(canonical(child))
         if text and not text.isspace():
-            self.no_text(element)
-        for kind in shape.children:
+            self.refuse_text(element)
+        for kind in schema.children:
             nodes = nodes_by_field.get(kind.field, [])
             if len(nodes) < kind.least:
-                raise Fault(f"wanted {shape.listed}, got none", element)
+                raise Fault(f"wanted {schema.listed}, got none", element)
             if kind.many:
                 values[kind.field] = tuple(nodes)
             elif len(nodes) > 1:
@@ -226,23 +224,23 @@ class ElementReader:
         if others:
             values["unknown_children"] = tuple(others)
 
-    def no_text(self, element: etree._Element) -> None:
-        """Raise a Fault for character data beside the child elements."""
+    def refuse_text(self, element: etree._Element) -> None:
+        """Raise a Fault if there is text between the child elements."""
         texts = (element.text, *(child.tail for child in element))
         if text := next((t.strip() for t in texts if t and not t.isspace()), ""):
             hint = ", put it into <text>" if self.tag(element) == Speech.tag else ""
             raise Fault(f"wanted elements, got the text {quoted(text)}{hint}", element)
 
-    def mixed(self, shape: NodeSchema, element: etree._Element) -> Iterator[Any]:
+    def mixed(self, schema: NodeSchema, element: etree._Element) -> Iterator[Any]:
         """Read text := (characters | sync)*, with whitespace as written."""
         text = element.text or ""
         for child in element:
-            spec = shape.by_tag.get(self.tag(child))
+            spec = schema.by_tag.get(self.tag(child))
             if spec is None:
-                raise Fault(f"wanted text and {shape.listed}, got <{local(str(child.tag))}>", child)
+                raise Fault(f"wanted text and {schema.listed}, got <{local(str(child.tag))}>", child)
             if child.get("id", "").strip() == "bml":
-                says = 'id: "bml" means the block in references, so this <sync> does nothing'
-                self.remarks.append(Fault(says, child, CUSTOM_ATTRIBUTE_NOT_SUPPORTED))
+                message = 'id: "bml" means the block in references, so this <sync> does nothing'
+                self.remarks.append(Fault(message, child, CUSTOM_ATTRIBUTE_NOT_SUPPORTED))
             else:
                 if text:
                     yield text
@@ -278,7 +276,7 @@ class ElementReader:
     def constraint(self, element: etree._Element) -> dict[str, Any]:
         """Return the id and parts of a constraint, by field."""
         values = self.attributes(schema_of(Constraint), element, False)
-        self.no_text(element)
+        self.refuse_text(element)
         values["parts"] = tuple(self.constraint_part(child) for child in element)
         if not values["parts"]:
             raise Fault("wanted <synchronize>, <before> or <after>, got none", element)
@@ -292,12 +290,12 @@ class ElementReader:
         if cls is None:
             got = local(str(element.tag))
             raise Fault(f"wanted <synchronize>, <before> or <after>, got <{got}>", element)
-        self.no_text(element)
+        self.refuse_text(element)
         refs = tuple(self.sync(child) for child in element)
         if not refs:
             raise Fault("wanted at least one <sync>, got none", element)
         if cls is Synchronize:
-            # Drafts name one of the points in an attribute.
+            # In drafts, one of the points is an attribute.
             return Synchronize(refs=((self.ref(element),) if "ref" in element.attrib else ()) + refs)
         return (After if cls is After else Before)(ref=self.ref(element), refs=refs)
 
@@ -312,13 +310,15 @@ class ElementReader:
             raise Fault("ref: wanted a sync reference, got none", element)
         try:
             return read_sync_ref(text, self.names)
-        except ValueError as wrong:
-            raise Fault(f"ref: {wrong}", element) from None
+        except ValueError as error:
+            raise Fault(f"ref: {error}", element) from None
 
 
-def _drafts(shape: NodeSchema, values: dict[str, Any], foreign: dict[str, str]) -> Iterator[str]:
+def _read_draft_attributes(
+    schema: NodeSchema, values: dict[str, Any], foreign: dict[str, str]
+) -> Iterator[str]:
     """Read attributes by their names in drafts, unless the present name is used too; yield faults."""
-    for name, spec in shape.old.items():
+    for name, spec in schema.old.items():
         if name in foreign and spec.field not in values and spec.read is not None:
             text = foreign.pop(name)
             try:
@@ -331,11 +331,11 @@ def _unwanted(spec: Attribute, text: str) -> str:
     return describe_mismatch(spec.value.wanted, text, quoted(text))
 
 
-def _of_the_kind(shape: NodeSchema, known: Iterable[str], value: str) -> list[str]:
-    """Return the attributes that a value can be meant for: words are no times, and times no words."""
+def _of_same_kind(schema: NodeSchema, known: Iterable[str], value: str) -> list[str]:
+    """Return the attributes that can have a value like this: a time or another word."""
     time = ":" in value or NUMBER.fullmatch(value.strip()) is not None
     return [
         name
         for name in known
-        if time or (name in shape.attributes and shape.attributes[name].value.low is None)
+        if time or (name in schema.attributes and schema.attributes[name].value.low is None)
     ]

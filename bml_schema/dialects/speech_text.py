@@ -1,4 +1,4 @@
-"""The text of a speech in a dialect: words beside the elements, and other names for <sync>."""
+"""Translation of a <speech> in a dialect: text outside <text>, and other names for <sync>."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ _MARKS = {"sync": "id", "tm": "id", "mark": "name"}
 
 
 def translate_speech(speech: Any, apply: Callable[[Row], None], *, words: bool) -> None:
-    """Put the words of a <speech> into its <text>, and read <tm> and <mark> as <sync>.
+    """Move the content of a <speech> into a <text>, and translate <tm> and <mark> to <sync>.
 
     Args:
-        apply: takes the rows of the table that were used.
-        words: also if there are only words, which are a fault of a document in no dialect.
+        apply: called with each used row of the table.
+        words: whether plain text without marks is moved; it is a fault of a document in no dialect.
     """
     elements = table().elements
     text = next((child for child in speech if local(str(child.tag)) == "text"), None)
@@ -49,7 +49,7 @@ def translate_speech(speech: Any, apply: Callable[[Row], None], *, words: bool) 
 
 
 def _rewrite(text: Any, source: Any, apply: Callable[[Row], None]) -> None:
-    """Give a <text> the words and marks of an element."""
+    """Replace the content of a <text> by the words and marks of an element."""
     content = _Content(str(text.tag).replace("text", "sync"), apply)
     content.add_text(source.text)
     for child in source:
@@ -66,7 +66,7 @@ def _is_marked(text: Any) -> bool:
 
 
 class _Content:
-    """Words and syncs in order."""
+    """The words and <sync> elements of a text, in order."""
 
     def __init__(self, tag: str, apply: Callable[[Row], None]) -> None:
         self.tag = tag

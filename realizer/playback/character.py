@@ -47,8 +47,8 @@ class Character:
 
     def replace_shifts(self, old: Mapping[str, BaseShift], new: Mapping[str, BaseShift]) -> None:
         """Replace the shifts of some behaviours."""
-        heirs = {id(old[name]): shift for name, shift in new.items()}
-        shifts = [heirs.get(id(s), s) for s in self.shifts]
+        replacements = {id(old[name]): shift for name, shift in new.items()}
+        shifts = [replacements.get(id(s), s) for s in self.shifts]
         self.shifts = sorted(shifts, key=lambda s: (s.begin, s.end))
 
     def cancel(self, shifts: Collection[BaseShift], now: float) -> None:
@@ -67,8 +67,7 @@ class Character:
     def set_emotion(self, values: Mapping[str, float], now: float) -> None:
         """Hold an emotion from `now` on instead of the previous one: AUs (0..1) and FAPs (FAPU) by name.
 
-        It is in the layer of expressions, below mood, speech, gaze and direct values, in whatever order they
-        are set. {} releases it.
+        Its layer is that of expressions, below mood, speech, gaze and direct values. {} releases it.
 
         Raises:
             KeyError: no such AU or FAP; nothing is changed then.
@@ -82,12 +81,12 @@ class Character:
         for index, shift in enumerate(self.shifts):
             for channel in shift.channels:
                 own = region(channel.target)
-                heir = next((s for s in self.shifts[index + 1 :] if own in s.regions), None)
-                out.append(channel if heir is None else channel.faded(heir.begin, heir.end))
+                successor = next((s for s in self.shifts[index + 1 :] if own in s.regions), None)
+                out.append(channel if successor is None else channel.faded(successor.begin, successor.end))
         return [*out, *self.emotion.values(), *self.direct.values()]
 
     def forget(self, before: float) -> None:
-        """Drop what is invisible after `before`, so that the cost does not grow with the past."""
+        """Drop channels that are invisible after `before`, so that the cost does not grow with time."""
         self.shifts = [
             shift
             for index, shift in enumerate(self.shifts)

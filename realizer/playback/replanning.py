@@ -21,8 +21,7 @@ def affected_blocks(
 ) -> list[ActiveBlock]:
     """Return the blocks that are solved together with one, by references to sync points that have not passed.
 
-    Of two blocks of which one waits for the other only one can move at a time; otherwise both would move
-    later for ever. The points of the other are fixed.
+    A block is not solved together with one that it waits for, because both would move later for ever.
 
     Args:
         block: a new block, or one whose times have changed.
@@ -30,15 +29,15 @@ def affected_blocks(
         waits: the dependencies of the block.
 
     Returns:
-        Those of `alive` that are connected to the block by any chain, in order.
+        Those of `alive` that are linked to the block, directly or through other blocks, in order.
     """
     by_id = {p.block.id: p for p in alive if p.start < FOREVER}
-    named = [
+    refs_by_block = [
         (block.id, external_refs(block)),
         *((id, p.external_refs) for id, p in by_id.items() if p.external_refs),
     ]
     neighbours: dict[str, set[str]] = {}
-    for own, refs in named:
+    for own, refs in refs_by_block:
         for ref in refs:
             other = by_id.get(ref.block or "")
             if other is not None and not _has_passed(ref, other, now):
@@ -67,7 +66,7 @@ def affected_blocks(
 
 
 def _has_passed(ref: SyncRef, playing: ActiveBlock, now: float) -> bool:
-    """Whether a point is past, or does not exist."""
+    """Return whether a point has passed or does not exist."""
     sync = ref.sync if ref.index is None else f"{ref.sync}:{ref.index}"
     try:
         time = playing.schedule.at(ref.behaviour or "", sync or "")
@@ -79,29 +78,29 @@ def _has_passed(ref: SyncRef, playing: ActiveBlock, now: float) -> bool:
 def member(playing: ActiveBlock, origin: float, now: float) -> Member:
     """Return a playing block on the clock of a block that starts at `origin`, with fixed past points."""
     delay = playing.start - origin
-    passed: dict[str, dict[str, float]] = {}
+    passed_times: dict[str, dict[str, float]] = {}
     for behaviour in playing.plan.timings:
         points, times = playing.schedule.points[behaviour], playing.schedule.times[behaviour]
-        when = {
+        passed = {
             point: float(time) + delay
             for point, time in zip(points, times, strict=True)
             if playing.start + float(time) <= now
         }
-        if when:
-            passed[behaviour] = when
+        if passed:
+            passed_times[behaviour] = passed
     return Member(
         playing.block,
         playing.plan.timings,
         start=delay,
         earliest=max(delay, now - origin),
-        passed_times=passed,
+        passed_times=passed_times,
         is_fixed=True,
         late=playing.schedule.late,
     )
 
 
 def anticipators_of(block: Block) -> set[str]:
-    """Return the anticipators that a block is tied to."""
+    """Return the anticipators that a block refers to."""
     return {ref.behaviour or "" for ref in references(block) if ref.block == ANTICIPATORS}
 
 
@@ -109,7 +108,7 @@ def lead_time(playing: ActiveBlock, id: str, sync: str, now: float) -> float:
     """Return the earliest possible time of an anticipated point, after the least times before it.
 
     Returns:
-        Seconds on the session clock; `now` if nothing of the block is tied to the point, or it has passed.
+        Seconds on the session clock; `now` if no later sync point refers to the point.
     """
     soonest = now
     for node in playing.block.behaviours:

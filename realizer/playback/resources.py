@@ -11,11 +11,12 @@ from realizer.behaviours.kind import BehaviourKind, PlanningContext
 from realizer.scheduling.timing import Schedule
 
 # s; two claims may overlap by this much.
-TOUCH = 1e-3
-# s; two speeches that overlap by less are placed one after the other, if there is a way.
-SMALL = 0.3
-# Resources that may pass from one behaviour to the next: two conflict only if one lies within the other. A
-# gaze does not pass to another block, which must not disturb it; a base state does, or it would never change.
+MAX_OVERLAP = 1e-3
+# s; two speeches that overlap by less are placed one after the other, if their references allow it.
+MAX_SHIFT = 0.3
+# Resources that may pass from one behaviour to the next: two claims conflict only if one contains the other.
+# A gaze passes only within its block, because other blocks must not disturb it; a base state passes to any
+# block, or it could never change.
 PASSES = {"gaze": "own block", "base gaze": "any block", "base head": "any block", "base face": "any block"}
 
 
@@ -27,8 +28,8 @@ class ResourceClaim:
         resource: such as "voice" or "gaze"; of one character.
         begin, end: seconds; all compared claims are on the same clock.
         block, behaviour: the claimant.
-        rank: of two behaviours in one block the one of lower rank wins.
-        silent_from: when its closing silence begins; infinite for what is no sound.
+        rank: of two behaviours in one block the one with the lower rank wins.
+        silent_from: when the final silence of its sound begins; infinite without sound.
     """
 
     resource: str
@@ -49,19 +50,19 @@ class ResourceClaim:
         )
 
     def conflicts_with(self, other: ResourceClaim) -> bool:
-        """Whether one of the two has to be dropped."""
+        """Return whether one of the two has to be dropped."""
         if self.resource != other.resource:
             return False
         first, second = (self, other) if self.begin <= other.begin else (other, self)
-        # Another block may speak in the closing silence of a speech.
+        # Another block may speak during the final silence of a speech.
         until = first.end if first.block == second.block else min(first.end, first.silent_from)
-        if min(until, second.end) - second.begin <= TOUCH:
+        if min(until, second.end) - second.begin <= MAX_OVERLAP:
             return False
         passes = PASSES.get(self.resource)
         if passes is None or (passes == "own block" and self.block != other.block):
             return True
         inner, outer = sorted((self, other), key=lambda c: c.end - c.begin)
-        return outer.begin <= inner.begin + TOUCH and inner.end <= outer.end + TOUCH
+        return outer.begin <= inner.begin + MAX_OVERLAP and inner.end <= outer.end + MAX_OVERLAP
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +71,7 @@ class ResourceConflict:
 
     claim: ResourceClaim
     winner: ResourceClaim
-    start: float = 0.0  # of the block that loses it
+    start: float = 0.0  # start of the block of `claim`
 
     @property
     def sequence(self) -> tuple[str | float, str | float] | None:
@@ -82,8 +83,8 @@ class ResourceConflict:
         first, second = sorted((self.claim, self.winner), key=lambda c: c.begin)
         own = self.claim.block
         audible = min(first.end, first.silent_from)
-        within = second.begin <= first.begin + TOUCH or second.end <= audible
-        if self.claim.resource != "voice" or within or audible - second.begin >= SMALL:
+        within = second.begin <= first.begin + MAX_OVERLAP or second.end <= audible
+        if self.claim.resource != "voice" or within or audible - second.begin >= MAX_SHIFT:
             return None
         until = first.end if first.block == own else audible
         return (
@@ -125,31 +126,32 @@ def interrupts(block: Block, schedule: Schedule) -> Iterator[tuple[float, Interr
 
 
 def after_interrupts(
-    existing_claims: Iterable[ResourceClaim], promised: Iterable[tuple[float, Interrupt]]
+    existing_claims: Iterable[ResourceClaim], planned: Iterable[tuple[float, Interrupt]]
 ) -> list[ResourceClaim]:
-    """Return claims as they are once interrupts, each at its time, have been made."""
-    ends: dict[str, list[tuple[float, Interrupt]]] = {}
-    for time, act in promised:
-        ends.setdefault(act.target, []).append((time, act))
-    if not ends:
+    """Return the claims that remain when interrupts end behaviours, each at its time."""
+    by_block: dict[str, list[tuple[float, Interrupt]]] = {}
+    for time, interrupt in planned:
+        by_block.setdefault(interrupt.target, []).append((time, interrupt))
+    if not by_block:
         return list(existing_claims)
-    left: list[ResourceClaim] = []
+    remaining: list[ResourceClaim] = []
     for claim in existing_claims:
-        cuts = [time for time, act in ends.get(claim.block, ()) if _ends(act, claim.behaviour)]
-        end = min([claim.end, *cuts])
+        of_block = by_block.get(claim.block, ())
+        end = min([claim.end, *(time for time, interrupt in of_block if _ends(interrupt, claim.behaviour))])
         if end > claim.begin:
-            left.append(claim if end == claim.end else replace(claim, end=end))
-    return left
+            remaining.append(claim if end == claim.end else replace(claim, end=end))
+    return remaining
 
 
-def _ends(act: Interrupt, behaviour: str) -> bool:
-    return behaviour not in act.exclude and (not act.include or behaviour in act.include)
+def _ends(interrupt: Interrupt, behaviour: str) -> bool:
+    included = not interrupt.include or behaviour in interrupt.include
+    return included and behaviour not in interrupt.exclude
 
 
 def trims(
     new_claims: Iterable[ResourceClaim], existing_claims: Iterable[ResourceClaim]
 ) -> Iterator[tuple[tuple[str, str], float]]:
-    """Yield (block, behaviour) and new end of the speeches whose closing silence a new speech overlaps."""
+    """Yield ((block, behaviour), new end) of each speech whose final silence a new speech overlaps."""
     begins = [claim.begin for claim in new_claims if claim.resource == "voice"]
     for claim in existing_claims if begins else ():
         cuts = [t for t in begins if claim.begin < t < claim.end] if claim.resource == "voice" else []
@@ -160,22 +162,23 @@ def trims(
 def conflicts(
     new_claims: Iterable[ResourceClaim], existing_claims: Iterable[ResourceClaim], start: float = 0.0
 ) -> list[ResourceConflict]:
-    """Return the conflicts of new claims: existing ones win, then those of lower rank.
+    """Return the conflicts of new claims, at most one for each behaviour, in order of rank.
 
-    There is one conflict a behaviour, in order of rank. The times in messages count from `start`.
+    Existing claims win against new ones, and lower ranks against higher ones. The times in messages count
+    from `start`.
     """
-    had: dict[str, list[ResourceClaim]] = {}
+    granted: dict[str, list[ResourceClaim]] = {}
     for claim in existing_claims:
-        had.setdefault(claim.resource, []).append(claim)
+        granted.setdefault(claim.resource, []).append(claim)
     by_behaviour: dict[str, list[ResourceClaim]] = {}
     for claim in sorted(new_claims, key=lambda c: c.rank):
         by_behaviour.setdefault(claim.behaviour, []).append(claim)
-    lost: list[ResourceConflict] = []
+    found: list[ResourceConflict] = []
     for own in by_behaviour.values():
-        clash = ((c, h) for c in own for h in had.get(c.resource, ()) if h.conflicts_with(c))
+        clash = ((c, g) for c in own for g in granted.get(c.resource, ()) if g.conflicts_with(c))
         if (conflict := next(clash, None)) is not None:
-            lost.append(ResourceConflict(*conflict, start))
+            found.append(ResourceConflict(*conflict, start))
             continue
         for claim in own:
-            had.setdefault(claim.resource, []).append(claim)
-    return lost
+            granted.setdefault(claim.resource, []).append(claim)
+    return found
