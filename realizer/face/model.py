@@ -1,4 +1,4 @@
-"""The value of a face that is loaded from a folder."""
+"""The data of a face that was loaded from a folder."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Fapu:
-    """The face's distances in metres, measured on the neutral face; a unit is the distance / 1024."""
+    """The distances of the neutral face in metres; a FAP unit is a distance / 1024."""
 
     irisd0: float
     es0: float
@@ -26,7 +26,7 @@ class Fapu:
     mw0: float
 
     def metres(self, unit: str) -> float:
-        """Return metres of one unit of MNS, MW, ENS, ES or IRISD; radians of an angle_unit; 0 for none."""
+        """Return one unit of MNS, MW, ENS, ES or IRISD in metres, an angle_unit in radians, 0 for "none"."""
         if unit in ("none", "angle_unit"):
             return {"none": 0.0, "angle_unit": 1e-5}[unit]
         return float(getattr(self, unit.lower() + "0")) / 1024
@@ -34,26 +34,26 @@ class Fapu:
 
 @dataclass(frozen=True, eq=False)
 class Face:
-    """A head, and what moves it.
+    """The mesh of a head, and the data that moves it.
 
     Attributes:
-        name, source, licence: from face.toml.
+        name, source, licence: as in face.toml.
         vertices: (n, 3) float32 metres, neutral; origin between the eyes, +x the character's left, +y up,
             +z forward.
         triangles: (m, 3) int32, counter-clockwise seen from outside.
         colours: (n, 3) uint8 sRGB albedo.
-        occlusion: (n,) float32, 0 dark .. 1 open: baked ambient occlusion.
-        gloss: (n,) float32, 0..1: eyes, lips, teeth shine.
+        occlusion: (n,) float32, baked ambient occlusion, from 0 (dark) to 1 (open).
+        gloss: (n,) float32, 0..1; eyes, lips and teeth have high values.
         parts: name -> (first, last + 1) vertex range: skin, left_eye, right_eye, upper_teeth, lower_teeth,
-            tongue, brows, lashes, hair, shirt; a face may leave some out.
+            tongue, brows, lashes, hair, shirt; some may be missing.
         feature_points: "2.1" -> index of the vertex nearest to the MPEG-4 feature point.
-        points: "2.1" -> (3,) float32 metres, the feature point itself (may lie inside the head: 7.1, 3.5).
-        fapu: measured from the feature points.
-        basis: what `face.deform` needs (displacement fields, rigid parts), made when the face is built.
+        points: "2.1" -> (3,) float32 metres, the feature point, which may be inside the head (7.1, 3.5).
+        fapu: distances between the feature points.
+        basis: data of `face.deform` (displacement fields, rigid parts), made when the face is built.
         cameras: extra camera presets by name.
-        inputs: the columns of a pose, a row from which `face.deform` makes vertices: the 68 FAPs,
+        inputs: names of the columns of a pose, from which `face.deform` computes vertices: the 68 FAPs,
             then the inputs of the model (`au.columns`).
-        model: the action units that displace by functions of the place; None if FAPs move everything.
+        model: functions by which action units displace points; None if FAPs move everything.
     """
 
     name: str

@@ -8,17 +8,17 @@ import numpy as np
 from realizer.core.array_types import Float64
 from realizer.face.au.functions import heading, height
 
-CENTIMETRE = 0.01  # m; the unit of the functions' coordinates, in which their parameters are near 1
-BENT = 0.008  # m before and behind the line between the lips; beyond it the mouth's plane is level
-SIDES = 0.008  # m; the halves of an action unit shown on one side fade into each other over twice this
+CENTIMETRE = 0.01  # m; the functions' unit of length, with which their parameters are near 1
+BEND_DEPTH = 0.008  # m before and behind the line between the lips; beyond it the mouth's plane is level
+FADE_WIDTH = 0.008  # m on either side of the middle, in which an action unit of one side fades out
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A density and a direction function.
+    """The density and direction functions of a displacement.
 
     Attributes:
-        origin: (3,) metres, where their coordinates begin.
+        origin: (3,) metres, origin of their coordinates.
         gaussians: (k, 10): height in metres, the rest in centimetres from the origin (`functions.density`).
         alpha, beta: (19,) each (`functions.angle`), radians.
     """
@@ -33,25 +33,25 @@ class Motion:
         return height(self.gaussians, (at - self.origin) / CENTIMETRE)
 
     def direction(self, at: Float64) -> Float64:
-        """Return the unit vectors (n, 3) that points are moved along."""
+        """Return the directions (n, 3) of the displacements of points, unit vectors."""
         return heading(self.alpha, self.beta, (at - self.origin) / CENTIMETRE)
 
     def __call__(self, at: Float64) -> Float64:
         """Return the displacement (n, 3) with full intensity, metres (equation 4.1)."""
-        far, moves = self.density(at), np.zeros(at.shape)
-        # Far off, polynomials are large and mean nothing; the density is nought there.
-        near = np.flatnonzero(np.abs(far) > 1e-7)
-        moves[near] = far[near, None] * self.direction(at[near])
+        lengths, moves = self.density(at), np.zeros(at.shape)
+        # Where the density is zero, the polynomials of the direction are large and meaningless.
+        near = np.flatnonzero(np.abs(lengths) > 1e-7)
+        moves[near] = lengths[near, None] * self.direction(at[near])
         return moves
 
 
 @dataclass(frozen=True, eq=False)
 class Mouth:
-    """The plane that ends the upper half of the face: through the corners of the mouth, bent along the lips.
+    """The bent plane between upper and lower face, through the corners of the mouth and along the lips.
 
     Attributes:
         x: (k,) metres from the middle, from 0 to the corner.
-        y, z: (k,) metres, where the lips meet in front; slope: (k,) how the plane rises from there with z.
+        y, z: (k,) metres, where the lips meet in front; slope: (k,) dy / dz of the plane there.
     """
 
     x: Float64
@@ -60,14 +60,14 @@ class Mouth:
     slope: Float64
 
     def above(self, at: Float64) -> Float64:
-        """Return how far points (n, 3) lie above the plane, (n,) metres."""
+        """Return the height of points (n, 3) above the plane, (n,) metres."""
         across = np.abs(at[:, 0])
         y, z, slope = (np.interp(across, self.x, line) for line in (self.y, self.z, self.slope))
-        # Deep in the mouth and on the bulge of the cheeks, the plane continues level.
-        return np.asarray(at[:, 1] - y - slope * np.clip(at[:, 2] - z, -BENT, BENT))
+        # Deep in the mouth and on the cheeks the plane is level.
+        return np.asarray(at[:, 1] - y - slope * np.clip(at[:, 2] - z, -BEND_DEPTH, BEND_DEPTH))
 
     def upper(self, at: Float64) -> Float64:
-        """Return 1 above and 0 below, (n,); beyond the corners the halves fade, or the cheek would tear."""
+        """Return 1 above and 0 below the plane, (n,), with a smooth step in the cheeks."""
         fade = np.maximum(np.abs(at[:, 0]) - self.x[-1], 0) + 1e-9
         share = np.clip(self.above(at) / fade / 2 + 0.5, 0, 1)
         return np.asarray(share * share * (3 - 2 * share))
@@ -75,11 +75,11 @@ class Mouth:
 
 @dataclass(frozen=True, eq=False)
 class UnitModel:
-    """A displacement unit: one motion, or one for each half of the face.
+    """The model of one action unit: one motion, or one for each half of the face.
 
     Attributes:
         motions: "whole", or "upper" and "lower".
-        jaw_degrees: how far the lower jaw (teeth and tongue) turns with full intensity.
+        jaw_degrees: rotation of the lower teeth and the tongue with full intensity.
     """
 
     au: int
@@ -90,24 +90,26 @@ class UnitModel:
         """Return the displacement (n, 3) of points (n, 3) of the face with full intensity, metres.
 
         Args:
-            upper: (n,) share in the upper half, if the mesh's topology shows it.
+            upper: (n,) 0..1, membership in the upper half, if the topology of the mesh shows it.
         """
         if "whole" in self.motions:
             return self.motions["whole"](at)
         share = mouth.upper(at) if upper is None else upper
         moves = np.zeros(at.shape)
         for half, part in (("upper", share), ("lower", 1 - share)):
-            mine = np.flatnonzero(part)
-            moves[mine] += part[mine, None] * self.motions[half](at[mine])
+            index = np.flatnonzero(part)
+            moves[index] += part[index, None] * self.motions[half](at[index])
         return moves
 
 
 @dataclass(frozen=True)
 class HeadTurn:
-    """The head's turns: the density is a smooth step between chin and collar, in a plane that tilts (4.2.3).
+    """The rotation of the head, which fades out between chin and collar (4.2.3).
 
     Attributes:
-        pivot: (3,) metres; top, end: metres, where the step is 1 and 0; tilt: how much z counts as height.
+        pivot: (3,) metres, centre of the rotation.
+        top, end: heights in metres at which the density is 1 and 0.
+        tilt: metres of height per metre of z.
     """
 
     pivot: tuple[float, float, float]
@@ -116,20 +118,20 @@ class HeadTurn:
     tilt: float
 
     def density(self, at: Float64) -> Float64:
-        """Return how far points turn with the head, (n,) 0..1."""
+        """Return the part of the head's rotation at points, (n,) 0..1."""
         share = np.clip((at[:, 1] + self.tilt * at[:, 2] - self.end) / (self.top - self.end), 0, 1)
         return np.asarray(share * share * (3 - 2 * share))
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A person's face by action units.
+    """The action units of a person's face.
 
     Attributes:
         form: "published" (one or two Gaussians) or "extended" (up to four).
         source, licence: of the data that the model was fitted to.
         units: number -> displacement unit.
-        degrees: number -> degrees that a unit of turning turns with full intensity.
+        degrees: number of an action unit that turns head or eyes -> degrees with full intensity.
         eyes: (3,) metres, centres of the left and the right eyeball; jaw: (3,) metres, the jaw's joint.
     """
 
@@ -144,11 +146,11 @@ class Model:
     degrees: Mapping[int, float] = field(default_factory=dict)
 
     def displacement(self, au: int, at: Float64, side: str = "", upper: Float64 | None = None) -> Float64:
-        """Return how far a displacement unit moves points (n, 3) with full intensity, (n, 3) metres.
+        """Return the displacements of points (n, 3) by an action unit with full intensity, (n, 3) metres.
 
         Args:
-            side: "L" or "R" for one side alone, as the character has it.
-            upper: (n,) how far each point belongs to the upper half; None: by the mouth's plane.
+            side: "L" or "R" for the character's left or right side alone.
+            upper: (n,) 0..1, membership of each point in the upper half; None: by the mouth's plane.
         """
         moves = self.units[au].displacement(at, self.mouth, upper)
         if not side:
@@ -156,15 +158,15 @@ class Model:
         return np.asarray(moves * half(at, side)[:, None])
 
     def gap(self, au: int) -> float:
-        """Return how far a displacement unit parts the lips in the middle with full intensity, metres."""
+        """Return the gap between the lips in the middle by an action unit with full intensity, metres."""
         between = np.array([[0.0, self.mouth.y[0], self.mouth.z[0]]])
         upper, lower = (self.displacement(au, between, upper=np.array([half]))[0, 1] for half in (1.0, 0.0))
         return float(upper - lower)
 
 
 def half(at: Float64, side: str) -> Float64:
-    """Return how far points (n, 3) belong to the character's side "L" or "R", (n,); the sum of both is 1."""
-    share = np.clip((at[:, 0] * (1 if side == "L" else -1) / SIDES + 1) / 2, 0, 1)
+    """Return the membership (n,) of points (n, 3) in side "L" or "R", 0..1; the sum of both is 1."""
+    share = np.clip((at[:, 0] * (1 if side == "L" else -1) / FADE_WIDTH + 1) / 2, 0, 1)
     return np.asarray(share * share * (3 - 2 * share))
 
 

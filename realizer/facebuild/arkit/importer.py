@@ -146,7 +146,7 @@ def _read(path: Path) -> _Head:
     fit = ball_behind if parts.painted else fit_ball
     balls = [fit(surface.vertices[slice(*ranges[part])])[0] for part in ("left_eye", "right_eye")]
     surface = replace(surface, vertices=surface.vertices - (balls[0] + balls[1]) / 2)
-    found = [f"{len(surface.moves)} of ARKit's {len(shapes())} shapes", *pose.words, *parts.words]
+    found = [f"{len(surface.moves)} of ARKit's {len(shapes())} shapes", *pose.notes, *parts.words]
     if foreign:
         found.append(f"shapes of other names are left out: {', '.join(foreign)}")
     missing = [

@@ -12,7 +12,7 @@ from realizer.core.errors import FaceError
 from realizer.facebuild.arkit.gltf import Gltf
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
-THIN = 0.35  # alpha below this is glass: a cornea, a tear line
+MAX_GLASS_ALPHA = 0.35  # more transparent surfaces are glass, such as a cornea or a tear line
 
 
 @dataclass(eq=False)
@@ -20,12 +20,12 @@ class Piece:
     """A primitive in scene coordinates.
 
     Attributes:
-        names: of its material, mesh and node, in that order; "" where one has none.
-        vertices: (n, 3) in the file's own unit and directions; triangles: (m, 3).
+        names: names of its material, mesh and node; "" for a missing name.
+        vertices: (n, 3) in the unit and the axes of the file; triangles: (m, 3).
         colours: (n, 3) sRGB 0..255.
-        textured: the colours come from a picture.
-        glass: one looks through it.
-        moves: name of a morph target -> (n, 3).
+        textured: whether the colours come from a texture.
+        glass: whether the surface is transparent.
+        moves: name of a morph target -> (n, 3) displacements.
     """
 
     names: tuple[str, str, str]
@@ -38,12 +38,12 @@ class Piece:
 
 
 def read_pieces(gltf: Gltf) -> list[Piece]:
-    """Return every piece of surface of the file's scene.
+    """Return the surfaces of the file's scene.
 
     Raises:
-        FaceError: an index or an array that is not there.
+        FaceError: an index or an array does not exist.
     """
-    worlds = dict(_worlds(gltf))
+    worlds = dict(_world_matrices(gltf))
     pieces = []
     for number, world in worlds.items():
         node = gltf.item("nodes", number)
@@ -58,32 +58,32 @@ def read_pieces(gltf: Gltf) -> list[Piece]:
     return [piece for piece in pieces if len(piece.vertices) and len(piece.triangles)]
 
 
-def _worlds(gltf: Gltf) -> Iterator[tuple[int, Float64]]:
-    """Yield number and matrix (4, 4) of each node of the scene."""
+def _world_matrices(gltf: Gltf) -> Iterator[tuple[int, Float64]]:
+    """Yield the number and the world matrix (4, 4) of each node of the scene."""
     scenes = gltf.list("scenes")
     nodes = gltf.list("nodes")
     if scenes:
-        todo = [(k, np.eye(4)) for k in gltf.item("scenes", gltf.json.get("scene", 0)).get("nodes", [])]
+        pending = [(k, np.eye(4)) for k in gltf.item("scenes", gltf.json.get("scene", 0)).get("nodes", [])]
     else:
         children = {k for node in nodes for k in node.get("children", [])}
-        todo = [(k, np.eye(4)) for k in range(len(nodes)) if k not in children]
+        pending = [(k, np.eye(4)) for k in range(len(nodes)) if k not in children]
     seen: set[int] = set()
-    while todo:
-        number, above = todo.pop(0)
+    while pending:
+        number, parent = pending.pop(0)
         if number in seen:
             raise FaceError(f"{gltf.path}: nodes[{number}] is its own ancestor or has two parents")
         seen.add(number)
         node = gltf.item("nodes", number)
-        world = above @ _matrix(node)
+        world = parent @ _matrix(node)
         yield number, world
-        todo += [(k, world) for k in node.get("children", [])]
+        pending += [(k, world) for k in node.get("children", [])]
 
 
 def _matrix(node: dict[str, Any]) -> Float64:
     if "matrix" in node:
         return np.array(node["matrix"], float).reshape(4, 4).T
     x, y, z, w = node.get("rotation", (0, 0, 0, 1))
-    turn = np.array(
+    rotation = np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
             [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
@@ -91,7 +91,7 @@ def _matrix(node: dict[str, Any]) -> Float64:
         ]
     )
     out = np.eye(4)
-    out[:3, :3] = turn * np.array(node.get("scale", (1, 1, 1)), float)
+    out[:3, :3] = rotation * np.array(node.get("scale", (1, 1, 1)), float)
     out[:3, 3] = node.get("translation", (0, 0, 0))
     return out
 
@@ -115,11 +115,11 @@ def _piece(
         raise FaceError(f"{where}: indices: wanted 0..{n - 1}, got {corners.max()}; export the head again")
     material = gltf.item("materials", primitive["material"]) if "material" in primitive else {}
     colours, textured, alpha = _colours(gltf, material, attributes, n)
-    turns = _skinned(gltf, node, attributes, worlds, n)
-    matrices = np.broadcast_to(world, (n, 4, 4)) if turns is None else turns
+    skinning = _skinning(gltf, node, attributes, worlds, n)
+    matrices = np.broadcast_to(world, (n, 4, 4)) if skinning is None else skinning
     triangles = _triangles(corners, primitive.get("mode", TRIANGLES))
     if np.linalg.det(matrices[:, :3, :3]).mean() < 0:
-        triangles = triangles[:, ::-1]  # a mirror image turns inside out
+        triangles = triangles[:, ::-1]  # a reflection reverses their orientation
     names = _target_names(gltf, mesh, primitive)
     moves: dict[str, Float64] = {}
     for name, target in zip(names, primitive.get("targets", []), strict=True):
@@ -136,7 +136,7 @@ def _piece(
         triangles=triangles.astype(np.int32),
         colours=colours,
         textured=textured,
-        glass=material.get("alphaMode", "OPAQUE") == "BLEND" and alpha < THIN,
+        glass=material.get("alphaMode", "OPAQUE") == "BLEND" and alpha < MAX_GLASS_ALPHA,
         moves=moves,
     )
 
@@ -147,7 +147,7 @@ def _triangles(corners: Any, mode: int) -> Any:
     k = np.arange(max(len(corners) - 2, 0))
     if mode == FAN:
         return np.stack([corners[0] * np.ones_like(k), corners[k + 1], corners[k + 2]], 1)
-    # Every second triangle of a strip is wound the other way.
+    # Every second triangle of a strip has the opposite orientation.
     odd = k % 2
     return np.stack([corners[k], corners[k + 1 + odd], corners[k + 2 - odd]], 1)
 
@@ -155,8 +155,8 @@ def _triangles(corners: Any, mode: int) -> Any:
 def _target_names(gltf: Gltf, mesh: dict[str, Any], primitive: dict[str, Any]) -> list[str]:
     """Return the names of a primitive's morph targets.
 
-    glTF has no place of its own for them: most tools write mesh.extras.targetNames, some the primitive's
-    extras, and some name the accessors.
+    glTF does not define a place for them. Most programs write mesh.extras.targetNames, some the extras of the
+    primitive, and some name the accessors.
     """
     targets = primitive.get("targets", [])
     for holder in (mesh, primitive):
@@ -172,7 +172,7 @@ def _target_names(gltf: Gltf, mesh: dict[str, Any], primitive: dict[str, Any]) -
     ]
 
 
-def _skinned(
+def _skinning(
     gltf: Gltf, node: dict[str, Any], attributes: dict[str, Any], worlds: dict[int, Float64], n: int
 ) -> Any:
     """Return the skinning matrix (n, 4, 4) of each vertex in the file's pose, or None without a skeleton."""
@@ -198,32 +198,32 @@ def _skinned(
 def _colours(
     gltf: Gltf, material: dict[str, Any], attributes: dict[str, Any], n: int
 ) -> tuple[Float64, bool, float]:
-    """Return sRGB 0..255 (n, 3) of texture, factor and vertex colours, if there is a texture, mean alpha."""
-    look = material.get("pbrMetallicRoughness", {})
-    factor = np.array(look.get("baseColorFactor", (1, 1, 1, 1)), float)
+    """Return the colours (n, 3) in sRGB 0..255, whether they have a texture, and the mean alpha."""
+    pbr = material.get("pbrMetallicRoughness", {})
+    factor = np.array(pbr.get("baseColorFactor", (1, 1, 1, 1)), float)
     light, alpha, textured = np.tile(factor[:3], (n, 1)), np.full(n, factor[3]), False
     if "COLOR_0" in attributes:
         vertex_colours = gltf.accessor(attributes["COLOR_0"])
         light = light * vertex_colours[:, :3]
         alpha = alpha * (vertex_colours[:, 3] if vertex_colours.shape[1] > 3 else 1)
-    texture = look.get("baseColorTexture")
+    texture = pbr.get("baseColorTexture")
     if texture:
-        shift = texture.get("extensions", {}).get("KHR_texture_transform", {})
-        name = f"TEXCOORD_{shift.get('texCoord', texture.get('texCoord', 0))}"
+        transform = texture.get("extensions", {}).get("KHR_texture_transform", {})
+        name = f"TEXCOORD_{transform.get('texCoord', texture.get('texCoord', 0))}"
         source = gltf.item("textures", texture.get("index")).get("source")
         pixels = gltf.pixels(source) if source is not None else None
         if pixels is not None and name in attributes:
-            uv = _shifted(gltf.accessor(attributes[name]), shift)
+            uv = _transformed(gltf.accessor(attributes[name]), transform)
             seen = sample(pixels, uv)
             light, alpha, textured = light * linear(seen[:, :3]), alpha * seen[:, 3] / 255, True
     return np.asarray(srgb(light.astype(np.float32)), np.float64) * 255, textured, float(alpha.mean())
 
 
-def _shifted(uv: Float64, shift: dict[str, Any]) -> Float64:
-    turn = float(shift.get("rotation", 0))
-    uv = uv * np.array(shift.get("scale", (1, 1)), float)
-    c, s = np.cos(turn), np.sin(turn)
-    return np.asarray(uv @ np.array([[c, -s], [s, c]]) + np.array(shift.get("offset", (0, 0)), float))
+def _transformed(uv: Float64, transform: dict[str, Any]) -> Float64:
+    angle = float(transform.get("rotation", 0))
+    uv = uv * np.array(transform.get("scale", (1, 1)), float)
+    c, s = np.cos(angle), np.sin(angle)
+    return np.asarray(uv @ np.array([[c, -s], [s, c]]) + np.array(transform.get("offset", (0, 0)), float))
 
 
 def sample(pixels: Any, uv: Float64) -> Float64:

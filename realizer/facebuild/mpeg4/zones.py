@@ -1,4 +1,4 @@
-"""The zone parameters of the MPEG-4 deformer, with masks and synchronised sides."""
+"""The parameters of the MPEG-4 deformer: zones of influence, masks and synchronised sides."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ from realizer.tables import faps
 Falloff = Literal["ease", "smooth", "cosine", "linear"]
 FALLOFFS: tuple[Falloff, ...] = ("ease", "smooth", "cosine", "linear")
 Triple = tuple[float, float, float]
-MIN_POWER = 1e-3  # an ease of -100 is the limit where nothing moves
+MIN_POWER = 1e-3  # least exponent of "ease"; with the exponent 0 of an ease of -100 nothing would move
 SAMPLES = 2001  # of a smooth curve
+MARGIN = 5e-4  # m; largest distance between a vertex and the mirror image of its twin
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,13 +26,13 @@ class Zone:
     """The zone of influence of a FAP's feature point (Paul 2010, 4.3.3).
 
     Attributes:
-        fap: its number.
-        falloff: the shape of the influence from the middle to the edge.
-        size: metres, the radius; scale multiplies it along x, y and z.
+        fap: number of the FAP.
+        falloff: curve of the influence from the centre to the edge.
+        size: radius in metres; scale: factors of the radius along x, y and z.
         ease: -100..100, for "ease"; smooth_centre, smooth_side: 0..1, for "smooth".
         use_mask: only vertices of the FAP's mask move; invert_mask: only those outside it.
         slide: metres forwards per metre along the FAP's direction, for skin that slides over a curve.
-        radial: 0..1, how much of the move goes away from `pivot` instead of the FAP's way.
+        radial: 0..1, part of the displacement that points away from `pivot`, not in the FAP's direction.
         pivot: (x, y, z) metres, for radial.
     """
 
@@ -74,11 +75,11 @@ class Zone:
         return np.asarray(self.size * np.array(self.scale))
 
     def influence(self, distance: Any) -> Float64:
-        """Return the influence (n,) at distances (n,) in radii from the middle: 1 there, 0 at the edge."""
+        """Return the influence (n,) at distances (n,) in radii: 1 at the centre, 0 at the edge."""
         if self.falloff == "smooth":
             return smooth_curve(distance, self.smooth_centre, self.smooth_side)
         away = np.clip(distance, 0, 1)
-        if self.falloff == "cosine":  # the raised cosine that Paul 2010 (8.2) names
+        if self.falloff == "cosine":  # raised cosine (Paul 2010, 8.2)
             return np.asarray((1 + np.cos(np.pi * away)) / 2, np.float64)
         if self.falloff == "ease":  # Paul 2010, 4.3.3
             power = 1 + self.ease / (100 if self.ease <= 0 else 20)
@@ -93,15 +94,15 @@ class Zone:
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """The parameters of one head's deformer.
+    """The parameters of the deformer of one head.
 
     Attributes:
-        points: feature point -> (x, y, z) metres, the middles of the zones.
-        zones: FAP -> zone; a FAP without one is not the deformer's.
+        points: feature point -> (x, y, z) metres, the centres of the zones.
+        zones: FAP -> zone.
         masks: FAP -> (k,) vertices that move, ascending.
-        synced: FAPs that share their zone with the other side.
+        synced: FAPs whose zone is mirrored to the other side.
         joined: whether overlapping neighbours share their influence, so that equal FAPs move a lip evenly.
-        whole: FAPs that are listed without a zone: their part moves as a whole.
+        whole: FAPs without a zone that move a part of the head as a whole.
     """
 
     points: Mapping[str, Triple]
@@ -113,20 +114,20 @@ class Setup:
 
 
 def smooth_curve(distance: Any, centre: float, side: float) -> Float64:
-    """Return a Bezier curve (Paul 2010, 4.3.4): level over `centre` of the zone, `side` past its edge.
+    """Return the heights of a cubic Bezier curve (Paul 2010, 4.3.4) at distances in radii.
 
-    The cubic runs from (0, 1) by (centre, 1) and (1, 0) to (1 + side, 0), so that 0 and 0 is the straight
-    line, and side makes the zone larger by that share of its size. (His figure draws it; the text gives no
-    formula: these control points are ours.)
+    The control points are (0, 1), (centre, 1), (1, 0) and (1 + side, 0); they are read from a figure, because
+    the text has no formula. The curve is a straight line if both parameters are 0.
 
     Args:
-        centre, side: 0..1.
+        centre: 0..1, flattens the curve near the centre.
+        side: 0..1, part of the radius by which the zone becomes larger.
     """
     t = np.linspace(0, 1, SAMPLES)
-    one, two, three = 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3
-    along = one * centre + two + three * (1 + side)
-    height = (1 - t) ** 3 + one
-    return np.asarray(np.interp(np.maximum(distance, 0), along, height, right=0.0), np.float64)
+    second, third, fourth = 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3  # Bernstein polynomials
+    x = second * centre + third + fourth * (1 + side)
+    height = (1 - t) ** 3 + second
+    return np.asarray(np.interp(np.maximum(distance, 0), x, height, right=0.0), np.float64)
 
 
 def mask_faults(setup: Setup, skin: tuple[int, int]) -> list[str]:
@@ -140,16 +141,13 @@ def mask_faults(setup: Setup, skin: tuple[int, int]) -> list[str]:
     ]
 
 
-MARGIN = 5e-4  # m that a mask's vertex may lie from the mirror image of its twin
-
-
 def synchronised(setup: Setup, vertices: Float64 | None = None) -> Setup:
     """Return the setup with each synchronised FAP's zone, and its mask, copied to the other side.
 
-    Of a pair the FAP with the lower number (the left side) is the one that is copied.
+    The FAP with the lower number of a pair, which is on the left side, is copied.
 
     Args:
-        vertices: (n, 3) metres; needed where masks have to be mirrored.
+        vertices: (n, 3) metres; needed if masks are mirrored.
 
     Raises:
         FaceError: a mask's vertex has no twin.

@@ -50,4 +50,4 @@ def test_couple_lips_keeps_equal_requests(kept) -> None:
 def test_couple_lips_meets_opposite_requests_half_way(kept) -> None:
     got = couple_lips(kept, rows({5: 800, 52: -800}))[0]
     assert got[4] == pytest.approx(-got[51])
-    assert got[4] - got[51] == pytest.approx(kept.apart[1], rel=1e-4)
+    assert got[4] - got[51] == pytest.approx(kept.max_difference[1], rel=1e-4)
