@@ -1,4 +1,4 @@
-"""A task: a document and the key of its outputs. Outputs with the same key have the same bytes."""
+"""Tasks of a batch: documents with the keys of their outputs. Equal keys mean equal outputs."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ import bml_schema
 import realizer
 from realizer.core.options import PlayOptions
 
-# Parts of our packages that do not affect outputs.
-APART = {"static", "web", "_faces", "server", "cli", "batch"}
-# Other packages that do, if they are installed: voices and encoders.
+# Folders of our packages that do not affect outputs.
+EXCLUDED = {"static", "web", "_faces", "server", "cli", "batch"}
+# Other packages that affect outputs: voices and encoders.
 ENGINES = ("av", "espeakng-loader", "hibari-tts", "numpy", "pillow")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options(PlayOptions):
-    """How all documents of a batch are played and drawn; see `RenderSettings`. `formats` are suffixes."""
+    """The options of all documents of a batch; see `RenderSettings`. `formats` are suffixes of files."""
 
     formats: tuple[str, ...]
     voice: str
@@ -32,7 +32,7 @@ class Options(PlayOptions):
 
     @property
     def files(self) -> dict[str, Path]:
-        """The files and folders by option: their content is part of the key, not their path."""
+        """Option -> its file or folder; keys depend on their content, not on their path."""
         paths = {"media": self.media, "expressions": self.expressions, "mapping": self.mapping}
         if self.cooccurrence not in ("on", "off"):
             paths["cooccurrence"] = Path(self.cooccurrence)
@@ -49,10 +49,10 @@ class Task:
     """A document to play.
 
     Attributes:
-        name: of the document.
-        key: of its outputs.
+        name: name of the document.
+        key: key of its outputs.
         text: the document.
-        fingerprint: as `fingerprint` returned it where the task was made.
+        fingerprint: result of `fingerprint` in the process that made the task.
     """
 
     name: str
@@ -62,9 +62,9 @@ class Task:
 
 
 def fingerprint(options: Options) -> str:
-    """Return a digest of all that affects outputs beside the document, 64 hexadecimal digits.
+    """Return a digest of everything except the document that affects outputs, 64 hexadecimal digits.
 
-    That are the options and their files, the program with its tables, the face, and the versions of engines.
+    It covers the options and their files, the program with its tables, the face, and the versions of engines.
 
     Raises:
         FaceError: there is no such face.
@@ -76,7 +76,7 @@ def fingerprint(options: Options) -> str:
     for package in (bml_schema, realizer):
         root = Path(package.__path__[0])
         for suffix in (".py", ".csv", ".toml"):
-            files = (p for p in root.rglob(f"*{suffix}") if not APART & {*p.relative_to(root).parts})
+            files = (p for p in root.rglob(f"*{suffix}") if not EXCLUDED & {*p.relative_to(root).parts})
             _add(digest, root, files)
     for folder in (folder_of(options.face), *options.files.values()):
         _add(digest, folder, iter([folder]) if folder.is_file() else filter(Path.is_file, folder.rglob("*")))
@@ -88,13 +88,13 @@ def fingerprint(options: Options) -> str:
     return digest.hexdigest()
 
 
-def key_of(text: bytes, mark: str) -> str:
-    """Return the key of a document for the fingerprint `mark`, 64 hexadecimal digits."""
-    return hashlib.sha256(mark.encode() + b"\n" + text).hexdigest()
+def key_of(text: bytes, fingerprint: str) -> str:
+    """Return the key of a document's outputs, 64 hexadecimal digits."""
+    return hashlib.sha256(fingerprint.encode() + b"\n" + text).hexdigest()
 
 
 def _add(digest: hashlib._Hash, root: Path, files: Iterator[Path]) -> None:
-    """Add the names and contents of files, in order of their names below the root."""
+    """Add the relative names and the contents of files to a digest, in order."""
     for path in sorted(files):
         content = path.read_bytes()
         digest.update(f"{path.relative_to(root).as_posix()} {len(content)}\n".encode())

@@ -21,10 +21,10 @@ from realizer.core.array_types import Float64
 FILE = "gaze.toml"
 NUMBER = r"\s*([+-]?(?:\d+\.?\d*|\.\d+))\s*"
 POINT = re.compile(",".join([NUMBER] * 3))
-_SIGNS = re.compile(r"[\s_-]")
+_SEPARATORS = re.compile(r"[\s_-]")
 # Degrees of yaw, positive to the left, and of pitch, positive up.
 Turn = tuple[float, float]
-# Part -> the AUs of (yaw to the left, to the right), (pitch up, down).
+# Part -> the AUs for (yaw to the left, to the right), (pitch up, down).
 TURNS = {"eyes": ((61, 62), (63, 64)), "head": ((51, 52), (53, 54))}
 
 
@@ -35,19 +35,19 @@ def facts() -> dict[str, Any]:
 
 
 def limits(part: str) -> Turn:
-    """Return the maximum angles of "eyes" or "head"."""
+    """Return the maximum yaw and pitch of "eyes" or "head"."""
     return facts()[part]["yaw"], facts()[part]["pitch"]
 
 
-def limited(turn: Turn, most: Turn) -> Turn:
+def limited(turn: Turn, maximum: Turn) -> Turn:
     """Limit a turn to maximum angles."""
-    (yaw, pitch), (most_yaw, most_pitch) = turn, most
-    return max(-most_yaw, min(most_yaw, yaw)), max(-most_pitch, min(most_pitch, pitch))
+    (yaw, pitch), (max_yaw, max_pitch) = turn, maximum
+    return max(-max_yaw, min(max_yaw, yaw)), max(-max_pitch, min(max_pitch, pitch))
 
 
 def known_direction(target: str) -> Turn | None:
     """Return yaw and pitch of a target that needs no scene: LEFT, UPLEFT, CAMERA ..., or None."""
-    found: Sequence[float] | None = facts()["targets"].get(_SIGNS.sub("", target).upper())
+    found: Sequence[float] | None = facts()["targets"].get(_SEPARATORS.sub("", target).upper())
     return None if found is None else (found[0], found[1])
 
 
@@ -66,7 +66,7 @@ def position(target: str, context: PlanningContext) -> Position | None:
 def angles(target: str, context: PlanningContext) -> tuple[float, float, float]:
     """Return yaw (positive to the left), pitch (positive up) and inward turn of each eye, degrees.
 
-    An unknown target, and one between the eyes, is straight ahead and far away; a direction is far away.
+    Unknown targets, and targets between the eyes, are straight ahead. Directions are infinitely far away.
     """
     place = position(target, context)
     if place is None and (direction := known_direction(target)) is not None:
@@ -82,12 +82,12 @@ def angles(target: str, context: PlanningContext) -> tuple[float, float, float]:
 
 
 def is_known(target: str, context: PlanningContext) -> bool:
-    """Return whether a target is a point, in the scene, or needs none."""
+    """Return whether a target is a point, a name of the scene, or a direction."""
     return position(target, context) is not None or known_direction(target) is not None
 
 
 def check_target(node: Gaze | GazeShift | HeadDirectionShift, context: PlanningContext) -> tuple[Fault, ...]:
-    """Return NO_SUCH_TARGET, not fatal, for a name that is not in a declared scene."""
+    """Return a NO_SUCH_TARGET fault, which is not fatal, for a name that a declared scene does not have."""
     if context.scene is None or is_known(node.target, context):
         return ()
     target = node.target
@@ -111,14 +111,14 @@ def turn(
 ) -> tuple[Channel, ...]:
     """Return channels that turn "eyes" or "head" by k turns at times (k,).
 
-    An angle is the difference of two AUs; between keys they add up to one smooth curve.
+    Each angle is the difference of two AUs, whose curves form one smooth curve between keys.
     """
     channels = []
     for degrees, sides in zip(zip(*turns, strict=True), TURNS[part], strict=True):
-        for number, sign, most in zip(sides, (1.0, -1.0), (max(degrees), -min(degrees)), strict=True):
-            if most > 0.0:
-                whole = tables.by_number()[number].degrees
-                values = np.array([max(0.0, sign * angle) / whole for angle in degrees])
+        for number, sign, largest in zip(sides, (1.0, -1.0), (max(degrees), -min(degrees)), strict=True):
+            if largest > 0.0:
+                full_angle = tables.by_number()[number].degrees
+                values = np.array([max(0.0, sign * angle) / full_angle for angle in degrees])
                 target = au(number)[0]
                 channels.append(Channel(target, times, values, layer=layer, keeps_last=holds, source=source))
     return tuple(channels)

@@ -40,9 +40,9 @@ if TYPE_CHECKING:
     from realizer.tables.knowledge import Mood, Role
 
 ADVICE = "ADVICE"
-LONG = 250.0  # s; longer times are probably milliseconds
-SHORT = 0.04  # s; shorter motion may be between two frames at 25 fps
-FASTER = 2.0  # standard deviations below the mean; a faster motion is unnatural
+MAX_SECONDS = 250.0  # longer times are probably milliseconds
+MIN_SECONDS = 0.04  # shorter motion may be between two frames at 25 fps
+MAX_DEVIATION = 2.0  # standard deviations below the mean; a shorter gap is unnatural
 KNOWN_SPACES = frozenset({CORE, EXTENSIONS, BMLA, BMLT, OWN})
 
 
@@ -67,7 +67,7 @@ def advice(file: str, source: Source, block: Block, schedule: Schedule, player: 
 
 @dataclass(frozen=True)
 class _Advisor:
-    """Makes the findings of an element, `node`: a behaviour or the block itself."""
+    """Makes the findings about `node`, which is a behaviour or the block itself."""
 
     file: str
     source: Source
@@ -79,7 +79,7 @@ class _Advisor:
     def attributes(self) -> Iterator[Finding]:
         """Yield advice on unknown attributes of BMLA and BMLT that are similar to a known one.
 
-        Not all attributes of these languages are known here; unknown attributes of BML are faults.
+        Many attributes of these languages are not in the schema; unknown attributes of BML are faults.
         """
         known = schema_of(type(self.node)).attributes
         for name in self.node.unknown_attributes:
@@ -112,9 +112,11 @@ class _Advisor:
                 yield self.finding(text, label, f'help: did you mean "{prefix}:{meant}"?')
 
     def namespace(self, name: str) -> str:
-        """Return the namespace of an element name, as declared first for its prefix."""
-        declared = f"xmlns:{name.rpartition(':')[0]}"
-        found = (self.source.value(e, declared) for e in self.source.elements if declared in e.attributes)
+        """Return the namespace of an element name by the first declaration of its prefix."""
+        declaration = f"xmlns:{name.rpartition(':')[0]}"
+        found = (
+            self.source.value(e, declaration) for e in self.source.elements if declaration in e.attributes
+        )
         return next(found, "")
 
     def units(self) -> Iterator[Finding]:
@@ -122,7 +124,7 @@ class _Advisor:
         times = [(name, ref.offset) for name, ref in self.node.syncs.items() if isinstance(ref, SyncRef)]
         times += [("duration", self.node.duration)] if hasattr(self.node, "duration") else []
         for name, seconds in times:
-            if abs(seconds) >= LONG:
+            if abs(seconds) >= MAX_SECONDS:
                 text = f"{name}: {seconds:g} s are {_minutes(abs(seconds))}; BML counts in seconds"
                 hint = f"help: if these are milliseconds, write {seconds / 1000:g}"
                 yield self.finding(text, self.label(_minutes(abs(seconds)), name), hint)
@@ -139,12 +141,12 @@ class _Advisor:
             yield self.finding(text, self.label("not declared", "target"), hint)
 
     def muscles(self, schedule: Schedule, player: Player) -> Iterator[Finding]:
-        """Yield advice on motion that takes less than a frame or is faster than muscles are."""
+        """Yield advice on motion that takes less than a frame, or is faster than muscles can be."""
         node, times = self.node, schedule.times[self.node.id]
         kind, seconds = player.kinds[node.tag], float(times[-1] - times[0])
         if not node.syncs or kind.command is not None or kind.speech_request is not None:
             return
-        if 0 < seconds < SHORT:
+        if 0 < seconds < MIN_SECONDS:
             text = f"lasts {seconds:.3g} s from start to end, less than a frame"
             hint = "help: it may not be seen at all; BML counts in seconds"
             yield self.finding(text, self.label("less than a frame"), hint)
@@ -152,10 +154,10 @@ class _Advisor:
         if kind.region is None and not node.sync_points[1:-1]:
             return  # no motion: a wait, a sound
         timing = kind.timing(node, replace(player.context, utterances={}))
-        spread = 1 / np.sqrt(timing.stiffness)
+        deviation = 1 / np.sqrt(timing.stiffness)
         for n, gap in enumerate(np.diff(times).tolist()):
             usual = float(timing.preferred[n])
-            if timing.rigid or not gap < usual - FASTER * float(spread[n]):
+            if timing.rigid or not gap < usual - MAX_DEVIATION * float(deviation[n]):
                 continue
             begin, end = timing.points[n : n + 2]
             text = f"{begin} to {end} in {gap:.2g} s; this usually takes {usual:.2g} s"
@@ -194,7 +196,7 @@ def advise_on_behaviours(
 
     Args:
         utterances: speech id -> utterance.
-        lists: the emotional words.
+        lists: lists of emotional words.
     """
     seen = [
         VisibleExpression(node.id, template, (start + peak) / 2, (relax + end) / 2)

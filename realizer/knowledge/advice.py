@@ -12,15 +12,15 @@ from realizer.tables.emotional_words import WordList
 from realizer.tables.knowledge import CompanionRule, Mood, PlacementRule, Role, knowledge
 from realizer.tables.templates import templates
 
-NEAR = 1.0  # s; distance of expressions that are "in the neighbourhood" (6.3.3)
-FRAME = 0.04  # s; the durations were counted in frames
-MIN_PACE = 3  # expressions from which a pace can be measured
-RATIO = 2.0  # largest ratio between a pace and that of the mood
+NEAR = 1.0  # s; largest distance of expressions "in the neighbourhood" (6.3.3)
+FRAME = 0.04  # s; the observed durations have this resolution
+MIN_COUNT = 3  # least number of expressions that have a pace
+MAX_RATIO = 2.0  # between a usual distance of expressions and the present one
 
 
 @dataclass(frozen=True, slots=True)
 class VisibleExpression:
-    """A template that a behaviour shows, and the seconds from which to which it is visible."""
+    """A template that a behaviour shows, visible from `start` to `end` seconds."""
 
     id: str
     template: str
@@ -61,11 +61,11 @@ def advise(
     """
     seen = sorted(seen, key=lambda one: one.start)
     for one in seen:
-        yield from _length(one, mood)
-        yield from _apart(one, seen)
+        yield from _duration(one, mood)
+        yield from _distance(one, seen)
         for company in knowledge().companies:
             if company.of == one.template and (company.keep or company.offered):
-                yield from _company(one, company, seen)
+                yield from _companion(one, company, seen)
     if role == "speaker":
         for node in block.behaviours:
             if isinstance(node, Speech) and node.text is not None:
@@ -79,13 +79,13 @@ def advise(
     yield from _pace(seen, role, mood)
 
 
-def _length(one: VisibleExpression, mood: Mood | None) -> Iterator[Advice]:
+def _duration(one: VisibleExpression, mood: Mood | None) -> Iterator[Advice]:
     """Yield advice on a duration that was never or rarely observed, considering the mood."""
     template = templates()[one.template.upper()]
     source = "Wojdel 2005, table 6.15"
     lasts, probable = one.end - one.start, template.probable
     if probable is not None:
-        # The mean of some templates is longer than their probable durations; it is not unusual either.
+        # The mean of some templates is longer than their probable durations, and not unusual either.
         usual = mood.length if mood is not None else 1.0
         most = max(probable[1], template.evident + FRAME) * max(usual, 1.0)
         if probable[0] * min(usual, 1.0) <= lasts <= most:
@@ -125,7 +125,7 @@ def _range(seconds: tuple[float, float]) -> str:
     return f"{low:g} to {high:g} s" if high < float("inf") else f"{low:g} s or longer"
 
 
-def _apart(one: VisibleExpression, seen: Sequence[VisibleExpression]) -> Iterator[Advice]:
+def _distance(one: VisibleExpression, seen: Sequence[VisibleExpression]) -> Iterator[Advice]:
     room = knowledge().apart.get(one.template)
     if room is None:
         return
@@ -138,7 +138,7 @@ def _apart(one: VisibleExpression, seen: Sequence[VisibleExpression]) -> Iterato
             return
 
 
-def _company(
+def _companion(
     one: VisibleExpression, company: CompanionRule, seen: Sequence[VisibleExpression]
 ) -> Iterator[Advice]:
     others = seen if company.offered else [other for other in seen if other.template == company.other]
@@ -181,21 +181,21 @@ def _listening(seen: Sequence[VisibleExpression]) -> Iterator[Advice]:
 
 
 def _pace(seen: Sequence[VisibleExpression], role: Role, mood: Mood | None) -> Iterator[Advice]:
-    """Yield advice on expressions that are too frequent for a listener, or not at the pace of the mood."""
+    """Yield advice on expressions that are too frequent for a listener, or unusually frequent for a mood."""
     groups = _groups(seen)
-    if len(groups) < MIN_PACE:
+    if len(groups) < MIN_COUNT:
         return
     gaps = [max(b[0] - a[1], 0.0) for a, b in pairwise(groups)]
     distance = sum(gaps) / len(gaps)
     text = f"{len(groups)} expressions, {distance:.2g} s between two of them on average"
     least = knowledge().listener_distance
     if role == "listener":
-        if distance < least / RATIO:
+        if distance < least / MAX_RATIO:
             hint = f"a listener's face is calmer: about {least:g} s between two (Wojdel 2005, 6.5)"
             yield Advice("", f"a listener with {text}", hint)
     elif mood is not None:
-        often = distance < mood.distance / RATIO
-        if often or distance > mood.distance * RATIO:
+        often = distance < mood.distance / MAX_RATIO
+        if often or distance > mood.distance * MAX_RATIO:
             hint = f"in that mood people show one about every {mood.distance:g} s (Wojdel 2005, table 6.5)"
             yield Advice("", f"{text}: {'often' if often else 'rarely'} for the mood {mood.name!r}", hint)
 

@@ -14,16 +14,16 @@ NO_GL = "pictures need OpenGL: install Debian packages libegl1 and libgl1"
 
 
 class OpenGLCanvas(Canvas):
-    """A head on the graphics card (or its stand-in in software).
+    """A canvas that draws with OpenGL.
 
-    Belongs to the thread that made it, as its GL context does; one at a time in a process. Light is worked
-    out a vertex, in numpy, and drawn flat: four times as fast as a lit shader on a software GL.
+    It belongs to the thread that made it, as its GL context does; a process has at most one. Light is
+    computed for each vertex with numpy, which is four times as fast as a shader on a software GL.
     """
 
     def _open(self) -> None:
         pyrender = _pyrender()
         vertices = self._figure.points
-        # x y z r g b a, as pyrender lays a primitive of positions and colours out in its one buffer.
+        # x y z r g b a: the layout of pyrender's buffer of positions and colours.
         self._interleaved = np.ones((len(vertices), 7), np.float32)
         material = pyrender.MetallicRoughnessMaterial(baseColorFactor=[1.0, 1.0, 1.0, 1.0])
         # Colours must be floats: pyrender takes integers 0/1 for 0..255 and draws black.
@@ -60,7 +60,7 @@ def _pyrender() -> Any:
     try:
         import pyglet
 
-        pyglet.options["headless"] = True  # or pyrender's viewer looks for a display
+        pyglet.options["headless"] = True  # otherwise pyrender's viewer looks for a display
         import pyrender
     except ModuleNotFoundError as error:
         raise RenderError(f"{NO_LIBRARY} (no module {error.name})") from None
@@ -73,7 +73,7 @@ def _open(pyrender: Any, size: tuple[int, int]) -> Any:
     """Return an offscreen renderer that reads colours only, on the first EGL device that works."""
 
     class Colours(pyrender.Renderer):  # type: ignore[misc]
-        """Leaves out the depth read-back, half the cost of a small picture."""
+        """A renderer that does not read the depth buffer, which takes half the time of a small picture."""
 
         def _read_main_framebuffer(self, scene: Any, flags: Any) -> UInt8:
             from OpenGL import GL
@@ -96,7 +96,7 @@ def _open(pyrender: Any, size: tuple[int, int]) -> Any:
     chosen = os.environ.get("EGL_DEVICE_ID")
     fault: Exception | None = None
     for device in range(8) if chosen is None else (chosen,):
-        os.environ["EGL_DEVICE_ID"] = str(device)  # a machine may list a card that we may not use first
+        os.environ["EGL_DEVICE_ID"] = str(device)  # the first card of a machine may be unusable
         try:
             return Offscreen(*size)
         except Exception as error:

@@ -13,12 +13,12 @@ from realizer.animation.lips.visemes import VISEME_COUNT
 from realizer.core.array_types import Float64, Int32
 from realizer.speech.utterance import Phoneme
 
-BLEND = 63  # the first viseme alone
+MAX_BLEND = 63  # FAP 1 then shows the first viseme alone
 
 
 @dataclass(frozen=True, slots=True)
 class OculusViseme:
-    """A viseme of Oculus (and of Ready Player Me, as `viseme_NAME`) and the equal one of MPEG-4."""
+    """A viseme of Oculus (of Ready Player Me as `viseme_NAME`), and the number of the same one in MPEG-4."""
 
     name: str
     viseme: int
@@ -33,8 +33,8 @@ def oculus_visemes() -> tuple[OculusViseme, ...]:
 def viseme_weights(phonemes: Sequence[Phoneme], times: Float64) -> Float64:
     """Return the weight of each MPEG-4 viseme over time.
 
-    Weights are the mean of the dominances of sounds in jaw, lips, width and tongue (see `lip_channels`);
-    sounds that close the lips or bite the lower one have weight 1 meanwhile.
+    Weights are the mean of the dominances of sounds in jaw, lips, width and tongue (see `lip_channels`). A
+    sound that closes the lips or presses the lower lip to the teeth has weight 1 meanwhile.
 
     Args:
         phonemes: in order, seconds from the start of the utterance; "" is a pause.
@@ -82,8 +82,8 @@ def fap_1(weights: Float64) -> Int32:
     """
     order = np.argsort(-weights, axis=1, kind="stable")[:, :2]
     first, second = np.take_along_axis(weights, order, axis=1).T
-    blend = np.rint(BLEND * first / np.maximum(first + second, 1e-12)).astype(np.int32)
+    blend = np.rint(MAX_BLEND * first / np.maximum(first + second, 1e-12)).astype(np.int32)
     out = np.zeros((len(weights), 4), np.int32)
     out[:, :2], out[:, 2] = order, blend
-    out[blend == BLEND, 1] = 0
+    out[blend == MAX_BLEND, 1] = 0
     return out

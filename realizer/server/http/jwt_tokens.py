@@ -9,8 +9,8 @@ from typing import Any
 
 from realizer.core.errors import RealizerError
 
-LEEWAY = 10.0  # s; clocks of hosts differ
-BITS = 2048  # of RSA; shorter keys are broken
+LEEWAY = 10.0  # s; allows for different clocks of hosts
+MIN_RSA_BITS = 2048  # shorter keys are insecure
 # Elliptic curve -> the one algorithm that signs with it (RFC 7518, 3.4).
 CURVES = {"secp256r1": "ES256", "secp384r1": "ES384", "secp521r1": "ES512"}
 
@@ -42,7 +42,7 @@ class TokenVerifier:
 
     Args:
         key: a public key in PEM (RSA, an elliptic curve, Ed25519), or a secret (HS256).
-        audience: that tokens must name; None: they must name none.
+        audience: required claim `aud` of tokens; None: they must not have one.
 
     Raises:
         RealizerError: the key is not one of these, or PyJWT is not installed.
@@ -105,13 +105,13 @@ def _public(text: str) -> tuple[Any, Sequence[str]]:
         key = load_pem_public_key(text.encode())
     except ValueError:
         key = None
-    if isinstance(key, rsa.RSAPublicKey) and key.key_size >= BITS:
+    if isinstance(key, rsa.RSAPublicKey) and key.key_size >= MIN_RSA_BITS:
         return key, ["RS256", "RS384", "RS512"]
     if isinstance(key, ec.EllipticCurvePublicKey) and key.curve.name in CURVES:
         return key, [CURVES[key.curve.name]]
     if isinstance(key, ed25519.Ed25519PublicKey):
         return key, ["EdDSA"]
-    wanted = f"of RSA ({BITS} bits or more), of an elliptic curve ({', '.join(CURVES)}) or of Ed25519"
+    wanted = f"of RSA ({MIN_RSA_BITS} bits or more), of an elliptic curve ({', '.join(CURVES)}) or of Ed25519"
     raise RealizerError(f"setting jwt_key: wanted a public key in PEM (BEGIN PUBLIC KEY), {wanted}")
 
 

@@ -1,4 +1,4 @@
-"""The build hook of the page: bundles the sources into `realizer/server/static` with npm and esbuild."""
+"""The build hook of the page, which bundles the sources into `realizer/server/static`."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class PageBuildHook(BuildHookInterface):  # type: ignore[type-arg]
 
 
 def bundle() -> None:
-    """Make the bundle.
+    """Bundle the sources with npm and esbuild.
 
     Raises:
         RuntimeError: npm failed; the text says what to do.
@@ -61,15 +61,15 @@ def bundle() -> None:
         if done.returncode:
             raise RuntimeError(_failed(step, (done.stderr or done.stdout).strip()[-2000:]))
     shutil.copyfile(WEB / "index.html", STATIC / "index.html")
-    # As it is written, with its comments: other pages import it.
+    # Other pages import the client, so it stays readable.
     shutil.copyfile(WEB / "src" / "realizer.js", STATIC / "realizer.js")
     (STATIC / MARK).write_text(_hash() + "\n", "utf-8")
 
 
-def _failed(step: list[str], words: str) -> str:
+def _failed(step: list[str], output: str) -> str:
     return (
         f"The page could not be bundled: `npm {' '.join(step)}` in {WEB} failed. It needs Node 18 or "
-        f"later and npm's registry. Set {SKIP}=1 to build without the page; everything else works.\n{words}"
+        f"later and npm's registry. Set {SKIP}=1 to build without the page; everything else works.\n{output}"
     )
 
 
@@ -78,7 +78,7 @@ def _skipped() -> bool:
 
 
 def _current() -> bool:
-    """Whether the bundle exists and was made of these sources."""
+    """Return whether the bundle exists and was made from the present sources."""
     mark = STATIC / MARK
     return mark.is_file() and (STATIC / "index.html").is_file() and mark.read_text("utf-8").strip() == _hash()
 

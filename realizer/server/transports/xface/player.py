@@ -13,9 +13,9 @@ from realizer.server.transports.xface.player_link import PlayerLink, State
 
 log = logging.getLogger(__name__)
 
-ATTEMPT = 5.0  # s; to connect, and for the greeting
-READ = 4096  # bytes
-STUCK = 2**18  # bytes that the player has not read: hundreds of frames
+CONNECT_TIMEOUT = 5.0  # s, including the greeting
+READ_SIZE = 4096  # bytes
+MAX_UNREAD = 2**18  # bytes that the player has not read; hundreds of frames
 # The frames of the first character, at the rate of the service, and no feedback.
 SUBSCRIPTIONS = (
     '{"type":"unsubscribe","stream":"feedback"}',
@@ -43,13 +43,13 @@ class XfacePlayerTransport(ReconnectingTransport):
         return (f"xface player: {self._peer} shows session {self._session}",)
 
     def stop_accepting(self) -> None:
-        """Go on: what plays is shown to its end."""
+        """Continue, because playing blocks are shown to their end."""
 
     # the session's side --------------------------------------------------------------------------
 
     @property
     def unsent_bytes(self) -> int:
-        """0: of the frames that arrive, only the last is kept."""
+        """Always 0, because only the last frame is stored."""
         return 0
 
     def send(self, data: str | bytes) -> None:
@@ -62,7 +62,7 @@ class XfacePlayerTransport(ReconnectingTransport):
     def disconnect(self, code: int, reason: str) -> None:
         log.warning("xface player: session %s ends: %s", self._session, reason)
         if self._writer is not None:
-            self._writer.transport.abort()  # another one will be opened
+            self._writer.transport.abort()  # then it connects again
 
     # the player's side ---------------------------------------------------------------------------
 
@@ -77,17 +77,17 @@ class XfacePlayerTransport(ReconnectingTransport):
         except OSError as error:  # also TimeoutError
             return f"no player at {self._peer} ({error.strerror or str(error) or 'nobody answers'})"
         finally:
-            self._part()
+            self._close()
 
     async def _connect(self) -> asyncio.StreamReader:
         """Connect to the player and wait for its greeting."""
-        async with asyncio.timeout(ATTEMPT):
+        async with asyncio.timeout(CONNECT_TIMEOUT):
             reader, self._writer = await asyncio.open_connection(*self._address)
             if self._writer.get_extra_info("sockname") == self._writer.get_extra_info("peername"):
                 raise OSError("nobody answers")  # a TCP self-connect
             self._link.on_connect()
             while self._link.state is State.GREETING:
-                if not (data := await reader.read(READ)):
+                if not (data := await reader.read(READ_SIZE)):
                     raise OSError("it closes the connection")
                 self._link.receive(data)
         return reader
@@ -99,7 +99,7 @@ class XfacePlayerTransport(ReconnectingTransport):
         try:
             for message in SUBSCRIPTIONS:
                 self._sessions.receive(number, message)
-            while data := await reader.read(READ):
+            while data := await reader.read(READ_SIZE):
                 self._link.receive(data)
                 self._pump()
         finally:
@@ -115,13 +115,13 @@ class XfacePlayerTransport(ReconnectingTransport):
         now = self._loop.time()
         while (task := self._link.due(now)) is not None:
             self._writer.write(task)
-        if self._writer.transport.get_write_buffer_size() > STUCK:
+        if self._writer.transport.get_write_buffer_size() > MAX_UNREAD:
             log.warning("xface player: %s reads nothing and is disconnected", self._peer)
             self._writer.transport.abort()
         if (at := self._link.next_deadline()) is not None:
             self._timer = self._loop.call_at(at, self._pump)
 
-    def _part(self) -> None:
+    def _close(self) -> None:
         if self._writer is not None:
             self._writer.transport.abort()
             self._writer = None

@@ -238,7 +238,7 @@ def test_player_reconnects_after(lost: str, monkeypatch: pytest.MonkeyPatch) -> 
                 1011, "internal error"
             )
         else:
-            monkeypatch.setattr(xface_player, "STUCK", -1)  # so much always waits
+            monkeypatch.setattr(xface_player, "MAX_UNREAD", -1)  # any number of bytes is more
             await hold(server, '{"type":"set","faps":{"open_jaw":600}}')
         await player.until(lambda: player.clients > 1)
 
@@ -248,7 +248,7 @@ def test_player_reconnects_after(lost: str, monkeypatch: pytest.MonkeyPatch) -> 
 def test_player_without_a_greeting_is_given_up(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(xface_player, "ATTEMPT", 0.05)
+    monkeypatch.setattr(xface_player, "CONNECT_TIMEOUT", 0.05)
     monkeypatch.setattr(reconnecting, "FIRST_RETRY", 0.01)
 
     async def test(server: Server, player: Player) -> None:
