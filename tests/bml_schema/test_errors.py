@@ -45,3 +45,8 @@ def test_did_you_mean_suggests_a_near_name() -> None:
     assert did_you_mean("nod2", ["speech1", "nod1"]) == ', did you mean "nod1"?'
     assert did_you_mean("nod2", ["speech1"]) == ""
     assert did_you_mean("n" * 1000, ["n" * 999]) == ""
+
+
+@pytest.mark.parametrize(("before", "found"), [(499, True), (500, False)])
+def test_did_you_mean_looks_at_the_first_500_choices(before: int, found: bool) -> None:
+    assert (did_you_mean("nod2", [*["speech1"] * before, "nod1"]) != "") is found

@@ -94,6 +94,16 @@ def test_schedule_of_an_id_is_that_of_the_newest_block() -> None:
     assert schedule.start == 5.0
 
 
+@pytest.mark.parametrize(("stopped", "end"), [(None, 1.0), (5.4, 0.4), (9.0, 1.0), (3.0, 0.0)])
+def test_first_schedule_of_a_block_ends_where_it_was_stopped(stopped: float | None, end: float) -> None:
+    cast = BlockStore()
+    added(cast, "a", start=5.0).stopped_at = stopped
+    schedule = cast.first_schedule_of("a")
+    assert schedule is not None
+    assert schedule.start == 5.0
+    assert schedule.at("w", "end") == pytest.approx(end)
+
+
 def test_drop_anticipators_removes_their_points_only() -> None:
     cast = BlockStore()
     for id in ("clock", "music"):

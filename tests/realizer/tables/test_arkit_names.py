@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import pytest
@@ -18,7 +19,8 @@ def test_shapes_are_the_52_of_arkit() -> None:
 @pytest.mark.parametrize(
     "spell",
     [lambda n: n.replace("Left", "_L").replace("Right", "_R"), lambda n: n[0].upper() + n[1:],
-     lambda n: f"blendShape1.{n}", lambda n: f"Head_{n}"],
+     lambda n: f"blendShape1.{n}", lambda n: f"Head_{n}",
+     lambda n: re.sub("(.+)(Left|Right)", r"\2_\1", n)],
 )  # fmt: skip
 def test_canonical_understands_usual_spellings(spell: Callable[[str], str]) -> None:
     assert {canonical(spell(name)) for name in shapes()} == set(shapes())

@@ -53,6 +53,14 @@ def test_blinks_have_uniform_draws_independent_of_the_window(seed: int) -> None:
     assert 0.35 < np.mean(list(whole.values())) < 0.65
 
 
+@given(st.integers(0, 2**40), st.floats(0, 600), st.floats(0, 60))
+def test_blinks_between_two_times_are_those_that_show_then(seed: int, start: float, length: float) -> None:
+    onsets = blinks(seed, start + length)
+    shown = onsets[onsets + 0.3 > start]
+    np.testing.assert_array_equal(blinks_between(start, start + length, seed).onsets, shown)
+    assert blinks(seed, start).max(initial=0.0) <= start
+
+
 def test_blinks_that_overlap_show_the_stronger_one() -> None:
     times = np.arange(0, 1, 0.01)
     one, other = (Blinks(np.array([onset]), np.zeros(1)).at(times) for onset in (0.2, 0.3))
