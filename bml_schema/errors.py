@@ -131,6 +131,6 @@ def did_you_mean(word: str, choices: Iterable[str], cutoff: float = 0.6) -> str:
     if len(word) > _LONGEST_SHOWN:
         return ""
     near = difflib.get_close_matches(
-        word, [c for c in islice(choices, _MAX_CHOICES) if len(c) <= _LONGEST_SHOWN], n=1, cutoff=cutoff
+        word, [c for c in islice(choices, _MAX_CHOICES) if len(c) <= _LONGEST_SHOWN], cutoff=cutoff
     )
     return f', did you mean "{near[0]}"?' if near else ""

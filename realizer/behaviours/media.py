@@ -137,7 +137,7 @@ def _near(folder: Path, parts: list[str]) -> str:
     except (OSError, RuntimeError, ValueError):
         return ""
     lower = {name.lower(): name for name in names}
-    near = difflib.get_close_matches(parts[-1].lower()[:200], lower, n=1, cutoff=0.7)
+    near = difflib.get_close_matches(parts[-1].lower()[:200], lower, cutoff=0.7)
     return f', did you mean "{"/".join([*parts[:-1], lower[near[0]]])}"?' if near else ""
 
 

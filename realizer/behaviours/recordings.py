@@ -41,7 +41,7 @@ def _clip(name: str) -> str | None:
 
 def _client_clip(id: str, context: PlanningContext) -> Recording:
     if id not in context.clips:
-        near = difflib.get_close_matches(id, list(context.clips), n=1)
+        near = difflib.get_close_matches(id, list(context.clips))
         suggestion = f', did you mean "{CLIP}{near[0]}"?' if near else ""
         raise MediaError(f"wanted a clip that was sent to its last piece, got {CLIP + id!r}{suggestion}")
     return context.clips[id]

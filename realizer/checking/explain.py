@@ -65,7 +65,7 @@ def finding_of(file: str, source: Source, warning: Warning, vocabulary: Mapping[
 def near(word: str, choices: Iterable[str], cutoff: float = 0.6) -> str | None:
     """Return the choice that is most similar to a word, ignoring case, or None."""
     by_case = {choice.lower(): choice for choice in choices}
-    found = difflib.get_close_matches(word.lower(), by_case, n=1, cutoff=cutoff)
+    found = difflib.get_close_matches(word.lower(), by_case, cutoff=cutoff)
     return by_case[found[0]] if found else None
 
 

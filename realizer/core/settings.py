@@ -158,7 +158,7 @@ def _closest(name: str, known: Iterable[str]) -> str | None:
     """Return the setting with the most similar name, or None."""
     from difflib import get_close_matches
 
-    return next(iter(get_close_matches(name, known, n=1, cutoff=0.8)), None)
+    return next(iter(get_close_matches(name, known, cutoff=0.8)), None)
 
 
 def _optional(read: Callable[[Any], T], empty: bool = True) -> Callable[[Any], T | None]:

@@ -45,7 +45,7 @@ def by_meaning(text: str, expressions: Iterable[Expression]) -> list[tuple[Expre
             if weights:
                 # A word in several places counts slightly more.
                 score += max(weights) + 0.1 * (len(weights) - 1)
-            elif difflib.get_close_matches(root, name | means, n=1, cutoff=0.85):
+            elif difflib.get_close_matches(root, name | means, cutoff=0.85):
                 score += SIMILAR
         if score:
             matches.append((expression, min(score / (NAME * len(query)), 1.0)))

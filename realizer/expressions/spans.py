@@ -43,19 +43,19 @@ def spans(track: Track, library: Mapping[str, Expression]) -> list[Span]:
         lengths.append(own if entry.duration is None else entry.duration)
         begins.append(begins[-1] + lengths[-1])
     times = [_onset_and_offset(entry, library) for entry in track.entries]
-    # (before, after): seconds of the transition before and after the border between two entries.
-    borders = [(0.0, times[0][0])]
+    # Seconds of the transition after the begin of each entry, and before its end.
+    rises, falls = [times[0][0]], []
     for (one, (_, offset)), (other, (onset, _)) in pairwise(zip(track.entries, times, strict=True)):
         before, after = offset, onset
         if track.joins == "onset":
             before, after = 0.0, offset if other.neutral else onset
         elif track.joins == "offset":
             before, after = onset if one.neutral else offset, 0.0
-        borders.append((before, after))
-    borders.append((times[-1][1], 0.0))
+        falls.append(before)
+        rises.append(after)
+    falls.append(times[-1][1])
     entries = []
-    for k, (entry, length) in enumerate(zip(track.entries, lengths, strict=True)):
-        rise, fall = borders[k][1], borders[k + 1][0]
+    for k, (entry, length, rise, fall) in enumerate(zip(track.entries, lengths, rises, falls, strict=True)):
         part = min(1.0, length / (rise + fall)) if rise + fall > 0 else 1.0
         begin, end = begins[k], begins[k + 1]
         entries.append(Span(entry, begin, begin + rise * part, end - fall * part, end))

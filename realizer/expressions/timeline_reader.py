@@ -74,7 +74,7 @@ class _TimelineReader:
     def _keys(self, row: Mapping[str, Any], known: Sequence[str], place: str) -> None:
         for name in row:
             if name not in known:
-                near = difflib.get_close_matches(name, known, n=1)
+                near = difflib.get_close_matches(name, known)
                 hint = f"; did you mean {near[0]}?" if near else ""
                 if place != "timeline" and name in TIMELINE:
                     hint = "; it belongs before all channels"

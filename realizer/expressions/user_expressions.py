@@ -71,7 +71,7 @@ class _FileReader:
     def expression(self) -> Expression | None:
         """Return the expression, or None if the file has faults."""
         for name in self.row.keys() - set(KEYS):
-            near = difflib.get_close_matches(name, KEYS, n=1)
+            near = difflib.get_close_matches(name, KEYS)
             hint = f", did you mean {near[0]}?" if near else ""
             self._fault(name, f"one of {', '.join(KEYS)}", f"{name!r}{hint}")
         name, means, aus = self._name(), self._means(), self._aus()

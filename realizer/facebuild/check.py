@@ -94,7 +94,7 @@ def check_face(name: str = "default", directory: Path | str | None = None) -> tu
 
 
 def _nearest(word: str, words: Any) -> str:
-    near = get_close_matches(word, list(words), n=1)
+    near = get_close_matches(word, list(words))
     return f"; did you mean {near[0]!r}?" if near else f"; there are: {', '.join(words)}"
 
 

@@ -157,5 +157,4 @@ def align_recording(request: SpeechRequest, recording: Recording) -> Utterance:
     # Words that are adjacent in the reference may have a pause between them here: of knots at one time the
     # last counts, so that a mark before a word is at the start of that word.
     marks = {name: float(np.interp(time, was, now)) for name, time in reference.marks.items()}
-    pcm = np.rint(sound * 32767).astype(np.int16)
-    return Utterance(len(sound) / rate, found.words, found.phonemes, marks, rate, pcm, found.warnings)
+    return Utterance(len(pcm) / rate, found.words, found.phonemes, marks, rate, pcm, found.warnings)

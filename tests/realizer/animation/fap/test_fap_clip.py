@@ -66,3 +66,10 @@ def test_resampled_refuses_invalid_rates(fps: float) -> None:
 def test_from_frame_keeps_rate_and_visemes() -> None:
     got = clip([1, 2, 3], 30).from_frame(1)
     assert (got.fps, got.values[:, 2].tolist(), got.visemes[:, 0].tolist()) == (30, [2, 3], [1, 2])
+
+
+def test_frames_hold_the_faps_of_the_clip_except_1_and_2() -> None:
+    frames = clip([0, 10, 20], 50.0).frames()
+    assert frames.times.tolist() == [0, 0.02, 0.04]
+    assert frames.values[:, 2].tolist() == [0, 10, 20]
+    assert np.flatnonzero(frames.mask).tolist() == [2]

@@ -30,6 +30,11 @@ def test_mouth_faps_move_both_sides_and_contours() -> None:
     assert {got[fap][0] for fap in (12, 13, 59, 60)} == {8}
 
 
+def test_mouth_faps_push_the_lips_and_move_the_tongue() -> None:
+    got = mouth_faps(shape(push_lower=1, push_upper=2, tip=3, thrust=4, body=5))
+    assert {fap: values[0] for fap, values in got.items() if values[0]} == {16: 1, 17: 2, 44: 3, 45: 4, 46: 5}
+
+
 @pytest.mark.parametrize("viseme", range(15))
 def test_mouth_faps_of_every_viseme_are_within_their_range(viseme: int) -> None:
     for fap, values in mouth_faps(shape_table()[0][[viseme]]).items():

@@ -57,3 +57,11 @@ def test_read_measurements_gathers_landmarks_by_unit(tmp_path: Path) -> None:
     assert found[4].visible.all()
     with pytest.raises(ValueError, match="wanted shapes whose halves are known"):
         write_shapes(tmp_path / "x.npz", found)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_read_measurements_takes_landmarks_that_move_along_one_axis(axis: int, tmp_path: Path) -> None:
+    path, move = tmp_path / "landmarks.csv", ["0"] * 3
+    move[axis] = "0.1"
+    path.write_text(HEAD + f"12,0,0,0,{','.join(move)}\n" * 8)
+    assert read_measurements(path)[12].moves[:, axis].tolist() == [0.1] * 8

@@ -168,7 +168,7 @@ def test_align_recording_places_marks_before_their_words(sentence) -> None:
     assert said.marks["c"] == pytest.approx(starts["down"], abs=0.1)
     assert said.marks["d"] == pytest.approx(said.words[-1].end, abs=0.01)
     assert said.duration == len(sentence.pcm) / sentence.rate
-    assert np.abs(said.pcm.astype(int) - sentence.pcm).max() <= 1
+    assert said.pcm is sentence.pcm
     assert said.stretch == (1, 1)
 
 
