@@ -155,7 +155,7 @@ def planning_player(chosen: Settings, scene: Path | None) -> Player:
 
     names = ("language", "media", "expressions", "strict_bml")
     values = {name: getattr(chosen, name) for name in names}
-    return Player(PlayOptions(scene=read_scene(scene), idle=False, **values))
+    return Player(PlayOptions(scene=read_scene(scene), **values))
 
 
 def read_documents(names: Iterable[str]) -> list[bytes]:

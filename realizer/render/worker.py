@@ -111,7 +111,7 @@ def serve(orders: Connection, answers: Connection) -> None:
 
 def triangle() -> Face:
     """Return a face of three vertices from chin to hairline that knows no FAP."""
-    vertices = np.array([[-0.08, -0.12, 0], [0.08, -0.12, 0], [0, 0.06, 0]], np.float32)
+    vertices = np.eye(3, dtype=np.float32)
     return Face(
         name="triangle",
         source="",
@@ -122,8 +122,8 @@ def triangle() -> Face:
         occlusion=np.ones(3, np.float32),
         gloss=np.zeros(3, np.float32),
         parts={"skin": (0, 3)},
-        feature_points={"2.1": 0, "11.1": 2},
-        points={"2.1": np.array([0, -0.12, 0], np.float32), "11.1": vertices[2]},
+        feature_points={"2.1": 0, "11.1": 1},
+        points={"2.1": vertices[0], "11.1": vertices[1]},
         fapu=Fapu(0.012, 0.064, 0.05, 0.03, 0.05),
         basis={},
     )

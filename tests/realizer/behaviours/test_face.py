@@ -82,3 +82,8 @@ def test_face_facs_warns_of_a_side_of_an_action_unit_without_sides() -> None:
     (fault,) = check('<ext:faceFacs id="x" au="26" side="LEFT"/>')
     assert not fault.fatal
     assert at(expand('<ext:faceFacs id="x" au="26" side="LEFT" amount="1"/>', FOUR), "26", 1.4) == [1]
+
+
+@pytest.mark.parametrize(("au", "side"), [(12, "LEFT"), (12, "BOTH"), (26, "BOTH")])
+def test_face_facs_accepts_the_sides_of_an_action_unit(au: int, side: str) -> None:
+    assert check(f'<ext:faceFacs id="x" au="{au}" side="{side}"/>') == ()

@@ -77,3 +77,12 @@ def test_render_marks_what_is_meant_in_a_line_of_any_length(data: st.DataObject)
     first, count = mark.index("^"), mark.count("^")
     assert row.ljust(500)[first : first + count] == line[start : start + length].ljust(count)
     assert max(len(row), len(mark)) <= width
+
+
+def test_render_shows_labels_that_lie_far_apart_in_rows_of_their_own() -> None:
+    line = "a" + "." * 200 + "b"
+    shown = rows(line, Label(Spot(1, 1, 1)), Label(Spot(1, len(line), 1), primary=False))[2:]
+    for letter, sign in (("a", "^"), ("b", "-")):
+        (row,) = (row for row in shown if letter in row)
+        assert shown[shown.index(row) + 1].rstrip()[-1] == sign
+        assert shown[shown.index(row) + 1].index(sign) == row.index(letter)

@@ -13,3 +13,7 @@ from realizer.core.options import PlayOptions
 def test_play_options_refuse_a_rate_that_is_not_above_0(fps: float) -> None:
     with pytest.raises(ValueError, match="fps: wanted a number above 0"):
         PlayOptions(fps=fps)
+
+
+def test_play_options_are_25_frames_a_second_with_idle_motion_by_default() -> None:
+    assert (PlayOptions().fps, PlayOptions().idle, PlayOptions().prosody) == (25.0, True, True)

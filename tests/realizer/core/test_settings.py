@@ -211,3 +211,11 @@ def test_settings_play_options_have_the_values_of_the_settings() -> None:
     settings = Settings(fps=50, idle=False, cooccurrence="off", prosody=False, seed=3)
     expected = PlayOptions(fps=50, idle=False, cooccurrence="off", prosody=False, seed=3, scene=cup)
     assert settings.play_options(cup) == expected
+
+
+@pytest.mark.parametrize(("name", "least"), [("max_memory", 64), ("max_size", 16), ("max_pixels", 256)])
+def test_settings_accept_the_least_value_and_no_lower_one(name: str, least: int) -> None:
+    variable = f"REALIZER_{name.upper()}"
+    assert getattr(Settings.read(environment={variable: str(least)}), name) == least
+    with pytest.raises(SettingsError, match=f"{name}: wanted"):
+        Settings.read(environment={variable: str(least - 1)})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -52,3 +53,10 @@ def test_to_glb_holds_mesh_colours_and_parts(face: Face) -> None:
         a, b = extras["parts"][name]["triangles"]
         assert face.triangles[a:b].min() >= first
         assert face.triangles[a:b].max() < last
+
+
+def test_to_glb_lets_a_vertex_without_a_triangle_point_forward(face: Face) -> None:
+    glb = to_glb(replace(face, triangles=face.triangles[(face.triangles != 0).all(axis=1)]))
+    size = struct.unpack_from("<I", glb, 12)[0]
+    view = json.loads(glb[20 : 20 + size])["bufferViews"][1]
+    assert struct.unpack_from("<3f", glb, 28 + size + view["byteOffset"]) == (0, 0, 1)

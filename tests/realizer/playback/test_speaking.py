@@ -9,7 +9,13 @@ from realizer.behaviours.registry import VOCABULARY
 from realizer.core.errors import VoiceError
 from realizer.core.options import PlayOptions
 from realizer.playback.player import Player
-from realizer.playback.speaking import open_voice, submit_with_speech, synthesize, without_stretch
+from realizer.playback.speaking import (
+    open_voice,
+    stretch_to_fit,
+    submit_with_speech,
+    synthesize,
+    without_stretch,
+)
 from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import SpeechRequest, Utterance
 
@@ -78,3 +84,12 @@ def test_open_voice_leaves_an_open_voice_open() -> None:
 def test_open_voice_refuses_a_name_that_is_not_installed() -> None:
     with pytest.raises(VoiceError, match="nobody"), open_voice("nobody"):
         pass
+
+
+def test_stretch_to_fit_fixes_utterances_without_a_planned_length() -> None:
+    spoken = SilentVoice().say(SpeechRequest(TEXT))
+    points = {"start": 0.0, "end": 1.1 * spoken.duration}
+    fits = stretch_to_fit({"a": spoken, "b": spoken}, {"a": points})
+    assert fits["a"].duration == pytest.approx(points["end"])
+    assert fits["b"].duration == spoken.duration
+    assert fits["b"].stretch == (1.0, 1.0)

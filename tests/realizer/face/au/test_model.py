@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from realizer.face.au.file import read_model
-from realizer.face.au.model import Model
+from realizer.face.au.model import HeadTurn, Model
 from realizer.face.au.units import units
 from realizer.face.load import load_face
 from realizer.face.model import Face
@@ -120,3 +120,14 @@ def test_model_drives_a_mesh_of_another_topology(name: str, model: Model, size: 
 def skin_of(face: Face) -> np.ndarray:
     first, last = face.parts["skin"]
     return face.vertices[first:last].astype(np.float64)
+
+
+def test_head_turn_density_is_a_smooth_step_between_chin_and_collar() -> None:
+    turn = HeadTurn((0.0, 0.0, 0.0), top=1.0, end=0.0, tilt=0.5)
+    heights = np.array([-1.0, 0.0, 0.25, 0.5, 1.0, 2.0])
+    at = np.stack([0 * heights, heights, 0 * heights], 1)
+    wanted = [0, 0, 0.15625, 0.5, 1, 1]
+    assert turn.density(at).tolist() == pytest.approx(wanted)
+    assert turn.density(at + np.array([3.0, -0.5, 1.0])).tolist() == pytest.approx(wanted), (
+        "height along the tilt"
+    )

@@ -6,6 +6,9 @@ import pytest
 from realizer.face.deform import deform
 from realizer.face.load import list_faces, load_face
 from realizer.face.model import Face
+from realizer.facebuild.parts import Part
+from realizer.facebuild.person.base_mesh import Ground
+from realizer.facebuild.person.lids import Lid
 
 FACES = [info.name for info in list_faces() if info.licence == "CC0-1.0"]
 
@@ -43,3 +46,11 @@ def test_lashes_fall_with_closed_lids(face: Face) -> None:
     rest = part(face, "lashes", face.vertices)
     highest = rest[:, 1] > np.percentile(rest[:, 1], 80)
     assert moved[highest, 1].max() < -0.002
+
+
+def test_lashes_grow_all_along_the_lids(parts: list[Part], mask_lids: list[Lid], ground: Ground) -> None:
+    across = np.concatenate([part.vertices[:, 0] for part in parts if part.name == "lashes"])
+    for lid in mask_lids:
+        edge = ground.at[lid.upper, 0]
+        bins = np.linspace(edge.min(), edge.max(), 6)
+        assert np.histogram(across, bins)[0].min() > 5

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
+from pydantic import ValidationError
 
 from realizer.protocol.messages.parse import SUPPORTED, parse_control
 from realizer.protocol.messages.replies import ErrorMessage
@@ -68,3 +69,9 @@ def test_whole_accepts_a_number_with_a_point() -> None:
     assert (message.size, message.rate) == ((64, 48), 22050)
     assert isinstance(parse_control('{"type":"subscribe","stream":"video","quality":22.5}'), ErrorMessage)
     assert isinstance(parse_control('{"type":"ping","id":true}'), ErrorMessage)
+
+
+def test_message_cannot_be_changed() -> None:
+    message = Subscribe(type="subscribe", stream="fap")
+    with pytest.raises(ValidationError, match="frozen"):
+        message.stream = "au"  # type: ignore[misc]

@@ -81,6 +81,7 @@ def test_parse_control_accepts_every_type() -> None:
         ('{"type":"subscribe","stream":"audio","rate":22051}', "invalid", "subscribe.rate", "50"),
         ('{"type":"set","aus":{"12":7}}', "invalid", "set.aus.12", "wanted at most 1; got 7"),
         ('{"type":"scene","objects":{"a":{"x":1e99,"y":0,"z":0}}}', "invalid", "scene.objects.a.x", "10000"),
+        ('{"type":"scene","objects":{"a":[1,"x",2]}}', "invalid", "scene.objects.a", "a number; got"),
         ('{"type":"hello","session":"a b"}', "invalid", "hello.session", "a string that matches"),
         ('{"type":"ping","id":"' + "x" * 300_000 + '"}', "too-large", None, "at most"),
     ],

@@ -13,6 +13,7 @@ from realizer.protocol.messages.replies import (
     FrameMessage,
     ScheduleMessage,
     StateMessage,
+    Subscribed,
     Welcome,
 )
 from realizer.protocol.streams import STREAMS
@@ -56,3 +57,7 @@ def test_schedule_message_and_state_message_describe_the_wire(driver) -> None:
     (state,) = [StateMessage.model_validate(message, extra="forbid") for message in client.of("state")]
     assert [(b.id, b.status, b.behaviours) for b in state.blocks] == [("b", "IN_EXEC", ["n"])]
     assert json.loads(state.text()) == client.of("state")[0]
+
+
+def test_subscribed_has_index_0_unless_told() -> None:
+    assert Subscribed(stream="fap", encoding="json").index == 0

@@ -42,6 +42,15 @@ def test_read_notes_does_not_store_other_data_for_ever() -> None:
     assert read_notes(data) == [Note("STOP_PLAYBACK", 1, 2, 3)]
 
 
+@given(st.integers(1, 60))
+def test_read_notes_keeps_the_begin_of_a_note_behind_other_data(cut: int) -> None:
+    note = pack_note("STOP_PLAYBACK", 1, 2, 3)
+    data = bytearray(b"x" * 10_000 + note[:cut])
+    assert read_notes(data) == []
+    data += note[cut:]
+    assert read_notes(data) == [Note("STOP_PLAYBACK", 1, 2, 3)]
+
+
 @given(NAMES.filter(lambda name: name != "UPLOAD_WAV"), NUMBERS, NUMBERS, PARAMS)
 def test_pack_task_round_trip(name: str, owner: int, id: int, params: list[str]) -> None:
     task = Task(name, owner, id, tuple(params))
