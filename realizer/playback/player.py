@@ -177,6 +177,12 @@ class Player(BlockManager):
                 character.forget(now - self.history)
         return out
 
+    @property
+    def next_event(self) -> float:
+        """The time of the next event of a block, which may change frames after it; infinite for never."""
+        due = self.timeline.events.next
+        return float("inf") if due is None else due
+
     def next_change(self) -> float:
         """Return when `due` will next report or forget something; infinite for never."""
         first = self.next_deadline()

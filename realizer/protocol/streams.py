@@ -42,16 +42,16 @@ class Stream:
 _ROWS = (
     Stream("feedback", ("text",), ("character", "elements")),
     Stream(
-        "fap", ("binary", "json"), ("fps", "character"),
-        kind=1, dtype="<i4", payload="68 int32 in FAPU, column = FAP - 1",
+        "fap", ("binary", "json"), ("fps", "character", "ahead"),
+        kind=1, dtype="<i4", flushes=True, payload="68 int32 in FAPU, column = FAP - 1",
     ),
     Stream(
-        "au", ("binary", "json"), ("fps", "character", "asked"),
-        kind=2, dtype="<f4", payload="float32, 0..1, in the order of `names` in `subscribed`",
+        "au", ("binary", "json"), ("fps", "character", "ahead", "asked"),
+        kind=2, dtype="<f4", flushes=True, payload="float32, 0..1, in the order of `names` in `subscribed`",
     ),
     Stream(
-        "arkit", ("binary", "json"), ("fps", "character"),
-        kind=6, dtype="<f4",
+        "arkit", ("binary", "json"), ("fps", "character", "ahead"),
+        kind=6, dtype="<f4", flushes=True,
         payload="59 float32: ARKit's 52 weights, 0..1, then rotations of head and eyes in radians",
     ),
     Stream(

@@ -16,7 +16,8 @@ VERSION = 1
 # u8 kind, u8 version, u16 flags, u32 frame, f64 time; little-endian. 16 bytes, so the payload stays aligned
 # for a Float32Array or an Int32Array over the message.
 HEADER = struct.Struct("<BBHId")
-# Flag of a sound packet: forget every sample from this packet's time on; later packets replace them.
+# Flag of a sound packet, or of rows that are sent ahead: forget everything from the message's time on; this
+# message and later ones replace it.
 FLUSH = 0x100
 # Flag of the last piece of a sound clip from a client.
 FINAL = 0x200
@@ -169,10 +170,22 @@ def unpack_clip(message: bytes) -> ClipPiece:
 
 
 def json_frame(
-    stream: str, frame: int, time: float, values: list[int] | list[float], character: str | None = None
+    stream: str,
+    frame: int,
+    time: float,
+    values: list[int] | list[float] | list[list[int]] | list[list[float]],
+    character: str | None = None,
+    *,
+    flush: bool = False,
 ) -> str:
-    """Encode a frame as text, such as `{"type":"fap","frame":3,"time":0.12,"values":[...]}`."""
+    """Encode a frame as text, such as `{"type":"fap","frame":3,"time":0.12,"values":[...]}`.
+
+    Args:
+        values: of one frame, or a list of them: of this frame and those that follow it.
+    """
     message = {"type": stream, "frame": frame, "time": round(time, 6), "values": values}
+    if flush:
+        message["flush"] = True
     if character is not None:
         message["character"] = character
     return json.dumps(message, separators=(",", ":"))

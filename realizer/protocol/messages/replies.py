@@ -70,6 +70,7 @@ class Subscribed(Reply):
     index: int = Field(0, description="the low byte of the flags of binary frames")
     fps: float | None = None
     frame: int | None = None
+    ahead: float | None = Field(None, description="fap, au and arkit: as in `subscribe`, if it is above 0")
     names: list[str] | None = Field(None, description="fap, au and arkit: names of the values")
     face: str | None = Field(
         None, description="mesh and video: name of the face; GET /faces/NAME has its mesh"
@@ -193,13 +194,18 @@ class Pong(Reply):
 
 
 class FrameMessage(Reply):
-    """One frame of the stream `type` in JSON."""
+    """One frame of the stream `type` in JSON; with `ahead`, this frame and those that follow it."""
 
     type: NumericStream
     frame: int = Field(description="number k of the frame, which shows the session clock's instant k / fps")
     time: float = Field(description="seconds on the session clock")
-    values: list[float] = Field(description="in the order of `names` in `subscribed`")
+    values: list[float] | list[list[float]] = Field(
+        description="in the order of `names` in `subscribed`; with `ahead` a list of such rows"
+    )
     character: str | None = None
+    flush: bool | None = Field(
+        None, description="true: discard the rows from `frame` on that were sent before, the plan has changed"
+    )
 
 
 class ScheduleMessage(Reply):

@@ -48,6 +48,7 @@ class Subscribe(Message):
 
     model_config = examples(
         {"type": "subscribe", "stream": "fap", "encoding": "json", "fps": 25},
+        {"type": "subscribe", "stream": "au", "ahead": 0.2},
         {"type": "subscribe", "stream": "video", "size": [640, 480], "format": "webp", "light": "evening"},
         {"type": "subscribe", "stream": "feedback", "elements": ["blockProgress"], "character": "Ada"},
     )
@@ -57,6 +58,12 @@ class Subscribe(Message):
     encoding: Encoding | None = Field(None, description="default: the stream's first")
     fps: float | None = Field(None, gt=0, le=MAX_FPS, description="default: the service's rate")
     character: str | None = Field(None, max_length=256, description="default: the first")
+    ahead: float = Field(
+        0.0,
+        ge=0,
+        le=2,
+        description="fap, au and arkit: seconds; above 0 a message has several rows, up to that long early",
+    )
     size: tuple[Side, Side] = Field((512, 512), strict=False, description="video: width, height in pixels")
     camera: str | None = Field(None, max_length=64, description="video: a camera; default: the service's")
     light: str | None = Field(None, max_length=64, description="video: a light; default: the service's")

@@ -137,6 +137,7 @@ COUNTERS = {
     "messages": "Messages that came in.",
     "refused": "Connections that were refused.",
     "frames_dropped": "Frames, pictures and sound packets that slow clients did not get.",
+    "taken_back": "How often frames that were sent ahead were taken back, because a plan had changed.",
     "failures": "Sessions that an internal error ended.",
     "records_stopped": "Recordings that could not be written to their end.",
 }

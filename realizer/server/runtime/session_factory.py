@@ -33,7 +33,7 @@ class SessionFactory:
     """The factory of the sessions of one process.
 
     Args:
-        metrics: counts recordings that have stopped.
+        metrics: counts recordings that have stopped, and frames that sessions take back.
 
     Attributes:
         journal: from which another process can resume sessions, or None.
@@ -157,6 +157,7 @@ class SessionFactory:
             epoch=epoch,
         )
         session.ending = self.ending
+        session.broadcast.counts = self._metrics.counts
         return session
 
     def _journal_writer(

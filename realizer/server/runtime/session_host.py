@@ -249,14 +249,15 @@ class SessionHost:
         A call that is already due stays, or a session that gets messages all the time would never be woken.
         """
         now = self._loop.time()
+        when = max(when, now)
         if (known := self._wakeups.get(session)) is not None:
             old, step = known
-            if when < math.inf and (old == when or old <= min(when, now)):
+            if when < math.inf and (old == when or old <= now):
                 return
             del self._wakeups[session]
             self._steps.get(step, {}).pop(session, None)
         if when < math.inf and not self._closed:
-            step = math.ceil(max(when, now) / STEP - SLACK)
+            step = math.ceil(when / STEP - SLACK)
             self._wakeups[session] = when, step
             if step not in self._steps:
                 self._steps[step] = {}

@@ -443,7 +443,7 @@ class Session:
         self._publish(t)
         if self.broadcast.active or any(c.subscriptions for c in self._connections.values()):
             self.broadcast.set_subscribers(self._connections.values())
-            self.broadcast.send_due(t, self._effects)
+            self.broadcast.send_due(t, self._effects, is_reading=read_documents and self.submission.has_work)
         if self.submission.pending.blocks:
             self._effects += self.submission.tts.expire(t + EPSILON)
         # A tick reads or plans, not both: so the acknowledgement is sent before planning begins, and due
@@ -504,6 +504,8 @@ class Session:
     def _publish(self, t: float) -> None:
         """Number the feedback that is due and send it to its subscribers."""
         t = self.submission.now(t)
+        if self.broadcast.active and (change := self.player.next_event) <= t + EPSILON:
+            self.broadcast.settle(change)
         texts: list[str] = []
         while due := self.player.due(t + EPSILON):
             for event in due:
@@ -522,7 +524,7 @@ class Session:
         """
         self._publish(t)
         if self.broadcast.active:
-            self._effects += self.broadcast.frames_due(t)[0]
+            self._effects += self.broadcast.frames_due(t, is_reading=True)[0]
 
     def _send_feedback(self, connection: Connection, texts: list[str]) -> None:
         if (filter := connection.feedback) is not None:

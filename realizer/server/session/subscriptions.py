@@ -27,6 +27,7 @@ from realizer.server.streams.connection import (
     VideoView,
 )
 from realizer.server.streams.frame_windows import SOURCES, FrameSubscription, first_frame_at
+from realizer.server.streams.frames_ahead import AheadSubscription
 
 # A subscription and the fields of the reply `subscribed`.
 _Answer = tuple[Subscription, dict[str, Any]]
@@ -60,6 +61,9 @@ class Subscriptions:
         encoding = message.encoding or encodings[0]
         if encoding not in encodings:
             raise FieldError("encoding", f"wanted {' or '.join(encodings)} for {stream}, got {encoding}")
+        if message.ahead and "ahead" not in STREAMS[stream].options:
+            names = " or ".join(name for name, row in STREAMS.items() if "ahead" in row.options)
+            raise FieldError("ahead", f"wanted 0, or the stream {names}: {stream} is not sent ahead")
         fields: dict[str, Any]
         if stream == "feedback":
             elements = None if message.elements is None else frozenset(message.elements)
@@ -137,12 +141,15 @@ class Subscriptions:
     ) -> _Answer:
         stream, fps = message.stream, message.fps or self.settings.fps
         encoding = message.encoding or STREAMS[stream].encodings[0]
+        ahead: Any = {"ahead": message.ahead} if message.ahead else {}
         fields = self._mesh(index) if stream == "mesh" else {"names": SOURCES[stream].names()}
         timeline, first = self.broadcast.timeline(index, fps), first_frame_at(t, fps)
-        new = FrameSubscription(stream, encoding, timeline, index, message.character, first, message.asked)
         if isinstance(old, FrameSubscription) and old.timeline is timeline:
-            new.next = max(new.next, old.next)  # no frame twice
-        return new, fields | {"index": index, "fps": fps, "frame": new.next}
+            # No frame twice, except those that were sent ahead of their time.
+            first = max(first, old.final if isinstance(old, AheadSubscription) else old.next)
+        make = AheadSubscription if ahead else FrameSubscription
+        new = make(stream, encoding, timeline, index, message.character, first, message.asked, **ahead)
+        return new, fields | ahead | {"index": index, "fps": fps, "frame": first}
 
     def _render_options(self, message: Subscribe, index: int) -> RenderOptions:
         from realizer.render.cameras import camera_names

@@ -1,6 +1,7 @@
 """The broadcast of a session: it sends due frames, packets, pictures and schedules to subscribers."""
 
 import math
+from collections import Counter
 from collections.abc import Iterable
 from weakref import WeakValueDictionary
 
@@ -13,15 +14,15 @@ from realizer.server.streams.frame_windows import (
     EPSILON,
     FrameSubscription,
     FrameTimeline,
+    FrameWindow,
     PackedFrames,
     first_frame_at,
     last_frame_at,
 )
+from realizer.server.streams.frames_ahead import LATE, AheadSubscription
 from realizer.server.streams.schedule_stream import ScheduleStream, schedule_message
 from realizer.server.streams.video_stream import VideoStream
 
-# Frames that are later than this, after the process stalled, are not sent.
-LATE = 0.5  # s
 # A slow client gets schedules again after this time.
 RETRY = 0.1  # s
 
@@ -30,24 +31,34 @@ class Fanout:
     """The distribution of one timeline's frames.
 
     Attributes:
-        members: the subscriptions with their connections.
+        members: the subscriptions that get each frame at its time, with their connections.
+        ahead: those that get frames ahead.
     """
 
     def __init__(self, timeline: FrameTimeline, members: list[tuple[Connection, FrameSubscription]]) -> None:
         self.timeline = timeline
-        self.members = members
+        self.members = [(c, s) for c, s in members if not isinstance(s, AheadSubscription)]
+        self.ahead = [(c, s) for c, s in members if isinstance(s, AheadSubscription)]
         self._packed: PackedFrames | None = None  # the next frames of a single subscriber
 
     @property
     def next(self) -> int:
-        """The first frame that a subscriber has not received."""
+        """The first frame that a subscriber of `members` has not received."""
         members = self.members
         return members[0][1].next if len(members) == 1 else min(s.next for _, s in members)
 
     @property
+    def next_due(self) -> float:
+        """The time of the next message."""
+        due = [s.next_due(is_slow=connection.is_slow) for connection, s in self.ahead]
+        if self.members:
+            due.append(self.next / self.timeline.fps)
+        return min(due)
+
+    @property
     def packed(self) -> PackedFrames | None:
         """The packed next frames, if there is one subscriber and the plan has not changed."""
-        return self._packed if self.timeline.is_current else None
+        return self._packed if self.timeline.is_current and not self.ahead else None
 
     def send(self, newest: int, now: float, sends: list[Send]) -> None:
         """Send all frames up to `newest` to the subscribers that have not received them."""
@@ -67,7 +78,29 @@ class Fanout:
         is_packed = s.encoding == "binary" and s.stream != "mesh"
         if len(self.members) == 1 and is_packed and not connection.is_slow:
             self._packed = window.packed(s)
-        window.drop_source()
+        self._drop_source(window)
+
+    def send_ahead(self, now: float, sends: list[Send], *, is_reading: bool) -> int:
+        """Send what is due to the subscribers that get frames ahead. Return how many must take some back.
+
+        Args:
+            is_reading: whether the plan will soon change again: what is due at once may wait for that.
+        """
+        taken_back = 0
+        for connection, s in self.ahead:
+            if is_reading and s.must_wait(now):
+                continue
+            is_slow = connection.is_slow
+            taken_back += s.take_back()
+            connection.dropped += s.drop_late(now, is_slow=is_slow)
+            if (message := s.message(now, is_slow=is_slow)) is not None:
+                sends.append(Send(connection.id, message))
+        if (window := self.timeline.current_window) is not None:
+            self._drop_source(window)
+        return taken_back
+
+    def _drop_source(self, window: FrameWindow) -> None:
+        window.drop_source(s for _, s in (*self.members, *self.ahead))
 
 
 class FrameRun:
@@ -120,6 +153,7 @@ class Broadcast:
 
     Attributes:
         active: whether there is a subscription; without one nothing is ever due.
+        counts: counts in `taken_back` how often frames were taken back that had been sent ahead.
         schedule_subscribers: the subscriptions to the stream `schedule`, with their connections.
     """
 
@@ -136,6 +170,7 @@ class Broadcast:
         self.schedule_subscribers: list[tuple[Connection, ScheduleSubscription]] = []
         self._video_subscribers: list[VideoSubscription] = []
         self.active = False
+        self.counts = Counter[str]()
 
     def timeline(self, index: int, fps: float) -> FrameTimeline:
         """Return the frames of one character at one rate."""
@@ -190,8 +225,18 @@ class Broadcast:
             frames or self.schedule_subscribers or self._audio_subscribers or self._video_subscribers
         )
 
-    def send_due(self, now: float, effects: list[Effect]) -> None:
-        """Send all that is due to the subscribers of the last `set_subscribers`."""
+    def settle(self, t: float) -> None:
+        """Keep the frames before `t` that were sent ahead, since the plan will change at that time."""
+        for fanout in self._fanouts:
+            for _, s in fanout.ahead:
+                s.settle(t)
+
+    def send_due(self, now: float, effects: list[Effect], *, is_reading: bool = False) -> None:
+        """Send all that is due to the subscribers of the last `set_subscribers`.
+
+        Args:
+            is_reading: as for `frames_due`.
+        """
         self._send_schedules(now, effects)
         for connection, s in self._audio_subscribers:
             for message, is_sound in s.messages(now):
@@ -199,16 +244,22 @@ class Broadcast:
                     connection.dropped += 1
                 else:
                     effects.append(Send(connection.id, message))
-        effects += self.frames_due(now)[0]
+        effects += self.frames_due(now, is_reading=is_reading)[0]
         self.video.due(self._video_subscribers, now, effects)
 
-    def frames_due(self, now: float) -> tuple[list[Send], float]:
-        """Return the due frames of fap, au, arkit and mesh, and the time of the next one."""
+    def frames_due(self, now: float, *, is_reading: bool = False) -> tuple[list[Send], float]:
+        """Return the due frames of fap, au, arkit and mesh, and the time of the next ones.
+
+        Args:
+            is_reading: whether the plan will soon change again: frames are taken back after that.
+        """
         sends: list[Send] = []
         for fanout in self._fanouts:
             newest = last_frame_at(now, fanout.timeline.fps)
-            if fanout.next <= newest:
+            if fanout.members and fanout.next <= newest:
                 fanout.send(newest, now, sends)
+            if fanout.ahead:
+                self.counts["taken_back"] += fanout.send_ahead(now, sends, is_reading=is_reading)
         return sends, self.next_frame
 
     def fast_path(self, zero: float, until: float) -> FrameRun | None:
@@ -225,8 +276,8 @@ class Broadcast:
 
     @property
     def next_frame(self) -> float:
-        """The time of the next frame; infinity without subscribers."""
-        return min([fanout.next / fanout.timeline.fps for fanout in self._fanouts], default=math.inf)
+        """The time of the next frames; infinity without subscribers."""
+        return min([fanout.next_due for fanout in self._fanouts], default=math.inf)
 
     @property
     def next_other(self) -> float:

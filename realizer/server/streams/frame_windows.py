@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,7 +18,8 @@ from realizer.animation.frames import AUFrames
 from realizer.animation.pose import poses
 from realizer.core.array_types import Float32, Float64, Int16, Int32
 from realizer.playback.player import Player
-from realizer.protocol.wire import HEADER, json_frame, pack, pack_frames
+from realizer.protocol.streams import STREAMS
+from realizer.protocol.wire import json_frame, pack, pack_frames
 from realizer.tables import faps
 
 if TYPE_CHECKING:
@@ -88,16 +89,10 @@ class PackedFrames:
     ) -> None:
         self.first, self.end = first, first + len(rows)
         self._bytes, self._size = pack_frames(stream, first, times, rows, character=character)
-        self._dtype: np.dtype[Any] = rows.dtype
 
     def __getitem__(self, frame: int) -> bytes:
         at = (frame - self.first) * self._size
         return self._bytes[at : at + self._size]
-
-    def row(self, frame: int) -> Float32 | Int32:
-        """Return the (k,) values of a frame."""
-        row: Float32 | Int32 = np.frombuffer(self[frame], self._dtype, offset=HEADER.size)
-        return row
 
 
 class FrameWindow:
@@ -111,7 +106,11 @@ class FrameWindow:
         self._times = np.arange(first, self.end) / timeline.fps
         self._aus: AUFrames | None = None
         self._packed: dict[tuple[str, bool], PackedFrames] = {}
-        self._latest: dict[tuple[str, str, bool, str | None], tuple[int, str | bytes]] = {}
+        self._rows: dict[tuple[str, bool], Float32 | Int32] = {}
+        # (stream, encoding, raw, name, whether several rows) -> (first row, last row, flush), message
+        self._latest: dict[
+            tuple[str, str, bool, str | None, bool], tuple[tuple[int, int, bool], str | bytes]
+        ] = {}
         self._meshes: Int16 | None = None
         self._meshes_from = 0
 
@@ -122,8 +121,17 @@ class FrameWindow:
             self._aus = self._timeline.player.frames(self._times, self._timeline.character)
         return self._aus
 
-    def drop_source(self) -> None:
-        """Free the AUs, which are several times as large as the streamed frames."""
+    def drop_source(self, subscriptions: Iterable[FrameSubscription] = ()) -> None:
+        """Compute what the subscriptions need, and free the AUs, which are several times as large."""
+        if self._aus is None:
+            return
+        for s in subscriptions:
+            if s.stream == "mesh":
+                _ = self.poses
+            elif s.encoding == "binary" and not s.ahead:
+                self.packed(s)
+            else:
+                self.rows(s, self.first, self.end)
         self._aus = None
 
     @cached_property
@@ -136,12 +144,37 @@ class FrameWindow:
         s = subscription
         if s.encoding == "binary" and s.stream != "mesh":
             return self.packed(s)[frame]
-        key = (s.stream, s.encoding, s.raw, s.name)
-        number, message = self._latest.get(key, (None, b""))
-        if number != frame:
+        key, span = (s.stream, s.encoding, s.raw, s.name, False), (frame, frame, False)
+        known, message = self._latest.get(key, (None, b""))
+        if known != span:
             message = self._encode(s, frame)
-            self._latest[key] = (frame, message)
+            self._latest[key] = (span, message)
         return message
+
+    def rows_message(
+        self, subscription: FrameSubscription, first: int, last: int, *, flush: bool
+    ) -> str | bytes:
+        """Return the WebSocket message of the rows `first` .. `last` of fap, au or arkit."""
+        s = subscription
+        key, span = (s.stream, s.encoding, s.raw, s.name, True), (first, last, flush)
+        known, message = self._latest.get(key, (None, b""))
+        if known != span:
+            rows, time = self.rows(s, first, last + 1), first / self._timeline.fps
+            if s.encoding == "binary":
+                data = rows.astype(STREAMS[s.stream].dtype, copy=False).tobytes()
+                message = pack(s.stream, first, time, data, character=s.index, flush=flush)
+            else:
+                message = json_frame(s.stream, first, time, _listed(rows), s.name, flush=flush)
+            self._latest[key] = (span, message)
+        return message
+
+    def rows(self, subscription: FrameSubscription, first: int, end: int) -> Float32 | Int32:
+        """Return the values of the frames `first` .. `end - 1` of fap, au or arkit, (n, k)."""
+        key = (subscription.stream, subscription.raw)
+        if (rows := self._rows.get(key)) is None:
+            rows = self._rows[key] = SOURCES[key[0]].rows(self.aus, self._mapping, key[1])
+        part: Float32 | Int32 = rows[first - self.first : end - self.first]
+        return part
 
     def packed(self, subscription: FrameSubscription) -> PackedFrames:
         """Return the binary messages of all frames of fap, au or arkit."""
@@ -157,11 +190,10 @@ class FrameWindow:
     def _encode(self, subscription: FrameSubscription, frame: int) -> str | bytes:
         """Return the message of a single frame: meshes, and all streams in JSON."""
         s, time = subscription, frame / self._timeline.fps
-        row = self.mesh(frame - self.first) if s.stream == "mesh" else self.packed(s).row(frame)
         if s.encoding == "binary":
-            return pack(s.stream, frame, time, row.tobytes(), character=s.index)
-        values = [v if isinstance(v, int) else round(v, 4) for v in row.tolist()]
-        return json_frame(s.stream, frame, time, values, s.name)
+            mesh = self.mesh(frame - self.first)
+            return pack(s.stream, frame, time, mesh.tobytes(), character=s.index)
+        return json_frame(s.stream, frame, time, _listed(self.rows(s, frame, frame + 1))[0], s.name)
 
     def mesh(self, row: int) -> Int16:
         """Return the (n_vertices, 3) int16 mesh of a frame; `row` counts from the window's first frame."""
@@ -200,6 +232,7 @@ class FrameTimeline:
         self._mapping: FapMapping | None = None
         self._window: FrameWindow | None = None
         self._version = -1
+        self._face_changes = 0
 
     def window(self, first: int, last: int) -> FrameWindow:
         """Return a window that contains the frames first .. last."""
@@ -209,17 +242,28 @@ class FrameTimeline:
                 self._mapping = self._find_mapping()
             count = max(math.ceil(WINDOW * self.fps), last - first + 1)
             window = self._window = FrameWindow(self, self._mapping, first, count)
-            self._version = self.player.version
+            self._version = self.version
         return window
 
     @property
+    def current_window(self) -> FrameWindow | None:
+        """The window that was computed last, if the frames have not changed since."""
+        return self._window if self.is_current else None
+
+    @property
+    def version(self) -> int:
+        """Increases whenever frames change that may have been computed before."""
+        return self.player.version + self._face_changes
+
+    @property
     def is_current(self) -> bool:
-        """Whether the plan has not changed since the window was computed."""
-        return self._version == self.player.version
+        """Whether the frames have not changed since the window was computed."""
+        return self._version == self.version
 
     def invalidate(self) -> None:
         """Discard the window because the face has changed."""
         self._window = self._mapping = None
+        self._face_changes += 1
 
 
 @dataclass(eq=False)
@@ -230,6 +274,7 @@ class FrameSubscription:
         name: the character's name, if the client named it.
         next: number of the next frame to send.
         raw: whether AUs are sent as they are before the rules of co-occurrence.
+        ahead: how long before their time rows are sent, in seconds.
     """
 
     stream: str
@@ -239,3 +284,9 @@ class FrameSubscription:
     name: str | None
     next: int
     raw: bool = False
+    ahead: float = 0.0
+
+
+def _listed(rows: Float32 | Int32) -> list[list[int]] | list[list[float]]:
+    """Return rows as JSON has them."""
+    return rows.tolist() if rows.dtype.kind == "i" else [[round(v, 4) for v in row] for row in rows.tolist()]

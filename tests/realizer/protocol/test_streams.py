@@ -43,7 +43,7 @@ def test_options_are_fields_of_subscribe(row) -> None:
         for name, field in Subscribe.model_fields.items()
         if (field.description or "").startswith(f"{row.name}:")
     }
-    assert own == set(row.options) - {"fps", "character"}
+    assert own == set(row.options) - {"fps", "character", "ahead"}
     assert set(row.options) <= Subscribe.model_fields.keys()
 
 
