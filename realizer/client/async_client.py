@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import math
+import time
 from collections.abc import AsyncIterator, Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -12,8 +14,10 @@ from urllib.parse import parse_qsl, urlencode, urlsplit
 
 from bml_schema.feedback import BlockProgress, Feedback
 from realizer.client.message_router import BlockWaiter, ClientError, Frame, Router, is_blank
+from realizer.client.playout import Playout
 from realizer.client.speech import Speech
 from realizer.protocol.messages.common import ANSWERS
+from realizer.protocol.wire import WireFrame
 
 
 class Client:
@@ -178,6 +182,48 @@ class Client:
             while True:
                 await self.wait_for(lambda: bool(queue))
                 yield queue.popleft()
+
+    def faps(self, *, ahead: float = 0.2, **options: Any) -> AsyncIterator[WireFrame]:
+        """Subscribe to FAPs, and yield each frame at its time: 68 int32 in FAPU.
+
+        Args:
+            ahead: how long before their time the service sends frames, 0 to 2 s: longer delays are noticed.
+            options: fps, character, as in `subscribe`.
+
+        Raises:
+            ClientError: the service refuses the subscription.
+        """
+        return self._play_out("fap", ahead, options)
+
+    def aus(self, *, ahead: float = 0.2, **options: Any) -> AsyncIterator[WireFrame]:
+        """Subscribe to action units, and yield each frame at its time, as `faps`: float32, 0..1."""
+        return self._play_out("au", ahead, options)
+
+    def arkit(self, *, ahead: float = 0.2, **options: Any) -> AsyncIterator[WireFrame]:
+        """Subscribe to ARKit's weights and rotations, and yield each frame at its time, as `faps`."""
+        return self._play_out("arkit", ahead, options)
+
+    async def _play_out(
+        self, stream: str, ahead: float, options: Mapping[str, Any]
+    ) -> AsyncIterator[WireFrame]:
+        character, playouts = options.get("character"), self._router.playouts
+        playout = playouts[stream, character] = Playout(ahead)
+        try:
+            await self.subscribe(stream, ahead=ahead, **options)
+            with contextlib.suppress(ClientError):
+                while True:
+                    while (frame := playout.take(time.monotonic())) is not None:
+                        yield frame
+                    due = playout.next_due
+                    pause = None if due == math.inf else due - time.monotonic()
+                    with contextlib.suppress(TimeoutError):
+                        async with asyncio.timeout(pause):
+                            await self.wait_for(lambda due=due: playout.next_due != due)  # type: ignore[misc]
+        finally:
+            if playouts.get((stream, character)) is playout:
+                del playouts[stream, character]
+                with contextlib.suppress(ClientError):
+                    await self.control("unsubscribe", stream=stream, character=character)
 
     async def film(self, path: str | Path, bml: str, *, fps: float = 25, **look: Any) -> BlockProgress:
         """Play BML and save its last block as a film with sound (.mp4, .webm), as it is drawn live.

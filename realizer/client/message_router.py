@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import re
+import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
 from html import unescape
 from typing import Any, Protocol
 
 from bml_schema.feedback import BlockProgress, Feedback, PredictionFeedback, WarningFeedback, parse_feedback
+from realizer.client.playout import Playout
 from realizer.core.errors import RealizerError
 from realizer.protocol.messages.common import ANSWERS
 from realizer.protocol.streams import JSON_STREAMS
@@ -62,12 +65,18 @@ class Listener(Protocol):
 class Router:
     """The queues of messages that have arrived, and the pending request.
 
+    Args:
+        clock: returns seconds, and never jumps.
+
     Attributes:
+        playouts: (stream, the character in `subscribe`) -> what its binary frames go to instead of a queue.
         errors: errors about messages without an answer, and of video streams that ended.
         last_block: id of the last block that was sent, or None.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self.playouts: dict[tuple[str, str | None], Playout] = {}
+        self._clock = clock
         self.feedback: deque[Feedback] = deque(maxlen=MAX_FEEDBACK)
         self.frames: dict[str, deque[Frame]] = {}
         self.errors: deque[dict[str, Any]] = deque(maxlen=MAX_FRAMES)
@@ -81,7 +90,12 @@ class Router:
         if isinstance(message, bytes):
             frame = unpack(message)
             description = self._streams.get((frame.stream, frame.character))
-            self.queue_of(frame.stream).append(replace(frame, stream_info=description))
+            frame = replace(frame, stream_info=description)
+            playout = self.playouts.get((frame.stream, (description or {}).get("character")))
+            if playout is None:
+                self.queue_of(frame.stream).append(frame)
+            else:
+                playout.receive(frame, self._clock())
         elif message.startswith("{"):
             reply = json.loads(message)
             if reply["type"] in JSON_STREAMS:
@@ -125,7 +139,8 @@ class Router:
         request = self._request
         if reply["type"] in ("subscribed", "changed"):
             key = reply["stream"], reply.get("index", 0)
-            self._streams[key] = self._streams.get(key, {}) | reply
+            known = self._streams.get(key, {}) if reply["type"] == "changed" else {}
+            self._streams[key] = known | reply
         if reply["type"] == "error":
             # Without `where` it is about a text that could not be parsed.
             is_answer = reply.get("where", f"{request}").partition(".")[0] in (request, "type")

@@ -2,7 +2,7 @@
 
 import asyncio
 import threading
-from collections.abc import AsyncIterator, Coroutine, Iterator, Mapping
+from collections.abc import AsyncGenerator, AsyncIterator, Coroutine, Iterator, Mapping
 from contextlib import AbstractAsyncContextManager, contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
@@ -11,6 +11,7 @@ from bml_schema.feedback import BlockProgress, Feedback
 from realizer.client.async_client import Client
 from realizer.client.message_router import ClientError, Frame
 from realizer.client.speech import SyncSpeech
+from realizer.protocol.wire import WireFrame
 
 T = TypeVar("T")
 
@@ -100,6 +101,18 @@ class SyncClient:
         """Yield frames of a stream as they arrive, until the connection ends."""
         return self._each(self._client.frames(stream))
 
+    def faps(self, *, ahead: float = 0.2, **options: Any) -> Iterator[WireFrame]:
+        """Subscribe to FAPs, and yield each frame at its time, as `Client.faps`."""
+        return self._each(self._client.faps(ahead=ahead, **options))
+
+    def aus(self, *, ahead: float = 0.2, **options: Any) -> Iterator[WireFrame]:
+        """Subscribe to action units, and yield each frame at its time, as `Client.aus`."""
+        return self._each(self._client.aus(ahead=ahead, **options))
+
+    def arkit(self, *, ahead: float = 0.2, **options: Any) -> Iterator[WireFrame]:
+        """Subscribe to ARKit's weights and rotations, and yield each frame at its time."""
+        return self._each(self._client.arkit(ahead=ahead, **options))
+
     def film(self, path: str | Path, bml: str, *, fps: float = 25, **look: Any) -> BlockProgress:
         """Play BML and save its last block as a film with sound."""
         return self._do(self._client.film(path, bml, fps=fps, **look))
@@ -115,8 +128,12 @@ class SyncClient:
             self._end()
 
     def _each(self, items: AsyncIterator[T]) -> Iterator[T]:
-        while (item := self._do(_next(items))) is not None:
-            yield item
+        try:
+            while (item := self._do(_next(items))) is not None:
+                yield item
+        finally:
+            if not self._loop.is_closed():
+                self._do(_end_iteration(items))
 
     def _do(self, work: Coroutine[Any, Any, T]) -> T:
         if self._loop.is_closed():
@@ -132,6 +149,11 @@ class SyncClient:
 
 async def _next(items: AsyncIterator[T]) -> T | None:
     return await anext(items, None)
+
+
+async def _end_iteration(items: AsyncIterator[T]) -> None:
+    if isinstance(items, AsyncGenerator):
+        await items.aclose()
 
 
 async def _enter(manager: AbstractAsyncContextManager[T]) -> T:

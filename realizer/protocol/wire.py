@@ -1,5 +1,7 @@
 """Binary and JSON encoding of stream frames."""
 
+from __future__ import annotations
+
 import json
 import struct
 from collections.abc import Mapping
@@ -35,6 +37,7 @@ class WireFrame:
 
     Attributes:
         character: index of the character, as in `subscribed`.
+        flush: whether to discard everything from this time on that was sent before.
         stream_info: the fields of the last `subscribed` or `changed` of its stream, added by the client.
     """
 
@@ -63,6 +66,19 @@ class WireFrame:
             raise WireError("a picture has no values: wanted a frame of numbers")
         values: Int32 | Float32 | Int16 = np.frombuffer(self.payload, row.dtype)
         return values if row.width == 1 else values.reshape(-1, row.width)
+
+    def rows(self) -> list[WireFrame]:
+        """Split a message of a subscription with `ahead` into frames of one row; others are one frame."""
+        info = self.stream_info
+        if not info or not info.get("ahead"):
+            return [self]
+        size = len(info["names"]) * np.dtype(KINDS[self.kind].dtype).itemsize
+        return [
+            WireFrame(
+                self.kind, k, k / info["fps"], self.payload[at : at + size], self.character, stream_info=info
+            )
+            for k, at in enumerate(range(0, len(self.payload), size), self.frame)
+        ]
 
     @property
     def vertices(self) -> Float32:

@@ -77,6 +77,46 @@ def test_client_keeps_the_frames_of_two_streams_apart() -> None:
     serving(test)
 
 
+@pytest.mark.parametrize("ahead", [0, 0.2])
+def test_client_yields_frames_without_those_taken_back(ahead: float) -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client, connect(f"{url}?session={client.session}") as other:
+            await other.subscribe("fap")
+            numbers, rows = [], {}
+            async for frame in client.faps(ahead=ahead, fps=25):
+                numbers.append(frame.frame)
+                rows[frame.frame] = frame.values.tolist()
+                if len(numbers) == 3:
+                    await client.send('<bml id="b"><head id="n" lexeme="NOD"/></bml>')
+                if len(numbers) == 30:
+                    break
+            assert numbers == list(range(numbers[0], numbers[0] + 30))
+            timely = {}
+            async for frame in other.frames("fap"):
+                assert isinstance(frame, WireFrame)
+                timely[frame.frame] = frame.values.tolist()
+                if frame.frame == numbers[-1]:
+                    break
+            # Frames that were due when the document was planned may have been yielded before it.
+            differ = [k for k in numbers if k in timely and rows[k] != timely[k]]
+            assert len(differ) <= 2
+            assert (await client.ask("ping"))["type"] == "pong"
+
+    serving(test)
+
+
+def test_client_refuses_frames_too_far_ahead() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            with pytest.raises(ClientError, match="ahead"):
+                await anext(client.aus(ahead=3))
+            frame = await anext(client.aus(ahead=0.5))
+            assert frame.stream == "au"
+            assert (await anext(client.arkit())).values.shape == (59,)
+
+    serving(test)
+
+
 def test_client_raises_an_error_of_the_service() -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:

@@ -48,6 +48,14 @@ def test_sync_client_does_what_the_async_client_does(url) -> None:
             client.subscribe("smell")
 
 
+def test_sync_client_yields_frames_until_it_stops(url) -> None:
+    with connect(url) as client:
+        numbers = [frame.frame for frame, _ in zip(client.faps(), range(5), strict=False)]
+        assert numbers == list(range(numbers[0], numbers[0] + 5))
+        assert len(next(client.aus(ahead=0, fps=50)).values) > 60
+        assert client.ask("ping")["type"] == "pong"
+
+
 def test_sync_client_shares_a_session(url) -> None:
     with connect(f"{url}?session=show") as manager, connect(f"{url}?session=show") as viewer:
         told = viewer.subscribe("arkit", fps=50)
