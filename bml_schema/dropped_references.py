@@ -48,6 +48,13 @@ def without(block: Block, gone: Collection[str]) -> ReducedBlock:
     return ReducedBlock(rest, lost, frozenset(remover.fatal))
 
 
+def without_constraints(block: Block, gone: Sequence[Constraint]) -> Block:
+    """Return a block without some of its own constraints."""
+    if not gone:
+        return block
+    return block.with_children(lambda node, _: None if any(node is lost for lost in gone) else node)
+
+
 class ReferenceRemover:
     """Removes references to dropped behaviours; collects `lost_references` and `fatal` as in ReducedBlock."""
 

@@ -123,6 +123,10 @@ class BlockManager:
         character = self.character_index(block.character_id)
         self.advance(now)
         self.announce(block, now)
+        announced = self._announced.get(block.id)
+        if announced is not None and announced.is_revoked:  # its end has been reported
+            del self._announced[block.id]
+            return Schedule(block.id, {}, {}, start=now, failed=True)
         try:
             if self._in_use(block, character):
                 text = f"block id {block.id!r} is still in use: wanted an id of no block that plays or waits"
@@ -132,9 +136,6 @@ class BlockManager:
             self._announced.pop(block.id, None)
             return self._refuse(block, refused.warning, now)
         announced = self._announced[block.id]
-        if announced.is_revoked:
-            del self._announced[block.id]
-            return Schedule(block.id, {}, {}, start=now, failed=True)
         ended = block_links.blocks_to_end(block, character, self.blocks.active())
         pending = block.preplan and not announced.activated
         start = FOREVER if pending else max([now, *(w.until for w in waits)])

@@ -9,7 +9,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from bml_schema import Block, SyncRef, without
-from bml_schema.dropped_references import listed
+from bml_schema.dropped_references import listed, without_constraints
 from realizer.animation.channel import Channel
 from realizer.behaviours.kind import BehaviourKind, PlanningContext
 from realizer.playback.resources import ResourceClaim, after_interrupts, claims, conflicts, interrupts, trims
@@ -174,14 +174,17 @@ class _PlanBuilder:
             if schedule.failed:
                 self.refuse(warnings[0])
             unscheduled = self.timings.keys() - schedule.times.keys()
+            lost_constraints = [self.block.constraints[n] for n in schedule.lost_constraints]
             self.drop([(self.behaviour_of(w), w) for w in warnings if self.behaviour_of(w) in unscheduled])
-            self.warnings += [w for w in warnings if self.behaviour_of(w) not in unscheduled]
-            character, all_warnings = self.block.character_id, tuple(self.warnings)
+            about_constraints = [w for w in warnings if self.behaviour_of(w) not in unscheduled]
+            character, all_warnings = self.block.character_id, (*self.warnings, *about_constraints)
             schedule = replace(schedule, start=start, character=character, warnings=all_warnings)
             self.claims = tuple(claims(self.block, schedule, self.kinds, self.context))
             remaining = after_interrupts(existing_claims, interrupts(self.block, schedule))
             found = conflicts(self.claims, remaining, start)
             if not found:
+                # A dropped constraint must not bind the block when it is planned again, or others with it.
+                self.block = without_constraints(self.block, lost_constraints)
                 self.trims = dict(trims(self.claims, remaining))
                 return [schedule, *moved]
             new_sequences = {pair for conflict in found if (pair := conflict.sequence) is not None}

@@ -60,8 +60,8 @@ class BlockStore:
         for playing in gone:
             if (old := self._past.pop(playing.block.id, None)) is not None:
                 self._points -= _points(old)
-            self._past[playing.block.id] = playing.schedule
-            self._points += _points(playing.schedule)
+            self._past[playing.block.id] = past = _with_lost_points(playing)
+            self._points += _points(past)
             del self._blocks[playing.number]
         while len(self._past) > PAST or (self._points > PAST_POINTS and len(self._past) > 1):
             self._points -= _points(self._past.pop(next(iter(self._past))))
@@ -99,17 +99,11 @@ class BlockStore:
     def first_schedule_of(self, id: str) -> Schedule | None:
         """Return the first schedule of the newest block with an id, moved to its present start."""
         newest = next((p for p in reversed(self._blocks.values()) if p.block.id == id), None)
-        if newest is None:
-            return None
-        first = replace(newest.first_schedule, start=newest.start)
-        if newest.stopped_at is None:
-            return first
-        last = max(0.0, newest.stopped_at - newest.start)  # points after its stop are never reached
-        return replace(first, times={b: np.minimum(t, last) for b, t in first.times.items()})
+        return None if newest is None else _first_schedule(newest)
 
     def snapshot(self) -> tuple[list[Schedule], Schedule]:
         """Return the schedules of ended blocks, the oldest first, and of the anticipators."""
-        ended = {playing.block.id: playing.schedule for playing in self._ended}
+        ended = {playing.block.id: _with_lost_points(playing) for playing in self._ended}
         past = {id: schedule for id, schedule in self._past.items() if id not in ended} | ended
         return list(past.values())[-PAST:], self._anticipated
 
@@ -145,3 +139,27 @@ class BlockStore:
 
 def _points(schedule: Schedule) -> int:
     return sum(map(len, schedule.times.values()))
+
+
+def _first_schedule(playing: ActiveBlock) -> Schedule:
+    """Return the first schedule of a block, moved to its present start."""
+    first = replace(playing.first_schedule, start=playing.start)
+    if playing.stopped_at is None:
+        return first
+    last = max(0.0, playing.stopped_at - playing.start)  # points after its stop are never reached
+    return replace(first, times={b: np.minimum(t, last) for b, t in first.times.items()})
+
+
+def _with_lost_points(playing: ActiveBlock) -> Schedule:
+    """Return the schedule of a block, with the points that it has lost, which references may still name."""
+    schedule, first = playing.schedule, _first_schedule(playing)
+    points, times = dict(schedule.points), dict(schedule.times)
+    for behaviour, names in first.points.items() if playing.start < FOREVER else ():
+        known = points.get(behaviour, ())
+        lost = [n for n, name in enumerate(names) if name not in known]
+        if lost:
+            at = np.minimum(first.times[behaviour][lost], playing.end - playing.start)
+            # The last point of a behaviour stays its end.
+            points[behaviour] = (*(names[n] for n in lost), *known)
+            times[behaviour] = np.append(at, times.get(behaviour, []))
+    return replace(schedule, points=points, times=times)

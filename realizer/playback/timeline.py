@@ -228,9 +228,9 @@ class BlockTimeline:
             self.reports.warn(planned.schedule.warnings[0], playing.block.character_id)
             self.stop(playing, now)
             return None, []
-        known = {w.id for w in playing.schedule.warnings}
+        known = {(w.id, w.text) for w in playing.schedule.warnings}
         for warning in planned.schedule.warnings:
-            if warning.id not in known:
+            if (warning.id, warning.text) not in known:
                 self.reports.warn(warning, playing.block.character_id)
         return planned, others
 

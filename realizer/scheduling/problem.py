@@ -198,6 +198,8 @@ def problem_of(
                 if sync not in points:
                     raise LookupError(f"{node.id} has no {sync}, only {', '.join(points)}")
             except LookupError as fault:
+                if member.is_fixed:
+                    continue  # it plays already, and the point has been forgotten since
                 problem.faults.append((part, str(fault)))
                 break
             if target[0] == ORIGIN and sync in member.passed_times.get(node.id, ()):
@@ -297,7 +299,8 @@ def _add_constraint(
                         Relation(x, r, target_offset - offset, part, (target, "=", ref))
                     )
     except LookupError as fault:
-        problem.faults.append((part, str(fault)))
+        if not member.is_fixed:  # else the point has been forgotten since
+            problem.faults.append((part, str(fault)))
 
 
 class _ReferenceResolver:

@@ -82,6 +82,7 @@ def schedule_together(
     if outcome.solution is None:
         return [Schedule(new.id, {}, {}, warnings=warnings[-1:], failed=True, character=new.character_id)]
     problem, found = outcome.problem, outcome.solution
+    lost_constraints = tuple(part.order for part in outcome.lost if part.is_constraint)
     number = {part.id: n for n, part in enumerate(problem.behaviours)}
     schedules = []
     for member in members:
@@ -102,6 +103,7 @@ def schedule_together(
                 warnings=warnings if member is members[0] else (),
                 cost=found.cost,
                 late={name: seconds for name, seconds in member.late.items() if name in times},
+                lost_constraints=lost_constraints if member is members[0] else (),
                 character=member.block.character_id,
             )
         )
@@ -114,18 +116,21 @@ class _Outcome(NamedTuple):
     solution: Solution | None
     problem: Problem
     warnings: Sequence[Warning]
+    lost: Sequence[Part] = ()
 
 
 def _settle(problem: Problem, block: str) -> _Outcome:
     """Solve a problem, again without the parts that cannot be placed, until all that is left fits."""
     warnings: list[Warning] = []
+    lost: list[Part] = []
     while True:
         found = _attempt(problem, block)
         if isinstance(found, Solution):
-            return _Outcome(found, problem, warnings)
+            return _Outcome(found, problem, warnings, lost)
         if isinstance(found, Warning):
-            return _Outcome(None, problem, [*warnings, found])
+            return _Outcome(None, problem, [*warnings, found], lost)
         warnings += (warning for _, warning in found)
+        lost += (part for part, _ in found)
         problem = problem.without(part for part, _ in found)
 
 

@@ -129,6 +129,7 @@ class Schedule:
         lengths: speech -> its points, with "end" -> seconds from its start that would let more of the block
             fit. If there are any, the block was not planned: plan it again with speech of these lengths.
         late: behaviour id -> seconds by which it is later than its references into other blocks say.
+        lost_constraints: positions, in the block, of the constraints that were dropped by themselves.
     """
 
     block: str
@@ -140,6 +141,7 @@ class Schedule:
     failed: bool = False
     lengths: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     late: Mapping[str, float] = field(default_factory=dict)
+    lost_constraints: tuple[int, ...] = field(default=(), compare=False)
     character: str | None = field(default=None, compare=False)
 
     @cached_property

@@ -449,3 +449,44 @@ def test_waiting_block_that_requires_a_lost_claim_never_starts(stage: Stage) -> 
     assert warnings(stage) == ["! b CANNOT_CREATE_BEHAVIOR"]
     assert "b:end REVOKED 1" in stage.log
     assert not any(line.startswith("b:start") for line in stage.log)
+
+
+def test_constraint_that_was_dropped_binds_no_later_block(stage: Stage) -> None:
+    unknown = '<constraint id="c"><before ref="x:s:end"><sync ref="w:end"/></before></constraint>'
+    stage.send("a", wait(2) + unknown)
+    stage.send("b", '<head id="n" lexeme="NOD" start="a:w:end"/>', at=0.1)
+    assert warnings(stage) == ["! a:c IMPOSSIBLE_TO_SCHEDULE"]
+    assert "b:start IN_EXEC 0.1" in stage.log
+
+
+def test_constraint_is_reported_once_beside_a_lost_claim(stage: Stage) -> None:
+    unknown = '<constraint id="c"><before ref="x:s:end"><sync ref="w:end"/></before></constraint>'
+    stage.send("a", gaze())
+    stage.send("b", gaze() + wait(2) + unknown)
+    assert sorted(warnings(stage)) == ["! b:c IMPOSSIBLE_TO_SCHEDULE", "! b:g CANNOT_CREATE_BEHAVIOR"]
+
+
+def test_waiting_block_reports_a_loss_of_what_had_a_warning_before(stage: Stage) -> None:
+    stage.player.set_scene({"x": (0.1, 0.0, 1.0)})
+    stage.send("a", gaze("g", "x"))
+    stage.send("b", gaze("h", "nobody"), preplan="true")
+    stage.send("c", '<bmla:activate id="i" target="b" start="0.5"/>')
+    assert warnings(stage) == ["! b:h NO_SUCH_TARGET", "! b:h CANNOT_CREATE_BEHAVIOR"]
+
+
+def test_forgotten_points_bind_a_playing_block_no_more(stage: Stage) -> None:
+    stage.send("x", '<head id="n" lexeme="NOD" start="2"/>')
+    stage.send("a", '<head id="n" lexeme="NOD" start="x:n:start+0.5"/>' + wait(12))
+    stage.send("i", interrupt("x", 1.0))
+    stage.until(8)
+    assert stage.send("b", '<head id="n" lexeme="NOD" start="a:w:end"/>', at=8).at("n", "start") == 4.0
+    assert not warnings(stage)
+
+
+def test_revoked_block_is_not_refused_after_its_end(stage: Stage) -> None:
+    late = parse(f'<bml id="b" {BMLA} bmla:prependBefore="nobody">{smile()}</bml>')
+    stage.player.announce(late, 0.0)
+    stage.send("a", wait(1), interrupt="b")
+    assert stage.player.submit(late, 0.2).failed
+    assert not warnings(stage)
+    assert "b:end REVOKED 0" in stage.log
