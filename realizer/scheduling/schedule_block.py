@@ -56,7 +56,8 @@ def schedule_together(
     """Return the sync times of a new block and of playing blocks, solved together.
 
     Behaviours that would have to start before their block, because a point of another block that they refer
-    to has just passed, start as soon as they can and keep their lengths, if that is within `grace`.
+    to has just passed, start as soon as they can and keep their lengths, if that is within `grace`. If not,
+    they are late by `grace` and shorter, or dropped if that is not enough.
 
     Args:
         members: the new block first; past points of the others are fixed, all else may move.
@@ -68,14 +69,22 @@ def schedule_together(
     """
     new = members[0].block
     problem = problem_of(members, outside)
-    outcome = _settle(problem, new.id)
+    outcome = in_time = _settle(problem, new.id)
     late: dict[str, float] = {}
     if grace > 0 and outcome.warnings and problem.external:
         late = _lateness(problem, new.id)
-        in_time = {behaviour: seconds for behaviour, seconds in late.items() if seconds <= grace}
-        if in_time:
-            members = [replace(members[0], late=in_time), *members[1:]]
-            outcome = _settle(problem_of(members, outside), new.id)
+        shifts = {behaviour: min(seconds, grace) for behaviour, seconds in late.items()}
+        while shifts:
+            shifted = [replace(members[0], late=shifts), *members[1:]]
+            outcome = _settle(problem_of(shifted, outside), new.id)
+            lost = {id.removeprefix(f"{new.id}:") for part in outcome.lost for id in (part.id, *part.names)}
+            # Behaviours that are tied to each other are equally late.
+            too_late = {late[behaviour] for behaviour in lost & shifts.keys() if late[behaviour] > grace}
+            if not too_late:
+                members = shifted
+                break
+            shifts = {behaviour: by for behaviour, by in shifts.items() if late[behaviour] not in too_late}
+            outcome = in_time
     warnings = tuple(
         _with_lateness(w, late.get(w.id.removeprefix(f"{new.id}:"), 0.0), grace) for w in outcome.warnings
     )
@@ -145,6 +154,11 @@ def _lateness(problem: Problem, block: str) -> dict[str, float]:
         u, v = problem.owner[relation.u], problem.owner[relation.v]
         if u in own and v in own:
             groups.tie(u, v, 0.0)
+    number = {part.id: n for n, part in own.items()}
+    for part in problem.external:
+        members = [number[id] for id in part.names if id in number]
+        for n in members[1:]:
+            groups.tie(members[0], n, 0.0)
     named = {part.id for part in problem.external}.union(*(part.names for part in problem.external))
     tied = {groups.find(n) for n, part in own.items() if part.id in named}
     own = {n: part for n, part in own.items() if groups.find(n) in tied}

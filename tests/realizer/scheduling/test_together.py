@@ -223,6 +223,33 @@ def test_schedule_together_drops_what_is_later_than_the_grace() -> None:
     assert "0.62 s too late, and the grace is 0.5 s" in found.warnings[0].text
 
 
+def test_schedule_together_shortens_what_the_grace_does_not_hold() -> None:
+    body = '<wait id="a" start="old:w:end"/><wait id="b" end="a:end"/>'
+    found = late(0.1, body, {"a": lasting(1.0, least=1.0), "b": lasting(3.0)})
+    assert found.at("a", "start") == pytest.approx(0.4)
+    assert found.at("a", "end") == pytest.approx(found.at("b", "end"))
+    assert found.at("b", "start") == pytest.approx(0.0, abs=1e-9)
+    assert dict(found.late) == {"a": 0.5, "b": 0.5}
+    assert not found.warnings
+
+
+def test_schedule_together_delays_nothing_for_what_it_drops_as_too_late() -> None:
+    body = """<wait id="a" start="old:w:end"/><wait id="b" end="old:w:end+9"/>
+    <constraint><synchronize><sync ref="a:end"/><sync ref="b:start"/></synchronize></constraint>"""
+    found = late(6.0, body, {"a": lasting(1.0, least=1.0), "b": lasting(1.0)})
+    assert found.at("b", "end") == pytest.approx(3.0)
+    assert not found.late
+    assert [w.id for w in found.warnings] == ["new:a"]
+
+
+def test_schedule_together_delays_what_a_constraint_ties_together() -> None:
+    body = """<wait id="a"/><wait id="b"/><constraint><synchronize>
+    <sync ref="old:w:end"/><sync ref="a:start"/><sync ref="b:start+0.1"/></synchronize></constraint>"""
+    found = late(0.1, body, {"a": lasting(1.0), "b": lasting(1.0)})
+    assert [found.at(name, "start") for name in "ab"] == pytest.approx([0.1, 0.0], abs=1e-9)
+    assert dict(found.late) == pytest.approx({"a": 0.2, "b": 0.2})
+
+
 def test_schedule_together_drops_what_is_late_without_grace() -> None:
     found = late(0.01, '<wait id="a" start="old:w:end"/>', {"a": lasting(1.0)}, grace=0.0)
     assert not found.times
