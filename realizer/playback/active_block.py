@@ -286,6 +286,14 @@ class ActiveBlock:
         if behaviour in self.speech:
             self.speech[behaviour] = replace(self.speech[behaviour], utterance=utterance)
 
+    def saved(self) -> tuple[Plan, PlanningContext, dict[str, ScheduledSpeech]]:
+        """Return what `update_speech` changes, for `restore`."""
+        return self.plan, self.context, dict(self.speech)
+
+    def restore(self, saved: tuple[Plan, PlanningContext, dict[str, ScheduledSpeech]]) -> None:
+        """Take back what `update_speech` has changed."""
+        self.plan, self.context, self.speech = saved
+
     def _placed(self, behaviour: str, channels: Sequence[Channel]) -> tuple[Channel, ...]:
         """Return channels of a behaviour on the session clock."""
         return later(channels, self.start, f"{self.block.id}:{behaviour}")

@@ -181,7 +181,8 @@ class _PlanBuilder:
             schedule = replace(schedule, start=start, character=character, warnings=all_warnings)
             self.claims = tuple(claims(self.block, schedule, self.kinds, self.context))
             remaining = after_interrupts(existing_claims, interrupts(self.block, schedule))
-            found = conflicts(self.claims, remaining, start)
+            # Speech may begin in a final silence of its own block if that speech cannot be faster.
+            found = conflicts(self.claims, remaining, start, in_silence=not may_sequence)
             if not found:
                 # A dropped constraint must not bind the block when it is planned again, or others with it.
                 self.block = without_constraints(self.block, lost_constraints)

@@ -49,13 +49,18 @@ class ResourceClaim:
             silent_from=self.silent_from + seconds,
         )
 
-    def conflicts_with(self, other: ResourceClaim) -> bool:
-        """Return whether one of the two has to be dropped."""
+    def conflicts_with(self, other: ResourceClaim, *, in_silence: bool = True) -> bool:
+        """Return whether one of the two has to be dropped.
+
+        Args:
+            in_silence: whether a speech may begin in the final silence of another speech of its block.
+        """
         if self.resource != other.resource:
             return False
         first, second = (self, other) if self.begin <= other.begin else (other, self)
-        # Another block may speak during the final silence of a speech.
-        until = first.end if first.block == second.block else min(first.end, first.silent_from)
+        # Another block may always speak during the final silence of a speech.
+        may_overlap = in_silence or first.block != second.block
+        until = min(first.end, first.silent_from) if may_overlap else first.end
         if min(until, second.end) - second.begin <= MAX_OVERLAP:
             return False
         passes = PASSES.get(self.resource)
@@ -160,12 +165,16 @@ def trims(
 
 
 def conflicts(
-    new_claims: Iterable[ResourceClaim], existing_claims: Iterable[ResourceClaim], start: float = 0.0
+    new_claims: Iterable[ResourceClaim],
+    existing_claims: Iterable[ResourceClaim],
+    start: float = 0.0,
+    *,
+    in_silence: bool = True,
 ) -> list[ResourceConflict]:
     """Return the conflicts of new claims, at most one for each behaviour, in order of rank.
 
     Existing claims win against new ones, and lower ranks against higher ones. The times in messages count
-    from `start`.
+    from `start`. For `in_silence` see `ResourceClaim.conflicts_with`.
     """
     granted: dict[str, list[ResourceClaim]] = {}
     for claim in existing_claims:
@@ -175,7 +184,8 @@ def conflicts(
         by_behaviour.setdefault(claim.behaviour, []).append(claim)
     found: list[ResourceConflict] = []
     for own in by_behaviour.values():
-        clash = ((c, g) for c in own for g in granted.get(c.resource, ()) if g.conflicts_with(c))
+        pairs = ((c, g) for c in own for g in granted.get(c.resource, ()))
+        clash = ((c, g) for c, g in pairs if g.conflicts_with(c, in_silence=in_silence))
         if (conflict := next(clash, None)) is not None:
             found.append(ResourceConflict(*conflict, start))
             continue

@@ -254,14 +254,26 @@ class BlockTimeline:
     def trim(self, ends: Mapping[tuple[str, str], float], now: float) -> None:
         """Cut the closing silence of speeches that play.
 
+        A speech stays as it is if its end has a stated time, or if other blocks refer to its end: what speaks
+        in its silence must not move with it.
+
         Args:
             ends: (block, behaviour) -> its new end, seconds on the session clock.
         """
         for (block, behaviour), end in ends.items():
             playing = self.blocks.find(block)
-            if playing is not None and behaviour in playing.plan.timings:
-                speech = playing.speech[behaviour]
-                self.update_speech(playing, behaviour, shortened(speech.utterance, end - speech.start), now)
+            if playing is None or behaviour not in playing.plan.timings:
+                continue
+            refs = (ref for other in self.blocks.active() for ref in other.external_refs)
+            if any((ref.block, ref.behaviour, ref.sync) == (block, behaviour, "end") for ref in refs):
+                continue
+            speech, before = playing.speech[behaviour], playing.saved()
+            playing.update_speech(behaviour, shortened(speech.utterance, end - speech.start), now)
+            blocks = [playing, *self.linked_blocks(playing, now)]
+            if self._retime_together(blocks, playing.start, now) is None:
+                self.mark_changed()
+            else:
+                playing.restore(before)
 
     def update_speech(self, playing: ActiveBlock, behaviour: str, utterance: Utterance, now: float) -> None:
         """Replace the utterance of a speech; its points that have passed stay, and the rest follows."""
@@ -275,18 +287,22 @@ class BlockTimeline:
 
     def reschedule(self, blocks: Sequence[ActiveBlock], origin: float, now: float) -> None:
         """Change the times of playing blocks to the best fit; if there is none, keep them and warn."""
-        if not blocks:
+        why = self._retime_together(blocks, origin, now) if blocks else None
+        if why is None:
             return
+        for playing in blocks:
+            warning = Warning(playing.block.id, "IMPOSSIBLE_TO_SCHEDULE", f"stays as it was planned: {why}")
+            self.reports.warn(warning, playing.block.character_id)
+
+    def _retime_together(self, blocks: Sequence[ActiveBlock], origin: float, now: float) -> str | None:
+        """Change the times of playing blocks to the best fit; if there is none, return why."""
         members = [member(p, origin, now) for p in blocks]
         instants = block_links.external_times(self.blocks.schedule_of, origin, self.blocks.first_schedule_of)
         schedules = schedule_together(members, outside=instants)
         if not schedules[0].failed and not self._conflict(blocks, schedules):
             self.retime(blocks, schedules, now)
-            return
-        why = schedules[0].warnings[0].text if schedules[0].failed else "it would disturb another block"
-        for playing in blocks:
-            warning = Warning(playing.block.id, "IMPOSSIBLE_TO_SCHEDULE", f"stays as it was planned: {why}")
-            self.reports.warn(warning, playing.block.character_id)
+            return None
+        return schedules[0].warnings[0].text if schedules[0].failed else "it would disturb another block"
 
     def stop(self, playing: ActiveBlock, now: float) -> None:
         """Cut a block off at `now`: what plays relaxes, what waits is cancelled, and its end is reported."""

@@ -490,3 +490,33 @@ def test_revoked_block_is_not_refused_after_its_end(stage: Stage) -> None:
     assert stage.player.submit(late, 0.2).failed
     assert not warnings(stage)
     assert "b:end REVOKED 0" in stage.log
+
+
+HELLO = "<text>Hello there my friend</text>"
+
+
+@pytest.mark.parametrize("end", ["", 'end="2"'])
+def test_speech_begins_in_the_closing_silence_of_its_own_block(stage: Stage, end: str) -> None:
+    found = stage.send(
+        "a", f'<speech id="s" {end}>{HELLO}</speech><speech id="t" start="s:end-0.1">{HELLO}</speech>'
+    )
+    assert not warnings(stage)
+    assert found.at("t", "start") == pytest.approx(found.at("s", "end") - 0.1)
+    assert "a:end DONE 2.42" in stage.log or end
+
+
+def test_speech_in_a_silence_of_stated_end_causes_no_warning(stage: Stage) -> None:
+    stage.send("a", f'<speech id="s" end="2">{HELLO}</speech>')
+    stage.send("b", f'<speech id="t" start="0">{HELLO}</speech>', at=1.9)
+    stage.send("c", '<head id="n" lexeme="NOD" start="a:s:end"/>', at=1.95)
+    assert not warnings(stage)
+    assert "a:end DONE 2" in stage.log
+    assert "c:start IN_EXEC 1.95" in stage.log
+
+
+def test_speech_tied_to_the_end_of_another_moves_it_not(stage: Stage) -> None:
+    stage.send("a", f'<speech id="s">{HELLO}</speech>')
+    found = stage.send("b", f'<speech id="t" start="a:s:end-0.2">{HELLO}</speech>', at=0.1)
+    assert not warnings(stage)
+    assert "a:end DONE 1.26" in stage.log
+    assert found.at("t", "start") == pytest.approx(0.96)

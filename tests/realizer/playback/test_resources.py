@@ -104,7 +104,12 @@ def test_conflicts_allow_another_block_to_speak_in_a_closing_silence() -> None:
     old = spoken("old", 0, 2, 1.7, "a")
     assert lost([claim("new", 1.7, 3)], [old]) == []
     assert lost([claim("new", 1.6, 3)], [old]) == ["new"]
-    assert lost([spoken("one", 0, 2, 1.7, "b"), claim("two", 1.8, 3, rank=1)]) == ["two"]
+
+
+def test_conflicts_allow_speech_in_a_silence_of_its_block_if_asked_to() -> None:
+    own = [spoken("one", 0, 2, 1.7, "b"), claim("two", 1.8, 3, rank=1)]
+    assert conflicts(own, []) == []
+    assert [loss.claim.behaviour for loss in conflicts(own, [], in_silence=False)] == ["two"]
 
 
 def test_trims_end_a_closing_silence_where_the_new_speech_begins() -> None:
