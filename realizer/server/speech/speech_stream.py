@@ -116,5 +116,7 @@ class SpeechStream:
 
     def awaits_sync(self, sync: str) -> bool:
         """Whether a sync of the text may still arrive or is not planned yet."""
+        if self.is_finished:
+            return False
         chunk = self.marks.get(sync)
         return chunk in self.unplanned or (chunk is None and not (self.is_closed and not self.unspoken))

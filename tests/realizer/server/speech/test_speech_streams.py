@@ -132,6 +132,18 @@ def test_awaits_sync_ends_when_the_speech_is_closed() -> None:
     assert "turn:end" in at
 
 
+def test_awaits_sync_ends_when_the_speech_is_cut_off() -> None:
+    driver = Talker()
+    driver.append("One two three. ")
+    driver.send(
+        '<bml id="b"><head id="n" lexeme="NOD" stroke="turn:turn:m"/><wait id="w" duration="1"/></bml>'
+    )
+    driver.send({"type": "stop", "blocks": ["turn"]})
+    at = times(driver.run(2))
+    assert "b:w:end" in at
+    assert "b:n:stroke" not in at
+
+
 def test_speech_streams_accept_a_speech_without_words() -> None:
     driver = Talker()
     received = [
