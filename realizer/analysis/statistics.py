@@ -9,7 +9,7 @@ from realizer import tables
 from realizer.emotions.profile import Profile
 from realizer.tables.profiles import statistics
 
-LEAST = 1.0  # FAPU; FAPs with a smaller mean are not part of an expression
+MIN_MEAN = 1.0  # FAPU; FAPs with a smaller mean are not part of an expression
 
 
 def from_statistics(
@@ -54,7 +54,7 @@ def from_faces(name: str, frames: Any, faps: Iterable[int] | None = None) -> Pro
 
     Args:
         frames: (n, 68) FAP values of at least 2 faces; column = FAP - 1.
-        faps: FAPs of the expression; None: those whose mean is at least `LEAST`.
+        faps: FAPs of the expression; None: those whose mean is at least `MIN_MEAN`.
 
     Raises:
         ValueError: frames of another shape, or values that are not finite.
@@ -65,6 +65,6 @@ def from_faces(name: str, frames: Any, faps: Iterable[int] | None = None) -> Pro
     if not np.isfinite(values).all():
         raise ValueError(f"{name}: wanted finite values, got NaN or infinity")
     means, deviations = values.mean(axis=0), values.std(axis=0, ddof=1)
-    chosen = faps if faps is not None else (int(k) + 1 for k in np.flatnonzero(np.abs(means) >= LEAST))
+    chosen = faps if faps is not None else (int(k) + 1 for k in np.flatnonzero(np.abs(means) >= MIN_MEAN))
     measured = {fap: (float(means[fap - 1]), float(deviations[fap - 1])) for fap in chosen if fap >= 3}
     return from_statistics(name, measured, "faces")

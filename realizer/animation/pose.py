@@ -12,21 +12,20 @@ from realizer.core.array_types import Float32
 def poses(frames: AUFrames, inputs: tuple[str, ...], mapping: FapMapping | None = None) -> Float32:
     """Return the parameters from which a face is drawn, a column for each of `inputs`.
 
-    Action units (0..1) are those that move the face; mask channels are 0..1. FAPs, in FAPU, are those that do
-    not come from action units, plus those of action units that are not among `inputs`; without action units
-    among them this is `to_fap`. An overridden FAP is reduced by what the face's own action units add to it
-    according to the mapping, so that the face shows the FAP as it is set.
+    Action units and mask channels are 0..1, FAPs are in FAPU. Action units that are not among `inputs` are
+    converted to FAPs, as in `to_fap`. An overridden FAP is reduced by the effect of the other action units on
+    it by the mapping, so that the face shows the value that was set.
 
     Args:
         frames: n frames.
         inputs: names of `axis()` (`Face.inputs`).
-        mapping: from AUs to FAPs; None for the built-in one.
+        mapping: mapping of AUs to FAPs; None for the built-in one.
 
     Returns:
         (n, len(inputs)) float32.
 
     Raises:
-        KeyError: if a name is not in `axis()`.
+        KeyError: a name is not in `axis()`.
     """
     columns = [axis()[name].column for name in inputs]
     count = len(AU_NAMES())
@@ -38,8 +37,8 @@ def poses(frames: AUFrames, inputs: tuple[str, ...], mapping: FapMapping | None 
         AUFrames(frames.times, rest, overridden=frames.overridden), mapping
     ).values
     if frames.overridden is not None:
-        moved, left = values.copy(), rest.copy()
-        moved[:, count : count + 68] = left[:, count : count + 68] = 0
-        both = (to_fap(AUFrames(frames.times, one), mapping).values for one in (moved, left))
-        values[:, count : count + 68] -= frames.overridden * np.subtract(*both)
+        all_units, converted_units = values.copy(), rest.copy()
+        all_units[:, count : count + 68] = converted_units[:, count : count + 68] = 0
+        faps = (to_fap(AUFrames(frames.times, aus), mapping).values for aus in (all_units, converted_units))
+        values[:, count : count + 68] -= frames.overridden * np.subtract(*faps)
     return np.ascontiguousarray(values[:, columns])

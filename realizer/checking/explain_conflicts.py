@@ -10,9 +10,9 @@ from bml_schema.tolerant_scanner import Element
 from realizer.checking.finding import FindingBuilder, Label
 from realizer.scheduling.timing import Clause, Warning
 
-_STATED = re.compile(r"(\S+) (?:is )?(=|not before|not after) (.+)")
+_RELATION = re.compile(r"(\S+) (?:is )?(=|not before|not after) (.+)")
 _CANNOT = re.compile(r".+? cannot be (?:placed|kept)")
-_ASTRAY = re.compile(
+_DANGLING = re.compile(
     r"(?:required: )?(\S.*?) was dropped(?: \((?:(constraint)(?: (\S+))?, )?line (\d+)\))?: (.+)"
 )
 _REFERENCE = re.compile(r"([^:\s]+(?: [^:\s]+)*:\S+(?: [+-] [\d.]+)?)(?=:? )")
@@ -28,9 +28,9 @@ def explain_conflict(builder: FindingBuilder, warning: Warning, text: str) -> bo
     if warning.clash:
         _conflict(builder, warning.clash, text)
         return True
-    if astray := _ASTRAY.fullmatch(text):
-        _dangling_reference(builder, *astray.groups())
-    return astray is not None
+    if dangling := _DANGLING.fullmatch(text):
+        _dangling_reference(builder, *dangling.groups())
+    return dangling is not None
 
 
 def _conflict(builder: FindingBuilder, clash: Iterable[Clause], text: str) -> None:
@@ -39,12 +39,12 @@ def _conflict(builder: FindingBuilder, clash: Iterable[Clause], text: str) -> No
     for clause in clash:
         own = _constraint(builder, clause.id.partition(":")[2], clause.line)
         of_behaviour = ":" in clause.id and (own is None or own.name.rpartition(":")[2] != "constraint")
-        stated = _STATED.fullmatch(clause.text)
-        # The order of the points of a behaviour is implied; only equalities are in the document.
-        if stated is None or clause.line is None or (of_behaviour and stated[2] != "="):
+        relation = _RELATION.fullmatch(clause.text)
+        # The document has no text for the order of a behaviour's points, only for equalities.
+        if relation is None or clause.line is None or (of_behaviour and relation[2] != "="):
             builder.notes.append(f"note: {clause.text}")
             continue
-        left, _, right = stated.groups()
+        left, _, right = relation.groups()
         if of_behaviour:
             spot = _in_behaviour(builder, left, clause.line)
         else:
@@ -54,8 +54,8 @@ def _conflict(builder: FindingBuilder, clash: Iterable[Clause], text: str) -> No
         builder.labels.append(Label(spot, clause.text.replace(" is ", " ", 1)))
     cannot = _CANNOT.match(text)
     builder.head = cannot[0] if cannot else "these cannot all hold"
-    if why := _BECAUSE.search(text):
-        builder.notes.append(f"note: {next(filter(None, why.groups()))}")
+    if reason := _BECAUSE.search(text):
+        builder.notes.append(f"note: {next(filter(None, reason.groups()))}")
 
 
 def _dangling_reference(
@@ -66,7 +66,7 @@ def _dangling_reference(
     place: str | None,
     message: str,
 ) -> None:
-    """Add a label for a reference to an unknown point; arguments as in `_ASTRAY`."""
+    """Add a label for a reference to an unknown point; arguments as in `_DANGLING`."""
     element, line = builder.element, int(place) if place else builder.line
     if element is None and kind:
         element = _constraint(builder, constraint, line)
@@ -80,10 +80,10 @@ def _dangling_reference(
         return
     found = _REFERENCE.match(message)
     wanted = "".join(found[1].split()) if found else ""
-    for one in (element, *builder.source.below(element)):
-        for attribute in one.attributes:
-            if wanted and "".join(builder.source.value(one, attribute).split()) == wanted:
-                builder.labels.append(Label(builder.source.locate_in(one, attribute), message))
+    for inner in (element, *builder.source.below(element)):
+        for attribute in inner.attributes:
+            if wanted and "".join(builder.source.value(inner, attribute).split()) == wanted:
+                builder.labels.append(Label(builder.source.locate_in(inner, attribute), message))
                 return
     builder.labels.append(Label(builder.source.name_spot(element), message))
 

@@ -38,7 +38,7 @@ def captions(realization: Realization) -> tuple[Span, ...]:
     found = []
     for start, end in pairwise(bounds):
         shown = [line.text for line in lines if line.start < end and line.end > start]
-        if shown and end - start >= speech_spans.LEAST:
+        if shown and end - start >= speech_spans.MIN_LENGTH:
             found.append(Span(start, end, "\n".join(shown)))
     return tuple(found)
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from realizer.realization import Realization
     from realizer.speech.utterance import Phoneme, Word
 
-LEAST = 0.001  # s; shorter spans are rounding errors
+MIN_LENGTH = 0.001  # s; shorter spans are rounding errors
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,5 +45,5 @@ def _audible(speaking: ScheduledSpeech, timed: Iterator[tuple[Word | Phoneme, st
     for part, text in timed:
         start = speaking.start + part.start
         end = min(speaking.start + part.end, speaking.until)
-        if end - start >= LEAST and text.strip():
+        if end - start >= MIN_LENGTH and text.strip():
             yield Span(start, end, " ".join(text.split()))

@@ -75,7 +75,7 @@ def _visemes(speaking: ScheduledSpeech) -> list[Span]:
             end = start + sound.share * (phoneme.end - phoneme.start)
             if sound.mix:
                 name = names[max(sound.mix, key=lambda part: part[1])[0]]
-                if spans and spans[-1].text == name and start - spans[-1].end < speech_spans.LEAST:
+                if spans and spans[-1].text == name and start - spans[-1].end < speech_spans.MIN_LENGTH:
                     start = spans.pop().start
                 spans.append(Span(start, end, name))
             start = end

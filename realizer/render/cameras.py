@@ -1,4 +1,4 @@
-"""Cameras: presets, projection of points to pixels."""
+"""Cameras with their presets, and the projection of points to pixels."""
 
 import math
 from collections.abc import Mapping
@@ -14,12 +14,12 @@ from realizer.face.model import Face
 
 @dataclass(frozen=True, slots=True)
 class Framing:
-    """A preset: from where, and between which heights of the picture hairline and chin stand.
+    """A preset: the direction of the camera, and the heights of hairline and chin in the picture.
 
     Attributes:
-        yaw: degrees; positive walks around the head to the character's left.
-        hairline, chin: fraction of the picture's height from the top, of feature points 11.1 and 2.1.
-        distance: metres from the origin (between the eyes). Portrait distance: nearer makes noses big.
+        yaw: degrees around the head; positive is the character's left.
+        hairline, chin: heights of feature points 11.1 and 2.1, as fractions of the picture from the top.
+        distance: metres from the origin between the eyes; nearer cameras make noses big.
     """
 
     yaw: float = 0.0
@@ -28,7 +28,7 @@ class Framing:
     distance: float = 1.8
 
 
-# Front: hairline to chin is the middle half of the height, its centre at 47 % from the top; fixed for good.
+# "front" must not change: hairline to chin is half of the height, with the centre 47 % from the top.
 PRESETS: Mapping[str, Framing] = {
     "front": Framing(),
     "three-quarter": Framing(yaw=-35),
@@ -39,12 +39,12 @@ PRESETS: Mapping[str, Framing] = {
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Camera:
-    """A level camera.
+    """A camera at the height of its target.
 
     Attributes:
-        position, target: (3,) float64 metres; same height.
-        fovy: radians, the picture's whole height.
-        near, far: metres.
+        position, target: (3,) float64 metres.
+        fovy: angle of the picture's height in radians.
+        near, far: distances of the clipping planes in metres.
     """
 
     name: str
@@ -56,13 +56,13 @@ class Camera:
 
     @property
     def towards(self) -> Float32:
-        """(3,) float32, length 1: from the head towards the camera."""
+        """The direction from the head towards the camera, (3,) float32, length 1."""
         back = self.position - self.target
         return (back / np.linalg.norm(back)).astype(np.float32)
 
     @property
     def pose(self) -> Float64:
-        """(4, 4) camera to world; the camera looks along its own -z, +y up (as OpenGL and glTF)."""
+        """The matrix (4, 4) from camera to world; as in OpenGL, the camera looks along -z, and +y is up."""
         pose = np.eye(4)
         back = np.asarray(self.towards, np.float64)
         right = np.cross([0, 1, 0], back)
@@ -70,8 +70,8 @@ class Camera:
         pose[:3, :4] = np.stack([right, np.cross(back, right), back, self.position], axis=1)
         return pose
 
-    def see(self, points: Any, size: tuple[int, int]) -> tuple[Float64, Float64]:
-        """Return pixels (n, 2) from the top left corner, y down, and metres ahead (n,), of points (n, 3)."""
+    def project(self, points: Any, size: tuple[int, int]) -> tuple[Float64, Float64]:
+        """Return the pixels (n, 2) of points (n, 3) from the top left corner, and their depths (n,) in m."""
         width, height = size
         right, up, back = (
             self.pose[:3, :3].T @ (np.asarray(points, np.float64) - self.position).reshape(-1, 3).T
@@ -80,7 +80,7 @@ class Camera:
         return np.stack([width / 2 - scale * right / back, height / 2 + scale * up / back], axis=1), -back
 
     def to_json(self) -> dict[str, Any]:
-        """Return plain numbers for the page; `fovy` in degrees, vertical, as WebGL libraries take it."""
+        """Return the camera as JSON for the page; `fovy` is in degrees, as in WebGL libraries."""
         return {
             "name": self.name,
             "position": [round(float(x), 6) for x in self.position],
@@ -113,8 +113,8 @@ def camera_for(face: Face, name: str = "front") -> Camera:
     back = np.array([math.sin(yaw), 0.0, math.cos(yaw)])
     right = np.array([math.cos(yaw), 0.0, -math.sin(yaw)])
     hairline, chin = (np.asarray(face.points[p], np.float64) for p in ("11.1", "2.1"))
-    # A point at height y and depth d is (y - eye) / (d tan(fovy / 2)) of half the picture above its
-    # middle: two points, two unknowns.
+    # A point at height y and depth d is (y - eye) / (d tan(fovy / 2)) above the picture's centre, in halves
+    # of its height. Two points determine the two unknowns eye and fovy.
     high, low = 1 - 2 * framing.hairline, 1 - 2 * framing.chin
     depths = [framing.distance - float(p @ back) for p in (hairline, chin)]
     tangent = (hairline[1] - chin[1]) / (high * depths[0] - low * depths[1])
@@ -134,9 +134,9 @@ def camera_for(face: Face, name: str = "front") -> Camera:
 
 
 def _sideways(face: Face, right: Float64, yaw: float) -> float:
-    """Return metres along `right` of the middle: half-way between the outermost points above the chin.
+    """Return the metres of the centre along `right`: half-way between the outermost points above the chin.
 
-    From the front that is the nose's plane, whatever the hair.
+    From the front it is at the chin, so that hair does not shift the face.
     """
     if yaw == 0:
         return float(np.asarray(face.points["2.1"], np.float64) @ right)

@@ -15,7 +15,7 @@ class SoftwareCanvas(Canvas):
 
     def _pixels(self) -> UInt8:
         figure = self._figure
-        places, distances = self._camera.see(figure.points, self._size)
+        places, distances = self._camera.project(figure.points, self._size)
         # Parts of a head do not come near the lens; those of a broken one are not drawn.
         nearness = np.where(distances > self._camera.near, 1 / distances, np.nan).astype(np.float32)
         return self._raster(places, nearness, figure.triangles, figure.colours)

@@ -16,13 +16,13 @@ from realizer.render.cameras import camera_for
 from realizer.render.light import preset
 from realizer.render.process_messages import Failed, Open, Pixels, connection
 
-BATCH = 16  # frames deformed in one call: enough to spread its fixed cost, few enough to stay in the cache
-# Pillow's options for a fast stream. PNG of level 1 is a fifth larger than of the default 6.
+BATCH = 16  # frames deformed in one call: many share its fixed cost, and few stay in the processor's cache
+# Pillow's fastest options for streams. A PNG of level 1 is a fifth larger than one of the default level 6.
 FASTEST: Mapping[str, Mapping[str, int]] = {"jpeg": {}, "png": {"compress_level": 1}, "webp": {"method": 0}}
 
 
 class FaceDrawer:
-    """A face, a canvas, and the memory that pictures go to."""
+    """A face with a canvas, and the shared memory of its pictures."""
 
     def __init__(self, order: Open) -> None:
         from realizer.face.load import load_face
@@ -38,14 +38,14 @@ class FaceDrawer:
     def draw(self, rows: Float32, first: int) -> int:
         """Draw poses (n, k) into the slots from `first` on; return n."""
         slots = self.pixels.array[first : first + len(rows)]
-        for (vertices, ups), out in zip(shapes(self.face, rows), slots, strict=True):
-            self.canvas.draw(vertices, ups, out)
+        for (vertices, normals), out in zip(shapes(self.face, rows), slots, strict=True):
+            self.canvas.draw(vertices, normals, out)
         return len(rows)
 
     def encode(self, row: Float32, form: str, quality: int) -> bytes:
         """Return the bytes of a picture of a pose (k,), as `encode`."""
-        ((vertices, ups),) = shapes(self.face, row[None])
-        return encode(self.canvas.draw(vertices, ups), form, quality)
+        ((vertices, normals),) = shapes(self.face, row[None])
+        return encode(self.canvas.draw(vertices, normals), form, quality)
 
 
 def shapes(face: Face, rows: Float32) -> Iterator[tuple[Float32, Float32]]:
@@ -59,11 +59,11 @@ def shapes(face: Face, rows: Float32) -> Iterator[tuple[Float32, Float32]]:
 
 
 def encode(pixels: UInt8, form: str, quality: int) -> bytes:
-    """Return a file of (h, w, 3 or 4) uint8; a JPEG has three. simplejpeg is twice as fast as Pillow."""
+    """Return an image file of pixels (h, w, 3 or 4) uint8; a JPEG has no alpha channel."""
     if form == "jpeg":
         pixels = np.ascontiguousarray(pixels[..., :3])
         try:
-            import simplejpeg
+            import simplejpeg  # twice as fast as Pillow
         except ModuleNotFoundError:
             pass
         else:
@@ -81,11 +81,11 @@ def encode(pixels: UInt8, form: str, quality: int) -> bytes:
 
 
 def serve(orders: Connection, answers: Connection) -> None:
-    """Answer messages until the owner hangs up or dies, or something fails."""
+    """Answer messages until the owner closes the pipe or ends, or an error occurs."""
     drawer: FaceDrawer | None = None
     owner = os.getppid()
     while True:
-        # A child of the owner may have inherited the pipe and keep it open: check the parent's id, too.
+        # A child of the owner may have inherited the pipe and keep it open, so check the parent's id, too.
         while not orders.poll(2.0):
             if os.getppid() != owner:
                 return
@@ -110,7 +110,7 @@ def serve(orders: Connection, answers: Connection) -> None:
 
 
 def triangle() -> Face:
-    """Return a face of three vertices from chin to hairline that knows no FAP."""
+    """Return a face of three vertices, without FAPs."""
     vertices = np.eye(3, dtype=np.float32)
     return Face(
         name="triangle",
@@ -130,16 +130,16 @@ def triangle() -> Face:
 
 
 def check(backend: str) -> int:
-    """Draw one triangle; print the backend, or return 3 and print what is missing."""
+    """Draw one triangle; print the backend, or print what is missing and return 3."""
     face = triangle()
     try:
-        taken, canvas = open_canvas(face, (16, 16), camera_for(face), preset(), backend=backend)
+        name, canvas = open_canvas(face, (16, 16), camera_for(face), preset(), backend=backend)
         canvas.draw(face.vertices, np.zeros_like(face.vertices))
         canvas.close()
     except RenderError as error:
         print(error)
         return 3
-    print(taken)
+    print(name)
     return 0
 
 

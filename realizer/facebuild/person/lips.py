@@ -1,7 +1,7 @@
-"""The lips: two contours of feature points joined by splines.
+"""The displacement fields of lip FAPs: splines between two contours of feature points.
 
-A place on the lips has two coordinates: u runs from the right corner (-1) over the middle (0) to the left
-corner (1), w from the inner contour (0: FAPs 4-13) to the outer (1: FAPs 51-60). Every FAP owns a knot.
+A point on the lips has two coordinates: u runs from the right corner (-1) over the middle (0) to the left
+corner (1), w from the inner contour (0: FAPs 4-13) to the outer (1: FAPs 51-60). Every FAP has a knot.
 """
 
 from typing import Any
@@ -13,22 +13,23 @@ from realizer.facebuild.parts import smooth
 from realizer.facebuild.person.base_mesh import FORWARD, LEFT, UP, Ground, scaled
 from realizer.facebuild.person.makehuman import walk
 
-# Two vertices each of the rings around the mouth, from inside out: ring 1 is where the lips meet, ring 7 the
-# border of the red. First the vertex in the middle of the upper lip, then its neighbour.
+# Two vertices of each ring of edges around the mouth, from inside to outside: the middle of the upper lip and
+# its neighbour. The lips meet at ring 1; ring 7 is the border of the red.
 RINGS = (
     (537, 7282), (520, 7267), (474, 7229), (468, 7224), (509, 7257),
     (467, 7223), (466, 7222), (455, 7214), (362, 7118), (5342, 11945),
 )  # fmt: skip
 MEET, BORDER = 1, 7
-LOWER_MIDDLE = 19  # place in a ring of 38 of the middle of the lower lip
+RING_SIZE = 38  # vertices
+LOWER_MIDDLE = 19  # index of the middle of the lower lip in a ring
 TENSION = 0.5  # equal FAPs overshoot by less than 4 % between the knots; more tension makes steps
 KNOTS = 5  # right corner, right half, middle, left half, left corner
-APART = 0.00005  # m that is left between closed lips
-ARC = 0.30  # metres forwards for each metre that the lower lip rises: it moves on the jaw's arc
+CLOSED_GAP = 0.00005  # m between closed lips
+ARC = 0.30  # metres forwards per metre of rise of the lower lip, which moves on the arc of the jaw
 
 
 def _stretch() -> tuple[Float64, Float64]:
-    # Place along the lip -> place between the knots; the knots at 0, 0.5 and 1 stay where they are.
+    # Coordinate u of a vertex -> u of the splines; the knots at 0, 0.5 and 1 do not move.
     u = np.linspace(0, 1, 201)
     mixed = 0.5 * u + 0.5 * np.arcsin(u) / (np.pi / 2)
     half = float(np.interp(0.5, u, mixed))
@@ -44,7 +45,7 @@ def spline_basis(u: Any) -> Float64:
     The weights sum to 1 everywhere, so equal FAPs move a lip evenly.
     """
     u = np.clip(np.asarray(u, float), -1, 1)
-    # Half-way to an ellipse's angle: an open mouth is round at its corners, a smile still runs into them.
+    # The mean of u and the angle of an ellipse: open mouths have round corners, and smiles sharp ones.
     u = np.sign(u) * np.interp(np.abs(u), *_STRETCH)
     piece = np.clip(np.floor((u + 1) * 2).astype(int), 0, 3)
     t = (u + 1) * 2 - piece
@@ -66,13 +67,13 @@ class Lips:
     """The position of every vertex of the base mesh relative to the lips.
 
     Attributes:
-        u, w: (n,) coordinates; inherited from the nearest place of the lips outside and inside them.
-        is_upper: (n,) bool.
-        inside: (n,) bool, in the mouth.
-        away: (n,) metres from the red's border, 0 on the lips and in the mouth.
-        lips: (n,) 1 on the lips and just inside, 0 from a centimetre on: what other FAPs leave alone.
-        upper, corners: (n,) the upper lip's and the corners' part of that.
-        around: (n,) 1 on the lips, falling to 0 towards the chin boss: what FAP 3 leaves to the lip FAPs.
+        u, w: (n,) coordinates; other vertices have those of the nearest point of the lips.
+        is_upper: (n,) bool, whether a vertex belongs to the upper lip.
+        inside: (n,) bool, whether it is in the mouth.
+        away: (n,) metres from the border of the red, 0 on the lips and in the mouth.
+        lips: (n,) from 1 on the lips to 0 a centimetre away; the part that other FAPs do not move.
+        upper, corners: (n,) the part of `lips` on the upper lip and at the corners.
+        around: (n,) from 1 on the lips to 0 at the chin; the part that FAP 3 does not move.
     """
 
     def __init__(self, ground: Ground) -> None:
@@ -92,13 +93,13 @@ class Lips:
             for place, vertex in enumerate(ring):
                 self.u[vertex] = np.clip(at[vertex, 0] / reach, -1, 1)
                 self.w[vertex] = np.clip((k - MEET) / (BORDER - MEET), 0, 1)
-                self.is_upper[vertex] = min(place, 38 - place) <= corner
+                self.is_upper[vertex] = min(place, RING_SIZE - place) <= corner
                 on_ring[vertex] = k
-        self._put_knots_at_points(ground)
+        self._align_knots(ground)
         self.fade = np.zeros(n)
         self.fade[on_ring >= 0] = 1
-        inside = self._into_the_mouth(ground, on_ring)
-        self._around(ground, on_ring, inside)
+        inside = self._extend_inwards(ground, on_ring)
+        self._extend_outwards(ground, on_ring, inside)
         ringed = (on_ring >= 0) & (on_ring <= BORDER)
         self.away[ringed | inside] = 0
         self.inside = inside
@@ -111,8 +112,8 @@ class Lips:
         self.around = np.where(ringed, 1.0, np.where(near, smooth(self.away / reach, 1.0, 0.06), 0.0))
         self.around[inside] = self.fade[inside]
 
-    def _put_knots_at_points(self, ground: Ground) -> None:
-        """Stretch u so that the points between middle and corner are at 0.5 on any lips."""
+    def _align_knots(self, ground: Ground) -> None:
+        """Stretch u so that the feature points between middle and corner are at 0.5."""
         for is_upper, names in ((True, ("2.6", "8.5")), (False, ("2.8", "8.7"))):
             inner, outer = (float(self.u[ground.points[name]]) for name in names)
             for ring in self.rings:
@@ -121,8 +122,8 @@ class Lips:
                 u = np.abs(self.u[mine])
                 self.u[mine] = np.sign(self.u[mine]) * np.interp(u, [0, half, 1], [0, 0.5, 1])
 
-    def _into_the_mouth(self, ground: Ground, on_ring: Any) -> Bool:
-        """Spread the inner ring's coordinates into the mouth, ring by ring, fading out."""
+    def _extend_inwards(self, ground: Ground, on_ring: Any) -> Bool:
+        """Extend the coordinates of the inner ring into the mouth, with decreasing influence."""
         n = len(ground.at)
         inside: Bool = np.zeros(n, bool)
         known = on_ring >= 0
@@ -146,14 +147,14 @@ class Lips:
                 break
         return inside
 
-    def _around(self, ground: Ground, on_ring: Any, inside: Bool) -> None:
-        """Give every other vertex the coordinates of the nearest place on the red's border."""
+    def _extend_outwards(self, ground: Ground, on_ring: Any, inside: Bool) -> None:
+        """Give all other vertices the coordinates of the nearest point on the border of the red."""
         from scipy.spatial import cKDTree
 
         at = ground.at
         ring = np.array(self.rings[BORDER] + self.rings[BORDER][:1])
-        # The ring as a fine polyline, so that neighbours do not jump from vertex to vertex.
-        t = np.linspace(0, 38, 38 * 12, endpoint=False)
+        # The ring is divided into short segments, so that coordinates change smoothly.
+        t = np.linspace(0, RING_SIZE, RING_SIZE * 12, endpoint=False)
         k, part = t.astype(int), (t - t.astype(int))[:, None]
         line = at[ring[k]] * (1 - part) + at[ring[k + 1]] * part
         u = self.u[ring[k]] * (1 - part[:, 0]) + self.u[ring[k + 1]] * part[:, 0]
@@ -165,7 +166,7 @@ class Lips:
 
 
 def close_lips(ground: Ground) -> Float64:
-    """Return the base mesh with its lips just closed, (n, 3): each lip moves half the way."""
+    """Return the base mesh (n, 3) with closed lips; each lip moves half of the distance."""
     lips = Lips(ground)
     at = ground.at.copy()
     for k, share in ((0, 1.0), (1, 1.0), (2, 0.55), (3, 0.25), (4, 0.10)):
@@ -175,9 +176,9 @@ def close_lips(ground: Ground) -> Float64:
         for i in lips.rings[k]:
             x = ground.at[i, 0]
             high, low = (np.interp(x, ground.at[row, 0], ground.at[row, 1]) for row in (upper, lower))
-            # Lips that overlap are parted.
-            apart = high - low - APART
-            at[i, 1] += share * apart / 2 * (-1 if lips.is_upper[i] else 1)
+            # The gap is negative where lips overlap.
+            gap = high - low - CLOSED_GAP
+            at[i, 1] += share * gap / 2 * (-1 if lips.is_upper[i] else 1)
     return at
 
 
@@ -187,7 +188,7 @@ def lip_fields(ground: Ground, lips: Lips) -> dict[int, Float64]:
     knots = spline_basis(lips.u)
     in_front = ground.body & (at[:, 2] > -0.03)
     soft = np.where(lips.is_upper, 0.015, 0.026)
-    # Between a straight line and a curve without corners: gentle where the chin folds.
+    # The mean of a straight line and a smooth curve, which is flat enough for the fold of the chin.
     near = 0.5 * np.clip(1 - lips.away / soft, 0, 1) + 0.5 * smooth(lips.away / soft, 1.0, 0.0)
     fall = np.where(in_front, near, 0) * np.where(lips.fade > 0, lips.fade, 1.0)
     upper, lower = lips.is_upper * fall, ~lips.is_upper * fall
@@ -195,12 +196,11 @@ def lip_fields(ground: Ground, lips: Lips) -> dict[int, Float64]:
     right, half_right, middle, half_left, left = knots
     out: dict[int, Float64] = {}
 
-    def put(number: int, name: str, weight: Float64, way: Any, direction: Any) -> None:
-        field = weight[:, None] * np.asarray(way)
-        rough = ground.smoothed(field, 2)
-        # Only vertices off the lips are smoothed: the spline holds on them.
-        mixed = np.where((lips.away > 0.0005)[:, None], rough, field)
-        out[number] = scaled(mixed, points[name], direction)
+    def add(number: int, name: str, weight: Float64, motion: Any, direction: Any) -> None:
+        field = weight[:, None] * np.asarray(motion)
+        # On the lips the spline is smooth already.
+        field = np.where((lips.away > 0.0005)[:, None], ground.smoothed(field, 2), field)
+        out[number] = scaled(field, points[name], direction)
 
     down = -UP
     for share, numbers, names in (
@@ -208,13 +208,13 @@ def lip_fields(ground: Ground, lips: Lips) -> dict[int, Float64]:
         (outer, (51, 55, 56, 52, 57, 58), ("8.1", "8.5", "8.6", "8.2", "8.7", "8.8")),
     ):
         for number, name, knot in zip(numbers[:3], names[:3], (middle, half_left, half_right), strict=True):
-            put(number, name, upper * share * knot, down, down)
+            add(number, name, upper * share * knot, down, down)
         for number, name, knot in zip(numbers[3:], names[3:], (middle, half_left, half_right), strict=True):
-            put(number, name, lower * share * knot, UP + ARC * FORWARD, UP)
+            add(number, name, lower * share * knot, UP + ARC * FORWARD, UP)
     out |= _corners(ground, lips, left, right, inner, outer)
     bow = (1 + np.cos(np.pi * np.clip(lips.u, -1, 1))) / 2
-    put(17, "2.2", upper * bow, FORWARD, FORWARD)
-    put(16, "2.3", lower * bow, FORWARD, FORWARD)
+    add(17, "2.2", upper * bow, FORWARD, FORWARD)
+    add(16, "2.3", lower * bow, FORWARD, FORWARD)
     boss = ground.ellipsoid(ground.point("2.10") - [0, 0.002, 0], (0.024, 0.0155, 0.03))
     field = (boss * (1 - lips.lips))[:, None] * (UP + 0.15 * FORWARD)
     out[18] = scaled(ground.smoothed(field, 1), points["2.10"], UP)
@@ -224,10 +224,10 @@ def lip_fields(ground: Ground, lips: Lips) -> dict[int, Float64]:
 def _corners(
     ground: Ground, lips: Lips, left: Float64, right: Float64, inner: Float64, outer: Float64
 ) -> dict[int, Float64]:
-    """Return FAPs 6, 7, 12, 13, 53, 54, 59, 60: splines on the lips, CC0 shapes in the cheeks."""
+    """Return the fields of FAPs 6, 7, 12, 13, 53, 54, 59, 60: splines on the lips, shapes in the cheeks."""
     at, points, out = ground.at, ground.points, {}
     in_front = ground.body & (at[:, 2] > -0.06)
-    # From the lips outwards the spline hands over to the shape of the cheek.
+    # The field changes from the spline on the lips to the shape in the cheeks.
     cheek = np.where(in_front, smooth(lips.away, 0.001, 0.014), 0)
     cheek[lips.fade > 0] = np.where(lips.away[lips.fade > 0] > 0, cheek[lips.fade > 0], 0)
     mouth = np.where(in_front, smooth(lips.away, 0.030, 0.0), 0) * np.where(lips.fade > 0, lips.fade, 1.0)
@@ -239,7 +239,7 @@ def _corners(
         smile, stretch = (
             np.where(ground.body[:, None], ground.shape(f"mouth{k}{word}"), 0) for k in ("Smile", "Stretch")
         )
-        # Two shapes are mixed so that the corner moves straight up, or straight out.
+        # Combine two shapes so that the corner moves exactly upwards, or exactly outwards.
         pull = np.array(
             [[smile[corner, 0] * side, stretch[corner, 0] * side], [smile[corner, 1], stretch[corner, 1]]]
         )
@@ -248,18 +248,17 @@ def _corners(
         up_shape = smile * mixes[0, 1] + stretch * mixes[1, 1]
         u = np.clip(lips.u * side, 0, 1)
         ramp = u**1.4
-        # A lip that slides outwards follows the arch of the teeth backwards.
+        # A lip that moves outwards follows the arch of the teeth backwards.
         slope = np.interp(u, [0, 0.5, 1], [0, -0.30, -0.62])
         draw = np.stack([side * ramp, np.zeros_like(ramp), slope * ramp], 1)
         lift = np.stack([np.zeros_like(knot), knot, -0.12 * knot], 1)
         for (across, upward), name, share in zip(numbers, names, (inner, outer), strict=True):
-            for number, on_lips, shape, way in (
+            for number, on_lips, shape, direction in (
                 (across, draw, out_shape, side * LEFT),
                 (upward, lift, up_shape, UP),
             ):
                 field = (1 - cheek)[:, None] * on_lips * mouth[:, None] + cheek[:, None] * shape
                 field = field * share[:, None]
-                rough = ground.smoothed(field, 3)
-                field = np.where((lips.away > 0.0005)[:, None], rough, field)
-                out[number] = scaled(field, points[name], way)
+                field = np.where((lips.away > 0.0005)[:, None], ground.smoothed(field, 3), field)
+                out[number] = scaled(field, points[name], direction)
     return out

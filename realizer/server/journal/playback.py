@@ -1,4 +1,4 @@
-"""Replay of a recording: feedback, frames and sound as its viewers received them."""
+"""Replay of recordings: returns feedback, frames and sound as viewers received them."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -18,38 +18,41 @@ from realizer.server.speech.speech_streams import OPEN
 
 
 def replay_feedback(recording: SavedSession, **changed: Any) -> list[str]:
-    """Replay a recording and return its feedback, XML texts with `seq`. Raises as `replay_recording`."""
-    rerun = _Replay(recording, changed)
-    rerun.play()
-    return [text for _, text in rerun.log.messages]
+    """Replay a recording and return its feedback, XML texts with `seq`.
+
+    Raises the errors of `replay_recording`.
+    """
+    repeated = _Replay(recording, changed)
+    repeated.play()
+    return [text for _, text in repeated.log.messages]
 
 
 def replay_recording(recording: SavedSession, **changed: Any) -> tuple[Realization, list[str]]:
-    """Replay a recording until it ends, or until nothing moves any more that was planned or set.
+    """Replay a recording until it has ended, and all its planned and directly set motion too.
 
-    The result is what viewers saw: plans that a later message changed have no effect after it, and the
-    message none before. If the recording begins with a checkpoint, times count from there.
+    The result is what viewers saw: a message that changes plans has no effect on earlier frames. If the
+    recording begins with a checkpoint, times count from there.
 
     Args:
-        changed: settings to override, where they are not None.
+        changed: settings that replace those of the recording; None keeps the recorded one.
 
     Returns:
-        The frames and the sound, and the feedback, XML texts with `seq`.
+        The realization with frames and sound, and the feedback, XML texts with `seq`.
 
     Raises:
         JournalError: a setting, the scene or the checkpoint of the recording cannot be used here.
         FaceError: there is no such face.
         RealizerError: the recording lasts too long.
     """
-    rerun = _Replay(recording, changed)
-    session, settings = rerun.session, rerun.session.settings
-    viewer = ReplayViewer(session, settings.fps, rerun.begin)
+    repeated = _Replay(recording, changed)
+    session, settings = repeated.session, repeated.session.settings
+    viewer = ReplayViewer(session, settings.fps, repeated.begin)
     begin = viewer.first / settings.fps
-    frames_until(rerun.last - begin, settings.fps)  # raises if it lasts too long
-    rerun.play(viewer.capture)
-    end = max(rerun.last, viewer.idle_from) - begin
+    frames_until(repeated.last - begin, settings.fps)  # raises if it lasts too long
+    repeated.play(viewer.capture)
+    end = max(repeated.last, viewer.idle_from) - begin
     characters = viewer.performances(frames_until(end, settings.fps))
-    feedback = [feedback for feedback, _ in rerun.log.messages]
+    feedback = [feedback for feedback, _ in repeated.log.messages]
     schedules = [block.latest for block in viewer.blocks]
     speeches = [_earlier(speech, begin) for block in viewer.blocks for speech in block.speech.values()]
     realization = Realization(
@@ -65,14 +68,14 @@ def replay_recording(recording: SavedSession, **changed: Any) -> tuple[Realizati
         deformer=settings.deformer,
         mapping=session.faces.mapping(0),
     )
-    return realization, [text for _, text in rerun.log.messages]
+    return realization, [text for _, text in repeated.log.messages]
 
 
 class _Replay:
     """A session that repeats a recorded one.
 
     Attributes:
-        begin, last: seconds on the session clock, of the begin of the recording and of its last entry.
+        begin, last: times of the recording's begin and of its last entry, on the session clock.
     """
 
     def __init__(self, recording: SavedSession, changed: Mapping[str, Any]) -> None:
@@ -91,14 +94,14 @@ class _Replay:
         self.last = recording.entries[-1].at if recording.entries else self.begin
 
     def play(self, look: Callable[[float], None] = lambda t: None) -> None:
-        """Replay all entries, and then the rest of what is planned; `look` as in `replay`."""
+        """Replay all entries, and then the remaining plans; `look` as in `replay`."""
         session = self.session
         engines = Engines(session.settings.deformer)
         try:
             replay(session, self._entries, engines.speak, look)
         finally:
             engines.close()
-        # A speech that was still open has no end of its own: it ends with what is planned.
+        # An open speech has no end; it ends when all other blocks have ended.
         ends = [block.end for block in session.player.blocks.active()]
         end = max((end for end in ends if end < self.last + OPEN / 2), default=self.last)
         session.replay_until(end, look, since=self.last)

@@ -20,7 +20,7 @@ class SpeechStream:
 
     Attributes:
         chunk: the last chunk.
-        unspoken: sentences and ids of clips that are in no block yet, each with whether it is a clip.
+        unspoken: (sentence or id of a clip, whether it is a clip) of what is in no block yet.
         marks: sync -> id of its chunk's block.
         partial_chunks: ids of blocks that speak only part of a sentence.
         unplanned: ids of blocks that are not planned yet, in order.
@@ -85,17 +85,17 @@ class SpeechStream:
 
     def next_chunk(self) -> Block:
         """Return the block of the next sentence or clip."""
-        one, is_clip = self.unspoken.popleft()
+        piece, is_clip = self.unspoken.popleft()
         chunk = self.chunk = replace(self.chunk, number=self.chunk.number + 1, marks=dict(self.marks))
-        block = clip_block(one, chunk) if is_clip else text_block(one, chunk)
+        block = clip_block(piece, chunk) if is_clip else text_block(piece, chunk)
         speech = next((node for node in block.behaviours if node.id == self.id), None)
         self.marks |= dict.fromkeys(getattr(speech, "marked", ()), block.id)
         self.unplanned.append(block.id)
-        if not is_clip and not is_sentence(one) and (self.unspoken or not self.is_closed):
+        if not is_clip and not is_sentence(piece) and (self.unspoken or not self.is_closed):
             self.partial_chunks.add(block.id)
         return block
 
-    # their states ---------------------------------------------------------------------------------
+    # states of blocks ---------------------------------------------------------------------------------
 
     @property
     def open_chunks(self) -> list[str]:
@@ -110,12 +110,12 @@ class SpeechStream:
 
     def on_done(self, chunk: str) -> None:
         """Note that a block has ended or was refused."""
-        for pieces in (self.unplanned, self.scheduled):
-            if chunk in pieces:
-                pieces.remove(chunk)
+        for chunks in (self.unplanned, self.scheduled):
+            if chunk in chunks:
+                chunks.remove(chunk)
 
     def awaits_sync(self, sync: str) -> bool:
-        """Whether a sync of the text may still arrive or is not planned yet."""
+        """Return whether a sync of the text may still arrive or is not planned yet."""
         if self.is_finished:
             return False
         chunk = self.marks.get(sync)

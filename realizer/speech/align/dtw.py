@@ -8,14 +8,14 @@ import numpy.typing as npt
 
 from realizer.core.array_types import Bool, Float64, Index
 
-# Costs, in units of the usual difference of a frame and a state; tuned on human and synthetic speech.
-STAY, SKIP, SKIP_TWO = 0.3, 0.3, 1.0  # of staying in a state, and of skipping one or two
-ENTER = 5.0  # of a pause, so that weak sounds and closures are not taken for one
-SILENT, NOT_SILENT = 0.35, 8.0  # of a silent frame in a pause, and for loudness (0..1) in it
+# Costs in units of the usual difference between a frame and a state, tuned on human and synthetic speech.
+STAY, SKIP, SKIP_TWO = 0.3, 0.3, 1.0  # staying in a state, and skipping one or two
+ENTER = 5.0  # beginning a pause; high, because weak sounds and closures resemble pauses
+SILENT, NOT_SILENT = 0.35, 8.0  # a silent frame in a pause, and the additional cost of loudness 1
 NOISE = 2.0  # greatest cost of a frame in a pause, for breaths and coughs
 IMPOSSIBLE = 1e30
-AT_ONCE = 256  # frames whose costs are computed together
-SAMPLED = 300  # rows and columns from which the usual difference is computed
+BATCH = 256  # frames whose costs are computed together
+SAMPLES = 300  # rows and columns from which the usual difference is computed
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ def distance(features: Float64, others: Float64) -> Float64:
 
 def usual(features: Float64, others: Float64) -> float:
     """Return the median of `distance` for a sample of rows."""
-    sampled = (rows[:: max(1, len(rows) // SAMPLED)] for rows in (features, others))
+    sampled = (rows[:: max(1, len(rows) // SAMPLES)] for rows in (features, others))
     return max(float(np.median(distance(*sampled))), 1e-6)
 
 
@@ -67,78 +67,78 @@ def quiet(part: Float64, threshold: float) -> Float64:
 
 
 def best_path(
-    heard: Observed, states: States, centre: Index | None = None, reach: int = 0
+    observed: Observed, states: States, centre: Index | None = None, reach: int = 0
 ) -> tuple[Index, Float64]:
-    """Return the cheapest path: (t,) the state of each frame, and (t,) the cost of each.
+    """Return the cheapest path: the state (t,) and the cost (t,) of each frame.
 
     From one frame to the next the state stays the same or advances by up to three (dynamic time warping with
-    slopes 0 to 3); skipping a pause and staying in it are free. Time and memory are t times the width of the
-    band.
+    slopes 0 to 3). It is free to skip a pause or to stay in it. Time and memory are proportional to t times
+    the width of the band.
 
     Args:
-        heard: t frames.
+        observed: t frames.
         states: j states.
-        centre: (t,) the state in the middle of the band, rising; None for no band.
-        reach: states to each side of it.
+        centre: (t,) states in the middle of the band, not decreasing; None for no band.
+        reach: number of states on each side of the middle.
 
-    Source: Sakoe and Chiba 1978, with the pauses of a recogniser of words.
+    Source: Sakoe and Chiba 1978, with optional pauses.
     """
-    frames, count = len(heard.features), len(states.times)
+    frames, count = len(observed.features), len(states.times)
     width = count if centre is None else min(count, 2 * reach + 1)
     lows = np.zeros(frames, np.intp) if centre is None else np.clip(centre - reach, 0, count - width)
     penalties = _penalties(states.pause)
     stay, enter, two, three = penalties
-    came = np.zeros((frames, width), np.int8)
-    costs = _costs(heard, states, lows, width)
-    total = np.full(width + 3, IMPOSSIBLE)  # by state - low, after three impossible ones
+    steps = np.zeros((frames, width), np.int8)
+    costs = _costs(observed, states, lows, width)
+    total = np.full(width + 3, IMPOSSIBLE)  # index: state - low + 3; the first three are impossible
     total[3:5] = next(costs)[:2]
-    ways, places = np.empty((4, width)), np.arange(width)
+    candidates, columns = np.empty((4, width)), np.arange(width)
     for t in range(1, frames):
         low, shift = int(lows[t]), int(lows[t] - lows[t - 1])
         if shift:
             moved = np.full(width + 3, IMPOSSIBLE)
             moved[: max(0, width + 3 - shift)] = total[shift:]
             total = moved
-        these = slice(low, low + width)
-        np.add(total[3:], stay[these], out=ways[0])
-        np.add(total[2:-1], enter[these], out=ways[1])
-        np.add(total[1:-2], two[these], out=ways[2])
-        np.add(total[:-3], three[these], out=ways[3])
-        came[t] = ways.argmin(axis=0)
-        total[3:], total[:3] = ways[came[t], places] + next(costs), IMPOSSIBLE
-    way = _traced(came, lows, width - 1 - int(total[-1] > total[-2]))
-    spent = np.sqrt(((heard.features - states.features[way]) ** 2).mean(axis=1)) / heard.usual
-    spent = np.where(states.pause[way], heard.quiet, spent)
-    spent[1:] += penalties[np.diff(way), way[1:]]
-    return way, spent
+        band = slice(low, low + width)
+        np.add(total[3:], stay[band], out=candidates[0])
+        np.add(total[2:-1], enter[band], out=candidates[1])
+        np.add(total[1:-2], two[band], out=candidates[2])
+        np.add(total[:-3], three[band], out=candidates[3])
+        steps[t] = candidates.argmin(axis=0)
+        total[3:], total[:3] = candidates[steps[t], columns] + next(costs), IMPOSSIBLE
+    path = _trace_back(steps, lows, width - 1 - int(total[-1] > total[-2]))
+    cost = np.sqrt(((observed.features - states.features[path]) ** 2).mean(axis=1)) / observed.usual
+    cost = np.where(states.pause[path], observed.quiet, cost)
+    cost[1:] += penalties[np.diff(path), path[1:]]
+    return path, cost
 
 
 def _penalties(pause: Bool) -> Float64:
-    """Return the costs (4, j) of staying in a state, and of reaching it from one, two or three before."""
+    """Return the costs (4, j) of staying in a state, and of advancing to it by one, two or three states."""
     enter = np.where(pause, ENTER, 0.0)
     enter[[0, -1]] = 0.0  # silence before and after the text is free
-    over = np.append(False, pause[:-1])  # skips a pause
-    over_two = over | np.append([False, False], pause[:-2])[: len(pause)]
+    skips_pause = np.append(False, pause[:-1])
+    skips_pause_of_two = skips_pause | np.append([False, False], pause[:-2])[: len(pause)]
     stay = np.where(pause, 0.0, STAY)
-    two, three = np.where(over, 0.0, SKIP), np.where(over_two, SKIP, SKIP_TWO)
+    two, three = np.where(skips_pause, 0.0, SKIP), np.where(skips_pause_of_two, SKIP, SKIP_TWO)
     return np.stack([stay, enter, enter + two, enter + three])
 
 
-def _costs(heard: Observed, states: States, lows: Index, width: int) -> Iterator[Float64]:
+def _costs(observed: Observed, states: States, lows: Index, width: int) -> Iterator[Float64]:
     """Yield the costs (width,) of each frame."""
-    for k in range(0, len(lows), AT_ONCE):
-        band = slice(int(lows[k]), int(lows[k : k + AT_ONCE][-1]) + width)
-        rows = distance(heard.features[k : k + AT_ONCE], states.features[band]) / heard.usual
-        rows[:, states.pause[band]] = heard.quiet[k : k + AT_ONCE, None]
-        for row, low in zip(rows, lows[k : k + AT_ONCE] - lows[k], strict=True):
+    for k in range(0, len(lows), BATCH):
+        band = slice(int(lows[k]), int(lows[k : k + BATCH][-1]) + width)
+        rows = distance(observed.features[k : k + BATCH], states.features[band]) / observed.usual
+        rows[:, states.pause[band]] = observed.quiet[k : k + BATCH, None]
+        for row, low in zip(rows, lows[k : k + BATCH] - lows[k], strict=True):
             yield row[low : low + width]
 
 
-def _traced(came: npt.NDArray[np.int8], lows: Index, last: int) -> Index:
+def _trace_back(steps: npt.NDArray[np.int8], lows: Index, last: int) -> Index:
     """Return the states (t,) of the path that ends at `last` in its band."""
-    way = np.empty(len(lows), np.intp)
+    path = np.empty(len(lows), np.intp)
     state = int(lows[-1]) + last
     for t in range(len(lows) - 1, -1, -1):
-        way[t] = state
-        state -= int(came[t, state - lows[t]])
-    return way
+        path[t] = state
+        state -= int(steps[t, state - lows[t]])
+    return path

@@ -1,11 +1,11 @@
-"""The espeak-ng engine, run by `engine_worker`: text to PCM and events.
+"""The espeak-ng engine, which `engine_worker` runs: synthesizes sound and events.
 
-espeak-ng is GPL-3 and not thread-safe, and its sound depends on earlier requests, so it is only loaded in a
-process of its own.
+espeak-ng is GPL-3 and not thread-safe, and its sound depends on earlier requests. Therefore it is loaded only
+in a separate process.
 
     hello     {"rate", "variants": [name], "voices": [{"name", "id", "languages": [[priority, tag]]}]}
     say       {"text", "voice", "wpm"} -> {"events": n, "marks": [name of each event that is a mark]},
-              n bytes of events as the engine's structs, and int16 PCM
+              n bytes of events in the engine's structures, and int16 PCM
     phonemes  {"voice", "words"} -> {"phonemes": [[ipa, ...], ...]}
 """
 
@@ -16,9 +16,9 @@ import os
 from pathlib import Path
 from typing import Any, ClassVar
 
-LONGEST_PATH = 140  # bytes; espeak-ng appends names to its data path in a buffer of 160
-PIECE = 500  # ms of sound in each callback
-LONGEST_SOUND = 1800  # s; longer texts are refused
+MAX_PATH = 140  # bytes; espeak-ng appends names to its data path in a buffer of 160
+CHUNK = 500  # ms of sound in each callback
+MAX_SOUND = 1800  # s; longer texts are refused
 SYNCHRONOUS, PHONEME_EVENTS, PHONEME_IPA, DONT_EXIT = 2, 1, 2, 0x8000
 UTF8, SSML, END_PAUSE = 1, 0x10, 0x1000
 RATE = 1  # parameter number: words a minute
@@ -76,7 +76,7 @@ class Engine:
     """
 
     drifts = True
-    # Spoken before any request: a fork of an engine that has spoken takes half the time.
+    # Spoken before the first request, because a fork of an engine that has spoken takes half the time.
     first: ClassVar[dict[str, Any]] = {"text": "<speak>One, two.</speak>", "wpm": 175}
 
     def __init__(self, data: str | None) -> None:
@@ -97,24 +97,24 @@ class Engine:
         self.variants: list[str] = []
         if data is not None:
             self.variants = sorted(p.name for p in Path(data, "voices", "!v").glob("*"))
-            if len(os.fsencode(data)) > LONGEST_PATH:
+            if len(os.fsencode(data)) > MAX_PATH:
                 # From inside the data folder the path is one character long.
                 os.chdir(data)
                 data = "."
         flags = PHONEME_EVENTS | PHONEME_IPA | DONT_EXIT
         folder = None if data is None else os.fsencode(data)
-        self.rate = lib.espeak_Initialize(SYNCHRONOUS, PIECE, folder, flags)
+        self.rate = lib.espeak_Initialize(SYNCHRONOUS, CHUNK, folder, flags)
         if self.rate <= 0:
             raise RuntimeError(f"espeak-ng found no data in {data!r}")
 
         self.voice = ""
         self.voices = self._voices()
         self.sound: list[bytes] = []
-        self.heard = 0
+        self.sample_count = 0
         self.events: list[bytes] = []
         self.marks: list[str] = []
         # Created here, because a fork pays for each page of memory that it touches first.
-        self.callback = SynthCallback(self._hear)
+        self.callback = SynthCallback(self._collect)
         lib.espeak_SetSynthCallback(self.callback)
         # The most common voice; an installation may lack English.
         english = (v["id"] for v in self.voices if any(tag == "en-us" for _, tag in v["languages"]))
@@ -142,28 +142,28 @@ class Engine:
         return found
 
     def say(self, request: dict[str, Any]) -> tuple[dict[str, Any], list[bytes]]:
-        self.sound, self.heard, self.events, self.marks = [], 0, [], []
+        self.sound, self.sample_count, self.events, self.marks = [], 0, [], []
         self._choose(request["voice"])
         self.lib.espeak_SetParameter(RATE, request["wpm"], 0)
         document = request["text"].encode() + b"\0"
         self.lib.espeak_Synth(document, len(document), 0, 1, 0, UTF8 | SSML | END_PAUSE, None, None)
-        if self.heard > LONGEST_SOUND * self.rate:
-            raise RuntimeError(f"the text lasts longer than {LONGEST_SOUND} s")
+        if self.sample_count > MAX_SOUND * self.rate:
+            raise RuntimeError(f"the text lasts longer than {MAX_SOUND} s")
         events = b"".join(self.events)
         return {"events": len(events), "marks": self.marks}, [events, *self.sound]
 
-    def _hear(self, wave: Any, count: int, event: Any) -> int:
-        """Store a piece of sound and its events; return 1 to stop the engine, otherwise 0."""
+    def _collect(self, wave: Any, count: int, event: Any) -> int:
+        """Store a chunk of sound and its events; return 1 to stop the engine, otherwise 0."""
         if wave and count > 0:
             self.sound.append(ctypes.string_at(wave, 2 * count))
-            self.heard += count
+            self.sample_count += count
         fields, at = ctypes.cast(event, INTS), 0
         while (kind := fields[at]) != 0:
-            if kind == MARK:  # its name is a pointer
+            if kind == MARK:  # its id is a pointer to its name
                 self.marks.append(text(event[at // FIELDS].id.name or b""))
             at += FIELDS
         self.events.append(ctypes.string_at(event, at * ctypes.sizeof(ctypes.c_int)))
-        return int(self.heard > LONGEST_SOUND * self.rate)
+        return int(self.sample_count > MAX_SOUND * self.rate)
 
     def phonemes(self, request: dict[str, Any]) -> tuple[dict[str, Any], list[bytes]]:
         self._choose(request["voice"])
@@ -193,7 +193,7 @@ def find_library() -> tuple[str, str | None]:
     try:
         import espeakng_loader
     except ImportError:
-        import ctypes.util  # imports so much that forks take half as long again
+        import ctypes.util  # imported only here, because it makes forks 50 % slower
 
         path = ctypes.util.find_library("espeak-ng")
         if path is None:

@@ -46,7 +46,9 @@ def test_parts_of_an_open_mouth_are_dark_red_not_black(name: str) -> None:
     canvas = SoftwareCanvas(face, (512, 512), camera, preset("portrait"))
     picture = canvas.draw(shape, normals(face, shape[None])[0]).astype(float)
     canvas.close()
-    upper, lower = camera.see(shape[[face.feature_points["2.2"], face.feature_points["2.3"]]], (512, 512))[0]
+    upper, lower = camera.project(
+        shape[[face.feature_points["2.2"], face.feature_points["2.3"]]], (512, 512)
+    )[0]
     for share in (0.4, 0.5, 0.6):
         x, y = np.rint(upper + share * (lower - upper)).astype(int)
         red, green, blue = picture[y - 1 : y + 2, x - 1 : x + 2].mean(axis=(0, 1))

@@ -17,7 +17,7 @@ SIZES = [(512, 512), (640, 480), (300, 500)]
 @pytest.mark.parametrize("size", SIZES)
 def test_front_camera_puts_hairline_to_chin_in_the_middle_half(balls, size):
     face, _ = balls
-    (x, hairline), (_, chin) = camera_for(face).see([face.points["11.1"], face.points["2.1"]], size)[0]
+    (x, hairline), (_, chin) = camera_for(face).project([face.points["11.1"], face.points["2.1"]], size)[0]
     assert (chin - hairline) / size[1] == pytest.approx(0.5)
     assert (chin + hairline) / 2 / size[1] == pytest.approx(0.47)
     assert x == pytest.approx(size[0] / 2)
@@ -27,7 +27,7 @@ def test_front_camera_puts_hairline_to_chin_in_the_middle_half(balls, size):
 def test_camera_presets_put_hairline_and_chin_as_framed(balls, name):
     face, _ = balls
     places = (
-        camera_for(face, name).see([face.points["11.1"], face.points["2.1"]], (400, 1000))[0][:, 1] / 1000
+        camera_for(face, name).project([face.points["11.1"], face.points["2.1"]], (400, 1000))[0][:, 1] / 1000
     )
     assert places == pytest.approx([PRESETS[name].hairline, PRESETS[name].chin])
 
@@ -45,13 +45,13 @@ def test_camera_presets_from_aside_show_the_right_cheek(balls):
     """The nose points to the picture's right: the camera stands at the character's right."""
     face, _ = balls
     for name in ("three-quarter", "profile"):
-        nose, back = camera_for(face, name).see([[0, 0, 0.02], [0, 0, -0.15]], (512, 512))[0][:, 0]
+        nose, back = camera_for(face, name).project([[0, 0, 0.02], [0, 0, -0.15]], (512, 512))[0][:, 0]
         assert nose > back + 30
 
 
 def test_camera_shows_the_character_s_left_on_the_right(balls):
     face, _ = balls
-    left, right = camera_for(face).see([[0.03, 0, 0], [-0.03, 0, 0]], (512, 512))[0][:, 0]
+    left, right = camera_for(face).project([[0.03, 0, 0], [-0.03, 0, 0]], (512, 512))[0][:, 0]
     assert left > right
 
 
@@ -80,4 +80,4 @@ def test_camera_to_json_gives_the_same_view(balls):
     local = np.array([right, np.cross(back, right), back]) @ (point - table["position"])
     scale = 256 / np.tan(np.radians(table["fovy"]) / 2)
     seen = [256 + scale * local[0] / -local[2], 256 - scale * local[1] / -local[2]]
-    assert camera.see(point, (512, 512))[0][0] == pytest.approx(seen, abs=0.05)
+    assert camera.project(point, (512, 512))[0][0] == pytest.approx(seen, abs=0.05)

@@ -43,9 +43,9 @@ def row_of(values: dict[int, float]) -> np.ndarray:
 def place(face, *points: str, rows=None) -> np.ndarray:
     """Pixels of feature points, on the neutral face or where the vertices nearest to them have moved."""
     if rows is None:
-        return camera_for(face).see([face.points[p] for p in points], SIZE)[0]
+        return camera_for(face).project([face.points[p] for p in points], SIZE)[0]
     vertices = deform(face, rows)[0]
-    return camera_for(face).see(vertices[[face.feature_points[p] for p in points]], SIZE)[0]
+    return camera_for(face).project(vertices[[face.feature_points[p] for p in points]], SIZE)[0]
 
 
 def patch(picture, corners) -> np.ndarray:
@@ -108,7 +108,7 @@ def test_face_eyes_have_a_glint_in_the_iris(face):
     with Renderer("default", (1024, 1024)) as renderer:
         picture = renderer.draw(row())[0]
     for point in ("3.5", "3.6"):
-        x, y = camera_for(face).see(face.points[point], (1024, 1024))[0][0].round().astype(int)
+        x, y = camera_for(face).project(face.points[point], (1024, 1024))[0][0].round().astype(int)
         eye = picture[y - 12 : y + 4, x - 14 : x + 4]
         assert eye.min(2).max() > 235
         assert eye.max(2).min() < 60  # beside the dark pupil

@@ -45,7 +45,7 @@ def test_opengl_canvas_draws_the_projected_silhouette(canvas, balls):
     picture = canvas.draw(face.vertices, normals)
     assert picture.shape == (240, 320, 3)
     rows, columns = np.nonzero(skin(picture))
-    outline = camera_for(face).see(face.vertices, SIZE)[0]
+    outline = camera_for(face).project(face.vertices, SIZE)[0]
     assert rows.min() == pytest.approx(outline[:, 1].min(), abs=2)
     assert rows.max() == pytest.approx(outline[:, 1].max(), abs=2)
     assert columns.min() == pytest.approx(outline[:, 0].min(), abs=2)
@@ -55,7 +55,7 @@ def test_opengl_canvas_draws_the_projected_silhouette(canvas, balls):
 def test_opengl_canvas_draws_the_eyes_where_they_project(canvas, balls):
     face, normals = balls
     picture = canvas.draw(face.vertices, normals)
-    for x, y in camera_for(face).see([[0.032, 0, 0], [-0.032, 0, 0]], SIZE)[0].round().astype(int):
+    for x, y in camera_for(face).project([[0.032, 0, 0], [-0.032, 0, 0]], SIZE)[0].round().astype(int):
         assert picture[y, x].min() > 170
 
 
@@ -63,7 +63,7 @@ def test_opengl_canvas_follows_the_vertices(canvas, balls):
     face, normals = balls
     still = canvas.draw(face.vertices, normals)
     moved = canvas.draw(face.vertices + np.float32([0.02, 0, 0]), normals)
-    shift = camera_for(face).see([[0.02, 0, -0.05], [0, 0, -0.05]], SIZE)[0][:, 0]
+    shift = camera_for(face).project([[0.02, 0, -0.05], [0, 0, -0.05]], SIZE)[0][:, 0]
     centre = [np.nonzero(skin(p))[1].mean() for p in (still, moved)]
     assert centre[1] - centre[0] == pytest.approx(shift[0] - shift[1], abs=1.5)
     assert np.array_equal(canvas.draw(face.vertices, normals), still)

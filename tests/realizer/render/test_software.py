@@ -59,9 +59,9 @@ def test_software_canvas_draws_points_where_they_project(face):
     camera = camera_for(face)
     picture = SoftwareCanvas(face, SIZE, camera, preset()).draw(*pose(face)).astype(int)
     for point in ("3.5", "3.6"):
-        x, y = camera.see(face.points[point], SIZE)[0][0].round().astype(int)
+        x, y = camera.project(face.points[point], SIZE)[0][0].round().astype(int)
         assert picture[y - 2 : y + 3, x - 2 : x + 3].sum(2).min() < 150
-    x, y = camera.see(face.points["9.3"], SIZE)[0][0].round().astype(int)
+    x, y = camera.project(face.points["9.3"], SIZE)[0][0].round().astype(int)
     red, _, blue = picture[y, x]
     assert red > blue + 30
 
