@@ -29,10 +29,10 @@ from bml_schema.parser import MAX_BEHAVIOURS, read_block
 from bml_schema.undeclared_prefixes import read_undeclared
 from bml_schema.vocabulary import VOCABULARY
 
-MAX_BYTES = 1 << 20  # of one document; an hour of speech with a nod on every word is a third of it
-_MAX_RETRIES = 20  # searches for a good document inside a broken one
-_MAX_AGAIN = 100_000  # characters of one text that are searched again; more would take seconds
-MAX_DOCUMENTS = 1000  # in one text; a text full of "<bml>" must not become a flood of warnings
+MAX_BYTES = 1 << 20  # of one document; an hour of speech with a nod on every word has a third of it
+_MAX_RETRIES = 20  # searches for a valid document inside a broken one
+_MAX_SEARCHED = 100_000  # characters of one text that are searched again; more would take seconds
+MAX_DOCUMENTS = 1000  # in one text, so that a text full of "<bml>" does not cause a flood of warnings
 
 Vocabulary = Mapping[str, type[Behaviour]]
 
@@ -55,19 +55,19 @@ def parse(
     """Return the block of a text that holds exactly one document.
 
     Args:
-        text: the document; with or without namespace, any prefix; blanks, BOM, declaration and comments
-            before it are allowed. Bytes in UTF-8, UTF-16 or Latin.
-        vocabulary: Clark tag -> node class; extensions add theirs.
-        strict: raise the first Problem.
+        text: the document, with or without namespace, with any prefix. Blanks, a BOM, a declaration and
+            comments may precede it. Bytes are UTF-8, UTF-16 or Latin.
+        vocabulary: Clark tag -> node class; extensions add their classes.
+        strict: whether to raise a BMLError for the first problem.
         max_bytes, max_behaviours: limits of a document.
-        strict_bml: read BML 1.0 only, no dialects and nothing that is only nearly BML.
+        strict_bml: whether to read BML 1.0 only, without dialects and lenient parsing.
 
     Returns:
         The block; `problems` has what was dropped from it.
 
     Raises:
-        BMLError: no block: not well-formed (BMLSyntaxError), no usable id, too big
-            (BMLSizeError), not one document.
+        BMLError: the text is not well-formed (BMLSyntaxError) or too big (BMLSizeError), its block has no
+            usable id, or it is not one document.
     """
     results = read(
         text, vocabulary, max_bytes=max_bytes, max_behaviours=max_behaviours, strict_bml=strict_bml
@@ -98,80 +98,82 @@ def read(
 ) -> Iterator[Block | BMLError]:
     """Yield the blocks of a text with any number of documents, in order.
 
-    After a broken stretch reading continues at the next `<bml`. Lines are counted over the whole text.
+    After broken text, reading continues at the next `<bml`. Lines are counted over the whole text.
 
     Args:
         text, vocabulary, max_bytes, max_behaviours, strict_bml: as for `parse`.
-        max_documents: the rest of the text is not read.
-        block_ids: the ids of documents in a dialect that have none; those of one session must differ.
+        max_documents: after so many documents, reading ends with an error.
+        block_ids: ids for documents of dialects without an id; they must be unique in a session.
 
     Yields:
-        A Block for each document, a BMLError for each stretch without one. Raises nothing.
+        A Block for each document, and a BMLError for each part of the text without one.
     """
     reader = _Reader(vocabulary, max_behaviours, strict_bml, block_ids or made_ids())
-    data, wrapper, roots = _whole(text, max_bytes, strict_bml)
+    data, wrapper, roots = _parse_at_once(text, max_bytes, strict_bml)
     if 0 < len(roots) <= max_documents:
         reader.wrapper, begins = wrapper, _begins(data)
         for root in roots:
             try:
                 yield reader.read(root, begins)
-            except BMLError as wrong:
-                yield wrong
+            except BMLError as error:
+                yield error
         return
     try:
         text = _decoded(text) if isinstance(text, bytes) else text
-    except BMLError as wrong:
-        yield wrong
+    except BMLError as error:
+        yield error
         return
     text = text if strict_bml else without_doctype(text)
     try:
         spans = list(document_spans(text))
-    except BMLError as wrong:
-        yield wrong
+    except BMLError as error:
+        yield error
         return
     if spans and not strict_bml and (around := WRAPPER_TAG.search(text, 0, spans[0].start)):
         reader.wrapper = around[1]
     line = 1
     counted = 0
-    broken = False  # the stretch before was broken XML: all text up to the next document is part of it
-    todo = deque(spans)
-    retries, again = _MAX_RETRIES, _MAX_AGAIN
+    broken = False  # whether the span before was broken XML, which all text up to the next document continues
+    pending = deque(spans)
+    retries, searched = _MAX_RETRIES, 0
     reported = 0  # end of the broken XML that was reported
     for n in count():
-        if not todo:
+        if not pending:
             return
-        stretch = todo.popleft()
-        line += text.count("\n", counted, stretch.start)
-        counted = stretch.start
+        span = pending.popleft()
+        line += text.count("\n", counted, span.start)
+        counted = span.start
         if n == max_documents:
             yield BMLError(f"wanted at most {n} documents in one text; the rest is not read", line=line)
             return
-        if broken and stretch.fault and not stretch.tag:
+        if broken and span.fault and not span.tag:
             continue
         try:
-            block = _block(text, stretch, line, reader, max_bytes)
-        except BMLError as wrong:
-            broken = isinstance(wrong, BMLSyntaxError)
-            if not (broken and stretch.start < reported):
-                yield wrong
-            if broken and not stretch.fault and retries and again > 0:
-                # A good document may stand inside the broken one, where their end tags happen to match.
-                inner = NEXT.search(text, stretch.start + len(stretch.tag), stretch.end)
+            block = _block(text, span, line, reader, max_bytes)
+        except BMLError as error:
+            broken = isinstance(error, BMLSyntaxError)
+            if not (broken and span.start < reported):
+                yield error
+            if broken and not span.fault and retries and searched < _MAX_SEARCHED:
+                # A valid document may be inside the broken one, if their end tags match by chance.
+                inner = NEXT.search(text, span.start + len(span.tag), span.end)
                 if inner is not None:
                     retries -= 1
-                    again -= stretch.end - inner.start()
-                    reported = max(reported, stretch.end)
-                    todo.extendleft(reversed(list(document_spans(text, inner.start(), stretch.end))))
+                    searched += span.end - inner.start()
+                    reported = max(reported, span.end)
+                    pending.extendleft(reversed(list(document_spans(text, inner.start(), span.end))))
         else:
             broken = False
             yield block
 
 
-def _whole(text: str | bytes, max_bytes: int, strict_bml: bool) -> tuple[bytes, str, list[etree._Element]]:
-    """Return the bytes of a text, its wrapper and its documents if it is sound, otherwise no documents.
+def _parse_at_once(
+    text: str | bytes, max_bytes: int, strict_bml: bool
+) -> tuple[bytes, str, list[etree._Element]]:
+    """Return the bytes of a text, its wrapper and its documents if it is well-formed, otherwise no documents.
 
-    Most texts are one sound document, and are parsed in one pass. All others take the slow way, which
-    explains.
+    Most texts are one well-formed document, which is parsed in one pass. All others are read again slowly, to
+    find their faults.
     """
     if len(text) > max_bytes:
         return b"", "", []
@@ -199,7 +201,7 @@ def _whole(text: str | bytes, max_bytes: int, strict_bml: bool) -> tuple[bytes, 
 
 
 def _begins(data: bytes) -> dict[tuple[int, str], int]:
-    """Map (last line, name) of each start tag over several lines to its first line; lxml knows the last."""
+    """Return (last line, name) -> first line of each start tag of several lines; lxml has the last."""
     begins: dict[tuple[int, str], int] = {}
     if data.count(b"\n") == data.count(b">\n"):
         return begins  # every line ends with a tag
@@ -254,33 +256,33 @@ class _Reader:
             return block(notes)
         plain: Block | BMLError | None = None
         if not self.wrapper and not is_draft(root):
-            # Nearly all documents are BML 1.0. Others have faults, or words that only dialects have.
+            # Nearly all documents are BML 1.0. Others have faults, or words that occur in dialects only.
             try:
                 plain = block(notes)
-            except BMLError as wrong:
-                plain = wrong
+            except BMLError as error:
+                plain = error
             if isinstance(plain, Block) and not plain.problems and not has_words_of_dialects(plain):
                 return plain
         for node in root.iter() if begins else ():
-            # The names by which lines are found may change.
+            # Translation may change the names by which `begins` finds lines.
             any_node: Any = node
             line = any_node.sourceline
             any_node.sourceline = begins.get((line, local(str(node.tag))), line)
         begins = {}
-        said = translate(root, self.wrapper, self.block_ids)
-        if said or plain is None:
-            return block((*notes, said) if said else notes)
+        note = translate(root, self.wrapper, self.block_ids)
+        if note or plain is None:
+            return block((*notes, note) if note else notes)
         if isinstance(plain, BMLError):
             raise plain
         return plain
 
 
-def _block(text: str, stretch: DocumentSpan, line: int, reader: _Reader, max_bytes: int) -> Block:
-    named = _ID.search(stretch.tag)
-    id = (named[1] or named[2]) if named else None
-    if stretch.fault:
-        raise BMLSyntaxError(stretch.fault, line=line, block=id)
-    data = _encoded(text[stretch.start : stretch.end], line, id)
+def _block(text: str, span: DocumentSpan, line: int, reader: _Reader, max_bytes: int) -> Block:
+    match = _ID.search(span.tag)
+    id = (match[1] or match[2]) if match else None
+    if span.fault:
+        raise BMLSyntaxError(span.fault, line=line, block=id)
+    data = _encoded(text[span.start : span.end], line, id)
     if len(data) > max_bytes:
         raise BMLSizeError(
             f"wanted at most {max_bytes} bytes in a document, got {len(data)}", line=line, block=id
@@ -304,9 +306,9 @@ def element(data: bytes, *, lines_before: int = 0, block: str | None = None) -> 
     """Return the root of a document in UTF-8 without prolog; raise BMLSyntaxError if not well-formed."""
     try:
         return etree.fromstring(data, _PARSER)
-    except etree.XMLSyntaxError as wrong:
-        line = (wrong.lineno or 1) + lines_before
-        reason = re.sub(r",? line \d+, column \d+.*", "", wrong.msg or "no XML", flags=re.DOTALL)
+    except etree.XMLSyntaxError as error:
+        line = (error.lineno or 1) + lines_before
+        reason = re.sub(r",? line \d+, column \d+.*", "", error.msg or "no XML", flags=re.DOTALL)
         if "xcessive depth" in reason:
             reason = "elements nested too deep, wanted at most 256"
         raise BMLSyntaxError(f"not well-formed: {reason}", line=line, block=block) from None
@@ -315,9 +317,9 @@ def element(data: bytes, *, lines_before: int = 0, block: str | None = None) -> 
 def _encoded(document: str, line: int, block: str | None) -> bytes:
     try:
         return document.encode()
-    except UnicodeEncodeError as wrong:
-        line += document.count("\n", 0, wrong.start)
-        text = f"wanted characters XML can hold, got U+{ord(document[wrong.start]):04X}"
+    except UnicodeEncodeError as error:
+        line += document.count("\n", 0, error.start)
+        text = f"wanted characters XML can hold, got U+{ord(document[error.start]):04X}"
         raise BMLSyntaxError(text, line=line, block=block) from None
 
 
@@ -325,8 +327,8 @@ def encoding_of(data: bytes) -> str:
     """Return the encoding of a text by BOM or declaration; UTF-8 by default."""
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return "utf-16"
-    named = _ENCODING.match(data.removeprefix(codecs.BOM_UTF8).lstrip())
-    return named[1].decode() if named else "utf-8"
+    match = _ENCODING.match(data.removeprefix(codecs.BOM_UTF8).lstrip())
+    return match[1].decode() if match else "utf-8"
 
 
 def _decoded(data: bytes) -> str:
@@ -338,8 +340,8 @@ def _decoded(data: bytes) -> str:
         return data.decode(encoding)
     except LookupError:
         raise BMLSyntaxError(f"encoding: wanted UTF-8, UTF-16 or Latin, got {quoted(encoding)}") from None
-    except UnicodeDecodeError as wrong:
-        line = data.count(b"\n", 0, wrong.start) + 1
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
         raise BMLSyntaxError(
-            f"wanted {encoding}, got the byte 0x{data[wrong.start]:02X}", line=line
+            f"wanted {encoding}, got the byte 0x{data[error.start]:02X}", line=line
         ) from None

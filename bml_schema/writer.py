@@ -84,18 +84,18 @@ class Writer:
             yield self._element(node, indent)
 
     def _element(self, node: Any, indent: str) -> str:
-        shape = schema_of(type(node))
+        schema = schema_of(type(node))
         name = self.name(node.tag)
         start = f"<{name}{self._attributes(node)}"
-        if shape.mixed:
+        if schema.mixed:
             inside = "".join(
-                escape(p) if isinstance(p, str) else self._element(p, "") for p in getattr(node, shape.mixed)
+                escape(p) if isinstance(p, str) else self._element(p, "") for p in getattr(node, schema.mixed)
             )
             return f"{indent}{start}>{inside}</{name}>"
-        if shape.text:
-            return f"{indent}{start}>{escape(getattr(node, shape.text))}</{name}>"
+        if schema.text:
+            return f"{indent}{start}>{escape(getattr(node, schema.text))}</{name}>"
         inner: list[str] = []
-        for kind in shape.children:
+        for kind in schema.children:
             value = getattr(node, kind.field)
             for child in value if kind.many else filter(None, [value]):
                 inner.append(self._element(child, indent + "  "))
@@ -115,13 +115,13 @@ class Writer:
         return f"<description{values}>{node.content}</description>"
 
     def _attributes(self, node: Any) -> str:
-        shape = schema_of(type(node))
+        schema = schema_of(type(node))
         out = ""
-        for spec in shape.attributes.values():
+        for spec in schema.attributes.values():
             value = getattr(node, spec.field)
             if value is None or (value == spec.default and not spec.required):
                 continue
-            if value or spec.field != "id":  # the parts of a face may have none
+            if value or spec.field != "id":  # the parts of a face may have no id
                 text = str(value) if spec.value is sync_ref else spec.value.write(value)
                 out += _value(self.name(spec.name, attribute=True), text)
         for point in _ordered(node):
@@ -154,8 +154,8 @@ def _parsed(content: str, wanted: str) -> etree._Element:
     """Parse content inside a wrapper element; raise ValueError if it is not well-formed."""
     try:
         return etree.fromstring(f"<x>{content}</x>".encode(), _PLAIN)
-    except (etree.XMLSyntaxError, UnicodeEncodeError) as wrong:
-        raise ValueError(f"{wanted}, got {content[:60]!r}") from wrong
+    except (etree.XMLSyntaxError, UnicodeEncodeError) as error:
+        raise ValueError(f"{wanted}, got {content[:60]!r}") from error
 
 
 def _checked(other: str) -> str:

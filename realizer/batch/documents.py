@@ -25,9 +25,9 @@ class Document:
 def find(places: Iterable[str]) -> list[Document]:
     """Return the documents of all places by name, each once.
 
-    Names are relative to the folder, or the folder before a pattern such as `talks/*/*.bml` or
-    `talks/**/*.bml`; those of files that are named themselves, to the current folder, or else only the last
-    part. So the name of a document does not depend on the others.
+    Names are relative to the given folder, or to the folder before a pattern such as `talks/**/*.bml`. Names
+    of single files are relative to the current folder, or only the file's name if the file is elsewhere.
+    Therefore the name of a document does not depend on other documents.
 
     Raises:
         DocumentsError: a place has no document, or two documents would write the same outputs.
@@ -61,7 +61,7 @@ def _files(place: str) -> list[tuple[Path, Path]]:
         files = list(base.glob(str(Path(*path.parts[first:]))))
     else:
         return []
-    # Also broken links, so that a failure is reported.
+    # Broken links are included, so that their failure is reported.
     return [(p, base) for p in sorted(files) if p.is_file() or (p.is_symlink() and not p.exists())]
 
 

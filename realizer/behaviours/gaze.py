@@ -1,4 +1,4 @@
-"""gaze, gazeShift: the eyes lead, the head follows, and the eyes turn back accordingly."""
+"""gaze, gazeShift: the eyes turn first, the head follows, and the eyes turn back meanwhile."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from realizer.behaviours.table_timing import timing_from_table
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
-# offsetDirection -> part of the offset that is yaw (left positive) and pitch (up positive).
 DIAGONAL = 2**-0.5
+# offsetDirection -> parts of the offset in yaw (left is positive) and pitch (up is positive).
 DIRECTIONS = {
     "RIGHT": (-1.0, 0.0),
     "LEFT": (1.0, 0.0),
@@ -30,23 +30,22 @@ DIRECTIONS = {
     "DOWNLEFT": (DIAGONAL, -DIAGONAL),
 }
 
-
 REST: Turn = (0.0, 0.0)
-# How far a gaze masks the base of eyes and head, at its keys: start, eyes on target, ready, relax, eyes
+# Mask of the base state of eyes and head at the keys of a gaze: start, eyes on target, ready, relax, eyes
 # back, end.
-EYES_TAKEN = np.array([0.0, 1.0, 1.0, 1.0, 0.0, 0.0])
-HEAD_TAKEN = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 0.0])
+EYES_MASK = np.array([0.0, 1.0, 1.0, 1.0, 0.0, 0.0])
+HEAD_MASK = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 0.0])
 
 
 class GazeAngles(NamedTuple):
-    """The final angles of a gaze.
+    """The angles of a gaze.
 
     Attributes:
-        eyes: of the eyes in the head.
-        head: of the head.
-        first: of the eyes before the head follows.
-        away: of the eyes when they have turned back and the head has not yet.
-        inward: degrees that each eye turns in.
+        eyes: final angles of the eyes relative to the head.
+        head: final angles of the head.
+        first: angles of the eyes before the head follows.
+        away: angles of the eyes when they have turned back and the head has not.
+        inward: degrees by which each eye turns inwards.
     """
 
     eyes: Turn
@@ -57,33 +56,33 @@ class GazeAngles(NamedTuple):
 
 
 def split_angle(node: Gaze | GazeShift, context: PlanningContext) -> GazeAngles:
-    """Split the angle between eyes and head.
+    """Divide the angle of a target between eyes and head.
 
-    The head turns its share, by influence, but little of a small angle; the eyes turn the rest up to their
-    limit, and the head what is left.
+    The part of the head depends on the influence, and is small for small angles. The eyes turn by the rest up
+    to their limit, and the head by what remains.
     """
     yaw, pitch, inward = angles(node.target, context)
     left, up = DIRECTIONS[node.offset_direction]
-    # A target behind the head is behind on the nearer side.
+    # The head turns to the nearer side of a target behind it.
     yaw = (yaw + node.offset_angle * left + 180.0) % 360.0 - 180.0
     pitch = max(-90.0, min(90.0, pitch + node.offset_angle * up))
     shares = facts()["influence"]
     part = shares.get((node.influence or "default").upper(), shares["default"])["head"]
-    eyes_most, head_most = limits("eyes"), limits("head") if part > 0 else REST
+    max_eyes, max_head = limits("eyes"), limits("head") if part > 0 else REST
     size = math.hypot(yaw, pitch)
-    wanted = _of_head(yaw, part, size, eyes_most[0]), _of_head(pitch, part, size, eyes_most[1])
-    head = limited(wanted, head_most)
+    wanted = _of_head(yaw, part, size, max_eyes[0]), _of_head(pitch, part, size, max_eyes[1])
+    head = limited(wanted, max_head)
     return GazeAngles(
-        eyes=limited((yaw - head[0], pitch - head[1]), eyes_most),
+        eyes=limited((yaw - head[0], pitch - head[1]), max_eyes),
         head=head,
-        first=limited((yaw, pitch), eyes_most),
-        away=limited((-head[0], -head[1]), eyes_most),
+        first=limited((yaw, pitch), max_eyes),
+        away=limited((-head[0], -head[1]), max_eyes),
         inward=inward,
     )
 
 
 def _of_head(angle: float, part: float, size: float, eyes: float) -> float:
-    """Return the head's share of an angle: its part, and the rest beyond the limit of the eyes."""
+    """Return the angle by which the head turns: its part, and the rest beyond the limit of the eyes."""
     head = angle * part * size / (size + facts()["head"]["small"])
     return angle - math.copysign(eyes, angle) if abs(angle - head) > eyes else head
 
@@ -103,9 +102,9 @@ def expand(node: Gaze, times: Float64, context: PlanningContext) -> tuple[Channe
     keys = np.array([start, reached, ready, relax, back, end])
     eyes = [REST, to.first, to.eyes, to.eyes, to.away, REST]
     head = [REST, REST, to.head, to.head, to.head, REST]
-    masks = {"eyes": EYES_TAKEN}
+    masks = {"eyes": EYES_MASK}
     if (node.influence or "").upper() != "EYES":
-        masks["head"] = HEAD_TAKEN
+        masks["head"] = HEAD_MASK
     return (
         *turn("eyes", keys, eyes, layer=Layer.GAZE, source=node.id),
         *turn("head", keys, head, layer=Layer.GAZE, source=node.id),
@@ -130,21 +129,21 @@ def expand_shift(node: GazeShift, times: Float64, context: PlanningContext) -> t
 
 
 def _lead(length: float) -> float:
-    """Return the seconds by which the eyes lead in a turn of this length: at most half of it."""
+    """Return the seconds by which the eyes precede the head in a turn of this length, at most half of it."""
     return min(float(facts()["eyes"]["lead"]), length / 2)
 
 
 def _converge(
     times: Float64, inward: float, layer: Layer, source: str, holds: bool = False
 ) -> tuple[Channel, ...]:
-    """Return AU66 for eyes that each turn in by some degrees, at the first keys of a gaze or all."""
+    """Return channels of AU66, by which both eyes turn inwards, at the first keys of a gaze or at all."""
     if not inward:
         return ()
-    values = min(inward / tables.by_number()[66].degrees, 1.0) * EYES_TAKEN[: len(times)]
+    values = min(inward / tables.by_number()[66].degrees, 1.0) * EYES_MASK[: len(times)]
     return (Channel(au(66)[0], times, values, layer=layer, keeps_last=holds, source=source),)
 
 
-# Every influence needs the gaze; a temporary one does not need the base gaze.
+# A temporary gaze does not claim the base gaze.
 KINDS = (
     BehaviourKind(Gaze, timing, expand, check_target, claims=claiming("gaze")),
     BehaviourKind(GazeShift, timing, expand_shift, check_target, claims=claiming("base gaze"), region="eyes"),

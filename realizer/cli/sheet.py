@@ -168,12 +168,12 @@ def _scale() -> Any:
     from PIL import Image, ImageDraw, ImageFont
 
     from realizer.render.contact_sheet import INK, PAPER
-    from realizer.render.difference_image import FULL, ramp
+    from realizer.render.difference_image import MAX_DIFFERENCE, ramp
 
     width, height = SCALE
     image = Image.new("RGB", (width, height * 2 + 8), PAPER)
     bar = np.broadcast_to(ramp(np.linspace(0, 1, width, dtype=np.float32)), (height, width, 3))
     image.paste(Image.fromarray(np.rint(bar).astype(np.uint8)), (0, 0))
-    text = f"differs by 0 .. {FULL:.0%} of white or more"
+    text = f"differs by 0 .. {MAX_DIFFERENCE:.0%} of white or more"
     ImageDraw.Draw(image).text((0, height + 4), text, INK, ImageFont.load_default(14))
     return np.asarray(image)

@@ -39,7 +39,7 @@ class Client:
         self.welcome: Mapping[str, Any] = {}
         self._socket = socket
         self._router = Router()
-        self._news = asyncio.Condition()
+        self._received = asyncio.Condition()
         self._ended = False
         self._close_reason = ""
         self._reader = asyncio.create_task(self._read())
@@ -129,8 +129,8 @@ class Client:
         Raises:
             ClientError: the connection ended first.
         """
-        async with self._news:
-            await self._news.wait_for(lambda: condition() or self._ended)
+        async with self._received:
+            await self._received.wait_for(lambda: condition() or self._ended)
         if not condition():
             self._check()
 
@@ -141,8 +141,8 @@ class Client:
         Leaving the block closes the speech without waiting for its end; an exception stops it.
 
         Args:
-            id: of the speech's block; the syncs of its text are `ID:ID:sync` for other blocks.
-            opening: composition, character, language of the message `speech`.
+            id: id of the speech and of its block; other blocks refer to a sync of its text as `ID:ID:sync`.
+            opening: composition, character and language, as in the message `speech`.
         """
         speech = Speech(id, self.control, self.wait_for, self._check, opening)
         self._router.add_listener(speech.progress)
@@ -226,10 +226,10 @@ class Client:
                     await self.control("unsubscribe", stream=stream, character=character)
 
     async def film(self, path: str | Path, bml: str, *, fps: float = 25, **look: Any) -> BlockProgress:
-        """Play BML and save its last block as a film with sound (.mp4, .webm), as it is drawn live.
+        """Play BML and save its last block as a film with sound (.mp4, .webm).
 
-        The film repeats a picture where the service had no time to draw the next one. (`realizer realize`
-        draws all of them.)
+        The service draws live, so the film repeats a picture if the next one was not drawn in time. `realizer
+        realize` draws all pictures.
 
         Args:
             look: size, camera, light, background, character, as in `subscribe` for video.
@@ -267,14 +267,14 @@ class Client:
             while True:
                 message = await self._socket.recv()
                 self._router.receive(message)
-                async with self._news:
-                    self._news.notify_all()
+                async with self._received:
+                    self._received.notify_all()
         except ConnectionClosed as closed:
             self._close_reason = closed.rcvd.reason if closed.rcvd is not None else ""
         finally:
             self._ended = True
-            async with self._news:
-                self._news.notify_all()
+            async with self._received:
+                self._received.notify_all()
 
     def _check(self) -> None:
         if self._ended:

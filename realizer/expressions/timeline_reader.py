@@ -11,7 +11,7 @@ from realizer.core.errors import TableError
 from realizer.expressions.timeline import Curve, Entry, Joins, Mixer, Timeline, Track
 from realizer.tables import action_units
 
-SHORTEST, LONGEST = 0.04, 3600.0  # s
+MIN_SECONDS, MAX_SECONDS = 0.04, 3600.0
 TIMELINE = ("mixer", "order", "channel")
 TRACK = ("name", "start", "joins", "curve", "entries")
 ENTRY = ("expression", "intensity", "duration")
@@ -64,12 +64,10 @@ class _TimelineReader:
 
     def _fault(self, place: str, wanted: str, got: object) -> None:
         try:
-            words = "nothing" if got is None else repr(got)
+            text = "nothing" if got is None else repr(got)
         except ValueError:
-            words = "a number of thousands of digits"
-        self.faults.append(
-            f"{place}: wanted {wanted}, got {words if len(words) <= 80 else words[:80] + '...'}"
-        )
+            text = "a number of thousands of digits"
+        self.faults.append(f"{place}: wanted {wanted}, got {text if len(text) <= 80 else text[:80] + '...'}")
 
     def _keys(self, row: Mapping[str, Any], known: Sequence[str], place: str) -> None:
         for name in row:
@@ -95,12 +93,12 @@ class _TimelineReader:
         if not isinstance(aus, list):
             self._fault("timeline, order", "a list of action units, such as [4, 1, 2]", aus)
             return ()
-        # Rotations always follow all other units (5.1).
-        mixed = {row.au for row in action_units() if not row.degrees}
+        # Rotations always follow all other units (Wojdel 2005, 5.1).
+        sortable = {row.au for row in action_units() if not row.degrees}
         order: list[int] = []
         for number, au in enumerate(aus, 1):
             place = f"timeline, order, place {number}"
-            if type(au) is not int or au not in mixed:
+            if type(au) is not int or au not in sortable:
                 self._fault(place, "the number of an action unit that turns neither head nor eyes", au)
             elif au in order:
                 self._fault(place, "each action unit once", au)
@@ -127,7 +125,7 @@ class _TimelineReader:
             tuple(self._entry(entry, f"{place}, entry {k}") for k, entry in enumerate(entries, 1)),
             cast(Joins, self._choice(row, "joins", get_args(Joins), place)),
             cast(Curve, self._choice(row, "curve", get_args(Curve), place)),
-            self._number(row, "start", 0.0, 0.0, LONGEST, place),
+            self._number(row, "start", 0.0, 0.0, MAX_SECONDS, place),
         )
 
     def _entry(self, row: Any, place: str) -> Entry:
@@ -140,7 +138,9 @@ class _TimelineReader:
             self._fault(f"{place}, expression", "the name of an expression, or neutral", expression)
             expression = ""
         duration = (
-            self._number(row, "duration", SHORTEST, SHORTEST, LONGEST, place) if "duration" in row else None
+            self._number(row, "duration", MIN_SECONDS, MIN_SECONDS, MAX_SECONDS, place)
+            if "duration" in row
+            else None
         )
         return Entry(expression, self._number(row, "intensity", 1.0, 0.0, 1.0, place), duration)
 

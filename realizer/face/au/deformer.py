@@ -9,7 +9,7 @@ from realizer.core.array_types import Bool, Float32, Float64
 from realizer.face.au.model import Model, rotation
 from realizer.face.au.mouth import shares
 from realizer.face.au.skin_binding import attached_parts, skin
-from realizer.face.au.successive_mixer import LEAST, SuccessiveMixer
+from realizer.face.au.successive_mixer import MIN_MOVE, SuccessiveMixer
 from realizer.face.au.units import units
 from realizer.face.basis import FAPS, JAW_SIN
 from realizer.face.model import Face
@@ -188,7 +188,7 @@ def _displacements(face: Face, model: Model, names: list[tuple[int, str]]) -> Fl
     # Brows and lashes go with the skin that they grow on: off it, functions of the place differ.
     for first, last, corners, share in attached_parts(face):
         moves[:, first:last] = np.einsum("nk,ankc->anc", share, moves[:, corners])
-    moves[np.abs(moves).max(axis=2) < LEAST] = 0
+    moves[np.abs(moves).max(axis=2) < MIN_MOVE] = 0
     return moves
 
 
@@ -200,7 +200,7 @@ def _meeting(face: Face, moves: Float64, side: str) -> float:
     upper, lower = (face.feature_points[point] for point in LID_POINTS[side])
     gap = float(face.vertices[upper, 1] - face.vertices[lower, 1])
     closed = float(moves[lower, 1] - moves[upper, 1])
-    return min(1.0, gap / closed) if closed > LEAST else 1.0
+    return min(1.0, gap / closed) if closed > MIN_MOVE else 1.0
 
 
 def _shares(face: Face, moving: slice) -> tuple[tuple[Any, Float32], tuple[Any, Float32]]:

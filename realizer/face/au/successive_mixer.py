@@ -1,4 +1,4 @@
-"""The successive mixer on a mesh: each action unit acts on the skin as the earlier ones have moved it."""
+"""The successive mixer: action units displace a mesh one after the other."""
 
 from collections.abc import Mapping
 
@@ -10,17 +10,17 @@ from realizer.face.au.mouth import shares
 from realizer.face.au.skin_binding import attached_parts, skin
 from realizer.face.model import Face
 
-LEAST = 1e-5  # m; smaller movements of a unit are ignored
-# The limit of a unit's movement, as a multiple of its largest on the neutral face. Off the skin, where its
-# functions were not fitted, they may grow without bounds.
+MIN_MOVE = 1e-5  # m; smaller displacements are ignored
+# Largest displacement by a unit, as a multiple of its largest one on the neutral face. Outside the neutral
+# skin, where the functions were not fitted, they may grow without bounds.
 MAX_RATIO = 1.3
 
 
 class SuccessiveMixer:
-    """The successive mixer (Wojdel 2005, 5.1): each unit moves the places where those before it left them.
+    """The successive mixer (Wojdel 2005, 5.1): each unit displaces the displaced vertices.
 
-    Places that no unit has moved yet are displaced as on the neutral face, which is computed once. Where
-    units overlap, their functions are evaluated again at every call.
+    The displacements of the neutral face are computed once. They hold for vertices that no earlier unit has
+    moved; for all others the functions are evaluated at every call.
     """
 
     def __init__(self, face: Face, model: Model) -> None:
@@ -59,17 +59,17 @@ class SuccessiveMixer:
         return out
 
     def _neutral(self, au: int) -> tuple[Float64, float]:
-        """Return a unit's displacement of the neutral face, (k, 3), and its limit for any place, metres."""
+        """Return a unit's displacement of the neutral face, (k, 3), and its limit for any vertex, metres."""
         if au not in self._neutral_cache:
             moves = self._model.displacement(au, self._neutral_places, upper=self._upper_share)
-            moves[np.abs(moves).max(axis=1) < LEAST] = 0
-            limit = max(MAX_RATIO * float(np.linalg.norm(moves, axis=1).max()), LEAST)
+            moves[np.abs(moves).max(axis=1) < MIN_MOVE] = 0
+            limit = max(MAX_RATIO * float(np.linalg.norm(moves, axis=1).max()), MIN_MOVE)
             self._neutral_cache[au] = moves, limit
         return self._neutral_cache[au]
 
 
 def _amount(at: Float64, left: float, right: float) -> Float64 | float:
-    """Return the weight of a unit at each place: (n, 1), or one number if both sides are alike."""
+    """Return the intensity of a unit at each vertex: (n, 1), or one number if both sides are equal."""
     if left == right:
         return left
     return (left * half(at, "L") + right * half(at, "R"))[:, None]

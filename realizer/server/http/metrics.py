@@ -8,13 +8,16 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
 MEDIA_TYPE = "text/plain; version=0.0.4; charset=utf-8"
-# Upper ends in seconds: a frame is late by less than a millisecond, or by several frames.
+# Upper bounds of buckets in seconds. Lateness is mostly below a millisecond, but may be several frames.
 LATENESS = (0.0005, 0.001, 0.002, 0.003, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0)
 PLANNING = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
 
 
 class Histogram:
-    """A histogram of seconds, whose buckets have the upper bounds `ends`.
+    """A histogram of seconds.
+
+    Args:
+        ends: upper bounds of the buckets.
 
     Attributes:
         pending: seconds that `count` will add to the buckets.
@@ -39,11 +42,11 @@ class Histogram:
         count = 0
         for end, n in zip((*(f"{end:g}" for end in self._ends), "+Inf"), self._counts, strict=True):
             count += n
-            inside = ",".join(filter(None, (labels, f'le="{end}"')))
-            yield f"{name}_bucket{{{inside}}} {count}"
-        outside = f"{{{labels}}}" if labels else ""
-        yield f"{name}_sum{outside} {_number(self._sum)}"
-        yield f"{name}_count{outside} {count}"
+            bucket_labels = ",".join(filter(None, (labels, f'le="{end}"')))
+            yield f"{name}_bucket{{{bucket_labels}}} {count}"
+        braces = f"{{{labels}}}" if labels else ""
+        yield f"{name}_sum{braces} {_number(self._sum)}"
+        yield f"{name}_count{braces} {count}"
 
 
 class Metrics:
@@ -53,8 +56,8 @@ class Metrics:
         worker: number of the process among several, or None.
 
     Attributes:
-        late: how late sessions were woken to send their frames.
-        planning: how long it took to read and plan documents.
+        late: seconds by which sessions woke too late to send frames.
+        planning: seconds of reading and planning documents.
         counts: name in `COUNTERS` -> count.
     """
 
@@ -73,14 +76,14 @@ class Metrics:
         """
         counts = {name: self.counts[name] + more.get(name, 0) for name in COUNTERS}
         lines: list[str] = []
-        outside = f"{{{self._labels}}}" if self._labels else ""
+        braces = f"{{{self._labels}}}" if self._labels else ""
         for kind, names, values in (("gauge", GAUGES, now), ("counter", COUNTERS, counts)):
             for name, description in names.items():
                 full = f"realizer_{name}" + ("_total" if kind == "counter" else "")
                 lines += [
                     f"# HELP {full} {description}",
                     f"# TYPE {full} {kind}",
-                    f"{full}{outside} {_number(values[name])}",
+                    f"{full}{braces} {_number(values[name])}",
                 ]
         for name, description, histogram in (
             ("realizer_lateness_seconds", "By how much a session was woken too late.", self.late),
@@ -121,7 +124,7 @@ def sum_samples(texts: Mapping[int, str]) -> str:
 
 
 def _number(value: float) -> str:
-    """Return integers exactly, other numbers with nine digits."""
+    """Format a number: integers exactly, other numbers with nine digits."""
     return str(int(value)) if value == int(value) else f"{value:.9g}"
 
 

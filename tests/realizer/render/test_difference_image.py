@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.render.difference_image import FULL, PAPER, difference, faint, flatten, ramp
+from realizer.render.difference_image import MAX_DIFFERENCE, PAPER, difference, faint, flatten, ramp
 
 
 @pytest.fixture
@@ -33,7 +33,7 @@ def test_faint_blurs_the_neutral_without_background(neutral):
 def test_difference_is_lighter_where_it_is_larger(neutral):
     flat = flatten(neutral, (90, 90, 90))
     brightness = []
-    for apart in (0.05, 0.12, 0.2, FULL, 2 * FULL):
+    for apart in (0.05, 0.12, 0.2, MAX_DIFFERENCE, 2 * MAX_DIFFERENCE):
         other = flat.copy()
         other[100:110, 100:110] = flat[100:110, 100:110] - np.uint8(np.ceil(255 * apart))
         out = difference(other, flat, faint(neutral))
