@@ -90,12 +90,6 @@ class ConstraintGraph:
             relations += self._chain(link.v, after.u)
         return _conflict(self.problem, relations, links)
 
-    def conflict(self, steps: Sequence[tuple[int, float, Relation | Link]]) -> Conflict:
-        """Return the conflict of a cycle of steps (point, seconds, reason)."""
-        links = [why for *_, why in steps if isinstance(why, Link)]
-        relations = [why if isinstance(why, Relation) else why.order for *_, why in steps]
-        return _conflict(self.problem, [r for r in relations if r is not None], links)
-
     def _chain(self, begin: int, end: int) -> list[Relation]:
         """Return the fewest equalities that connect one point to another."""
         previous: dict[int, tuple[int, Relation] | None] = {begin: None}
@@ -112,6 +106,14 @@ class ConstraintGraph:
             chain.append(step[1])
             step = previous[step[0]]
         return chain[::-1]
+
+
+def conflict_of(problem: Problem, steps: Iterable[Relation | Link]) -> Conflict:
+    """Return the conflict of the steps of a cycle."""
+    steps = list(steps)
+    links = [step for step in steps if isinstance(step, Link)]
+    relations = [step if isinstance(step, Relation) else step.order for step in steps]
+    return _conflict(problem, [r for r in relations if r is not None], links)
 
 
 def _conflict(problem: Problem, relations: Sequence[Relation], links: Sequence[Link]) -> Conflict:

@@ -58,11 +58,14 @@ class _GroupProblem:
         return Link(ORIGIN, point, float(model.earliest[model.owner[point]]))
 
 
-def solve_groups(model: Model, clusters: RigidClusters, groups: Sequence[Group]) -> list[list[Link]]:
+def solve_groups(
+    model: Model, clusters: RigidClusters, groups: Sequence[Group], find_all: bool = True
+) -> list[list[Link]]:
     """Move the points of some groups, in place, to the least cost within gaps and orders.
 
     Returns:
-        For each infeasible group a cycle of inequalities; no point is moved then.
+        Cycles of inequalities if there is no solution, and no point is moved then: one for each infeasible
+        group, or without `find_all` a single one.
     """
     # A group that can slide is moved so that its class of node 0 is at 0.
     begin = np.zeros(len(clusters.label))
@@ -70,31 +73,29 @@ def solve_groups(model: Model, clusters: RigidClusters, groups: Sequence[Group])
         if not group.held:
             begin[group.clusters] = clusters.at[_anchor(model, group)]
     clusters.at -= begin[clusters.label[model.owner]]
+    # This is much faster than the search for the optimum, which would not find one.
+    level, cycle = _feasible(model, clusters, groups)
+    if cycle and find_all:
+        return [cycle for group in groups if (cycle := _feasible(model, clusters, [group])[1])]
+    if cycle:
+        return [cycle]
     problem = _group_problem(model, clusters, groups)
     x = active_set(problem.quadratic, problem.start(clusters))
     if x is None:
-        cycles = [cycle for group in groups if (cycle := _impossible(model, clusters, group))]
-        if cycles:
-            return cycles
-        # Some least gaps may have been dropped.
-        problem = _group_problem(model, clusters, groups)
-        x = active_set(problem.quadratic, problem.start(clusters))
-    if x is None:
-        level, _ = feasible_start(problem.quadratic, problem.start(clusters))
         x = optimum(problem.quadratic, level)
     clusters.at[problem.points] = x[problem.number[model.root[problem.points]]] + model.shift[problem.points]
     return []
 
 
-def _impossible(model: Model, clusters: RigidClusters, group: Group) -> list[Link] | None:
-    """Return why a group violates its inequalities, or None if it can satisfy them with shorter gaps."""
+def _feasible(model: Model, clusters: RigidClusters, groups: Sequence[Group]) -> tuple[Float64, list[Link]]:
+    """Return positions that satisfy all inequalities, some least gaps dropped; or a cycle of inequalities."""
     while True:
-        problem = _group_problem(model, clusters, [group])
-        _, cycle = feasible_start(problem.quadratic, problem.start(clusters))
+        problem = _group_problem(model, clusters, groups)
+        level, cycle = feasible_start(problem.quadratic, problem.start(clusters))
         if not cycle:
-            return None
+            return level, []
         if not _yield_to_stated(model, problem.gaps):
-            return [problem.link(model, k) for k in cycle]
+            return level, [problem.link(model, k) for k in cycle]
 
 
 def _group_problem(model: Model, clusters: RigidClusters, groups: Sequence[Group]) -> _GroupProblem:

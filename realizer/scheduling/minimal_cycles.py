@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from realizer.scheduling.conflict import Conflict, ConstraintGraph, Link
+from realizer.scheduling.conflict import Conflict, ConstraintGraph, Link, conflict_of
 from realizer.scheduling.model import LOOSE, Model
 from realizer.scheduling.problem import ORIGIN, Relation
 
@@ -38,7 +38,7 @@ def minimal_cycles(model: Model, web: ConstraintGraph, cycles: Sequence[Sequence
             left -= tried
             if steps:
                 steps = _simple(start, steps)
-                clash = web.conflict(steps)
+                clash = conflict_of(model.problem, (reason for *_, reason in steps))
                 todo = sorted(point for point, _, _ in steps)
         conflicts.append(clash)
     return conflicts

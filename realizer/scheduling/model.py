@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from realizer.core.array_types import Bool, Float64
-from realizer.scheduling.conflict import Conflict, ConstraintGraph
 from realizer.scheduling.problem import ORIGIN, Problem
 from realizer.scheduling.union_find import UnionFind
 
@@ -58,8 +57,8 @@ class Model:
         return np.flatnonzero(chosen[self.owner])
 
 
-def model_of(problem: Problem) -> Model | list[Conflict]:
-    """Return the problem as arrays, or the loops of equalities that do not close."""
+def model_of(problem: Problem) -> Model | list[int]:
+    """Return the problem as arrays, or the numbers of the equalities that contradict those before them."""
     n = len(problem.owner)
     ties = UnionFind(n)
     contradicting = [
@@ -68,8 +67,7 @@ def model_of(problem: Problem) -> Model | list[Conflict]:
         if abs(ties.tie(u, v, seconds)) > LOOSE
     ]
     if contradicting:
-        web = ConstraintGraph(problem, contradicting)
-        return [web.loop(k) for k in contradicting]
+        return contradicting
     named = {p for relation in problem.equalities for p in relation[:2]}
     named.discard(ORIGIN)
     tied = sorted(named)

@@ -36,17 +36,26 @@ class Solution:
 def solve(problem: Problem) -> Solution | list[Conflict]:
     """Return the least-cost times of a problem, as early as possible; or some of its conflicts.
 
-    There may be more conflicts after the returned ones are resolved.
+    There may be more conflicts after the returned ones are resolved. Those of a small problem have the fewest
+    statements; those of a large one are found in one pass.
     """
-    if len(problem.owner) <= FEW and (found := solve_small(problem)) is not None:
+    is_small = len(problem.owner) <= FEW
+    if is_small and (found := solve_small(problem)) is not None:
         return Solution(np.array(found[0]), found[1])
     model = model_of(problem)
+    if isinstance(model, list) and is_small:
+        graph = ConstraintGraph(problem, model)
+        return [graph.loop(k) for k in model]
     if isinstance(model, list):
-        return model
+        return _all_conflicts(problem)
     clusters = clusters_of(model)
-    clashes = _keep_inequalities(model, clusters)
-    if clashes:
-        return clashes
+    cycles = _keep_inequalities(model, clusters, is_small)
+    if cycles and is_small:
+        from realizer.scheduling.minimal_cycles import minimal_cycles  # only for contradicting documents
+
+        return minimal_cycles(model, ConstraintGraph(problem), cycles)
+    if cycles:
+        return _all_conflicts(problem)
     time = _slide(model, clusters)
     # Remove rounding errors from equalities, orders and earliest starts.
     time = time[model.root] + model.shift
@@ -61,8 +70,18 @@ def solve(problem: Problem) -> Solution | list[Conflict]:
     return Solution(time, float(np.sum(model.stiffness * strain * strain)))
 
 
-def _keep_inequalities(model: Model, clusters: RigidClusters) -> list[Conflict]:
-    """Solve, in place, the groups of clusters that violate an inequality which sliding cannot satisfy."""
+def _all_conflicts(problem: Problem) -> list[Conflict]:
+    from realizer.scheduling.feasibility import conflicts_of  # only for large contradicting documents
+
+    return conflicts_of(problem)
+
+
+def _keep_inequalities(model: Model, clusters: RigidClusters, find_all: bool) -> list[list[Link]]:
+    """Solve, in place, the groups of clusters that violate an inequality which sliding cannot satisfy.
+
+    Returns:
+        Cycles of inequalities if there is no solution: of each group, or without `find_all` a single one.
+    """
     at, label = clusters.at, clusters.label
     length = at[model.gap + 1] - at[model.gap]
     misfit = (length < model.least - TIGHT) | (length > model.most + TIGHT)
@@ -73,15 +92,11 @@ def _keep_inequalities(model: Model, clusters: RigidClusters) -> list[Conflict]:
     begin = _earliest(model, clusters)
     groups = [g for g in groups if not bad.isdisjoint(g.clusters) or not _fits(model, clusters, g, begin)]
     groups += [Group([shape], [], bool(clusters.held[shape])) for shape in sorted(alone)]
-    cycles = solve_groups(model, clusters, groups) if groups else []
+    cycles = solve_groups(model, clusters, groups, find_all) if groups else []
     for order in model.problem.orders:
         if order.u == order.v == ORIGIN and order.seconds > LOOSE:
             cycles.append([Link(ORIGIN, ORIGIN, order.seconds, order)])
-    if not cycles:
-        return []
-    from realizer.scheduling.minimal_cycles import minimal_cycles  # for documents that contradict themselves
-
-    return minimal_cycles(model, ConstraintGraph(model.problem), cycles)
+    return cycles
 
 
 def _fits(model: Model, clusters: RigidClusters, group: Group, begin: Float64) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from realizer.scheduling.conflict import ConstraintGraph, Link
+from realizer.scheduling.conflict import ConstraintGraph, Link, conflict_of
 from realizer.scheduling.problem import ORIGIN, Part, Problem, Relation
 from realizer.scheduling.timing import Timing
 from tests.realizer.scheduling.recipes import lasting
@@ -64,19 +64,19 @@ def test_cycle_joins_greatest_lengths_backwards() -> None:
     assert round(gap.seconds, 9) == 0.5
 
 
-def test_conflict_has_the_bound_of_a_behaviour_that_starts_too_early() -> None:
+def test_conflict_of_has_the_bound_of_a_behaviour_that_starts_too_early() -> None:
     made = problem(1)
     pin = Relation(1, ORIGIN, 0.0, made.behaviours[0], ("a:start", "=", 0))
-    found = ConstraintGraph(made).conflict([(1, 0.5, Link(ORIGIN, 1, 0.5)), (ORIGIN, 0.0, pin)])
+    found = conflict_of(made, [Link(ORIGIN, 1, 0.5), pin])
     assert found.relations == (pin,)
     assert found.earliest == (made.behaviours[0], "a:start", 0.5)
     assert (found.statements, [part.name for part in found.named]) == (2, ["a"])
 
 
-def test_conflict_names_each_order_once() -> None:
+def test_conflict_of_names_each_order_once() -> None:
     made = problem(1, 1)
     order = Relation(2, 3, 0.0, CONSTRAINT, ("b:start", "not before", "a:end"))
     link = Link(2, 3, 0.0, order)
-    found = ConstraintGraph(made).conflict([(3, 0.0, link), (3, 0.0, link)])
+    found = conflict_of(made, [link, link])
     assert found.relations == (order,)
     assert not found.gaps
