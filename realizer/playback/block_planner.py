@@ -269,14 +269,15 @@ class _PlanBuilder:
             if id in self.block.required:
                 self.refuse(dropped[id], f" (required {id})")
         self.block, removed_references, fatal = without(self.block, dropped.keys())
+        # The new warnings replace earlier ones about the behaviours.
+        replaced = {warning.id for warning in dropped.values()}
+        self.warnings = [w for w in self.warnings if w.id not in replaced]
         for id, warning in dropped.items():
             self.timings.pop(id, None)
             if id in fatal:
                 self.refuse(warning, f" (a required constraint names {id})")
             if names := removed_references.get(id):
                 warning = replace(warning, text=f"{warning.text}; with it went {listed(names)}")
-            # The new warning replaces earlier ones about the behaviour.
-            self.warnings = [w for w in self.warnings if w.id != warning.id]
             self.warnings.append(warning)
 
     def refuse(self, warning: Warning, more: str = "") -> NoReturn:

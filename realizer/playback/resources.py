@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import count
 from math import inf
+from operator import itemgetter
 
 from bml_schema import Block, Interrupt
 from realizer.behaviours.kind import BehaviourKind, PlanningContext
@@ -14,6 +17,8 @@ from realizer.scheduling.timing import Schedule
 MAX_OVERLAP = 1e-3
 # s; two speeches that overlap by less are placed one after the other, if their references allow it.
 MAX_SHIFT = 0.3
+# Up to so many overlapping claims, the first that was granted is named as the reason.
+MANY = 50
 # Resources that may pass from one behaviour to the next: two claims conflict only if one contains the other.
 # A gaze passes only within its block, because other blocks must not disturb it; a base state passes to any
 # block, or it could never change.
@@ -176,19 +181,68 @@ def conflicts(
     Existing claims win against new ones, and lower ranks against higher ones. The times in messages count
     from `start`. For `in_silence` see `ResourceClaim.conflicts_with`.
     """
-    granted: dict[str, list[ResourceClaim]] = {}
+    granted: dict[str, dict[str, _ClaimsOfBlock]] = {}
+    number = count()
+
+    def add(claim: ResourceClaim) -> None:
+        granted.setdefault(claim.resource, {}).setdefault(claim.block, _ClaimsOfBlock()).add(
+            next(number), claim
+        )
+
     for claim in existing_claims:
-        granted.setdefault(claim.resource, []).append(claim)
+        add(claim)
     by_behaviour: dict[str, list[ResourceClaim]] = {}
     for claim in sorted(new_claims, key=lambda c: c.rank):
         by_behaviour.setdefault(claim.behaviour, []).append(claim)
     found: list[ResourceConflict] = []
     for own in by_behaviour.values():
-        pairs = ((c, g) for c in own for g in granted.get(c.resource, ()))
-        clash = ((c, g) for c, g in pairs if g.conflicts_with(c, in_silence=in_silence))
-        if (conflict := next(clash, None)) is not None:
-            found.append(ResourceConflict(*conflict, start))
-            continue
         for claim in own:
-            granted.setdefault(claim.resource, []).append(claim)
+            blocks = granted.get(claim.resource, {}).values()
+            winners = [winner for block in blocks for winner in block.winners(claim, in_silence)]
+            if winners:
+                found.append(ResourceConflict(claim, min(winners, key=itemgetter(0))[1], start))
+                break
+        else:
+            for claim in own:
+                add(claim)
     return found
+
+
+class _ClaimsOfBlock:
+    """The claims of a block on a resource, by their begins.
+
+    The claims of a block do not lie within each other, or one would have been dropped: so their ends are in
+    the same order. The few that do, because they were cut off, are compared one by one.
+    """
+
+    def __init__(self) -> None:
+        self._begins: list[float] = []
+        self._claims: list[tuple[int, ResourceClaim]] = []  # in the order of their begins
+        self._nested: list[tuple[int, ResourceClaim]] = []
+
+    def add(self, number: int, claim: ResourceClaim) -> None:
+        """Add a claim with its number, the order in which claims win."""
+        place = bisect_right(self._begins, claim.begin)
+        follows = place == 0 or self._claims[place - 1][1].end <= claim.end
+        if follows and (place == len(self._claims) or claim.end <= self._claims[place][1].end):
+            self._begins.insert(place, claim.begin)
+            self._claims.insert(place, (number, claim))
+        else:
+            self._nested.append((number, claim))
+
+    def winners(self, claim: ResourceClaim, in_silence: bool) -> list[tuple[int, ResourceClaim]]:
+        """Return claims, with their numbers, because of which a new claim is refused.
+
+        If it overlaps very many they are not all compared: if any wins, one that begins first or last does,
+        or one that begins about when the new claim does.
+        """
+        low = bisect_left(self._claims, claim.begin, key=lambda numbered: numbered[1].end)
+        high = bisect_left(self._begins, claim.end)
+        places: Iterable[int] = range(low, high)
+        if len(range(low, high)) > MANY:
+            near = bisect_left(self._begins, claim.begin)
+            places = sorted({low, low + 1, high - 1, *range(max(near - 2, low), min(near + 2, high))})
+        overlapping = (*(self._claims[place] for place in places), *self._nested)
+        return [
+            numbered for numbered in overlapping if numbered[1].conflicts_with(claim, in_silence=in_silence)
+        ]
