@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,6 +11,7 @@ from hypothesis import strategies as st
 
 from bml_schema import Interrupt, parse
 from realizer.behaviours.registry import VOCABULARY
+from realizer.playback import resources
 from realizer.playback.resources import (
     PASSES,
     ResourceClaim,
@@ -159,3 +162,36 @@ def test_interrupts_are_at_the_start_of_their_behaviours() -> None:
     schedule = Schedule("b", {"i": ("start", "end")}, {"i": np.array([2.0, 2.0])}, start=10.0)
     ((time, act),) = interrupts(parse(text, VOCABULARY), schedule)
     assert (time, act.target) == (12.0, "a")
+
+
+times = st.integers(0, 40).map(lambda k: k / 4)
+claims_of = st.builds(
+    lambda resource, block, begin, length, rank: ResourceClaim(
+        resource, begin, begin + length, block, f"{begin}-{length}-{rank}", (0.0, False, rank)
+    ),
+    st.sampled_from(["voice", "gaze", "base gaze"]),
+    st.just("new"),
+    times,
+    times,
+    st.integers(0, 10**6),
+)
+
+
+@pytest.mark.parametrize("many", [2, resources.MANY])
+@given(st.lists(claims_of, max_size=40), st.lists(claims_of, max_size=8), st.integers(1, 2))
+def test_conflicts_are_those_of_all_pairs(many, new, existing, blocks) -> None:
+    new = [replace(claim, behaviour=f"n{k}", rank=(0.0, False, k)) for k, claim in enumerate(new)]
+    existing = [replace(claim, block=f"old{k % blocks}") for k, claim in enumerate(existing)]
+    granted, expected = list(existing), []
+    for claim in new:
+        winner = next((g for g in granted if g.conflicts_with(claim)), None)
+        if winner is None:
+            granted.append(claim)
+        else:
+            expected.append((claim, winner))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(resources, "MANY", many)
+        found = [(conflict.claim, conflict.winner) for conflict in conflicts(new, existing)]
+    assert [claim for claim, _ in found] == [claim for claim, _ in expected]
+    if many == resources.MANY:
+        assert found == expected
