@@ -1,16 +1,16 @@
-"""The table of dialects: what their elements, attributes and values become in BML 1.0 (`rows.csv`).
+"""The table of dialects: the elements, attributes and values that BML 1.0 has instead (`rows.csv`).
 
 Columns:
 
-    dialect    whose word it is: SmartBody, Greta, draft, or any
-    element    its local name; with the prefix sbm: only in SmartBody's namespace; * for every behaviour
-    attribute  "" in the row of the element itself; sbm: is optional
-    value      a pattern, in any case; "" for any value, (none) if the element lacks the attribute
+    dialect    the dialect that has it: SmartBody, Greta, draft, or any
+    element    local name of the element; prefix sbm: if only in SmartBody's namespace; * for every behaviour
+    attribute  name of the attribute, the prefix sbm: is optional; "" in the row of the element itself
+    value      a pattern, in any case; "" for any value, (none) if the attribute is missing
     becomes    of an element: another name, with attributes behind ": ", or - to remove it, or "" if it stays
                of an attribute: another name, - to remove it, ! to remove the element, name=value;name=value,
                @function of `values`, or a|b: the first sync point that the element has; with another name of
                the element in front of ": " if it changes too
-    says       what a reader should know besides
+    says       a remark for the documentation and for warnings
 """
 
 from __future__ import annotations
@@ -47,14 +47,14 @@ class Row(NamedTuple):
 
 
 class Table(NamedTuple):
-    """The rows, by what they are about.
+    """The rows of the table.
 
     Attributes:
-        rows: all, in order.
-        elements: name -> its row.
+        rows: all rows, in order.
+        elements: name of an element -> its row.
         attributes: element -> attribute without prefix -> (pattern of the value or None, row), in order.
-        missing: element -> the rows for attributes that it lacks.
-        points: name of a sync point, as it is or in lower case without - and _ -> its row.
+        missing: element -> the rows for missing attributes.
+        points: name of a sync point, as written or `squeezed` -> its row.
     """
 
     rows: Sequence[Row]

@@ -1,4 +1,4 @@
-"""The translation of an element tree from a dialect to BML 1.0, in place, before it is parsed."""
+"""Translates an element tree from a dialect to BML 1.0, in place, before it is parsed."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = ["is_draft", "made_ids", "translate"]
 
 _SPACES = {"ext": EXTENSIONS, "bmla": BMLA, "bmlt": BMLT, "realizer": OWN}
 _OURS = frozenset({BMLA, BMLT, OWN})
-_MOST_LISTED = 12  # words that the warning names
+_MAX_LISTED = 12  # words in the warning
 _NAMES = {"SmartBody": "SmartBody's BML", "Greta": "Greta's BML", "draft": "a draft of BML"}
 _POINTS = {local(tag): cls.sync_points for tag, cls in VOCABULARY.items()}
 _MARKS = {local(tag) for tag, cls in VOCABULARY.items() if cls.marks}
@@ -44,12 +44,12 @@ def translate(root: etree._Element, wrapper: str, block_ids: Iterator[str]) -> s
     """Translate a document to BML 1.0 in place.
 
     Args:
-        root: the <bml> element; what is BML 1.0 already stays as it is.
+        root: the <bml> element; elements and attributes of BML 1.0 do not change.
         wrapper: local name of the element around it, or "".
-        block_ids: where its id comes from if it has none and is in a dialect.
+        block_ids: ids for blocks of a dialect without an id.
 
     Returns:
-        What was read how, for one warning; "" if nothing was changed.
+        The text of a warning that lists the translations; "" if nothing was translated.
     """
     space = str(root.tag).rpartition("}")[0][1:]
     if space not in ("", CORE, *DRAFTS):
@@ -73,8 +73,8 @@ class _Translation:
     """The translation of one document.
 
     Attributes:
-        applied: the rows of the table that it has used.
-        in_dialect: the document is in a dialect, so that rows for any dialect are used too.
+        applied: the rows of the table that it has used, in order.
+        in_dialect: whether the document is in a dialect, so that rows for any dialect apply too.
     """
 
     def __init__(self, root: etree._Element) -> None:
@@ -109,7 +109,7 @@ class _Translation:
             own = self.table.elements.get(key) or self.table.elements.get(name)
             if not self._attributes(element, name, key):
                 continue
-            if own is not None and own.becomes and not self._becomes(element, own):
+            if own is not None and own.becomes and not self._translate_element(element, own):
                 continue
             renamed, _ = self._name(element)
             if renamed != name and not self._attributes(element, renamed):
@@ -123,7 +123,7 @@ class _Translation:
             self._children(element)
 
     def _name(self, element: Any) -> tuple[str, str | None]:
-        """Return the local name of an element, and its name in the table; None if it is no dialect's."""
+        """Return the local name of an element, and its name in the table, or None for an extension."""
         space, _, name = str(element.tag).rpartition("}")
         if space[1:] in _OURS:
             return name, None
@@ -141,7 +141,7 @@ class _Translation:
             known = {**known, **self.table.attributes.get(key, {})}
         everywhere = self.table.attributes["*"]
         if len(element.attrib) > MAX_ATTRIBUTES:
-            return True  # the parser refuses it
+            return True  # the parser will refuse it
         for attribute, value in element.items():
             short = attribute.rpartition("}")[2]
             rows = known.get(short) or (everywhere.get(short) if name in _POINTS or key != name else None)
@@ -193,14 +193,14 @@ class _Translation:
         return True
 
     def _assignments(self, row: Row, element: Any, value: str) -> Iterator[tuple[str, str]]:
-        """Yield the attributes that a row gives."""
+        """Yield (name, value) of the attributes that a row sets."""
         for part in row.becomes.rpartition(": ")[2].split(";"):
             name, _, text = part.partition("=")
             if "{id}" in text and not element.get("id", "").strip():
                 element.set("id", self._free_id(element))
             yield name, text.format(value=value.strip(), id=element.get("id", "").strip())
 
-    def _becomes(self, element: Any, row: Row) -> bool:
+    def _translate_element(self, element: Any, row: Row) -> bool:
         """Apply the row of an element; return whether the element stays."""
         self._apply(row)
         if row.becomes == "-":
@@ -233,7 +233,7 @@ class _Translation:
         return local(str(element.tag))
 
     def _sync_points(self, element: Any, kinds: Mapping[str, str]) -> None:
-        """Give sync points of a behaviour, and those it refers to, their names in BML 1.0."""
+        """Rename the sync points of a behaviour, and those that it refers to, to their names in BML 1.0."""
         kind = self._kind(element)
         points = _POINTS.get(kind)
         if points is None or len(element.attrib) > MAX_ATTRIBUTES:
@@ -255,16 +255,16 @@ class _Translation:
                 element.set(point, reference)
 
     def _point(self, row: Row, name: str, points: tuple[str, ...]) -> str:
-        """Return the first point of a row that a behaviour has, or "" if only a dialect means it."""
+        """Return the first sync point of a row that a behaviour has, or "" if the row does not apply."""
         meant = next((point for point in row.becomes.split("|") if point in points), "")
         spelled = name.lower() != meant.lower() and squeezed(name) == squeezed(meant)
         return meant if self.in_dialect or spelled else ""
 
     def _reference(self, value: str, kinds: Mapping[str, str]) -> str:
-        """Return a reference to the sync point that is meant."""
-        if called := _FUNCTION.fullmatch(value):
+        """Return a reference with the name of its sync point in BML 1.0."""
+        if function := _FUNCTION.fullmatch(value):
             self._apply(self.table.elements["*"])
-            value = called[1]
+            value = function[1]
         found = _REFERENCE.fullmatch(value)
         if found is None:
             return value
@@ -276,16 +276,16 @@ class _Translation:
         row = point_row(point)
         if points is None or row is None or point in points:
             return value
-        meant = self._point(row, point, points)
-        if not meant:
+        translated = self._point(row, point, points)
+        if not translated:
             return value
         self._apply(row)
-        return f"{id}:{meant}{offset or ''}"
+        return f"{id}:{translated}{offset or ''}"
 
     # ids
 
     def add_ids(self) -> list[str]:
-        """Give ids to the behaviours that have none or another's; return what was made."""
+        """Set the ids of behaviours with no id or with that of another one; return descriptions of them."""
         seen: set[str] = set()
         made = []
         for element in self._timed():
@@ -306,7 +306,7 @@ class _Translation:
         return id
 
     def add_character(self) -> None:
-        """Take the character from SmartBody's <participant>."""
+        """Set the character that SmartBody's <participant> names."""
         around = self.root.getparent()
         participants = around.findall("{*}participant") if around is not None else []
         if (
@@ -342,5 +342,5 @@ def _shown(row: Row) -> str:
 
 
 def _listed(words: list[str]) -> str:
-    rest = len(words) - _MOST_LISTED
-    return ", ".join(words[:_MOST_LISTED]) + (f" and {rest} more" if rest > 0 else "")
+    rest = len(words) - _MAX_LISTED
+    return ", ".join(words[:_MAX_LISTED]) + (f" and {rest} more" if rest > 0 else "")

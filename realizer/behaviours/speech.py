@@ -19,10 +19,10 @@ from realizer.scheduling.timing import Timing
 from realizer.speech.utterance import MAX_TEXT, Recording, SpeechRequest, Utterance
 
 SSML = "application/ssml+xml"
-# 1/s: a second of speech is as stiff as a stiff gap of the face. Gaps are at least SHORT for this.
-BEND, SHORT = 1000.0, 0.01
-# s; minimum duration, for text without words such as a full stop.
-LEAST = 0.1
+# Stiffness of a second of speech, which is that of a stiff gap of the face; shorter gaps are stiffer.
+STIFFNESS = 1000.0
+MIN_GAP = 0.01  # s; limits the stiffness of very short gaps
+MIN_DURATION = 0.1  # s, for text without words such as a full stop
 LANG = "{http://www.w3.org/XML/1998/namespace}lang"
 
 
@@ -36,10 +36,10 @@ class SpokenContent:
 
 
 def speech_request(node: Speech, context: PlanningContext) -> SpeechRequest | None:
-    """Return the SSML description of highest priority, or else the text with its syncs as marks.
+    """Return the request for the SSML description of highest priority, or for the text with its marks.
 
-    A description that is an audio file replaces the voice; its text is in the others, or came with the clip.
-    Without text, the mouth follows the loudness.
+    A description with an audio file replaces the voice. The text is then in another description, or in the
+    sound clip; without text, the mouth follows the loudness.
     """
     recording = _recording(node, context)
     spoken = _spoken_content(node)
@@ -52,7 +52,7 @@ def speech_request(node: Speech, context: PlanningContext) -> SpeechRequest | No
 
 
 def timing(node: Speech, context: PlanningContext) -> Timing:
-    """Return the rigid timing: start, the sync points in the order of their times, end.
+    """Return the rigid timing of start, the sync points in the order of their times, and end.
 
     Raises:
         KeyError: there is no `context.utterances[node.id]` yet.
@@ -64,13 +64,13 @@ def timing(node: Speech, context: PlanningContext) -> Timing:
         for name, time in utterance.marks.items()
         if name not in Speech.sync_points
     }
-    # A sync that the SSML or the voice left out is as far into the sound as into the text.
-    guessed = {name: part * utterance.duration for name, part in _places(node).items()}
-    times = guessed | measured
-    order = {name: i for i, name in enumerate((*spoken.marks, *guessed))}
+    # The time of a sync that the voice does not report is estimated from its position in the text.
+    estimated = {name: part * utterance.duration for name, part in _places(node).items()}
+    times = estimated | measured
+    order = {name: i for i, name in enumerate((*spoken.marks, *estimated))}
     names = sorted(times, key=lambda name: (times[name], order.get(name, len(order))))
     points = ("start", *names, "end")
-    gaps = np.diff([0.0, *(times[name] for name in names), max(utterance.duration, LEAST)])
+    gaps = np.diff([0.0, *(times[name] for name in names), max(utterance.duration, MIN_DURATION)])
     return Timing(points, gaps, gaps, np.ones(len(gaps)), rigid=True)
 
 
@@ -82,7 +82,7 @@ def stretch(node: Speech, context: PlanningContext) -> Timing | None:
     natural = timing(node, context)
     gaps = natural.preferred
     # With stiffness inverse to length all gaps stretch evenly, as with one rate of speech.
-    stiffness = BEND / np.maximum(gaps, SHORT)
+    stiffness = STIFFNESS / np.maximum(gaps, MIN_GAP)
     return Timing(natural.points, gaps, gaps * least, stiffness, most=gaps * most)
 
 
@@ -95,19 +95,19 @@ def expand(node: Speech, times: Float64, context: PlanningContext) -> tuple[Chan
 
 
 # Utterance -> its start and lips. A long text grows part by part, and the lips of earlier parts are reused.
-_made: WeakKeyDictionary[Utterance, tuple[float, tuple[Channel, ...]]] = WeakKeyDictionary()
+_cached_lips: WeakKeyDictionary[Utterance, tuple[float, tuple[Channel, ...]]] = WeakKeyDictionary()
 
 
 def _lips(utterance: Utterance, start: float) -> tuple[Channel, ...]:
     # Imported here, because it reads tables that a block without speech does not need.
     from realizer.animation.lips.lip_sync import lip_channels
 
-    if utterance not in _made:
-        _made[utterance] = start, lip_channels(utterance.phonemes, start, room=max(start, 0.0))
-    before, channels = _made[utterance]
+    if utterance not in _cached_lips:
+        _cached_lips[utterance] = start, lip_channels(utterance.phonemes, start, room=max(start, 0.0))
+    before, channels = _cached_lips[utterance]
     if start != before:
         channels = tuple(channel.shifted(start - before) for channel in channels)
-        _made[utterance] = start, channels
+        _cached_lips[utterance] = start, channels
     return channels
 
 

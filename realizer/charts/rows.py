@@ -1,4 +1,4 @@
-"""The row of one behaviour: names, gaps in colour, sync points, text."""
+"""Draws the row of one behaviour: its name, coloured gaps, sync points and words."""
 
 import math
 import re
@@ -10,24 +10,24 @@ from realizer.charts.shapes import Box, Path, Picture, Text, cut, cut_inside, fo
 from realizer.charts.timeline import BehaviourRow, Dropped, Gap
 
 HEIGHT = 46.0
-# Above the bar there is room for pins and for what orders leave, below it for the names of the points.
+# Pins and arrows are above the bar, the names of sync points below it.
 ABOVE, BAR = 13.0, 18.0
-NAME = 62.0  # where ids begin; kinds stand before them
+NAME = 62.0  # left edge of ids; kinds are to the left of them
 SMALL, PLAIN = 9.5, 12.5
-SAME = 1e-6  # s; a word at a sync point begins there, however it was rounded
-MAX_WHY = 4  # lines of a reason
-_AT = re.compile(r"line \d+, /\S*: ")
+TOLERANCE = 1e-6  # s; rounding errors of the begins of words and sync points
+MAX_REASON = 4  # lines
+_PLACE = re.compile(r"line \d+, /\S*: ")
 
 
 def draw_row(
-    picture: Picture, scale: Scale, line: BehaviourRow, start: float, top: float, tied: frozenset[str]
+    picture: Picture, scale: Scale, line: BehaviourRow, start: float, top: float, linked: frozenset[str]
 ) -> None:
     """Draw the row of a behaviour.
 
     Args:
-        start: of its block, seconds on the session clock.
-        top: of the row, in pixels.
-        tied: its points that take part in a link: named before others.
+        start: start of its block, seconds on the session clock.
+        top: top of the row in pixels.
+        linked: its sync points that belong to a link; their names have priority.
     """
     _name(picture, line.id, _about(line), top, INK, FAINT)
     bar = top + ABOVE
@@ -36,19 +36,19 @@ def draw_row(
         picture.add(Box(left, bar, right - left, BAR, colour(gap), tip=_tip(line, gap)))
     picture.add(Box(xs[0], bar, max(xs[-1] - xs[0], 1.0), BAR, None, "#4b5563"))
     if line.words:
-        _say(picture, scale, line, start, bar)
+        _words(picture, scale, line, start, bar)
     else:
         for gap, left, right in zip(line.gaps, xs[:-1], xs[1:], strict=True):
             _percent(picture, gap, left, right, bar)
     for point, x in zip(line.points, xs, strict=True):
         tip = f"{line.id}:{point.name} {point.time:.3f} s"
         picture.add(Path(((x, bar - 3), (x, bar + BAR + 3)), INK, 1.3, tip=tip))
-    _names(picture, [p.name for p in line.points], xs, bar + BAR + 13, tied, scale.right)
+    _names(picture, [p.name for p in line.points], xs, bar + BAR + 13, linked, scale.right)
 
 
 def height_of(dropped: Dropped, scale: Scale) -> float:
     """Return the height of the row of dropped behaviours."""
-    return 22.0 + 13.0 * max(1, len(_why(dropped, scale)))
+    return 22.0 + 13.0 * max(1, len(_reason(dropped, scale)))
 
 
 def draw_dropped(picture: Picture, scale: Scale, dropped: Dropped, top: float, height: float) -> None:
@@ -60,8 +60,8 @@ def draw_dropped(picture: Picture, scale: Scale, dropped: Dropped, top: float, h
     picture.add(Box(scale.left, top + 3, scale.right - scale.left, height - 6, "#f3f4f6", radius=3))
     picture.add(*hatch(scale.left, top + 3, 16, height - 6, LOST, 6))
     picture.add(Text(scale.left + 24, top + 17, dropped.type.replace("_", " ").lower(), SMALL, FAINT))
-    for k, words in enumerate(_why(dropped, scale)):
-        picture.add(Text(scale.left + 24, top + 30 + 13 * k, words, 10.5, "#4b5563"))
+    for k, text in enumerate(_reason(dropped, scale)):
+        picture.add(Text(scale.left + 24, top + 30 + 13 * k, text, 10.5, "#4b5563"))
 
 
 def colour(gap: Gap) -> str:
@@ -114,8 +114,8 @@ def _percent(picture: Picture, gap: Gap, left: float, right: float, bar: float) 
             return
 
 
-def _say(picture: Picture, scale: Scale, line: BehaviourRow, start: float, bar: float) -> None:
-    """Draw the words, each at its time, or as a line from point to point if they do not fit."""
+def _words(picture: Picture, scale: Scale, line: BehaviourRow, start: float, bar: float) -> None:
+    """Draw each word at its time, or if they do not fit, the words between two sync points as one text."""
     spans = [(scale.x(start + w.start), scale.x(start + w.end), w.text) for w in line.words]
     if all(width_of(text, 10.5) <= max(right - left, 12) + 3 for left, right, text in spans):
         for left, right, text in spans:
@@ -123,37 +123,39 @@ def _say(picture: Picture, scale: Scale, line: BehaviourRow, start: float, bar: 
         return
     for begin, end in zip(line.points[:-1], line.points[1:], strict=True):
         left, right = scale.x(start + begin.time), scale.x(start + end.time)
-        spoken = " ".join(w.text for w in line.words if begin.time - SAME <= w.start < end.time - SAME)
+        spoken = " ".join(
+            w.text for w in line.words if begin.time - TOLERANCE <= w.start < end.time - TOLERANCE
+        )
         if text := cut(spoken, SMALL, right - left - 6):
             picture.add(Text(left + 4, bar + 12.5, text, SMALL, INK))
 
 
 def _names(
-    picture: Picture, names: Sequence[str], xs: Sequence[float], y: float, tied: frozenset[str], edge: float
+    picture: Picture, names: Sequence[str], xs: Sequence[float], y: float, linked: frozenset[str], edge: float
 ) -> None:
-    """Draw names under their ticks, as many as fit: linked points first, then the ends, then the rest."""
-    order = sorted(range(len(names)), key=lambda k: (names[k] not in tied, 0 < k < len(names) - 1, k))
+    """Draw the names that fit below their ticks: first of linked points, then of both ends, then others."""
+    order = sorted(range(len(names)), key=lambda k: (names[k] not in linked, 0 < k < len(names) - 1, k))
     taken: list[tuple[float, float]] = []
     for k in order:
-        wide = width_of(names[k], SMALL)
-        for shift in _shifts(wide, k, len(names)):
+        width = width_of(names[k], SMALL)
+        for shift in _shifts(width, k, len(names)):
             left = xs[k] + shift
-            if left + wide > edge + 20 or left < Scale(0, 1, 1).left - 8:
+            if left + width > edge + 20 or left < Scale(0, 1, 1).left - 8:
                 continue
-            if all(left > b + 3 or left + wide < a - 3 for a, b in taken):
-                taken.append((left, left + wide))
-                ink = INK if names[k] in tied else FAINT
+            if all(left > b + 3 or left + width < a - 3 for a, b in taken):
+                taken.append((left, left + width))
+                ink = INK if names[k] in linked else FAINT
                 picture.add(Text(left, y, names[k], SMALL, ink, halo=PAPER))
                 break
 
 
-def _shifts(wide: float, k: int, count: int) -> Iterable[float]:
-    """Return possible places of a name, from its tick: in the middle, to the right, to the left."""
-    first = (-2.0, -wide / 2) if k == 0 else (-wide + 2, -wide / 2) if k == count - 1 else (-wide / 2,)
-    return (*first, -2.0, -wide + 2)
+def _shifts(width: float, k: int, count: int) -> Iterable[float]:
+    """Return possible offsets of a name from its tick: in the middle, to the right, to the left."""
+    first = (-2.0, -width / 2) if k == 0 else (-width + 2, -width / 2) if k == count - 1 else (-width / 2,)
+    return (*first, -2.0, -width + 2)
 
 
-def _why(dropped: Dropped, scale: Scale) -> Sequence[str]:
-    # The line of the document is below the name.
-    text = _AT.sub("", dropped.text)
-    return fold(text, 10.5, scale.right - scale.left - 36, MAX_WHY)
+def _reason(dropped: Dropped, scale: Scale) -> Sequence[str]:
+    # The place in the document is shown below the name.
+    text = _PLACE.sub("", dropped.text)
+    return fold(text, 10.5, scale.right - scale.left - 36, MAX_REASON)

@@ -1,4 +1,4 @@
-"""The deformer: a sparse product for displacements, then rigid parts and eyelids."""
+"""Deforms a face: displacements by a sparse matrix, then rigid parts and eyelids."""
 
 from typing import Any
 
@@ -11,25 +11,25 @@ from realizer.face.basis import FAPS, JAW_COS, JAW_DROP, JAW_SIN, ROWS, TONGUE_C
 from realizer.face.contours import couple_lips
 from realizer.face.model import Face
 
-OPEN_JAW, TONGUE_ROLL, HEAD, EYES, THRUST = 2, 46, slice(47, 50), slice(22, 26), slice(26, 28)  # columns
-LIDS = slice(18, 22)  # columns: upper left and right, lower left and right
-CHUNK = 16  # frames at once, so that they fit a cache
-MAX_TURN = 0.42  # rad, 24 degrees
-# Rotated by these, the parts are driven apart from the product. Eyeballs too, but they have no rows in it;
-# eyes that are no balls have rows, and no vertices that turn.
-DRIVEN = [OPEN_JAW, TONGUE_ROLL, 47, 48, 49]
+# Columns of poses.
+OPEN_JAW, TONGUE_ROLL, HEAD, EYES, THRUST = 2, 46, slice(47, 50), slice(22, 26), slice(26, 28)
+LIDS = slice(18, 22)  # upper left and right, lower left and right
+CHUNK = 16  # frames at once, so that they fit into the processor's cache
+MAX_JAW_TURN = 0.42  # rad, 24 degrees
+# Columns of rotations, which the sparse matrix does not apply. It has no rows for the rotations of eyeballs;
+# eyes without eyeballs have rows.
+ROTATING = [OPEN_JAW, TONGUE_ROLL, 47, 48, 49]
 
 
 def deform(face: Face, poses: Any) -> Float32:
-    """Return the face's vertices in poses.
+    """Return the vertices of a face in poses.
 
-    FAPs move every face. Where a face has a model of action units, its displacements are added to those of
-    the FAPs; rigid parts turn, and lids slide over the eyeballs, in the same way for both.
+    FAPs move every face. If a face has a model of action units, its displacements are added to those of the
+    FAPs. In both cases rigid parts turn, and lids slide over the eyeballs.
 
     Args:
-        poses: (n, len(face.inputs)): FAP values in FAPU, column = FAP - 1 (FAPs 1 and 2 are not looked at),
-            then intensities 0..1 of the model's inputs. `animation.pose` makes them. Or (n, 68)
-            FAPs alone.
+        poses: (n, len(face.inputs)): FAP values in FAPU, column = FAP - 1 (FAPs 1 and 2 are ignored), then
+            intensities 0..1 of the model's inputs, as `animation.pose` makes them; or (n, 68) FAPs alone.
 
     Returns:
         (n, n_vertices, 3) float32 metres.
@@ -41,12 +41,16 @@ def deform(face: Face, poses: Any) -> Float32:
     if not np.isfinite(rows).all():
         raise ValueError("poses: wanted finite values, got NaN or infinity")
     basis, units = face.basis, moves_of(face)
-    rows, taken = rows[:, :FAPS], rows[:, FAPS:]
+    rows, unit_values = rows[:, :FAPS], rows[:, FAPS:]
     moved: Bool = np.logical_or(rows[:, LIDS].any(axis=1), rows[:, THRUST].any(axis=1))
     if units is not None:
-        shown, lips, mixing = units.intensities(taken), taken[:, units.lips], taken[:, units.mixing]
+        shown, lips, mixing = (
+            units.intensities(unit_values),
+            unit_values[:, units.lips],
+            unit_values[:, units.mixing],
+        )
         moved |= units.lids(shown)
-        # Lids that a unit closes are closed: what gaze and others ask of them would bring them through.
+        # Where a unit closes the lids, FAPs of gaze and others must not move them further.
         rows = rows.copy()
         rows[:, LIDS] *= 1 - np.tile(units.closed(shown), 2)
     out = np.empty((len(rows), *face.vertices.shape), np.float32)
@@ -80,17 +84,17 @@ def complete_poses(poses: Any, inputs: tuple[str, ...]) -> Float32:
 
 
 def jaw_pose(basis: Any, opening: Any) -> tuple[Float64, Float64]:
-    """Return the jaw's pose when the chin (2.1) has sunk by `opening` metres: rotation in rad, slide in m.
+    """Return the rotation (rad) and the slide (m) of the jaw that lower the chin (2.1) by `opening` metres.
 
-    A jaw turns about its joint. Where it opens further than the turn reaches, the joint slides.
+    The jaw turns about its joint up to `MAX_JAW_TURN`; then the joint slides.
     """
     y, z = basis["chin"]
     opening = np.asarray(opening, np.float64)
     # y' = y cos a - z sin a, so y - y' = opening is one sine of a shifted angle.
     length, rest = float(np.hypot(y, z)), float(np.arctan2(y, z))
-    turned = np.minimum(np.arcsin(np.clip((opening - y) / length, -1, 1)) + rest, MAX_TURN)
+    turned = np.minimum(np.arcsin(np.clip((opening - y) / length, -1, 1)) + rest, MAX_JAW_TURN)
     reached = y - (y * np.cos(turned) - z * np.sin(turned))
-    # The neutral face stays still to the last bit.
+    # The neutral face must be exact.
     return np.where(opening == 0, 0, turned), np.where(opening == 0, 0, opening - reached)
 
 
@@ -98,7 +102,7 @@ def _weights(basis: Any, rows: Float32) -> Float32:
     """Return the factors (n, 73) of the rows of the basis."""
     weights = np.zeros((len(rows), ROWS), np.float32)
     weights[:, 2:FAPS] = couple_lips(basis["contours"], rows)[:, 2:]
-    weights[:, DRIVEN] = 0
+    weights[:, ROTATING] = 0
     jaw, slid = jaw_pose(basis, rows[:, OPEN_JAW].astype(np.float64) * basis["open_jaw"])
     weights[:, JAW_COS], weights[:, JAW_SIN] = 1 - np.cos(jaw), np.sin(jaw)
     weights[:, JAW_DROP] = slid
@@ -108,7 +112,7 @@ def _weights(basis: Any, rows: Float32) -> Float32:
 
 
 def rotations(pitch: Float32, yaw: Float32, roll: Float32) -> Float32:
-    """Return rotations (n, 3, 3) of radians: pitch looks down, yaw to the character's left, roll right."""
+    """Return rotations (n, 3, 3): radians of pitch down, yaw to the character's left, roll to the right."""
     (a, b, c), (d, e, f) = np.cos([pitch, yaw, roll]), np.sin([pitch, yaw, roll])
     zero, one = np.zeros_like(a), np.ones_like(a)
 
@@ -135,7 +139,7 @@ def _turn_eyes(basis: Any, rows: Float32, out: Float32) -> None:
 
 
 def _keep_lids_over_balls(basis: Any, rows: Float32, moved: Bool, out: Float32) -> None:
-    """Push lid vertices forward until they are as far from the ball's centre as at rest: lids slide over."""
+    """Move vertices of lids forwards until they are as far from the eyeball's centre as at rest."""
     if not moved.any():
         return
     lid, side = basis["lid"], basis["lid_eye"]

@@ -1,4 +1,4 @@
-"""Submeshes of the base mesh, whose vertices stay known mixes of base vertices."""
+"""Submeshes of the base mesh, whose vertices are linear combinations of base vertices."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from realizer.core.array_types import Float64, Int32
 
 @dataclass(frozen=True, eq=False)
 class Submesh:
-    """A piece of surface.
+    """A surface that is made from the base mesh.
 
     Attributes:
-        mix: (n, n_base) sparse; vertex = mix @ base vertices + offset, so its fields come along.
+        mix: (n, n_base) sparse; vertices = mix @ base vertices + offset, and displacements likewise.
         offset: (n, 3) metres.
         triangles: (m, 3) counter-clockwise seen from outside.
     """
@@ -39,7 +39,7 @@ class Submesh:
         return int(self.mix.shape[0])
 
     def sources(self) -> Int32:
-        """Return the base vertex that each vertex is, (n,); -1 for those that are mixed."""
+        """Return the base vertex that each vertex is equal to, (n,); -1 for combinations of several."""
         first = self.mix.indices[self.mix.indptr[:-1]]
         return np.where(np.diff(self.mix.indptr) == 1, first, -1).astype(np.int32)
 
@@ -48,11 +48,11 @@ class Submesh:
         return np.asarray(self.mix @ base) + self.offset
 
     def mixed(self, mix: sp.csr_matrix, triangles: Any) -> Submesh:
-        """Return the patch whose vertices are mixes of this one's."""
+        """Return a submesh whose vertices are linear combinations of the vertices of this one."""
         return Submesh((mix @ self.mix).tocsr(), np.asarray(mix @ self.offset), triangles.astype(np.int32))
 
     def with_triangles(self, keep: Any) -> Submesh:
-        """Return the triangles that are kept (m,), with the vertices that they use."""
+        """Return the submesh of the triangles in the mask `keep` (m,), with the vertices that they use."""
         used, inverse = np.unique(self.triangles[keep], return_inverse=True)
         pick = sp.eye_array(len(self), format="csr")[used]
         return self.mixed(sp.csr_matrix(pick), inverse.reshape(-1, 3))
@@ -62,8 +62,8 @@ class Submesh:
         return replace(self, offset=self.offset + offset)
 
     def clipped(self, height: Float64) -> tuple[Submesh, sp.csr_matrix]:
-        """Return the surface where `height` (n,) is above zero, cut along its zeros, and its mixes."""
-        # A cut very close to a vertex would leave slivers: move it through the vertex.
+        """Return the part of the surface with `height` (n,) above zero, and its mix of vertices."""
+        # A cut very close to a vertex would leave slivers, so it passes through the vertex.
         height = np.where(np.abs(height) < 1e-6, 1e-6, height)
         inside = height > 0
         rows: list[dict[int, float]] = [{i: 1.0} for i in range(len(self))]
@@ -93,9 +93,12 @@ class Submesh:
         return self.mixed(mix, inverse.reshape(-1, 3)), mix
 
     def threaded(self, loops: list[list[int]]) -> Submesh:
-        """Return the surface with a vertex more on every edge of closed loops, on smooth curves through them.
+        """Return the surface with one more vertex on every edge of closed loops, which makes them smoother.
 
-        Four points make each (Dyn, Levin and Gregory 1987); loops that share a vertex or an edge do not go.
+        Each new vertex is made from four points (Dyn, Levin and Gregory 1987).
+
+        Args:
+            loops: vertices of each loop; loops must not share vertices.
         """
         middle: dict[tuple[int, int], int] = {}
         rows: list[dict[int, float]] = [{i: 1.0} for i in range(len(self))]

@@ -28,7 +28,7 @@ MATERIALS = [
     }
     for name, roughness in (("face", 0.6), ("eyes", 0.15))
 ]
-NEGLIGIBLE_BEND = 0.01  # smaller changes of a normal, half a degree, are invisible
+MIN_NORMAL_CHANGE = 0.01  # half a degree; smaller changes of a normal are invisible
 
 
 def encode_glb(face: Face, poses: Float32, fps: float) -> bytes:
@@ -40,7 +40,7 @@ def encode_glb(face: Face, poses: Float32, fps: float) -> bytes:
     Args:
         poses: (n, len(face.inputs)), `Realization.poses`.
     """
-    made = make_morph_targets(face, poses)
+    targets = make_morph_targets(face, poses)
     file = GlbFile()
     pivot = face.basis["head_pivot"]
     nodes: list[dict[str, Any]] = [
@@ -48,9 +48,9 @@ def encode_glb(face: Face, poses: Float32, fps: float) -> bytes:
         {"name": "neck", "children": [HEAD]},
         {"name": "head", "translation": pivot.tolist()},
     ]
-    keys = [(HEAD, "rotation", quaternions(made.head))]
-    if made.names:
-        keys.append((FACE, "weights", made.weights.ravel()))
+    keys = [(HEAD, "rotation", quaternions(targets.head))]
+    if targets.names:
+        keys.append((FACE, "weights", targets.weights.ravel()))
     balls = []
     rest = np.ones(len(face.vertices), bool)
     for eye, ((first, last), centre) in enumerate(face.basis["eyes"]):
@@ -63,10 +63,10 @@ def encode_glb(face: Face, poses: Float32, fps: float) -> bytes:
         node = len(nodes)
         nodes[HEAD].setdefault("children", []).append(node)
         nodes.append({"name": EYES[eye], "mesh": len(balls), "translation": (centre - pivot).tolist()})
-        keys.append((node, "rotation", quaternions(np.pad(made.eyes[:, eye], ((0, 0), (0, 1))))))
-        if made.thrust[:, eye].any():
-            keys.append((node, "translation", centre - pivot + np.outer(made.thrust[:, eye], (0, 0, 1))))
-    meshes = [morphing_mesh(file, face, rest, 0, made)]
+        keys.append((node, "rotation", quaternions(np.pad(targets.eyes[:, eye], ((0, 0), (0, 1))))))
+        if targets.thrust[:, eye].any():
+            keys.append((node, "translation", centre - pivot + np.outer(targets.thrust[:, eye], (0, 0, 1))))
+    meshes = [morphing_mesh(file, face, rest, 0, targets)]
     meshes += [rigid_mesh(file, face, ball, name, 1, centre) for ball, name, centre in balls]
     clock = file.add((np.arange(len(poses)) / fps).astype(np.float32), bounds=True)
     unbound = np.tile(np.eye(4, dtype=np.float32), (2, 1, 1))
@@ -93,8 +93,8 @@ def quaternions(turns: Float32) -> Float32:
     """Convert pitch, yaw, roll (n, 3) to x, y, z, w (n, 4), as `face.deform` does: roll first, yaw last."""
     from scipy.spatial.transform import Rotation
 
-    turned = Rotation.from_euler("YXZ", turns[:, [1, 0, 2]].astype(np.float64)).as_quat()
-    out: Float32 = np.where(turned[:, 3:] < 0, -turned, turned).astype(np.float32)
+    rotations = Rotation.from_euler("YXZ", turns[:, [1, 0, 2]].astype(np.float64)).as_quat()
+    out: Float32 = np.where(rotations[:, 3:] < 0, -rotations, rotations).astype(np.float32)
     return out
 
 
@@ -124,7 +124,9 @@ def rigid_mesh(
     return {"name": name, "primitives": [primitive]}
 
 
-def morphing_mesh(file: GlbFile, face: Face, part: Bool, material: int, made: MorphTargets) -> dict[str, Any]:
+def morphing_mesh(
+    file: GlbFile, face: Face, part: Bool, material: int, targets: MorphTargets
+) -> dict[str, Any]:
     """Return the mesh of a part with morph targets, and two joints: 0 is fixed, 1 is the head."""
     mesh = rigid_mesh(file, face, part, face.name, material)
     (primitive,) = mesh["primitives"]
@@ -135,26 +137,26 @@ def morphing_mesh(file: GlbFile, face: Face, part: Bool, material: int, made: Mo
     joints = (shares > 0) * np.array([0, 1, 0, 0], np.uint8)
     primitive["attributes"]["JOINTS_0"] = file.add(joints, target=ARRAY_BUFFER)
     primitive["attributes"]["WEIGHTS_0"] = file.add(shares, target=ARRAY_BUFFER)
-    if made.names:
-        ups = _normals(face, face.vertices)
-        primitive["targets"] = [_target(file, face, part, moves, ups) for moves in made.moves]
-        mesh["weights"] = [0.0] * len(made.names)
+    if targets.names:
+        rest = _normals(face, face.vertices)
+        primitive["targets"] = [_target(file, face, part, moves, rest) for moves in targets.moves]
+        mesh["weights"] = [0.0] * len(targets.names)
         # The usual place for names of targets, which glTF does not define.
-        mesh["extras"] = {"targetNames": list(made.names)}
+        mesh["extras"] = {"targetNames": list(targets.names)}
     return mesh
 
 
-def _target(file: GlbFile, face: Face, part: Bool, moves: Float32, ups: Float32) -> dict[str, int]:
-    bent = _normals(face, face.vertices + moves) - ups
-    bent[np.abs(bent).max(axis=1) < NEGLIGIBLE_BEND] = 0
-    return {"POSITION": file.add_sparse(moves[part], bounds=True), "NORMAL": file.add_sparse(bent[part])}
+def _target(file: GlbFile, face: Face, part: Bool, moves: Float32, rest: Float32) -> dict[str, int]:
+    changes = _normals(face, face.vertices + moves) - rest
+    changes[np.abs(changes).max(axis=1) < MIN_NORMAL_CHANGE] = 0
+    return {"POSITION": file.add_sparse(moves[part], bounds=True), "NORMAL": file.add_sparse(changes[part])}
 
 
 def _normals(face: Face, vertices: Float32) -> Float32:
     """Return normals; forward for a vertex without a triangle, because glTF requires unit length."""
-    ups: Float32 = normals(face, vertices[None])[0]
-    ups[np.abs(ups).sum(axis=1) == 0] = (0, 0, 1)
-    return ups
+    directions: Float32 = normals(face, vertices[None])[0]
+    directions[np.abs(directions).sum(axis=1) == 0] = (0, 0, 1)
+    return directions
 
 
 GLB = Output(

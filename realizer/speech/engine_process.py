@@ -18,7 +18,7 @@ from typing import Any
 from realizer.core.errors import VoiceError
 
 RUN = Path(__file__).with_name("engine_worker.py")
-CHECKS = 20  # checks of a running request within its time limit
+CHECKS = 20  # number of checks of a running request within its time limit
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +40,9 @@ class EngineProcess:
     """A process that starts with the first request and serves one at a time; thread-safe.
 
     Args:
-        engine: what to run.
-        options: further arguments.
-        limit: seconds after which a request counts as hung and the process is replaced.
+        engine: the engine to run.
+        options: further arguments of its process.
+        limit: seconds after which a request is cancelled and the process is replaced.
     """
 
     def __init__(self, engine: Engine, options: tuple[str, ...] = (), limit: float = 30.0) -> None:
@@ -65,7 +65,7 @@ class EngineProcess:
         """Return the engine's description of itself (rate, voices, variants), starting it if needed.
 
         Raises:
-            VoiceError: if it is not installed or does not start.
+            VoiceError: the engine is not installed or does not start.
         """
         with self._lock:
             if not self._hello:
@@ -76,7 +76,8 @@ class EngineProcess:
         """Send a request, and return the head and the body of the answer.
 
         Raises:
-            VoiceError: if it is not installed, refused, died or hung; the next call starts it again.
+            VoiceError: the engine is not installed, refused the request, ended or took too long; the next
+                call starts it again.
         """
         with self._lock:
             running = self._started()
@@ -99,7 +100,7 @@ class EngineProcess:
         """End the process, even during a request of another thread. May be called twice."""
         running = self._running
         if running is not None and self._owner == os.getpid():
-            running.process.kill()  # a request in progress gets the end of the pipe and releases the lock
+            running.process.kill()  # a running request then ends with an error and releases the lock
         with self._lock:
             self._stop()
 
@@ -114,7 +115,7 @@ class EngineProcess:
         if fix:
             raise VoiceError(fix)
         process = subprocess.Popen(
-            # By path and with -P, so that only the worker's own imports are loaded, from any folder.
+            # A path and -P, so that the process imports only modules that the worker needs.
             [sys.executable, "-P", str(RUN), str(self._engine.worker), *self._options],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -142,8 +143,8 @@ class EngineProcess:
 class _Running:
     """A process that is killed when a request takes too long.
 
-    One thread watches it for its whole life, because a thread for each request would cost as much as the
-    rest of a request.
+    One thread watches it as long as it runs, because a thread for each request would take as much time as the
+    rest of the request.
     """
 
     def __init__(self, process: subprocess.Popen[bytes], limit: float) -> None:
