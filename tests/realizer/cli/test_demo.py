@@ -5,10 +5,13 @@ from __future__ import annotations
 import asyncio
 import re
 import socket
+from pathlib import Path
 
 import pytest
 
-from realizer.cli.demo import _serve
+from realizer.cli.demo import _film, _serve
+from realizer.core.errors import RenderError
+from realizer.outputs import registry
 
 
 def test_demo_takes_a_free_port_where_its_own_is_in_use(capsys: pytest.CaptureFixture[str]) -> None:
@@ -18,3 +21,22 @@ def test_demo_takes_a_free_port_where_its_own_is_in_use(capsys: pytest.CaptureFi
     (page,) = re.findall(r"page: http://127\.0\.0\.1:(\d+)/", capsys.readouterr().out)
     assert int(page) != port
     assert int(page) >= 1024  # one that the system chose
+
+
+def test_demo_names_the_files_that_it_writes_and_leaves_out(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    written: list[str] = []
+
+    class Writer:
+        def write(self, realization: object, path: Path, settings: object) -> None:
+            if path.suffix == ".mp4":
+                raise RenderError("no film")
+            written.append(path.name)
+
+    monkeypatch.setattr(registry, "output_for", lambda path: Writer())
+    _film(['<bml id="a"><wait id="w" duration="2"/></bml>'], "silent", "default")
+    said = capsys.readouterr()
+    assert written == ["demo.fap"]
+    assert said.out.splitlines() == ["writing demo.fap (2.0 s) ...", "writing demo.mp4 (2.0 s) ..."]
+    assert said.err == "realizer: demo.mp4 was left out: no film\n"

@@ -9,11 +9,13 @@ import pytest
 from click.testing import CliRunner, Result
 
 from realizer.cli import cli
+from realizer.cli.options import parse_size
 from realizer.server import serve
 from realizer.speech.espeak.voice import EspeakVoice
 from realizer.speech.registry import VOICES
 from realizer.speech.silent import SilentVoice
 
+CONTEXT, OPTION = click.Context(cli), click.Option(["--size"])
 GOOD = '<bml id="b"><head id="n" lexeme="NOD" start="0.2" end="0.6"/></bml>'
 
 
@@ -115,3 +117,14 @@ def test_light_and_background_are_visible_in_the_picture(tmp_path: Path) -> None
     assert sum(plain.getpixel((32, 30))) > sum(evening.getpixel((40, 30)))
     assert picture("--background", "#204060").getpixel((1, 1)) == (0x20, 0x40, 0x60)
     assert picture("--background", "transparent").getpixel((1, 1))[3] == 0
+
+
+@pytest.mark.parametrize("text", ["16x4096", "4096x16", "512x384"])
+def test_parse_size_accepts_16_to_4096_pixels(text: str) -> None:
+    assert "x".join(map(str, parse_size(CONTEXT, OPTION, text))) == text
+
+
+@pytest.mark.parametrize("text", ["15x64", "64x15", "4097x64", "64x4097", "64", "64x", "-64x64"])
+def test_parse_size_refuses_others(text: str) -> None:
+    with pytest.raises(click.BadParameter, match="between 16x16 and 4096x4096"):
+        parse_size(CONTEXT, OPTION, text)

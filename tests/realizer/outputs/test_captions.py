@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
-from realizer.outputs.captions import MOST, captions
+from realizer.outputs.captions import MOST, Track, captions
 from realizer.outputs.speech_spans import Span
 from realizer.speech.utterance import Word
 
@@ -55,3 +57,17 @@ def test_captions_show_simultaneous_speech_in_separate_lines(realization):
 def test_captions_exclude_words_that_were_cut_off(realization):
     found = captions(spoken(realization, (0, 1, "heard"), (1, 2, "lost"), until=2.0))
     assert [line.text for line in found] == ["heard"]
+
+
+@pytest.mark.parametrize(("end", "last"), [(9.0, 1000), (2.25, 250)])
+def test_track_shows_each_line_from_its_start_to_its_end(end: float, last: int) -> None:
+    written: list[Any] = []
+    film = SimpleNamespace(
+        add_stream=lambda codec: SimpleNamespace(codec_context=SimpleNamespace()), mux=written.append
+    )
+    av = SimpleNamespace(Packet=lambda data: SimpleNamespace(data=data))
+    track = Track(av, film, "webvtt", [Span(0.5, 1.25, "one"), Span(2.0, 3.0, "a & b")], end)
+    track.write(1.0)
+    assert [(p.data, p.pts, p.duration) for p in written] == [(b"one", 500, 750)]
+    track.write(9.0)
+    assert [(p.data, p.pts, p.duration) for p in written[1:]] == [(b"a &amp; b", 2000, last)]

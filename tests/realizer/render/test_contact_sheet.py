@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.render.contact_sheet import PAPER, sheet
+from realizer.render.contact_sheet import PAPER, Cell, Group, album, sheet
 
 
 def plain(value, size=(60, 80)):
@@ -48,3 +48,19 @@ def test_sheet_ends_too_many_notes_in_a_count():
 def test_sheet_refuses_no_pictures():
     with pytest.raises(ValueError, match="at least one"):
         sheet([], [])
+
+
+def test_album_cuts_a_long_caption_before_the_legend():
+    legend = np.full((12, 90, 3), 7, np.uint8)
+    pixels = album([Group("", [Cell((plain(99),) * 4, "a", ())], 1)], legend, "w" * 500)
+    rows = pixels[(pixels == 7).all(2).any(1)]
+    first = np.flatnonzero((rows == 7).all(2).any(0))[0]
+    assert (rows == 7).all(2).sum() == 12 * 90
+    assert (rows[:, first - 8 : first] == PAPER).all()
+    assert (rows[:, : first - 8] != PAPER).any()
+
+
+def test_album_has_a_margin_beside_its_headings():
+    pixels = album([Group("brows", [Cell((plain(99),) * 4, "a", ())], 1)])
+    for margin in (pixels[:, :6], pixels[:, -5:]):
+        assert (margin == PAPER).all()

@@ -192,3 +192,17 @@ def test_shortened_utterance_loses_its_closing_pause() -> None:
     assert [p.end for p in short.phonemes] == [0.8, 0.9]
     assert [w.end for w in short.words] == [0.8]
     assert shortened(whole, 0.5).silent_from == 0.5
+
+
+@pytest.mark.parametrize(("off", "again"), [(0.004, False), (0.008, True)])
+def test_speak_to_length_tries_another_rate_over_6_parts_in_1000(off: float, again: bool) -> None:
+    rates = []
+
+    class Counting(SilentVoice):
+        def say(self, request: SpeechRequest) -> Utterance:
+            rates.append(request.rate)
+            return super().say(request)
+
+    natural = SilentVoice().say(SAY).duration
+    speak_to_length(Counting(), replace(SAY, seconds=natural * (1 + off)))
+    assert (len(rates) > 1) is again

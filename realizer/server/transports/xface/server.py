@@ -112,7 +112,7 @@ class _SessionLink:
         self.has_left = False
         self._sessions = sessions
         self._writer = writer
-        self._number = 0
+        self._number: int
 
     def attach(self, number: int) -> None:
         """Subscribe to feedback, and greet the client."""

@@ -76,6 +76,18 @@ def test_shape_fields_move_each_feature_point_by_one(known: dict[str, Any]) -> N
         assert move @ np.array(WAYS[row.direction]) == pytest.approx(1), row.name
 
 
+def test_shape_fields_divide_the_lips_among_their_points(known: dict[str, Any]) -> None:
+    upper = {4: -0.004, 51: -0.004, 8: -0.005, 9: -0.005, 55: -0.005, 56: -0.005}
+    lower = {5: -0.006, 52: -0.006, 10: -0.005, 11: -0.005, 57: -0.005, 58: -0.005}
+    half = {fap: metres / 2 for fap, metres in upper.items()}
+    made = shape_fields(shaped(known, mouthUpperUpLeft=half, mouthUpperUpRight=half, jawOpen=lower))
+    for fap in (*upper, *lower):
+        row = faps()[fap - 1]
+        along = made[fap] @ np.array(WAYS[row.direction])
+        assert along[known["vertex"][row.feature_point]] == pytest.approx(1), row.name
+        assert along.max() < 1.5, row.name
+
+
 def test_shape_fields_need_both_shapes_of_a_pair(known: dict[str, Any]) -> None:
     assert shape_fields(shaped(known)) == {}
     one = {name: parts for name, parts in SHAPES.items() if name in ("mouthSmileLeft", "browInnerUp")}

@@ -13,7 +13,7 @@ from realizer.face.deform import deform
 from realizer.face.load import folder_of, load_face
 from realizer.face.model import Face
 from realizer.facebuild.check import check_face
-from realizer.facebuild.mpeg4.build import apply_zones, setup_of, with_brows
+from realizer.facebuild.mpeg4.build import apply_zones, copy_with_zones, setup_of, with_brows
 from realizer.facebuild.mpeg4.parameters import write_setup
 from tests.fap_scores import mean_score, score_faps
 
@@ -119,6 +119,7 @@ def test_zones_command_makes_another_face(tmp_path: Path) -> None:
     assert face_of(folder).name == "zoe"
     assert (folder / "mpeg4.toml").is_file()
     assert check_face("zoe", tmp_path) == ()
+    assert ran.output == f"{folder}: 2 zones\n"
 
 
 def test_with_brows_moves_what_grows_on_the_skin() -> None:
@@ -130,3 +131,13 @@ def test_with_brows_moves_what_grows_on_the_skin() -> None:
     assert row[3] == pytest.approx([0, 1, 0], abs=0.05)
     assert row[4] == pytest.approx([0, 2, 0], abs=0.05)
     assert (row[5] == 9).all()
+
+
+def test_copy_with_zones_locates_missing_feature_points(tmp_path: Path) -> None:
+    source = copy(tmp_path, fields=True)
+    (source / "features.csv").unlink()
+    folder = tmp_path / "found"
+    _, guesses = copy_with_zones(source, folder, only={31})
+    found = face_of(folder)
+    assert set(guesses) < set(found.points)
+    assert found.points["3.5"] == pytest.approx(load_face().points["3.5"], abs=0.005)

@@ -59,3 +59,10 @@ def test_tongue_rows_move_the_tip_exactly(face: Face) -> None:
     assert rows[45][tip] == pytest.approx([0, 0, 1])
     assert not rows[44][slice(*face.parts["skin"])].any()
     assert tongue_rows(at, points, {"skin": face.parts["skin"]}) == {}
+
+
+def test_head_weight_does_not_depend_on_where_the_head_is(face: Face) -> None:
+    at, move = face.vertices.astype(float), np.array([0.3, -0.2, 0.1])
+    weight = head_weight(at, {name: tuple(p) for name, p in face.points.items()}, face.parts)
+    moved = head_weight(at + move, {name: tuple(p + move) for name, p in face.points.items()}, face.parts)
+    assert moved == pytest.approx(weight, abs=1e-5)

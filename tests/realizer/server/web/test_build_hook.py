@@ -73,3 +73,14 @@ def test_build_hook_explains_a_failure(hook, tmp_path, monkeypatch) -> None:
 
 def test_lock_file_names_no_host() -> None:
     assert "resolved" not in (HOOK.parent / "package-lock.json").read_text("utf-8")
+
+
+def test_bundle_copies_the_page_and_the_client_as_they_are(hook, tmp_path, monkeypatch) -> None:
+    npm = tmp_path / "npm"
+    npm.write_text("#!/bin/sh\nexit 0\n")
+    npm.chmod(0o755)
+    monkeypatch.setattr(hook.shutil, "which", lambda name: str(npm))
+    hook.bundle()
+    for copied, source in (("index.html", "index.html"), ("realizer.js", "src/realizer.js")):
+        assert (hook.STATIC / copied).read_bytes() == (hook.WEB / source).read_bytes()
+    assert build(hook).dependencies() == []

@@ -9,6 +9,7 @@ from realizer.speech.hibari.times import (
     KEPT_OF_LAST,
     Sound,
     guess_lengths,
+    signs_of,
     sounds,
     trim_to_sound,
     word_spans,
@@ -72,3 +73,8 @@ def test_guess_lengths_divides_the_audible_part() -> None:
     assert signs[0] == pytest.approx(signs[2], abs=1)
     assert signs[0] > signs[1]
     assert guess_lengths([("", "", False)], pcm) == [0, 100]
+
+
+def test_signs_of_a_sentence_end_without_a_blank() -> None:
+    assert signs_of([("a", "ɐ", True), ("cat", "kæt", True)]) == ("ɐ kæt", (0, 0, 1, 1, 1))
+    assert signs_of([("a", "ɐ", False), ("cat", "kæt", True)]) == ("ɐkæt", (0, 1, 1, 1))
