@@ -51,6 +51,9 @@ def f(x: "1 + 1" = None) -> "0":
         ("x = a + 1e-9, 1e-5", ["x = a - 1e-9, 1e-5", "x = a + 1e-9, 2e-05"]),
         ("x = F(ge=0, le=-1e4, b=1e4)", ["x = F(ge=1, le=-1e4, b=1e4)", "x = F(ge=0, le=-1e4, b=20000.0)"]),
         ("return AnError(a or b, 1)", []),
+        ("x = zip(a, b[1:], strict=True)", ["x = zip(a, b[2:], strict=True)"]),
+        ("x = F(strict=True)", ["x = F(strict=False)"]),
+        ("SEED = 3", []),
     ],
 )
 def test_mutations_of_a_line(source: str, wanted: list[str]) -> None:

@@ -72,7 +72,7 @@ def vocabulary() -> bytes:
         "profiles": profiles,
         "voices": [_fields(voice, "name", "engine", "available") for voice in voices()],
     }
-    return json.dumps(data, ensure_ascii=False, separators=(",", ":")).encode()
+    return json.dumps(data, separators=(",", ":")).encode()
 
 
 def _fields(row: object, *names: str) -> dict[str, Any]:

@@ -72,3 +72,9 @@ def test_manifest_of_a_folder_is_written_by_one_batch(tmp_path: Path) -> None:
         pass
     with Manifest(tmp_path).open():
         pass
+
+
+def test_manifest_makes_the_folders_above_it(tmp_path: Path) -> None:
+    with Manifest(tmp_path / "a" / "b").open() as manifest:
+        manifest.add(row("a"))
+    assert (tmp_path / "a" / "b" / NAME).is_file()

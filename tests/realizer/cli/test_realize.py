@@ -225,3 +225,13 @@ def test_schedule_writes_a_dialect_as_bml_1_0(tmp_path: Path) -> None:
     written = CliRunner().invoke(cli, ["schedule", str(document), "--bml"], standalone_mode=False).stdout
     assert 'id="unnamed1"' in written
     assert '<head id="head1" lexeme="NOD" start="0"' in written
+
+
+@pytest.mark.parametrize(("suffix", "status"), [("fap", 0), ("png", 2)])
+def test_realize_checks_the_camera_of_pictures_only(tmp_path: Path, suffix: str, status: int) -> None:
+    output = str(tmp_path / f"a.{suffix}")
+    flags = ["--voice", "silent", "--camera", "top", "-o", output]
+    done = CliRunner().invoke(cli, ["realize", "-", *flags], input='<bml id="b"><wait duration="1"/></bml>')
+    assert done.exit_code == status
+    assert ("got 'top'" in done.output) is (status == 2)
+    assert Path(output).exists() is (status == 0)

@@ -66,3 +66,8 @@ def test_letters_to_phonemes_opens_the_mouth_for_unknown_scripts() -> None:
 @given(st.text(max_size=20), st.sampled_from(["en", "nl", "fr", "pl", "xx", ""]))
 def test_vowel_units_are_at_least_one(word: str, language: str) -> None:
     assert vowel_units(word, language) >= 1
+
+
+@pytest.mark.parametrize("word", ["", "_"])
+def test_vowel_units_are_at_least_1(word: str) -> None:
+    assert vowel_units(word, "en") == 1

@@ -46,3 +46,10 @@ def test_matrix_separates_raising_and_lowering() -> None:
     assert np.flatnonzero(raised.any(axis=1)).tolist() == [2]
     assert raised[2] == pytest.approx([0, 20, 40, 60, 100, 20, 0, 0], abs=1e-3)
     assert lowered[2] == pytest.approx([0, 0, 0, 0, 0, 0, 60, 100], abs=1e-3)
+
+
+def test_matrix_closed_is_the_greatest_value_of_each_fap() -> None:
+    rows = (AuToFap(43, "L", 19, 0.0, 1.0, 0.0, 900.0), AuToFap(7, "L", 19, 0.0, 1.0, 0.0, 200.0))
+    closed = PiecewiseMatrix.of(rows).closed
+    assert closed[18] == 900
+    assert np.count_nonzero(closed) == 1
