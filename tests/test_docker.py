@@ -12,7 +12,7 @@ import subprocess
 import sys
 import sysconfig
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -71,9 +71,49 @@ def variables() -> dict[str, str]:
 # The files -------------------------------------------------------------------------------------------
 
 
-def test_install_script_runs_in_any_shell() -> None:
-    checked(tool("sh"), "-n", DOCKER / "install.sh")
-    checked(tool("shellcheck"), DOCKER / "install.sh")
+@pytest.mark.parametrize("script", ["install.sh", "start.sh"])
+def test_scripts_run_in_any_shell(script: str) -> None:
+    checked(tool("sh"), "-n", DOCKER / script)
+    checked(tool("shellcheck"), DOCKER / script)
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Callable[..., str]:
+    """Run the entry point of the image; return the token that `realizer` gets, and its arguments."""
+    stub, folder = tmp_path / "bin" / "realizer", tmp_path / "volume"
+    stub.parent.mkdir()
+    folder.mkdir()
+    stub.write_text('#!/bin/sh\necho "${REALIZER_TOKEN-none} $*"\n')
+    stub.chmod(0o755)
+    path = f"{stub.parent}{os.pathsep}{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    return lambda *command, **environment: checked(
+        DOCKER / "start.sh", *command, **{"PATH": path, "TOKEN_FOLDER": str(folder), **environment}
+    )
+
+
+def test_start_script_makes_one_token_and_keeps_it(start: Callable[..., str], tmp_path: Path) -> None:
+    first = start("serve", "--log", "json")
+    token = (tmp_path / "volume" / "token").read_text().strip()
+    assert first == f"{token} serve --log json\n"
+    assert len(token) >= 32
+    assert start("serve") == f"{token} serve\n"
+    assert [file.name for file in (tmp_path / "volume").iterdir()] == ["token"]
+
+
+def test_start_script_makes_no_token_where_one_is_set(start: Callable[..., str], tmp_path: Path) -> None:
+    assert start("voices") == "none voices\n"
+    assert start("serve", REALIZER_TOKEN="mine") == "mine serve\n"
+    assert start("serve", REALIZER_TOKEN="") == " serve\n"  # which the service refuses
+    assert start("serve", REALIZER_JWT_KEY="k" * 32) == "none serve\n"
+    assert start("serve", REALIZER_INSECURE="1") == "none serve\n"
+    assert not list((tmp_path / "volume").iterdir())
+
+
+def test_image_keeps_its_token_on_a_volume_of_its_user() -> None:
+    assert re.search(r"^ENTRYPOINT \[\"/opt/realizer/bin/start\"\]$", DOCKERFILE, re.M)
+    assert re.search(r"^VOLUME /run/realizer$", DOCKERFILE, re.M)
+    assert re.search(r"^RUN install -d -o 10001 .* /run/realizer$", DOCKERFILE, re.M)
+    assert all(node["volumes"] == ["token:/run/realizer"] for node in NODES.values())
 
 
 def test_dockerfile_passes_its_linter() -> None:
@@ -169,7 +209,8 @@ def test_compose_gives_nodes_options_that_exist(name: str) -> None:
     assert node["command"][0] == "serve"
     flags = serve.make_context("serve", node["command"][1:]).params
     given = {**variables(), **node["environment"]}
-    said = {name: value for name, value in given.items() if value is not None}
+    said = {"REALIZER_TOKEN": "made at the start"}
+    said |= {name: value for name, value in given.items() if value is not None}
     assert all(name.removeprefix("REALIZER_").lower() in vars(Settings()) for name in node["environment"])
     settings = Settings.read({k: v for k, v in flags.items() if k != "config"}, environment=said)
     assert settings.host == "0.0.0.0"

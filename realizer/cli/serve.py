@@ -21,7 +21,7 @@ def setting_option(
     """Return the option for a setting, with its description and default; `Settings` checks the value."""
     field = next(f for f in fields(Settings) if f.name == name)
     description, _, unset = field.metadata["description"].partition("; none: ")
-    default = unset if field.default is None else str(field.default).removesuffix(".0")
+    default = unset if field.default in (None, ()) else str(field.default).removesuffix(".0")
     default_note = f"  [default: {default}]" if default else ""
     text = f"{description[0].upper()}{description[1:]}.{default_note}"
     return click.option(f"--{name.replace('_', '-')}", name, metavar=metavar, help=text, **attributes)
@@ -40,6 +40,14 @@ def setting_options(*rows: tuple[str, str]) -> Callable[[options.Command], optio
     ("token", "WORD"),
     ("jwt_key", "FILE|SECRET"),
     ("jwt_audience", "WORD"),
+    ("hosts", "NAME,..."),
+    ("allow", "ADDRESS,..."),
+)
+@click.option(
+    "--insecure",
+    is_flag=True,
+    default=None,
+    help="Listen beyond this machine without a token, or without --allow.",
 )
 @click.option(
     "--origin",

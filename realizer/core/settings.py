@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ipaddress
 import math
 import os
 import re
@@ -123,15 +124,46 @@ def _switch_or_file(value: Any) -> str:
         return str(value)
 
 
-def _origins(value: Any) -> tuple[str, ...]:
-    """Parse origins, which have scheme and host but no path, from a list or a text."""
-    origins = value.replace(",", " ").split() if isinstance(value, str) else value
-    if not isinstance(origins, list | tuple) or not all(
-        origin == "*" or re.fullmatch(r"[a-z][a-z0-9+.-]*://[^/\s]+/?|null", str(origin))
-        for origin in origins
-    ):
-        raise ValueError("addresses such as https://example.org, or *")
-    return tuple(str(origin) for origin in origins)
+def _several(read: Callable[[str], str], wanted: str) -> Callable[[Any], tuple[str, ...]]:
+    """Return a parser of several values, from a list or a text; `read` parses one of them."""
+
+    def parse(value: Any) -> tuple[str, ...]:
+        items = value.replace(",", " ").split() if isinstance(value, str) else value
+        try:
+            if isinstance(items, list | tuple):
+                return tuple(read(str(item)) for item in items)
+        except ValueError:
+            pass
+        raise ValueError(wanted)
+
+    return parse
+
+
+# An origin has a scheme and a host, but no path.
+_origins = _several(
+    _matching(r"[a-z][a-z0-9+.-]*://[^/\s]+/?|null|\*", ""), "addresses such as https://example.org, or *"
+)
+
+
+def _host_name(text: str) -> str:
+    name = text.lower().strip("[]")
+    if ":" in name:
+        return str(ipaddress.IPv6Address(name))
+    return _matching(r"[a-z0-9._-]+", "")(name)
+
+
+_hosts = _several(_host_name, "names or addresses without a port, such as face.example")
+_networks = _several(
+    lambda text: str(ipaddress.ip_network(text, strict=False)), "addresses or networks such as 192.168.1.0/24"
+)
+
+
+def is_loopback(host: str) -> bool:
+    """Return whether a host name or an address can be reached from this machine only."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost" or host.endswith(".localhost")
 
 
 def _key(value: Any) -> str:
@@ -211,6 +243,15 @@ class Settings:
         empty=False,
     )
     jwt_audience: str | None = _row(None, _text, "required claim aud of a JWT; none: it must have none")
+    insecure: bool = _row(False, _flag, "listen beyond this machine without a token, a key or addresses")
+    hosts: tuple[str, ...] = _row(
+        (),
+        _hosts,
+        "names under which clients reach the service, beside its addresses, the machine's name and localhost",
+    )
+    allow: tuple[str, ...] = _row(
+        (), _networks, "addresses and networks of the clients of Asap and Xface; none: all"
+    )
     origins: tuple[str, ...] = _row((), _origins, "origins of pages that may connect; *: all")
     tls_cert: Path | None = _row(None, _file, "certificate chain in PEM; none: no TLS")
     tls_key: Path | None = _row(None, _file, "private key in PEM; none: it is in the file tls_cert")
@@ -331,17 +372,20 @@ class Settings:
                 f"setting tls_cert: wanted workers = 1, got {self.workers}: connections are distributed to "
                 "workers by their first line; use TLS in a proxy in front of the service"
             )
-        unprotected = [name for name in ("asap_ports", "xface_port") if getattr(self, name) is not None]
         if self.jwt_audience is not None and self.jwt_key is None:
             raise SettingsError("setting jwt_audience: wanted jwt_key too, got none")
-        if (
-            (self.token or self.jwt_key)
-            and unprotected
-            and self.host not in ("127.0.0.1", "localhost", "::1")
-        ):
-            raise SettingsError(
-                f"setting {unprotected[0]}: wanted none, or host 127.0.0.1: its clients cannot send the token"
-            )
+        if not is_loopback(self.host) and not self.insecure:
+            if self.token is None and self.jwt_key is None:
+                raise SettingsError(
+                    "setting host: wanted token, jwt_key or insecure too, because other machines can reach "
+                    f"{self.host}"
+                )
+            tokenless = [name for name in ("asap_ports", "xface_port") if getattr(self, name) is not None]
+            if tokenless and not self.allow:
+                raise SettingsError(
+                    f"setting {tokenless[0]}: wanted allow or insecure too, or host 127.0.0.1: its clients "
+                    "cannot send the token"
+                )
 
     def play_options(self, scene: Mapping[str, tuple[float, float, float]] | None = None) -> PlayOptions:
         """Return the options for playing; `scene` is the content of the file `self.scene`."""

@@ -5,31 +5,37 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import hmac
+import ipaddress
 import json
 import logging
+import socket
 import ssl
 from collections.abc import Callable, Mapping
 from http import HTTPStatus
 from urllib.parse import parse_qs, urlsplit
 
-from realizer.core.settings import Settings, SettingsError, limit_hint
+from realizer.core.settings import Settings, SettingsError, is_loopback, limit_hint
 from realizer.protocol.messages.common import MAX_CONTROL
 from realizer.server.documents.limits import memory_error
 from realizer.server.http.jwt_tokens import Grant, TokenError, TokenVerifier
 from realizer.server.runtime.session_registry import JoinError
 
-LOOPBACK = {"localhost", "127.0.0.1", "::1"}
+# To listen on all addresses of the machine -> the one that it prints.
+EVERYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}
 PATIENCE = 10.0  # s; a client whose token comes in `hello` must have sent it by then
 # For a service without tokens, and for the service's own token.
 ANY_GRANT = Grant()
 
 
 class AccessControl:
-    """The access rules of a service: tokens, origins and TLS.
+    """The access rules of a service: tokens, hosts, origins and TLS.
 
     A token comes as `Authorization: Bearer TOKEN`, as `?token=TOKEN` (browsers can send no header with a
     WebSocket), or in a `hello` that is the first message. It is compared in constant time and never logged.
     A JWT signed with `settings.jwt_key` is accepted instead.
+
+    A browser sends the host that its user, or a page, has asked for. Only names of this service are accepted,
+    because the owner of another name may point it to this machine (DNS rebinding).
 
     A browser sends the origin of the page that opens a WebSocket. Accepted are those of `settings.origins`,
     and pages of the loopback address if the service listens there, or else of the service's own address.
@@ -41,6 +47,7 @@ class AccessControl:
         self._verifier = (
             None if settings.jwt_key is None else TokenVerifier(settings.jwt_key, settings.jwt_audience)
         )
+        self._hosts = {*settings.hosts, settings.host.lower(), socket.gethostname().lower()}
         if self.requires_token:
             # On the level DEBUG it logs whole requests, with their tokens.
             logging.getLogger("websockets.server").setLevel(logging.WARNING)
@@ -86,6 +93,23 @@ class AccessControl:
         query = parse_qs(target.partition("?")[2]).get("token", [None])[-1]
         token = credentials.strip() if scheme.lower() == "bearer" else query
         return None if token is None and self.requires_token and later else self._admit(token)
+
+    def check_host(self, headers: Mapping[str, str]) -> None:
+        """Raise JoinError (403) if a request is for another host. One without a host is from no browser."""
+        host = headers.get("host")
+        try:
+            name = "localhost" if host is None else (urlsplit(f"//{host}").hostname or "").rstrip(".")
+        except ValueError:
+            name = ""
+        if name in self._hosts or is_loopback(name):
+            return
+        # No name server can make an address lead elsewhere.
+        if self._settings.host in EVERYWHERE and _is_address(name):
+            return
+        raise JoinError(
+            HTTPStatus.FORBIDDEN,
+            f"host: wanted a name of this service, got {str(host)[:200]!r}; REALIZER_HOSTS adds names",
+        )
 
     def check_hello(self, message: str | bytes) -> Grant:
         """Return the grant of the token in a first message.
@@ -141,9 +165,8 @@ class AccessControl:
             parts = urlsplit(origin.lower())
         except ValueError:
             parts = urlsplit("")
-        if self._settings.host in LOOPBACK:
-            # Not the Host header: a name of the attacker's may point to this machine.
-            local = parts.hostname in LOOPBACK
+        if is_loopback(self._settings.host):
+            local = is_loopback(parts.hostname or "")
         else:
             local = parts.netloc != "" and parts.netloc == headers.get("host", "").lower()
         if not local:
@@ -194,6 +217,13 @@ class RateLimiter:
         if self.notice is not None:
             warn(self.notice)
         await asyncio.sleep(seconds)
+
+
+def _is_address(name: str) -> bool:
+    try:
+        return bool(ipaddress.ip_address(name))
+    except ValueError:
+        return False
 
 
 def _digest(token: str) -> bytes:

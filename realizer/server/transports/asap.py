@@ -48,7 +48,7 @@ class AsapTransport(TcpTransport):
     def __init__(self, sessions: SessionHost, settings: Settings) -> None:
         assert settings.asap_ports is not None
         port, self._feedback_port = settings.asap_ports
-        super().__init__("asap", settings.host, port, settings.max_connections)
+        super().__init__("asap", settings.host, port, settings.max_connections, settings.allow)
         self._limit = settings.max_document
         self._rate = settings.max_rate
         self._sessions = sessions

@@ -1,12 +1,14 @@
 """The base of transports that listen on a TCP port."""
 
 import asyncio
+import ipaddress
 import logging
 import re
 import socket
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 
-from realizer.core.settings import limit_hint
+from realizer.core.settings import is_loopback, limit_hint
 
 log = logging.getLogger(__name__)
 
@@ -24,13 +26,15 @@ class TcpTransport(ABC):
     Args:
         name: of the transport, for the log.
         most: number of connections that one address may open.
+        allow: addresses and networks whose clients are accepted, beside this machine; none: all.
     """
 
-    def __init__(self, name: str, host: str, port: int, most: int) -> None:
+    def __init__(self, name: str, host: str, port: int, most: int, allow: Iterable[str] = ()) -> None:
         self.port = port
         self._name = name
         self._host = host
         self._most = most
+        self._allowed = [ipaddress.ip_network(network) for network in allow]
         self._from: list[str] = []  # the addresses of the open connections
         self._server: asyncio.Server | None = None
         self._clients: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
@@ -67,6 +71,11 @@ class TcpTransport(ABC):
     async def _handle(self, host: str, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Serve the client at an IP address until it leaves."""
 
+    def _is_allowed(self, host: str) -> bool:
+        if not self._allowed or is_loopback(host):
+            return True
+        return bool(host) and any(ipaddress.ip_address(host) in network for network in self._allowed)
+
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         task = asyncio.current_task()
         assert task is not None
@@ -75,7 +84,9 @@ class TcpTransport(ABC):
         host = "" if peer is None else peer[0].removeprefix("::ffff:")
         self._from.append(host)
         try:
-            if self._from.count(host) > self._most:
+            if not self._is_allowed(host):
+                log.warning("%s: %s is refused: REALIZER_ALLOW does not name it", self._name, host)
+            elif self._from.count(host) > self._most:
                 words = (
                     f"{self._most} connections from it are open: wanted fewer {limit_hint('max_connections')}"
                 )

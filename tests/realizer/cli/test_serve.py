@@ -41,3 +41,26 @@ def test_serve_refuses_an_invalid_limit(limit: Any) -> None:
     assert done.exit_code == 2
     assert f"setting {limit.name}: wanted a" in done.stderr
     assert "got 'much'" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--host", "0.0.0.0"], "setting host: wanted token, jwt_key or insecure too"),
+        (["--host", "::", "--workers", "2"], "setting host: wanted token, jwt_key or insecure too"),
+        (["--host", "0.0.0.0", "--token", "x", "--xface-port", "0"], "setting xface_port: wanted allow or"),
+    ],
+)
+def test_serve_refuses_to_listen_beyond_this_machine_unprotected(options: list[str], says: str) -> None:
+    done = CliRunner().invoke(cli, ["serve", *options])
+    assert done.exit_code == 2
+    assert says in done.stderr
+
+
+def test_serve_listens_beyond_this_machine_if_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    settings = settings_of(monkeypatch, "--host", "0.0.0.0", "--insecure", "--hosts", "a.example,b.example")
+    assert (settings.insecure, settings.hosts) == (True, ("a.example", "b.example"))
+    allowed = settings_of(
+        monkeypatch, "--host", "::", "--token", "x", "--asap-ports", "0", "1", "--allow", "192.0.2.1"
+    )
+    assert allowed.allow == ("192.0.2.1/32",)

@@ -184,6 +184,32 @@ def test_settings_refuse_a_short_or_missing_key_and_do_not_show_it(key: str, tmp
 
 
 @pytest.mark.parametrize(
+    "settings",
+    [
+        {"host": "127.0.0.2", "xface_port": 0},
+        {"host": "localhost", "asap_ports": (0, 1)},
+        {"host": "::1"},
+        {"host": "0.0.0.0", "token": "x"},
+        {"host": "0.0.0.0", "jwt_key": "x" * 32},
+        {"host": "0.0.0.0", "token": "x", "xface_port": 0, "allow": "192.0.2.1, 198.51.100.7/24"},
+        {"host": "::", "insecure": True, "xface_port": 0},
+    ],
+)
+def test_settings_listen_beyond_this_machine_with_protection(settings: dict[str, Any]) -> None:
+    assert Settings(**settings).host == settings["host"]
+
+
+def test_settings_read_several_hosts_and_networks_from_a_text() -> None:
+    read = Settings.read(
+        environment={"REALIZER_HOSTS": "Face.example,[::1]", "REALIZER_ALLOW": "192.0.2.9/24"}
+    )
+    assert (read.hosts, read.allow) == (("face.example", "::1"), ("192.0.2.0/24",))
+    for wrong in ({"hosts": "face.example:80"}, {"hosts": "http://face"}, {"allow": "face"}, {"allow": 7}):
+        with pytest.raises(SettingsError, match=r"wanted (names or )?addresses"):
+            Settings(**wrong)
+
+
+@pytest.mark.parametrize(
     ("settings", "says"),
     [
         ({"tls_key": Path(__file__)}, "setting tls_key: wanted tls_cert too"),
@@ -191,7 +217,13 @@ def test_settings_refuse_a_short_or_missing_key_and_do_not_show_it(key: str, tmp
         ({"token": "x", "host": "0.0.0.0", "xface_port": 0}, "its clients cannot send the token"),
         ({"jwt_key": "x" * 32, "host": "0.0.0.0", "xface_port": 0}, "its clients cannot send the token"),
         ({"jwt_audience": "faces"}, "setting jwt_audience: wanted jwt_key too"),
-        ({"token": "x", "host": "::", "asap_ports": (0, 1)}, "setting asap_ports: wanted none, or host 127"),
+        (
+            {"token": "x", "host": "::", "asap_ports": (0, 1)},
+            "setting asap_ports: wanted allow or insecure too",
+        ),
+        ({"host": "0.0.0.0"}, "setting host: wanted token, jwt_key or insecure too, because other machines can reach 0"),
+        ({"host": "::"}, "setting host: wanted token"),
+        ({"host": "face.example", "allow": ["192.0.2.1"]}, "setting host: wanted token"),
     ],
 )
 def test_settings_refuse_contradictions(settings: dict[str, Any], says: str) -> None:

@@ -226,7 +226,7 @@ def test_server_start_raises_if_the_address_is_in_use() -> None:
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_serve_names_a_host_that_does_not_exist(workers: int) -> None:
-    settings = Settings(host="nowhere.invalid", port=0, workers=workers)
+    settings = Settings(host="nowhere.invalid", port=0, workers=workers, insecure=True)
     with pytest.raises(SettingsError, match=r"setting host: wanted .*, got 'nowhere\.invalid'"):
         asyncio.run(serve(settings))
 

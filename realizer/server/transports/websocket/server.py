@@ -19,7 +19,7 @@ from websockets.protocol import State
 from websockets.server import ServerProtocol
 
 from realizer.core.settings import Settings
-from realizer.server.http.access import AccessControl
+from realizer.server.http.access import EVERYWHERE, AccessControl
 from realizer.server.http.http_site import TEXT, HttpResponse, HttpSite
 from realizer.server.http.metrics import MEDIA_TYPE
 from realizer.server.runtime.session_host import SessionHost
@@ -130,38 +130,47 @@ class WebSocketTransport:
             await self._socket.wait_closed()
 
     async def _http(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Answer requests that are not for a WebSocket, and refuse WebSockets that may not be opened."""
+        """Answer a request; return None if a WebSocket may be opened."""
+        try:
+            answer = await self._answer(connection, request, headers_of(request))
+        except JoinError as error:
+            answer = self._refused(connection, error)
+        return None if answer is None else response_to(answer)
+
+    async def _answer(
+        self, connection: ServerConnection, request: Request, headers: Mapping[str, str]
+    ) -> HttpResponse | None:
+        """Return the answer to a request; None if a WebSocket may be opened.
+
+        Raises:
+            JoinError: the client may not do this.
+        """
+        self._access.check_host(headers)
         path = urlsplit(request.path).path
-        upgrade = request.headers.get("Upgrade", "").lower() == "websocket"
+        upgrade = headers.get("upgrade", "").lower() == "websocket"
         if path in ("/ws", "/check") and upgrade:
-            try:
-                grant = self._access.request(request.path, headers_of(request), later=path == "/ws")
-                self._connections.check_room(connection)
-                if path == "/check":
-                    self._access.check_memory()
-                else:
-                    # Without a grant its sessions are not known yet.
-                    visitor = Visitor(address_of(connection), None if grant is None else grant.sessions)
-                    self._sessions.check(session_of(request)[0], visitor)
-            except JoinError as error:
-                return self._refused(connection, error)
+            grant = self._access.request(request.path, headers, later=path == "/ws")
+            self._connections.check_room(connection)
+            if path == "/check":
+                self._access.check_memory()
+            else:
+                # Without a grant its sessions are not known yet.
+                visitor = Visitor(address_of(connection), None if grant is None else grant.sessions)
+                self._sessions.check(session_of(request)[0], visitor)
             return None
         if path in ("/ws", "/check") or upgrade:
             got = "a WebSocket" if upgrade else "plain HTTP"
             words = f"wanted a WebSocket at /ws or /check, got {got} at {path}\n"
-            return response_to(HttpResponse(426 if not upgrade else 404, TEXT, words.encode()))
+            return HttpResponse(426 if not upgrade else 404, TEXT, words.encode())
         if path in ("/metrics", "/healthz") and (wrong := self._wrong_worker(request)) is not None:
-            return response_to(HttpResponse(404, TEXT, f"{wrong}\n".encode()))
+            return HttpResponse(404, TEXT, f"{wrong}\n".encode())
         if path == "/metrics":
-            try:
-                grant = self._access.request(request.path, headers_of(request))
-                if grant is None or grant.sessions is not None:
-                    raise JoinError(http.HTTPStatus.FORBIDDEN, "metrics: wanted a token for all sessions")
-            except JoinError as error:
-                return self._refused(connection, error)
-            return response_to(HttpResponse(200, MEDIA_TYPE, self._sessions.metrics_text().encode()))
+            grant = self._access.request(request.path, headers)
+            if grant is None or grant.sessions is not None:
+                raise JoinError(http.HTTPStatus.FORBIDDEN, "metrics: wanted a token for all sessions")
+            return HttpResponse(200, MEDIA_TYPE, self._sessions.metrics_text().encode())
         loop = asyncio.get_running_loop()
-        return response_to(await loop.run_in_executor(None, self._site.answer, request.path))
+        return await loop.run_in_executor(None, self._site.answer, request.path)
 
     def _wrong_worker(self, request: Request) -> str | None:
         """Return the error if a request names another worker, or None."""
@@ -170,11 +179,11 @@ class WebSocketTransport:
             return None
         return f"worker: wanted a number of 0..{self._settings.workers - 1}, got {worker[:80]!r}"
 
-    def _refused(self, connection: ServerConnection, error: JoinError) -> Response:
+    def _refused(self, connection: ServerConnection, error: JoinError) -> HttpResponse:
         self._sessions.metrics.counts["refused"] += 1
         log.info("refused: %s", error, extra={"address": address_of(connection), "status": error.status})
         headers = (("WWW-Authenticate", "Bearer"),) if error.status == http.HTTPStatus.UNAUTHORIZED else ()
-        return response_to(HttpResponse(error.status, TEXT, f"{error}\n".encode(), headers))
+        return HttpResponse(error.status, TEXT, f"{error}\n".encode(), headers)
 
 
 def _unreachable_socket() -> socket.socket:
@@ -195,6 +204,6 @@ def startup_lines(settings: Settings, port: int) -> tuple[str, ...]:
 
 
 def _addresses(settings: Settings, port: int) -> tuple[str, str]:
-    host = "127.0.0.1" if settings.host in ("", "0.0.0.0", "::") else settings.host
+    host = EVERYWHERE.get(settings.host, settings.host)
     place, s = f"[{host}]:{port}" if ":" in host else f"{host}:{port}", "s" if settings.tls_cert else ""
     return f"ws{s}://{place}/ws", f"http{s}://{place}/"

@@ -41,7 +41,9 @@ class XfaceTransport(TcpTransport):
 
     def __init__(self, sessions: SessionHost, settings: Settings) -> None:
         assert settings.xface_port is not None
-        super().__init__("xface", settings.host, settings.xface_port, settings.max_connections)
+        super().__init__(
+            "xface", settings.host, settings.xface_port, settings.max_connections, settings.allow
+        )
         self._settings = settings
         self._sessions = sessions
         self._count = 0

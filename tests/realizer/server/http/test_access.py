@@ -139,6 +139,8 @@ def test_access_without_a_token_setting_is_open() -> None:
         # A name of the attacker's that points to this machine.
         ("127.0.0.1", {"origin": "http://evil.example:8765", "host": "evil.example:8765"}, (), False),
         ("127.0.0.1", {"origin": "http://localhost.evil.example"}, (), False),
+        ("127.0.0.2", {"origin": "http://127.0.0.2:8765"}, (), True),
+        ("127.0.0.2", {"origin": "http://evil.example:8765", "host": "evil.example:8765"}, (), False),
         ("0.0.0.0", {"origin": "http://face.example:8765", "host": "face.example:8765"}, (), True),
         ("0.0.0.0", {"origin": "http://evil.example", "host": "face.example:8765"}, (), False),
         ("0.0.0.0", {"origin": "http://localhost", "host": "face.example"}, (), False),
@@ -151,12 +153,40 @@ def test_access_without_a_token_setting_is_open() -> None:
 def test_access_refuses_pages_of_other_origins(
     host: str, headers: dict[str, str], origins: tuple[str, ...], welcome: bool
 ) -> None:
-    g = guard(host=host, origins=origins)
+    g = guard(host=host, origins=origins, insecure=True)
     if welcome:
         assert g.request("/ws", headers)
         return
     with pytest.raises(JoinError, match="REALIZER_ORIGINS lets more in") as refused:
         g.request("/ws", headers)
+    assert refused.value.status == 403
+
+
+@pytest.mark.parametrize(
+    ("host", "named", "welcome"),
+    [
+        ("127.0.0.1", None, True),
+        ("127.0.0.1", "localhost.:8765", True),
+        ("127.0.0.1", "192.0.2.1", False),
+        ("0.0.0.0", "192.0.2.1:8765", True),
+        ("::", "[2001:db8::1]:8765", True),
+        ("192.0.2.1", "192.0.2.1:8765", True),
+        ("192.0.2.1", "192.0.2.2:8765", False),
+        ("face.example", "FACE.example", True),
+        ("0.0.0.0", "face.example.evil.example", False),
+        ("0.0.0.0", "", False),
+        ("0.0.0.0", "[x", False),
+    ],
+)
+def test_access_check_host_knows_the_names_of_the_service(
+    host: str, named: str | None, welcome: bool
+) -> None:
+    g, headers = guard(host=host, insecure=True), {} if named is None else {"host": named}
+    if welcome:
+        g.check_host(headers)
+        return
+    with pytest.raises(JoinError, match="REALIZER_HOSTS adds names") as refused:
+        g.check_host(headers)
     assert refused.value.status == 403
 
 

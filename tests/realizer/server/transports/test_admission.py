@@ -6,6 +6,7 @@ import asyncio
 import json
 import logging
 import re
+import socket
 import ssl
 import subprocess
 import time
@@ -14,6 +15,7 @@ import urllib.request
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import jwt
 import pytest
@@ -260,6 +262,49 @@ def test_admission_refuses_pages_of_other_origins() -> None:
             assert (await welcomed(server.url, origin=origin))["type"] == "welcome"
 
     serving(test, origins=("https://app.example",))
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.2", "0.0.0.0", "::"])
+def test_admission_by_a_name_that_is_not_the_service_is_refused(host: str) -> None:
+    """The name of an attacker may point to this machine: its pages have the service's own origin."""
+
+    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as probe:
+        try:
+            probe.bind((host, 0))
+        except OSError as error:
+            pytest.skip(f"this machine has no {host}: {error}")
+
+    async def test(server: Server) -> None:
+        address = urlsplit(server.page).hostname
+        ours = f"localhost:{server.port}"
+        for name in ("evil.example", "127.0.0.1.evil.example", "localhost.evil.example", "[", ""):
+            theirs = f"{name}:{server.port}"
+            headers = {"Host": theirs, "Origin": f"http://{theirs}"}
+            for path in ("", "healthz", "metrics", "faces/ada", "check"):
+                with pytest.raises(urllib.error.HTTPError, match="403") as refused:
+                    await read(server.page + path, headers)
+                assert b"REALIZER_HOSTS" in refused.value.read()
+            if name.endswith("example"):
+                with pytest.raises(InvalidStatus) as closed:
+                    await connect(f"ws://{theirs}/ws", host=address, port=server.port)
+                assert closed.value.response.status_code == 403
+        for name in (ours, f"{socket.gethostname()}:{server.port}", "face.example", "LOCALHOST", "[::1]:80"):
+            assert json.loads(await read(f"{server.page}healthz", {"Host": name}))["status"] == "ok"
+        assert (await welcomed(server.url))["type"] == "welcome"
+
+    serving(test, host=host, hosts=("face.example",), insecure=True)
+
+
+def test_admission_by_any_address_needs_a_service_on_all_of_them() -> None:
+    async def test(server: Server) -> None:
+        assert "ok" in await read(f"{server.page}healthz", {"Host": "192.0.2.1:8765"})
+
+    async def local(server: Server) -> None:
+        with pytest.raises(urllib.error.HTTPError, match="403"):
+            await read(f"{server.page}healthz", {"Host": "192.0.2.1:8765"})
+
+    serving(test, host="0.0.0.0", insecure=True)
+    serving(local)
 
 
 def test_admission_reads_a_flood_slowly_and_loses_nothing() -> None:

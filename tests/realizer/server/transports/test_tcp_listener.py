@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer.server.runtime.session_registry import SESSION_ID
+from realizer.server.transports import tcp_listener
 from realizer.server.transports.tcp_listener import TcpTransport, session_name
 
 LIMIT = 10  # s; a hung test ends
@@ -30,9 +31,14 @@ class Echo(TcpTransport):
             writer.write(line)
 
 
-def opened(test: Callable[[Echo], Awaitable[None]], host: str = "127.0.0.1", most: int = 2) -> None:
+def opened(
+    test: Callable[[Echo], Awaitable[None]],
+    host: str = "127.0.0.1",
+    most: int = 2,
+    allow: tuple[str, ...] = (),
+) -> None:
     async def run() -> None:
-        transport = Echo("echo", host, 0, most)
+        transport = Echo("echo", host, 0, most, allow)
         await transport.start()
         await transport.ready()
         try:
@@ -112,6 +118,22 @@ def test_tcp_transport_limits_the_connections_of_an_address(caplog: pytest.LogCa
     with caplog.at_level(logging.WARNING):
         opened(test)
     assert "echo: 127.0.0.1 is refused: 2 connections from it are open" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("allow", "got"), [("127.0.0.0/8", b"x\n"), ("2001:db8::/32", b""), ("192.0.2.1", b"")]
+)
+def test_tcp_transport_accepts_the_allowed_addresses_only(
+    allow: str, got: bytes, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def test(transport: Echo) -> None:
+        assert (await line_of(transport, b"x\n"))[0] == b"x\n"  # this machine is always allowed
+        monkeypatch.setattr(tcp_listener, "is_loopback", lambda host: False)
+        assert (await line_of(transport, b"x\n"))[0] == got
+
+    with caplog.at_level(logging.WARNING):
+        opened(test, allow=(allow,))
+    assert ("echo: 127.0.0.1 is refused: REALIZER_ALLOW does not name it" in caplog.text) == (got == b"")
 
 
 def test_tcp_transport_logs_an_error_and_ends_that_connection_only(caplog: pytest.LogCaptureFixture) -> None:
