@@ -355,3 +355,18 @@ def test_page_fits_a_phone(page) -> None:  # type: ignore[no-untyped-def]
     for tab in page.locator("#tabs button").all():
         tab.click()
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), tab.text_content()
+
+
+def test_page_passes_its_token_on(browser) -> None:  # type: ignore[no-untyped-def]
+    command = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--token", "a-word"]
+    with serving([*command, "--voice", "silent"]) as address:
+        page = browser.new_page(bypass_csp=True)
+        page.set_default_timeout(PATIENCE)
+        faults: list[str] = []
+        page.on("response", lambda answer: answer.status >= 400 and faults.append(answer.url))
+        page.goto(f"{address}/?token=a-word")
+        page.wait_for_selector('#status[data-state="live"]')
+        page.wait_for_selector("#lights button")  # the look of the face is there
+        page.wait_for_load_state("networkidle")
+        page.close()
+    assert faults == []

@@ -37,8 +37,9 @@ class AccessControl:
     A browser sends the host that its user, or a page, has asked for. Only names of this service are accepted,
     because the owner of another name may point it to this machine (DNS rebinding).
 
-    A browser sends the origin of the page that opens a WebSocket. Accepted are those of `settings.origins`,
-    and pages of the loopback address if the service listens there, or else of the service's own address.
+    A browser sends the origin of a page that opens a WebSocket or reads an answer. Accepted are those of
+    `settings.origins`, and pages of the loopback address if the service listens there, or else of the
+    service's own address.
     """
 
     def __init__(self, settings: Settings) -> None:
@@ -88,7 +89,12 @@ class AccessControl:
         Raises:
             JoinError: 403, a page of another origin; 401, no token or a wrong one.
         """
-        self._check_origin(headers)
+        if not self.allows_origin(headers):
+            raise JoinError(
+                HTTPStatus.FORBIDDEN,
+                f"origin: wanted a page of this service, got one of {headers['origin'][:200]!r}; "
+                "REALIZER_ORIGINS lets more in",
+            )
         scheme, _, credentials = headers.get("authorization", "").partition(" ")
         query = parse_qs(target.partition("?")[2]).get("token", [None])[-1]
         token = credentials.strip() if scheme.lower() == "bearer" else query
@@ -156,25 +162,19 @@ class AccessControl:
             ) from None
         return context
 
-    def _check_origin(self, headers: Mapping[str, str]) -> None:
+    def allows_origin(self, headers: Mapping[str, str]) -> bool:
+        """Return whether a request is from a page that may use the service. One of no page has no origin."""
         origin = headers.get("origin")
         allowed = {known.rstrip("/").lower() for known in self._settings.origins}
         if origin is None or "*" in allowed or origin.rstrip("/").lower() in allowed:
-            return  # only browsers send an origin
+            return True
         try:
             parts = urlsplit(origin.lower())
         except ValueError:
-            parts = urlsplit("")
+            return False
         if is_loopback(self._settings.host):
-            local = is_loopback(parts.hostname or "")
-        else:
-            local = parts.netloc != "" and parts.netloc == headers.get("host", "").lower()
-        if not local:
-            raise JoinError(
-                HTTPStatus.FORBIDDEN,
-                f"origin: wanted a page of this service, got one of {origin[:200]!r}; "
-                "REALIZER_ORIGINS lets more in",
-            )
+            return is_loopback(parts.hostname or "")
+        return parts.netloc != "" and parts.netloc == headers.get("host", "").lower()
 
 
 class RateLimiter:

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import functools
 import json
+import logging
 import mimetypes
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import files
-from urllib.parse import parse_qs, unquote
+from urllib.parse import parse_qs
 
-from realizer.core.errors import FaceError, RealizerError
+from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
-from realizer.server.http.page_tools import ToolError, export_pose, preview_emotion
+from realizer.server.http.page_tools import ToolError, UnknownName, export_pose, preview_emotion
+
+log = logging.getLogger(__name__)
 
 JSON = "application/json; charset=utf-8"
 TEXT = "text/plain; charset=utf-8"
@@ -20,11 +24,14 @@ NOT_BUILT = """The page was not bundled when this package was built.
 Build it where npm is on the PATH: pip install -e . in the checkout, or install a wheel.
 The WebSocket at /ws works without it.
 """
+# No page of another origin may show an answer in a frame.
+FRAMES = "frame-ancestors 'self'"
 # The page loads nothing from other hosts, and opens no other connections than WebSockets.
 POLICY = (
     "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; "
-    "connect-src 'self' ws: wss:"
+    f"connect-src 'self' ws: wss:; {FRAMES}"
 )
+NAME = re.compile(r"[a-z0-9_-]{1,64}")  # in a URL
 
 
 @dataclass(frozen=True)
@@ -46,50 +53,56 @@ class HttpSite:
     """
 
     def __init__(self, health: Callable[[], dict[str, object]], settings: Settings | None = None) -> None:
-        self._health = health
         self._settings = settings or Settings()
         self._static = files("realizer.server").joinpath("static")
+        self._routes: dict[str, Callable[[dict[str, str]], HttpResponse]] = {
+            "/": lambda asked: self._file("index.html"),
+            "/healthz": lambda asked: _json(json.dumps({"status": "ok", **health()})),
+            "/asyncapi.json": lambda asked: _json(_asyncapi()),
+            "/examples.json": lambda asked: _json(_examples()),
+            "/vocabulary.json": lambda asked: _json(_vocabulary()),
+            "/feeling.json": lambda asked: _json(preview_emotion(asked.get("of", ""))),
+            "/look.json": lambda asked: _json(
+                _look(_face(asked.get("face", "default")), self._settings.light, self._settings.background)
+            ),
+            "/pose.fap": self._pose,
+        }
+
+    def is_public(self, path: str) -> bool:
+        """Return whether anybody may get what is at a path: the page, its files, and the health."""
+        return path in ("/", "/healthz") or path[1:] in self._names()
 
     def answer(self, target: str) -> HttpResponse:
         """Return the response to `GET target`. May block while a face is loaded for the first time."""
         path, _, query = target.partition("?")
-        path = unquote(path)
-        if path == "/healthz":
-            return HttpResponse(200, JSON, json.dumps({"status": "ok", **self._health()}).encode())
-        if path == "/asyncapi.json":
-            return HttpResponse(200, JSON, files("realizer.server").joinpath("asyncapi.json").read_bytes())
-        if path == "/examples.json":
-            return HttpResponse(200, JSON, _examples())
-        if path == "/vocabulary.json":
-            from realizer.server.http.vocabulary import vocabulary
-
-            return HttpResponse(200, JSON, vocabulary())
         asked = {name: values[-1] for name, values in parse_qs(query).items()}
         try:
-            if path == "/feeling.json":
-                return HttpResponse(200, JSON, preview_emotion(asked.get("of", "")).encode())
-            if path == "/pose.fap":
-                pose = export_pose(asked.get("set", ""), asked.get("face"), self._settings)
-                headers = (("Content-Disposition", 'attachment; filename="pose.fap"'),)
-                return HttpResponse(200, "text/x-fap", pose.encode(), headers)
-            if path == "/look.json":
-                name, settings = asked.get("face", "default"), self._settings
-                return HttpResponse(200, JSON, _look(name, settings.light, settings.background))
+            if path in self._routes:
+                return self._routes[path](asked)
             if path.startswith("/faces/"):
-                glb = _glb(path.removeprefix("/faces/").removesuffix(".glb"))
+                glb = _glb(_face(path.removeprefix("/faces/").removesuffix(".glb")))
                 return HttpResponse(200, "model/gltf-binary", glb, (("Cache-Control", "no-cache"),))
         except ToolError as error:
-            return HttpResponse(400, TEXT, f"{error}\n".encode())
-        except FaceError as error:
-            return HttpResponse(404, TEXT, f"{error}\n".encode())
-        except RealizerError as error:
-            return HttpResponse(500, TEXT, f"{error}\n".encode())
-        return self._file("index.html" if path == "/" else path[1:])
+            return HttpResponse(error.status, TEXT, f"{error}\n".encode())
+        except RealizerError:
+            log.exception("there is no answer to GET %s", path)
+            return HttpResponse(500, TEXT, b"an error of the service: its log says which\n")
+        return self._file(path[1:])
+
+    def _names(self) -> set[str]:
+        """Return the names of the page's files."""
+        found = self._static.iterdir() if self._static.is_dir() else ()
+        return {f.name for f in found if not f.name.startswith(".")}
+
+    def _pose(self, asked: dict[str, str]) -> HttpResponse:
+        face = asked.get("face")
+        pose = export_pose(asked.get("set", ""), None if face is None else _face(face), self._settings)
+        headers = (("Content-Disposition", 'attachment; filename="pose.fap"'),)
+        return HttpResponse(200, "text/x-fap", pose.encode(), headers)
 
     def _file(self, name: str) -> HttpResponse:
         """Return a file of the page. Only names in its folder are accepted, so that no path can leave it."""
-        names = {f.name for f in self._static.iterdir()} if self._static.is_dir() else set()
-        if name in names and not name.startswith("."):
+        if name in self._names():
             media_type = mimetypes.guess_type(name)[0] or "application/octet-stream"
             if media_type.startswith("text/") or media_type.endswith("svg+xml"):
                 media_type += "; charset=utf-8"
@@ -97,8 +110,32 @@ class HttpSite:
             return HttpResponse(200, media_type, self._static.joinpath(name).read_bytes(), headers)
         if name == "index.html":
             return HttpResponse(503, TEXT, NOT_BUILT.encode())
-        words = f"/{name} is not here; there are / /ws /faces/NAME /healthz\n"
+        words = f"/{name[:80]} is not here; there are / /ws /faces/NAME /healthz\n"
         return HttpResponse(404, TEXT, words.encode())
+
+
+def _json(text: str | bytes) -> HttpResponse:
+    return HttpResponse(200, JSON, text.encode() if isinstance(text, str) else text)
+
+
+def _face(name: str) -> str:
+    """Return the name of a face in a URL if there is such a face, without a look at other folders."""
+    from realizer.face.load import face_folders, face_name
+
+    known = face_folders()
+    if not NAME.fullmatch(name) or face_name(name) not in known:
+        raise UnknownName(f"face: wanted one of {', '.join(known)}, got {name[:80]!r}")
+    return name
+
+
+def _asyncapi() -> bytes:
+    return files("realizer.server").joinpath("asyncapi.json").read_bytes()
+
+
+def _vocabulary() -> bytes:
+    from realizer.server.http.vocabulary import vocabulary
+
+    return vocabulary()
 
 
 @functools.cache

@@ -18,10 +18,24 @@ MAX_TEXT = 50_000  # characters; checking takes a tenth of a second
 MAX_FINDINGS = 100
 SETTLED = 10.0  # s; by then set values are reached
 FPS = 25.0
+# The attributes of <emotion> that can be previewed.
+EMOTION = {"name": str, "profile": str, "angle": int | float, "activation": int | float}
 
 
 class ToolError(RealizerError):
-    """A request that cannot be answered; the text says what was wanted."""
+    """A request that cannot be answered; the text says what was wanted.
+
+    Attributes:
+        status: of the response.
+    """
+
+    status = 400
+
+
+class UnknownName(ToolError):
+    """A request for something of a name that does not exist."""
+
+    status = 404
 
 
 def lint(text: str, settings: Settings) -> str:
@@ -86,16 +100,18 @@ def preview_emotion(request: str) -> str:
     from realizer.behaviours.kind import PlanningContext
     from realizer.emotions.wheel import blend_weights
 
-    fields = {k: v for k, v in _object(request).items() if k in ("name", "angle", "activation", "profile")}
-    node = Emotion(id="asked", **fields)
+    fields = {k: v for k, v in _object(request).items() if k in EMOTION and v is not None}
+    if wrong := [name for name, value in fields.items() if not isinstance(value, EMOTION[name])]:
+        raise ToolError(f"feeling: {wrong[0]}: wanted a {'text' if EMOTION[wrong[0]] is str else 'number'}")
     try:
-        error = node.fault() or next((fault.text for fault in emotion.check(node, PlanningContext())), "")
-        if error:
-            raise ToolError(error)
+        node = Emotion(id="asked", **fields)
+        fault = node.fault() or next((fault.text for fault in emotion.check(node, PlanningContext())), "")
+        if fault:
+            raise ToolError(fault)
         values = emotion.values_of(node)
         weights = blend_weights(node.angle, node.profile or "own") if node.angle is not None else {}
-    except (TypeError, ValueError) as wrong:
-        raise ToolError(f"feeling: {wrong}") from None
+    except (TypeError, ValueError, ArithmeticError) as error:
+        raise ToolError(f"feeling: {error}") from None
     return json.dumps(
         {
             "values": {target.name: round(float(value), 4) for target, value in values.items()},

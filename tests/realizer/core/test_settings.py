@@ -221,7 +221,10 @@ def test_settings_read_several_hosts_and_networks_from_a_text() -> None:
             {"token": "x", "host": "::", "asap_ports": (0, 1)},
             "setting asap_ports: wanted allow or insecure too",
         ),
-        ({"host": "0.0.0.0"}, "setting host: wanted token, jwt_key or insecure too, because other machines can reach 0"),
+        (
+            {"host": "0.0.0.0"},
+            "setting host: wanted token, jwt_key or insecure too, because other machines can reach 0",
+        ),
         ({"host": "::"}, "setting host: wanted token"),
         ({"host": "face.example", "allow": ["192.0.2.1"]}, "setting host: wanted token"),
     ],

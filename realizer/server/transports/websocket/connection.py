@@ -7,7 +7,6 @@ import contextlib
 import http
 import logging
 from functools import lru_cache
-from urllib.parse import urlsplit
 
 from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
@@ -23,7 +22,7 @@ from realizer.server.http.jwt_tokens import Grant
 from realizer.server.journal import JournalError
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError, Visitor
-from realizer.server.transports.websocket.request import address_of, headers_of, session_of
+from realizer.server.transports.websocket.request import address_of, headers_of, path_of, session_of
 
 log = logging.getLogger(__name__)
 
@@ -62,7 +61,7 @@ class WebSocketConnections:
             return
         self._from.append(address)
         try:
-            if urlsplit(socket.request.path).path == "/check":
+            if path_of(socket.request) == "/check":
                 await self._check(socket)
             else:
                 await self._serve(socket, socket.request)

@@ -1,13 +1,13 @@
 """The HTTP request of a WebSocket, and HTTP responses."""
 
 import http
-from urllib.parse import parse_qsl, urlsplit
+from urllib.parse import parse_qsl
 
 from websockets.asyncio.server import ServerConnection
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
-from realizer.server.http.http_site import HttpResponse
+from realizer.server.http.http_site import FRAMES, HttpResponse
 from realizer.server.runtime.session_registry import JoinError
 
 
@@ -27,7 +27,7 @@ def headers_of(request: Request) -> dict[str, str]:
 
 def query_of(request: Request) -> dict[str, str]:
     """Return the query of a request; of several values with one name the last."""
-    return dict(parse_qsl(urlsplit(request.path).query, keep_blank_values=True))
+    return dict(parse_qsl(request.path.partition("?")[2], keep_blank_values=True))
 
 
 def session_of(request: Request) -> tuple[str | None, int | None]:
@@ -45,16 +45,22 @@ def session_of(request: Request) -> tuple[str | None, int | None]:
     return session, int(seen)
 
 
-def response_to(answer: HttpResponse) -> Response:
-    """Convert a response for the websockets library."""
+def path_of(request: Request) -> str:
+    """Return the path of a request as it was sent, without its query."""
+    return request.path.partition("?")[0]
+
+
+def response_to(answer: HttpResponse, origin: str | None = None) -> Response:
+    """Convert a response for the websockets library; pages of `origin` may read it beside those of ours."""
     headers = Headers(
         {
             "Content-Type": answer.media_type,
             "Content-Length": str(len(answer.body)),
             "X-Content-Type-Options": "nosniff",
-            # Pages of other origins may import realizer.js and load faces.
-            "Access-Control-Allow-Origin": "*",
+            "Content-Security-Policy": FRAMES,
+            "Vary": "Origin",
             "Connection": "close",
+            **({} if origin is None else {"Access-Control-Allow-Origin": origin}),
             **dict(answer.headers),
         }
     )

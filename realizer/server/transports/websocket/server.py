@@ -8,7 +8,6 @@ import socket
 import tempfile
 from collections.abc import Mapping
 from typing import Any
-from urllib.parse import urlsplit
 from weakref import WeakSet
 
 from websockets.asyncio.server import Server as SocketServer
@@ -16,7 +15,6 @@ from websockets.asyncio.server import ServerConnection
 from websockets.asyncio.server import serve as listen
 from websockets.http11 import Request, Response
 from websockets.protocol import State
-from websockets.server import ServerProtocol
 
 from realizer.core.settings import Settings
 from realizer.server.http.access import EVERYWHERE, AccessControl
@@ -25,9 +23,11 @@ from realizer.server.http.metrics import MEDIA_TYPE
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError, Visitor
 from realizer.server.transports.websocket.connection import GOODBYE, WebSocketConnections
+from realizer.server.transports.websocket.protocol import Protocol
 from realizer.server.transports.websocket.request import (
     address_of,
     headers_of,
+    path_of,
     query_of,
     response_to,
     session_of,
@@ -84,7 +84,6 @@ class WebSocketTransport:
             self._connections.handle,
             process_request=self._http,
             compression=None,  # frames are dense, and a late one is worse than a large one
-            max_size=self._settings.max_message,
             open_timeout=OPENING,
             close_timeout=GOODBYE,
             server_header=None,
@@ -102,11 +101,11 @@ class WebSocketTransport:
 
     def _connection(self) -> ServerConnection:
         assert self._socket is not None
-        protocol = ServerProtocol(max_size=self._settings.max_message)
-        return self._open(protocol, self._socket, close_timeout=GOODBYE, **PATIENCE)
+        return self._open(None, self._socket, close_timeout=GOODBYE, **PATIENCE)
 
-    def _open(self, *arguments: Any, **named: Any) -> ServerConnection:
-        connection = ServerConnection(*arguments, **named)
+    def _open(self, _: object, server: SocketServer, **named: Any) -> ServerConnection:
+        """Return the connection to a new client. The library offers a protocol, which ours replaces."""
+        connection = ServerConnection(Protocol(max_size=self._settings.max_message), server, **named)
         self._opened.add(connection)
         return connection
 
@@ -131,11 +130,13 @@ class WebSocketTransport:
 
     async def _http(self, connection: ServerConnection, request: Request) -> Response | None:
         """Answer a request; return None if a WebSocket may be opened."""
+        headers = headers_of(request)
         try:
-            answer = await self._answer(connection, request, headers_of(request))
+            answer = await self._answer(connection, request, headers)
         except JoinError as error:
             answer = self._refused(connection, error)
-        return None if answer is None else response_to(answer)
+        origin = headers.get("origin") if self._access.allows_origin(headers) else None
+        return None if answer is None else response_to(answer, origin)
 
     async def _answer(
         self, connection: ServerConnection, request: Request, headers: Mapping[str, str]
@@ -146,7 +147,7 @@ class WebSocketTransport:
             JoinError: the client may not do this.
         """
         self._access.check_host(headers)
-        path = urlsplit(request.path).path
+        path = path_of(request)
         upgrade = headers.get("upgrade", "").lower() == "websocket"
         if path in ("/ws", "/check") and upgrade:
             grant = self._access.request(request.path, headers, later=path == "/ws")
@@ -164,10 +165,11 @@ class WebSocketTransport:
             return HttpResponse(426 if not upgrade else 404, TEXT, words.encode())
         if path in ("/metrics", "/healthz") and (wrong := self._wrong_worker(request)) is not None:
             return HttpResponse(404, TEXT, f"{wrong}\n".encode())
-        if path == "/metrics":
+        if not self._site.is_public(path):
             grant = self._access.request(request.path, headers)
-            if grant is None or grant.sessions is not None:
+            if path == "/metrics" and (grant is None or grant.sessions is not None):
                 raise JoinError(http.HTTPStatus.FORBIDDEN, "metrics: wanted a token for all sessions")
+        if path == "/metrics":
             return HttpResponse(200, MEDIA_TYPE, self._sessions.metrics_text().encode())
         loop = asyncio.get_running_loop()
         return await loop.run_in_executor(None, self._site.answer, request.path)

@@ -7,6 +7,7 @@ import { download, Pose } from "./pose.js";
 import { Clock, Realizer, Sound } from "./realizer.js";
 import { Recorder } from "./record.js";
 import { ActionUnits, Faps } from "./sliders.js";
+import { ask, token } from "./service.js";
 import { Stage } from "./stage.js";
 import { Timeline } from "./timeline.js";
 import { Tracks } from "./tracks.js";
@@ -23,7 +24,7 @@ const sound = new Sound(clock);
 const recorder = new Recorder(stage, sound);
 const log = new Log(at("log"), at("filter"), at("log-head").querySelectorAll("[type=checkbox]"));
 const query = new URLSearchParams(location.search);
-const link = new Realizer({ session: query.get("session") ?? undefined, token: query.get("token") });
+const link = new Realizer({ session: query.get("session") ?? undefined, token });
 const pose = new Pose((message) => link.ask(message));
 const editor = new Editor(at("editor"), new Checker(), showFaults);
 const timeline = new Timeline(at("score"), scrub, () => stage.oldest);
@@ -218,7 +219,7 @@ function mark() {
 }
 
 async function examples() {
-  const rows = await (await fetch("examples.json")).json();
+  const rows = await (await ask("examples.json")).json();
   const cards = rows.map((row) => {
     const about = row.bml.match(/<!--\s*([\s\S]*?)\s*-->/)?.[1].replace(/\s+/g, " ") ?? "";
     const card = make("button.card", { type: "button", value: row.bml, title: about }, make("b", {}, row.title), make("span", {}, about));
@@ -302,7 +303,7 @@ dress(localStorage.getItem("theme") in THEMES ? localStorage.getItem("theme") : 
 at("help").onclick = () => at("keys").showModal();
 
 async function vocabulary() {
-  const known = await (await fetch("vocabulary.json")).json();
+  const known = await (await ask("vocabulary.json")).json();
   editor.know(known);
   units.know(known);
   params.know(known);

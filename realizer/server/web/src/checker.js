@@ -1,4 +1,5 @@
 // Checks texts as `realizer check` does: one request at a time, over its own WebSocket.
+import { token } from "./service.js";
 
 export class Checker {
   constructor() {
@@ -20,7 +21,6 @@ export class Checker {
     return (this.opening ??= new Promise((resolve, reject) => {
       const url = new URL("check", location.href);
       url.protocol = url.protocol.replace("http", "ws");
-      const token = new URLSearchParams(location.search).get("token");
       if (token) url.searchParams.set("token", token);
       const socket = new WebSocket(url);
       socket.onopen = () => {

@@ -1,4 +1,5 @@
 // The values that the tools hold on the face: an emotion, action units, FAPs. Changes are sent once per drawn frame.
+import { ask } from "./service.js";
 
 export class Pose extends EventTarget {
   constructor(send) {
@@ -44,7 +45,7 @@ export class Pose extends EventTarget {
   // All values as a FAP file, made by the service; reject with its error text.
   async file(face) {
     const query = new URLSearchParams({ set: JSON.stringify(this.message), ...(face ? { face } : {}) });
-    const answer = await fetch(`pose.fap?${query}`);
+    const answer = await ask(`pose.fap?${query}`);
     if (!answer.ok) throw new Error((await answer.text()).trim());
     return answer.blob();
   }

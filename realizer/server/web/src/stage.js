@@ -2,6 +2,7 @@
 import { BufferAttribute, BufferGeometry, DoubleSide, Mesh, PerspectiveCamera, Scene, ShaderMaterial, Spherical, Vector3, WebGLRenderer } from "three";
 import { readGlb } from "./glb.js";
 import { Furrows, Glints } from "./figure.js";
+import { ask } from "./service.js";
 import { backdrop, fragment, lightUniforms, MIDDLE, REACH, stops, vertex } from "./light.js";
 
 const KEPT = 20; // s of frames, for looking back
@@ -29,8 +30,8 @@ export class Stage {
   async load(name, scale, offset) {
     const path = encodeURIComponent((this.awaited = name));
     const [look, glb] = await Promise.all([
-      fetch(`look.json?face=${path}`).then((answer) => checked(answer).json()),
-      fetch(`faces/${path}`).then((answer) => checked(answer).arrayBuffer()),
+      ask(`look.json?face=${path}`).then((answer) => checked(answer).json()),
+      ask(`faces/${path}`).then((answer) => checked(answer).arrayBuffer()),
     ]);
     if (this.awaited !== name) return; // another face was requested in the meantime
     const { attributes, indices } = readGlb(glb);

@@ -1,5 +1,6 @@
 // The wheel of emotions: a click chooses an angle and an activation, and the face shows that emotion.
 import { at, make } from "./dom.js";
+import { ask } from "./service.js";
 
 const RINGS = [1, 3, 5, 7]; // activations
 const MOST = 7;
@@ -126,7 +127,7 @@ export class Wheel {
     const profile = at("profiles").value;
     const number = ++this.asked;
     const query = new URLSearchParams({ of: JSON.stringify({ ...asked, profile }) });
-    const answer = await fetch(`feeling.json?${query}`);
+    const answer = await ask(`feeling.json?${query}`);
     if (number !== this.asked) return;
     if (!answer.ok) return this.told((await answer.text()).trim());
     const { values, shares } = await answer.json();

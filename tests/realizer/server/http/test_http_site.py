@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from urllib.parse import quote
 
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
-from realizer.server.http.http_site import NOT_BUILT, HttpSite
+import realizer
+from realizer.face.load import list_faces
+from realizer.server.http.http_site import NAME, NOT_BUILT, HttpSite
 
 SITE = HttpSite(lambda: {"sessions": 2})
 BUILT = SITE.answer("/").status == 200
@@ -89,3 +94,79 @@ def test_site_answers_the_tools_of_the_page_and_their_errors() -> None:
     assert "pose.fap" in dict(file.headers)["Content-Disposition"]
     for target in ("/feeling.json", "/pose.fap", "/pose.fap?set=x", "/feeling.json?of=%00"):
         assert SITE.answer(target).status == 400
+
+
+ROUTES = ("/", "/faces/", "/look.json?face=", "/pose.fap?face=", "/feeling.json?of=", "/pose.fap?set=", "/x/")
+VALUES = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.integers(-(10**400), 10**400) | st.text(max_size=8),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=4), inner, max_size=3),
+    max_leaves=4,
+)
+FEELINGS = st.dictionaries(
+    st.sampled_from(["angle", "activation", "name", "profile", "type", "aus", "faps", "emotion"]), VALUES
+).map(lambda fields: quote(json.dumps(fields | {"type": "set"})))
+
+
+def check(target: str) -> None:
+    answer = SITE.answer(target)
+    assert answer.status in (200, 400, 404) or not BUILT
+    assert str(Path(realizer.__path__[0]).parent).encode() not in answer.body
+
+
+@pytest.mark.parametrize(
+    "target",
+    [
+        "/faces/..",
+        "/faces/ada%00",
+        "/faces/%61da",
+        "/faces/Ada",
+        "/faces/" + 5000 * "a",
+        "/faces/ada/face.toml",
+        "/faces/",
+        "/look.json?face=..",
+        "/pose.fap?face=%2e%2e&set=%7B%22type%22:%22set%22%7D",
+        "/index.html%00",
+        "//[",
+    ],
+)
+def test_site_names_no_folder_for_a_name_that_is_none(target: str) -> None:
+    check(target)
+    assert SITE.answer(target).status == 404
+
+
+@pytest.mark.parametrize(
+    "of", [{"angle": 10**400, "activation": 5}, {"name": ["a"]}, {"angle": {}}, {"profile": 7}]
+)
+def test_site_refuses_what_is_no_emotion(of: dict[str, object]) -> None:
+    assert SITE.answer("/feeling.json?of=" + quote(json.dumps(of))).status == 400
+
+
+@given(st.sampled_from(ROUTES), st.text() | st.text(alphabet='./%&=?#{}[]"a0') | FEELINGS)
+@example("/feeling.json?of=", quote('{"angle": 1e999, "activation": 1}'))
+def test_site_answers_any_target_without_an_error(route: str, rest: str) -> None:
+    check(route + rest)
+
+
+@given(st.text(alphabet="/.%abfces012e_-?", max_size=30))
+def test_site_answers_any_path_without_an_error(path: str) -> None:
+    check("/" + path)
+
+
+def test_site_reaches_every_shipped_face_by_its_name() -> None:
+    assert all(NAME.fullmatch(info.name) for info in list_faces())
+
+
+@pytest.mark.skipif(not BUILT, reason="the page was not bundled: build the package where npm is")
+def test_site_has_its_page_and_its_health_for_everybody() -> None:
+    for path in ("/", "/healthz", "/app.js", "/style.css", "/realizer.js"):
+        assert SITE.is_public(path)
+    for path in (
+        "/metrics",
+        "/faces/ada",
+        "/look.json",
+        "/vocabulary.json",
+        "/asyncapi.json",
+        "/nothing",
+        "/.",
+    ):
+        assert not SITE.is_public(path)

@@ -349,6 +349,46 @@ def test_admission_to_metrics_needs_the_token() -> None:
     serving(test, token=TOKEN)
 
 
+def test_admission_to_what_computes_or_lists_needs_the_token() -> None:
+    async def test(server: Server) -> None:
+        asked = (
+            *("faces/ada", "look.json", "vocabulary.json", "asyncapi.json", "examples.json", "nothing"),
+            "pose.fap?set=%7B%22type%22:%22set%22%7D",
+            "feeling.json?of=%7B%22name%22:%22joy%22%7D",
+        )
+        for path in asked:
+            with pytest.raises(urllib.error.HTTPError, match="401") as refused:
+                await read(server.page + path)
+            assert refused.value.headers["WWW-Authenticate"] == "Bearer"
+        header = {"Authorization": f"Bearer {TOKEN}"}
+        assert json.loads(await read(f"{server.page}vocabulary.json", header))["elements"]
+        assert json.loads(await read(f"{server.page}asyncapi.json?token={TOKEN}"))["asyncapi"]
+        assert json.loads(await read(f"{server.page}healthz"))["status"] == "ok"
+
+    serving(test, token=TOKEN)
+
+
+def test_admission_lets_pages_of_allowed_origins_read_answers() -> None:
+    async def test(server: Server) -> None:
+        async def headers(path: str, **sent: str) -> Any:
+            request = urllib.request.Request(server.page + path, headers=sent)
+            get = asyncio.get_running_loop().run_in_executor
+            with await get(None, urllib.request.urlopen, request) as answer:
+                return answer.headers
+
+        for origin in ("https://app.example", "http://localhost:3000"):
+            for path in ("faces/ada", "healthz"):
+                assert (await headers(path, Origin=origin))["Access-Control-Allow-Origin"] == origin
+        for told in (await headers("healthz"), await headers("healthz", Origin="https://evil.example")):
+            assert told["Access-Control-Allow-Origin"] is None
+            assert told["Vary"] == "Origin"
+            assert "frame-ancestors 'self'" in told["Content-Security-Policy"]
+        with pytest.raises(urllib.error.HTTPError, match="403"):
+            await read(f"{server.page}faces/ada", {"Origin": "https://evil.example"})
+
+    serving(test, origins=("https://app.example",))
+
+
 @pytest.fixture(scope="module")
 def certificate(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     folder = tmp_path_factory.mktemp("tls")
