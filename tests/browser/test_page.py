@@ -366,7 +366,7 @@ def test_page_passes_its_token_on(browser) -> None:  # type: ignore[no-untyped-d
         page.on("response", lambda answer: answer.status >= 400 and faults.append(answer.url))
         page.goto(f"{address}/?token=a-word")
         page.wait_for_selector('#status[data-state="live"]')
-        page.wait_for_selector("#lights button")  # the look of the face is there
+        page.wait_for_selector("#lights button", state="attached")  # the look of the face is there
         page.wait_for_load_state("networkidle")
         page.close()
     assert faults == []

@@ -193,9 +193,9 @@ class RateLimiter:
         self._was_limited = False
         self._free = float("-inf")  # when all messages so far would have arrived at that rate
 
-    def wait(self, now: float) -> float:
-        """Return the seconds to wait after a message that arrived `now`."""
-        self._free = max(self._free, now) + 1.0 / self._rate
+    def wait(self, now: float, count: float = 1.0) -> float:
+        """Return the seconds to wait after a message, or several, that arrived `now`."""
+        self._free = max(self._free, now) + count / self._rate
         pause = max(0.0, self._free - now - 2.0)
         words = (
             f"wanted at most {self._rate:g} messages a second; more are read later {limit_hint('max_rate')}"

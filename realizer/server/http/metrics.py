@@ -139,6 +139,10 @@ GAUGES = {
 COUNTERS = {
     "messages": "Messages that came in.",
     "refused": "Connections that were refused.",
+    "control_frames": "Pings, pongs and close frames of WebSockets that came in.",
+    "rate_exceeded": "How often a WebSocket began to exceed max_rate, and was read more slowly.",
+    "http_errors": "HTTP requests that were answered with a status of 400 to 499.",
+    "http_failures": "HTTP requests that were answered with a status of 500 or more.",
     "frames_dropped": "Frames, pictures and sound packets that slow clients did not get.",
     "taken_back": "How often frames that were sent ahead were taken back, because a plan had changed.",
     "failures": "Sessions that an internal error ended.",

@@ -17,11 +17,12 @@ from websockets.protocol import State
 from realizer.core.settings import Settings, limit_hint
 from realizer.protocol.messages.replies import ErrorMessage
 from realizer.server.http import access
-from realizer.server.http.access import AccessControl, RateLimiter
+from realizer.server.http.access import AccessControl
 from realizer.server.http.jwt_tokens import Grant
 from realizer.server.journal import JournalError
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError, Visitor
+from realizer.server.transports.websocket.protocol import Connection
 from realizer.server.transports.websocket.request import address_of, headers_of, path_of, session_of
 
 log = logging.getLogger(__name__)
@@ -101,12 +102,13 @@ class WebSocketConnections:
             log.info("left", extra={**fields, "code": socket.close_code})
 
     async def _read(self, socket: ServerConnection, number: int, client: WebSocketWriter) -> None:
-        """Pass on messages, no faster than the rate limit: the others wait in the client's buffers."""
-        limiter = RateLimiter(self._settings.max_rate)
+        """Pass on messages; `Connection` limits their rate."""
+        if isinstance(socket, Connection):
+            socket.warn = lambda notice: client.send(ErrorMessage(code="rate", message=notice).text())
         async for message in socket:
             if not self._sessions.receive(number, message):
                 return
-            await limiter.pause(lambda notice: client.send(ErrorMessage(code="rate", message=notice).text()))
+            await asyncio.sleep(0)  # one read may hold many messages
 
     async def _first_message(self, socket: ServerConnection) -> tuple[str | bytes, Grant]:
         """Return the first message of a client without a token, and the grant of the token in it.

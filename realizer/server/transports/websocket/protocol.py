@@ -1,20 +1,38 @@
-"""The WebSocket protocol of the service: other methods than GET get an answer, too."""
+"""The WebSocket protocol of the service: it answers other methods than GET, and limits what it reads."""
 
 from __future__ import annotations
 
-from collections.abc import Generator
+import asyncio
+from collections import Counter
+from collections.abc import Callable, Generator
+from typing import Any
 
+from websockets.asyncio.server import Server, ServerConnection
 from websockets.exceptions import InvalidMessage
-from websockets.protocol import State
+from websockets.frames import CTRL_OPCODES, Frame
+from websockets.http11 import Response
+from websockets.protocol import Event, State
 from websockets.server import ServerProtocol
+
+from realizer.server.http.access import RateLimiter
 
 LONGEST_METHOD = 8  # characters, with the blank after it
 POST = "there is nothing to POST to: send BML through the WebSocket at /ws\n"
 OTHERS = "wanted GET\n"
+SLICE = 4 * 1024  # bytes that are parsed before others have their turn: 3 ms of empty frames
+UNIT = 16 * 1024  # bytes that count as much as a frame
 
 
 class Protocol(ServerProtocol):
-    """The protocol of a connection."""
+    """The protocol of a connection.
+
+    Args:
+        counts: counts the HTTP errors.
+    """
+
+    def __init__(self, counts: Counter[str], **options: Any) -> None:
+        super().__init__(**options)
+        self._counts = counts
 
     def parse(self) -> Generator[None]:
         """Parse what the client sends. Refuse other methods here: the library cannot read their bodies."""
@@ -29,6 +47,11 @@ class Protocol(ServerProtocol):
                 yield
         yield from super().parse()
 
+    def send_response(self, response: Response) -> None:
+        if response.status_code >= 400:
+            self._counts["http_errors" if response.status_code < 500 else "http_failures"] += 1
+        super().send_response(response)
+
     def _refuse(self, method: bytes) -> None:
         response = self.reject(*((404, POST) if method == b"POST" else (405, OTHERS)))
         response.headers["Allow"] = "GET"
@@ -36,3 +59,86 @@ class Protocol(ServerProtocol):
             response.body = b""
         self.handshake_exc = InvalidMessage(f"wanted GET, got {method.decode()}")
         self.send_response(response)
+
+
+class Connection(ServerConnection):
+    """A connection that reads at a limited rate, in slices between which others have their turn.
+
+    Every frame counts, also control frames and fragments, and so does every `UNIT` of bytes.
+
+    Args:
+        rate: frames a second; after a pause twice as many may come at once.
+        counts: counts control frames, and how often a client exceeds the rate.
+
+    Attributes:
+        warn: takes a text for the client when it begins to exceed the rate.
+    """
+
+    def __init__(
+        self, protocol: ServerProtocol, server: Server, rate: float, counts: Counter[str], **options: Any
+    ) -> None:
+        super().__init__(protocol, server, **options)
+        self.warn: Callable[[str], None] = lambda text: None
+        self._limiter = RateLimiter(rate)
+        self._counts = counts
+        self._frames = 0
+        self._unread = b""
+        self._next: asyncio.Handle | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        super().connection_made(transport)
+        # The library resumes reading when its queue of messages is short. The rate must allow it, too.
+        self.recv_messages.resume = self._go_on_later
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._drop_unread()
+        super().connection_lost(exc)
+
+    def eof_received(self) -> None:
+        self._drop_unread()
+        super().eof_received()
+
+    def data_received(self, data: bytes) -> None:
+        self._unread += data
+        if self._next is None:
+            self._go_on()
+        else:
+            self.transport.pause_reading()
+
+    def process_event(self, event: Event) -> None:
+        if isinstance(event, Frame):
+            self._frames += 1
+            self._counts["control_frames"] += event.opcode in CTRL_OPCODES
+        super().process_event(event)
+
+    def _go_on(self) -> None:
+        """Parse a slice of what has come; read more when all of it is parsed and the rate allows it."""
+        self._next = None
+        if self._unread and not self.recv_messages.paused:
+            part, self._unread = self._unread[:SLICE], self._unread[SLICE:]
+            before = self._frames
+            super().data_received(part)
+            frames = self._frames - before
+            pause = 0.0
+            if self.request is not None:
+                pause = self._limiter.wait(self.loop.time(), frames + len(part) / UNIT)
+            if self._limiter.notice is not None:
+                self._counts["rate_exceeded"] += 1
+                self.warn(self._limiter.notice)
+            if pause or self._unread:
+                self._go_on_later(pause)
+        if self.transport.is_closing():
+            self._drop_unread()
+        elif self._next or self.recv_messages.paused:
+            self.transport.pause_reading()
+        else:
+            self.transport.resume_reading()
+
+    def _go_on_later(self, pause: float = 0.0) -> None:
+        if self._next is None:
+            self._next = self.loop.call_later(pause, self._go_on)
+
+    def _drop_unread(self) -> None:
+        self._unread = b""
+        if self._next is not None:
+            self._next.cancel()

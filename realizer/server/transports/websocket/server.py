@@ -23,7 +23,7 @@ from realizer.server.http.metrics import MEDIA_TYPE
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError, Visitor
 from realizer.server.transports.websocket.connection import GOODBYE, WebSocketConnections
-from realizer.server.transports.websocket.protocol import Protocol
+from realizer.server.transports.websocket.protocol import Connection, Protocol
 from realizer.server.transports.websocket.request import (
     address_of,
     headers_of,
@@ -105,7 +105,9 @@ class WebSocketTransport:
 
     def _open(self, _: object, server: SocketServer, **named: Any) -> ServerConnection:
         """Return the connection to a new client. The library offers a protocol, which ours replaces."""
-        connection = ServerConnection(Protocol(max_size=self._settings.max_message), server, **named)
+        counts = self._sessions.metrics.counts
+        protocol = Protocol(counts, max_size=self._settings.max_message)
+        connection = Connection(protocol, server, self._settings.max_rate, counts, **named)
         self._opened.add(connection)
         return connection
 

@@ -254,6 +254,13 @@ def test_rate_limiter_notices_a_flood_once() -> None:
     assert [pace.wait(60.0) > 0 and pace.notice for _ in range(4)][-1] == told[4]  # and again, after a pause
 
 
+def test_rate_limiter_counts_several_messages_at_once() -> None:
+    one, several = RateLimiter(10), RateLimiter(10)
+    for _ in range(30):
+        pause = one.wait(0.0)
+    assert several.wait(0.0, 30) == pytest.approx(pause) == pytest.approx(1.0)
+
+
 def test_rate_limiter_limits_a_flood_after_a_first_burst() -> None:
     pace, now, read = RateLimiter(10), 0.0, 0
     while now < 60.0:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import re
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from websockets.asyncio.client import connect
 
 from realizer.core.settings import Settings
 from realizer.server.serve import Server
+from realizer.server.transports.websocket.protocol import SLICE
 
 LIMIT = 60  # s; a hung test ends
 
@@ -68,3 +72,79 @@ def test_protocol_answers_any_bytes_without_an_error(targets: list[bytes]) -> No
         *(b"GET /" + target + b" HTTP/1.1\r\nHost: localhost\r\n\r\n" for target in targets)
     ):
         assert re.match(rb"HTTP/1\.1 [24]\d\d |$", answer)
+
+
+UPGRADE = (
+    b"GET /ws HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
+    b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+)
+MASK = b"\x80\0\0\0\0"  # of an empty frame
+FLOODS = {"pong": b"\x8a" + MASK, "ping": b"\x89" + MASK, "fragment": b"\x00" + MASK}
+
+
+def flooded(flood: bytes, **settings: Any) -> dict[str, float]:
+    """Return the metrics when a flood has exceeded the rate, and another client has got its pong."""
+
+    async def run() -> dict[str, float]:
+        here = Settings(port=0, voice="silent", max_rate=10, **settings)
+        async with asyncio.timeout(LIMIT), Server(here) as server:
+            reader, writer = await asyncio.open_connection("127.0.0.1", server.port)
+            writer.write(UPGRADE)
+            assert (await reader.readuntil(b"\r\n\r\n")).startswith(b"HTTP/1.1 101 ")
+            writer.write(flood)
+            await writer.drain()
+            async with connect(f"{server.url}?token=a-word") as neighbour:
+                await neighbour.send(json.dumps({"type": "ping", "id": "x"}))
+                assert json.loads(await neighbour.recv())["id"] == "x"
+            while "rate_exceeded_total 0" in (text := server._sessions.metrics_text()):
+                await asyncio.sleep(0)
+            writer.transport.abort()
+        return {name: float(value) for name, value in re.findall(r"^realizer_(\w+) (\S+)$", text, re.M)}
+
+    return asyncio.run(run())
+
+
+@pytest.mark.parametrize("token", [None, "a-word"])
+@pytest.mark.parametrize("kind", ["ping", "pong"])
+def test_connection_reads_a_flood_of_control_frames_slowly(kind: str, token: str | None) -> None:
+    counts = flooded(100_000 * FLOODS[kind], token=token)
+    # Those of a slice, and the neighbour's close frame.
+    assert 0 < counts["control_frames_total"] <= SLICE / len(FLOODS[kind]) + 2
+    assert counts["rate_exceeded_total"] == 1
+
+
+def test_connection_reads_a_flood_of_empty_fragments_slowly() -> None:
+    counts = flooded(b"\x01" + MASK + 100_000 * FLOODS["fragment"])
+    assert counts["rate_exceeded_total"] == 1
+    assert counts["messages_total"] == 1  # of the neighbour
+
+
+def test_connection_counts_the_bytes_of_a_large_message() -> None:
+    head = b"\x82\xff" + (2**20).to_bytes(8, "big") + bytes(4)
+    assert flooded(head + bytes(2**20))["rate_exceeded_total"] == 1
+
+
+def test_connection_reads_large_messages_whole() -> None:
+    async def run() -> None:
+        here = Settings(port=0, voice="silent")
+        async with asyncio.timeout(LIMIT), Server(here) as server, connect(server.url) as socket:
+            for size in (SLICE - 100, 3 * SLICE, 100_000):
+                await socket.send(json.dumps({"type": "ping", "id": size * "x"}))
+                assert len(json.loads(await socket.recv())["id"]) == size
+
+    asyncio.run(run())
+
+
+def test_protocol_counts_errors_of_requests() -> None:
+    async def run() -> None:
+        async with asyncio.timeout(LIMIT), Server(Settings(port=0, voice="silent")) as server:
+            for method in ("POST", "GET"):
+                reader, writer = await asyncio.open_connection("127.0.0.1", server.port)
+                writer.write(request(method, "/nothing"))
+                assert b" 404 " in await reader.readline()
+                writer.close()
+            text = server._sessions.metrics_text()
+        assert "realizer_http_errors_total 2\n" in text
+        assert "realizer_http_failures_total 0\n" in text
+
+    asyncio.run(run())
