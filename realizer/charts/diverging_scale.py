@@ -7,15 +7,15 @@ PAPER = "#ffffff"
 INK = "#1f2430"
 FAINT = "#6b7280"
 GRID = "#e6e8ec"
-RIGID = "#d5dbe6"  # gaps that cannot give way
+RIGID = "#d5dbe6"  # gaps that cannot be stretched
 LINK = "#0f766e"  # links
-HELD = "#1f2430"  # a pin: fixed at a time
-ROOM = "#7c6bb0"  # room before an order binds
-TIGHT = "#c2185b"  # an order that binds
+HELD = "#1f2430"  # sync points that are fixed at a time
+ROOM = "#7c6bb0"  # inequalities with slack
+TIGHT = "#c2185b"  # active inequalities
 LOST = "#9aa0aa"  # dropped behaviours
 
 # (log3 of the stretch, colour): a third of the preferred length, the preferred length, three times it.
-# Blue to orange: distinct for every kind of colour vision, and in grey by the darkness of the ends.
+# From blue to orange, which differ for every kind of colour vision; both ends are dark in grey.
 SCALE = (
     (-1.0, (33, 92, 168)),
     (-0.45, (128, 178, 226)),

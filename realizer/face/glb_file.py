@@ -14,7 +14,7 @@ MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
 
 
 class GlbFile:
-    """The binary part of a GLB file, as accessors are added to it."""
+    """A GLB file to which arrays are added as accessors."""
 
     def __init__(self) -> None:
         self._views: list[dict[str, Any]] = []
@@ -28,8 +28,8 @@ class GlbFile:
 
         Args:
             target: ARRAY_BUFFER of vertices, ELEMENT_ARRAY_BUFFER of triangles, None of anything else.
-            normalised: integers stand for 0..1.
-            bounds: with the least and the greatest, as glTF asks of positions and of times.
+            normalised: whether integers stand for 0..1.
+            bounds: whether to store minimum and maximum, which glTF requires for positions and times.
         """
         raw = _little(array)
         accessor = {"bufferView": self._view(raw, target), **_shape(raw)}
@@ -58,7 +58,7 @@ class GlbFile:
         """Return an animation of nodes, linear between its keys.
 
         Args:
-            clock: the accessor with the keys' times.
+            clock: number of the accessor with the times of the keys.
             keys: (node, "translation", "rotation" or "weights", a value for each time); as float32.
         """
         channels: list[dict[str, Any]] = []

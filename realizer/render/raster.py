@@ -13,40 +13,41 @@ from realizer.core.array_types import Float32, Int32, UInt8
 from realizer.core.errors import RenderError
 
 NO_NUMBA = "pictures without OpenGL need the render extra: pip install 'bml-realizer[render]'"
-# Sample positions in a pixel, a row each: on a rotated grid with no two in one column, as graphics cards do.
+# Horizontal positions of the samples in a pixel, one in each row of a rotated grid, as in graphics cards.
 SAMPLES = (0.375, 0.875, 0.125, 0.625)
-THREADS = 4  # at most
-LEAST, MOST = np.float32(0), np.float32(255.5)  # of a tone
+MAX_THREADS = 4
+LEAST, MOST = np.float32(0), np.float32(255.5)  # limits of a colour component
 
 
 class Raster:
-    """Memory for pictures of one size, drawn again and again; one thread at a time."""
+    """A rasterizer for pictures of one size; not thread-safe."""
 
     def __init__(self, size: tuple[int, int]) -> None:
-        """Reserve the memory for width, height in pixels; nothing is compiled.
+        """Reserve the memory of a picture of (width, height) pixels.
 
         Raises:
-            RenderError: no numba; the text says what to install.
+            RenderError: numba is not installed; the text says what to install.
         """
         self._loops = _compiled()
         width, height = size
-        # The samples of a pixel are adjacent, so that a small triangle writes to adjacent memory.
-        # Each is one number, nearness above and tone below: the greater one is the nearer one.
+        # The samples of a pixel are adjacent, so that a small triangle writes to adjacent memory. A sample is
+        # one number with nearness in the upper half and colour in the lower one, so that the greater number
+        # is the nearer sample.
         self._keys = np.zeros((height, width, len(SAMPLES)), np.uint64)
         self._picture = np.zeros((height, width), np.uint32)
-        # A band of rows for each processor: the loops release Python's lock.
-        bands = max(1, min(THREADS, os.cpu_count() or 1, height))
+        # Each thread draws a band of rows; the loops release Python's lock.
+        bands = max(1, min(MAX_THREADS, os.cpu_count() or 1, height))
         edges = [height * k // bands for k in range(bands + 1)]
         self._bands = list(pairwise(edges))
         self._pool = ThreadPoolExecutor(bands)
 
     def __call__(self, points: Any, nearness: Float32, triangles: Int32, colours: Float32) -> UInt8:
-        """Return (h, w, 4) uint8, premultiplied, row 0 at the top; valid until the next call.
+        """Return the picture (h, w, 4) uint8, premultiplied, from the top; it is valid until the next call.
 
         Args:
             points: (n, 2) pixels, x to the right and y down from the top left corner.
-            nearness: (n,), above 0, more is nearer and straight across the picture: one over the distance.
-            triangles: (m, 3); those that are not counter-clockwise as seen are left out.
+            nearness: (n,) 1 / distance, which is linear in the picture.
+            triangles: (m, 3); those that are not counter-clockwise in the picture are invisible.
             colours: (n, 3) sRGB 0..1.
         """
         fill, mean = self._loops
@@ -63,13 +64,13 @@ class Raster:
         return self._picture.view(np.uint8).reshape(*self._picture.shape, 4)
 
     def close(self) -> None:
-        """End its threads."""
+        """End the threads."""
         self._pool.shutdown()
 
 
 @cache
 def _compiled() -> tuple[Callable[..., None], ...]:
-    """Return the two loops below as machine code, cached on disk if possible, so compiled once."""
+    """Return the two loops below as machine code, which is cached on disk if possible."""
     try:
         import numba
     except ImportError as error:
@@ -84,31 +85,34 @@ def _compiled() -> tuple[Callable[..., None], ...]:
 def _fill(
     points: Any, nearness: Any, triangles: Any, colours: Any, samples: Any, begin: int, stop: int, keys: Any
 ) -> None:
-    """Write each triangle's samples where nothing nearer is: nearness and RGBA in one number.
+    """Write the samples of all triangles that are nearer than the present samples, in rows `begin` to `stop`.
 
-    Args as `Raster.__call__`, but colours 0.5..255.5 and a tuple of samples; `keys` is (h, w, samples), and
-    rows `begin` to `stop` are written.
+    Args:
+        points, nearness, triangles: as in `Raster.__call__`.
+        colours: (n, 3) 0.5..255.5.
+        samples: `SAMPLES`.
+        keys: (h, w, samples) uint64, nearness and RGBA of each sample.
     """
     width = keys.shape[1]
     high_half = np.uint64(32)
     per = len(samples)
     pitch = 1.0 / per
     firsts, lasts = np.empty(per, np.int64), np.empty(per, np.int64)
-    beside = np.empty(per, np.float32)  # how much nearer a sample is than its pixel's middle
+    beside = np.empty(per, np.float32)  # nearness of a sample relative to the middle of its pixel
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         ax, ay = points[a, 0], points[a, 1]
         ux, uy = points[b, 0] - ax, points[b, 1] - ay
         vx, vy = points[c, 0] - ax, points[c, 1] - ay
         turn = ux * vy - vx * uy
-        if not turn < 0:  # seen from behind, without area, or not a number
+        if not turn < 0:  # the back of a triangle, without area, or not a number
             continue
-        # Half-open, so that what two triangles share belongs to one of them.
+        # Intervals are half-open, so that a shared edge belongs to one triangle.
         top = int(np.ceil(max((ay + min(0.0, uy, vy)) * per - 0.5, float(begin * per))))
         end = int(np.ceil(min((ay + max(0.0, uy, vy)) * per - 0.5, float(stop * per))))
         if top >= end:
             continue
-        # From the highest corner to the lowest goes one long edge; two short ones go by the third corner.
+        # One long edge connects the highest and the lowest corner; two short ones meet at the third corner.
         high, mid, low = a, b, c
         if points[mid, 1] < points[high, 1]:
             high, mid = mid, high
@@ -124,7 +128,7 @@ def _fill(
             points[low, 0],
             points[low, 1],
         )
-        # Each from its upper end, whichever triangle asks, so that neighbours agree to the last bit.
+        # Edges are computed from their upper end, so that neighbours get exactly the same values.
         long_slope = (x2 - x0) / (y2 - y0)
         long_at = x0 - long_slope * y0
         bend = min(max(int(np.ceil(y1 * per - 0.5)), top), end)

@@ -1,6 +1,6 @@
-"""Motion that accompanies speech: nods and brow raises on accents, glances aside, ends of phrases for blinks.
+"""Motion that accompanies speech: nods and raised brows on accents, glances, and ends of phrases for blinks.
 
-It is a function of the seed, of utterances and their start times, and of time, not of the requested frames.
+It depends on the seed, the utterances and their start times, but not on the requested frames.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -19,7 +19,7 @@ from realizer.core.array_types import Float64
 from realizer.speech.accents import Phrase, phrases, prosody_facts
 from realizer.speech.utterance import Utterance
 
-# s after the end of a block until it affects no visible blink.
+# s after the end of a block, in which it may still affect visible blinks.
 AFTERMATH = 2.0
 
 # Signed angles: AUs of (negative, positive). When the head turns down, the eyes turn up by as much.
@@ -61,7 +61,7 @@ class Gesture:
 
 
 def phrase_ends(talks: Iterable[SpeechSpan]) -> tuple[PhraseEnd, ...]:
-    """Return the ends of phrases in order of time; those shortly after a cut may have moved blinks."""
+    """Return the ends of phrases in order of time, also those shortly after a cut, which may move blinks."""
     reach = prosody_facts()["blinks"]["reach"]
     ends = [
         PhraseEnd(talk.start, talk.start + phrase.end)
@@ -149,9 +149,9 @@ def _accents(all_phrases: tuple[Phrase, ...], start: float, seed: int) -> Iterat
     for phrase in all_phrases:
         for accent in phrase.accents:
             chance = "nuclear" if accent.nuclear else "others"
-            # An accent too close to the start for a full attack peaks later: nothing moves before the speech.
+            # Accents that are too near to the start peak later, because nothing moves before the speech.
             time = start + max(accent.time, nod["attack"])
-            # The nuclear accent, last in its phrase, has priority and always shows in one way or the other.
+            # The nuclear accent, the last of its phrase, has priority; it always has a nod or raised brows.
             left = np.inf if accent.nuclear else phrase.accents[-1].time - accent.time
             may_nod = min(left, time - nodded) >= nod["apart"]
             may_raise = min(left, time - raised) >= brows["apart"]
@@ -200,7 +200,7 @@ def _looks_aside(all_phrases: tuple[Phrase, ...], start: float, seed: int) -> It
         away = min(most, aside["shortest"] + lengths[k] * max(0.0, most - aside["shortest"]))
         # A glance begins in the first part of the phrase and returns before its end.
         begin = start + phrase.start + late[k] * 0.5 * (length - away)
-        # Mainly to one side, never straight up or down.
+        # Glances go mainly to one side, never straight up or down.
         yaw = np.interp(abs(2.0 * yaws[k] - 1.0), (0.0, 1.0), aside["yaw"]) * np.sign(yaws[k] - 0.5)
         pitch = np.interp(pitches[k], (0.0, 1.0), aside["pitch"])
         keys = begin + np.array([0.0, aside["saccade"], away, away + aside["saccade"]])

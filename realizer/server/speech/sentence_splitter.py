@@ -12,8 +12,8 @@ from realizer import tables
 TAG = re.compile(r"<(/?)([A-Za-z_][\w.-]*(?::[\w.-]+)?)((?:[^<>\"']|\"[^\"]*\"|'[^']*')*?)(/?)>")
 BEGUN = re.compile(r"</?(?:[A-Za-z_][^<>]*)?$")  # an incomplete tag
 ENTITY = re.compile(r"&#?\w{1,10}$")  # an entity without its semicolon
-LONGEST_TAG = 2000  # characters; longer text after "<" is no tag
-MOST = 20_000  # characters; longer text does not wait for an end tag
+MAX_TAG = 2000  # characters; longer text after "<" is not a tag
+MAX_TEXT = 20_000  # characters; longer text does not wait for an end tag
 
 
 class SentenceSplitter:
@@ -27,8 +27,7 @@ class SentenceSplitter:
         """Add text and return the pieces that are complete.
 
         A sentence is complete when white space follows it; tags directly behind it belong to it. A long
-        sentence, and the first one already if it is not short, is split into clauses. Elements are never
-        split.
+        sentence, and a first one that is not short, is split into clauses. Elements are never split.
 
         Args:
             close: whether this is the end of the text: then the rest is returned too.
@@ -41,14 +40,14 @@ class SentenceSplitter:
         while (end := _end(self._rest, first=self._first, closed=close)) is not None:
             pieces.append(self._rest[:end])
             self._rest, self._first = self._rest[end:], False
-        if close or len(self._rest) > MOST:
+        if close or len(self._rest) > MAX_TEXT:
             pieces.append(self._rest)
             self._rest = ""
         return [piece for piece in pieces if piece.strip()]
 
 
 def is_sentence(piece: str) -> bool:
-    """Whether a piece ends like a sentence."""
+    """Return whether a piece ends like a sentence."""
     text = TAG.sub("", piece).rstrip()
     return bool(_ending().search(text)) and not _abbreviated(text)
 
@@ -58,7 +57,7 @@ def _end(text: str, *, first: bool, closed: bool) -> int | None:
     rules = _rules()
     limit = rules["first"] if first else rules["longest"]
     at = depth = length = 0
-    blank: int | None = None  # behind the last white space outside of elements
+    blank: int | None = None  # end of the last white space outside of elements
     ended = False  # whether a sentence ends here
     while at < len(text):
         if text[at] == "<":
@@ -67,7 +66,7 @@ def _end(text: str, *, first: bool, closed: bool) -> int | None:
                 depth = max(0, depth + (-1 if tag[1] else 0 if tag[4] else 1))
                 at = tag.end()
                 continue
-            if not closed and BEGUN.match(text[at : at + LONGEST_TAG]):
+            if not closed and BEGUN.match(text[at : at + MAX_TAG]):
                 return None
             # A plain "<" is handled like any character.
         end = text.find("<", at + 1)
@@ -102,7 +101,7 @@ def _end(text: str, *, first: bool, closed: bool) -> int | None:
 
 
 def _abbreviated(text: str) -> bool:
-    """Whether the full stop at the end belongs to an abbreviation, an initial or a list number."""
+    """Return whether the final full stop belongs to an abbreviation, an initial or a list number."""
     match = re.search(r"([^\W_][\w.]*)\.$", text)
     if match is None:
         return False

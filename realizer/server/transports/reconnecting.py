@@ -13,10 +13,10 @@ LAST_RETRY = 10.0  # s
 
 
 class ReconnectingTransport(ABC):
-    """The base of transports that connect to another program, again whenever the connection is lost.
+    """A transport that connects to another program, and connects again when the connection is lost.
 
     Args:
-        name: of the transport, for the log.
+        name: name of the transport in log messages.
         peer: HOST:PORT of the program.
     """
 
@@ -43,7 +43,7 @@ class ReconnectingTransport(ABC):
 
     @abstractmethod
     async def _serve(self, connected: Callable[[], None]) -> str:
-        """Connect, call `connected`, serve until the connection is lost, and return why there is none."""
+        """Connect, call `connected`, serve until the connection is lost, and return the reason."""
 
     async def _keep_connected(self) -> None:
         """Serve until cancelled. Only the first of several failures is logged."""
