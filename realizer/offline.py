@@ -84,7 +84,7 @@ def schedule(
         BMLError: the text has no valid document; with line and path.
         VoiceError: the named voice is not installed.
     """
-    player = Player(PlayOptions(scene=scene, idle=False, media=media))
+    player = Player(PlayOptions(scene=scene, media=media), animates=False)
     block = parse(document, VOCABULARY, strict_bml=strict_bml)
     with open_voice(voice) as speaker:
         return submit_with_speech(player, block, speaker)

@@ -32,6 +32,7 @@ class PlanningContext:
         library: the expressions that documents can name.
         face_inputs: () -> the inputs of the character's face (`Face.inputs`), or None if unknown.
         grace: seconds by which a behaviour may come too late for its references into other blocks.
+        animates: whether behaviours are expanded and played; False if only their times are wanted.
     """
 
     scene: Mapping[str, Position] | None = None
@@ -43,6 +44,7 @@ class PlanningContext:
     library: Library = field(default_factory=builtin)
     face_inputs: Callable[[], Sequence[str] | None] = lambda: None
     grace: float = 0.0
+    animates: bool = True
 
 
 # What a behaviour does to other blocks and behaviours when it starts.

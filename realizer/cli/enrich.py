@@ -242,7 +242,9 @@ def _spoken_texts(block: Block, language: str) -> list[SpokenText]:
     from realizer.playback.speaking import submit_with_speech
     from realizer.speech.silent import SilentVoice
 
-    times = submit_with_speech(Player(PlayOptions(language=language)), block, SilentVoice()).times
+    times = submit_with_speech(
+        Player(PlayOptions(language=language), animates=False), block, SilentVoice()
+    ).times
     texts = [
         SpokenText(str(node.text), float(times[node.id][0]), language_of(node, block, language))
         for node in block.behaviours

@@ -148,6 +148,8 @@ class BlockManager:
             return self._refuse(block, planned.schedule.warnings[0], now)
         if (words := self._veto(block, planned.schedule)) is not None:
             return self._refuse(block, Warning(block.id, "CANNOT_CREATE_BEHAVIOR", words), now)
+        if not context.animates:
+            return planned.schedule
         for earlier in ended:
             self.timeline.stop(earlier, now)
         for name in block.interrupt:

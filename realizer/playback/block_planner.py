@@ -201,7 +201,7 @@ class _PlanBuilder:
         return {
             node.id: self.kinds[node.tag].expand(node, schedule.times[node.id], self.context)
             for node in self.block.behaviours
-            if node.id in schedule.times
+            if node.id in schedule.times and self.context.animates
         }
 
     def solve(

@@ -48,6 +48,7 @@ class Player(BlockManager):
         history: seconds before the last `due` for which frames can still be computed.
         face_inputs: index of a character -> the inputs of its face (`Face.inputs`); None if unknown.
         veto: (block, its schedule) -> why it is refused, or None.
+        animates: False if blocks are only scheduled, and nothing is played.
 
     Attributes:
         blocks: the blocks, for reading only.
@@ -62,6 +63,7 @@ class Player(BlockManager):
         history: float = HISTORY,
         face_inputs: Callable[[int], Sequence[str]] | None = None,
         veto: Callable[[Block, Schedule], str | None] = lambda block, schedule: None,
+        animates: bool = True,
     ) -> None:
         super().__init__(kinds, veto)
         self._face_inputs = face_inputs
@@ -73,6 +75,7 @@ class Player(BlockManager):
             clips={} if clips is None else clips,
             library=library_of(options.expressions),
             grace=options.grace,
+            animates=animates,
         )
         self.idle = options.idle
         self.prosody = options.prosody

@@ -7,9 +7,14 @@ from dataclasses import fields
 
 import pytest
 
-from bml_schema import BMLError
+from bml_schema import BMLError, parse
 from realizer import realize, schedule
+from realizer.behaviours.registry import VOCABULARY
 from realizer.core.options import PlayOptions
+from realizer.playback.player import Player
+from realizer.playback.speaking import submit_with_speech
+from realizer.speech.silent import SilentVoice
+from tests.cases import CASES
 
 NOD = '<bml id="b"><head id="n" lexeme="NOD"/></bml>'
 
@@ -33,6 +38,19 @@ def test_realize_refuses_a_rate_that_is_not_above_0() -> None:
 def test_schedule_has_the_times_that_realize_plays() -> None:
     (played,) = realize(NOD, idle=False).schedules
     assert schedule(NOD).behaviours == played.behaviours
+
+
+@pytest.mark.parametrize("case", CASES[::12], ids=lambda case: case.name)
+def test_schedule_is_what_a_player_plays(case) -> None:
+    try:
+        block = parse(case.document, VOCABULARY)
+    except BMLError:
+        pytest.skip("the case has no single document")
+    voice = SilentVoice()
+    played = submit_with_speech(Player(PlayOptions()), block, voice)
+    scheduled = schedule(case.document, voice=voice)
+    assert scheduled.to_json() == played.to_json()
+    assert (scheduled.cost, scheduled.failed, scheduled.late) == (played.cost, played.failed, played.late)
 
 
 def test_schedule_refuses_a_document_without_a_block() -> None:
