@@ -45,7 +45,9 @@ def test_schedule_is_what_a_player_plays(case) -> None:
     try:
         block = parse(case.document, VOCABULARY)
     except BMLError:
-        pytest.skip("the case has no single document")
+        with pytest.raises(BMLError):
+            schedule(case.document)
+        return
     voice = SilentVoice()
     played = submit_with_speech(Player(PlayOptions()), block, voice)
     scheduled = schedule(case.document, voice=voice)
