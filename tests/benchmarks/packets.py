@@ -10,7 +10,7 @@ __all__ = ["HANDSHAKE", "encode_text", "handshake", "take_messages"]
 
 # The opening request of a client; {} is the name of its session.
 HANDSHAKE = (
-    "GET /ws?session={} HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+    "GET /ws?session={} HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
     "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n\r\n"
 )
 
