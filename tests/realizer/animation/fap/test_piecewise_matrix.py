@@ -49,7 +49,7 @@ def test_matrix_separates_raising_and_lowering() -> None:
 
 
 def test_matrix_closed_is_the_greatest_value_of_each_fap() -> None:
-    rows = (AuToFap(43, "L", 19, 0.0, 1.0, 0.0, 900.0), AuToFap(7, "L", 19, 0.0, 1.0, 0.0, 200.0))
+    rows = (AuToFap(43, "L", 19, 0.0, 1.0, 0.0, 200.0), AuToFap(7, "L", 19, 0.0, 1.0, 0.0, 900.0))
     closed = PiecewiseMatrix.of(rows).closed
     assert closed[18] == 900
     assert np.count_nonzero(closed) == 1

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.animation.idle.blinks import Blinks, blinks_between
+from realizer.animation.idle.blinks import Blinks, PhraseEnd, blinks_between
 from realizer.core.array_types import Float64
 
 
@@ -66,3 +66,13 @@ def test_blinks_that_overlap_show_the_stronger_one() -> None:
     one, other = (Blinks(np.array([onset]), np.zeros(1)).at(times) for onset in (0.2, 0.3))
     both = Blinks(np.array([0.3, 0.2]), np.zeros(2)).at(times)
     np.testing.assert_array_equal(both, np.maximum(one, other))
+
+
+@given(st.integers(0, 2**40), st.floats(-0.2, 0.2))
+def test_blinks_near_the_end_of_a_phrase_wait_for_it(seed: int, later: float) -> None:
+    plain = blinks(seed, 60.0)
+    end = PhraseEnd(0.0, plain[3] + later)
+    moved = blinks_between(0.0, 60.0, seed, (end,)).onsets
+    assert plain[3] not in moved
+    assert end.at <= moved[3] <= end.at + 0.6
+    assert blinks_between(0.0, 60.0, seed, (PhraseEnd(plain[3] + 9, plain[3] + 9.1),)).onsets[3] == plain[3]

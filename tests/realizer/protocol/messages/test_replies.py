@@ -10,6 +10,7 @@ from realizer.protocol.messages.common import PICTURES
 from realizer.protocol.messages.replies import (
     Capabilities,
     ErrorMessage,
+    FaceChanged,
     FrameMessage,
     ScheduleMessage,
     StateMessage,
@@ -59,5 +60,7 @@ def test_schedule_message_and_state_message_describe_the_wire(driver) -> None:
     assert json.loads(state.text()) == client.of("state")[0]
 
 
-def test_subscribed_has_index_0_unless_told() -> None:
+def test_subscribed_and_changed_have_index_0_unless_told() -> None:
     assert Subscribed(stream="fap", encoding="json").index == 0
+    told = {"stream": "mesh", "frame": 7, "face": "ada", "vertices": 3, "scale": 1.0, "offset": [0.0] * 3}
+    assert FaceChanged.model_validate(told).index == 0
