@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer.animation.fap.fap_clip import FAPClip
+from realizer.animation.frames import FAPFrames
 
 
 def clip(jaw: list[int], fps: float = 25.0) -> FAPClip:
@@ -73,3 +74,12 @@ def test_frames_hold_the_faps_of_the_clip_except_1_and_2() -> None:
     assert frames.times.tolist() == [0, 0.02, 0.04]
     assert frames.values[:, 2].tolist() == [0, 10, 20]
     assert np.flatnonzero(frames.mask).tolist() == [2]
+
+
+def test_clip_of_frames_is_rounded_and_leaves_out_faps_1_and_2() -> None:
+    values = np.zeros((2, 68), np.float32)
+    values[:, :4] = 7.6
+    made = FAPClip.of(FAPFrames(np.array([0.0, 0.04]), values, np.arange(68) < 3), 25.0, "x")
+    assert made.values[:, :4].tolist() == [[0, 0, 8, 0]] * 2
+    assert np.flatnonzero(made.mask).tolist() == [2]
+    assert (made.name, made.fps) == ("x", 25.0)
