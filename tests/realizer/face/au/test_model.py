@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from realizer.face.au.file import read_model
-from realizer.face.au.model import HeadTurn, Model
+from realizer.face.au.model import HeadTurn, Model, Mouth
 from realizer.face.au.units import units
 from realizer.face.load import load_face
 from realizer.face.model import Face
@@ -131,3 +131,15 @@ def test_head_turn_density_is_a_smooth_step_between_chin_and_collar() -> None:
     assert turn.density(at + np.array([3.0, -0.5, 1.0])).tolist() == pytest.approx(wanted), (
         "height along the tilt"
     )
+
+
+def test_mouth_upper_is_a_step_at_the_lips_and_a_smooth_one_in_the_cheeks() -> None:
+    flat = Mouth(np.array([0.0, 1.0]), np.zeros(2), np.zeros(2), np.zeros(2))
+    heights = np.array([-2.0, -0.5, 0.0, 0.5, 2.0])
+
+    def upper(across: float) -> list[float]:
+        at = np.stack([np.full(5, across), heights, 0 * heights], 1)
+        return [float(share) for share in flat.upper(at)]
+
+    assert upper(0.5) == pytest.approx([0, 0, 0.5, 1, 1])
+    assert upper(2.0) == upper(-2.0) == pytest.approx([0, 0.15625, 0.5, 0.84375, 1])
