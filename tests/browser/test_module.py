@@ -109,6 +109,27 @@ def test_play_of_a_refused_block_rejects_with_its_warning(page) -> None:  # type
     assert said == ["refused", "no"]
 
 
+@pytest.mark.parametrize("encoding", ["binary", "json"])
+@pytest.mark.parametrize(("method", "values"), [("faps", 68), ("arkit", 59)])
+def test_frames_ahead_are_passed_on_one_by_one(page, method, values, encoding) -> None:  # type: ignore[no-untyped-def]
+    script = """async ([method, encoding]) => {
+      const frames = [];
+      await new Promise((done, fail) => {
+        const take = (frame) => {
+          frames.push([frame.frame, frame.values().length]);
+          if (frames.length === 5) realizer.send('<bml id="nod"><head id="n" lexeme="NOD"/></bml>');
+          if (frames.length === 40) done();
+        };
+        realizer[method]({ fps: 50, encoding }, take).catch(fail);
+      });
+      realizer.unsubscribe(method.replace("faps", "fap"));
+      return frames;
+    }"""
+    frames = page.evaluate(script, [method, encoding])
+    first = frames[0][0]
+    assert frames == [[first + k, values] for k in range(40)]
+
+
 @pytest.mark.parametrize(
     ("stream", "options", "values", "kind"),
     [

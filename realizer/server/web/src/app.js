@@ -15,6 +15,7 @@ import { Wheel } from "./wheel.js";
 
 const MESH_RATE = 30; // frames a second; the page draws between them
 const CURVE_RATE = 25; // frames a second
+const AHEAD = 0.2; // s; curves are sent so long before their time
 const BLOCK = /(<(?:\w+:)?bml\b[^<>]*?\sid\s*=\s*)(["'])(.*?)\2/;
 const THEMES = { "": "as the system", light: "light", dark: "dark" };
 
@@ -94,7 +95,7 @@ function subscribe() {
   link.subscribe("mesh", { fps: MESH_RATE });
   link.subscribe("audio", { rate: sound.rate });
   link.subscribe("schedule");
-  for (const stream of Object.keys(timeline.kinds)) link.subscribe(stream, { fps: CURVE_RATE });
+  for (const stream of Object.keys(timeline.kinds)) link.subscribe(stream, { fps: CURVE_RATE, ahead: AHEAD });
 }
 
 function status(state, text) {
@@ -320,7 +321,7 @@ async function vocabulary() {
   choose(at("curves"), ["au", "fap"], "au", (kind) => timeline.show(kind), (kind) => kind.toUpperCase() + "s");
   timeline.show("au");
   if (link.open) {
-    for (const stream of Object.keys(timeline.kinds)) link.subscribe(stream, { fps: CURVE_RATE });
+    for (const stream of Object.keys(timeline.kinds)) link.subscribe(stream, { fps: CURVE_RATE, ahead: AHEAD });
     link.ask({ type: "state" });
   }
 }

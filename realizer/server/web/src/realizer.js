@@ -6,7 +6,7 @@
  *   const realizer = new Realizer({ session: "show" });
  *   realizer.onfeedback = (element) => console.log(element.outerHTML);
  *   realizer.connect();
- *   const { names } = await realizer.subscribe("arkit", { fps: 30 }, (frame) => move(head, frame.values()));
+ *   const { names } = await realizer.arkit({ fps: 30 }, (frame) => move(head, frame.values()));
  *   await realizer.play('<bml id="hello"><speech id="s"><text>Hello there.</text></speech></bml>');
  *
  * Sound, with the face on its clock:
@@ -38,6 +38,7 @@ const JSON_STREAMS = ["fap", "au", "arkit", "schedule"];
 const ANSWERS = { hello: "welcome", subscribe: "subscribed", state: "state", ping: "pong" };
 // end of protocol
 
+const AHEAD = 0.2; // s; frames that are sent so long before their time survive most delays
 const RETRY = [0.3, 0.6, 1.2, 2.5, 5]; // s
 const BLOCK = /<(?:\w+:)?bml\b[^<>]*?\sid\s*=\s*["']([^"'<>]+)["']/g;
 const COMMENT = /<!--[^]*?-->|<\?[^]*?\?>/g;
@@ -78,7 +79,8 @@ export class Realizer {
   #tries = 0;
   #closed = false;
   #asked = []; // { message, resolve, reject } of requests without an answer
-  #streams = new Map(); // stream, character and view -> { message, take, streamInfo: fields of `subscribed` }
+  // stream, character and view -> { message, take, streamInfo: fields of `subscribed`, playout: with `ahead` }
+  #streams = new Map();
   #unsent = []; // documents to send once the connection is open
   #awaited = new Map(); // block id -> [{ planned, resolve, reject }]
 
@@ -110,7 +112,10 @@ export class Realizer {
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
       this.#tries = 0;
-      for (const { message } of this.#streams.values()) this.#post(message);
+      for (const { message, playout } of this.#streams.values()) {
+        playout?.reset();
+        this.#post(message);
+      }
       for (const { message } of this.#asked) if (message.type !== "subscribe") this.#post(message);
       for (const text of this.#unsent.splice(0)) this.send(text);
       this.onopen();
@@ -155,14 +160,21 @@ export class Realizer {
   /**
    * Subscribe to fap, au, arkit, mesh, audio, video, schedule or feedback, also after a reconnect.
    * @param {string} stream
-   * @param {object} [options] encoding, fps, character, ... of the message `subscribe`
+   * @param {object} [options] encoding, fps, character, ... of the message `subscribe`. With `ahead` the service sends
+   *   frames up to that many seconds before their time, and each is passed on at its time
    * @param {function} [take] called with every frame
    * @returns {Promise<object>} the message `subscribed`, which describes the values
    */
   subscribe(stream, options = {}, take = nothing) {
     const message = { type: "subscribe", stream, ...options };
     const key = keyOf(message);
-    this.#streams.set(key, { message, take, streamInfo: { index: 0 } });
+    const pass = (frame) => {
+      take(frame);
+      this.onframe(frame);
+    };
+    const playout = options.ahead > 0 ? new Playout(options.ahead, pass) : null;
+    this.#streams.get(key)?.playout?.reset();
+    this.#streams.set(key, { message, take, streamInfo: { index: 0 }, playout });
     const answer = this.ask(message);
     answer.catch(() => {
       if (this.#streams.get(key)?.message === message) this.#streams.delete(key);
@@ -170,9 +182,26 @@ export class Realizer {
     return answer;
   }
 
+  /** Subscribe to FAPs: `subscribe` with frames that are sent 0.2 s ahead. */
+  faps(options = {}, take = nothing) {
+    return this.subscribe("fap", { ahead: AHEAD, ...options }, take);
+  }
+
+  /** Subscribe to action units, as `faps`. */
+  aus(options = {}, take = nothing) {
+    return this.subscribe("au", { ahead: AHEAD, ...options }, take);
+  }
+
+  /** Subscribe to ARKit's weights and rotations, as `faps`. */
+  arkit(options = {}, take = nothing) {
+    return this.subscribe("arkit", { ahead: AHEAD, ...options }, take);
+  }
+
   /** End a stream; `view` is the name of a video's view. */
   unsubscribe(stream, character, view) {
-    this.#streams.delete(keyOf({ stream, character, view }));
+    const key = keyOf({ stream, character, view });
+    this.#streams.get(key)?.playout?.reset();
+    this.#streams.delete(key);
     this.#post({ type: "unsubscribe", stream, character, view });
   }
 
@@ -220,14 +249,18 @@ export class Realizer {
   }
 
   #frame(frame) {
-    for (const { message, take, streamInfo } of this.#streams.values()) {
+    let waits = false;
+    for (const { message, take, streamInfo, playout } of this.#streams.values()) {
       // JSON frames name the character like the subscription, binary frames have its index.
       const own = frame.kind === undefined ? message.character : streamInfo.index;
       if (message.stream !== frame.stream || own !== frame.character) continue;
       frame.streamInfo = streamInfo;
-      take(frame);
+      if (playout) {
+        waits = true;
+        if (streamInfo.names) playout.add(frame); // before `subscribed` it is of another subscription
+      } else take(frame);
     }
-    this.onframe(frame);
+    if (!waits) this.onframe(frame);
   }
 
   #answer(message) {
@@ -269,7 +302,7 @@ export class Realizer {
 /**
  * Decode a binary message.
  * @returns {object} stream, kind, character (its index in `subscribed`), frame (its number), time (seconds
- *   on the session clock), forget (sound: discard everything from this time on), values(): a typed array;
+ *   on the session clock), forget (discard everything from this time on that was sent before), values(): a typed array;
  *   for a picture the bytes of its file
  */
 export function frameOf(buffer) {
@@ -289,7 +322,15 @@ export function frameOf(buffer) {
 }
 
 function jsonFrameOf(message) {
-  return { stream: message.type, ...message, forget: false, values: () => message.values ?? [] };
+  return { stream: message.type, ...message, forget: Boolean(message.flush), values: () => message.values ?? [] };
+}
+
+/** Split a frame of a stream with `ahead` into frames of one row. */
+function rowsOf(frame) {
+  const { fps, names } = frame.streamInfo;
+  const values = frame.values();
+  const rows = frame.kind === undefined ? values : Array.from({ length: values.length / names.length }, (_, k) => values.subarray(k * names.length, (k + 1) * names.length));
+  return rows.map((row, k) => ({ ...frame, frame: frame.frame + k, time: (frame.frame + k) / fps, forget: false, values: () => row }));
 }
 
 /** Delay of what is shown behind the newest data, in seconds, so that late packets are not missed. */
@@ -320,6 +361,50 @@ export class Clock {
   /** The session time to show and play at `here`; null before the first frame. */
   playhead(here) {
     return this.offset === null ? null : here - this.offset - DELAY;
+  }
+}
+
+/** Passes on frames that arrive up to `ahead` seconds early, each at its time, and drops those that were taken back. */
+class Playout {
+  #ahead;
+  #take;
+  #clock = new Clock();
+  #frames = [];
+  #next = 0; // number of the first frame that was not passed on
+  #timer = null;
+
+  constructor(ahead, take) {
+    this.#ahead = ahead;
+    this.#take = take;
+  }
+
+  /** Drop everything, as after a new connection. */
+  reset() {
+    clearTimeout(this.#timer);
+    this.#clock.reset();
+    this.#frames = [];
+    this.#next = 0;
+  }
+
+  /** Add the rows of a frame, instead of those from its first one on. */
+  add(frame) {
+    const rows = rowsOf(frame);
+    this.#frames = this.#frames.filter((old) => old.frame < frame.frame);
+    this.#frames.push(...rows.filter((row) => row.frame >= this.#next));
+    // The last row of a message is sent `ahead` before its time.
+    this.#clock.heard(rows.at(-1).time - this.#ahead, performance.now() / 1000);
+    this.#play();
+  }
+
+  #play() {
+    clearTimeout(this.#timer);
+    const now = performance.now() / 1000 - this.#clock.offset;
+    while (this.#frames.length && this.#frames[0].time <= now) {
+      const frame = this.#frames.shift();
+      this.#next = frame.frame + 1;
+      this.#take(frame);
+    }
+    if (this.#frames.length) this.#timer = setTimeout(() => this.#play(), 1000 * (this.#frames[0].time - now));
   }
 }
 
