@@ -9,6 +9,7 @@ import select
 import socket
 import struct
 import time
+from collections import Counter
 from dataclasses import dataclass, field
 from heapq import heappop, heappush
 from urllib.parse import urlsplit
@@ -31,6 +32,7 @@ BODY = (
 )
 # Bytes of a frame of 68 FAPs with its WebSocket header. Number and time follow four bytes of the frame.
 FRAME = 292
+HEADER, ROW, FLUSH = 16, 272, 0x100
 NUMBER = struct.Struct("<Id")
 POSIX = re.compile(rb'globalTime="([0-9.]+)".*?posixTime="([0-9.]+)"')
 
@@ -47,7 +49,7 @@ class Peer:
     newest: int | None = None  # number of its newest frame
 
 
-def open_peer(url: str, session: str, plays: bool) -> Peer:
+def open_peer(url: str, session: str, plays: bool, ahead: float = 0.0) -> Peer:
     """Open a connection, and subscribe to frames if it plays."""
     host, _, port = urlsplit(url).netloc.rpartition(":")
     peer = socket.create_connection((host, int(port)), 20)
@@ -55,7 +57,8 @@ def open_peer(url: str, session: str, plays: bool) -> Peer:
     rest = handshake(peer, session)
     if plays:
         peer.sendall(encode_text(json.dumps(SCENE)))
-        peer.sendall(encode_text(json.dumps({"type": "subscribe", "stream": "fap", "fps": FPS})))
+        subscribe = {"type": "subscribe", "stream": "fap", "fps": FPS, "ahead": ahead}
+        peer.sendall(encode_text(json.dumps(subscribe)))
     peer.setblocking(False)
     return Peer(peer, rest)
 
@@ -68,9 +71,10 @@ class ClientGroup:
         sessions: number of clients.
         plays: whether clients send documents, or only listen to a server whose frames have POSIX times.
         every: seconds between two documents of a session; a document plays for six.
+        ahead: seconds that frames are sent before their time.
     """
 
-    def __init__(self, url: str, sessions: int, plays: bool, every: float = 10.0) -> None:
+    def __init__(self, url: str, sessions: int, plays: bool, every: float = 10.0, ahead: float = 0.0) -> None:
         chance = random.Random(0)
         self._poll = select.epoll()
         self._peers: dict[int, Peer] = {}
@@ -80,8 +84,12 @@ class ClientGroup:
         self._late: list[float] = []
         self._answers: list[float] = []
         self._frames = self._missing = 0
+        self._ahead = ahead
+        # Rows that came early by at least half of `ahead`, and after their time; rows that replace others,
+        # and those of them after their time; messages with such rows.
+        self._rows = Counter[str]()
         for k in range(sessions):
-            peer = open_peer(url, f"load-{k}", plays)
+            peer = open_peer(url, f"load-{k}", plays, ahead)
             if not plays:
                 peer.zero = 0.0
             self._peers[peer.socket.fileno()] = peer
@@ -93,6 +101,7 @@ class ClientGroup:
         """Play and listen for some seconds; return counts, and lateness and response times in ms."""
         self._run(UNMEASURED)  # frames that waited in the sockets do not count
         self._frames = self._missing = 0
+        self._rows.clear()
         self._late.clear()
         self._answers.clear()
         begin, used = time.time(), time.process_time()
@@ -103,6 +112,7 @@ class ClientGroup:
             "expected": len(self._peers) * seconds * FPS,
             "missing": self._missing,
             **{name: 1e3 * float(np.percentile(late, part)) for name, part in PERCENTILES.items()},
+            **{name: self._rows[name] for name in COUNTED},
             "answers": len(self._answers),
             **{f"answer_{n}": 1e3 * float(np.percentile(answers, part)) for n, part in PERCENTILES.items()},
             "load": (time.process_time() - used) / (time.time() - begin),
@@ -129,6 +139,8 @@ class ClientGroup:
         for code, payload in take_messages(peer.data):
             if code == PING:  # clients that do not answer are disconnected
                 peer.socket.sendall(bytes([0x80 | PONG, 0x80 | len(payload)]) + bytes(4) + payload)
+            elif code == 2 and payload[0] == 1 and self._ahead:
+                self._batch(peer, payload, received)
             elif code == 2 and payload[0] == 1:
                 self._frame(peer, payload, 4, received)
             elif code == 1 and payload[:1] == b"<":
@@ -146,6 +158,24 @@ class ClientGroup:
         if peer.zero is not None:
             self._late.append(received - instant - peer.zero)
 
+    def _batch(self, peer: Peer, data: bytes, received: float) -> None:
+        """Count the rows of a message that were sent ahead."""
+        first, instant = NUMBER.unpack_from(data, 4)
+        newest = first - 1 if peer.newest is None else peer.newest
+        self._missing += max(0, first - newest - 1)
+        self._rows["taken_back"] += int.from_bytes(data[2:4], "little") & FLUSH > 0
+        for number in range(first, first + (len(data) - HEADER) // ROW):
+            is_new = number > newest
+            self._frames += is_new
+            late = 0.0 if peer.zero is None else received - instant - (number - first) / FPS - peer.zero
+            if is_new and peer.zero is not None:
+                self._late.append(late)
+                self._rows["early"] += late <= -self._ahead / 2
+                self._rows["after"] += late > 0
+            self._rows["replaced"] += not is_new
+            self._rows["replaced_after"] += not is_new and late > 0
+        peer.newest = max(newest, number)
+
     def _send(self) -> None:
         instant, number = heappop(self._due)
         heappush(self._due, (instant + self._every, number))
@@ -156,4 +186,5 @@ class ClientGroup:
         peer.socket.sendall(encode_text(f'<bml id="{name}" composition="REPLACE">{BODY}</bml>'))
 
 
+COUNTED = ("early", "after", "replaced", "replaced_after", "taken_back")
 PERCENTILES = {"p50": 50, "p99": 99, "most": 100}

@@ -3,6 +3,7 @@
 Run: python tests/benchmarks/sessions.py [--sessions 1000] [--every 10] [--floor] [options of serve]
      python tests/benchmarks/sessions.py --sessions 125,250,500,1000     growth
      python tests/benchmarks/sessions.py --sessions 200 --minutes 30     drift over time
+     python tests/benchmarks/sessions.py --ahead 0.2 --floor             frames ahead, and each in time
 
 Each session is a WebSocket that receives 25 FAP frames a second, and plays a document of head, face, gaze and
 idle motion of six seconds every ten seconds. The clients are one process with plain sockets, which costs
@@ -108,11 +109,12 @@ def measure(
     times: int,
     plays: bool,
     every: float = 10.0,
+    ahead: float = 0.0,
 ) -> Iterator[dict[str, float]]:
     """Yield the measurements of a service for each of `times` spans of `seconds` seconds."""
     with running_service(command) as (url, service):
         me = [sys.executable, __file__, "--load", url, "--sessions", str(sessions), "--seconds", str(seconds)]
-        me += ["--warm", str(warm), "--times", str(times), "--every", str(every)]
+        me += ["--warm", str(warm), "--times", str(times), "--every", str(every), "--ahead", str(ahead)]
         me += [] if plays else ["--floor"]
         idle = resident(service)
         client = subprocess.Popen(me, stdout=subprocess.PIPE, text=True)
@@ -137,6 +139,14 @@ def print_result(name: str, sessions: int, result: dict[str, float], plays: bool
         f" (the client {result['load']:.0%})\n"
         f"  memory          {result['memory']:5.0f} MB more than without sessions"
     )
+    if result["early"]:
+        rows, replaced = max(result["frames"], 1), max(result["replaced"], 1)
+        print(
+            f"  ahead           {result['early'] / rows:.2%} of the rows early by at least half of it,"
+            f" {result['after']} after their time;\n"
+            f"                  {result['taken_back']} take-backs replace {result['replaced']} rows,"
+            f" {result['replaced_after'] / replaced:.2%} of them after their time"
+        )
     if plays:
         print(
             f"  first feedback  p50 {result['answer_p50']:6.2f}  p99 {result['answer_p99']:6.2f} ms"
@@ -171,6 +181,7 @@ def main() -> None:
     )
     parser.add_argument("--minutes", type=int, help="measure this long, minute by minute")
     parser.add_argument("--warm", type=float, default=12.0, help="seconds before the measurement")
+    parser.add_argument("--ahead", type=float, default=0.0, help="seconds that frames are sent ahead")
     parser.add_argument(
         "--floor", action="store_true", help="also measure a plain server of the package websockets"
     )
@@ -185,7 +196,7 @@ def main() -> None:
         return
     counts = [int(part) for part in options.sessions.split(",")]
     if options.load:
-        crowd = ClientGroup(options.load, counts[0], not options.floor, options.every)
+        crowd = ClientGroup(options.load, counts[0], not options.floor, options.every, options.ahead)
         crowd.listen(options.warm)
         print("measuring", flush=True)
         for _ in range(options.times):
@@ -199,8 +210,12 @@ def main() -> None:
         return
     rows: list[dict[str, float]] = []
     for count in counts:
-        rows += measure(serve, count, options.seconds, options.warm, 1, True, options.every)
+        rows += measure(serve, count, options.seconds, options.warm, 1, True, options.every, options.ahead)
         print_result("realizer", count, rows[-1], plays=True)
+    if options.ahead:
+        (timely,) = measure(serve, counts[-1], options.seconds, options.warm, 1, True, options.every)
+        print_result("realizer, each frame in time", counts[-1], timely, plays=True)
+        print(f"a frame ahead costs {rows[-1]['frame'] / timely['frame']:.2f} times what it costs in time")
     if len(counts) > 1:
         for name, unit in (("cpu", "of a core"), ("memory", "MB"), ("p99", "ms late")):
             values = [row[name] for row in rows]
