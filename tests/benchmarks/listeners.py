@@ -113,6 +113,7 @@ class ClientGroup:
             "missing": self._missing,
             **{name: 1e3 * float(np.percentile(late, part)) for name, part in PERCENTILES.items()},
             **{name: self._rows[name] for name in COUNTED},
+            "timed": len(self._late),
             "answers": len(self._answers),
             **{f"answer_{n}": 1e3 * float(np.percentile(answers, part)) for n, part in PERCENTILES.items()},
             "load": (time.process_time() - used) / (time.time() - begin),

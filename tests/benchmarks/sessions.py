@@ -140,7 +140,7 @@ def print_result(name: str, sessions: int, result: dict[str, float], plays: bool
         f"  memory          {result['memory']:5.0f} MB more than without sessions"
     )
     if result["early"]:
-        rows, replaced = max(result["frames"], 1), max(result["replaced"], 1)
+        rows, replaced = max(result["timed"], 1), max(result["replaced"], 1)
         print(
             f"  ahead           {result['early'] / rows:.2%} of the rows early by at least half of it,"
             f" {result['after']} after their time;\n"
