@@ -50,10 +50,10 @@ class Fanout:
     @property
     def next_due(self) -> float:
         """The time of the next message."""
-        due = [s.next_due(is_slow=connection.is_slow) for connection, s in self.ahead]
-        if self.members:
-            due.append(self.next / self.timeline.fps)
-        return min(due)
+        due = self.next / self.timeline.fps if self.members else math.inf
+        for connection, s in self.ahead:
+            due = min(due, s.next_due(is_slow=connection.is_slow))
+        return due
 
     @property
     def packed(self) -> PackedFrames | None:
@@ -80,22 +80,25 @@ class Fanout:
             self._packed = window.packed(s)
         self._drop_source(window)
 
-    def send_ahead(self, now: float, sends: list[Send], *, is_reading: bool) -> int:
+    def send_ahead(self, newest: int, now: float, sends: list[Send], *, is_reading: bool) -> int:
         """Send what is due to the subscribers that get frames ahead. Return how many must take some back.
 
         Args:
+            newest: number of the last frame whose time has come.
             is_reading: whether the plan will soon change again: what is due at once may wait for that.
         """
-        taken_back = 0
+        taken_back, version = 0, self.timeline.version
         for connection, s in self.ahead:
-            if is_reading and s.must_wait(now):
-                continue
+            if s.version != version:
+                if is_reading and s.can_wait(newest):
+                    continue
+                taken_back += s.take_back()
             is_slow = connection.is_slow
-            taken_back += s.take_back()
-            connection.dropped += s.drop_late(now, is_slow=is_slow)
-            if (message := s.message(now, is_slow=is_slow)) is not None:
+            connection.dropped += s.drop_late(newest, now, is_slow=is_slow)
+            if (message := s.message(newest, now, is_slow=is_slow)) is not None:
                 sends.append(Send(connection.id, message))
-        if (window := self.timeline.current_window) is not None:
+        window = self.timeline.latest_window
+        if window is not None and window.has_source:
             self._drop_source(window)
         return taken_back
 
@@ -259,7 +262,8 @@ class Broadcast:
             if fanout.members and fanout.next <= newest:
                 fanout.send(newest, now, sends)
             if fanout.ahead:
-                self.counts["taken_back"] += fanout.send_ahead(now, sends, is_reading=is_reading)
+                taken_back = fanout.send_ahead(newest, now, sends, is_reading=is_reading)
+                self.counts["taken_back"] += taken_back
         return sends, self.next_frame
 
     def fast_path(self, zero: float, until: float) -> FrameRun | None:

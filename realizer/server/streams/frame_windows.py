@@ -121,6 +121,11 @@ class FrameWindow:
             self._aus = self._timeline.player.frames(self._times, self._timeline.character)
         return self._aus
 
+    @property
+    def has_source(self) -> bool:
+        """Whether the AUs are in memory."""
+        return self._aus is not None
+
     def drop_source(self, subscriptions: Iterable[FrameSubscription] = ()) -> None:
         """Compute what the subscriptions need, and free the AUs, which are several times as large."""
         if self._aus is None:
@@ -214,6 +219,9 @@ class FrameTimeline:
     Args:
         face: returns the face; called when the first mesh or pose is needed.
         mapping: returns the mapping from AUs to FAPs; called again when the face has changed.
+
+    Attributes:
+        latest_window: the window that was computed last, or None.
     """
 
     def __init__(
@@ -230,25 +238,20 @@ class FrameTimeline:
         self.face = face
         self._find_mapping = mapping
         self._mapping: FapMapping | None = None
-        self._window: FrameWindow | None = None
+        self.latest_window: FrameWindow | None = None
         self._version = -1
         self._face_changes = 0
 
     def window(self, first: int, last: int) -> FrameWindow:
         """Return a window that contains the frames first .. last."""
-        window = self._window
+        window = self.latest_window
         if window is None or not self.is_current or first < window.first or last >= window.end:
             if self._mapping is None:
                 self._mapping = self._find_mapping()
             count = max(math.ceil(WINDOW * self.fps), last - first + 1)
-            window = self._window = FrameWindow(self, self._mapping, first, count)
+            window = self.latest_window = FrameWindow(self, self._mapping, first, count)
             self._version = self.version
         return window
-
-    @property
-    def current_window(self) -> FrameWindow | None:
-        """The window that was computed last, if the frames have not changed since."""
-        return self._window if self.is_current else None
 
     @property
     def version(self) -> int:
@@ -262,7 +265,7 @@ class FrameTimeline:
 
     def invalidate(self) -> None:
         """Discard the window because the face has changed."""
-        self._window = self._mapping = None
+        self.latest_window = self._mapping = None
         self._face_changes += 1
 
 

@@ -33,6 +33,7 @@ class AheadSubscription(FrameSubscription):
     final: int = 0
     version: int = -1
     takes_back: bool = False
+    _due: float = -math.inf  # when the next message is due, if the plan does not change
     _window: FrameWindow | None = None  # has the rows `final` .. `next - 1`
 
     def next_due(self, *, is_slow: bool) -> float:
@@ -43,20 +44,16 @@ class AheadSubscription(FrameSubscription):
         """
         if self._is_outdated:
             return -math.inf
-        fps = self.timeline.fps
-        if is_slow:
-            return self.next / fps
-        together = math.floor(SHARE * self.ahead * fps + EPSILON)
-        return (self.next + together) / fps - self.ahead
+        return self.next / self.timeline.fps if is_slow else self._due
 
     def settle(self, t: float) -> None:
         """Keep the rows before `t`, since the plan will change at that time."""
         if not self._is_outdated:
             self.final = max(self.final, first_frame_at(t, self.timeline.fps))
 
-    def must_wait(self, now: float) -> bool:
-        """Whether nothing is lost if changes of the plan are handled later: no row is due."""
-        return self._is_outdated and self.final > last_frame_at(now, self.timeline.fps)
+    def can_wait(self, newest: int) -> bool:
+        """Whether nothing is lost if changes of the plan are handled later: no row is due after `newest`."""
+        return self._is_outdated and self.final > newest
 
     def take_back(self) -> bool:
         """Return to the first row that was sent and has changed. Return whether there is one."""
@@ -73,25 +70,31 @@ class AheadSubscription(FrameSubscription):
         self.version = self.timeline.version
         return changed is not None
 
-    def drop_late(self, now: float, *, is_slow: bool) -> int:
-        """Skip rows that are too late, for a slow client all whose time has come. Return their number."""
-        fps = self.timeline.fps
-        oldest = last_frame_at(now, fps) + 1 if is_slow else first_frame_at(now - LATE, fps)
+    def drop_late(self, newest: int, now: float, *, is_slow: bool) -> int:
+        """Skip rows that are too late, for a slow client all up to `newest`. Return their number."""
+        if self.next > newest:
+            return 0
+        oldest = newest + 1 if is_slow else first_frame_at(now - LATE, self.timeline.fps)
         dropped = max(0, oldest - self.next)
         self.next += dropped
         return dropped
 
-    def message(self, now: float, *, is_slow: bool) -> str | bytes | None:
-        """Return a message with the rows up to `now + ahead`; None if it is not due, or the client slow."""
-        fps = self.timeline.fps
-        passed, last = last_frame_at(now, fps), last_frame_at(now + self.ahead, fps)
-        message = None
-        is_due = self.takes_back or self.next_due(is_slow=False) <= now + EPSILON
-        if is_due and self.next <= last and not is_slow:
-            window = self._window = self.timeline.window(min(self.final, self.next), last)
-            message = window.rows_message(self, self.next, last, flush=self.takes_back)
-            self.next, self.takes_back = last + 1, False
-        self.final = max(self.final, passed + 1)
+    def message(self, newest: int, now: float, *, is_slow: bool) -> str | bytes | None:
+        """Return a message with the rows up to `now + ahead`; None if it is not due, or the client slow.
+
+        Args:
+            newest: number of the last row whose time has come.
+        """
+        message, fps = None, self.timeline.fps
+        if (self.takes_back or self._due <= now + EPSILON) and not is_slow:
+            last = last_frame_at(now + self.ahead, fps)
+            if self.next <= last:
+                window = self._window = self.timeline.window(min(self.final, self.next), last)
+                message = window.rows_message(self, self.next, last, flush=self.takes_back)
+                self.next, self.takes_back = last + 1, False
+            together = math.floor(SHARE * self.ahead * fps + EPSILON)
+            self._due = (self.next + together) / fps - self.ahead
+        self.final = max(self.final, newest + 1)
         return message
 
     @property
