@@ -23,6 +23,7 @@ from websockets.asyncio.client import connect
 
 from realizer.cli.serve import serve
 from realizer.core.settings import Settings
+from realizer.server.http.metrics import GAUGES, Metrics
 
 pytestmark = pytest.mark.xdist_group("image")
 
@@ -223,6 +224,21 @@ def test_proxy_knows_every_node() -> None:
     configuration = (DOCKER / "haproxy.cfg").read_text("utf-8")
     servers = dict(re.findall(r'^    server (\S+) "\$\{\w+-(\S+)\}"$', configuration, re.M))
     assert servers == {name: f"{name}:{variables()['REALIZER_PORT']}" for name in NODES}
+
+
+def test_alerts_are_rules_that_prometheus_accepts() -> None:
+    checked(tool("promtool"), "check", "rules", DOCKER / "alerts.yml")
+
+
+def test_alerts_name_metrics_of_the_service_and_say_what_to_do() -> None:
+    text = Metrics().text(dict.fromkeys(GAUGES, 0), {})
+    known = set(re.findall(r"^(realizer_\w+)", text, re.M))
+    (group,) = yaml.safe_load((DOCKER / "alerts.yml").read_text("utf-8"))["groups"]
+    for rule in group["rules"]:
+        assert set(re.findall(r"realizer_\w+", rule["expr"])) <= known
+        assert rule["labels"]["severity"] in ("page", "ticket")
+        assert rule["annotations"]["summary"].endswith(".")
+    assert len({rule["alert"] for rule in group["rules"]}) == len(group["rules"]) >= 8
 
 
 # What is installed -----------------------------------------------------------------------------------

@@ -11,6 +11,7 @@ MEDIA_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 # Upper bounds of buckets in seconds. Lateness is mostly below a millisecond, but may be several frames.
 LATENESS = (0.0005, 0.001, 0.002, 0.003, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0)
 PLANNING = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
+SLOW_STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0, 60.0)
 
 
 class Histogram:
@@ -58,12 +59,14 @@ class Metrics:
     Attributes:
         late: seconds by which sessions woke too late to send frames.
         planning: seconds of reading and planning documents.
+        slow_steps: seconds of the steps of the event loop that delayed all clients.
         counts: name in `COUNTERS` -> count.
     """
 
     def __init__(self, worker: int | None = None) -> None:
         self.late = Histogram(LATENESS)
         self.planning = Histogram(PLANNING)
+        self.slow_steps = Histogram(SLOW_STEPS)
         self.counts: Counter[str] = Counter(dict.fromkeys(COUNTERS, 0))
         self._labels = "" if worker is None else f'worker="{worker}"'
 
@@ -88,6 +91,7 @@ class Metrics:
         for name, description, histogram in (
             ("realizer_lateness_seconds", "By how much a session was woken too late.", self.late),
             ("realizer_planning_seconds", "How long it took to read and plan a document.", self.planning),
+            ("realizer_slow_step_seconds", "Steps of the event loop of 0.05 s or more.", self.slow_steps),
         ):
             lines += [f"# HELP {name} {description}", f"# TYPE {name} histogram"]
             lines += histogram.lines(name, self._labels)

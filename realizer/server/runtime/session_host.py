@@ -6,6 +6,7 @@ import itertools
 import logging
 import math
 from collections import deque
+from collections.abc import Iterable
 from typing import Any
 
 from realizer.core.settings import Settings
@@ -33,6 +34,7 @@ TURN = 0.004  # s; so long sessions are woken before the loop looks for messages
 # due than can be done, frames are late and documents are still read.
 READING_SHARE = 0.25
 LONGEST_READING = 0.02  # s
+SLOW_STEP = 0.05  # s; a step of the loop that takes so long is logged
 EXPIRY_INTERVAL = 5.0  # s; how often expired sessions and due checkpoints are looked for
 
 
@@ -202,13 +204,15 @@ class SessionHost:
         if session is None or session.closed:
             return False
         self.metrics.counts["messages"] += 1
+        began = self._loop.time()
         try:
             # A client that only asks and never reads must be noticed here: nothing else may ever be due.
             session.update_backlog(number, self._clients[number].unsent_bytes)
-            session.receive(number, message, self._loop.time())
+            session.receive(number, message, began)
         except Exception:
             self._fail(session)
         self._apply_effects(session)
+        self._report_slow_step(began, f"a message of {len(message)} characters", session, [number])
         return True
 
     def leave(self, number: int) -> None:
@@ -274,12 +278,13 @@ class SessionHost:
     def _tick_due(self) -> None:
         """Wake sessions for a while. Then messages and documents come before the others."""
         end = self._loop.time() + TURN
-        while self._due and self._loop.time() <= end:
+        while self._due and (began := self._loop.time()) <= end:
             step, session = self._due.popleft()
             when, own = self._wakeups.get(session, (0.0, None))
             if own == step:
                 del self._wakeups[session]
                 self._tick(session, when)
+                self._report_slow_step(began, "frames and feedback", session)
         if self._due:
             self._loop.call_soon(self._tick_due)
 
@@ -321,6 +326,7 @@ class SessionHost:
             began, plans = self._loop.time(), session.player.version
             self._work(session, began, read_documents=True)
             self._read_until = self._loop.time()
+            self._report_slow_step(began, "a document", session)
             if session.player.version != plans:
                 self.metrics.planning.pending.append(self._read_until - began)
             if self._read_until >= end:
@@ -335,6 +341,27 @@ class SessionHost:
         except Exception:
             self._fail(session)
         self._apply_effects(session)
+
+    def _report_slow_step(
+        self, began: float, action: str, session: Session, connections: Iterable[int] | None = None
+    ) -> None:
+        """Log and count a step of the loop if it took so long that it delayed the frames of all clients."""
+        seconds = self._loop.time() - began
+        if seconds < SLOW_STEP:
+            return
+        self.metrics.slow_steps.pending.append(seconds)
+        clients = list(session.connections if connections is None else connections)
+        fields = {
+            "session": session.id,
+            "connections": clients,
+            "seconds": round(seconds, 3),
+            "action": action,
+        }
+        log.warning(
+            "slow step: %.0f ms for %s (session %s, connections %s)",
+            *(1000 * seconds, action, session.id, ", ".join(map(str, clients)) or "none"),
+            extra=fields,
+        )
 
     def _fail(self, session: Session) -> None:
         """Log an internal error and end its session; the others play on."""
@@ -367,17 +394,21 @@ class SessionHost:
 
     def _deliver_result(self, session: Session, deliver: Any, id: int, future: asyncio.Future[Any]) -> None:
         if not future.cancelled() and not self._closed:
-            deliver(id, future.result(), self._loop.time())
+            began = self._loop.time()
+            deliver(id, future.result(), began)
             self._apply_effects(session)
+            self._report_slow_step(began, "the result of a voice or a renderer", session)
 
     def _compact_journal(self, session: Session) -> None:
         if self._closed:
             return
+        began = self._loop.time()
         try:
-            session.compact_journal(self._loop.time())
+            session.compact_journal(began)
         except Exception:
             self._fail(session)
         self._apply_effects(session)
+        self._report_slow_step(began, "a checkpoint of the journal", session)
 
     async def _check_takeovers(self) -> None:
         for session in await self._factory.taken_over(self._registry.sessions.values()):
@@ -386,7 +417,7 @@ class SessionHost:
 
     def _expire_sessions(self) -> None:
         self._gc_policy.collect_if_needed(len(self._clients))
-        for histogram in (self.metrics.late, self.metrics.planning):
+        for histogram in (self.metrics.late, self.metrics.planning, self.metrics.slow_steps):
             histogram.count()
         now = self._loop.time()
         self._registry.remove_expired(now)

@@ -24,7 +24,7 @@ def samples(text: str) -> dict[tuple[str, str], float]:
 def test_metrics_describe_each_series_once() -> None:
     text = Metrics().text(dict.fromkeys(GAUGES, 0), {})
     names = re.findall(r"^# TYPE (\S+) (\S+)$", text, re.M)
-    assert len(names) == len({name for name, _ in names}) == len(GAUGES) + len(COUNTERS) + 2
+    assert len(names) == len({name for name, _ in names}) == len(GAUGES) + len(COUNTERS) + 3
     assert re.findall(r"^# HELP (\S+) .+$", text, re.M) == [name for name, _ in names]
 
 

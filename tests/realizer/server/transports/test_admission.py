@@ -26,6 +26,7 @@ from realizer.core.settings import Settings, SettingsError
 from realizer.server.documents import limits
 from realizer.server.http import access
 from realizer.server.http.jwt_tokens import Grant
+from realizer.server.runtime import session_host
 from realizer.server.serve import Server
 
 LIMIT = 60  # s; a hung test ends
@@ -338,6 +339,32 @@ def test_admission_metrics_count_what_happened() -> None:
         assert 2**20 < int(values["memory_bytes"]) < 2**40
 
     serving(test)
+
+
+def test_admission_metrics_count_slow_steps_and_the_log_names_them(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(session_host, "SLOW_STEP", 0.0)
+
+    async def test(server: Server) -> None:
+        async with connect(f"{server.url}?session=show") as socket:
+            await socket.send(NOD.format("b"))
+            while 'id="b:end"' not in str(await socket.recv()):
+                pass
+            steps = re.search(r"realizer_slow_step_seconds_count (\d+)", await read(f"{server.page}metrics"))
+        assert steps is not None
+        assert int(steps[1]) >= 3
+
+    with caplog.at_level(logging.WARNING):
+        serving(test)
+    told = [record for record in caplog.records if record.message.startswith("slow step: ")]
+    size = len(NOD.format("b"))
+    actions = {f"a message of {size} characters", "a document", "frames and feedback"}
+    assert actions == {record.action for record in told}  # type: ignore[attr-defined]
+    assert all(record.session == "show" for record in told)  # type: ignore[attr-defined]
+    assert re.fullmatch(
+        r"slow step: \d+ ms for a message .* \(session show, connections \d+\)", told[0].message
+    )
 
 
 def test_admission_to_metrics_needs_the_token() -> None:
