@@ -109,6 +109,9 @@ class AccessControl:
             name = ""
         if name in self._hosts or is_loopback(name):
             return
+        # Nobody can register a name without a dot; simple clients on this machine send any.
+        if is_loopback(self._settings.host) and name and not set(".:") & set(name):
+            return
         # No name server can make an address lead elsewhere.
         if self._settings.host in EVERYWHERE and _is_address(name):
             return
