@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from heapq import heappop, heappush
+from itertools import count
 from math import inf
 
 from realizer.scheduling.conflict import Conflict, Link, conflict_of
@@ -40,11 +42,12 @@ class ConstraintNetwork:
 
     def add(self, edge: Edge) -> list[Edge]:
         """Add an inequality, or return the cycle of inequalities with which it cannot hold."""
-        level, cause = self._level, self._cause
+        level, cause, order = self._level, self._cause, count()
         before: dict[int, tuple[float, Edge | None]] = {}
-        queue = deque([edge])
+        # The point that rises most comes first; so each rises once, as in Dijkstra's algorithm.
+        queue = [(0.0, next(order), edge)]
         while queue:
-            step = queue.popleft()
+            _, _, step = heappop(queue)
             v, time = step.v, level[step.u] + step.seconds
             if time <= level[v] + LOOSE:
                 continue
@@ -55,7 +58,10 @@ class ConstraintNetwork:
                 return cycle
             before.setdefault(v, (level[v], cause[v]))
             level[v], cause[v] = time, step
-            queue.extend(self._out[v])
+            for following in self._out[v]:
+                rise = time + following.seconds - level[following.v]
+                if rise > LOOSE:
+                    heappush(queue, (-rise, next(order), following))
         self._out[edge.u][edge] = self._in[edge.v][edge] = None
         return []
 
