@@ -46,6 +46,7 @@ from realizer.server.speech.audio_clips import AudioClips, ClipError
 from realizer.server.streams.broadcast import Broadcast, FrameRun
 from realizer.server.streams.connection import SLOW, STUCK, Connection
 from realizer.server.streams.frame_windows import EPSILON
+from realizer.server.streams.frames_ahead import AheadRun
 from realizer.speech.utterance import Utterance
 
 log = logging.getLogger(__name__)
@@ -113,7 +114,7 @@ class Session:
         self._connections: dict[int, Connection] = {}
         self.feedback_log = log or FeedbackLog(epoch)
         self._checkpoint = Checkpoint(self.player, self.faces, self.clips, self.submission, self.feedback_log)
-        self.fast_path: FrameRun | None = None
+        self.fast_path: FrameRun | AheadRun | None = None
         self._effects: list[Effect] = []
         # The cached deadlines on the session clock: of the next event that is neither a frame nor feedback
         # (None if unknown), and of feedback.

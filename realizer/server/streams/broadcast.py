@@ -19,7 +19,7 @@ from realizer.server.streams.frame_windows import (
     first_frame_at,
     last_frame_at,
 )
-from realizer.server.streams.frames_ahead import LATE, AheadSubscription
+from realizer.server.streams.frames_ahead import LATE, AheadRun, AheadSubscription
 from realizer.server.streams.schedule_stream import ScheduleStream, schedule_message
 from realizer.server.streams.video_stream import VideoStream
 
@@ -266,16 +266,23 @@ class Broadcast:
                 self.counts["taken_back"] += taken_back
         return sends, self.next_frame
 
-    def fast_path(self, zero: float, until: float) -> FrameRun | None:
-        """Return the packed frames of the only subscriber; None if there are other or more subscribers.
+    def fast_path(self, zero: float, until: float) -> FrameRun | AheadRun | None:
+        """Return the frames of the only subscriber; None if there are other or more subscribers.
 
         Args:
             zero: the caller's clock when the session clock was 0.
             until: time of the next other event, on the caller's clock.
         """
-        if len(self._fanouts) != 1 or (packed := self._fanouts[0].packed) is None:
+        if len(self._fanouts) != 1:
             return None
-        ((connection, s),) = self._fanouts[0].members
+        fanout = self._fanouts[0]
+        if len(fanout.ahead) == 1 and not fanout.members:
+            ((client, ahead),) = fanout.ahead
+            can_run = ahead.can_run and not client.is_slow
+            return AheadRun(client.id, ahead, zero, until) if can_run else None
+        if (packed := fanout.packed) is None:
+            return None
+        ((connection, s),) = fanout.members
         return FrameRun(connection.id, s, packed, zero, until)
 
     @property
