@@ -121,7 +121,12 @@ def test_play_passes_the_golden_values_between_steps(
     run_read = pipeline.read
     monkeypatch.setattr(pipeline, "read", lambda *args, **options: list(run_read(*args, **options)))
     note("parse", pipeline, "read", read)
-    note("time", builder, "time", lambda _, own: {b: rounded(t.preferred) for b, t in own.timings.items()})
+    note(
+        "time",
+        builder,
+        "find_timings",
+        lambda _, own: {b: rounded(t.preferred) for b, t in own.timings.items()},
+    )
     note("schedule", builder, "schedule", lambda got, *_: {b: rounded(t) for b, t in got[0].times.items()})
     note("expand", builder, "expand", lambda got, *_: {b: described(cs) for b, cs in got.items()})
     note("blend", pipeline, "blend", lambda got, *_: rounded(got.aus.max(axis=0)))

@@ -17,11 +17,11 @@ from tests.shipped import FACES
 
 def hairy() -> Face:
     """One triangle of skin, and a hair that stands on its middle and bends over the edge."""
-    skin = triangle()
+    face, skin = triangle(), [[-0.08, -0.12, 0], [0.08, -0.12, 0], [0, 0.06, 0]]
     hair = [[0.01, -0.06, 0.001], [0.012, -0.06, 0.001], [0.01, -0.06, 0.02], [0.2, -0.06, 0.03]]
     return dataclasses.replace(
-        skin,
-        vertices=np.concatenate([skin.vertices, np.array(hair, np.float32)]),
+        face,
+        vertices=np.array(skin + hair, np.float32),
         triangles=np.array([[0, 1, 2], [3, 4, 5], [4, 6, 5]], np.int32),
         parts={"skin": (0, 3), "lashes": (3, 7)},
     )
