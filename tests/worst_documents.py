@@ -1,7 +1,7 @@
 """Documents that cost much: kinds of behaviours, timed in ways that conflict, overlap, wait or squeeze.
 
-`python -m tests.worst_documents [PATTERN ...] [--size N] [--kind KIND]` prints what the schedule of each costs
-at a size and at twice that size, in calls and in processor time.
+`python -m tests.worst_documents [PATTERN ...] [--size N] [--kind KIND]` prints what the schedule of each
+costs at a size and at twice that size, in calls and in processor time.
 """
 
 from __future__ import annotations
