@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from importlib.resources import files
+from itertools import product
 
 import pytest
 
 from realizer import tables
 from realizer.core.errors import TableError
-from realizer.tables import Fap, lexemes, timing
+from realizer.tables import lexemes, timing
 
 FAPS = {row.fap: row for row in tables.faps()}
 AUS = tables.by_number()
@@ -50,13 +51,13 @@ def test_faps_that_stop_at_zero_are_the_five_unidirectional_ones() -> None:
     assert {row.fap for row in tables.faps() if row.least == 0 and row.most > 0} == {3, 14, 41, 42, 47}
 
 
-@pytest.mark.parametrize("row", tables.faps(), ids=lambda row: row.name)
-def test_faps_are_the_mirror_of_their_mirror(row: Fap) -> None:
-    other = FAPS[row.mirror]
-    assert other.mirror == row.fap
-    assert other.sign == row.sign
-    assert (other.unit, other.group, other.speech_owns) == (row.unit, row.group, row.speech_owns)
-    assert abs(row.sign) == 1
+def test_faps_are_the_mirror_of_their_mirror() -> None:
+    for row in tables.faps():
+        other = FAPS[row.mirror]
+        assert other.mirror == row.fap
+        assert other.sign == row.sign
+        assert (other.unit, other.group, other.speech_owns) == (row.unit, row.group, row.speech_owns)
+        assert abs(row.sign) == 1
 
 
 def test_action_units_are_numbered_once_and_upwards() -> None:
@@ -64,32 +65,32 @@ def test_action_units_are_numbered_once_and_upwards() -> None:
     assert numbers == sorted(set(numbers))
 
 
-@pytest.mark.parametrize("key", sorted(polylines()), ids=str)
-def test_au_to_fap_has_continuous_polylines_within_ranges(key: tuple[int, str, int]) -> None:
-    au, side, fap = key
-    assert side in (("L", "R") if AUS[au].sides else ("",))
-    points = polylines()[key]
-    assert points[0][1] == 0
-    for left, right in zip(points[1:-1:2], points[2::2], strict=True):
-        assert left == right
-    assert [a for a, _ in points] == sorted(a for a, _ in points)
-    assert all(0 <= a <= 1 and math.isfinite(f) for a, f in points)
-    assert all(a < b for (a, _), (b, _) in zip(points[::2], points[1::2], strict=True))
-    assert all(FAPS[fap].least <= f <= FAPS[fap].most for _, f in points)
-    assert any(f for _, f in points)
+def test_au_to_fap_has_continuous_polylines_within_ranges() -> None:
+    for key in sorted(polylines()):
+        au, side, fap = key
+        assert side in (("L", "R") if AUS[au].sides else ("",))
+        points = polylines()[key]
+        assert points[0][1] == 0
+        for left, right in zip(points[1:-1:2], points[2::2], strict=True):
+            assert left == right
+        assert [a for a, _ in points] == sorted(a for a, _ in points)
+        assert all(0 <= a <= 1 and math.isfinite(f) for a, f in points)
+        assert all(a < b for (a, _), (b, _) in zip(points[::2], points[1::2], strict=True))
+        assert all(FAPS[fap].least <= f <= FAPS[fap].most for _, f in points)
+        assert any(f for _, f in points)
 
 
 def test_action_units_have_every_one_of_facs() -> None:
     assert set(AUS) == FACS
 
 
-@pytest.mark.parametrize("unit", tables.action_units(), ids=lambda unit: f"AU{unit.au}")
-def test_action_units_move_a_fap_on_each_side_or_say_why_not(unit: tables.ActionUnit) -> None:
-    sides = {row.side for row in ROWS if row.au == unit.au}
-    if unit.no_fap:
-        assert not sides
-    else:
-        assert sides == ({"L", "R"} if unit.sides else {""})
+def test_action_units_move_a_fap_on_each_side_or_say_why_not() -> None:
+    for unit in tables.action_units():
+        sides = {row.side for row in ROWS if row.au == unit.au}
+        if unit.no_fap:
+            assert not sides
+        else:
+            assert sides == ({"L", "R"} if unit.sides else {""})
 
 
 def test_au_to_fap_of_one_side_does_not_move_the_other_side() -> None:
@@ -167,11 +168,10 @@ def test_au_to_fap_has_the_signs_of_mpeg_4(au: int, side: str, fap: int, sign: i
 LIPS = [(4, 5), (8, 10), (9, 11), (51, 52), (55, 57), (56, 58)]
 
 
-@pytest.mark.parametrize("au", sorted({row.au for row in ROWS}))
-@pytest.mark.parametrize(("upper", "lower"), LIPS[:3])
-def test_au_to_fap_does_not_push_a_lip_through_the_other(au: int, upper: int, lower: int) -> None:
-    for side in ("L", "R", ""):
-        assert at_one(au, side, upper) + at_one(au, side, lower) <= 0
+def test_au_to_fap_does_not_push_a_lip_through_the_other() -> None:
+    for au, (upper, lower) in product(sorted({row.au for row in ROWS}), LIPS[:3]):
+        for side in ("L", "R", ""):
+            assert at_one(au, side, upper) + at_one(au, side, lower) <= 0
 
 
 @pytest.mark.parametrize(("upper", "lower"), LIPS)
@@ -212,18 +212,18 @@ FACE = ("faceLexeme", "faceFacs", "face", "faceShift", "gaze", "gazeShift", "hea
 BODY = ("gesture", "pointing", "posture", "postureShift", "locomotion", "wait")
 
 
-@pytest.mark.parametrize("element", [*FACE, *BODY])
-def test_gaps_of_every_element_have_a_source(element: str) -> None:
-    row = timing.gaps(element)
-    assert row.points[0] == "start"
-    assert row.points[-1] == "end"
-    assert all(gap.source and gap.stiffness > 0 and gap.preferred >= gap.least >= 0 for gap in row.gaps)
+def test_gaps_of_every_element_have_a_source() -> None:
+    for element in (*FACE, *BODY):
+        row = timing.gaps(element)
+        assert row.points[0] == "start"
+        assert row.points[-1] == "end"
+        assert all(gap.source and gap.stiffness > 0 and gap.preferred >= gap.least >= 0 for gap in row.gaps)
 
 
-@pytest.mark.parametrize("name", sorted(timing.all_gaps()))
-def test_gaps_of_a_variant_have_the_points_of_its_element(name: str) -> None:
-    element, _, variant = name.partition(".")
-    assert timing.gaps(element, variant.lower()).points == timing.gaps(element).points
+def test_gaps_of_a_variant_have_the_points_of_its_element() -> None:
+    for name in sorted(timing.all_gaps()):
+        element, _, variant = name.partition(".")
+        assert timing.gaps(element, variant.lower()).points == timing.gaps(element).points
 
 
 def test_gaps_of_an_unknown_variant_are_those_of_its_element() -> None:
