@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from bml_schema.dialects.table import MISSING, Row, squeezed, table
+from bml_schema.dialects.table import MISSING, squeezed, table
 from bml_schema.dialects.values import FUNCTIONS
 from bml_schema.node_schema import local, schema_of
 from bml_schema.vocabulary import VOCABULARY
@@ -15,10 +15,6 @@ ROWS = table().rows
 CLASSES = {local(tag): cls for tag, cls in VOCABULARY.items()}
 # Elements that are children of behaviours, or around documents.
 OTHERS = {"sync", "text", "description", "bml"}
-
-
-def named(row: Row) -> str:
-    return "-".join(row[:4])
 
 
 def test_table_has_each_row_once() -> None:
