@@ -357,7 +357,7 @@ class SessionHost:
             "seconds": round(seconds, 3),
             "action": action,
         }
-        log.warning(
+        log.info(
             "slow step: %.0f ms for %s (session %s, connections %s)",
             *(1000 * seconds, action, session.id, ", ".join(map(str, clients)) or "none"),
             extra=fields,

@@ -355,7 +355,7 @@ def test_admission_metrics_count_slow_steps_and_the_log_names_them(
         assert steps is not None
         assert int(steps[1]) >= 3
 
-    with caplog.at_level(logging.WARNING):
+    with caplog.at_level(logging.INFO):
         serving(test)
     told = [record for record in caplog.records if record.message.startswith("slow step: ")]
     size = len(NOD.format("b"))
