@@ -11,7 +11,7 @@ from realizer.core.array_types import Float64
 from realizer.scheduling.conflict import Link
 from realizer.scheduling.convex import Quadratic, active_set, feasible_start, optimum
 from realizer.scheduling.groups import Group
-from realizer.scheduling.model import LOOSE, TIGHT, Index, Model
+from realizer.scheduling.model import Index, Model, drop_least_gaps
 from realizer.scheduling.problem import ORIGIN, Relation
 from realizer.scheduling.rigid_clusters import RigidClusters
 
@@ -74,12 +74,11 @@ def solve_groups(
             begin[group.clusters] = clusters.at[_anchor(model, group)]
     clusters.at -= begin[clusters.label[model.owner]]
     # This is much faster than the search for the optimum, which would not find one.
-    level, cycle = _feasible(model, clusters, groups)
+    problem, level, cycle = _feasible(model, clusters, groups)
     if cycle and find_all:
-        return [cycle for group in groups if (cycle := _feasible(model, clusters, [group])[1])]
+        return [cycle for group in groups if (cycle := _feasible(model, clusters, [group])[2])]
     if cycle:
         return [cycle]
-    problem = _group_problem(model, clusters, groups)
     x = active_set(problem.quadratic, problem.start(clusters))
     if x is None:
         x = optimum(problem.quadratic, level)
@@ -87,15 +86,20 @@ def solve_groups(
     return []
 
 
-def _feasible(model: Model, clusters: RigidClusters, groups: Sequence[Group]) -> tuple[Float64, list[Link]]:
-    """Return positions that satisfy all inequalities, some least gaps dropped; or a cycle of inequalities."""
+def _feasible(
+    model: Model, clusters: RigidClusters, groups: Sequence[Group]
+) -> tuple[_GroupProblem, Float64, list[Link]]:
+    """Return the problem of some groups, some least gaps dropped, and positions that satisfy it.
+
+    If there are none, return a cycle of inequalities as well.
+    """
     while True:
         problem = _group_problem(model, clusters, groups)
         level, cycle = feasible_start(problem.quadratic, problem.start(clusters))
         if not cycle:
-            return level, []
+            return problem, level, []
         if not _yield_to_stated(model, problem.gaps):
-            return level, [problem.link(model, k) for k in cycle]
+            return problem, level, [problem.link(model, k) for k in cycle]
 
 
 def _group_problem(model: Model, clusters: RigidClusters, groups: Sequence[Group]) -> _GroupProblem:
@@ -157,14 +161,11 @@ def _yield_to_stated(model: Model, gaps: Index) -> bool:
         first, last = int(model.first[b]), int(model.last[b])
         if (model.most[k : k + last - first] < np.inf).any():
             continue
-        seen: dict[int, int] = {}
-        for p in range(first, last + 1):
-            begin = seen.get(int(model.root[p]))
-            if begin is not None:
-                stretch = slice(k + begin - first, k + p - first)
-                stated = model.shift[p] - model.shift[begin]
-                if -LOOSE <= stated < model.least[stretch].sum() - TIGHT:
-                    model.least[stretch] = 0.0
-                    changed = True
-            seen[int(model.root[p])] = p
+        own = model.least[k : k + last - first].tolist()
+        classes = zip(
+            model.root[first : last + 1].tolist(), model.shift[first : last + 1].tolist(), strict=True
+        )
+        if drop_least_gaps(own, enumerate(classes)):
+            model.least[k : k + last - first] = own
+            changed = True
     return changed

@@ -11,7 +11,7 @@ from math import inf
 
 from realizer.scheduling.conflict import Conflict, Link, conflict_of
 from realizer.scheduling.explain import choose
-from realizer.scheduling.model import LOOSE, TIGHT
+from realizer.scheduling.model import LOOSE, drop_least_gaps
 from realizer.scheduling.problem import ORIGIN, Part, Problem, Relation
 from realizer.scheduling.union_find import UnionFind
 
@@ -134,9 +134,11 @@ def conflicts_of(problem: Problem) -> list[Conflict]:
     for relation, is_equality in relations:
         u, v, seconds, part, _ = relation
         reason = relation if is_equality else Link(u, v, seconds, relation)
-        # An equality says that time[u] = time[v] + seconds.
-        pair = [Edge(v, u, seconds, reason), Edge(u, v, -seconds, reason)]
-        for edge in pair if is_equality else [Edge(u, v, seconds, reason)]:
+        if is_equality:  # time[u] = time[v] + seconds
+            inequalities = [Edge(v, u, seconds, reason), Edge(u, v, -seconds, reason)]
+        else:
+            inequalities = [Edge(u, v, seconds, reason)]
+        for edge in inequalities:
             while id(part) not in gone and absent.isdisjoint((problem.owner[u], problem.owner[v])):
                 cycle = network.add(edge)
                 if not cycle:
@@ -153,39 +155,22 @@ def conflicts_of(problem: Problem) -> list[Conflict]:
 
 def _lengths(problem: Problem) -> Iterator[Edge]:
     """Return the inequalities that behaviours state by themselves: their lengths and earliest starts."""
-    yielding = _yielding_gaps(problem)
-    for timing, first, earliest in zip(problem.timings, problem.first, problem.earliest, strict=True):
-        if earliest > -inf:
+    ties, tied = UnionFind(len(problem.owner)), dict[int, set[int]]()
+    for u, v, seconds, _, _ in problem.equalities:
+        ties.tie(u, v, seconds)
+        for p in (u, v):
+            tied.setdefault(problem.owner[p], set()).add(p)
+    for b, (timing, first) in enumerate(zip(problem.timings, problem.first, strict=True)):
+        if (earliest := problem.earliest[b]) > -inf:
             yield Edge(ORIGIN, first, earliest, Link(ORIGIN, first, earliest))
         if timing.rigid:
             continue
-        for p, least in enumerate(timing.arrays.least, first):
-            seconds = 0.0 if p in yielding else least
+        least, most = list(timing.arrays.least), timing.arrays.most
+        if most is None:
+            points = sorted(tied.get(b, ()))
+            drop_least_gaps(least, [(p - first, (ties.find(p), ties.shift[p])) for p in points])
+        for p, seconds in enumerate(least, first):
             yield Edge(p, p + 1, seconds, Link(p, p + 1, seconds))
-        for p, most in enumerate(timing.arrays.most or (), first):
-            if most < inf:
-                yield Edge(p + 1, p, -most, Link(p + 1, p, -most))
-
-
-def _yielding_gaps(problem: Problem) -> set[int]:
-    """Return the gaps whose least lengths give way to a shorter length that the document states."""
-    ties = UnionFind(len(problem.owner))
-    for u, v, seconds, _, _ in problem.equalities:
-        ties.tie(u, v, seconds)
-    tied: dict[int, list[int]] = {}
-    for p in sorted({p for relation in problem.equalities for p in relation[:2]} - {ORIGIN}):
-        tied.setdefault(problem.owner[p], []).append(p)
-    yielding: set[int] = set()
-    for b, points in tied.items():
-        timing, first = problem.timings[b], problem.first[b]
-        if timing.rigid or timing.arrays.most is not None:
-            continue
-        seen: dict[int, int] = {}
-        for p in points:
-            begin = seen.get(ties.find(p))
-            if begin is not None:
-                stated = ties.shift[p] - ties.shift[begin]
-                if -LOOSE <= stated < sum(timing.arrays.least[begin - first : p - first]) - TIGHT:
-                    yielding.update(range(begin, p))
-            seen[ties.find(p)] = p
-    return yielding
+        for p, seconds in enumerate(most or (), first):
+            if seconds < inf:
+                yield Edge(p + 1, p, -seconds, Link(p + 1, p, -seconds))

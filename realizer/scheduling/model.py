@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -116,6 +117,29 @@ def model_of(problem: Problem) -> Model | list[int]:
         stiffness[free],
         np.array(problem.earliest),
     )
+
+
+def drop_least_gaps(least: list[float], points: Iterable[tuple[int, tuple[int, float]]]) -> bool:
+    """Drop the least gaps of a behaviour, in place, within a shorter length that the document states.
+
+    Args:
+        least: of each gap.
+        points: (place in the behaviour, (root, shift)) of its points in order; those that no equality names
+            may be left out.
+
+    Returns:
+        Whether any was dropped.
+    """
+    changed = False
+    seen: dict[int, tuple[int, float]] = {}
+    for place, (root, shift) in points:
+        if root in seen:
+            begin, before = seen[root]
+            if -LOOSE <= shift - before < sum(least[begin:place]) - TIGHT:
+                least[begin:place] = [0.0] * (place - begin)
+                changed = True
+        seen[root] = place, shift
+    return changed
 
 
 def _along(gap: Index, length: Float64, first: Index, owner: Index) -> Float64:
