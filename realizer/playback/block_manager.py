@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 
@@ -98,6 +98,11 @@ class BlockManager:
             return 0
         self._characters.append(Character(id))
         return len(self._characters) - 1
+
+    def drop_characters(self, ids: Sequence[str | None]) -> None:
+        """Drop the characters that a former list of ids does not have, and a later name of the first one."""
+        del self._characters[len(ids) :]
+        self._characters[0].id = ids[0]
 
     def announce(self, block: Block, now: float) -> None:
         """Acknowledge a block, once: planning has begun. `accept` does it if it was not done before."""

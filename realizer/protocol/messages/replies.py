@@ -168,7 +168,7 @@ ErrorCode = Literal[
 
 
 class ErrorMessage(Reply):
-    """The service refused a control message, which has changed nothing."""
+    """The service refused a control message, which has changed nothing, except `stop` of several blocks."""
 
     type: Literal["error"] = "error"
     code: ErrorCode

@@ -191,7 +191,7 @@ class Anticipate(Message):
 
 
 class Stop(Message):
-    """End blocks gracefully: the listed ones, or all."""
+    """End blocks gracefully: the listed ones, or all. An unknown one is an error; the others end."""
 
     model_config = examples({"type": "stop", "blocks": ["b"]})
 

@@ -44,27 +44,26 @@ class ControlHandlers:
     reply: Callable[[int, Reply], None]
 
     def handle(self, connection: Connection, message: Control, t: float) -> None:
-        """Handle a control message, or reply with an error and change nothing.
+        """Handle a control message, or reply with an error and change nothing (`stop`: see `_stop`).
 
         Args:
             t: seconds on the session clock.
         """
+        characters = self.player.characters
         try:
             self._handle(connection, message, t)
+            return
         except ClipError as error:
-            self._error(connection, "clip", error, error.where)
+            answer = _error("clip", error, error.where)
         except FieldError as error:
             id = message.id if isinstance(message, SpeechMessage) else None
-            self._error(connection, "invalid", error, f"{message.type}.{error.where}", id)
+            answer = _error("invalid", error, f"{message.type}.{error.where}", id)
         except FaceError as error:
-            self._error(connection, "face", error, f"{message.type}.face")
+            answer = _error("face", error, f"{message.type}.face")
         except VoiceError as error:
-            self._error(connection, "voice", error, f"{message.type}.voice")
-
-    def _error(
-        self, connection: Connection, code: ErrorCode, error: Exception, where: str, id: str | None = None
-    ) -> None:
-        self.reply(connection.id, ErrorMessage(code=code, message=str(error), where=where, id=id))
+            answer = _error("voice", error, f"{message.type}.voice")
+        self.player.drop_characters(characters)
+        self.reply(connection.id, answer)
 
     def _handle(self, connection: Connection, message: Control, t: float) -> None:
         match message:
@@ -88,7 +87,10 @@ class ControlHandlers:
                 self._stop(message, t)
 
     def _stop(self, message: Stop, t: float) -> None:
-        """End blocks. A block that has just ended by itself is no error."""
+        """End blocks. A block that has just ended by itself is no error.
+
+        Unknown blocks are an error, but the others end: someone who stops a face must not hear it speak on.
+        """
         submission, wanted = self.submission, None if message.blocks is None else set(message.blocks)
         # Unread documents may contain any of the blocks.
         unread = bool(submission.queue)
@@ -100,17 +102,21 @@ class ControlHandlers:
             if not (unread or id in known or id in submission.speeches or self.player.blocks.has_seen(id))
         ]
         if unknown:
-            raise FieldError("blocks", f"wanted blocks that play or wait, got {', '.join(unknown[:10])}")
+            more = "" if len(unknown) == len(message.blocks or ()) else "; the others were stopped"
+            text = f"wanted blocks that play or wait, got {', '.join(unknown[:10])}{more}"
+            raise FieldError("blocks", text)
 
     def _speech(self, connection: Connection, message: SpeechMessage, t: float) -> None:
-        if message.clip is not None and (message.id is None or _has_annotation(message)):
+        annotates = message.clip is not None and (message.id is None or _has_annotation(message))
+        if message.id is not None:
+            if message.clip is not None:
+                self.clips.check(message, annotates=annotates)
+            character_index(self.player, message.character)
+            self.submission.speeches.check(message)
+        if annotates:
             self.clips.annotate(message)
-        if message.id is None:
-            return
-        if message.clip is not None and message.clip not in self.clips.recordings:
-            raise FieldError("clip", f"wanted a clip that was sent to its last piece, got {message.clip!r}")
-        character_index(self.player, message.character)
-        self.submission.speeches.handle(message, connection.id, t)
+        if message.id is not None:
+            self.submission.speeches.handle(message, connection.id, t)
 
     def _character(self, message: CharacterMessage) -> None:
         if message.face is not None:
@@ -132,6 +138,10 @@ class ControlHandlers:
         if "emotion" in message.model_fields_set:
             self.player.set_emotion(emotion_values(message.emotion), t, index)
         self.player.set_direct(values, t, index)
+
+
+def _error(code: ErrorCode, error: Exception, where: str, id: str | None = None) -> ErrorMessage:
+    return ErrorMessage(code=code, message=str(error), where=where, id=id)
 
 
 def _has_annotation(message: SpeechMessage) -> bool:

@@ -123,30 +123,42 @@ class AudioClips:
             ClipError: the piece is out of order, too large or has a wrong rate; or the sound file is invalid,
                 and the clip is removed.
         """
-        where = f"clip:{piece.id}"
-        self._changed.add(piece.id)
+        where, begins = f"clip:{piece.id}", piece.number == 0
         clip = self._clips.get(piece.id)
-        if clip is None or (piece.number == 0 and clip.sound is not None):
-            self.recordings.pop(piece.id, None)
-            clip = self._clips[piece.id] = Clip()
-        if piece.number == 0:
-            clip.pieces = []
-            clip.rate = piece.rate
-        if clip.sound is not None or piece.number != len(clip.pieces):
-            wanted = 0 if clip.sound is not None else len(clip.pieces)
-            raise ClipError(where, f"wanted piece {wanted}, got {piece.number}")
-        if piece.rate != clip.rate:
+        if clip is None or (begins and clip.sound is not None):
+            clip = Clip()
+        pieces = [] if begins else clip.pieces
+        size = sum(map(len, pieces)) + len(piece.sound)
+        if piece.number != len(pieces):
+            raise ClipError(where, f"wanted piece {len(pieces)}, got {piece.number}")
+        if not begins and piece.rate != clip.rate:
             raise ClipError(where, f"wanted {clip.rate} Hz as in piece 0, got {piece.rate}")
         if piece.rate and not RATES[0] <= piece.rate <= RATES[1]:
             raise ClipError(where, f"wanted {RATES[0]}..{RATES[1]} Hz, or 0 for a file, got {piece.rate}")
         if piece.rate and len(piece.sound) % 2:
             raise ClipError(where, f"wanted samples of two bytes, got {len(piece.sound)} bytes")
-        if clip.size + len(piece.sound) > MAX_BYTES:
-            raise ClipError(where, f"wanted at most {MAX_BYTES} bytes, got {clip.size + len(piece.sound)}")
-        clip.pieces.append(piece.sound)
+        if size > MAX_BYTES:
+            raise ClipError(where, f"wanted at most {MAX_BYTES} bytes, got {size}")
+        if begins:
+            self.recordings.pop(piece.id, None)
+            self._clips[piece.id] = clip
+            clip.rate, clip.pieces = piece.rate, pieces
+        pieces.append(piece.sound)
+        self._changed.add(piece.id)
         if piece.final:
             self._complete(piece.id, clip)
         self._make_room(piece.id)
+
+    def check(self, message: SpeechMessage, *, annotates: bool) -> None:
+        """Check that the clip that a message names can be spoken, if it is annotated by that message or not.
+
+        Raises:
+            FieldError: its sound or its annotation is not complete.
+        """
+        clip = self._clips.get(message.clip or "")
+        is_annotated = clip is not None and (message.final if annotates else clip.is_annotated)
+        if clip is None or clip.sound is None or not is_annotated:
+            raise FieldError("clip", f"wanted a clip that was sent to its last piece, got {message.clip!r}")
 
     def annotate(self, message: SpeechMessage) -> None:
         """Set the text and the times of a clip, or add to them after an annotation that was not final.
@@ -156,7 +168,6 @@ class AudioClips:
         """
         assert message.clip is not None
         phonemes = [*message.phonemes, *_phonemes(message)]
-        self._changed.add(message.clip)
         clip = self._clips.get(message.clip) or Clip()
         old = Clip() if clip.is_annotated else clip
         for name, known, new in (("words", old.words, message.words), ("phonemes", old.phonemes, phonemes)):
@@ -164,6 +175,7 @@ class AudioClips:
                 raise ClipError(f"speech.{name}", "wanted times that rise, got some that go back")
             if len(known) + len(new) > MAX_TIMES:
                 raise ClipError(f"speech.{name}", f"wanted at most {MAX_TIMES}, got more")
+        self._changed.add(message.clip)
         clip.words, clip.phonemes = [*old.words, *message.words], [*old.phonemes, *phonemes]
         clip.is_annotated = message.final
         clip.text = old.text if message.text is None else message.text

@@ -41,19 +41,31 @@ class SpeechStreams:
 
     # from clients -------------------------------------------------------------------------------
 
-    def handle(self, message: SpeechMessage, connection: int, t: float) -> None:
-        """Begin, continue or close a speech.
-
-        Messages for a speech that was cut off are ignored; its id is free again after `close`.
+    def check(self, message: SpeechMessage) -> None:
+        """Check that `handle` can take a message.
 
         Raises:
             FieldError: too many speeches or characters wait, or the speech is already closed.
         """
+        speech = self._speeches.get(message.id or "")
+        if speech is None and len(self._speeches) >= MAX_SPEECHES:
+            raise FieldError("id", f"wanted at most {MAX_SPEECHES} speeches at a time")
+        if speech is not None and speech.is_finished:
+            return
+        if speech is not None and speech.is_closed:
+            raise FieldError("id", f"wanted an open speech, but {message.id!r} is closed and being spoken")
+        waiting = 0 if speech is None else speech.unspoken_length
+        if waiting + len(message.append or "") > MOST:
+            raise FieldError("append", f"wanted at most {MOST} characters that wait to be spoken, got more")
+
+    def handle(self, message: SpeechMessage, connection: int, t: float) -> None:
+        """Begin, continue or close a speech, with a message that `check` has passed.
+
+        Messages for a speech that was cut off are ignored; its id is free again after `close`.
+        """
         assert message.id is not None
         speech = self._speeches.get(message.id)
         if speech is None:
-            if len(self._speeches) >= MAX_SPEECHES:
-                raise FieldError("id", f"wanted at most {MAX_SPEECHES} speeches at a time")
             chunk = Chunk(message.id, 0, message.character, message.language)
             speech = SpeechStream(message.id, connection, message.composition, chunk, last_end=t)
             self._speeches[message.id] = speech
@@ -62,12 +74,7 @@ class SpeechStreams:
             if message.close:
                 self._forget(message.id)
             return
-        elif speech.is_closed:
-            raise FieldError("id", f"wanted an open speech, but {message.id!r} is closed and being spoken")
-        text = message.append or ""
-        if speech.unspoken_length + len(text) > MOST:
-            raise FieldError("append", f"wanted at most {MOST} characters that wait to be spoken, got more")
-        speech.add(text, message.clip)
+        speech.add(message.append or "", message.clip)
         if message.close:
             speech.close()
 

@@ -10,6 +10,9 @@ import pytest
 
 from bml_schema.feedback import WarningFeedback
 from realizer.animation.axis import axis
+from realizer.protocol.wire import ClipPiece, pack_clip
+from realizer.server.journal.checkpoint import Checkpoint
+from realizer.server.speech import speech_streams
 from realizer.tables.emotions import emotion_faces
 from tests.realizer.server.conftest import Driver, spoken
 
@@ -176,9 +179,18 @@ def test_stop_names_unknown_blocks_and_ends_the_others(drive) -> None:
     client = driver.send({"type": "stop", "blocks": ["x", "a", "y"]})
     (error,) = client.of("error")
     assert (error["code"], error["where"]) == ("invalid", "stop.blocks")
-    assert error["message"] == "wanted blocks that play or wait, got 'x', 'y'"
+    assert error["message"] == "wanted blocks that play or wait, got 'x', 'y'; the others were stopped"
     driver.run(0.1)
     assert "a:end" in client.ids
+
+
+def test_stop_of_unknown_blocks_alone_stops_nothing(drive) -> None:
+    driver = drive()
+    driver.send(NOD.format("a"))
+    client = driver.send({"type": "stop", "blocks": ["x"]})
+    (error,) = client.of("error")
+    assert error["message"] == "wanted blocks that play or wait, got 'x'"
+    assert "a:end" not in driver.run(0.1).ids
 
 
 @pytest.mark.parametrize("blocks", [["b", "s"], None])
@@ -284,6 +296,51 @@ def test_set_holds_an_au_until_it_is_released(driver) -> None:
 def test_handle_answers_an_invalid_field_with_its_path(driver, message, where) -> None:
     (error,) = driver.send(message).of("error")
     assert error["where"] == where
+
+
+def test_handle_changes_nothing_with_an_error(drive, monkeypatch) -> None:
+    monkeypatch.setattr(speech_streams, "MOST", 10)
+    driver = drive()
+    sound, words = np.ones(800, "<i2").tobytes(), [{"start": 0, "text": "One"}]
+    for id, final in (("whole", True), ("part", False)):
+        driver.session.receive(1, pack_clip(ClipPiece(id, 0, 8000, sound, final=final)), driver.opened)
+    driver.send({"type": "speech", "clip": "whole", "words": words})
+    refused = (
+        {"type": "set", "character": "Eve", "aus": {"99": 1}},
+        {"type": "set", "character": "Eve", "emotion": {"name": "joy"}, "faps": {"nose_hair": 5}},
+        {"type": "subscribe", "stream": "video", "character": "Eve", "camera": "nowhere"},
+        {"type": "subscribe", "stream": "video", "character": "Eve", "size": [16, 9999]},
+        {"type": "character", "id": "Eve", "face": "nobody", "voice": "silent"},
+        {"type": "character", "id": "Eve", "face": "default", "voice": "nope"},
+        {"type": "speech", "id": "turn", "character": "Eve", "append": "far too long a text"},
+        {"type": "speech", "id": "turn", "character": "Eve", "clip": "part", "words": words},
+        {"type": "speech", "id": "turn", "clip": "nothing"},
+        {"type": "speech", "id": "turn", "clip": "whole", "words": words, "final": False},
+        {"type": "speech", "id": "turn", "clip": "whole", "visemes": [{"start": 0, "text": "PPP"}]},
+        {"type": "speech", "clip": "new", "visemes": [{"start": 0, "text": "PPP"}]},
+        {"type": "stop", "blocks": ["nothing"]},
+        pack_clip(ClipPiece("whole", 0, 7, sound)),
+        pack_clip(ClipPiece("whole", 3, 8000, sound)),
+        pack_clip(ClipPiece("part", 1, 16000, sound)),
+        pack_clip(ClipPiece("part", 0, 8000, sound[1:])),
+        pack_clip(ClipPiece("new", 1, 8000, sound)),
+    )
+
+    def state():
+        session = driver.session
+        saved = Checkpoint(
+            session.player, session.faces, session.clips, session.submission, session.feedback_log
+        )
+        return saved.write(0.0, []), session.submission.speeches.open_ids, driver.clients[1].ids
+
+    before = state()
+    for number, message in enumerate(refused, 1):
+        driver.session.receive(
+            1, message if isinstance(message, bytes) else json.dumps(message), driver.opened
+        )
+        driver.collect()
+        assert len(driver.clients[1].of("error")) == number, message
+        assert state() == before, message
 
 
 def test_anticipate_moves_behaviours_that_refer_to_the_point(driver) -> None:
