@@ -25,12 +25,12 @@ def chart_of(playing: ActiveBlock, schedule_of: Callable[[str], Schedule | None]
     Args:
         schedule_of: block id -> its schedule, for links to other blocks.
     """
-    block, schedule = playing.block, playing.schedule
-    known = math.isfinite(schedule.start)
+    block, schedule = playing.block, playing.schedule.known
+    known = playing.has_known_start
     start = schedule.start if known else None
     links = links_of(block, schedule, external_times(schedule_of, schedule.start if known else 0.0))
     own = tuple(
-        _behaviour_row(playing, node, start, tuple(links.get(node.id, ())))
+        _behaviour_row(playing, schedule, node, start, tuple(links.get(node.id, ())))
         for node in block.behaviours
         if node.id in schedule.times
     )
@@ -40,16 +40,20 @@ def chart_of(playing: ActiveBlock, schedule_of: Callable[[str], Schedule | None]
     dropped += [
         _cut(playing, id) for id in playing.first_schedule.times if id not in (*names, *schedule.times)
     ]
-    end = playing.end if known else None
+    end = (schedule.end if playing.stopped_at is None else playing.stopped_at) if known else None
     return BlockChart(
         block.id, block.character_id, playing.state.value, start, end, own, tuple(dropped), warnings
     )
 
 
 def _behaviour_row(
-    playing: ActiveBlock, node: Behaviour, start: float | None, links: tuple[Link, ...]
+    playing: ActiveBlock,
+    schedule: Schedule,
+    node: Behaviour,
+    start: float | None,
+    links: tuple[Link, ...],
 ) -> BehaviourRow:
-    names, times = playing.schedule.points[node.id], playing.schedule.times[node.id].tolist()
+    names, times = schedule.points[node.id], schedule.times[node.id].tolist()
     points = tuple(
         Point(name, time, None if start is None else start + time)
         for name, time in zip(names, times, strict=True)

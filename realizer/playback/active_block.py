@@ -18,7 +18,7 @@ from realizer.playback.block_states import BlockEvent, State, next_state
 from realizer.playback.character import RELAX, BaseShift
 from realizer.playback.references import external_refs
 from realizer.playback.resources import claims
-from realizer.scheduling.timing import Schedule
+from realizer.scheduling.timing import UNKNOWN, Schedule
 from realizer.speech.utterance import Utterance
 
 # Sound and lips stop faster than a face relaxes, so that an interruption is heard at once.
@@ -137,6 +137,11 @@ class ActiveBlock:
     def start(self) -> float:
         """When it starts or started, seconds on the session clock; inf while unknown."""
         return self.schedule.start
+
+    @property
+    def has_known_start(self) -> bool:
+        """Whether its start is known: it waits neither for activation nor for the end of an open speech."""
+        return self.start < self.not_before + UNKNOWN
 
     @property
     def end(self) -> float:

@@ -23,7 +23,7 @@ from realizer.playback.feedback_events import (
 )
 from realizer.playback.replanning import anticipators_of, lead_time
 from realizer.playback.timeline import Arrival, BlockTimeline
-from realizer.scheduling.timing import Schedule, Warning
+from realizer.scheduling.timing import UNKNOWN, Schedule, Warning
 from realizer.speech.utterance import Utterance
 
 FOREVER = float("inf")
@@ -111,7 +111,7 @@ class BlockManager:
             return
         self._announced[block.id] = AnnouncedBlock(block, self.blocks.new_number())
         start = max([now, *(w.until for w in self._dependencies(block, character))])
-        self.reports.add(acknowledgement(block, now if start == FOREVER else start))
+        self.reports.add(acknowledgement(block, start if start < now + UNKNOWN else now))
 
     def withdraw(self, block: Block, now: float) -> None:
         """Remove an announced block that will not be submitted, and report its end."""

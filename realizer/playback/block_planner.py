@@ -12,9 +12,10 @@ from bml_schema import Block, SyncRef, without
 from bml_schema.dropped_references import listed, without_constraints
 from realizer.animation.channel import Channel
 from realizer.behaviours.kind import BehaviourKind, PlanningContext
+from realizer.playback.references import external_refs
 from realizer.playback.resources import ResourceClaim, after_interrupts, claims, conflicts, interrupts, trims
 from realizer.scheduling import Member, schedule_together
-from realizer.scheduling.timing import Schedule, Timing, Warning
+from realizer.scheduling.timing import UNKNOWN, Schedule, Timing, Warning
 from realizer.speech.utterance import WARP
 
 # s; a speech whose sync points move by no more than this is not synthesized again.
@@ -154,10 +155,13 @@ class _PlanBuilder:
     ) -> list[Schedule]:
         """Step 3: solve for the times, and again without conflicting behaviours until no conflict is left.
 
+        In a block that refers to a time that is not known yet, behaviours hold their poses until then.
         Speeches that overlap a little are placed one after the other, if the document and the voice allow it.
         """
         sequences: list[tuple[str | float, str | float]] = []
         may_sequence = True
+        if any((external_times(ref) or 0.0) > UNKNOWN for ref in external_refs(self.block)):
+            self.timings = {b: timing.with_hold for b, timing in self.timings.items()}
         while True:
             priorities = {node.id: node.priority for node in self.block.behaviours if node.priority}
             own = Member(self.block, self.timings, priorities=priorities, sequences=tuple(sequences))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import IntEnum
+from math import isfinite
 from typing import NamedTuple
 
 from bml_schema import (
@@ -18,7 +19,7 @@ from bml_schema import (
     prediction_of,
 )
 from realizer.playback.block_states import State
-from realizer.scheduling.timing import Schedule, Warning
+from realizer.scheduling.timing import UNKNOWN, Schedule, Warning
 
 
 class Phase(IntEnum):
@@ -71,16 +72,28 @@ def prediction(
     state: State,
     behaviours: Mapping[str, Mapping[str, float]] | None = None,
 ) -> PredictionFeedback:
-    """Return the prediction of a block's start and end, and of some behaviours' sync points."""
+    """Return the prediction of a block's start and end, and of some behaviours' sync points.
+
+    Times that are not known yet are left out.
+    """
+    end = schedule.known.end
     times = BlockPrediction(
-        id=block.id, global_start=schedule.start, global_end=schedule.end, status=state.value
+        id=block.id,
+        global_start=schedule.start,
+        global_end=end if isfinite(end) else None,
+        status=state.value,
     )
+    known = {
+        id: {sync: time for sync, time in syncs.items() if time < UNKNOWN}
+        for id, syncs in (behaviours or {}).items()
+    }
     return PredictionFeedback(
         character_id=block.character_id,
         blocks=(times,),
         behaviours=tuple(
             prediction_of(block[id], block.id, syncs, schedule.late.get(id, 0.0))
-            for id, syncs in (behaviours or {}).items()
+            for id, syncs in known.items()
+            if syncs
         ),
     )
 

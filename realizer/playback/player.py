@@ -28,7 +28,7 @@ from realizer.playback.active_block import ScheduledSpeech
 from realizer.playback.block_manager import BlockManager
 from realizer.playback.block_states import BlockEvent, State, next_state
 from realizer.playback.character import RELAX, Character
-from realizer.scheduling.timing import Schedule
+from realizer.scheduling.timing import UNKNOWN, Schedule
 from realizer.speech.utterance import Recording, SpeechRequest, Utterance
 from realizer.tables.cooccurrence import load_rules
 
@@ -277,8 +277,9 @@ class Player(BlockManager):
             starts = p.state is State.LURKING and p.start <= now
             status = next_state(p.state, BlockEvent.START) if starts else p.state
             blocks.append({"id": p.block.id, "character": p.block.character_id, "status": status.value})
-            if p.start < float("inf"):
-                blocks[-1] |= {"start": p.start, "end": p.end}
+            if p.has_known_start:
+                end = p.end if p.schedule.duration < UNKNOWN else None
+                blocks[-1] |= {"start": p.start, "end": end}
                 spans = ((b, t + p.start) for b, t in p.schedule.times.items() if len(t))
                 blocks[-1]["behaviours"] = [b for b, t in spans if t[0] <= now < t[-1]]
         faces = [self._face_state(now, index) for index in range(len(self._characters))]

@@ -334,8 +334,8 @@ class BlockTimeline:
 
     def predict(self, playing: ActiveBlock, now: float, behaviours: Iterable[str] | None = None) -> None:
         schedule = playing.schedule
-        if schedule.start == FOREVER:
-            schedule = replace(schedule, start=now)  # as if it were activated now
+        if not playing.has_known_start:
+            schedule = replace(schedule, start=now)  # as if it started now
         syncs = schedule.behaviours
         predicted = syncs if behaviours is None else {b: syncs[b] for b in behaviours}
         self.reports.add(prediction(playing.block, schedule, playing.state, predicted))

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from realizer.core.array_types import Float64
+
+# s; a time that is so much later than the start of its block is not known yet: an open speech ends there.
+UNKNOWN = 5e5
+# A gap that holds a pose until an unknown time is so much softer than the other gaps of its behaviour.
+SOFTER = 1e-6
 
 
 class TimingArrays(NamedTuple):
@@ -66,6 +71,15 @@ class Timing:
             object.__setattr__(self, name, value)
         if self.most is not None and not (self.most >= self.least).all():
             raise ValueError(f"most: wanted at least {self.least.tolist()}, got {self.most.tolist()}")
+
+    @property
+    def with_hold(self) -> Timing:
+        """The timing with a softest gap that can last for days, while the others keep their lengths."""
+        if self.rigid:
+            return self
+        stiffness = self.stiffness.copy()
+        stiffness[stiffness.argmin()] *= SOFTER
+        return replace(self, stiffness=stiffness)
 
     @cached_property
     def arrays(self) -> TimingArrays:
@@ -153,6 +167,13 @@ class Schedule:
     def end(self) -> float:
         """When the block ends, on the session clock."""
         return self.start + self.duration
+
+    @property
+    def known(self) -> Schedule:
+        """The schedule with infinite times where they are not known yet."""
+        if self.duration < UNKNOWN:
+            return self
+        return replace(self, times={b: np.where(t < UNKNOWN, t, np.inf) for b, t in self.times.items()})
 
     @property
     def behaviours(self) -> dict[str, dict[str, float]]:

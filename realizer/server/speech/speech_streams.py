@@ -9,12 +9,13 @@ from bml_schema import Block, BlockProgress, Feedback, SyncRef
 from realizer.playback.player import Player
 from realizer.playback.references import references, with_references
 from realizer.protocol.messages.speech import SpeechMessage
+from realizer.scheduling.timing import UNKNOWN
 from realizer.server.session.control_fields import FieldError
 from realizer.server.speech.speech_chunks import Chunk
 from realizer.server.speech.speech_stream import SpeechStream
 
-# The anticipated end of an open speech is so much later than now.
-OPEN = 1e6  # s
+# The anticipated end of an open speech is so much later than now, so that it counts as not known.
+OPEN = 2 * UNKNOWN  # s
 # Its own block ends so much after its last chunk, so that the feedback of the chunk comes first.
 BEHIND = 1e-3  # s
 SAME = 1e-6  # s

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from bml_schema import parse, parse_feedback
@@ -15,7 +17,7 @@ from realizer.playback.feedback_events import (
     progress,
     sync_progress,
 )
-from realizer.scheduling.timing import Schedule
+from realizer.scheduling.timing import UNKNOWN, Schedule
 
 BLOCK = parse('<bml id="b" characterId="Ann"><gazeShift id="g" target="x"/><head id="h" lexeme="NOD"/></bml>')
 SCHEDULE = Schedule(
@@ -60,3 +62,11 @@ def test_prediction_has_the_given_sync_points() -> None:
         "b:h": {"start": 0.0, "stroke": 0.5, "end": 1.0},
     }
     assert prediction(BLOCK, SCHEDULE, State.IN_EXEC).behaviours == ()
+
+
+def test_prediction_leaves_out_times_that_are_not_known() -> None:
+    times = {"g": np.array([0.0, 2 * UNKNOWN]), "h": 2 * UNKNOWN + np.array([0.0, 0.5, 1.0])}
+    schedule = replace(SCHEDULE, times=times)
+    told = prediction(BLOCK, schedule, State.IN_EXEC, schedule.behaviours)
+    assert (told.blocks[0].global_start, told.blocks[0].global_end) == (10.0, None)
+    assert [(b.id, list(b.syncs)) for b in told.behaviours] == [("b:g", ["start"])]

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from realizer.scheduling.timing import Clause, Schedule, Timing, Warning
+from realizer.scheduling.timing import SOFTER, UNKNOWN, Clause, Schedule, Timing, Warning
 
 POINTS = ("start", "relax", "end")
 
@@ -24,6 +27,20 @@ def schedule() -> Schedule:
     )
     times = {"a": np.array([0.5, 1.0, 3.0]), "w": np.array([0.0, 1.5])}
     return Schedule("b1", {"a": POINTS, "w": ("start", "end")}, times, start=10.0, warnings=warnings)
+
+
+def test_with_hold_makes_the_softest_gap_softer() -> None:
+    assert timing().with_hold.stiffness.tolist() == [4.0, 2.0 * SOFTER]
+    assert timing(rigid=True).with_hold.stiffness.tolist() == [4.0, 2.0]
+
+
+def test_known_has_infinite_times_where_they_are_not_known() -> None:
+    whole = schedule()
+    assert whole.known is whole
+    far = replace(whole, times={"a": np.array([0.5, 1.0, 2 * UNKNOWN]), "w": np.array([0.0, 1.5])})
+    assert far.known.behaviours["a"] == {"start": 0.5, "relax": 1.0, "end": math.inf}
+    assert far.known.times["w"].tolist() == [0.0, 1.5]
+    assert far.known.end == math.inf
 
 
 @pytest.mark.parametrize("name", ["preferred", "least", "stiffness", "most"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -30,6 +31,7 @@ from realizer.speech.utterance import Phoneme, Utterance, Word
 from tests.realizer.server.conftest import RATE, Client, Driver
 
 EACH = 0.5  # s a piece
+NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
 class Talker(Driver):
@@ -207,6 +209,68 @@ def test_is_streaming_shortens_pauses_inside_a_sentence() -> None:
     assert at["turn.1:end"] - at["turn.1:start"] == pytest.approx(EACH - 0.4 + 0.15, abs=1e-3)
     assert at["turn.2:end"] - at["turn.2:start"] == pytest.approx(EACH)
     assert at["turn.3:end"] - at["turn.3:start"] == pytest.approx(EACH), "nothing follows the last one"
+
+
+SMILE = '<faceLexeme id="s" lexeme="SMILE" amount="1" start="{}" end="turn:turn:end"/>'
+
+
+def test_advance_leaves_unknown_times_out() -> None:
+    driver = Talker(idle=False)
+    driver.append("One. Two")
+    driver.send({"type": "subscribe", "stream": "schedule"})
+    driver.send(f'<bml id="smile">{SMILE.format("turn:turn:start")}</bml>')
+    driver.send('<bml id="after"><head id="n" lexeme="NOD" start="turn:turn:end"/></bml>')
+    driver.send('<bml id="next" composition="APPEND"><head id="n" lexeme="NOD"/></bml>')
+    client = driver.run(0.1)
+    predictions = [f for f in client.feedback if isinstance(f, PredictionFeedback)]
+    newest = {p.blocks[0].id: p for p in predictions if p.behaviours}
+    assert newest["turn"].blocks[0].global_start == 0
+    assert newest["turn"].blocks[0].global_end is None
+    assert list(newest["turn"].behaviours[0].syncs) == ["start"]
+    assert list(newest["smile"].behaviours[0].syncs) == ["start", "attackPeak"]
+    assert "after" not in newest
+    assert [p.blocks[0].global_end for p in predictions if p.blocks[0].id == "after"] == [None] * 3
+    # The start of this block is not known: as if it started now.
+    assert newest["next"].blocks[0].global_start == 0
+    assert newest["next"].blocks[0].global_end == pytest.approx(0.72)
+    state = driver.send({"type": "state"}).of("state")[-1]
+    blocks = {block["id"]: block for block in state["blocks"]}
+    assert "end" not in blocks["turn"]
+    assert "start" not in blocks["next"]
+    far = [
+        float(number) for text in client.messages if isinstance(text, str) for number in NUMBER.findall(text)
+    ]
+    assert max(far) < 50_000, "a sample rate at most"
+
+
+def test_advance_predicts_what_waits_for_the_end() -> None:
+    driver = Talker(idle=False)
+    driver.append("One. Two")
+    driver.send(f'<bml id="smile">{SMILE.format(0)}</bml>')
+    driver.send('<bml id="next" composition="APPEND"><head id="n" lexeme="NOD"/></bml>')
+    driver.run(3)
+    driver.append(close=True)
+    client = driver.run(3.1)
+    ends = {
+        p.blocks[0].id: p.blocks[0].global_end for p in client.feedback if isinstance(p, PredictionFeedback)
+    }
+    assert ends["turn"] == pytest.approx(3 + EACH, abs=0.01)
+    assert ends["smile"] == ends["turn"]
+    assert ends["next"] == pytest.approx(ends["turn"] + 0.72)
+
+
+@pytest.mark.parametrize("start", ["0", "turn:turn:start"])
+def test_advance_lets_expressions_last_until_the_end(start) -> None:
+    driver = Talker(idle=False)
+    names = driver.send({"type": "subscribe", "stream": "au"}).of("subscribed")[0]["names"]
+    driver.append("One. Two")
+    driver.send(f'<bml id="smile">{SMILE.format(start)}</bml>')
+    smile = [frame.values[names.index("12L")] for frame in driver.run(30).frames]
+    assert min(smile[20:]) == max(smile), "it is there after 0.8 s, and stays"
+    assert max(smile) > 0.3
+    driver.append(close=True)
+    frames = driver.run(33).frames
+    assert frames[-1].values[names.index("12L")] == 0
 
 
 def test_advance_predicts_the_end_once_it_is_known() -> None:
