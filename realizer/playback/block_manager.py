@@ -158,7 +158,8 @@ class BlockManager:
         for earlier in ended:
             self.timeline.stop(earlier, now)
         for name in block.interrupt:
-            self.revoke(name, now)
+            if self._has_arrived(name, announced.number):
+                self.revoke(name, now)
         state = next_state(announced.state, BlockEvent.PREPLAN if pending else BlockEvent.PLAN)
         playing = ActiveBlock(planned, self.kinds, context, character, announced.number, now, waits, state)
         playing.apply_plan(planned, playing.earliest)  # it may have ended its own dependencies
@@ -168,8 +169,8 @@ class BlockManager:
             follower.add_dependency(Dependency(playing, subsiding))
             self.timeline.reorder(follower)
         for name, subsiding in block_links.followers(block):
-            if (coming := self._announced.get(name)) is not None:
-                coming.dependencies.append(Dependency(playing, subsiding))
+            if self._has_arrived(name, announced.number):
+                self._announced[name].dependencies.append(Dependency(playing, subsiding))
         self.timeline.predict(playing, now)
         for warning in planned.schedule.warnings:
             self.reports.warn(warning, block.character_id)
@@ -255,6 +256,7 @@ class BlockManager:
 
     def _revoke(self, announced: AnnouncedBlock, now: float) -> None:
         announced.change_state(BlockEvent.STOP)
+        self.blocks.note_revoked(announced.block.id, now)
         self.reports.add(progress(announced.block, "end", now, announced.state))
 
     def stop(self, now: float, block_ids: Iterable[str] | None = None) -> list[str]:
@@ -346,7 +348,7 @@ class BlockManager:
             playing = self.blocks.find(name)
             if playing is not None and playing.is_waiting:
                 waiting.append((playing, subsiding))
-            elif playing is not None or name not in self._announced:
+            elif playing is not None or not self._has_arrived(name, self._announced[block.id].number):
                 text = f"prependBefore, chunkBefore: wanted blocks that have not started, got {name!r}"
                 raise _Rejection(Warning(block.id, "TargetBlockAlreadyStartedException", text))
         if waiting and any(id(playing) in block_links.all_dependencies(waits) for playing, _ in waiting):
@@ -359,6 +361,11 @@ class BlockManager:
         placed_before = [w for w in announced.dependencies if not w.block.is_done]
         waits = block_links.dependencies(block, character, announced.number, self.blocks.active())
         return waits + placed_before
+
+    def _has_arrived(self, id: str, before: int) -> bool:
+        """Whether a block is announced that arrived before another one, by its number."""
+        announced = self._announced.get(id)
+        return announced is not None and announced.number < before
 
     def _in_use(self, block: Block, character: int) -> bool:
         """Whether its id belongs to a playing or waiting block that it does not end."""

@@ -58,14 +58,23 @@ class BlockStore:
         self._ended = [p for p in self._ended if p.invisible_after >= before]
         self.first_invisible = min((p.invisible_after for p in self._ended), default=FOREVER)
         for playing in gone:
-            if (old := self._past.pop(playing.block.id, None)) is not None:
-                self._points -= _points(old)
-            self._past[playing.block.id] = past = _with_lost_points(playing)
-            self._points += _points(past)
+            self._remember(_with_lost_points(playing))
             del self._blocks[playing.number]
+        return gone
+
+    def note_revoked(self, id: str, now: float) -> None:
+        """Note a block that was ended before it was planned."""
+        if not self.has_seen(id):
+            self._remember(Schedule(id, {}, {}, start=now))
+
+    def _remember(self, past: Schedule) -> None:
+        """Store the schedule of an ended block, and drop the oldest ones if there are too many."""
+        if (old := self._past.pop(past.block, None)) is not None:
+            self._points -= _points(old)
+        self._past[past.block] = past
+        self._points += _points(past)
         while len(self._past) > PAST or (self._points > PAST_POINTS and len(self._past) > 1):
             self._points -= _points(self._past.pop(next(iter(self._past))))
-        return gone
 
     def __getitem__(self, number: int) -> ActiveBlock:
         return self._blocks[number]

@@ -59,6 +59,27 @@ class PendingBlock:
         """What it needs; asked only while several blocks of a character are pending."""
         return self.resources_of(self.block)
 
+    @cached_property
+    def named(self) -> frozenset[str | None]:
+        """The ids of the blocks whose sync points or ends it names."""
+        refs = (ref.block for ref in references(self.block))
+        return frozenset(refs).union(self.block.append_after, self.block.chunk_after)
+
+    def precedes(self, id: str) -> bool:
+        """Return whether it names a block in any way, which must not be there when this one is planned."""
+        block = self.block
+        return id in self.named or id in (*block.prepend_before, *block.chunk_before, *block.interrupt)
+
+    @property
+    def all_predecessors(self) -> set[PendingBlock]:
+        """The blocks that it waits for, directly or because others wait for them."""
+        found, todo = set[PendingBlock](), [self]
+        while todo:
+            more = todo.pop().predecessors - found
+            found |= more
+            todo += more
+        return found
+
     @property
     def is_ready(self) -> bool:
         """Whether the block waits for nothing."""
@@ -82,21 +103,26 @@ class PendingBlocks:
     def add(self, pending: PendingBlock) -> None:
         """Add a block, which waits for its speech and for the earlier blocks it depends on.
 
-        It depends on blocks whose sync points it names, on those it follows, on one with its own id, on a
-        replacing block of its character, on blocks of its character that need the voice or the gaze as it
-        does, and, if it is appended, on all blocks of its character. A replacing block depends on none: it
-        ends those that `replaced_by` returns. Blocks that must follow this one depend on it.
+        It depends on blocks whose sync points it names, on those it follows, on one with its own id, on those
+        that name it and must not find it yet, on a replacing block of its character, on blocks of its
+        character that need the voice or the gaze as it does, and, if it is appended, on all blocks of its
+        character. A replacing block depends on none: it ends those that `replaced_by` returns. Blocks that
+        must follow this one depend on it.
         """
         block = pending.block
-        ids = {ref.block for ref in references(block)} | {*block.append_after, *block.chunk_after, block.id}
 
         def is_predecessor(other: PendingBlock) -> bool:
-            if other.block.id in ids or other.character != pending.character:
-                return other.block.id in ids
-            if block.composition == "APPEND" or other.block.composition == "REPLACE":
+            if other.block.id in pending.named or other.block.id == block.id:
                 return True
             # A block that waits for the rest of a streamed speech may wait for long: nobody waits for it.
-            if other.block.id in block.interrupt or other.is_incomplete(other.block):
+            is_incomplete = other.is_incomplete(other.block)
+            if other.precedes(block.id) and not is_incomplete:
+                return True
+            if other.character != pending.character:
+                return False
+            if block.composition == "APPEND" or other.block.composition == "REPLACE":
+                return True
+            if other.block.id in block.interrupt or is_incomplete:
                 return False
             return not pending.resources.isdisjoint(other.resources)
 
@@ -104,7 +130,7 @@ class PendingBlocks:
         pending.predecessors.update(filter(is_predecessor, earlier))
         for other in self.blocks:
             is_successor = other.block.id in (*block.prepend_before, *block.chunk_before)
-            if is_successor and other not in pending.predecessors:
+            if is_successor and other not in pending.all_predecessors:
                 other.predecessors.add(pending)
         self.blocks.append(pending)
 

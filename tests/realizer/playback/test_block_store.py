@@ -85,6 +85,18 @@ def test_forget_keeps_fewer_long_schedules_but_always_the_last(
     assert [cast.has_seen(name) for name in "abcde"] == [False, False, False, False, True]
 
 
+def test_note_revoked_remembers_an_id_but_no_points() -> None:
+    cast = BlockStore()
+    cast.note_revoked("a", 3.0)
+    assert cast.has_seen("a")
+    ended(cast, "b")
+    cast.forget(9.0)
+    cast.note_revoked("b", 9.0)
+    schedule = cast.schedule_of("b")
+    assert schedule is not None
+    assert schedule.at("w", "end") == 1.0, "that of the block that played"
+
+
 def test_schedule_of_an_id_is_that_of_the_newest_block() -> None:
     cast = BlockStore()
     ended(cast, "a")

@@ -212,6 +212,38 @@ def test_submission_drops_the_gaze_of_a_newer_block_after_a_slow_voice() -> None
     assert warnings == ["b:g"]
 
 
+BMLA = 'xmlns:bmla="http://www.asap-project.org/bmla"'
+LATER = '<bml id="later" characterId="Ann"><wait id="w" duration="3"/><speech id="s"><text>Two</text></speech></bml>'
+
+
+@pytest.mark.parametrize(
+    ("head", "body", "warns"),
+    [
+        ("", '<head id="n" lexeme="NOD" start="later:w:end"/>', ["first:n"]),
+        ('bmla:appendAfter="later"', "", []),
+        ('bmla:chunkAfter="later"', "", []),
+        ('bmla:interrupt="later"', "", []),
+        ('bmla:prependBefore="later"', "", ["first"]),
+    ],
+)
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_submission_does_not_link_a_block_to_a_later_one(head, body, warns, order) -> None:
+    driver = Driver(mute=True)
+    driver.send(
+        f'<bml id="first" characterId="Bea" {BMLA} {head}><speech id="s"><text>One</text></speech>{body}</bml>'
+    )
+    driver.send(LATER)
+    voices = list(driver.spoken)
+    for number in order:
+        driver.say(voices[number].id, spoken(0.5))
+    client = driver.run(10)
+    assert [f.id for f in client.feedback if isinstance(f, WarningFeedback)] == warns
+    starts = {f.id: f.global_time for f in client.feedback if isinstance(f, BlockProgress)}
+    assert starts["later:end"] == 3
+    if "first" not in warns:
+        assert (starts["first:start"], starts["first:end"]) == (0, 0.5)
+
+
 def test_document_queue_gives_ids_to_blocks_of_dialects_that_no_other_has() -> None:
     documents = DocumentQueue(Settings())
     for _ in range(2):

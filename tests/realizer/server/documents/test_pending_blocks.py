@@ -346,6 +346,28 @@ def test_add_waits_for_an_earlier_block_that_needs_the_same(pending, speaking) -
     assert not waits('<bml id="b"/>', "gaze")
 
 
+def test_add_makes_no_circle_of_blocks_that_wait_for_each_other(pending) -> None:
+    bmla = 'xmlns:bmla="http://www.asap-project.org/bmla"'
+    pending.add(PendingBlock(block('<bml id="b"><wait id="w" start="a:s:end"/></bml>'), 0, 1.0))
+    text = f'<bml id="c" {bmla} bmla:prependBefore="a"><wait id="w" start="b:w:end"/></bml>'
+    pending.add(PendingBlock(block(text), 0, 1.0))
+    pending.blocks[0].requests.clear()
+    order = []
+    while (ready := pending.first_ready()) is not None:
+        order.append(ready.block.id)
+        pending.remove([ready])
+    assert order == ["a", "b", "c"]
+
+
+def test_add_waits_for_an_earlier_block_that_names_it(pending) -> None:
+    pending.remove(pending.blocks)
+    first = PendingBlock(block('<bml id="first"><wait id="w" start="later:w:end"/></bml>'), 0, 1.0)
+    pending.add(first)
+    pending.add(later := PendingBlock(block('<bml id="later"><wait id="w"/></bml>'), 1, 1.0))
+    assert later.predecessors == {first}
+    assert not first.predecessors
+
+
 def test_replaced_by_returns_the_blocks_that_arrived_before(pending) -> None:
     pending.add(PendingBlock(block('<bml id="other"/>'), 1, 1.0))
     pending.add(new := PendingBlock(block('<bml id="r" composition="REPLACE"/>'), 0, 1.0))
