@@ -213,7 +213,8 @@ def test_submission_drops_the_gaze_of_a_newer_block_after_a_slow_voice() -> None
 
 
 BMLA = 'xmlns:bmla="http://www.asap-project.org/bmla"'
-LATER = '<bml id="later" characterId="Ann"><wait id="w" duration="3"/><speech id="s"><text>Two</text></speech></bml>'
+TALK = '<speech id="s"><text>Hello</text></speech>'
+LATER = f'<bml id="later" characterId="Ann"><wait id="w" duration="3"/>{TALK}</bml>'
 
 
 @pytest.mark.parametrize(
@@ -229,9 +230,7 @@ LATER = '<bml id="later" characterId="Ann"><wait id="w" duration="3"/><speech id
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
 def test_submission_does_not_link_a_block_to_a_later_one(head, body, warns, order) -> None:
     driver = Driver(mute=True)
-    driver.send(
-        f'<bml id="first" characterId="Bea" {BMLA} {head}><speech id="s"><text>One</text></speech>{body}</bml>'
-    )
+    driver.send(f'<bml id="first" characterId="Bea" {BMLA} {head}>{TALK}{body}</bml>')
     driver.send(LATER)
     voices = list(driver.spoken)
     for number in order:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import partial
 from random import Random
+from types import MappingProxyType
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -24,6 +27,7 @@ from realizer.speech.utterance import Voice
 from tests.wake_times import next_wake
 
 NAMES = "abcdefg"
+FRAMES = 30  # of a session
 # {other} may be a block that arrives later, {earlier} not: commands look for their target when they act.
 BODIES = (
     '<wait id="w" duration="0.5"/>',
@@ -36,6 +40,11 @@ BODIES = (
     '<bmla:interrupt id="i" target="{earlier}"/><speech id="s" start="i:end"><text>Yes</text></speech>',
     '<bmla:activate id="i" target="{earlier}" start="0.4"/>',
     '<speech id="s"><text>Four</text></speech><speech id="t" start="0.35"><text>Five six</text></speech>',
+)
+VISIBLE = (
+    *BODIES,
+    '<gazeShift id="h" target="LEFT" end="0.6"/><faceFacs id="u" au="4" amount="0.5" start="0.2" end="1"/>',
+    '<bmla:interrupt id="j" target="{earlier}" start="0.3"/>',
 )
 HEADS = (
     *(
@@ -59,13 +68,13 @@ NEVER_BEFORE = tuple(head for head in HEADS if "Before" not in head)
 
 
 @st.composite
-def sessions(draw: st.DrawFn, heads: Sequence[str] = HEADS) -> list[str]:
+def sessions(draw: st.DrawFn, heads: Sequence[str] = HEADS, bodies: Sequence[str] = BODIES) -> list[str]:
     """Return 2 to 7 documents that name earlier ones, and sometimes the next one."""
     documents = []
     for n, id in enumerate(NAMES[: draw(st.integers(2, 7))]):
         earlier = draw(st.sampled_from((*NAMES[:n], "nobody")))
         other = draw(st.sampled_from((earlier, *NAMES[n + 1 : n + 2])))
-        body = "".join(draw(st.lists(st.sampled_from(BODIES), max_size=2, unique=True)))
+        body = "".join(draw(st.lists(st.sampled_from(bodies), max_size=2, unique=True)))
         text = f'<bml xmlns:bmla="http://www.asap-project.org/bmla" id="{id}" {draw(st.sampled_from(heads))}>'
         documents.append(f"{text}{body}</bml>".replace("{other}", other).replace("{earlier}", earlier))
     return documents
@@ -79,13 +88,26 @@ def offline(documents: Sequence[str], voice: Voice) -> list[Feedback]:
 
 
 def live(messages: Sequence[str], voice: Voice, order: Random | None = None) -> list[Feedback]:
-    """Return the feedback of a session whose clock stands still until all messages have been planned.
+    """Return the feedback of a session whose clock stands still until all messages have been planned."""
+    return played(Session("test", Settings(idle=False), 0.0), messages, voice, order)
 
-    The voices answer at once, or with `order` in a random order, before or after the next message.
+
+def played(
+    session: Session,
+    messages: Sequence[str],
+    voice: Voice,
+    order: Random | None = None,
+    looks: Mapping[float, Callable[[], None]] = MappingProxyType({}),
+) -> list[Feedback]:
+    """Play messages in a session whose clock stands still until all have been planned; return the feedback.
+
+    Args:
+        order: the voices answer in a random order, before or after the next message; None: at once.
+        looks: times, and what is then called.
     """
-    session = Session("test", Settings(idle=False), 0.0)
     session.connect(1, 0.0)
     now, got, requests = 0.0, list[str](), list[Speak]()
+    coming = sorted(looks, reverse=True)
 
     def collect() -> None:
         for effect in session.take_effects():
@@ -113,11 +135,14 @@ def live(messages: Sequence[str], voice: Voice, order: Random | None = None) -> 
     while requests:
         answer()
         read()
-    while (deadline := next_wake(session)) < float("inf"):
-        now = max(now, deadline)
+    while (deadline := next_wake(session)) < float("inf") or coming:
+        looks_first = bool(coming) and coming[-1] < deadline
+        now = max(now, coming[-1] if looks_first else deadline)
         session.tick(now)
         collect()
         answer()
+        if looks_first:
+            looks[coming.pop()]()
     return [parse_feedback(text) for text in got]
 
 
@@ -197,5 +222,30 @@ def test_session_equals_offline_whatever_voices_take(request: pytest.FixtureRequ
             if not (is_cut_at_once(feedback) or is_cut_at_once(expected)):
                 gone = ended_at_once(feedback) | ended_at_once(expected)
                 assert events(feedback, gone) == events(expected, gone)
+
+    law()
+
+
+def test_session_shows_the_frames_of_offline(request: pytest.FixtureRequest) -> None:
+    voice = SilentVoice()
+
+    @settings(max_examples=request.config.getoption("--sessions") // 5)
+    @given(sessions(bodies=VISIBLE))
+    def law(documents: list[str]) -> None:
+        player = Player(PlayOptions(seed=3), history=float("inf"))
+        plan(documents, player, voice)
+        if is_cut_at_once(player.due(float("inf"))):
+            return
+        faces = range(len(player.characters))
+        times = np.linspace(0.0, player.end + 0.7, FRAMES)
+        session, shown = Session("test", Settings(seed=3), 0.0), list[Sequence[np.ndarray]]()
+
+        def look(time: float) -> None:
+            shown.append([session.player.frames(np.array([time]), face).values[0] for face in faces])
+
+        played(session, documents, voice, looks={time: partial(look, time) for time in times.tolist()})
+        for face in faces:
+            expected = player.frames(times, face).values
+            assert np.abs(expected - [frames[face] for frames in shown]).max() < 1e-4
 
     law()
