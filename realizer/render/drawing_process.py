@@ -22,27 +22,24 @@ class DrawingProcess:
     """A drawing process, which opens its canvas while its owner continues."""
 
     def __init__(self, order: Open) -> None:
-        self._memory = Path(order.memory)
         self._opened = threading.Event()
-        try:
-            self.pixels = Pixels(order.memory, order.slots, order.size, channels(order.background))
-            self._popen = subprocess.Popen(
-                _command(), stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=_environment()
-            )
-            assert self._popen.stdin is not None
-            assert self._popen.stdout is not None
-            self._orders = connection(self._popen.stdin.fileno(), writes=True)
-            self._answers = connection(self._popen.stdout.fileno(), writes=False)
-            self._popen.stdin.close()
-            self._popen.stdout.close()
-            self.pid = self._popen.pid
-            self.end = weakref.finalize(
-                self, _end, self._popen, self._orders, self._answers, self._opened, self._memory
-            )
-            self.send(order)
-        except BaseException:
-            self._memory.unlink(missing_ok=True)
-            raise
+        self.pixels = Pixels(order.memory, order.slots, order.size, channels(order.background))
+        self._popen = subprocess.Popen(
+            _command(),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env=_environment(),
+            pass_fds=(order.memory,),
+        )
+        assert self._popen.stdin is not None
+        assert self._popen.stdout is not None
+        self._orders = connection(self._popen.stdin.fileno(), writes=True)
+        self._answers = connection(self._popen.stdout.fileno(), writes=False)
+        self._popen.stdin.close()
+        self._popen.stdout.close()
+        self.pid = self._popen.pid
+        self.end = weakref.finalize(self, _end, self._popen, self._orders, self._answers, self._opened)
+        self.send(order)
 
     def open(self) -> None:
         """Wait until it can draw; does nothing the second time.
@@ -50,13 +47,9 @@ class DrawingProcess:
         Raises:
             RenderError: it cannot; says why.
         """
-        if self._opened.is_set():
-            return
-        try:
+        if not self._opened.is_set():
             self.receive()
-        finally:
-            self._memory.unlink(missing_ok=True)
-        self._opened.set()
+            self._opened.set()
 
     def send(self, message: Open | tuple[Any, ...]) -> None:
         try:
@@ -84,11 +77,7 @@ class DrawingProcess:
 
 
 def _end(
-    popen: subprocess.Popen[bytes],
-    orders: Connection,
-    answers: Connection,
-    opened: threading.Event,
-    memory: Path,
+    popen: subprocess.Popen[bytes], orders: Connection, answers: Connection, opened: threading.Event
 ) -> None:
     """Close the pipes and kill the process if it does not end."""
     orders.close()
@@ -98,7 +87,6 @@ def _end(
     except subprocess.TimeoutExpired:
         popen.kill()
         popen.wait()
-    memory.unlink(missing_ok=True)
 
 
 def unavailable_reason(backend: str | None = None) -> str | None:

@@ -5,7 +5,7 @@ import os
 import tempfile
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from pathlib import Path
+from typing import IO
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from realizer.face.model import Face
 
 @dataclass(frozen=True)
 class Open:
-    """The first message: what to draw, and the file of the shared memory. The answer names the backend.
+    """The first message: what to draw, and the descriptor of the shared memory. The answer names the backend.
 
     All others are the name of a method of `worker.FaceDrawer` and its arguments.
     """
@@ -23,7 +23,7 @@ class Open:
     face: str | Face
     size: tuple[int, int]
     camera: str
-    memory: str
+    memory: int
     slots: int
     light: str | None
     backend: str
@@ -41,24 +41,21 @@ class Failed:
 class Pixels:
     """(slots, h, w, 3 or 4) uint8 in memory that two processes map.
 
-    A file that is unlinked as soon as both have it open, so a killed process leaves nothing behind;
-    `multiprocessing.shared_memory` would leave its segment, or a warning about it.
+    The file has no name, so killed processes leave nothing behind; `multiprocessing.shared_memory` would
+    leave its segment, or a warning about it.
     """
 
-    def __init__(self, path: str, slots: int, size: tuple[int, int], channels: int = 3) -> None:
+    def __init__(self, descriptor: int, slots: int, size: tuple[int, int], channels: int = 3) -> None:
         width, height = size
-        with Path(path).open("r+b") as file:
-            self._map = mmap.mmap(file.fileno(), slots * height * width * channels)
+        self._map = mmap.mmap(descriptor, slots * height * width * channels)
         self.array: UInt8 = np.frombuffer(self._map, np.uint8).reshape(slots, height, width, channels)
 
     @staticmethod
-    def create(slots: int, size: tuple[int, int], channels: int = 3) -> str:
-        """Return the path of a new file of the right length, in memory if the system has such a folder."""
-        folder = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
-        handle, path = tempfile.mkstemp(prefix="realizer-", dir=folder)
-        with os.fdopen(handle, "wb") as file:
-            file.truncate(slots * size[0] * size[1] * channels)
-        return path
+    def create(slots: int, size: tuple[int, int], channels: int = 3) -> IO[bytes]:
+        """Return a new file of the right length, in memory if the system has such a folder."""
+        file = tempfile.TemporaryFile(dir="/dev/shm" if os.access("/dev/shm", os.W_OK) else None)
+        file.truncate(slots * size[0] * size[1] * channels)
+        return file
 
 
 def connection(descriptor: int, *, writes: bool) -> Connection:

@@ -168,9 +168,10 @@ class Renderer:
     def _started(self) -> DrawingProcess:
         if self._process is None:
             slots, behind = 2 * self._half, self.background
-            path = Pixels.create(slots, self.size, channels(behind))
             names = self.light, self.backend, behind, self.deformer
-            self._process = DrawingProcess(Open(self.face, self.size, self.camera, path, slots, *names))
+            with Pixels.create(slots, self.size, channels(behind)) as memory:
+                order = Open(self.face, self.size, self.camera, memory.fileno(), slots, *names)
+                self._process = DrawingProcess(order)
         return self._process
 
     def _ready(self) -> DrawingProcess:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,12 +12,10 @@ from realizer.render.process_messages import Failed, Pixels, connection
 
 @pytest.mark.parametrize("channels", [3, 4])
 def test_pixels_are_seen_by_all_that_map_them(channels: int) -> None:
-    path = Pixels.create(2, (5, 4), channels)
-    try:
-        one, other = (Pixels(path, 2, (5, 4), channels) for _ in range(2))
-        assert Path(path).stat().st_size == 2 * 4 * 5 * channels
-    finally:
-        Path(path).unlink()
+    with Pixels.create(2, (5, 4), channels) as file:
+        one, other = (Pixels(file.fileno(), 2, (5, 4), channels) for _ in range(2))
+        status = os.stat(file.fileno())
+    assert (status.st_size, status.st_nlink) == (2 * 4 * 5 * channels, 0)
     one.array[1, 3, 4] = 7
     assert one.array.shape == (2, 4, 5, channels)
     assert np.array_equal(other.array, one.array)
