@@ -17,7 +17,7 @@ from PIL import Image
 
 import realizer
 from realizer.core.errors import RealizerError, RenderError
-from realizer.render import Renderer, unavailable_reason
+from realizer.render import Renderer
 
 pytestmark = pytest.mark.xdist_group("render")
 
@@ -204,12 +204,9 @@ def test_renderer_encodes_every_form(renderer, form):
     assert np.abs(np.asarray(written).astype(int) - picture).mean() < (0.01 if form == "png" else 3)
 
 
-@pytest.mark.gl
-@pytest.mark.parametrize("way", ["gl", "onboard"])
+@pytest.mark.parametrize("way", [pytest.param(way, marks=pytest.mark.gl(way)) for way in ("gl", "onboard")])
 @pytest.mark.slow
 def test_renderer_draws_transparent_pictures(way):
-    if missing := unavailable_reason(way):
-        pytest.skip(missing)
     with Renderer("default", SIZE, background="#000000", backend=way) as renderer:
         black = renderer.draw(rows(2)).astype(int)
     with Renderer("default", SIZE, background="transparent", backend=way) as renderer:
