@@ -17,7 +17,7 @@ from PIL import Image
 
 import realizer
 from realizer.core.errors import RealizerError, RenderError
-from realizer.render import Renderer
+from realizer.render import Renderer, drawing_process
 
 pytestmark = pytest.mark.xdist_group("render")
 
@@ -85,6 +85,18 @@ def test_renderer_replaces_a_killed_process_after_one_error(call):
             renderer.draw(rows(1)) if call == "draw" else renderer.encoded(rows(1)[0])
         assert np.array_equal(renderer.draw(rows(1)), first)
         assert renderer.pid != killed
+
+
+def test_renderer_ends_a_process_that_does_not_answer(monkeypatch):
+    monkeypatch.setattr(drawing_process, "PATIENCE", 0)
+    with Renderer("default", SIZE) as renderer:
+        renderer.start()
+        pid = renderer.pid
+        with pytest.raises(RenderError) as caught:  # the error refers to the process, which has to end first
+            renderer.draw(rows(1))
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)
+        assert "no picture within 0 s" in str(caught.value)
 
 
 @pytest.mark.gl
