@@ -34,9 +34,11 @@ def find(places: Iterable[str]) -> list[Document]:
     """
     documents: dict[str, Document] = {}
     for place in places:
-        files = _files(place)
+        files = _files(place) if place else []
         if not files:
-            raise DocumentsError(f"{place}: wanted a document, a folder or a pattern, found nothing there")
+            raise DocumentsError(
+                f"{place or repr(place)}: wanted a document, a folder or a pattern, found nothing there"
+            )
         for path, base in files:
             document = Document(_name(path, base), path)
             other = documents.setdefault(document.name, document)

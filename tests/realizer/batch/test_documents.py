@@ -46,3 +46,9 @@ def test_find_refuses_a_place_without_documents(place: str, tmp_path: Path) -> N
     (tmp_path / "empty").mkdir()
     with pytest.raises(DocumentsError, match="wanted a document, a folder or a pattern"):
         find([str(tmp_path / place)])
+
+
+def test_find_refuses_an_empty_place_among_documents(talks: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(talks)  # an empty path is the current folder otherwise
+    with pytest.raises(DocumentsError, match=r"'': wanted a document, a folder or a pattern"):
+        find([""])
