@@ -81,10 +81,11 @@ def read_recipe(path: Path, data: Path) -> Recipe:
             tables[name] = {}
     faults += _target_faults(tables["targets"], data)
     faults += _colour_faults(tables["colours"])
-    try:
-        style_of(tables["hair"])
-    except FaceError as error:
-        faults.append(str(error))
+    for reader, name in ((style_of, "hair"), (appearance_of, "look")):
+        try:
+            reader(tables[name])
+        except FaceError as error:
+            faults.append(str(error))
     if faults:
         raise FaceError("\n".join(f"{path}: {fault}" for fault in faults))
     return Recipe(raw["says"], tables["targets"], tables["colours"], tables["hair"], tables["look"])
@@ -100,7 +101,7 @@ def appearance_of(table: Mapping[str, Any]) -> Appearance:
     for key, value in table.items():
         if key not in names:
             raise FaceError(f"look: wanted one of {', '.join(names)}, got {key!r}")
-        if isinstance(value, bool) or not isinstance(value, int | float):
+        if not _number(value):
             raise FaceError(f"look: {key}: wanted a number, got {value!r}")
     plain = toml_table("look.toml")
     return Appearance(**{name: float(table.get(name, plain[name])) for name in names})

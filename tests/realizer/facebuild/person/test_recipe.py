@@ -68,6 +68,8 @@ def test_read_recipe_keeps_what_is_written(data: Path) -> None:
         ("says = 'Eve'", "says = 'Eve'\nhair = 3", "hair: wanted a table, got 3"),
         ("says = 'Eve'", "says = 'Eve'\nhair = {style = 'mohawk'}", "hair: style: wanted one of bun, "),
         ("says = 'Eve'", "says = 'Eve'\nhair = {colour = 3}", "got 'colour'"),
+        ("says = 'Eve'", "says = 'Eve'\nlook = {beard = 1}", "look: wanted one of brow_thick, "),
+        ("says = 'Eve'", "says = 'Eve'\nlook = {lips = nan}", "look: lips: wanted a number, got nan"),
     ],
 )  # fmt: skip
 def test_read_recipe_names_the_key_of_a_fault(old: str, new: str, fault: str, data: Path) -> None:
