@@ -306,6 +306,8 @@ def test_restored_session_disconnects_viewers_of_the_old_process(
             await read_feedback(watching, "b:end")
             async with connect(f"{other.url}?session=seen") as second:
                 await second.send('{"type": "set", "aus": {"12L": 0.5}}')
+                while await held(second) < 0.5:  # before the first process takes the session back
+                    pass
                 with pytest.raises(ConnectionClosed) as closed:
                     await drained(watching)  # without a message to the first process
             assert closed.value.rcvd is not None
