@@ -14,7 +14,7 @@ from realizer.render.process_messages import Failed, Pixels, connection
 def test_pixels_are_seen_by_all_that_map_them(channels: int) -> None:
     with Pixels.create(2, (5, 4), channels) as file:
         one, other = (Pixels(file.fileno(), 2, (5, 4), channels) for _ in range(2))
-        status = os.stat(file.fileno())
+        status = os.fstat(file.fileno())
     assert (status.st_size, status.st_nlink) == (2 * 4 * 5 * channels, 0)
     one.array[1, 3, 4] = 7
     assert one.array.shape == (2, 4, 5, channels)
