@@ -27,7 +27,7 @@ def each_row(names: str, rows: Iterable[Any]) -> Callable[[Callable[..., None]],
                 try:
                     test(**dict(zip(columns, values, strict=True)), **fixtures)
                 except Exception as error:
-                    error.add_note(f"in the row {row!r}")
+                    error.add_note(f"in the row {repr(row)[:300]}")
                     errors.append(error)
             if errors:
                 raise ExceptionGroup(f"{len(errors)} of {len(table)} rows", errors)

@@ -9,6 +9,7 @@ import pytest
 
 import bml_schema
 import realizer
+from tests.rows import each_row
 
 TESTS = Path(__file__).parent
 PACKAGES = {
@@ -27,7 +28,7 @@ def packages() -> list[str]:
     return sorted(set(found) - ELSEWHERE)
 
 
-@pytest.mark.parametrize("package", packages())
+@each_row("package", packages())
 def test_each_package_has_its_folder_of_tests(package: str) -> None:
     assert list((TESTS / package).glob("test_*.py")), f"write tests/{package}/test_NAME.py"
 

@@ -31,6 +31,7 @@ from tests.protocol import (
     tables,
     within,
 )
+from tests.rows import each_row
 
 LIMIT = 30  # s
 DOCUMENT = asyncapi()
@@ -97,7 +98,7 @@ def test_everything_that_is_named_is_there_and_everything_there_is_named() -> No
     assert set(ANSWERS.values()) < REPLIES.keys()
 
 
-@pytest.mark.parametrize("name", sorted(DOCUMENT["components"]["schemas"]))
+@each_row("name", sorted(DOCUMENT["components"]["schemas"]))
 def test_each_schema_is_one(name: str) -> None:
     validator({}).check_schema(DOCUMENT["components"]["schemas"][name])
 

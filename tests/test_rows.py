@@ -23,7 +23,10 @@ def test_each_row_runs_all_rows_and_names_those_that_fail(tmp_path: Path) -> Non
         same()
     assert seen == [1, 2, 4, 5]
     assert [str(error).splitlines()[0] for error in caught.value.exceptions] == ["2 is not 3", "5 is not 6"]
-    assert [error.__notes__ for error in caught.value.exceptions] == [["in the row (2, 3)"], ["in the row (5, 6)"]]
+    assert [error.__notes__ for error in caught.value.exceptions] == [
+        ["in the row (2, 3)"],
+        ["in the row (5, 6)"],
+    ]
 
 
 @pytest.mark.parametrize("folder", ["a", "b"])

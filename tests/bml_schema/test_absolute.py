@@ -27,6 +27,7 @@ from bml_schema import (
 )
 from realizer import schedule
 from realizer.speech.silent import SilentVoice
+from tests.rows import each_row
 from tests.strategies import blocks, numbers
 
 CORPUS = Path(__file__).parents[1] / "corpus"
@@ -156,7 +157,7 @@ def test_with_absolute_times_removes_a_constraint_that_the_times_break() -> None
 CASES = sorted(p for folder in ("core", "constraints", "ext") for p in (CORPUS / folder).glob("*.xml"))
 
 
-@pytest.mark.parametrize("case", CASES, ids=[f"{c.parent.name}/{c.stem}" for c in CASES])
+@each_row("case", CASES)
 def test_with_absolute_times_is_scheduled_to_the_same_times(case: Path) -> None:
     for block in read(case.read_bytes()):
         assert isinstance(block, Block)

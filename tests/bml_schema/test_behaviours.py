@@ -24,6 +24,7 @@ from bml_schema import (
     write,
 )
 from bml_schema.node_schema import schema_of
+from tests.rows import each_row
 
 # What an element needs beyond its required attributes; children without namespace.
 LEAST = {
@@ -52,9 +53,7 @@ def sample(cls: type[Behaviour], *, leave_out: str = "", extra: str = "") -> str
     return f"<bml id='b' xmlns='{CORE}'>{start}{inside}</n:{name}></bml>"
 
 
-EACH = pytest.mark.parametrize(
-    "cls", VOCABULARY.values(), ids=[c.tag.partition("}")[2] for c in VOCABULARY.values()]
-)
+EACH = each_row("cls", VOCABULARY.values())
 
 
 @EACH

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from bml_schema import SyncRef
 from bml_schema.sync_refs import Names, Points, read_sync_ref
+from tests.rows import each_row
 from tests.strategies import numbers
 
 STROKES = ("start", "ready", "strokeStart", "stroke", "strokeEnd", "relax", "end")
@@ -25,8 +26,8 @@ def names() -> Names:
     )
 
 
-@pytest.mark.parametrize(
-    ("text", "ref"),
+@each_row(
+    "text, ref",
     [
         ("1.5", SyncRef(offset=1.5)),
         (" -2 ", SyncRef(offset=-2.0)),

@@ -37,6 +37,7 @@ from bml_schema import (
 from bml_schema.node_schema import Attribute, schema_of
 from realizer.behaviours.registry import VOCABULARY
 from tests import schema
+from tests.rows import each_row
 from tests.strategies import blocks
 
 XSD = Path(str(files("bml_schema") / "xsd"))
@@ -126,7 +127,7 @@ NODES: list[type[Any]] = [
     FaceInterpolator,
     Fap,
 ]
-EACH = pytest.mark.parametrize("cls", NODES, ids=[c.__name__ for c in NODES])
+EACH = each_row("cls", NODES)
 
 
 def declaration_of(cls: type[Any]) -> Element:

@@ -15,6 +15,7 @@ from realizer.playback.player import Player
 from realizer.playback.speaking import submit_with_speech
 from realizer.speech.silent import SilentVoice
 from tests.cases import CASES
+from tests.rows import each_row
 
 NOD = '<bml id="b"><head id="n" lexeme="NOD"/></bml>'
 
@@ -40,7 +41,7 @@ def test_schedule_has_the_times_that_realize_plays() -> None:
     assert schedule(NOD).behaviours == played.behaviours
 
 
-@pytest.mark.parametrize("case", CASES[::12], ids=lambda case: case.name)
+@each_row("case", CASES[::12])
 def test_schedule_is_what_a_player_plays(case) -> None:
     try:
         block = parse(case.document, VOCABULARY)

@@ -22,6 +22,7 @@ from realizer.core.options import PlayOptions
 from realizer.pipeline import plan
 from realizer.playback.player import Player
 from realizer.speech.silent import SilentVoice
+from tests.rows import each_row
 
 DOCUMENTS = Path(__file__).parents[2] / "dialect_documents"
 WRAPPERS = {"act", "participant", "fml-apml", "fml"}
@@ -76,10 +77,6 @@ VALUES = {
 }
 
 
-def named(row: Row) -> str:
-    return "-".join(row[:4])
-
-
 def sample(row: Row) -> str:
     """Return a document in which a row of the table has its element, attribute and value."""
     strange = {"relax": "gazeShift", "attackPeak": "head", "attack_peak": "head", "priority": "head"}
@@ -118,7 +115,7 @@ def sample(row: Row) -> str:
     return f'{start}{speech}{inside}<head type="NOD"/></bml></act>'
 
 
-@pytest.mark.parametrize("row", ROWS, ids=named)
+@each_row("row", ROWS)
 def test_translate_uses_each_row_and_drops_nothing(row: Row) -> None:
     document = sample(row)
     (block,) = read(document)

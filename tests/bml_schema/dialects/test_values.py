@@ -8,10 +8,11 @@ import pytest
 from lxml import etree
 
 from bml_schema.dialects.values import FUNCTIONS, language_tag
+from tests.rows import each_row
 
 
-@pytest.mark.parametrize(
-    ("function", "element", "value", "wanted"),
+@each_row(
+    "function, element, value, wanted",
     [
         ("amount", "<head/>", "0.5", None),
         ("amount", "<head/>", "-0.02", {"amount": "0.02"}),

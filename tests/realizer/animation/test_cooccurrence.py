@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -12,6 +11,7 @@ from realizer.animation.axis import AU_NAMES
 from realizer.animation.cooccurrence import bounds
 from realizer.core.array_types import Float32
 from realizer.tables.cooccurrence import Rule, rules
+from tests.rows import each_row
 
 NAMES = AU_NAMES()
 INTENSITIES = arrays(
@@ -40,7 +40,7 @@ def names(number: int) -> list[str]:
     return [name for name in NAMES if name.rstrip("LR") == str(number)]
 
 
-@pytest.mark.parametrize("rule", rules().rules, ids=lambda rule: rule.text)
+@each_row("rule", rules().rules)
 def test_rules_silence_weaker_units_at_full_strength(rule: Rule) -> None:
     asked = {
         f"AU{name}": 1.0 for unit in (rule.weaker, *(s.au for s in rule.stronger)) for name in names(unit)
@@ -49,7 +49,7 @@ def test_rules_silence_weaker_units_at_full_strength(rule: Rule) -> None:
     assert all(left[f"AU{name}"] == 0.0 for name in names(rule.weaker))
 
 
-@pytest.mark.parametrize("rule", rules().rules, ids=lambda rule: rule.text)
+@each_row("rule", rules().rules)
 def test_rules_keep_every_unit_that_is_alone(rule: Rule) -> None:
     assert set(shown(**{f"AU{name}": 0.75 for name in names(rule.weaker)}).values()) == {0.75}
 

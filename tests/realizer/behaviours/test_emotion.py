@@ -13,6 +13,7 @@ from realizer.emotions.words import emotion, known_words
 from realizer.tables.emotions import emotion_faces
 from realizer.tables.lexemes import face_lexemes
 from realizer.tables.wheel_words import ring, whissell_words
+from tests.rows import each_row
 
 AT = 'start="0" attackPeak="0.5" relax="1.5" end="2"'
 SAD = emotion_faces()["sadness"].aus[15, "BOTH"]
@@ -226,7 +227,7 @@ def test_mood_is_below_an_expression(play) -> None:
     assert asked(played, 1.0)["12L"] == pytest.approx(0.85)
 
 
-@pytest.mark.parametrize("word", known_words())
+@each_row("word", known_words())
 def test_emotion_plays_every_word_in_any_case(play, word: str) -> None:
     played = play(f'<own:emotion id="e" name="{word.upper()}" {AT}/>')
     assert played.warnings == []

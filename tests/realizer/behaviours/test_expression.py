@@ -7,6 +7,7 @@ import pytest
 from realizer.offline import realize
 from realizer.tables.lexemes import face_lexemes
 from realizer.tables.templates import templates
+from tests.rows import each_row
 
 AT = 'start="0" attackPeak="0.5" relax="1.5" end="2"'
 
@@ -20,7 +21,7 @@ def test_expression_shows_the_action_units_of_a_template(play, template) -> None
     assert played.aus(2.0) == {}
 
 
-@pytest.mark.parametrize("name", face_lexemes())
+@each_row("name", face_lexemes())
 def test_expression_of_a_face_lexeme_is_the_same(play, name: str) -> None:
     shown = play(f'<own:expression id="e" name="{name.lower()}" intensity="0.7" {AT}/>')
     asked = play(f'<faceLexeme id="e" lexeme="{name}" amount="0.7" {AT}/>')

@@ -9,6 +9,7 @@ from realizer.animation.axis import AU_NAMES
 from realizer.animation.blend import blend
 from realizer.tables.lexemes import face_lexemes
 from tests.realizer.behaviours.elements import at, check, expand
+from tests.rows import each_row
 
 FOUR = (1.0, 1.4, 2.4, 3.0)
 
@@ -35,7 +36,7 @@ def test_face_lexeme_of_one_side_moves_one_side() -> None:
     assert at(expand('<faceLexeme id="x" lexeme="RAISE_LEFT_BROW" amount="1"/>', FOUR), "2L", 1.4) == [1]
 
 
-@pytest.mark.parametrize("lexeme", sorted(face_lexemes()))
+@each_row("lexeme", sorted(face_lexemes()))
 def test_face_lexeme_shows_exactly_its_action_units(lexeme: str) -> None:
     channels = expand(f'<faceLexeme id="x" lexeme="{lexeme.lower()}" amount="1"/>', FOUR)
     values = blend(channels, np.array([1.4])).aus[0]

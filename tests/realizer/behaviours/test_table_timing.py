@@ -7,9 +7,10 @@ import pytest
 from realizer.behaviours.kind import PlanningContext
 from realizer.behaviours.table_timing import from_gaps, table_timing, timing_from_table
 from realizer.tables.timing import all_gaps, gaps
+from tests.rows import each_row
 
 
-@pytest.mark.parametrize("name", sorted(all_gaps()))
+@each_row("name", sorted(all_gaps()))
 def test_timing_from_table_has_the_gaps_of_the_table(name: str) -> None:
     element, _, variant = name.partition(".")
     timing, row = timing_from_table(element, variant), gaps(element, variant)

@@ -14,6 +14,7 @@ from realizer.server import serve
 from realizer.speech.espeak.voice import EspeakVoice
 from realizer.speech.registry import VOICES
 from realizer.speech.silent import SilentVoice
+from tests.rows import each_row
 
 CONTEXT, OPTION = click.Context(cli), click.Option(["--size"])
 GOOD = '<bml id="b"><head id="n" lexeme="NOD" start="0.2" end="0.6"/></bml>'
@@ -29,7 +30,7 @@ def leaves(command: click.Command) -> list[click.Command]:
     return [command]
 
 
-@pytest.mark.parametrize("command", leaves(cli), ids=lambda command: str(command.name))
+@each_row("command", leaves(cli))
 def test_verbosity_is_an_option_of_every_command(command: click.Command) -> None:
     flags = {flag for parameter in command.params for flag in parameter.opts}
     assert {"-q", "--quiet", "-v", "--verbose"} <= flags

@@ -16,6 +16,7 @@ from click.testing import CliRunner, Result
 from bml_schema import Block, SyncRef, parse, read
 from realizer.behaviours.registry import VOCABULARY
 from realizer.cli import cli
+from tests.rows import each_row
 
 CORPUS = Path(__file__).parents[2] / "corpus"
 TALK = """<bml id="b">
@@ -56,9 +57,7 @@ DOCUMENTS = [
 ]
 
 
-@pytest.mark.parametrize(
-    "path", DOCUMENTS, ids=[str(p.relative_to(CORPUS).with_suffix("")) for p in DOCUMENTS]
-)
+@each_row("path", DOCUMENTS)
 def test_schedule_of_its_own_bml_gives_the_same_times(path: Path) -> None:
     first = schedule(str(path), "--json")
     written = schedule(str(path), "--bml")

@@ -11,6 +11,7 @@ import pytest
 
 from realizer.core.options import PlayOptions
 from realizer.core.settings import Settings, SettingsError
+from tests.rows import each_row
 
 
 def test_settings_have_defaults() -> None:
@@ -88,8 +89,8 @@ def test_settings_read_a_file_with_a_byte_order_mark(tmp_path: Path) -> None:
     assert Settings.read(file=file, environment={}).fps == 30
 
 
-@pytest.mark.parametrize("name", [f.name for f in fields(Settings)])
-@pytest.mark.parametrize("value", ["[1]", "{ a = 1 }", "2020-01-01", "-0.5"])
+@each_row("name", [f.name for f in fields(Settings)])
+@each_row("value", ["[1]", "{ a = 1 }", "2020-01-01", "-0.5"])
 def test_settings_only_raise_settings_errors(name: str, value: str, tmp_path: Path) -> None:
     file = tmp_path / "realizer.toml"
     file.write_text(f"{name} = {value}\n")
@@ -108,8 +109,8 @@ def test_settings_name_the_source_of_a_wrong_value(tmp_path: Path) -> None:
         Settings.read({"port": -1}, file=file, environment={"REALIZER_PORT": "x", "REALIZER_RECORD": ""})
 
 
-@pytest.mark.parametrize(
-    ("name", "value"),
+@each_row(
+    "name, value",
     [
         ("asap_ports", "7500"),
         ("asap_ports", "7500 0"),

@@ -10,11 +10,12 @@ from realizer.expressions.library import builtin, library_of
 from realizer.tables.emotions import archetypes
 from realizer.tables.expression_words import expression_words
 from realizer.tables.templates import templates
+from tests.rows import each_row
 
 SMIRK = 'means = ["irony"]\naus = { 12L = 0.6, 2R = 0.3 }\nonset = 0.2\napex = 0.5\noffset = 0.4\n'
 
 
-@pytest.mark.parametrize("one", builtin().values(), ids=lambda one: one.name)
+@each_row("one", builtin().values())
 def test_builtin_expressions_have_meanings_units_and_durations(one) -> None:
     for said in (one.means, one.features, one.aus, one.source):
         assert said

@@ -6,6 +6,7 @@ import pytest
 
 from realizer.expressions.library import builtin
 from realizer.expressions.search import by_action_units, by_meaning, stem
+from tests.rows import each_row
 
 
 def names(found) -> list[str]:
@@ -49,7 +50,7 @@ def test_by_meaning_of_unknown_words_is_empty() -> None:
     assert by_meaning("...", builtin().values()) == []
 
 
-@pytest.mark.parametrize("one", builtin().values(), ids=lambda one: one.name)
+@each_row("one", builtin().values())
 def test_by_action_units_finds_an_expression_by_its_own_units(one) -> None:
     (_, best), *_ = found = by_action_units(one.aus, builtin().values())
     assert best == pytest.approx(1)

@@ -7,6 +7,7 @@ import pytest
 from realizer.core.errors import TableError
 from realizer.expressions.timeline import Entry, Timeline, Track
 from realizer.expressions.timeline_reader import read_timeline
+from tests.rows import each_row
 
 FILE = b"""
 [[channel]]
@@ -74,7 +75,7 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("text", BAD)
+@each_row("text", BAD)
 def test_read_timeline_names_channel_and_entry_of_a_fault(text: bytes) -> None:
     with pytest.raises(TableError) as caught:
         read_timeline(text)

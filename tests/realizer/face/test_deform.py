@@ -7,6 +7,7 @@ from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.face.model import Face
 from realizer.tables import Fap, faps
+from tests.rows import each_row
 from tests.shipped import FACES, FOLDERS
 
 LOW_LEVEL = faps()[2:]
@@ -70,7 +71,7 @@ def test_deform_keeps_the_neutral_mesh(face: Face) -> None:
     assert np.array_equal(deform(face, np.zeros((3, 68)))[1], face.vertices)
 
 
-@pytest.mark.parametrize("row", STRAIGHT, ids=lambda row: row.name)
+@each_row("row", STRAIGHT)
 def test_deform_moves_a_feature_point_by_value_times_fapu(face: Face, row: Fap) -> None:
     for value in both(row):
         move = moved(face, {row.fap: value})[face.feature_points[row.feature_point]]
@@ -202,7 +203,7 @@ def test_deform_lifts_both_borders_by_tongue_roll(face: Face) -> None:
         assert rise == pytest.approx(abs(face.vertices[vertex, 0]) * np.sin(0.6), rel=0.02)
 
 
-@pytest.mark.parametrize("row", LOW_LEVEL, ids=lambda row: row.name)
+@each_row("row", LOW_LEVEL)
 def test_deform_mirrors_mirrored_faps(face: Face, row: Fap) -> None:
     from scipy.spatial import cKDTree
 
@@ -258,7 +259,7 @@ def test_deform_keeps_eyeballs_behind_the_lids_of_a_blink(face: Face) -> None:
             assert np.linalg.norm(at[lids] - centre, axis=1).min() > radius
 
 
-@pytest.mark.parametrize("row", LOW_LEVEL, ids=lambda row: row.name)
+@each_row("row", LOW_LEVEL)
 def test_deform_flips_no_triangle_at_usual_values(face: Face, row: Fap) -> None:
     first, last = face.parts["skin"]
     mine = face.triangles[(face.triangles < last).all(axis=1)]

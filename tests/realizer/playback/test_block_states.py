@@ -13,6 +13,7 @@ from realizer.behaviours.registry import VOCABULARY
 from realizer.playback import block_states
 from realizer.playback.block_states import TRANSITIONS, BlockEvent, State, TransitionError, next_state
 from realizer.playback.player import Player
+from tests.rows import each_row
 
 DOCS = Path(__file__).parents[3] / "docs" / "blocks.md"
 SMILE = '<faceLexeme id="s" lexeme="SMILE" start="0" attackPeak="0.5" relax="1" end="2"/>'
@@ -48,8 +49,8 @@ def test_docs_draw_the_table() -> None:
     assert drawing() in DOCS.read_text("utf-8"), f"docs/blocks.md: wanted\n{drawing()}"
 
 
-@pytest.mark.parametrize("state", State)
-@pytest.mark.parametrize("event", BlockEvent)
+@each_row("state", State)
+@each_row("event", BlockEvent)
 def test_next_state_follows_the_table_or_refuses(state: State, event: BlockEvent) -> None:
     if (after := TRANSITIONS.get((state, event))) is not None:
         assert next_state(state, event) is after

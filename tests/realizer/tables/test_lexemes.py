@@ -7,6 +7,7 @@ import pytest
 from realizer.core.errors import TableError
 from realizer.tables import au_to_fap, by_number
 from realizer.tables.lexemes import HeadLexeme, face_lexemes, head_lexemes, read_aus
+from tests.rows import each_row
 
 BROWS = tuple(f"{way}_{brow}" for way in ("RAISE", "LOWER") for brow in ("BROWS", "LEFT_BROW", "RIGHT_BROW"))
 CORNERS = tuple(
@@ -30,7 +31,7 @@ def test_face_lexemes_have_joy_as_happiness() -> None:
     assert known["JOY"].aus == known["HAPPINESS"].aus
 
 
-@pytest.mark.parametrize("name", sorted(face_lexemes()))
+@each_row("name", sorted(face_lexemes()))
 def test_face_lexemes_of_one_side_mirror_those_of_the_other(name: str) -> None:
     swapped = {"LEFT": "RIGHT", "RIGHT": "LEFT", "BOTH": "BOTH"}
     swap = name.replace("LEFT", "?").replace("RIGHT", "LEFT").replace("?", "RIGHT")
@@ -38,7 +39,7 @@ def test_face_lexemes_of_one_side_mirror_those_of_the_other(name: str) -> None:
     assert known[swap].aus == {(au, swapped[side]): amount for (au, side), amount in known[name].aus.items()}
 
 
-@pytest.mark.parametrize("name", sorted(face_lexemes()))
+@each_row("name", sorted(face_lexemes()))
 def test_face_lexemes_use_action_units_that_move_faps(name: str) -> None:
     moved = {row.au for row in au_to_fap()}
     assert {au for au, _ in face_lexemes()[name].aus} <= moved

@@ -10,6 +10,7 @@ from realizer import tables
 from realizer.core.errors import TableError
 from realizer.tables import AuToFap
 from realizer.tables.mappings import FORMS, read_mapping, write_mapping
+from tests.rows import each_row
 
 # Paul 2010, figure 5.2.
 FIGURE = """
@@ -82,9 +83,7 @@ def test_read_mapping_without_a_side_assigns_faps_to_their_sides(tmp_path: Path)
     }
 
 
-@pytest.mark.parametrize(
-    "row", [row for row in tables.faps()[2:] if row.mirror != row.fap], ids=lambda r: r.name
-)
+@each_row("row", [row for row in tables.faps()[2:] if row.mirror != row.fap])
 def test_read_mapping_gives_a_mirrored_fap_one_side(tmp_path: Path, row: tables.Fap) -> None:
     units = read_mapping(written(tmp_path, f"12\n{row.fap} 0 1 0 9\n{row.mirror} 0 1 0 9\n"))
     assert {len(unit) for unit in units.values()} == {1}

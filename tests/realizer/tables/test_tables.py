@@ -12,6 +12,7 @@ import pytest
 from realizer import tables
 from realizer.core.errors import TableError
 from realizer.tables import lexemes, timing
+from tests.rows import each_row
 
 FAPS = {row.fap: row for row in tables.faps()}
 AUS = tables.by_number()
@@ -32,9 +33,7 @@ def at_one(au: int, side: str, fap: int) -> float:
     return sum(points[-1][1] for key, points in polylines().items() if key == (au, side, fap))
 
 
-@pytest.mark.parametrize(
-    "name", [f.name for f in files(tables).iterdir() if f.name.endswith((".csv", ".toml"))]
-)
+@each_row("name", [f.name for f in files(tables).iterdir() if f.name.endswith((".csv", ".toml"))])
 def test_tables_name_source_units_and_licence(name: str) -> None:
     tables._check_head(tables.text_of(name), name)
 
@@ -125,8 +124,8 @@ def test_au_to_fap_closes_the_lids_exactly(au: int, side: str, upper: int, lower
     assert at_one(au, side, upper) + at_one(au, side, lower) == 1024
 
 
-@pytest.mark.parametrize(
-    ("au", "side", "fap", "sign"),
+@each_row(
+    "au, side, fap, sign",
     [
         (1, "L", 31, 1),
         (2, "L", 35, 1),

@@ -10,12 +10,13 @@ from realizer.behaviours.registry import VOCABULARY
 from realizer.core.errors import TableError
 from realizer.tables.templates import templates
 from realizer.tables.timing import Gaps, all_gaps, gaps
+from tests.rows import each_row
 
 ROWS = all_gaps()
 MEASURED = re.compile(r"Wojdel 2005 table 6\.4, template (\w+) \(?.*?(\d+) frames, sigma (\d+)")
 
 
-@pytest.mark.parametrize("name", ROWS)
+@each_row("name", ROWS)
 def test_gaps_have_the_points_of_the_element(name: str) -> None:
     row: Gaps = ROWS[name]
     element = name.partition(".")[0]

@@ -13,6 +13,7 @@ from realizer.animation.fap.fap_clip import FAPClip
 from realizer.animation.fap.fap_reader import read_fap
 from realizer.animation.frames import FAPFrames
 from realizer.core.errors import RealizerError
+from tests.rows import each_row
 
 JAW, LIP = 3, 4
 
@@ -112,7 +113,7 @@ ODD = {
 }
 
 
-@pytest.mark.parametrize("case", ODD)
+@each_row("case", ODD)
 def test_read_fap_tolerates(case):
     text, wanted, note = ODD[case]
     got = read_fap(text)

@@ -14,6 +14,7 @@ from realizer.facebuild.arkit.importer import Report, import_head
 from realizer.facebuild.au.measure import read_shapes
 from realizer.facebuild.check import check_face
 from realizer.tables import Fap, faps
+from tests.rows import each_row
 
 pytestmark = pytest.mark.xdist_group("fits")
 
@@ -51,9 +52,7 @@ def test_import_head_measures_action_units(brought: tuple[Face, Report], place: 
 LINEAR = [row for row in faps()[2:] if row.direction in ("up", "down", "left", "right")]
 
 
-@pytest.mark.parametrize(
-    "row", [row for row in LINEAR if row.unit != "angle_unit"], ids=lambda row: str(row.fap)
-)
+@each_row("row", [row for row in LINEAR if row.unit != "angle_unit"])
 def test_import_head_keeps_the_movement_of_every_point(brought: tuple[Face, Report], row: Fap) -> None:
     asked = np.zeros((1, 68), np.float32)
     asked[0, row.fap - 1] = 150

@@ -13,6 +13,7 @@ from realizer.protocol.messages.parse import SUPPORTED, parse_control
 from realizer.protocol.messages.replies import ErrorMessage
 from realizer.protocol.messages.requests import Subscribe
 from tests.protocol import REQUESTS, asyncapi
+from tests.rows import each_row
 
 DOCUMENT = asyncapi()
 
@@ -53,7 +54,7 @@ def test_places_include_nested_numbers() -> None:
     assert {"speech.words.0.start", "set.emotion.angle", "speech.close", "hello.seen"} <= found
 
 
-@pytest.mark.parametrize(("where", "kind", "make"), PLACES, ids=[where for where, _, _ in PLACES])
+@each_row("where, kind, make", PLACES)
 def test_message_refuses_values_that_only_look_like_numbers(where, kind, make) -> None:
     name, field, *_ = where.split(".")
     (example, *_) = DOCUMENT["components"]["schemas"][REQUESTS[name].__name__]["examples"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -10,6 +9,7 @@ from realizer.protocol.messages.parse import SUPPORTED, parse_control
 from realizer.protocol.messages.replies import ErrorMessage
 from realizer.protocol.messages.requests import Ping
 from tests.protocol import asyncapi
+from tests.rows import each_row
 
 DOCUMENT = asyncapi()
 
@@ -29,8 +29,8 @@ def test_parse_control_accepts_every_type() -> None:
         assert message.type == kind
 
 
-@pytest.mark.parametrize(
-    ("text", "code", "where", "says"),
+@each_row(
+    "text, code, where, says",
     [
         ("{", "bad-json", None, "JSON object"),
         ("{" * 100_000, "bad-json", None, "JSON object"),

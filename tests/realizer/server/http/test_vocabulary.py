@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import json
 
-import pytest
-
 from bml_schema.node_schema import local
 from realizer.behaviours.registry import VOCABULARY
 from realizer.server.http.vocabulary import vocabulary
+from tests.rows import each_row
 
 ALL = json.loads(vocabulary())
 ELEMENTS = {element["name"]: element for element in ALL["elements"]}
 
 
-@pytest.mark.parametrize("tag", VOCABULARY)
+@each_row("tag", VOCABULARY)
 def test_vocabulary_has_every_behaviour_as_child_of_a_block(tag: str) -> None:
     name = local(tag)
     assert ELEMENTS[name]["namespace"] == tag[1:].partition("}")[0]

@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer.server.transports.document_framing import DocumentFramer, Fault
+from tests.rows import each_row
 
 LIMIT = 300
 NOD = '<bml id="b"><head id="n" lexeme="NOD"/></bml>'
@@ -42,9 +43,9 @@ BETWEEN = {
 }
 
 
-@pytest.mark.parametrize("document", WHOLE.values(), ids=WHOLE)
-@pytest.mark.parametrize("between", BETWEEN.values(), ids=BETWEEN)
-@pytest.mark.parametrize("step", [None, 1, 7])
+@each_row("document", WHOLE.values())
+@each_row("between", BETWEEN.values())
+@each_row("step", [None, 1, 7])
 def test_framer_returns_documents_as_they_were_sent(document: str, between: str, step: int | None) -> None:
     stream = between + document + between + document + "\n"
     assert assemble(stream, step=step) == [document, document]
@@ -70,8 +71,8 @@ BROKEN = {
 }
 
 
-@pytest.mark.parametrize("step", [None, 1, 5])
-@pytest.mark.parametrize(("stretch", "says"), BROKEN.values(), ids=BROKEN)
+@each_row("step", [None, 1, 5])
+@each_row("stretch, says", BROKEN.values())
 def test_framer_reports_a_broken_span_once_and_goes_on(
     stretch: str | bytes, says: str, step: int | None
 ) -> None:

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from realizer.server.transports.xface.reader import Fault, TaskReader
 from realizer.server.transports.xface.wire import Task
+from tests.rows import each_row
 
 LIMIT = 2000
 STOP = Task("STOP_PLAYBACK", 1, 9)
@@ -69,8 +70,8 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize(("data", "says"), BAD.values(), ids=BAD)
-@pytest.mark.parametrize("cut", [1, 7, 10_000])
+@each_row("data, says", BAD.values())
+@each_row("cut", [1, 7, 10_000])
 def test_reader_reports_one_fault_and_reads_the_next_task(data: bytes, says: str, cut: int) -> None:
     fault, *rest = found(data + b"\0" + NEXT, cut)
     assert isinstance(fault, Fault)
