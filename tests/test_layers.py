@@ -14,6 +14,9 @@ import pytest
 import bml_schema
 import realizer
 
+# Processes of pytest-xdist would each parse all modules.
+pytestmark = pytest.mark.xdist_group("layers")
+
 ROOTS = {"bml_schema": Path(bml_schema.__path__[0]), "realizer": Path(realizer.__path__[0])}
 
 # Each package may import itself and those to its left.

@@ -8,7 +8,7 @@ from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree
 
@@ -22,6 +22,7 @@ from realizer.core.options import PlayOptions
 from realizer.pipeline import plan
 from realizer.playback.player import Player
 from realizer.speech.silent import SilentVoice
+from tests.example_counts import examples
 from tests.rows import each_row
 
 DOCUMENTS = Path(__file__).parents[2] / "dialect_documents"
@@ -275,7 +276,7 @@ def test_translate_knows_every_behaviour_of_the_table() -> None:
     assert {"head", "gaze", "face", "speech"} <= {local(tag) for tag in VOCABULARY}
 
 
-@settings(max_examples=150)
+@examples(2)
 @given(st.data())
 def test_translate_of_mutated_documents_gives_blocks_that_can_be_written(data: st.DataObject) -> None:
     text = data.draw(

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,8 @@ from realizer.batch.task import Options, Task
 from realizer.batch.worker import Outcome, Worker
 from realizer.core.errors import RealizerError
 
-pytest.importorskip("distributed")
+# It is not imported here: every process of pytest-xdist would.
+pytestmark = pytest.mark.skipif(find_spec("distributed") is None, reason="needs the cluster extra")
 
 
 def start(*arguments: str) -> subprocess.Popen[str]:

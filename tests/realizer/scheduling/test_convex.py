@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer.scheduling.convex import Quadratic, active_set, feasible_start, optimum
+from tests.example_counts import examples
 
 NODES = 7
 nodes = st.integers(0, NODES - 1)
@@ -28,7 +29,7 @@ def quadratics(draw: st.DrawFn) -> Quadratic:
     return Quadratic(NODES, i, j, wanted, stiffness, u, v, w, np.zeros(NODES, np.intp))
 
 
-@settings(max_examples=100)
+@examples(1.5)
 @given(quadratics())
 def test_active_set_finds_the_optimum_of_the_interior_point_method(quadratic: Quadratic) -> None:
     start = np.zeros(NODES)

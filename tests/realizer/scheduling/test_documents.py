@@ -109,7 +109,6 @@ def check_same(one: Schedule, other: Schedule) -> None:
         np.testing.assert_allclose(one.times[name], other.times[name], atol=1e-6, rtol=0)
 
 
-@settings(max_examples=60)
 @given(documents())
 def test_schedule_block_leaves_no_trace_of_dropped_parts(document: Document) -> None:
     """The rest has the same times as in a document without the dropped parts."""
@@ -123,7 +122,6 @@ def test_schedule_block_leaves_no_trace_of_dropped_parts(document: Document) -> 
     assert again.cost == pytest.approx(found.cost, abs=1e-6)
 
 
-@settings(max_examples=60)
 @given(possible(), st.randoms(use_true_random=False))
 def test_schedule_block_does_not_depend_on_the_order_of_elements(document: Document, chance: Random) -> None:
     found = document.schedule()

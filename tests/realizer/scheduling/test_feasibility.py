@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer import schedule
@@ -10,6 +10,7 @@ from realizer.scheduling.explain import choose, in_words
 from realizer.scheduling.feasibility import ConstraintNetwork, Edge, conflicts_of
 from realizer.scheduling.problem import ORIGIN, Problem
 from realizer.scheduling.solve import Solution, solve
+from tests.example_counts import examples
 from tests.realizer.scheduling.recipes import Body, Recipe, built, possible, wild
 
 ONE = Body([1.0], 0.2, 1.0, False, None)
@@ -31,14 +32,14 @@ def test_conflicts_of_a_possible_problem_are_none(recipe: Recipe) -> None:
     assert conflicts_of(built(recipe)) == []
 
 
-@settings(max_examples=200)
+@examples(3)
 @given(wild)
 def test_conflicts_of_are_found_iff_there_is_no_solution(recipe: Recipe) -> None:
     problem = built(recipe)
     assert bool(conflicts_of(problem)) is not isinstance(solve(problem), Solution)
 
 
-@settings(max_examples=200)
+@examples(3)
 @given(wild)
 def test_conflicts_of_leave_nothing_in_conflict(recipe: Recipe) -> None:
     problem = with_own_parts(recipe)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from scipy.optimize import linprog
 
 from realizer.core.array_types import Float64
@@ -13,6 +13,7 @@ from realizer.scheduling.conflict import Conflict, LengthBound
 from realizer.scheduling.explain import in_words
 from realizer.scheduling.problem import ORIGIN, Problem, Relation
 from realizer.scheduling.solve import Solution, solve
+from tests.example_counts import examples
 from tests.realizer.scheduling.recipes import Recipe, built, lasting, schedule, spans, wild
 
 # (u, v, seconds): time[v] >= time[u] + seconds.
@@ -64,7 +65,7 @@ def clashes_of(recipe: Recipe) -> tuple[Problem, list[Conflict]]:
     return problem, [] if isinstance(found, Solution) else found
 
 
-@settings(max_examples=90)
+@examples(1.5)
 @given(wild)
 def test_minimal_cycles_can_hold_without_any_one_statement(recipe: Recipe) -> None:
     problem, clashes = clashes_of(recipe)
@@ -98,7 +99,7 @@ def ways(problem: Problem) -> Float64:
     return found
 
 
-@settings(max_examples=100)
+@examples(1.5)
 @given(wild)
 def test_minimal_cycles_have_the_fewest_statements_at_their_points(recipe: Recipe) -> None:
     # A length that the document states takes precedence over least gaps, so these never conflict.

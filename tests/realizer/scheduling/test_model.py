@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from realizer.scheduling.model import Model, model_of
 from realizer.scheduling.problem import ORIGIN
@@ -43,7 +43,6 @@ def test_points_of_chosen_behaviours() -> None:
     assert found.points_of(np.array([False, True, False])).tolist() == [4, 5, 6]
 
 
-@settings(max_examples=60)
 @given(possible())
 def test_model_of_a_problem_that_can_be_solved_keeps_it(recipe: Recipe) -> None:
     problem, found = built(recipe), model(recipe)

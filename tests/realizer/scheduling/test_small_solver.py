@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 
 from realizer.scheduling import solve as solver
 from realizer.scheduling.problem import ORIGIN
 from realizer.scheduling.small_solver import solve_small
+from tests.example_counts import examples
 from tests.realizer.scheduling.recipes import Body, Recipe, built, possible, tenths, wild
 
 FREE = Body([1.0, 1.0], 0.1, 1.0, False, None)
@@ -22,7 +23,7 @@ def in_arrays(recipe: Recipe, earliest: float = 0.0) -> solver.Solution:
     return found
 
 
-@settings(max_examples=200)
+@examples(3)
 @given(possible() | wild, tenths)
 def test_solve_small_agrees_with_the_solver_in_arrays(recipe: Recipe, earliest: float) -> None:
     recipe = recipe._replace(orders=[])

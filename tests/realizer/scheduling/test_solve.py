@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from hypothesis import assume, example, given, settings
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from scipy.linalg import null_space
 from scipy.optimize import linprog, minimize
@@ -11,6 +11,7 @@ from scipy.optimize import linprog, minimize
 from realizer.core.array_types import Float64
 from realizer.scheduling.problem import Part, Problem, Relation
 from realizer.scheduling.solve import Solution, solve
+from tests.example_counts import examples
 from tests.realizer.scheduling.recipes import (
     MOST_BODIES,
     Body,
@@ -85,7 +86,7 @@ def by_scipy(problem: Problem) -> Float64 | None:
     return early.x if early.status == 0 else None
 
 
-@settings(max_examples=80)
+@examples(1.5)
 @given(possible())
 def test_solve_agrees_with_a_slow_general_solver(recipe: Recipe) -> None:
     problem = built(recipe)
@@ -98,7 +99,7 @@ def test_solve_agrees_with_a_slow_general_solver(recipe: Recipe) -> None:
     np.testing.assert_allclose(found.time, reference, atol=3e-3)
 
 
-@settings(max_examples=120)
+@examples(2)
 @given(wild)
 def test_solve_finds_a_conflict_iff_a_linear_program_is_infeasible(recipe: Recipe) -> None:
     # No least gaps: a stated length takes precedence over them, which a linear program does not know.
@@ -109,7 +110,7 @@ def test_solve_finds_a_conflict_iff_a_linear_program_is_infeasible(recipe: Recip
     assert isinstance(solve(problem), Solution) == (there_are.status == 0)
 
 
-@settings(max_examples=200)
+@examples(3)
 @given(anything, st.sampled_from([0.0, 0.5]))
 def test_solve_keeps_everything_exactly(recipe: Recipe, earliest: float) -> None:
     problem = built(recipe, earliest=earliest)
@@ -169,7 +170,7 @@ def check_any_order(recipe: Recipe, everyone: list[int]) -> None:
             )
 
 
-@settings(max_examples=180)
+@examples(3)
 @given(anything, st.permutations(range(MOST_BODIES)))
 @example(CLOSED, [2, 0, 1, 3, 4, 5])
 @example(JOINED, [2, 1, 0, 3, 4, 5])
@@ -178,7 +179,7 @@ def test_solve_does_not_depend_on_document_order(recipe: Recipe, everyone: list[
     check_any_order(recipe, everyone)
 
 
-@settings(max_examples=100)
+@examples(1.5)
 @given(possible(stiffness=(1e-3, 1.0, 1e3)), st.permutations(range(MOST_BODIES)))
 def test_solve_does_not_depend_on_order_with_very_different_stiffness(
     recipe: Recipe, everyone: list[int]
@@ -186,7 +187,7 @@ def test_solve_does_not_depend_on_order_with_very_different_stiffness(
     check_any_order(recipe, everyone)
 
 
-@settings(max_examples=100)
+@examples(1.5)
 @given(possible(), st.sampled_from([0.0, 0.5]), st.integers(-50, 1000).map(lambda k: k / 10))
 def test_solve_moves_everything_with_fixed_times(recipe: Recipe, earliest: float, late: float) -> None:
     problem = built(recipe, earliest=earliest)
@@ -197,7 +198,7 @@ def test_solve_moves_everything_with_fixed_times(recipe: Recipe, earliest: float
     np.testing.assert_allclose(moved[1:], time[1:] + late, atol=1e-6, rtol=0)
 
 
-@settings(max_examples=120)
+@examples(2)
 @given(anything)
 def test_solve_has_no_cheaper_feasible_neighbour(recipe: Recipe) -> None:
     problem = built(recipe)
@@ -214,7 +215,7 @@ def test_solve_has_no_cheaper_feasible_neighbour(recipe: Recipe) -> None:
     assert nudge.fun > -1e-5 * step
 
 
-@settings(max_examples=120)
+@examples(2)
 @given(anything)
 def test_solve_starts_free_behaviours_as_early_as_possible(recipe: Recipe) -> None:
     problem = built(recipe)
@@ -248,7 +249,7 @@ def test_solve_gives_a_lone_behaviour_its_preferred_gaps(
     np.testing.assert_allclose(np.diff(time[1:]), gaps, atol=1e-12)
 
 
-@settings(max_examples=100)
+@examples(1.5)
 @given(anything, spots, spots, tenths)
 @example(Recipe([Body([1.0], 0.0, 1.0, False, None)], [], [], []), (0, 0), (0, 1), 0.0)
 def test_solve_ignores_a_constraint_that_already_holds(recipe: Recipe, u: Spot, v: Spot, less: float) -> None:
@@ -270,7 +271,7 @@ def test_solve_ignores_a_constraint_that_already_holds(recipe: Recipe, u: Spot, 
         np.testing.assert_allclose(again.time, found.time, atol=1e-6, rtol=0)
 
 
-@settings(max_examples=80)
+@examples(1.5)
 @given(wild)
 def test_solve_is_feasible_after_dropping_behaviours(recipe: Recipe) -> None:
     problem = built(recipe)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from bml_schema import Block, parse
 from realizer.scheduling import Member, Schedule, Timing, schedule_block, schedule_together
+from tests.example_counts import examples
 
 FACE = ("start", "attackPeak", "relax", "end")
 
@@ -85,7 +86,7 @@ def same(one: Schedule, other: Schedule) -> None:
         np.testing.assert_allclose(one.times[name], other.times[name], atol=1e-6, rtol=0)
 
 
-@settings(max_examples=80)
+@examples(1.5)
 @given(tied, st.integers(0, 30).map(lambda k: k / 10), st.integers(1, 30).map(lambda k: k / 10))
 def test_schedule_together_keeps_the_past_and_moves_the_future_after_now(
     faces: Faces, late: float, length: float
@@ -115,7 +116,6 @@ def test_schedule_together_keeps_the_past_and_moves_the_future_after_now(
         assert found[1].at(last, "end") - late == pytest.approx(found[0].at("w", "end"), abs=1e-6)
 
 
-@settings(max_examples=60)
 @given(tied, tied, st.integers(0, 20).map(lambda k: k / 10))
 def test_schedule_together_of_unrelated_blocks_is_as_alone(one: Faces, other: Faces, late: float) -> None:
     a, b = drawn("a", one), drawn("b", other)
