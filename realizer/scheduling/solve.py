@@ -126,7 +126,6 @@ def _slide(model: Model, clusters: RigidClusters) -> Float64:
     ground = len(model.first)
     free = ~clusters.held
     level = np.where(free, _earliest(model, clusters), 0.0)
-    level[np.isneginf(level)] = 0.0
     orders = model.problem.orders
     if orders:
         edges = [
