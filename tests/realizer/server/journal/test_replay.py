@@ -259,11 +259,13 @@ async def two_that_share(where: str) -> AsyncIterator[tuple[Server, Server]]:
         yield one, other
 
 
-async def held(client: ClientConnection) -> float:
-    """Return the value of AU 12L."""
-    await client.send('{"type": "state"}')
-    layers = json.loads(await client.recv())["characters"][0]["layers"]
-    return float(layers.get("direct", {"aus": {}})["aus"].get("12L", 0.0))
+async def smiles(client: ClientConnection) -> None:
+    """Wait until AU 12L has risen to 0.5."""
+    value = 0.0
+    while value < 0.5:
+        await client.send('{"type": "state"}')
+        layers = json.loads(await client.recv())["characters"][0]["layers"]
+        value = layers.get("direct", {"aus": {}})["aus"].get("12L", 0.0)
 
 
 def test_restored_session_is_unchanged_by_connections_that_still_leave(
@@ -282,10 +284,9 @@ def test_restored_session_is_unchanged_by_connections_that_still_leave(
                 await second.send('{"type": "set", "aus": {"12L": 0.5}}')
                 while not one._sessions._registry.sessions["deaf"].closed:
                     await asyncio.sleep(0)
-                while await held(second) < 0.5:
-                    pass
+                await smiles(second)
             async with connect(f"{one.url}?session=deaf") as back:
-                assert await held(back) == 0.5
+                await smiles(back)
             deaf.transport.resume_reading()
 
     asyncio.run(run())
@@ -306,16 +307,14 @@ def test_restored_session_disconnects_viewers_of_the_old_process(
             await read_feedback(watching, "b:end")
             async with connect(f"{other.url}?session=seen") as second:
                 await second.send('{"type": "set", "aus": {"12L": 0.5}}')
-                while await held(second) < 0.5:  # before the first process takes the session back
-                    pass
+                await smiles(second)  # before the first process takes the session back
                 with pytest.raises(ConnectionClosed) as closed:
                     await drained(watching)  # without a message to the first process
             assert closed.value.rcvd is not None
             assert closed.value.rcvd.code == 1012
             assert "seen" in closed.value.rcvd.reason
             async with connect(f"{one.url}?session=seen") as back:  # to the process that had lost it
-                while await held(back) < 0.5:
-                    pass
+                await smiles(back)
             await stays.send(NEXT)
             await read_feedback(stays, "b:end")
 
