@@ -37,8 +37,9 @@ def test_quoted_shows_numbers_bare_and_words_quoted(value: str, said: str) -> No
     assert quoted(value) == said
 
 
-def test_quoted_cuts_a_long_value() -> None:
-    assert len(quoted("x" * 1000)) < 80
+def test_quoted_cuts_a_value_of_more_than_60_characters() -> None:
+    assert quoted("x" * 60) == f'"{"x" * 60}"'
+    assert quoted("x" * 61) == quoted("x" * 1000) == f'"{"x" * 60}..."'
 
 
 def test_did_you_mean_suggests_a_near_name() -> None:

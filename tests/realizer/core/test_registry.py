@@ -71,9 +71,10 @@ def test_registry_imports_a_plugin_when_it_is_used(installed):
         (f"{MODULE}:NUMBER", "NUMBER = ", "cannot be imported: SyntaxError"),
         (f"{MODULE}:NAME", "NUMBER = 7", "cannot be imported: AttributeError"),
         (f"{MODULE}:NUMBER", "NUMBER = 'seven'", "cannot be used: wanted a number, got 'seven'"),
+        (f"{MODULE}:NUMBER", "NUMBER = 'x' * 58", f"cannot be used: wanted a number, got '{'x' * 58}'"),
         (
             f"{MODULE}:NUMBER",
-            "NUMBER = 'x' * 99",
+            "NUMBER = 'x' * 59",
             "cannot be used: wanted a number, got an object of the type str",
         ),
         (
@@ -82,7 +83,16 @@ def test_registry_imports_a_plugin_when_it_is_used(installed):
             "cannot be used: wanted a number, got a tuple of int, str",
         ),
     ],
-    ids=["no module", "fails", "no Python", "no attribute", "another kind", "a long value", "a long tuple"],
+    ids=[
+        "no module",
+        "fails",
+        "no Python",
+        "no attribute",
+        "another kind",
+        "60 characters",
+        "61 characters",
+        "a tuple",
+    ],
 )
 def test_registry_leaves_out_a_broken_plugin(installed, caplog, value, code, says):
     installed({"bad": value}, code)
