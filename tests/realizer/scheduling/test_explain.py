@@ -54,6 +54,13 @@ def test_warning_of_gives_the_reason(others: list[Part], reason: str) -> None:
     assert warning.text.endswith(f"a was dropped {reason}")
 
 
+def test_in_words_of_a_long_chain_counts_what_it_leaves_out() -> None:
+    text = in_words(conflict(*(behaviour(f"n{k}") for k in range(40))))
+    assert [k for k in range(40) if f"n{k}:start" in text] == list(range(29))
+    assert text.endswith("n28:start = 1 and 11 more such things cannot all hold")
+    assert "more" not in in_words(conflict(*(behaviour(f"n{k}") for k in range(30))))
+
+
 def test_warning_of_names_a_constraint_with_its_id() -> None:
     constraint = Part("c", "c", line=4, is_constraint=True)
     text = warning_of(conflict(constraint), constraint).text

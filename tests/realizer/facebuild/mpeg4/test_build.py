@@ -14,6 +14,7 @@ from realizer.face.load import folder_of, load_face
 from realizer.face.model import Face
 from realizer.facebuild.check import check_face
 from realizer.facebuild.mpeg4.build import apply_zones, copy_with_zones, setup_of, with_brows
+from realizer.facebuild.mpeg4.faceeditor import write_faceeditor
 from realizer.facebuild.mpeg4.parameters import write_setup
 from tests.fap_scores import mean_score, score_faps
 
@@ -114,12 +115,17 @@ def test_apply_zones_refuses_a_fap_without_a_zone(tmp_path: Path) -> None:
 
 def test_zones_command_makes_another_face(tmp_path: Path) -> None:
     folder = tmp_path / "zoe"
-    ran = CliRunner().invoke(faces, ["zones", "default", "-o", str(folder), "--fap", "31", "--fap", "32"])
+    some, xml = ["--fap", "31", "--fap", "32"], tmp_path / "zones.xml"
+    ran = CliRunner().invoke(faces, ["zones", "default", "-o", str(folder), *some, "--xml", str(xml)])
     assert ran.exit_code == 0, ran.output
     assert face_of(folder).name == "zoe"
     assert (folder / "mpeg4.toml").is_file()
     assert check_face("zoe", tmp_path) == ()
-    assert ran.output == f"{folder}: 2 zones\n"
+    assert ran.stdout == f"{folder}: 2 zones\n"
+    lost = write_faceeditor(tmp_path / "again.xml", setup_of(folder))
+    assert lost
+    assert ran.stderr.splitlines() == [f"{xml}: {line}" for line in lost]
+    assert xml.is_file()
 
 
 def test_with_brows_moves_what_grows_on_the_skin() -> None:
