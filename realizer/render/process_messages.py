@@ -53,7 +53,7 @@ class Pixels:
     @staticmethod
     def create(slots: int, size: tuple[int, int], channels: int = 3) -> IO[bytes]:
         """Return a new file of the right length, in memory if the system has such a folder."""
-        file = tempfile.TemporaryFile(dir="/dev/shm" if os.access("/dev/shm", os.W_OK) else None)
+        file = tempfile.TemporaryFile(dir="/dev/shm" if os.access("/dev/shm", os.W_OK) else None)  # noqa: SIM115
         file.truncate(slots * size[0] * size[1] * channels)
         return file
 
