@@ -1,7 +1,7 @@
 """Scores of a face's 127 FAP displacements against the MPEG-4 definitions.
 
-Paul 2010 (4.4) scored displacements by eye: 3 as it should look, 2 slightly odd, 1 only its place can be
-told, 0 nothing. Here rules give the score, so that it can be repeated.
+Paul 2010 (4.4) scored displacements by eye: 3 as it should look, 2 slightly odd, 1 only its place is
+right, 0 nothing. Here rules give the score, so that it can be repeated.
 """
 
 from __future__ import annotations

@@ -243,8 +243,8 @@ def _answered(desk: TaskRunner, answers: list[Answer], now: float) -> None:
                 if isinstance(item, Block):
                     refused = WarningFeedback(id=item.id, type="IMPOSSIBLE_TO_SCHEDULE", text="no")
                     start = BlockProgress(id=f"{item.id}:start", global_time=now)
-                    told = refused if len(item.id) % 2 else start
-                    _answered(desk, list(desk.on_feedback(told.to_xml(), now)), now)
+                    reply = refused if len(item.id) % 2 else start
+                    _answered(desk, list(desk.on_feedback(reply.to_xml(), now)), now)
         else:
             assert isinstance(answer, Disconnect)
 
@@ -293,14 +293,14 @@ def _change(message: dict[str, object], random: Random) -> None:
 
 def _sent(session: Session) -> str:
     """Return all readable messages to a client."""
-    told = [effect.data for effect in session.take_effects() if isinstance(effect, Send)]
-    for data in told:
+    messages = [effect.data for effect in session.take_effects() if isinstance(effect, Send)]
+    for data in messages:
         if isinstance(data, str) and data.startswith("<"):
             assert "internal error" not in data, data
             parse_feedback(data)
         elif isinstance(data, str):
             json.loads(data)
-    return "\n".join(data for data in told if isinstance(data, str))
+    return "\n".join(data for data in messages if isinstance(data, str))
 
 
 # sessions ---------------------------------------------------------------------------------------
@@ -334,7 +334,7 @@ def main() -> int:
     arguments = parser.parse_args()
     done: Counter[str] = Counter()
     failed = 0
-    told = end = time.process_time()
+    printed = end = time.process_time()
     end += 60 * arguments.minutes
     for seed in itertools.count(arguments.seed):
         for target in arguments.only:
@@ -344,8 +344,8 @@ def main() -> int:
                 traceback.print_exc()
                 failed += 1
             done[target] += 1
-        if (now := time.process_time()) >= end or now >= told + 20:
-            told = now
+        if (now := time.process_time()) >= end or now >= printed + 20:
+            printed = now
             print(f"seeds {arguments.seed}..{seed}: {dict(done)}, {failed} failed", flush=True)
         if now >= end:
             break

@@ -176,7 +176,7 @@ class Interleaving:
         self._broken = mutants(documents, 10**9, seed) if documents else None
         self._views: dict[int, View] = {}
         self._count = 0
-        self._told: defaultdict[Session, dict[int, str]] = defaultdict(dict)
+        self._sent: defaultdict[Session, dict[int, str]] = defaultdict(dict)
         self._speaks: list[tuple[Session, Speak]] = []
         self._draws: list[tuple[Session, Draw]] = []
 
@@ -343,9 +343,9 @@ class Interleaving:
             frame = unpack(data)
             assert frame.time >= 0
         elif data.startswith("{"):
-            told = json.loads(data)
-            if told["type"] == "welcome":
-                self._welcomed(view, told["session"], told["seq"])
+            control = json.loads(data)
+            if control["type"] == "welcome":
+                self._welcomed(view, control["session"], control["seq"])
         else:
             seq = parse_feedback(data).seq
             assert "internal error" not in data, data
@@ -356,7 +356,7 @@ class Interleaving:
             follows = seq == view.last + 1 if view.whole else seq > view.last
             assert follows, f"{connection} in {view.session.id} got {seq} after {view.last}: {data}"
             view.last = seq
-            assert self._told[view.session].setdefault(seq, data) == data, "one number, one message"
+            assert self._sent[view.session].setdefault(seq, data) == data, "one number, one message"
 
     def _welcomed(self, view: View, name: str, newest: int) -> None:
         """What follows is what came after `seen`; after a gap it is all there is."""
@@ -370,7 +370,7 @@ class Interleaving:
     # the end -----------------------------------------------------------------------------------
 
     def _end(self) -> None:
-        """Everybody stops and goes; what plays ends, and all of it is told again by the journal."""
+        """Everybody stops and goes; what plays ends, and the journal repeats all of it."""
         self._pump()
         for one in list(self._views):
             self._receive(one, '{"type":"stop"}')
@@ -402,10 +402,10 @@ class Interleaving:
         while (due := next_wake(other)) <= self.now - session.opened:
             other.tick(max(due, 0.0))
         first = max(session.feedback_log.first, other.feedback_log.first)
-        told, again = session.feedback_log.since(first), other.feedback_log.since(first)
-        for here, there in zip(told, again, strict=False):
-            assert here == there, f"told {here}, told again {there}"
-        assert len(told) == len(again), (told[len(again) :], again[len(told) :])
+        first_log, again = session.feedback_log.since(first), other.feedback_log.since(first)
+        for here, there in zip(first_log, again, strict=False):
+            assert here == there, f"sent {here}, sent again {there}"
+        assert len(first_log) == len(again), (first_log[len(again) :], again[len(first_log) :])
 
 
 def spoken(order: Speak) -> Utterance:
@@ -419,7 +419,7 @@ def spoken(order: Speak) -> Utterance:
 
 @contextmanager
 def no_error() -> Iterator[None]:
-    """Fails where an exception is logged: one that nobody was told of but those who read logs."""
+    """Fails where an exception is logged: one that only readers of the log would see."""
     found: list[str] = []
 
     class Handler(logging.Handler):

@@ -307,19 +307,19 @@ def confined(command: list[str], writable: Path, environment: Mapping[str, str])
 @pytest.mark.slow
 def test_service_works_on_a_read_only_disk(installed: Path) -> None:
     async def test(url: str) -> list[str]:
-        streams, told = set(), []
+        streams, texts = set(), []
         async with asyncio.timeout(LIMIT), connect(url, max_size=None) as client:
             for asked in ({"stream": "video", "fps": 2, "size": [64, 64]}, {"stream": "audio"}):
                 await client.send(json.dumps({"type": "subscribe", **asked}))
             await client.send('<bml id="b"><speech id="s"><text>Hello</text></speech></bml>')
-            while not ({3, 4} <= streams and any('id="b:end"' in text for text in told)):
+            while not ({3, 4} <= streams and any('id="b:end"' in text for text in texts)):
                 message = await client.recv()
                 if isinstance(message, bytes):
                     streams.add(message[0])
                 else:
                     assert '"error"' not in message
-                    told.append(message)
-        return told
+                    texts.append(message)
+        return texts
 
     health = re.search(r'CMD \["python3", (".*")\]', DOCKERFILE)
     assert health is not None

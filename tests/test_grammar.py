@@ -63,19 +63,19 @@ def feedback_of(text: str) -> tuple[Block, Schedule, list[Feedback]]:
 
 
 def test_check_feedback_accepts_sound_feedback() -> None:
-    well_told(*feedback_of(SOUND), calm=True)
+    well_reported(*feedback_of(SOUND), calm=True)
 
 
 def test_check_feedback_notices_missing_repeated_and_late_messages() -> None:
-    block, schedule, told = feedback_of(SOUND)
-    for n, message in enumerate(told):
+    block, schedule, feedback = feedback_of(SOUND)
+    for n, message in enumerate(feedback):
         if isinstance(message, PredictionFeedback):
             continue  # there may be several, whenever the plan changes
-        rest = told[:n] + told[n + 1 :]
-        last = n + 1 == len(told)
+        rest = feedback[:n] + feedback[n + 1 :]
+        last = n + 1 == len(feedback)
         for wrong in (rest, [*rest, message, message], [message, *rest] if last else [*rest, message]):
             with pytest.raises(AssertionError):
-                well_told(block, schedule, wrong, calm=True)
+                well_reported(block, schedule, wrong, calm=True)
 
 
 def plays(text: str) -> None:
@@ -83,7 +83,7 @@ def plays(text: str) -> None:
     player = Player(PlayOptions(idle=False))
     blocks: list[Block] = []
     schedules: list[Schedule] = []
-    told: list[Feedback] = []
+    feedback: list[Feedback] = []
     now = 0.0
     for item in read(text, VOCABULARY):
         assert isinstance(item, Block), item
@@ -92,7 +92,7 @@ def plays(text: str) -> None:
             item.problems
         )
         assert list(read(write(item), VOCABULARY)) == [item], "written back, it means the same"
-        told += run(player, now)
+        feedback += run(player, now)
         blocks.append(item)
         schedules.append(submit_with_speech(player, item, SilentVoice(), now))
         now += APART
@@ -102,16 +102,16 @@ def plays(text: str) -> None:
     calm = not any(map(ends_or_withholds, blocks))
     latest = [player.latest(schedule) for schedule in schedules]
     faces(player)
-    told += run(player, LATEST)
-    done = {f.id.rpartition(":")[0] for f in told if isinstance(f, BlockProgress) and f.status == "DONE"}
+    feedback += run(player, LATEST)
+    done = {f.id.rpartition(":")[0] for f in feedback if isinstance(f, BlockProgress) and f.status == "DONE"}
     for block, planned, moved in zip(blocks, schedules, latest, strict=True):
         # A later block may have moved an earlier one, and dropped what cannot follow.
         schedule = moved if calm and block.id in done else planned
-        well_told(block, schedule, told, calm)
+        well_reported(block, schedule, feedback, calm)
         if calm:
-            well_predicted(block, told)
-    well_composed(blocks, told)
-    progress = [f.global_time for f in told if isinstance(f, BlockProgress | SyncPointProgress)]
+            well_predicted(block, feedback)
+    well_composed(blocks, feedback)
+    progress = [f.global_time for f in feedback if isinstance(f, BlockProgress | SyncPointProgress)]
     assert progress == sorted(progress)
 
 
@@ -150,12 +150,12 @@ def ends_or_withholds(block: Block) -> bool:
 
 def run(player: Player, until: float) -> list[Feedback]:
     """Return everything that is due up to `until`, from deadline to deadline."""
-    told: list[Feedback] = []
+    feedback: list[Feedback] = []
     for _ in range(10_000):
         deadline = player.next_deadline()
         if deadline is None or deadline > until:
-            return told
-        told += player.due(max(deadline, 0.0))
+            return feedback
+        feedback += player.due(max(deadline, 0.0))
     raise AssertionError("it goes on for ever")
 
 
@@ -170,13 +170,13 @@ def faces(player: Player) -> None:
         assert np.isfinite(to_fap(frames).values).all()
 
 
-def well_told(block: Block, schedule: Schedule, told: list[Feedback], calm: bool) -> None:
+def well_reported(block: Block, schedule: Schedule, feedback: list[Feedback], calm: bool) -> None:
     """Check that the feedback of one block is complete, without repetition, and in order.
 
     Args:
         calm: nothing in the text ends or withholds blocks early.
     """
-    own = [f for f in told if block.id in ids(f)]
+    own = [f for f in feedback if block.id in ids(f)]
     starts = [n for n, f in enumerate(own) if isinstance(f, BlockProgress) and f.id == f"{block.id}:start"]
     ends = [n for n, f in enumerate(own) if isinstance(f, BlockProgress) and f.id == f"{block.id}:end"]
     points = [(n, f) for n, f in enumerate(own) if isinstance(f, SyncPointProgress)]
@@ -225,12 +225,12 @@ def well_told(block: Block, schedule: Schedule, told: list[Feedback], calm: bool
     assert all(n < last for n, f in enumerate(own) if isinstance(f, WarningFeedback))
 
 
-def well_predicted(block: Block, told: list[Feedback]) -> None:
+def well_predicted(block: Block, feedback: list[Feedback]) -> None:
     """Check that the last prediction of a played block is what happened."""
     start: float | None = None
     times: dict[str, float] = {}
     happened: dict[str, float] = {}
-    for f in told:
+    for f in feedback:
         if isinstance(f, PredictionFeedback):
             start = next((b.global_start for b in f.blocks if b.id == block.id), start)
             for node in f.behaviours:
@@ -244,10 +244,10 @@ def well_predicted(block: Block, told: list[Feedback]) -> None:
         assert times[point] == pytest.approx(happened[point], abs=1e-5), point
 
 
-def well_composed(blocks: list[Block], told: list[Feedback]) -> None:
+def well_composed(blocks: list[Block], feedback: list[Feedback]) -> None:
     """Check that dependencies of APPEND, and blocks that REPLACE replaces, have ended."""
-    starts = {f.id.rpartition(":")[0]: (n, f) for n, f in enumerate(told) if started(f)}
-    ends = {f.id.rpartition(":")[0]: (n, f) for n, f in enumerate(told) if ended(f)}
+    starts = {f.id.rpartition(":")[0]: (n, f) for n, f in enumerate(feedback) if started(f)}
+    ends = {f.id.rpartition(":")[0]: (n, f) for n, f in enumerate(feedback) if ended(f)}
     first = next((b.character_id for b in blocks if b.character_id), None)
     idle: set[str] = set()  # blocks that wait for an activation, or for a block that does
     for block in blocks:

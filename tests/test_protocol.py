@@ -124,7 +124,7 @@ def test_a_table_names_every_message_stream_and_kind() -> None:
 
 
 def test_what_the_service_says_fits_the_file() -> None:
-    told: list[dict[str, Any]] = []
+    replies: list[dict[str, Any]] = []
     asked = [
         {"type": "hello", "seen": 99},
         {"type": "hello", "version": 7},
@@ -148,7 +148,7 @@ def test_what_the_service_says_fits_the_file() -> None:
     payloads |= dict.fromkeys(NUMERIC, payloads.pop("frame"))
 
     def missing() -> list[str]:
-        return sorted(payloads.keys() - {message["type"] for message in told})
+        return sorted(payloads.keys() - {message["type"] for message in replies})
 
     async def run() -> None:
         async with asyncio.timeout(LIMIT), Server(Settings(port=0, voice="silent")) as server:
@@ -160,12 +160,12 @@ def test_what_the_service_says_fits_the_file() -> None:
                 while missing():
                     text = await socket.recv()
                     if isinstance(text, str) and text.startswith("{"):
-                        told.append(json.loads(text))
+                        replies.append(json.loads(text))
 
     try:
         asyncio.run(run())
     except TimeoutError:
         pytest.fail(f"not sent within {LIMIT} s: {', '.join(missing())}; `asked` must cause each message")
-    assert {message["type"] for message in told} == payloads.keys()
-    for message in told:
+    assert {message["type"] for message in replies} == payloads.keys()
+    for message in replies:
         validator(payloads[message["type"]]).validate(message)

@@ -50,7 +50,7 @@ def scheduled(draw: st.DrawFn) -> tuple[Block, Times]:
     return block, {b.id: {p: draw(numbers) for p in points(b)} for b in chosen}
 
 
-def told(block: Block) -> dict[str, dict[str, float]]:
+def times_of(block: Block) -> dict[str, dict[str, float]]:
     """Return the times that a block states as numbers."""
     found: dict[str, dict[str, float]] = {}
     for node in block.behaviours:
@@ -76,7 +76,7 @@ def test_with_absolute_times_writes_every_time_exactly(given_: tuple[Block, Time
     assert with_absolute_times(back, times) == back, "what says its times already stays as it is"
     assert [b.id for b in result.behaviours] == [b.id for b in block.behaviours if b.id in times]
     for id, at in times.items():
-        assert {p: t for p, t in told(back)[id].items() if p in at and ":" not in p} == {
+        assert {p: t for p, t in times_of(back)[id].items() if p in at and ":" not in p} == {
             p: t for p, t in at.items() if ":" not in p
         }
 

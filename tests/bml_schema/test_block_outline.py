@@ -21,8 +21,8 @@ def test_entries_of_required_are_a_flat_list() -> None:
     found, tree = outline("<head id='a'/><required><head/><required><wait id=' c '/></required></required>")
     first, inside = tree
     assert isinstance(inside, list)
-    told = [(e.id, e.path, e.required) for e in flat([first, inside])]  # type: ignore[list-item]
-    assert told == [
+    summary = [(e.id, e.path, e.required) for e in flat([first, inside])]  # type: ignore[list-item]
+    assert summary == [
         ("a", "/bml/head[1]", False),
         ("", "/bml/required[1]/head[1]", True),
         ("c", "/bml/required[1]/required[1]/wait[1]", True),

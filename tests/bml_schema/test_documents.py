@@ -13,23 +13,23 @@ from tests.strategies import blocks
 A, B, C = '<bml id="a"/>', '<bml id="b"></bml>', '<bml id="c">\n</bml>'
 
 
-def told(text: str | bytes) -> list[str]:
+def ids_and_errors(text: str | bytes) -> list[str]:
     """Return the id of each block and the message of each error."""
     return [found.id if isinstance(found, Block) else str(found) for found in read(text)]
 
 
 def test_read_several_documents_in_order() -> None:
-    assert told(A + B + C) == ["a", "b", "c"]
+    assert ids_and_errors(A + B + C) == ["a", "b", "c"]
 
 
 def test_read_declarations_comments_and_blanks_before_documents() -> None:
     declaration = '<?xml version="1.0" encoding="UTF-8"?>'
     text = f'\ufeff \n{declaration}<!-- <bml id="no"/> -->\n{A}\n{declaration}\ufeff{B}<!---->'
-    assert told(text) == ["a", "b"]
+    assert ids_and_errors(text) == ["a", "b"]
 
 
 def test_read_an_empty_text_gives_nothing() -> None:
-    assert told("") == told(" \n\ufeff<!-- nothing -->") == []
+    assert ids_and_errors("") == ids_and_errors(" \n\ufeff<!-- nothing -->") == []
 
 
 @pytest.mark.parametrize(
@@ -58,7 +58,7 @@ def test_read_an_empty_text_gives_nothing() -> None:
     ],
 )
 def test_read_goes_on_at_the_next_bml_after_a_broken_stretch(text: str, wanted: list[str]) -> None:
-    found = told(text)
+    found = ids_and_errors(text)
     assert len(found) == len(wanted)
     assert all(f.startswith(w) for f, w in zip(found, wanted, strict=True)), found
 
@@ -164,12 +164,12 @@ def test_read_hostile_texts_gives_few_errors(text: str) -> None:
 
 def test_read_decodes_bytes_by_mark_declaration_or_as_utf8() -> None:
     text = '<bml id="ä"/>'
-    assert told(text.encode()) == ["ä"]
-    assert told(text.encode("utf-8-sig")) == ["ä"]
-    assert told(text.encode("utf-16")) == ["ä"]
+    assert ids_and_errors(text.encode()) == ["ä"]
+    assert ids_and_errors(text.encode("utf-8-sig")) == ["ä"]
+    assert ids_and_errors(text.encode("utf-16")) == ["ä"]
     declared = f'<?xml version="1.0" encoding="ISO-8859-1"?>{text}'
-    assert told(declared.encode("latin-1")) == ["ä"]
-    assert told(declared) == ["ä"]
+    assert ids_and_errors(declared.encode("latin-1")) == ["ä"]
+    assert ids_and_errors(declared) == ["ä"]
 
 
 @pytest.mark.parametrize(
@@ -187,7 +187,7 @@ def test_read_decodes_bytes_by_mark_declaration_or_as_utf8() -> None:
     ],
 )
 def test_read_undecodable_bytes_is_one_error(data: bytes, said: str) -> None:
-    assert told(data) == [said]
+    assert ids_and_errors(data) == [said]
 
 
 @pytest.mark.parametrize("bad", ["\0", "\x1b", "\ud800", "\uffff"])
@@ -201,7 +201,7 @@ def test_read_ignores_marks_inside_cdata_and_comments() -> None:
     text = (
         '<bml id="a"><speech id="s"><text><![CDATA[</bml><bml id="x">]]></text></speech><!-- </bml> --></bml>'
     )
-    assert told(text + B) == ["a", "b"]
+    assert ids_and_errors(text + B) == ["a", "b"]
     speech = parse(text)["s"]
     assert isinstance(speech, Speech)
     assert str(speech.text) == '</bml><bml id="x">'
@@ -326,14 +326,17 @@ def test_read_ignores_the_act_around_smartbodys_documents() -> None:
 
 
 def test_read_an_act_with_several_documents_and_several_acts() -> None:
-    assert told(f"<act>{A}{B}</act>") == ["a", "b"]
-    assert told(f"<act>{A}</act>\n<act><participant id='p'></participant>{B}</act>") == ["a", "b"]
-    assert told(f"<act>{A}<bml id='x'><head </bml></act>{B}")[0::2] == ["a", "b"]
+    assert ids_and_errors(f"<act>{A}{B}</act>") == ["a", "b"]
+    assert ids_and_errors(f"<act>{A}</act>\n<act><participant id='p'></participant>{B}</act>") == ["a", "b"]
+    assert ids_and_errors(f"<act>{A}<bml id='x'><head </bml></act>{B}")[0::2] == ["a", "b"]
 
 
 def test_read_reports_text_in_an_act() -> None:
-    assert told(f"<act>{A}</act>oops <active/>") == ["a", 'line 1: wanted <bml>, got "oops <active/>"']
-    assert told("<act/>") == []
+    assert ids_and_errors(f"<act>{A}</act>oops <active/>") == [
+        "a",
+        'line 1: wanted <bml>, got "oops <active/>"',
+    ]
+    assert ids_and_errors("<act/>") == []
 
 
 LONG = """<bml

@@ -51,7 +51,7 @@ def predictions(draw: st.DrawFn) -> PredictionFeedback:
         )
         for b in block.behaviours
     )
-    told = st.builds(
+    block_prediction = st.builds(
         BlockPrediction,
         id=names,
         global_start=st.none() | times,
@@ -59,7 +59,9 @@ def predictions(draw: st.DrawFn) -> PredictionFeedback:
         status=st.none() | st.just("IN_PREP"),
     )
     return PredictionFeedback(
-        character_id=draw(who), blocks=tuple(draw(st.lists(told, max_size=3))), behaviours=behaviours
+        character_id=draw(who),
+        blocks=tuple(draw(st.lists(block_prediction, max_size=3))),
+        behaviours=behaviours,
     )
 
 
@@ -78,24 +80,24 @@ feedback = st.one_of(
 
 
 @given(feedback)
-def test_parse_feedback_reads_back_every_message(told: Feedback) -> None:
-    assert parse_feedback(told.to_xml()) == told
+def test_parse_feedback_reads_back_every_message(message: Feedback) -> None:
+    assert parse_feedback(message.to_xml()) == message
 
 
 @given(feedback, st.integers(1, 10**9))
-def test_to_xml_writes_the_number_of_a_message_in_our_namespace(told: Feedback, seq: int) -> None:
-    text = told.to_xml(seq)
+def test_to_xml_writes_the_number_of_a_message_in_our_namespace(message: Feedback, seq: int) -> None:
+    text = message.to_xml(seq)
     root = etree.fromstring(text.encode())
     assert root.get(f"{{{OWN}}}seq") == str(seq)
     back = parse_feedback(text)
-    assert back == told
+    assert back == message
     assert back.seq == seq
-    assert replace(told, seq=seq).to_xml() == text
+    assert replace(message, seq=seq).to_xml() == text
 
 
 @given(feedback)
-def test_to_xml_uses_known_namespaces_and_plain_names(told: Feedback) -> None:
-    root = etree.fromstring(told.to_xml(7, 1.7e9).encode())
+def test_to_xml_uses_known_namespaces_and_plain_names(message: Feedback) -> None:
+    root = etree.fromstring(message.to_xml(7, 1.7e9).encode())
     assert str(root.tag).startswith(f"{{{CORE}}}")
     for name in root.attrib:
         known = (f"{{{OWN}}}seq", f"{{{BMLA}}}status", f"{{{BMLA}}}posixTime")
@@ -103,23 +105,23 @@ def test_to_xml_uses_known_namespaces_and_plain_names(told: Feedback) -> None:
 
 
 @given(feedback, st.integers(0, 2 * 10**9))
-def test_to_xml_writes_wall_clock_times_beside_those_of_the_session(told: Feedback, epoch: int) -> None:
-    back = parse_feedback(told.to_xml(1, epoch))
-    assert back == told
+def test_to_xml_writes_wall_clock_times_beside_those_of_the_session(message: Feedback, epoch: int) -> None:
+    back = parse_feedback(message.to_xml(1, epoch))
+    assert back == message
     if isinstance(back, BlockProgress | SyncPointProgress):
         assert back.posix_time == round((epoch + back.global_time) * 1000)
     if isinstance(back, PredictionFeedback):
         for block in back.blocks:
             for time, posix in ((block.global_start, block.posix_start), (block.global_end, block.posix_end)):
                 assert posix == (None if time is None else round((epoch + time) * 1000))
-    assert back.to_xml() == told.to_xml(1, epoch), "what was read can be passed on as it was"
+    assert back.to_xml() == message.to_xml(1, epoch), "what was read can be passed on as it was"
 
 
 def test_to_xml_shares_a_prefix_of_a_predicted_behaviour_and_a_number() -> None:
-    told = PredictionFeedback(behaviours=(Blink(id="b:x"),))
-    root = etree.fromstring(told.to_xml(4).encode())
+    message = PredictionFeedback(behaviours=(Blink(id="b:x"),))
+    root = etree.fromstring(message.to_xml(4).encode())
     assert root.get(f"{{{OWN}}}seq") == "4"
-    assert parse_feedback(told.to_xml(4)) == told
+    assert parse_feedback(message.to_xml(4)) == message
 
 
 def test_to_xml_of_block_progress_is_as_in_the_standard() -> None:
@@ -187,8 +189,10 @@ def test_prediction_of_speech_has_its_syncs_in_the_text() -> None:
 def test_prediction_of_leaves_out_keys_and_unknown_parts() -> None:
     keys = FaceInterpolator(parts="31", keys="0 1\n" * 1000)
     node = FaceKeyframe(id="k", type="FAPS", interpolator=keys, unknown_children=('<a xmlns="urn:a"/>',))
-    told = prediction_of(node, "b", {"start": 0.0, "end": 1.0})
-    assert told == FaceKeyframe(id="b:k", type="FAPS", syncs={"start": SyncRef(), "end": SyncRef(offset=1.0)})
+    message = prediction_of(node, "b", {"start": 0.0, "end": 1.0})
+    assert message == FaceKeyframe(
+        id="b:k", type="FAPS", syncs={"start": SyncRef(), "end": SyncRef(offset=1.0)}
+    )
 
 
 def test_parse_feedback_skips_unknown_children_of_a_prediction() -> None:
@@ -230,8 +234,8 @@ def test_parse_feedback_refuses_other_elements(text: str, said: str) -> None:
 
 def test_prediction_of_speech_appends_marks_of_descriptions() -> None:
     node = parse('<bml id="b"><speech id="s"><text>a <sync id="m"/> b</text></speech></bml>')["s"]
-    told = prediction_of(node, "b", {"start": 0.0, "m": 0.5, "x": 0.75, "end": 1.0})
-    text = text_of(told)
+    message = prediction_of(node, "b", {"start": 0.0, "m": 0.5, "x": 0.75, "end": 1.0})
+    text = text_of(message)
     assert text == 'a <sync id="m" ref="0.5"/> b<sync id="x" ref="0.75"/>'
     bare = parse(
         '<bml id="b"><speech id="s"><description priority="1" type="application/ssml+xml">'
@@ -250,11 +254,11 @@ def text_of(node: Behaviour) -> str:
 
 
 def test_block_progress_has_the_words_spoken_before_a_cut() -> None:
-    told = BlockProgress(id="b:end", global_time=1.0, status="INTERRUPTED", said="I think that")
-    root = etree.fromstring(told.to_xml(3).encode())
+    message = BlockProgress(id="b:end", global_time=1.0, status="INTERRUPTED", said="I think that")
+    root = etree.fromstring(message.to_xml(3).encode())
     assert root.get(f"{{{OWN}}}said") == "I think that"
     assert root.get(f"{{{OWN}}}lastWord") == "that"
-    assert parse_feedback(told.to_xml(3)) == told
+    assert parse_feedback(message.to_xml(3)) == message
     silent = parse_feedback(BlockProgress(id="b:end", global_time=1.0, said="").to_xml())
     assert (silent.said, silent.last_word) == ("", None)
 
@@ -265,5 +269,5 @@ def test_block_progress_has_the_words_spoken_before_a_cut() -> None:
     | st.integers(-(10**7), 10**7).map(lambda n: n / 2e6)
 )
 def test_to_xml_writes_times_to_the_microsecond(time: float) -> None:
-    told = BlockProgress(id="b:end", global_time=time).to_xml()
-    assert f'globalTime="{decimal(round(float(time), 6))}"' in told
+    message = BlockProgress(id="b:end", global_time=time).to_xml()
+    assert f'globalTime="{decimal(round(float(time), 6))}"' in message

@@ -107,10 +107,10 @@ def facets(attribute: Element) -> dict[str, Any]:
     assert inner is not None
     restriction = inner.find(XS + "restriction")
     assert restriction is not None
-    told: dict[str, list[str]] = {}
+    restrictions: dict[str, list[str]] = {}
     for facet in restriction:
-        told.setdefault(str(facet.tag).removeprefix(XS), []).append(facet.get("value", ""))
-    return {"base": restriction.get("base"), **told}
+        restrictions.setdefault(str(facet.tag).removeprefix(XS), []).append(facet.get("value", ""))
+    return {"base": restriction.get("base"), **restrictions}
 
 
 NODES: list[type[Any]] = [
@@ -139,14 +139,14 @@ def assert_agrees(spec: Attribute, declared: Element) -> None:
     assert spec.required == (declared.get("use") == "required"), spec.name
     default = None if spec.required or spec.default in (None, ()) else spec.value.write(spec.default)
     assert declared.get("default") == default, spec.name
-    told = facets(declared)
-    assert tuple(told.get("enumeration", ())) == spec.value.words, spec.name
+    restrictions = facets(declared)
+    assert tuple(restrictions.get("enumeration", ())) == spec.value.words, spec.name
     if spec.value.type == "boolean":
-        assert told["base"] == "xs:boolean", spec.name
+        assert restrictions["base"] == "xs:boolean", spec.name
     if spec.value.low is not None:
-        assert float(told["minInclusive"][0]) == spec.value.low, spec.name
-        assert told["maxInclusive"] == [f"{spec.value.high:.15g}"], spec.name
-        assert told["base"] == f"xs:{spec.value.type}", spec.name
+        assert float(restrictions["minInclusive"][0]) == spec.value.low, spec.name
+        assert restrictions["maxInclusive"] == [f"{spec.value.high:.15g}"], spec.name
+        assert restrictions["base"] == f"xs:{spec.value.type}", spec.name
 
 
 def own_attributes(cls: type[Any]) -> dict[str, Attribute]:

@@ -22,8 +22,8 @@ PAGE = """<!doctype html><title>another page</title><script type="module">
 import * as module from "{address}/realizer.js";
 Object.assign(globalThis, module);
 globalThis.realizer = new Realizer({{ session: "module" }});
-globalThis.told = [];
-realizer.onfeedback = (element, seq) => told.push(seq);
+globalThis.received = [];
+realizer.onfeedback = (element, seq) => received.push(seq);
 realizer.onlost = () => (globalThis.lost = true);
 realizer.connect();
 realizer.ask({{ type: "hello", version: VERSION }}).then((welcome) => (globalThis.welcome = welcome));
@@ -77,7 +77,7 @@ def test_connect_resolves_with_the_capabilities(page) -> None:  # type: ignore[n
 def test_play_resolves_at_the_end_of_the_block(page) -> None:  # type: ignore[no-untyped-def]
     bml = WAIT.format("b", 0.1)
     assert page.evaluate("async (bml) => (await realizer.play(bml)).getAttribute('id')", bml) == "b:end"
-    assert page.evaluate("told.length") >= 4
+    assert page.evaluate("received.length") >= 4
 
 
 def test_play_before_the_connection_is_not_lost(page) -> None:  # type: ignore[no-untyped-def]
@@ -200,6 +200,6 @@ def test_connection_comes_back_with_streams_and_feedback(page) -> None:  # type:
       const id = (await end).getAttribute("id");
       const before = frames.length;
       while (frames.length < before + 3) await new Promise((done) => requestAnimationFrame(done));
-      return [id, globalThis.lost, told.every((seq, k) => k === 0 || seq === told[k - 1] + 1)];
+      return [id, globalThis.lost, received.every((seq, k) => k === 0 || seq === received[k - 1] + 1)];
     }"""
     assert page.evaluate(script, WAIT.format("kept", 1)) == ["kept:end", True, True]

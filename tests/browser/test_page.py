@@ -256,8 +256,8 @@ def test_page_plays_a_typed_document_and_shows_feedback(page) -> None:  # type: 
     page.press("#document", "Control+Enter")
     page.wait_for_selector("#log li:has-text('typed ends')")
     lines = page.locator("#log li span").all_text_contents()
-    told = ["typed starts", "s start", "s attackPeak", "s relax", "s end", "typed ends"]
-    assert [line for line in lines if line in told] == told
+    wanted = ["typed starts", "s start", "s attackPeak", "s relax", "s end", "typed ends"]
+    assert [line for line in lines if line in wanted] == wanted
 
 
 def test_page_reports_a_broken_document_and_goes_on(page) -> None:  # type: ignore[no-untyped-def]
@@ -326,8 +326,8 @@ def test_page_reconnects_and_shows_missed_feedback(page) -> None:  # type: ignor
     page.wait_for_selector("#log li:has-text('kept starts')")
     closed = """() => new Promise((done) => {
       const status = document.getElementById("status");
-      const told = (_, watch) => (watch.disconnect(), done(status.dataset.state));
-      new MutationObserver(told).observe(status, { attributes: true });
+      const report = (_, watch) => (watch.disconnect(), done(status.dataset.state));
+      new MutationObserver(report).observe(status, { attributes: true });
       realizerPage.link.socket.close();
     })"""
     assert page.evaluate(closed) == "lost"

@@ -173,7 +173,7 @@ def test_timeline_draws_scheduled_and_actual_times(page) -> None:  # type: ignor
     page.press("#document", "Control+Enter")
     page.wait_for_selector("#log li:has-text('drawn ends')")
     page.wait_for_function("document.querySelectorAll('#score .happened').length === 2")
-    # What is told is drawn with the next picture.
+    # Changes are drawn with the next picture.
     page.wait_for_function("document.querySelectorAll('#score .track:not(.curve) i.dot').length === 11")
     assert page.text_content("#playing") == "drawn"
     rows = page.locator("#score .track:not(.curve)")
@@ -320,9 +320,9 @@ def test_feedback_is_listed_in_order_of_its_times(page) -> None:  # type: ignore
 
 
 def test_feedback_is_filtered_by_kind_and_words(page) -> None:  # type: ignore[no-untyped-def]
-    page.fill("#document", NOD.format("told"))
+    page.fill("#document", NOD.format("typed"))
     page.click("#play")
-    page.wait_for_selector("#log li:has-text('told ends')")
+    page.wait_for_selector("#log li:has-text('typed ends')")
     assert page.locator("#log .point:visible").count() == 11
     page.uncheck("#points")
     assert page.locator("#log .point:visible").count() == 0

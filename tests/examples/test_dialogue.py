@@ -135,13 +135,13 @@ def reply(history):
 @pytest.mark.slow
 def test_dialogue_plays_tokens_on_a_running_service(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(MODEL)
-    told: list[Feedback] = []
+    feedback_of_turns: list[Feedback] = []
 
     async def test(console: Console, url: str) -> None:
         session = (await console.until("\n> ")).partition("?session=")[2].split()[0]
         async with connect(f"{url}?session={session}") as viewer:
             await console.type("Well?")
-            told.extend([feedback async for feedback in viewer.until_end("turn1")])
+            feedback_of_turns.extend([feedback async for feedback in viewer.until_end("turn1")])
         printed = " ".join((await console.until("\n")).split())
         assert printed == "Yes, <b> [nod] that & this [smile] is [here] so. [quiet"
         assert (await console.end()).strip() == ">"
@@ -152,12 +152,14 @@ def test_dialogue_plays_tokens_on_a_running_service(tmp_path: Path) -> None:
             await asyncio.to_thread(playing, lambda console: test(console, server.url), *command)
 
     asyncio.run(served())
-    assert isinstance(told[-1], BlockProgress)
-    assert told[-1].status == "DONE"
-    said = {f.id.partition(":")[2]: f.global_time for f in told if isinstance(f, SyncPointProgress)}
+    assert isinstance(feedback_of_turns[-1], BlockProgress)
+    assert feedback_of_turns[-1].status == "DONE"
+    said = {
+        f.id.partition(":")[2]: f.global_time for f in feedback_of_turns if isinstance(f, SyncPointProgress)
+    }
     (nod,) = {
         node.id: node
-        for feedback in told
+        for feedback in feedback_of_turns
         if isinstance(feedback, PredictionFeedback)
         for node in feedback.behaviours
         if isinstance(node, Head)

@@ -33,7 +33,7 @@ def test_table_row_becomes_something_known() -> None:
             continue
         if becomes.startswith("@"):
             assert becomes[1:] in FUNCTIONS
-            assert row.says, "functions are told in words"
+            assert row.says, "functions are described in words"
         elif "|" in becomes:
             points = {point for cls in CLASSES.values() for point in cls.sync_points}
             assert set(becomes.split("|")) <= points

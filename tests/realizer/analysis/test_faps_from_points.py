@@ -109,14 +109,14 @@ def test_faps_from_features_shares_a_feature_equally() -> None:
 
 
 def test_measurable_profile_joins_lids_and_uses_outer_lips() -> None:
-    told = measurable_profile(
+    profile = measurable_profile(
         Profile.parse("F19 [100, 120], F21 [10, 20], F5 [0, 5], F52 [-200, -100], F51 [20, 30]")
     )
-    assert told.ranges[19] == told.ranges[21] == (55, 70)
-    assert told.ranges[4] == (20, 30)
-    assert told.ranges[5] == (-200, -100)
-    assert told.ranges[3] == (70, 180)  # -(F51 + F52): how far the lips part
-    assert 52 not in told.ranges
+    assert profile.ranges[19] == profile.ranges[21] == (55, 70)
+    assert profile.ranges[4] == (20, 30)
+    assert profile.ranges[5] == (-200, -100)
+    assert profile.ranges[3] == (70, 180)  # -(F51 + F52): how far the lips part
+    assert 52 not in profile.ranges
     shut = measurable_profile(Profile.parse("F3 [100, 200]"))
     assert dict(shut.ranges) == {3: (100, 200)}
 

@@ -49,7 +49,7 @@ class Played:
         return [(w.id, w.type) for w in self.realization.warnings]
 
     @property
-    def told(self) -> str:
+    def warnings_text(self) -> str:
         """The text of the one warning."""
         (warning,) = self.realization.warnings
         return warning.text

@@ -65,7 +65,7 @@ def test_audio_file_that_cannot_be_read_is_dropped(play, media: Path) -> None:
     (media / "not.wav").write_bytes(b"ID3 this is an mp3")
     played = play('<bmlt:audiofile id="a" fileName="not.wav"/><head id="h" lexeme="NOD"/>', media=media)
     assert played.warnings == [("b:a", "CANNOT_CREATE_BEHAVIOR")]
-    assert "'not.wav': wanted a WAV file" in played.told
+    assert "'not.wav': wanted a WAV file" in played.warnings_text
     assert played.times("h")
 
 
@@ -116,7 +116,7 @@ def test_speech_without_its_recording_is_synthesized_with_a_warning(play, media:
         media=media,
     )
     assert played.warnings == [("b:s", "CANNOT_CREATE_BEHAVIOR")]
-    assert "none.wav" in played.told
+    assert "none.wav" in played.warnings_text
     assert played.times("s")["end"] > 0.3
 
 

@@ -112,7 +112,7 @@ def test_emotion_timing_is_of_its_face_lexeme_or_between_two(play) -> None:
 def test_emotion_of_an_unknown_word_is_dropped_with_a_suggestion(play) -> None:
     played = play('<own:emotion id="e" name="hapy"/><head id="h" lexeme="NOD"/>')
     assert played.warnings == [("b:e", "CANNOT_CREATE_BEHAVIOR")]
-    assert "got 'hapy', did you mean happy" in played.told
+    assert "got 'hapy', did you mean happy" in played.warnings_text
     assert played.times("h")
 
 
@@ -120,7 +120,7 @@ def test_emotion_with_an_unknown_profile_warns_and_shows_the_default(play) -> No
     assert play(f'<own:emotion id="e" name="fear" profile="default" {AT}/>').warnings == []
     played = play(f'<own:emotion id="e" name="fear" profile="P_F(8)" {AT}/>')
     assert played.warnings == [("b:e", "CUSTOM_ATTRIBUTE_NOT_SUPPORTED")]
-    assert "P_F(8)" in played.told
+    assert "P_F(8)" in played.warnings_text
     assert played.aus(1.0) == play(f'<own:emotion id="e" name="fear" {AT}/>').aus(1.0)
 
 
@@ -173,7 +173,7 @@ def test_emotion_with_an_unknown_number_is_dropped_with_a_suggestion(
 ) -> None:
     played = play(f'<own:emotion id="e" {attributes}/>')
     assert played.warnings == [("b:e", "CANNOT_CREATE_BEHAVIOR")]
-    assert said in played.told
+    assert said in played.warnings_text
 
 
 def test_emotion_with_a_seed_varies_a_published_profile_reproducibly(play) -> None:

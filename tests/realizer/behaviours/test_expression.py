@@ -67,7 +67,7 @@ def test_expression_of_a_template_lasts_as_long_as_measured(play, template) -> N
 def test_expression_with_an_unknown_name_is_dropped_with_suggestions(play, name: str, meant: str) -> None:
     played = play(f'<own:expression id="e" name="{name}"/><head id="h" lexeme="NOD"/>')
     assert played.warnings == [("b:e", "CANNOT_CREATE_BEHAVIOR")]
-    assert meant in played.told
+    assert meant in played.warnings_text
     assert played.times("h")
 
 

@@ -40,14 +40,14 @@ def test_faps_override_other_behaviours(play) -> None:
 def test_faps_beyond_their_range_are_limited_with_a_warning(play) -> None:
     played = play(faps((19, 5000)))
     assert played.warnings == [("b:f", "CUSTOM_ATTRIBUTE_NOT_SUPPORTED")]
-    assert "wanted -1080..1080, got 5000" in played.told
+    assert "wanted -1080..1080, got 5000" in played.warnings_text
     assert played.fap(19, 1.0) == 1080
 
 
 def test_faps_with_a_repeated_number_are_a_fault(play) -> None:
     played = play(faps((31, 10), (31, 20)))
     assert played.warnings == [("b:f", "CANNOT_CREATE_BEHAVIOR")]
-    assert "31 (raise_l_i_eyebrow) twice" in played.told
+    assert "31 (raise_l_i_eyebrow) twice" in played.warnings_text
 
 
 def test_faps_of_two_behaviours_conflict(play) -> None:
@@ -114,7 +114,7 @@ def test_fap_file_warns_of_visemes_that_cannot_be_shown(play, media: Path) -> No
     with_compound(media, "500 0 63 0", "7 63 0 0 0 0")
     played = play('<own:fapFile id="f" fileName="v.fap"/>', media=media)
     assert played.warnings == [("b:f", "CUSTOM_ATTRIBUTE_NOT_SUPPORTED")]
-    assert "FAP 1: wanted visemes 0..14, got 500: shown as none; FAP 2: wanted" in played.told
+    assert "FAP 1: wanted visemes 0..14, got 500: shown as none; FAP 2: wanted" in played.warnings_text
 
 
 @pytest.mark.parametrize(
@@ -130,6 +130,6 @@ def test_fap_file_that_cannot_be_read_is_dropped(play, media: Path, content: str
     (media / "bad.fap").write_text(content, "utf-8")
     played = play('<own:fapFile id="f" fileName="bad.fap"/><head id="h" lexeme="NOD"/>', media=media)
     assert played.warnings == [("b:f", "CANNOT_CREATE_BEHAVIOR")]
-    assert says in played.told
-    assert "bad.fap" in played.told
+    assert says in played.warnings_text
+    assert "bad.fap" in played.warnings_text
     assert played.times("h")

@@ -77,7 +77,7 @@ def test_keyframes_that_are_not_at_rest_are_eased(play) -> None:
 def test_keyframes_that_cannot_be_read_are_dropped(play, element: str, says: str) -> None:
     played = play(element + '<head id="h" lexeme="NOD"/>')
     assert played.warnings == [("b:k", "CANNOT_CREATE_BEHAVIOR")]
-    assert says in played.told
+    assert says in played.warnings_text
     assert played.times("h")
 
 

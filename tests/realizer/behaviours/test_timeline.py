@@ -108,7 +108,7 @@ def test_timeline_can_be_tied_to_speech(timeline) -> None:
 
 
 @pytest.mark.parametrize(
-    ("channel", "told"),
+    ("channel", "parts"),
     [
         (
             {"name": "brows", "entries": [{"expression": "smiel"}, {"expression": "angr"}]},
@@ -118,11 +118,11 @@ def test_timeline_can_be_tied_to_speech(timeline) -> None:
         ({"entries": [{"expression": "smile", "intensity": 3}]}, ["channel 1, entry 1, intensity: wanted"]),
     ],
 )
-def test_timeline_faults_of_a_file_are_one_warning(timeline, channel, told) -> None:
+def test_timeline_faults_of_a_file_are_one_warning(timeline, channel, parts) -> None:
     played = timeline(channel)
     assert played.warnings == [("b:t", "CANNOT_CREATE_BEHAVIOR")]
-    for part in told:
-        assert part in played.told
+    for part in parts:
+        assert part in played.warnings_text
 
 
 SNEER = {"entries": [{"expression": "template:disgust", "duration": 2.0}]}
@@ -168,17 +168,17 @@ def test_timeline_mixers_and_orders_give_different_faces(timeline) -> None:
 def test_timeline_warns_of_mixing_that_the_face_cannot_do(timeline) -> None:
     played = timeline(GRIN, mixing={"mixer": "successive"}, deformer="mpeg4")
     assert played.warnings == [("b:t", "CUSTOM_ATTRIBUTE_NOT_SUPPORTED")]
-    assert "fileName: 't.json': mixer: no effect, FAPs move this face; wanted" in played.told
+    assert "fileName: 't.json': mixer: no effect, FAPs move this face; wanted" in played.warnings_text
     assert course(played, "12L").max() > 0.8
     played = timeline(GRIN, mixing={"order": [12]}, deformer="au")
-    assert "order: no effect, a sum has no order" in played.told
+    assert "order: no effect, a sum has no order" in played.warnings_text
 
 
 def test_timeline_orders_of_two_at_once_are_kept(play, tmp_path: Path) -> None:
     face = load_face(deformer="au")
     for name, order in (("a", [4, 12, 1]), ("b", [4, 1, 12])):
-        told = {"mixer": "successive", "order": order, "channel": [GRIN]}
-        (tmp_path / f"{name}.json").write_text(json.dumps(told), "utf-8")
+        content = {"mixer": "successive", "order": order, "channel": [GRIN]}
+        (tmp_path / f"{name}.json").write_text(json.dumps(content), "utf-8")
     nodes = "".join(f'<own:timeline id="{name}" fileName="{name}.json"/>' for name in "ab")
     played = play(nodes, media=tmp_path, deformer="au")
     values = [mixed(played, face, name)[100] for name in ("successive", "rank 4", "rank 12", "rank 1")]
@@ -191,4 +191,4 @@ def test_timeline_orders_of_two_at_once_are_kept(play, tmp_path: Path) -> None:
 def test_timeline_refuses_an_unknown_mixer_or_order(timeline, mixing) -> None:
     played = timeline(GRIN, mixing=mixing)
     assert played.warnings == [("b:t", "CANNOT_CREATE_BEHAVIOR")]
-    assert "'t.json': timeline, " in played.told
+    assert "'t.json': timeline, " in played.warnings_text

@@ -49,8 +49,8 @@ def test_gap_without_preferred_length_has_no_stretch() -> None:
 
 
 def test_block_chart_to_json_is_what_the_stream_sends() -> None:
-    told = json.loads(json.dumps(BLOCK.to_json(), allow_nan=False))
-    assert {key: told[key] for key in ("block", "character", "state", "start", "end", "cost")} == {
+    written = json.loads(json.dumps(BLOCK.to_json(), allow_nan=False))
+    assert {key: written[key] for key in ("block", "character", "state", "start", "end", "cost")} == {
         "block": "b",
         "character": None,
         "state": "IN_EXEC",
@@ -58,7 +58,7 @@ def test_block_chart_to_json_is_what_the_stream_sends() -> None:
         "end": 4.0,
         "cost": 1.0,
     }
-    (line,) = told["behaviours"]
+    (line,) = written["behaviours"]
     assert (line["id"], line["element"], line["line"], line["required"]) == ("n", "head", 3, True)
     assert line["syncs"][1] == {"name": "end", "time": 2.0, "at": 4.0}
     assert line["gaps"] == [
@@ -76,7 +76,7 @@ def test_block_chart_to_json_is_what_the_stream_sends() -> None:
         }
     ]
     assert line["words"] == [{"start": 0.5, "end": 1.0, "text": "yes"}]
-    assert told["dropped"][0]["text"] == told["warnings"][0]["text"] == "no such lexeme"
+    assert written["dropped"][0]["text"] == written["warnings"][0]["text"] == "no such lexeme"
 
 
 def test_block_chart_head_leaves_out_the_behaviours() -> None:

@@ -70,7 +70,7 @@ def faults(text: str) -> list[tuple[str, str, str]]:
 
 
 @pytest.mark.parametrize(
-    ("behaviour", "told"),
+    ("behaviour", "wanted"),
     [
         ('<faceLexeme id="f" lexeme="XYZ"\n amount="7"/>', ["XYZ", "7"]),
         ('<faceLexeme id="f" amount = \'a\nb\' lexeme="XYZ"/>', ["a", "XYZ"]),
@@ -80,10 +80,10 @@ def faults(text: str) -> list[tuple[str, str, str]]:
         ('<head id="f" lexeme="NOD" amount="7"/>', ["7"]),
     ],
 )
-def test_masked_faults_has_faults_behind_those_of_the_parser(behaviour: str, told: list[str]) -> None:
+def test_masked_faults_has_faults_behind_those_of_the_parser(behaviour: str, wanted: list[str]) -> None:
     good = '<head id="n" lexeme="NOD"/>'
     found = faults(f'<bml id="b">\n{good}{behaviour}</bml>')
-    assert [what for _, _, what in found] == told
+    assert [what for _, _, what in found] == wanted
     assert {id for _, id, _ in found} == {"b:f"}
 
 

@@ -69,9 +69,9 @@ def test_batch_refuses_wrong_options_before_it_plays(
 ) -> None:
     import click
 
-    with pytest.raises(click.UsageError) as told:
+    with pytest.raises(click.UsageError) as caught:
         batch(str(talks), "-o", str(tmp_path / "out"), *args)
-    assert words in told.value.format_message()
+    assert words in caught.value.format_message()
     assert not (tmp_path / "out").exists()
 
 

@@ -338,18 +338,18 @@ DUTCH = (
 
 
 def test_check_uses_the_words_of_the_language_of_a_document(tmp_path: Path) -> None:
-    told = check(tmp_path, DUTCH).stderr
-    assert '"Nonsense" is said without anger' in told
-    assert '"nonsense"' not in told
-    assert "no emotional words" not in told
+    printed = check(tmp_path, DUTCH).stderr
+    assert '"Nonsense" is said without anger' in printed
+    assert '"nonsense"' not in printed
+    assert "no emotional words" not in printed
 
 
 def test_check_names_a_language_without_words_once_if_verbose(tmp_path: Path) -> None:
     document = tmp_path / "d.bml"
     document.write_text(DUTCH + DUTCH)
     arguments = ["-v", "check", str(document)]
-    told = CliRunner().invoke(cli, arguments, standalone_mode=False).stderr
-    assert told.count("no emotional words for language 'nl'") == 1
+    printed = CliRunner().invoke(cli, arguments, standalone_mode=False).stderr
+    assert printed.count("no emotional words for language 'nl'") == 1
 
 
 def test_check_reads_words_of_another_language_from_a_file(tmp_path: Path) -> None:
@@ -378,8 +378,8 @@ def test_check_ignores_words_of_a_text_that_a_description_replaces(tmp_path: Pat
 
 def test_check_says_how_a_dialect_was_read_and_its_faults_in_strict_bml(tmp_path: Path) -> None:
     text = '<bml id="b"><head id="h" type="NOD"/><faceFacs id="f" au="4" side="left"/></bml>'
-    (told,) = check(tmp_path, text).stdout.splitlines()
-    assert """NOT_BML_1_0 b: line 1, /bml: read as SmartBody's BML: <head type="NOD"> as lexeme=NOD""" in told
+    (line,) = check(tmp_path, text).stdout.splitlines()
+    assert """NOT_BML_1_0 b: line 1, /bml: read as SmartBody's BML: <head type="NOD"> as lexeme=NOD""" in line
     head, face = check(tmp_path, text, "--strict-bml").stdout.splitlines()
     assert "b:h: line 1, /bml/head[1]: lexeme: wanted a word, got none" in head
     assert "b:f: line 1, /bml/faceFacs[1]: side: wanted LEFT, RIGHT or BOTH" in face

@@ -72,12 +72,12 @@ def test_enrich_reads_words_of_another_language_from_a_file(tmp_path: Path) -> N
 
 
 def test_enrich_suggests_a_language_for_a_text_in_other_letters() -> None:
-    told = "this text has no letters of 'en-US'"
+    warning = "this text has no letters of 'en-US'"
     done = enrich("Ты уверен?")
-    assert told in done.stderr
+    assert warning in done.stderr
     assert starts(done.stdout) == {"bml1:surprise1": "speech1:w1"}
     for text, more in (("Really?", []), ("!!! 😀", []), ("Ты уверен?", ["--language", "ru"])):
-        assert told not in enrich(text, *more).stderr
+        assert warning not in enrich(text, *more).stderr
 
 
 def test_enrich_counts_one_expression_in_the_singular(tmp_path: Path) -> None:

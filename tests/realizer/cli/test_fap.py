@@ -31,20 +31,20 @@ def actor(tmp_path: Path) -> Path:
 
 
 def test_info_prints_duration_rate_and_ranges(actor: Path) -> None:
-    told = run("info", str(actor))
-    assert told.exit_code == 0
-    assert told.stdout.splitlines() == [
+    done = run("info", str(actor))
+    assert done.exit_code == 0
+    assert done.stdout.splitlines() == [
         "C:\\my clips\\actor.fap: 26 frames at 25 fps, 1 s",
         "  31 raise_l_i_eyebrow            0 .. 10      ENS",
         "   1 visemes                10",
         "   2 expressions            6",
     ]
-    assert told.stderr == f"{actor}: line 1: the name has blanks\n"
+    assert done.stderr == f"{actor}: line 1: the name has blanks\n"
 
 
 def test_info_as_json_has_the_same_values(actor: Path) -> None:
-    told = json.loads(run("info", str(actor), "--json").stdout)
-    assert told == {
+    done = json.loads(run("info", str(actor), "--json").stdout)
+    assert done == {
         "name": "C:\\my clips\\actor.fap",
         "fps": 25.0,
         "frames": 26,

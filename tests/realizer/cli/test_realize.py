@@ -117,12 +117,14 @@ def test_realize_on_a_full_disk_names_the_file_and_leaves_no_part(tmp_path: Path
     assert not list((tmp_path / "out").glob(".0*"))
 
 
-@pytest.mark.parametrize(("suffix", "told"), [(".fap", True), (".vtt", False)])
-def test_realize_names_characters_that_a_format_leaves_out(tmp_path: Path, suffix: str, told: bool) -> None:
+@pytest.mark.parametrize(("suffix", "is_named"), [(".fap", True), (".vtt", False)])
+def test_realize_names_characters_that_a_format_leaves_out(
+    tmp_path: Path, suffix: str, is_named: bool
+) -> None:
     two = "".join(f'<bml id="{who}" characterId="{who}"><wait id="w" duration="1"/></bml>' for who in "ab")
     done = CliRunner().invoke(cli, ["-q", "realize", "-", "-o", str(tmp_path / f"x{suffix}")], input=two)
     assert done.exit_code == 0
-    assert ("shows a, not b" in done.stderr) is told
+    assert ("shows a, not b" in done.stderr) is is_named
 
 
 def test_schedule_keeps_the_planned_times_of_a_replaced_block() -> None:

@@ -57,7 +57,7 @@ def test_serve_refuses_to_listen_beyond_this_machine_unprotected(options: list[s
     assert says in done.stderr
 
 
-def test_serve_listens_beyond_this_machine_if_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_serve_listens_beyond_this_machine_with_its_options(monkeypatch: pytest.MonkeyPatch) -> None:
     settings = settings_of(monkeypatch, "--host", "0.0.0.0", "--insecure", "--hosts", "a.example,b.example")
     assert (settings.insecure, settings.hosts) == (True, ("a.example", "b.example"))
     allowed = settings_of(

@@ -39,13 +39,13 @@ def test_timeline_plays_like_a_document(file: Path) -> None:
     out = file.with_suffix(".json")
     done = run("timeline", str(file), "--expressions", str(file.parent / "mine"), "-o", str(out), "--no-idle")
     assert done.return_value == 0, done.stderr
-    told = json.loads(out.read_text("utf-8"))
-    assert told["warnings"] == []
-    names = told["au"]["names"]
-    values = told["au"]["values"]
+    written = json.loads(out.read_text("utf-8"))
+    assert written["warnings"] == []
+    names = written["au"]["names"]
+    values = written["au"]["values"]
     assert max(row[names.index("1L")] for row in values) == pytest.approx(0.9, abs=1e-3)
     assert max(row[names.index("12R")] for row in values) == pytest.approx(0.6, abs=1e-3)
-    assert told["duration"] == pytest.approx(1.4 + 0.5 + 3, abs=1e-3)
+    assert written["duration"] == pytest.approx(1.4 + 0.5 + 3, abs=1e-3)
 
 
 def test_timeline_prints_every_fault(file: Path) -> None:
@@ -77,17 +77,17 @@ def test_check_gives_advice_on_a_timeline_without_faults(file: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "message"),
     [
         (["x.bml"], "x.bml: wanted a name that ends in .toml or .json"),
         (["x.toml", "--media", "."], "refers to no"),
     ],
 )
-def test_timeline_refuses_wrong_options(tmp_path: Path, words: list[str], told: str) -> None:
+def test_timeline_refuses_wrong_options(tmp_path: Path, words: list[str], message: str) -> None:
     (tmp_path / words[0]).write_text("", "utf-8")
     done = CliRunner().invoke(cli, ["timeline", str(tmp_path / words[0]), *words[1:]])
     assert done.exit_code == 2
-    assert told in " ".join(done.stderr.split())
+    assert message in " ".join(done.stderr.split())
 
 
 def test_timeline_plays_with_a_warning_on_a_mixer_without_effect(file: Path) -> None:

@@ -45,13 +45,13 @@ def test_client_schedules_do_not_mix_with_answers() -> None:
         async with connect(url) as client:
             await client.subscribe("schedule")
             await client.send(WAIT.format("b"))
-            told = []
+            states = []
             async for message in client.frames("schedule"):
                 assert isinstance(message, dict)
-                told += [block["state"] for block in message["blocks"]]
-                if "DONE" in told:
+                states += [block["state"] for block in message["blocks"]]
+                if "DONE" in states:
                     break
-            assert told[0] != "DONE"
+            assert states[0] != "DONE"
             assert (await client.ask("ping"))["type"] == "pong"
 
     serving(test)
@@ -60,16 +60,16 @@ def test_client_schedules_do_not_mix_with_answers() -> None:
 def test_client_keeps_the_frames_of_two_streams_apart() -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:
-            told = await client.subscribe("fap", fps=50)
+            subscribed = await client.subscribe("fap", fps=50)
             await client.subscribe("au", fps=50, encoding="json")
-            assert len(told["names"]) == 68
+            assert len(subscribed["names"]) == 68
             numbers = []
             async for frame in client.frames("fap"):
                 assert isinstance(frame, WireFrame)
                 numbers.append(frame.frame)
                 if len(numbers) == 5:
                     break
-            assert numbers == list(range(told["frame"], told["frame"] + 5))
+            assert numbers == list(range(subscribed["frame"], subscribed["frame"] + 5))
             async for frame in client.frames("au"):
                 assert frame["type"] == "au"
                 break
@@ -218,8 +218,8 @@ def test_client_reads_a_mesh_by_the_present_face() -> None:
         async with connect(url) as client:
             await client.control("character", face="ada")
             await client.subscribe("fap")
-            told = await client.subscribe("mesh", fps=50)
-            assert told["face"] == "ada"
+            subscribed = await client.subscribe("mesh", fps=50)
+            assert subscribed["face"] == "ada"
             numbers, shown = [], []
             async for frame in client.frames("mesh"):
                 assert isinstance(frame, WireFrame)
@@ -234,7 +234,7 @@ def test_client_reads_a_mesh_by_the_present_face() -> None:
                     break
             assert frame.stream_info["type"] == "changed"
             assert frame.stream_info["frame"] == frame.frame - 2
-            assert numbers == list(range(told["frame"], told["frame"] + len(numbers)))
+            assert numbers == list(range(subscribed["frame"], subscribed["frame"] + len(numbers)))
             assert not client.errors
 
     serving(test)

@@ -98,7 +98,7 @@ def warning(id: str) -> WarningFeedback:
 
 
 @pytest.mark.parametrize(
-    ("told", "last"),
+    ("messages", "last"),
     [
         ([block("b:start", 1.0), block("b:end", 2.0)], "b:end"),
         ([block("a:end", 1.0), block("b:end", 2.0)], "b:end"),
@@ -107,9 +107,9 @@ def warning(id: str) -> WarningFeedback:
         ([warning("b:n"), block("b:start", 1.0)], None),
     ],
 )
-def test_block_waiter_finishes_with_the_end_or_the_refusal(told, last) -> None:
+def test_block_waiter_finishes_with_the_end_or_the_refusal(messages, last) -> None:
     until = BlockWaiter("b")
-    for feedback in told:
+    for feedback in messages:
         until.on_feedback(feedback)
     assert (until.last.id if until.last else None) == last
     assert until.is_finished == (last is not None)

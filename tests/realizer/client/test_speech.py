@@ -28,8 +28,8 @@ def test_speech_waits_for_syncs_and_the_end() -> None:
             end = await speech.ended()
             assert second < end.global_time
             assert (end.status, end.said) == ("DONE", None)
-            told = {f.id: f async for f in client.until_end("s1") if isinstance(f, SyncPointProgress)}
-            assert told["n:n:start"].global_time == pytest.approx(second)
+            progress = {f.id: f async for f in client.until_end("s1") if isinstance(f, SyncPointProgress)}
+            assert progress["n:n:start"].global_time == pytest.approx(second)
 
     serving(test)
 

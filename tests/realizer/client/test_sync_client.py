@@ -58,7 +58,7 @@ def test_sync_client_yields_frames_until_it_stops(url) -> None:
 
 def test_sync_client_shares_a_session(url) -> None:
     with connect(f"{url}?session=show") as manager, connect(f"{url}?session=show") as viewer:
-        told = viewer.subscribe("arkit", fps=50)
+        subscribed = viewer.subscribe("arkit", fps=50)
         end = manager.play(WAIT.format("b"))
         assert end.id == "b:end"
         assert [f.seq for f in viewer.until_end("b")][-1] == end.seq
@@ -67,7 +67,7 @@ def test_sync_client_shares_a_session(url) -> None:
         assert isinstance(first, WireFrame)
         assert isinstance(second, WireFrame)
         assert second.frame == first.frame + 1
-        assert len(first.values) == len(told["names"]) == 59
+        assert len(first.values) == len(subscribed["names"]) == 59
         assert manager.state()["connections"] == 2
         assert manager.session == viewer.session == "show"
         assert manager.errors == []

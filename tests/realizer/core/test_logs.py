@@ -27,9 +27,9 @@ def lines() -> Iterator[io.StringIO]:
 def test_json_formatter_writes_a_record_on_one_line(lines: io.StringIO) -> None:
     logging.getLogger("realizer.server.x").info("joined %s\nfor good", "show", extra={"connection": 7})
     (line,) = lines.getvalue().splitlines()
-    told = json.loads(line)
-    assert told.pop("time").endswith("Z")
-    assert told == {
+    record = json.loads(line)
+    assert record.pop("time").endswith("Z")
+    assert record == {
         "level": "info",
         "logger": "realizer.server.x",
         "message": "joined show\nfor good",

@@ -24,9 +24,9 @@ def test_remarks_are_empty_if_the_face_supports_the_mixer() -> None:
 
 
 def test_remarks_name_settings_without_effect() -> None:
-    (told,) = remarks(Timeline((TRACK,), "successive", (4,)), input_names(deformer="mpeg4"))
-    assert told.startswith("mixer: no effect, FAPs move this face; wanted")
-    (told,) = remarks(Timeline((TRACK,), "additive", (4,)), input_names(deformer="au"))
-    assert told == 'order: no effect, a sum has no order; wanted mixer = "successive"'
-    (told,) = remarks(Timeline((TRACK,), "successive", (43, 4, 8)), input_names(deformer="au"))
-    assert told.startswith("order: no effect on 43, 8, which this face does not mix")
+    (remark,) = remarks(Timeline((TRACK,), "successive", (4,)), input_names(deformer="mpeg4"))
+    assert remark.startswith("mixer: no effect, FAPs move this face; wanted")
+    (remark,) = remarks(Timeline((TRACK,), "additive", (4,)), input_names(deformer="au"))
+    assert remark == 'order: no effect, a sum has no order; wanted mixer = "successive"'
+    (remark,) = remarks(Timeline((TRACK,), "successive", (43, 4, 8)), input_names(deformer="au"))
+    assert remark.startswith("order: no effect on 43, 8, which this face does not mix")

@@ -74,10 +74,10 @@ BAD = {
 
 @pytest.mark.parametrize("case", BAD)
 def test_read_folder_names_file_and_key_of_a_fault(folder, case: str) -> None:
-    text, told = BAD[case]
+    text, fault = BAD[case]
     with pytest.raises(TableError) as caught:
         read_folder(folder(a=text))
-    assert told in str(caught.value)
+    assert fault in str(caught.value)
     assert len(str(caught.value).splitlines()) == 1
 
 

@@ -191,30 +191,30 @@ BROKEN: dict[str, tuple[Callable[[Path], object], tuple[str, ...]]] = {
 def test_check_face_names_the_file_and_the_remedy(folder: Path, name: str) -> None:
     spoil, words = BROKEN[name]
     spoil(folder)
-    told = "\n".join(faults(folder))
+    found = "\n".join(faults(folder))
     for word in words:
-        assert word in told, told
+        assert word in found, found
 
 
 def test_check_face_lists_every_fault(folder: Path) -> None:
     for name in ("an unknown key", "colours above 255", "fields of another mesh", "a model with NaN"):
         BROKEN[name][0](folder)
     (folder / "features.csv").unlink()
-    told = faults(folder)
-    assert len(told) >= 5
+    found = faults(folder)
+    assert len(found) >= 5
     for file in ("face.toml", "mesh.npz", "fields.npz", "features.csv", "au_published.toml"):
-        assert any(file in fault for fault in told), file
+        assert any(file in fault for fault in found), file
 
 
 def test_check_face_names_a_point_on_no_surface(folder: Path) -> None:
     path = folder / "mesh.npz"
     cheek = load_face("ada").feature_points["5.1"]
     rewrite(path, triangles=lambda a: a[(a != cheek).all(axis=1)])
-    told = "\n".join(faults(folder))
-    assert "5.1: vertex" in told
-    assert "no triangle has it" in told
-    assert "skin: it has 1 holes" in told
-    assert "open edges at vertex" in told
+    found = "\n".join(faults(folder))
+    assert "5.1: vertex" in found
+    assert "no triangle has it" in found
+    assert "skin: it has 1 holes" in found
+    assert "open edges at vertex" in found
 
 
 def test_load_face_names_the_first_fault_and_the_check(folder: Path) -> None:

@@ -14,7 +14,7 @@ from realizer.outputs.speech_spans import Span
 from realizer.speech.utterance import Word
 
 
-def spoken(realization, *told, until=99.0, also=()):
+def spoken(realization, *spoken_words, until=99.0, also=()):
     """Return the realization with these words spoken from 1 s on; `also` by another character."""
     (speaking,) = realization.speeches
 
@@ -22,7 +22,7 @@ def spoken(realization, *told, until=99.0, also=()):
         utterance = replace(speaking.utterance, words=tuple(Word(*word) for word in words))
         return replace(speaking, start=1.0, until=until, utterance=utterance, character=character)
 
-    return replace(realization, speeches=(says(told, 0), *([says(also, 1)] if also else ())))
+    return replace(realization, speeches=(says(spoken_words, 0), *([says(also, 1)] if also else ())))
 
 
 def test_captions_break_lines_at_pauses_and_when_full(realization):

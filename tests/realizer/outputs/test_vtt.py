@@ -45,9 +45,9 @@ def test_vtt_has_cues_in_order(realization, tmp_path):
 def test_vtt_excludes_words_that_were_cut_off(realization, tmp_path):
     (speaking,) = realization.speeches
     short = replace(realization, speeches=(replace(speaking, until=0.6),))
-    told = [cue for cue in cues(short, tmp_path) if cue[2] != "sync"]
-    assert [cue[3] for cue in told] == ["Hello", "h", "oʊ"]
-    assert max(cue[1] for cue in told) == 0.6
+    shown = [cue for cue in cues(short, tmp_path) if cue[2] != "sync"]
+    assert [cue[3] for cue in shown] == ["Hello", "h", "oʊ"]
+    assert max(cue[1] for cue in shown) == 0.6
 
 
 def test_vtt_has_every_word_and_point(turn, tmp_path):

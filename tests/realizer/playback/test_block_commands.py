@@ -26,7 +26,7 @@ def play(*inside: str) -> Realization:
     return realize("".join(documents), voice=SilentVoice(), idle=False, fps=50)
 
 
-def told(played: Realization, part: str) -> list[str]:
+def feedback_with(played: Realization, part: str) -> list[str]:
     return [f for f in played.feedback if part in f and "predictionFeedback" not in f]
 
 
@@ -36,10 +36,10 @@ def interrupt(more: str = "", start: float = 1.0, target: str = "a") -> str:
 
 def test_interrupt_ends_the_whole_block_by_default() -> None:
     played = play(SMILE, interrupt())
-    (end,) = told(played, '"a:end"')
+    (end,) = feedback_with(played, '"a:end"')
     assert 'globalTime="1"' in end
     assert "INTERRUPTED" in end
-    assert not told(played, "a:s:relax")
+    assert not feedback_with(played, "a:s:relax")
 
 
 def test_interrupt_relaxes_the_face_without_a_jump() -> None:
@@ -54,51 +54,51 @@ def test_interrupt_relaxes_the_face_without_a_jump() -> None:
 def test_interrupt_of_some_behaviours_lets_the_block_go_on() -> None:
     nod = '<head id="n" lexeme="NOD" start="2"/>'
     played = play(SMILE + nod, interrupt(' include="s"'))
-    (relax,), (end,) = told(played, "a:s:relax"), told(played, "a:s:end")
+    (relax,), (end,) = feedback_with(played, "a:s:relax"), feedback_with(played, "a:s:end")
     assert 'time="1"' in relax
     assert 'time="1.3"' in end
-    assert told(played, "a:n:end")
-    assert "DONE" in told(played, '"a:end"')[0]
+    assert feedback_with(played, "a:n:end")
+    assert "DONE" in feedback_with(played, '"a:end"')[0]
     assert played.schedules[0].at("s", "end") == pytest.approx(1.3)
 
 
 def test_interrupt_spares_excluded_behaviours() -> None:
     nod = '<head id="n" lexeme="NOD" start="2"/>'
     played = play(SMILE + nod, interrupt(' exclude="s"'))
-    assert not told(played, "a:n:")
-    assert 'time="5"' in told(played, "a:s:end")[0]
+    assert not feedback_with(played, "a:n:")
+    assert 'time="5"' in feedback_with(played, "a:s:end")[0]
 
 
 def test_interrupt_of_all_remaining_behaviours_ends_the_block() -> None:
     played = play(SMILE + '<head id="n" lexeme="NOD"/>', interrupt(' include="s"', start=3.0))
-    assert "INTERRUPTED" in told(played, '"a:end"')[0]
+    assert "INTERRUPTED" in feedback_with(played, '"a:end"')[0]
 
 
 def test_interrupt_of_a_past_block_is_ignored_of_an_unknown_one_warned() -> None:
     assert not play('<wait id="w" duration="0.2"/>', interrupt()).warnings
     played = play(SMILE, interrupt(target="nobody"))
-    assert [f for f in told(played, "warningFeedback") if "b:i" in f and "nobody" in f]
+    assert [f for f in feedback_with(played, "warningFeedback") if "b:i" in f and "nobody" in f]
 
 
 def test_interrupt_that_is_required_and_fails_ends_its_own_block() -> None:
     played = play(f"<required>{interrupt(target='nobody')}</required>{SMILE}")
-    (end,) = told(played, '"a:end"')
+    (end,) = feedback_with(played, '"a:end"')
     assert "INTERRUPTED" in end
-    (warning,) = told(played, "warningFeedback")
+    (warning,) = feedback_with(played, "warningFeedback")
     assert 'id="a"' in warning
     assert played.feedback.index(warning) < played.feedback.index(end)
 
 
 def test_activate_starts_a_preplanned_block() -> None:
     played = play(f' bmla:preplan="true">{SMILE}', '<bmla:activate id="x" target="a" start="2"/>')
-    assert 'globalTime="2"' in told(played, '"a:start"')[0]
+    assert 'globalTime="2"' in feedback_with(played, '"a:start"')[0]
     assert played.schedules[0].start == 2.0
     assert played.duration == 7.0
 
 
 def test_activate_of_a_block_that_does_not_wait_warns() -> None:
     played = play(SMILE, '<bmla:activate id="x" target="a" start="2"/>')
-    assert [f for f in told(played, "warningFeedback") if "b:x" in f]
+    assert [f for f in feedback_with(played, "warningFeedback") if "b:x" in f]
 
 
 def change(parameter: str, trajectory: str, times: str, target: str = "a:s") -> str:
@@ -146,7 +146,7 @@ def test_change_starts_with_the_initial_value() -> None:
 )
 def test_change_of_an_unknown_parameter_warns(parameter: str, target: str) -> None:
     played = play(SMILE, change(parameter, 'type="instant" targetValue="1"', 'start="1"', target))
-    assert [f for f in told(played, "warningFeedback") if "b:p" in f and "EXECUTION_FAILURE" in f]
+    assert [f for f in feedback_with(played, "warningFeedback") if "b:p" in f and "EXECUTION_FAILURE" in f]
 
 
 @pytest.mark.espeak

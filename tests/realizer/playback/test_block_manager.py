@@ -43,14 +43,14 @@ class Stage:
         return schedule
 
     def until(self, now: float) -> list[str]:
-        for told in self.player.due(now):
-            if isinstance(told, BlockProgress):
-                self.log.append(f"{told.id} {told.status} {told.global_time:g}")
-            elif isinstance(told, WarningFeedback):
-                self.log.append(f"! {told.id} {told.type}")
-                self.texts.append(told.text)
-            elif isinstance(told, PredictionFeedback):
-                (block,) = told.blocks
+        for feedback in self.player.due(now):
+            if isinstance(feedback, BlockProgress):
+                self.log.append(f"{feedback.id} {feedback.status} {feedback.global_time:g}")
+            elif isinstance(feedback, WarningFeedback):
+                self.log.append(f"! {feedback.id} {feedback.type}")
+                self.texts.append(feedback.text)
+            elif isinstance(feedback, PredictionFeedback):
+                (block,) = feedback.blocks
                 end = "" if block.global_end is None else f"{block.global_end:g}"
                 self.log.append(f"{block.id} {block.status} {block.global_start:g}-{end}")
         return self.log
@@ -147,8 +147,8 @@ def test_prepend_before_delays_all_followers_too(stage: Stage) -> None:
     stage.send("c", composition="APPEND")
     stage.send("e", composition="APPEND")
     stage.send("d", wait(4), prependBefore="c")
-    told = ["d:end DONE 4", "c:start IN_EXEC 4", "c:end DONE 4", "e:start IN_EXEC 4", "e:end DONE 4"]
-    assert stage.progress()[-5:] == told
+    expected = ["d:end DONE 4", "c:start IN_EXEC 4", "c:end DONE 4", "e:start IN_EXEC 4", "e:end DONE 4"]
+    assert stage.progress()[-5:] == expected
 
 
 def test_chunk_before_waits_for_the_subsiding_only(stage: Stage) -> None:
@@ -230,9 +230,9 @@ def test_interrupt_attribute_ends_blocks_when_the_block_is_scheduled(stage: Stag
     stage.send("a", smile(5))
     stage.send("b", smile(5))
     stage.send("c", wait(1), interrupt="a", at=1.0)
-    told = stage.progress()
-    assert told.index("a:end INTERRUPTED 1") < told.index("c:start IN_EXEC 1")
-    assert "b:end DONE 5" in told
+    progress = stage.progress()
+    assert progress.index("a:end INTERRUPTED 1") < progress.index("c:start IN_EXEC 1")
+    assert "b:end DONE 5" in progress
 
 
 def test_interrupt_attribute_of_a_refused_block_ends_nothing(stage: Stage) -> None:
@@ -256,8 +256,8 @@ def test_preplan_delays_a_block_that_waits_for_it(stage: Stage) -> None:
     stage.send("b", wait(1), appendAfter="p")
     assert stage.progress() == []
     stage.send("a", wait(1), onStart="p", at=1.5e4)
-    told = [line for line in stage.progress() if line[0] == "b"]
-    assert told == ["b:start IN_EXEC 15002", "b:end DONE 15003"]
+    progress = [line for line in stage.progress() if line[0] == "b"]
+    assert progress == ["b:start IN_EXEC 15002", "b:end DONE 15003"]
 
 
 def test_preplan_does_not_delay_an_append(stage: Stage) -> None:
@@ -371,10 +371,10 @@ def test_prepend_before_that_ends_its_follower_leaves_it_ended(
     stage.send("a", wait(0.5))
     stage.send("b", wait(0.5), composition="APPEND")
     assert not stage.send("c", wait(1), **said, **{before: "b"}).failed
-    told = stage.progress()
-    assert "b:end REVOKED 0" in told
-    assert "c:end DONE 1" in told
-    assert not any(line.startswith("b:start") for line in told)
+    progress = stage.progress()
+    assert "b:end REVOKED 0" in progress
+    assert "c:end DONE 1" in progress
+    assert not any(line.startswith("b:start") for line in progress)
 
 
 def test_replace_refuses_the_id_of_another_characters_block(stage: Stage) -> None:

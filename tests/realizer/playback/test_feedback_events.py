@@ -35,8 +35,13 @@ def test_events_are_in_the_order_of_time_then_of_the_document() -> None:
 
 
 def test_sync_progress_has_the_time_on_both_clocks() -> None:
-    told = sync_progress(BLOCK, "h", "stroke", 10.5, 10.0)
-    assert (told.id, told.time, told.global_time, told.character_id) == ("b:h:stroke", 0.5, 10.5, "Ann")
+    feedback = sync_progress(BLOCK, "h", "stroke", 10.5, 10.0)
+    assert (feedback.id, feedback.time, feedback.global_time, feedback.character_id) == (
+        "b:h:stroke",
+        0.5,
+        10.5,
+        "Ann",
+    )
 
 
 def test_events_of_an_earlier_block_end_before_a_later_one_starts() -> None:
@@ -45,19 +50,19 @@ def test_events_of_an_earlier_block_end_before_a_later_one_starts() -> None:
 
 
 def test_feedback_reads_back_as_written() -> None:
-    for told in (
+    for feedback in (
         acknowledgement(BLOCK, 10.0),
         prediction(BLOCK, SCHEDULE, State.LURKING, SCHEDULE.behaviours),
         progress(BLOCK, "end", 11.0, State.DONE),
     ):
-        assert parse_feedback(told.to_xml()) == told
+        assert parse_feedback(feedback.to_xml()) == feedback
 
 
 def test_prediction_has_the_given_sync_points() -> None:
-    told = prediction(BLOCK, SCHEDULE, State.PENDING, SCHEDULE.behaviours)
-    assert (told.blocks[0].global_start, told.blocks[0].global_end) == (10.0, 11.0)
-    assert told.blocks[0].status == "PENDING"
-    assert {b.id: {p: r.offset for p, r in b.syncs.items()} for b in told.behaviours} == {
+    feedback = prediction(BLOCK, SCHEDULE, State.PENDING, SCHEDULE.behaviours)
+    assert (feedback.blocks[0].global_start, feedback.blocks[0].global_end) == (10.0, 11.0)
+    assert feedback.blocks[0].status == "PENDING"
+    assert {b.id: {p: r.offset for p, r in b.syncs.items()} for b in feedback.behaviours} == {
         "b:g": {"start": 0.0, "end": 1.0},
         "b:h": {"start": 0.0, "stroke": 0.5, "end": 1.0},
     }
@@ -67,6 +72,6 @@ def test_prediction_has_the_given_sync_points() -> None:
 def test_prediction_leaves_out_times_that_are_not_known() -> None:
     times = {"g": np.array([0.0, 2 * UNKNOWN]), "h": 2 * UNKNOWN + np.array([0.0, 0.5, 1.0])}
     schedule = replace(SCHEDULE, times=times)
-    told = prediction(BLOCK, schedule, State.IN_EXEC, schedule.behaviours)
-    assert (told.blocks[0].global_start, told.blocks[0].global_end) == (10.0, None)
-    assert [(b.id, list(b.syncs)) for b in told.behaviours] == [("b:g", ["start"])]
+    feedback = prediction(BLOCK, schedule, State.IN_EXEC, schedule.behaviours)
+    assert (feedback.blocks[0].global_start, feedback.blocks[0].global_end) == (10.0, None)
+    assert [(b.id, list(b.syncs)) for b in feedback.behaviours] == [("b:g", ["start"])]

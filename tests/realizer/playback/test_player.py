@@ -88,8 +88,8 @@ def test_append_starts_after_the_reported_end_of_earlier_blocks() -> None:
     player = Player()
     submit(player, SMILE, "first")
     submit(player, SMILE, "second", 'composition="APPEND"')
-    told = progress(player.due(100.0))
-    assert told.index(("first:end", 2.6)) < told.index(("second:start", 2.6))
+    reported = progress(player.due(100.0))
+    assert reported.index(("first:end", 2.6)) < reported.index(("second:start", 2.6))
 
 
 def test_append_without_earlier_blocks_starts_now() -> None:
@@ -102,9 +102,9 @@ def test_merge_plays_beside_earlier_blocks() -> None:
     player = Player()
     submit(player, SMILE, "first")
     submit(player, SMILE, "second", now=1.0)
-    told = dict(progress(player.due(100.0)))
-    assert told["second:start"] == 1.0
-    assert told["first:end"] == pytest.approx(2.6)
+    reported = dict(progress(player.due(100.0)))
+    assert reported["second:start"] == 1.0
+    assert reported["first:end"] == pytest.approx(2.6)
 
 
 def test_replace_ends_earlier_blocks_first_and_silences_them() -> None:
@@ -113,9 +113,9 @@ def test_replace_ends_earlier_blocks_first_and_silences_them() -> None:
     submit(player, SMILE, "waiting", 'composition="APPEND"')
     player.due(1.0)
     submit(player, SMILE, "second", 'composition="REPLACE"', now=1.0)
-    told = [id for id, _ in progress(player.due(100.0))]
-    assert told[:3] == ["first:end", "waiting:end", "second:start"]
-    assert not any(id.startswith(("first:s", "waiting:s")) for id in told)
+    reported = [id for id, _ in progress(player.due(100.0))]
+    assert reported[:3] == ["first:end", "waiting:end", "second:start"]
+    assert not any(id.startswith(("first:s", "waiting:s")) for id in reported)
 
 
 def test_player_allows_an_id_again_after_its_end_or_a_replace() -> None:
@@ -125,8 +125,8 @@ def test_player_allows_an_id_again_after_its_end_or_a_replace() -> None:
     submit(player, SMILE, "b", 'composition="REPLACE"', now=1.0)
     player.due(20.0)
     submit(player, SMILE, "b", now=20.0)
-    told = progress(player.due(100.0))
-    assert ("b:start", 20.0) in told
+    reported = progress(player.due(100.0))
+    assert ("b:start", 20.0) in reported
 
 
 def test_player_refuses_an_id_that_still_plays() -> None:
@@ -134,8 +134,8 @@ def test_player_refuses_an_id_that_still_plays() -> None:
     submit(player, SMILE)
     player.due(0.5)
     submit(player, SMILE, now=1.0)
-    told = player.due(1.0)
-    warnings = [f for f in told if isinstance(f, WarningFeedback)]
+    feedback = player.due(1.0)
+    warnings = [f for f in feedback if isinstance(f, WarningFeedback)]
     assert len(warnings) == 1
     assert "still in use" in warnings[0].text
     assert [id for id, _ in progress(player.due(100.0))][-1] == "b:end"
@@ -195,16 +195,16 @@ def test_player_fixes_a_reference_into_a_running_block() -> None:
     submit(player, SMILE, "first")
     player.due(1.0)
     submit(player, '<head id="n" lexeme="NOD" stroke="first:s:end"/>', "second", now=1.0)
-    told = dict(progress(player.due(100.0)))
-    assert told["second:n:stroke"] == pytest.approx(2.6)
+    reported = dict(progress(player.due(100.0)))
+    assert reported["second:n:stroke"] == pytest.approx(2.6)
 
 
 def test_player_refuses_a_block_with_a_failed_required_behaviour() -> None:
     player = Player()
     submit(player, f'{SMILE}<required><faceLexeme id="x" lexeme="WAGGLE_EARS"/></required>')
-    told = player.due(100.0)
-    assert progress(told) == []
-    warnings = [f for f in told if isinstance(f, WarningFeedback)]
+    feedback = player.due(100.0)
+    assert progress(feedback) == []
+    warnings = [f for f in feedback if isinstance(f, WarningFeedback)]
     assert [w.id for w in warnings] == ["b"]
     assert "WAGGLE_EARS" in warnings[0].text
 
@@ -212,9 +212,9 @@ def test_player_refuses_a_block_with_a_failed_required_behaviour() -> None:
 def test_player_ends_a_block_without_its_dropped_behaviours() -> None:
     player = Player()
     submit(player, f'{SMILE}<faceLexeme id="x" lexeme="WAGGLE_EARS" start="0" end="60"/>')
-    told = player.due(100.0)
-    assert [f.id for f in told if isinstance(f, WarningFeedback)] == ["b:x"]
-    assert progress(told)[-1] == ("b:end", pytest.approx(2.6))
+    feedback = player.due(100.0)
+    assert [f.id for f in feedback if isinstance(f, WarningFeedback)] == ["b:x"]
+    assert progress(feedback)[-1] == ("b:end", pytest.approx(2.6))
 
 
 def test_set_direct_holds_values_until_they_are_released() -> None:
@@ -247,13 +247,13 @@ def test_frames_at_25_fps_are_every_second_of_50(seed: int, start: float) -> Non
 
 @given(st.lists(st.floats(0, 4), min_size=1, max_size=8))
 def test_due_gives_the_same_feedback_however_often_it_is_called(asked: list[float]) -> None:
-    def told(times: list[float]) -> list[str]:
+    def feedback_at(times: list[float]) -> list[str]:
         player = Player()
         submit(player, SMILE, "a")
         submit(player, SMILE, "c", 'composition="APPEND"')
         return [f.to_xml() for now in times for f in player.due(now)]
 
-    assert told([*sorted(asked), 100.0]) == told([100.0])
+    assert feedback_at([*sorted(asked), 100.0]) == feedback_at([100.0])
 
 
 # The parts that idle motion and prosody move: brows, lids, head, eyes.

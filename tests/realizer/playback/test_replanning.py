@@ -17,7 +17,7 @@ from realizer.speech.utterance import Phoneme, Utterance
 class Stage:
     def __init__(self) -> None:
         self.player = Player(PlayOptions(idle=False), history=float("inf"))
-        self.told: list[SyncPointProgress] = []
+        self.reported: list[SyncPointProgress] = []
         self.predicted: list[PredictionFeedback] = []
 
     def send(self, id: str, inside: str, at: float = 0.0, said: str = "") -> Schedule:
@@ -32,14 +32,14 @@ class Stage:
     def until(self, now: float) -> None:
         for feedback in self.player.due(now):
             if isinstance(feedback, SyncPointProgress):
-                self.told.append(feedback)
+                self.reported.append(feedback)
             elif isinstance(feedback, PredictionFeedback):
                 self.predicted.append(feedback)
 
     def times(self) -> dict[str, float]:
         self.until(1e6)
-        assert len({f.id for f in self.told}) == len(self.told), "each once"
-        return {f.id: f.global_time for f in self.told}
+        assert len({f.id for f in self.reported}) == len(self.reported), "each once"
+        return {f.id: f.global_time for f in self.reported}
 
 
 FACE = '<faceLexeme id="f" lexeme="SMILE"{}/>'
@@ -63,7 +63,7 @@ def test_replanning_shares_the_stretch_between_a_new_and_a_running_block(stage: 
 def test_replanning_never_changes_what_has_passed(stage: Stage) -> None:
     stage.send("a", FACE.format(""))
     stage.until(0.6)
-    early = {f.id: f.global_time for f in stage.told}
+    early = {f.id: f.global_time for f in stage.reported}
     stage.send("b", '<wait id="w" duration="9" start="0" end="a:f:end"/>', at=0.6)
     times = stage.times()
     assert {id: times[id] for id in early} == early

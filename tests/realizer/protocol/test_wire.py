@@ -81,8 +81,8 @@ def test_values_have_the_type_of_their_kind(stream, values) -> None:
 def test_vertices_are_scaled_and_moved() -> None:
     steps = np.array([[-2, 0, 2], [4, 6, 8]], "<i2")
     frame = unpack(pack("mesh", 0, 0.0, steps.tobytes()))
-    told = replace(frame, stream_info={"scale": 0.5, "offset": [1.0, 2.0, 3.0]})
-    assert told.vertices.tolist() == [[0, 2, 4], [3, 5, 7]]
+    described = replace(frame, stream_info={"scale": 0.5, "offset": [1.0, 2.0, 3.0]})
+    assert described.vertices.tolist() == [[0, 2, 4], [3, 5, 7]]
     with pytest.raises(WireError, match="a mesh whose scale is known, got mesh"):
         _ = frame.vertices
 

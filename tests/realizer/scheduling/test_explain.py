@@ -120,9 +120,9 @@ def test_clauses_of_gaps_name_their_behaviours() -> None:
     body = '<faceLexeme id="a" lexeme="SMILE" end="0.5"/>\n<wait id="b" start="2" end="a:attackPeak"/>'
     found = schedule(body, {"a": lasting(1, 1, 1, least=0.3), "b": lasting(1.0)})
     (warning,) = found.warnings
-    told = {(c.id, c.line, c.text) for c in warning.clash}
-    assert ("b1:a", 2, "a:end = 0.5") in told
-    assert all(id in ("b1:a", "b1:b") for id, _, _ in told)
+    clauses = {(c.id, c.line, c.text) for c in warning.clash}
+    assert ("b1:a", 2, "a:end = 0.5") in clauses
+    assert all(id in ("b1:a", "b1:b") for id, _, _ in clauses)
 
 
 def test_clauses_are_left_out_of_the_json_without_a_conflict() -> None:

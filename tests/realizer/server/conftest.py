@@ -1,4 +1,4 @@
-"""A session on a clock of its own: time jumps from deadline to deadline, voices answer when they are told."""
+"""A session on a clock of its own: time jumps from deadline to deadline; tests say when voices answer."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def kept(tmp_path: Path) -> Settings:
 
 
 def spoken(seconds: float = 1.0) -> Utterance:
-    """A second of a rising ramp, so that every sample is told from its neighbours."""
+    """A second of a rising ramp, so that every sample differs from its neighbours."""
     pcm = (np.arange(round(seconds * RATE)) % 30000).astype(np.int16)
     return Utterance(seconds, (), (), {}, RATE, pcm)
 

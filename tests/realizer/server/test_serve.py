@@ -96,10 +96,10 @@ def test_serve_sends_a_mesh_that_moves_and_fits_the_face() -> None:
     async def test(server: Server) -> None:
         async with connect(server.url) as socket:
             await socket.send(json.dumps({"type": "subscribe", "stream": "mesh", "fps": 10}))
-            told = json.loads(await socket.recv())
+            subscribed = json.loads(await socket.recv())
             frame = unpack(await socket.recv())
-        assert frame.values.shape == (told["vertices"], 3)
-        face = await asyncio.to_thread(fetch, server.page + f"faces/{told['face']}")
+        assert frame.values.shape == (subscribed["vertices"], 3)
+        face = await asyncio.to_thread(fetch, server.page + f"faces/{subscribed['face']}")
         assert face[0] == 200
 
     serving(test)
@@ -242,14 +242,14 @@ def test_serve_prints_a_line_for_each_transport_that_is_ready() -> None:
             assert serving.stdout is not None
             assert serving.stderr is not None
             lines = [serving.stdout.readline() for _ in range(4)]
-            told = sorted(serving.stderr.readline() for _ in range(2))
+            warnings = sorted(serving.stderr.readline() for _ in range(2))
             serving.send_signal(signal.SIGTERM)
             assert (serving.wait(LIMIT), serving.stdout.read()) == (0, "")
     starts = ["listening on ws://127.0.0.1:", "page at http://127.0.0.1:", "asap: BML at 127.0.0.1:"]
     starts.append("xface: tasks at 127.0.0.1:")
     assert all(line.startswith(start) for line, start in zip(lines, starts, strict=True))
-    assert told[0] == f"realizer: stomp: no broker at {there} (nobody answers); looking for it\n"
-    assert told[1].startswith(f"realizer: xface player: no player at {there} (")
+    assert warnings[0] == f"realizer: stomp: no broker at {there} (nobody answers); looking for it\n"
+    assert warnings[1].startswith(f"realizer: xface player: no player at {there} (")
 
 
 def test_serve_names_what_a_transport_needs_in_one_sentence(tmp_path: Path) -> None:

@@ -64,10 +64,10 @@ BAD = [
 @pytest.mark.espeak
 @pytest.mark.parametrize(("speech", "words"), BAD, ids=range(len(BAD)))
 def test_speech_of_a_bad_text_gives_one_warning(voice: EspeakVoice, speech: str, words: str) -> None:
-    told = warned(played(speech, voice))
-    assert len(told) == 1
-    assert words in told[0]
-    assert "line 1" in told[0]
+    warnings = warned(played(speech, voice))
+    assert len(warnings) == 1
+    assert words in warnings[0]
+    assert "line 1" in warnings[0]
     assert not warned(played("<text>and now?</text>", voice))
 
 
@@ -76,9 +76,9 @@ def test_speech_of_a_bad_text_gives_one_warning(voice: EspeakVoice, speech: str,
 def test_speech_of_a_bad_text_gives_one_warning_by_hibari(
     neural: HibariVoice, speech: str, words: str
 ) -> None:
-    told = warned(played(speech, neural))
-    assert len(told) == 1
-    assert words in told[0]
+    warnings = warned(played(speech, neural))
+    assert len(warnings) == 1
+    assert words in warnings[0]
 
 
 @pytest.mark.parametrize(
@@ -104,7 +104,7 @@ def test_speech_of_odd_ssml_gives_one_warning(voice: EspeakVoice) -> None:
         '<break time="3600s"/><mark name="m"/>three <mark name=""/>four <mark name="m"/>five</speak>'
     )
     schedule = played(f'<text>a</text><description priority="1" type="{SSML}">{ssml}</description>', voice)
-    (told,) = warned(schedule)
+    (warnings,) = warned(schedule)
     odd = (
         'rate="banana"',
         "<nonsense>",
@@ -113,8 +113,8 @@ def test_speech_of_odd_ssml_gives_one_warning(voice: EspeakVoice) -> None:
         "without a name",
         "'m'",
     )
-    assert [words for words in odd if words not in told] == []
-    assert "Hz" not in told
+    assert [words for words in odd if words not in warnings] == []
+    assert "Hz" not in warnings
     assert list(points(schedule, "s")) == ["start", "m", "end"]
     assert points(schedule, "s")["end"] > points(schedule, "s")["m"] + 0.6
 
@@ -129,8 +129,8 @@ def test_speech_of_odd_ssml_gives_one_warning(voice: EspeakVoice) -> None:
     ],
 )
 def test_speech_in_an_unknown_language_gives_a_warning(voice: EspeakVoice, speech: str) -> None:
-    told = warned(played(speech, voice))
-    assert told == [
+    warnings = warned(played(speech, voice))
+    assert warnings == [
         "line 1, /bml/speech[1]: speech: espeak-ng does not speak 'xx-YY': spoken as English",
     ]
 
@@ -203,9 +203,9 @@ def test_engines_lose_one_sound_when_a_process_is_killed(
     assert isinstance(answers[0], VoiceError)
     assert not isinstance(again, RealizerError)
     assert again.duration > 0.5
-    told = capsys.readouterr().err.splitlines()
-    assert len(told) == 1
-    assert "going on without sound" in told[0]
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1
+    assert "going on without sound" in lines[0]
 
 
 @pytest.mark.espeak

@@ -47,12 +47,12 @@ def test_fit_models_recovers_a_published_unit(known: Model, tmp_path: Path) -> N
     path = tmp_path / "landmarks.csv"
     path.write_text(landmarks(known, (1, 15)))
     measured = read_measurements(path)
-    told: list[str] = []
-    model = fit_models(load_face(), measured, ("published",), told.append)["published"]
+    lines: list[str] = []
+    model = fit_models(load_face(), measured, ("published",), lines.append)["published"]
     rows = table(model, measured)
     assert [row.au for row in rows] == [1, 15]
     assert max(row.ratio for row in rows) < 0.02, table_text(rows)
-    assert [line.split(":")[0] for line in told] == ["AU1", "AU15"]
+    assert [line.split(":")[0] for line in lines] == ["AU1", "AU15"]
     # Only one side was measured; the other follows.
     corner = np.asarray(load_face().points["8.4"], np.float64)[None]
     assert model.displacement(15, corner) == pytest.approx(known.displacement(15, corner), abs=5e-4)

@@ -12,7 +12,7 @@ from realizer.facebuild.mpeg4.landmarks import head_of
 
 
 def wall(front: np.ndarray) -> HeadGeometry:
-    """Return a head whose skin is as far forward as told at 65 heights from -2.2 to 1."""
+    """Return a head whose skin is as far forward as given at 65 heights from -2.2 to 1."""
     heights = np.linspace(-2.2, 1.0, len(front))
     x = np.linspace(-0.5, 0.5, 11)
     at = np.stack([np.tile(x, len(front)), np.repeat(heights, 11), np.repeat(front, 11)], 1)

@@ -60,7 +60,7 @@ def test_schedule_message_and_state_message_describe_the_wire(driver) -> None:
     assert json.loads(state.text()) == client.of("state")[0]
 
 
-def test_subscribed_and_changed_have_index_0_unless_told() -> None:
+def test_subscribed_and_changed_have_index_0_by_default() -> None:
     assert Subscribed(stream="fap", encoding="json").index == 0
-    told = {"stream": "mesh", "frame": 7, "face": "ada", "vertices": 3, "scale": 1.0, "offset": [0.0] * 3}
-    assert FaceChanged.model_validate(told).index == 0
+    message = {"stream": "mesh", "frame": 7, "face": "ada", "vertices": 3, "scale": 1.0, "offset": [0.0] * 3}
+    assert FaceChanged.model_validate(message).index == 0

@@ -249,12 +249,14 @@ def test_rate_limiter_never_delays_a_client_within_its_rate() -> None:
 
 def test_rate_limiter_notices_a_flood_once() -> None:
     pace = RateLimiter(2)
-    told = [pace.wait(0.0) > 0 and pace.notice for _ in range(10)]
-    assert told[:4] == [False] * 4
-    assert told[4] == "wanted at most 2 messages a second; more are read later (REALIZER_MAX_RATE sets it)"
-    assert told[5:] == [None] * 5
+    notices = [pace.wait(0.0) > 0 and pace.notice for _ in range(10)]
+    assert notices[:4] == [False] * 4
+    assert notices[4] == "wanted at most 2 messages a second; more are read later (REALIZER_MAX_RATE sets it)"
+    assert notices[5:] == [None] * 5
     pace.wait(60.0)
-    assert [pace.wait(60.0) > 0 and pace.notice for _ in range(4)][-1] == told[4]  # and again, after a pause
+    assert [pace.wait(60.0) > 0 and pace.notice for _ in range(4)][-1] == notices[
+        4
+    ]  # and again, after a pause
 
 
 def test_rate_limiter_counts_several_messages_at_once() -> None:

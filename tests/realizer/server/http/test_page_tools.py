@@ -15,28 +15,28 @@ from realizer.tables import faps
 NAMES = [row.name for row in faps()]
 
 
-def told(text: str) -> list[dict]:
+def faults_of(text: str) -> list[dict]:
     return json.loads(lint(text, Settings()))["faults"]
 
 
 def test_lint_gives_the_place_of_a_fault() -> None:
     text = '<bml id="a">\n  <head id="n" lexeme="NIX"/>\n</bml>'
-    (fault,) = told(text)
+    (fault,) = faults_of(text)
     (spot,) = fault["spots"]
     line = text.split("\n")[spot["line"] - 1]
     assert line[spot["column"] - 1 :][: spot["length"]] == "NIX"
     assert "NOD" in fault["notes"][0]
-    assert told(text.replace("NIX", "NOD")) == []
+    assert faults_of(text.replace("NIX", "NOD")) == []
 
 
 def test_lint_marks_advice() -> None:
-    (fault,) = told('<bml id="a"><head id="n" lexeme="NOD" start="300"/></bml>')
+    (fault,) = faults_of('<bml id="a"><head id="n" lexeme="NOD" start="300"/></bml>')
     assert fault["type"] == "ADVICE"
 
 
 @pytest.mark.parametrize("text", ["", "no markup", "<", "<bml", "\ud800", "<bml id='a'>" * 300])
 def test_lint_answers_any_text(text: str) -> None:
-    assert isinstance(told(text), list)
+    assert isinstance(faults_of(text), list)
 
 
 def test_lint_says_that_a_text_is_too_long() -> None:

@@ -113,13 +113,13 @@ def test_fleet_repeats_no_feedback_to_a_client_that_comes_back(
 
     with (tmp_path / "proxy.log").open("w+") as log:
         with proxy(nodes, log) as at:
-            told = asyncio.run(test(at))
+            feedback = asyncio.run(test(at))
         log.seek(0)
         written = log.read()
-    seqs = seq_numbers(told)
+    seqs = seq_numbers(feedback)
     assert seqs == list(range(1, len(seqs) + 1))
-    assert any('id="a:end"' in text for text in told)
-    for text in told:
+    assert any('id="a:end"' in text for text in feedback)
+    for text in feedback:
         parse_feedback(text)
     assert "GET /ws" in written
     assert "hidden" not in written

@@ -113,10 +113,10 @@ def test_checkpoint_with_less_feedback_than_a_client_missed_sends_a_gap() -> Non
     restore_session(again, kept, spoken)
     again.connect(9, end, seen=1)
     gap, *rest = [str(effect.data) for effect in again.take_effects() if isinstance(effect, Send)]
-    told = json.loads(gap)
-    assert (told["type"], told["seen"]) == ("gap", 1)
-    assert told["first"] > 2
-    assert seq_numbers(rest) == list(range(told["first"], again.feedback_log.newest + 1))
+    answer = json.loads(gap)
+    assert (answer["type"], answer["seen"]) == ("gap", 1)
+    assert answer["first"] > 2
+    assert seq_numbers(rest) == list(range(answer["first"], again.feedback_log.newest + 1))
 
 
 def test_checkpoint_writes_a_clip_once_and_deletes_it_with_its_session() -> None:

@@ -39,7 +39,7 @@ def recorded(folder: Path) -> tuple[Path, list[str]]:
         (100.9, "<bml"),
         (101.0, '{"type": "set", "aus": {"12L": 0.3}}'),
     ]
-    told: list[str] = []
+    feedback: list[str] = []
     answers: list[tuple[float, Speak]] = []
     for step in range(800):
         now = 100.0 + step * 0.0107
@@ -53,29 +53,29 @@ def recorded(folder: Path) -> tuple[Path, list[str]]:
             if isinstance(effect, Speak):
                 answers.append((now + 0.2, effect))
             elif isinstance(effect, Send) and str(effect.data).startswith("<"):
-                told.append(str(effect.data))
+                feedback.append(str(effect.data))
     session.disconnect(1, now)
     session.journal.end()
-    return next(folder.glob("*.jsonl")), told
+    return next(folder.glob("*.jsonl")), feedback
 
 
 def test_replay_recording_repeats_the_feedback_to_the_last_digit(tmp_path: Path) -> None:
-    path, told = recorded(tmp_path)
+    path, feedback = recorded(tmp_path)
     realization, again = replay_recording(read_recording(path))
-    assert again == playback.replay_feedback(read_recording(path)) == told
-    assert any('"b:end"' in text for text in told)
+    assert again == playback.replay_feedback(read_recording(path)) == feedback
+    assert any('"b:end"' in text for text in feedback)
     assert [w.text for w in realization.speeches[0].utterance.words] == ["Hello", "how", "are", "you"]
 
 
 def test_replay_recording_plays_what_was_planned_to_its_end(tmp_path: Path) -> None:
-    path, told = recorded(tmp_path)
+    path, feedback = recorded(tmp_path)
     lines = path.read_text().splitlines()
     spoken = next(k for k, line in enumerate(lines) if '"spoken"' in line)
     path.write_text("\n".join(lines[: spoken + 1]) + '\n{"at": 0.9, "kind": "te')
     _, again = replay_recording(read_recording(path))
     assert any('id="a:end"' in text for text in again)
     assert not any('id="b:' in text for text in again)
-    assert again[:4] == told[:4]
+    assert again[:4] == feedback[:4]
 
 
 def test_replay_recording_ends_with_the_words_of_an_open_speech(tmp_path: Path) -> None:
@@ -124,9 +124,9 @@ def test_replay_recording_names_the_line_that_is_no_entry(tmp_path: Path) -> Non
 
 
 def test_replay_command_prints_feedback_and_writes_any_output(tmp_path: Path) -> None:
-    path, told = recorded(tmp_path)
+    path, feedback = recorded(tmp_path)
     printed = CliRunner().invoke(cli, ["replay", str(path)])
-    assert printed.output.splitlines() == "\n".join(told).splitlines()
+    assert printed.output.splitlines() == "\n".join(feedback).splitlines()
     out = tmp_path / "x.json"
     assert CliRunner().invoke(cli, ["replay", str(path), "-o", str(out), "--fps", "10"]).exit_code == 0
     assert json.loads(out.read_text())["fps"] == 10
@@ -135,9 +135,9 @@ def test_replay_command_prints_feedback_and_writes_any_output(tmp_path: Path) ->
 def test_replay_recording_is_silent_without_its_voice(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path, told = recorded(tmp_path)
+    path, feedback = recorded(tmp_path)
     path.write_text(path.read_text().replace('"voice": "silent"', '"voice": "no-such-voice"'))
-    assert len(replay_recording(read_recording(path), voice="silent")[1]) == len(told)
+    assert len(replay_recording(read_recording(path), voice="silent")[1]) == len(feedback)
     again = replay_recording(read_recording(path))[1]
     assert sum("no-such-voice" in text for text in again) == 1  # in a warning
     assert any('id="b:end"' in text for text in again)

@@ -171,9 +171,9 @@ TICK = b'{"at": 5, "kind": "tick"}\n'
 def test_read_recording_names_the_faulty_line(content: bytes, fault: str, tmp_path: Path) -> None:
     path = tmp_path / "x.jsonl"
     path.write_bytes(content)
-    told = CliRunner().invoke(cli, ["replay", str(path)])
-    assert told.exit_code == 1
-    assert fault in told.output
+    done = CliRunner().invoke(cli, ["replay", str(path)])
+    assert done.exit_code == 1
+    assert fault in done.output
 
 
 def test_read_recording_reads_a_file_of_version_1(tmp_path: Path) -> None:
@@ -218,9 +218,9 @@ def test_read_recording_accepts_a_folder_with_one_file(tmp_path: Path) -> None:
     assert read_recording(tmp_path) == read_recording(path)
     other = tmp_path / "other.jsonl"
     other.write_bytes(BEGIN)
-    told = CliRunner().invoke(cli, ["replay", str(tmp_path)])
-    assert told.exit_code == 1
-    assert f"got 2\n  {other}\n  {path}" in told.output
+    done = CliRunner().invoke(cli, ["replay", str(tmp_path)])
+    assert done.exit_code == 1
+    assert f"got 2\n  {other}\n  {path}" in done.output
 
 
 def test_replay_of_a_recording_that_lasts_too_long_gives_feedback_only(tmp_path: Path) -> None:

@@ -35,9 +35,9 @@ POINTS = ("start", "ready", "strokeStart", "stroke", "strokeEnd", "relax", "end"
 SCENE = json.dumps({"type": "scene", "objects": {"cup": {"x": 0.2, "y": -0.1, "z": 0.5}}})
 
 
-def points(told: list[str]) -> list[str]:
+def points(received: list[str]) -> list[str]:
     """Return the blocks and sync points that feedback has reported as reached."""
-    return [text.split(' id="')[1].split('"')[0] for text in told if "Progress" in text.split(" ")[0]]
+    return [text.split(' id="')[1].split('"')[0] for text in received if "Progress" in text.split(" ")[0]]
 
 
 async def drained(client: ClientConnection) -> None:
@@ -53,14 +53,14 @@ def test_restored_session_sends_all_feedback_once_and_in_order(where: str) -> No
             await client.send(SCENE)
             await client.send(FIRST)
             await client.send(NEXT)
-            told = []
+            received = []
             async for message in client:
                 if isinstance(message, str) and message.startswith("<"):
-                    told.append(message)
+                    received.append(message)
                     if 'id="a:s:m"' in message:  # the second block waits, the first one is in the middle
                         service.kill()
                         break
-            return told + await read_feedback(client, "never")
+            return received + await read_feedback(client, "never")
 
     async def after(url: str, seen: int) -> list[str]:
         async with asyncio.timeout(LIMIT), connect(f"{url}?session=killed&seen={seen}") as client:
@@ -110,7 +110,7 @@ def test_restored_session_has_the_state_of_its_checkpoint(
         async with asyncio.timeout(LIMIT), connect(f"{url}?session=long", max_queue=None) as client:
             for message in (SCENE, hold, FIRST):
                 await client.send(message)
-            told = await read_feedback(client, "a:end")
+            received = await read_feedback(client, "a:end")
             for _ in range(ENTRIES):
                 await client.send(SCENE)
             while not in_a_checkpoint(where, "long"):  # the face comes to rest
@@ -118,9 +118,9 @@ def test_restored_session_has_the_state_of_its_checkpoint(
                 await client.recv()
             await client.send(tied)
             await client.send(NEXT.replace("APPEND", "MERGE"))
-            told += await read_feedback(client, "b:start")
+            received += await read_feedback(client, "b:start")
             service.kill()
-            return told + await read_feedback(client, "never")
+            return received + await read_feedback(client, "never")
 
     async def after(url: str, seen: int) -> tuple[list[str], list[str], dict[str, float]]:
         async with asyncio.timeout(LIMIT), connect(f"{url}?session=long&seen={seen}") as client:
@@ -168,38 +168,38 @@ def test_restored_sessions_of_fifty_clients_repeat_no_feedback(
     where: str,
 ) -> None:
     block = '<bml id="b"><head id="n" lexeme="NOD" start="{:.2f}" end="{:.2f}"/></bml>'
-    told: dict[int, list[str]] = {k: [] for k in range(50)}
+    received: dict[int, list[str]] = {k: [] for k in range(50)}
 
     async def before(url: str, service: subprocess.Popen[str]) -> None:
-        playing = asyncio.Barrier(len(told))
+        playing = asyncio.Barrier(len(received))
 
         async def one(k: int) -> None:
             async with connect(f"{url}?session=one-{k}") as client:
                 await client.send(SCENE)
                 await client.send(block.format(k / 50, 1.5 + k / 50))
-                told[k] += await read_feedback(client, "b:start")
+                received[k] += await read_feedback(client, "b:start")
                 await playing.wait()  # all of them play, each is elsewhere
                 service.kill()
-                told[k] += await read_feedback(client, "never")
+                received[k] += await read_feedback(client, "never")
 
         async with asyncio.timeout(LIMIT):
-            await asyncio.gather(*map(one, told))
+            await asyncio.gather(*map(one, received))
 
     async def after(url: str) -> None:
         async def one(k: int) -> None:
-            seen = seq_numbers(told[k])[-1]
+            seen = seq_numbers(received[k])[-1]
             async with connect(f"{url}?session=one-{k}&seen={seen}") as client:
-                told[k] += await read_feedback(client, "b:end")
+                received[k] += await read_feedback(client, "b:end")
 
         async with asyncio.timeout(LIMIT):
-            await asyncio.gather(*map(one, told))
+            await asyncio.gather(*map(one, received))
 
     with serving("--journal", where) as (url, service):
         asyncio.run(before(url, service))
-    assert any("b:end" not in text for texts in told.values() for text in texts[-1:])
+    assert any("b:end" not in text for texts in received.values() for text in texts[-1:])
     with serving("--journal", where) as (url, _):
         asyncio.run(after(url))
-    for texts in told.values():
+    for texts in received.values():
         seqs = seq_numbers(texts)
         assert seqs == list(range(1, len(seqs) + 1))
         assert points(texts) == ["b:start", *(f"b:n:{point}" for point in POINTS), "b:end"]
@@ -328,15 +328,15 @@ def test_restored_session_catches_up_for_a_second_client_without_a_gap(clock: Cl
         async with asyncio.timeout(LIMIT):
             async with Server(kept) as server, connect(f"{server.url}?session=s") as client:
                 await client.send(block)
-                told = await read_feedback(client, "b:n:end")
+                received = await read_feedback(client, "b:n:end")
             clock.step = -3600.0  # what has passed since is not known
             async with Server(kept) as server, connect(f"{server.url}?session=s&seen=1") as first:
-                seen = seq_numbers(told)[-1]
+                seen = seq_numbers(received)[-1]
                 async with connect(f"{server.url}?session=s&seen={seen}") as second:
                     rest = await read_feedback(second, "b:end")
                 others = await read_feedback(first, "b:end")
-        assert seq_numbers(told + rest) == list(range(1, len(told + rest) + 1))
-        assert others == told[1:] + rest
+        assert seq_numbers(received + rest) == list(range(1, len(received + rest) + 1))
+        assert others == received[1:] + rest
 
     asyncio.run(run())
 
@@ -358,6 +358,6 @@ def test_restored_session_is_not_replaced_by_a_hello(where: str) -> None:
             return await read_feedback(client, "b:end")
 
     with serving("--journal", where) as (url, _):
-        told = asyncio.run(play(url))
+        received = asyncio.run(play(url))
     with serving("--journal", where) as (url, _):
-        assert asyncio.run(resume(url)) == told
+        assert asyncio.run(resume(url)) == received

@@ -106,7 +106,7 @@ def test_factory_that_cannot_restore_leaves_the_journal_unchanged(
         async with asyncio.timeout(LIMIT):
             async with Server(kept) as server, connect(f"{server.url}?session=s") as client:
                 await client.send(NEXT)
-                told = await read_feedback(client, "b:end")
+                feedback = await read_feedback(client, "b:end")
             async with Server(kept) as server:
                 with monkeypatch.context() as here:
                     here.setattr(Session, "receive", None)
@@ -119,7 +119,7 @@ def test_factory_that_cannot_restore_leaves_the_journal_unchanged(
                         "session s cannot be resumed: internal error",
                     )
                 async with connect(f"{server.url}?session=s&seen=0") as client:
-                    assert await read_feedback(client, "b:end") == told
+                    assert await read_feedback(client, "b:end") == feedback
 
     asyncio.run(run())
 
@@ -140,10 +140,10 @@ def test_factory_restores_a_session_whose_recording_failed(
         async with asyncio.timeout(LIMIT):
             async with Server(settings) as server, connect(f"{server.url}?session=s") as client:
                 await client.send(NEXT)
-                told = await read_feedback(client, "b:end")
+                feedback = await read_feedback(client, "b:end")
                 assert "realizer_records_stopped_total 1" in server._sessions.metrics_text()
             async with Server(settings) as server, connect(f"{server.url}?session=s&seen=0") as client:
-                assert await read_feedback(client, "b:end") == told
+                assert await read_feedback(client, "b:end") == feedback
 
     asyncio.run(run())
 

@@ -94,15 +94,15 @@ def test_aggregate_sums_health_and_names_silent_workers(monkeypatch: pytest.Monk
     monkeypatch.setattr(module, "HASTE", 0.2)
     request = REQUEST.replace(b"/metrics", b"/healthz")
 
-    def told(*answers: bytes | None) -> tuple[bytes, object]:
+    def health_of(*answers: bytes | None) -> tuple[bytes, object]:
         head, _, body = asked(*answers, request=request)[0].partition(b"\r\n\r\n")
         assert b"Content-Length: %d" % len(body) in head
         return head[9:12], json.loads(body)
 
     whole = {"status": "ok", "sessions": 3, "connections": 4, "workers": 2}
-    assert told(health(1), health(2)) == (b"200", whole)
+    assert health_of(health(1), health(2)) == (b"200", whole)
     partly = {"status": "partly", "sessions": 1, "connections": 2, "workers": 3, "silent": [1, 2]}
-    assert told(health(1), None, b"") == (b"200", partly)
+    assert health_of(health(1), None, b"") == (b"200", partly)
     got, _ = asked(None, b"", request=request)
     assert got.startswith(b"HTTP/1.1 503 ")
     assert got.endswith(b"no worker answers")

@@ -72,7 +72,7 @@ def one_of(number: int) -> str:
     return next(f"s{k}" for k in range(100) if worker_of(f"s{k}", 2, Settings()) == number)
 
 
-async def told(client: ClientConnection, what: str) -> str:
+async def message_with(client: ClientConnection, what: str) -> str:
     """The first text message that holds `what`."""
     async for message in client:
         if isinstance(message, str) and what in message:
@@ -88,7 +88,7 @@ def test_workers_bring_clients_of_a_session_together(workers: Workers) -> None:
             name = one_of(number)
             async with connect(f"{url}?session={name}") as sends, connect(f"{url}?session={name}") as looks:
                 await sends.send(NOD.format(f"b{number}"))
-                assert "blockProgress" in await told(looks, f'"b{number}:start"')
+                assert "blockProgress" in await message_with(looks, f'"b{number}:start"')
 
     played(test())
 
@@ -101,10 +101,10 @@ def test_workers_say_how_to_reach_a_session_of_another_worker(
     async def test() -> None:
         async with connect(f"{url}?session={one_of(0)}") as client:
             await client.send(json.dumps({"type": "hello", "version": 1, "session": one_of(1)}))
-            error = json.loads(await told(client, '"error"'))
+            error = json.loads(await message_with(client, '"error"'))
             assert f"/ws?session={one_of(1)}" in error["message"]
             await client.send(NOD.format("b"))  # and plays on
-            await told(client, '"b:end"')
+            await message_with(client, '"b:end"')
 
     played(test())
 
@@ -141,7 +141,7 @@ def test_workers_show_the_sum_of_all_metrics(workers: Workers) -> None:
             # One after the other, because two documents planned in one wake-up count as one.
             for number, client in enumerate(clients):
                 await client.send(NOD.format(f"m{number}"))
-                await told(client, f'"m{number}:start"')
+                await message_with(client, f'"m{number}:start"')
             await until(workers, connections=3)
             each = [await asyncio.to_thread(metrics, workers, f"?worker={number}") for number in (0, 1)]
             whole = await asyncio.to_thread(metrics, workers)
@@ -174,18 +174,18 @@ def health(workers: Workers, query: str = "") -> dict[str, object]:
         with urllib.request.urlopen(
             f"http://127.0.0.1:{workers.port}/healthz{query}", timeout=LIMIT
         ) as answer:
-            told: dict[str, object] = json.loads(answer.read())
+            answer_fields: dict[str, object] = json.loads(answer.read())
     except urllib.error.HTTPError as none:  # none of them has answered in time
         with none:
             return {}
-    return told
+    return answer_fields
 
 
 async def until(workers: Workers, **wanted: object) -> dict[str, object]:
     """Wait until the health of all workers is as wanted; a busy machine keeps them waiting."""
-    while not wanted.items() <= (told := await asyncio.to_thread(health, workers)).items():
+    while not wanted.items() <= (answer_fields := await asyncio.to_thread(health, workers)).items():
         pass
-    return told
+    return answer_fields
 
 
 def test_workers_report_the_health_of_all_while_one_hangs(workers: Workers) -> None:
@@ -255,18 +255,18 @@ def test_workers_restart_one_that_was_killed_while_others_play(workers: Workers)
         async with connect(f"{url}?session={one_of(0)}") as stays:
             async with connect(f"{url}?session={one_of(1)}") as client:
                 await client.send(NOD.format("b"))
-                await told(client, '"b:start"')
+                await message_with(client, '"b:start"')
                 killed = workers._children[1][0].pid
                 os.kill(killed, signal.SIGKILL)
                 with contextlib.suppress(ConnectionClosed):
-                    await told(client, '"b:end"')
+                    await message_with(client, '"b:end"')
             while workers._children[1][0].pid == killed:
                 await asyncio.sleep(0)
             await stays.send(NOD.format("c"))
-            await told(stays, '"c:end"')
+            await message_with(stays, '"c:end"')
             async with connect(f"{url}?session={one_of(1)}", open_timeout=LIMIT) as client:
                 await client.send(NOD.format("d"))
-                await told(client, '"d:end"')
+                await message_with(client, '"d:end"')
 
     played(test())
 
@@ -279,7 +279,7 @@ def test_workers_do_not_wait_for_clients_that_send_half_a_line(workers: Workers)
         silent[0].sendall(b"GET /ws?sess")
         async with connect(url) as client:
             await client.send(NOD.format("b"))
-            await told(client, '"b:start"')
+            await message_with(client, '"b:start"')
         silent[0].sendall(b"ion=x HTTP/1.1\r\nHost: x\r\n\r\n")
         answer = await asyncio.to_thread(silent[0].recv, 4096)
         assert b" 426 " in answer
@@ -301,9 +301,9 @@ def test_workers_of_the_command_drain_and_end() -> None:
         async def play() -> None:
             async with connect(url) as client:
                 await client.send(NOD.format("b"))
-                await told(client, '"b:start"')
+                await message_with(client, '"b:start"')
                 service.send_signal(signal.SIGTERM)
-                await told(client, '"b:end"')
+                await message_with(client, '"b:end"')
 
         played(play())
         assert service.wait(LIMIT) == 0

@@ -13,5 +13,5 @@ def test_welcome_has_capabilities_and_limits(driver) -> None:
 def test_welcome_has_the_limits_of_the_settings(drive) -> None:
     limits = {"max_elements": 7, "max_duration": 8, "max_speech": 9, "max_rate": 10, "max_pixels": 1000}
     (welcome,) = drive(**limits).send({"type": "hello"}).of("welcome")
-    told = {f"max_{name}": value for name, value in welcome["limits"].items()}
-    assert limits.items() <= told.items()
+    announced = {f"max_{name}": value for name, value in welcome["limits"].items()}
+    assert limits.items() <= announced.items()

@@ -85,8 +85,8 @@ def test_admission_refuses_a_wrong_token_before_a_session_is_created() -> None:
                 await connect(target)
             assert refused.value.response.status_code == 401
             assert b"REALIZER_TOKEN" in refused.value.response.body
-        told = await welcomed(server.url, {"token": "x"})
-        assert (told["type"], told["code"], told["where"]) == ("error", "token", "hello.token")
+        reply = await welcomed(server.url, {"token": "x"})
+        assert (reply["type"], reply["code"], reply["where"]) == ("error", "token", "hello.token")
         async with connect(server.url) as socket:
             await socket.send(NOD.format("b"))
             assert json.loads(await socket.recv())["code"] == "token"
@@ -122,8 +122,8 @@ def test_admission_by_a_signed_token_is_for_its_sessions_only() -> None:
                 await connect(target)
             assert refused.value.response.status_code == 403
             assert b"session: wanted one that the token is for (show)" in refused.value.response.body
-        told = await welcomed(f"{server.url}?session=other", {"token": mine})
-        assert (told["code"], told["where"]) == ("token", "hello.session")
+        reply = await welcomed(f"{server.url}?session=other", {"token": mine})
+        assert (reply["code"], reply["where"]) == ("token", "hello.session")
         async with connect(f"{server.url}?session=show&token={mine}") as socket:
             await socket.send(json.dumps({"type": "hello", "session": "other"}))
             error = json.loads(await socket.recv())
@@ -247,10 +247,10 @@ def test_admission_logs_no_token_at_any_level(caplog: pytest.LogCaptureFixture) 
     mine, old = signed(), signed(exp=1)
     with caplog.at_level(logging.DEBUG):
         serving(test, token=TOKEN, jwt_key=SECRET)
-    told = [*caplog.messages, *map(str, (vars(record) for record in caplog.records))]
-    assert any("joined" in line for line in told)
+    lines = [*caplog.messages, *map(str, (vars(record) for record in caplog.records))]
+    assert any("joined" in line for line in lines)
     secrets = (TOKEN, SECRET, "other-secret", mine, old)
-    assert not [line for line in told if any(secret in line for secret in secrets)]
+    assert not [line for line in lines if any(secret in line for secret in secrets)]
 
 
 def test_admission_refuses_pages_of_other_origins() -> None:
@@ -357,13 +357,13 @@ def test_admission_metrics_count_slow_steps_and_the_log_names_them(
 
     with caplog.at_level(logging.INFO):
         serving(test)
-    told = [record for record in caplog.records if record.message.startswith("slow step: ")]
+    records = [record for record in caplog.records if record.message.startswith("slow step: ")]
     size = len(NOD.format("b"))
     actions = {f"a message of {size} characters", "a document", "frames and feedback"}
-    assert actions == {record.action for record in told}  # type: ignore[attr-defined]
-    assert all(record.session == "show" for record in told)  # type: ignore[attr-defined]
+    assert actions == {record.action for record in records}  # type: ignore[attr-defined]
+    assert all(record.session == "show" for record in records)  # type: ignore[attr-defined]
     assert re.fullmatch(
-        r"slow step: \d+ ms for a message .* \(session show, connections \d+\)", told[0].message
+        r"slow step: \d+ ms for a message .* \(session show, connections \d+\)", records[0].message
     )
 
 
@@ -406,10 +406,10 @@ def test_admission_lets_pages_of_allowed_origins_read_answers() -> None:
         for origin in ("https://app.example", "http://localhost:3000"):
             for path in ("faces/ada", "healthz"):
                 assert (await headers(path, Origin=origin))["Access-Control-Allow-Origin"] == origin
-        for told in (await headers("healthz"), await headers("healthz", Origin="https://evil.example")):
-            assert told["Access-Control-Allow-Origin"] is None
-            assert told["Vary"] == "Origin"
-            assert "frame-ancestors 'self'" in told["Content-Security-Policy"]
+        for response in (await headers("healthz"), await headers("healthz", Origin="https://evil.example")):
+            assert response["Access-Control-Allow-Origin"] is None
+            assert response["Vary"] == "Origin"
+            assert "frame-ancestors 'self'" in response["Content-Security-Policy"]
         with pytest.raises(urllib.error.HTTPError, match="403"):
             await read(f"{server.page}faces/ada", {"Origin": "https://evil.example"})
 

@@ -477,8 +477,8 @@ def test_asap_applies_and_names_the_limits_of_the_service(limit: dict[str, int],
 def test_asap_prints_its_address_and_raises_if_it_is_in_use() -> None:
     async def test(server: Server, bml: int, port: int) -> None:
         (transport,) = [d for d in server.transports if isinstance(d, AsapTransport)]
-        told = f"asap: BML at 127.0.0.1:{bml}, feedback to port {port} of the client, session asap-ADDRESS"
-        assert transport.startup_lines == (told,)
+        line = f"asap: BML at 127.0.0.1:{bml}, feedback to port {port} of the client, session asap-ADDRESS"
+        assert transport.startup_lines == (line,)
         with pytest.raises(OSError, match="in use"):
             await Server(Settings(port=0, asap_ports=(bml, port))).start()
 

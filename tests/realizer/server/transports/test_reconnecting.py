@@ -15,7 +15,7 @@ LIMIT = 10  # s; a hung test ends
 
 
 class Scripted(ReconnectingTransport):
-    """A transport whose connections succeed or fail as told, and which waits for ever after the last."""
+    """A transport whose connections succeed or fail in this order; it waits for ever after the last."""
 
     def __init__(self, *succeeds: bool) -> None:
         super().__init__("peer", "[::1]:7")

@@ -111,8 +111,8 @@ def test_vhmsg_reports_a_vrspeak_from_start_to_end() -> None:
 def test_vhmsg_starts_several_blocks_once_and_ends_with_the_last() -> None:
     dialect = vhmsg()
     assert len(spoken(dialect, 'vrSpeak Brad ALL m1 <act><bml id="x"/><bml id="y"/></act>')) == 2
-    told = [progress("x", "start"), progress("y", "start"), progress("x", "end"), progress("y", "end")]
-    counts = [len(dialect.outgoing(feedback)) for feedback in told]
+    messages = [progress("x", "start"), progress("y", "start"), progress("x", "end"), progress("y", "end")]
+    counts = [len(dialect.outgoing(feedback)) for feedback in messages]
     assert counts == [1, 0, 0, 2]
 
 

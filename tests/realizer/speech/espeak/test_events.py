@@ -222,8 +222,8 @@ def struct(kind: int, sample: int = 0, place: int = 0, text: bytes = b"") -> byt
 
 
 def read(*structs: bytes, marks: tuple[str, ...] = (), sound: bytes = b"") -> list[Event]:
-    told = b"".join(structs)
-    return read_answer({"events": len(told), "marks": list(marks)}, told + sound)[0]
+    records = b"".join(structs)
+    return read_answer({"events": len(records), "marks": list(marks)}, records + sound)[0]
 
 
 def test_read_answer_returns_type_sample_place_and_text() -> None:
@@ -239,8 +239,8 @@ def test_read_answer_ignores_other_events() -> None:
 
 
 def test_read_answer_names_marks_by_the_head() -> None:
-    told = read(struct(MARK, 1), struct(WORD, 2), struct(MARK, 3), marks=("m0", "m1"))
-    assert [(sample, text) for _, sample, _, text in told] == [(1, "m0"), (2, ""), (3, "m1")]
+    events = read(struct(MARK, 1), struct(WORD, 2), struct(MARK, 3), marks=("m0", "m1"))
+    assert [(sample, text) for _, sample, _, text in events] == [(1, "m0"), (2, ""), (3, "m1")]
 
 
 @pytest.mark.parametrize(
@@ -257,7 +257,9 @@ def test_read_answer_ends_phonemes_at_0_or_after_eight_bytes(raw: bytes, ipa: st
 
 
 def test_read_answer_returns_read_only_samples() -> None:
-    told = struct(WORD) + struct(END)
-    _, pcm = read_answer({"events": len(told), "marks": []}, told + np.array([1, -2, 3], "<i2").tobytes())
+    records = struct(WORD) + struct(END)
+    _, pcm = read_answer(
+        {"events": len(records), "marks": []}, records + np.array([1, -2, 3], "<i2").tobytes()
+    )
     assert pcm.tolist() == [1, -2, 3]
     assert not pcm.flags.writeable

@@ -19,8 +19,8 @@ TEXT = SpeechRequest('One <mark name="m"/>two, three', ("m",))
 WORDS = (Word(0.2, 0.5, "One"), Word(1.0, 1.3, "two,"), Word(1.3, 1.8, "three"))
 
 
-def said(request: SpeechRequest = TEXT, **told):
-    recording = Recording(RATE, SOUND, **told)
+def said(request: SpeechRequest = TEXT, **fields):
+    recording = Recording(RATE, SOUND, **fields)
     return speak_to_length(SilentVoice(), SpeechRequest(request.ssml, request.marks, recording=recording))
 
 

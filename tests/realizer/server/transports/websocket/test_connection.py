@@ -27,15 +27,15 @@ def closed(url: str, *messages: str, **settings: object) -> tuple[list[str], int
     """Return the answers to a client whose first messages are these, and the code and reason of the close."""
 
     async def run() -> tuple[list[str], int, str]:
-        told: list[str] = []
+        received: list[str] = []
         here = Settings(port=0, voice="silent", **settings)  # type: ignore[arg-type]
         async with asyncio.timeout(LIMIT), Server(here) as server, connect(server.url + url) as client:
             for message in messages:
                 await client.send(message)
             with contextlib.suppress(ConnectionClosed):
                 while True:
-                    told.append(str(await client.recv()))
-        return told, client.close_code or 0, client.close_reason or ""
+                    received.append(str(await client.recv()))
+        return received, client.close_code or 0, client.close_reason or ""
 
     return asyncio.run(run())
 
@@ -54,8 +54,8 @@ def test_connection_asks_to_come_again_if_a_session_cannot_be_read(
         raise JournalError("the disk does not answer")
 
     monkeypatch.setattr("realizer.server.journal.sqlite_journal.SqliteJournal.claim", broken)
-    told, code, reason = closed("?session=s", journal=str(tmp_path / "journal.db"))
-    assert (told, code, reason) == ([], 1013, "the disk does not answer")
+    received, code, reason = closed("?session=s", journal=str(tmp_path / "journal.db"))
+    assert (received, code, reason) == ([], 1013, "the disk does not answer")
 
 
 def test_connection_logs_its_begin_and_end(caplog: pytest.LogCaptureFixture) -> None:

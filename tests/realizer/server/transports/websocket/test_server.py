@@ -49,9 +49,9 @@ async def ask(socket: ClientConnection, **message: Any) -> dict[str, Any]:
     """The next JSON message after this one was sent."""
     await socket.send(json.dumps(message))
     while True:
-        told = await socket.recv()
-        if isinstance(told, str) and told.startswith("{"):
-            reply: dict[str, Any] = json.loads(told)
+        data = await socket.recv()
+        if isinstance(data, str) and data.startswith("{"):
+            reply: dict[str, Any] = json.loads(data)
             return reply
 
 
@@ -86,8 +86,8 @@ def test_websocket_shows_one_sender_and_three_viewers_the_same() -> None:
             streams = ("fap", "au", "arkit")
             for viewer in viewers:
                 for stream in streams:
-                    told = await ask(viewer, type="subscribe", stream=stream, fps=50)
-                    assert told["type"] == "subscribed"
+                    subscribed = await ask(viewer, type="subscribe", stream=stream, fps=50)
+                    assert subscribed["type"] == "subscribed"
             await manager.send(WAIT.format("b"))
             seen: list[dict[tuple[int, int], bytes]] = []
             heard: list[list[str]] = []

@@ -258,10 +258,10 @@ def test_player_without_a_greeting_is_given_up(
         assert not player.shown
 
     playing(test)
-    told = [record.getMessage() for record in caplog.records if "no player" in record.getMessage()]
-    assert len(told) == 1
+    warnings = [record.getMessage() for record in caplog.records if "no player" in record.getMessage()]
+    assert len(warnings) == 1
     assert re.fullmatch(
-        r"xface player: no player at 127\.0\.0\.1:\d+ \(nobody answers\); looking for it", told[0]
+        r"xface player: no player at 127\.0\.0\.1:\d+ \(nobody answers\); looking for it", warnings[0]
     )
 
 
