@@ -5,7 +5,7 @@ from __future__ import annotations
 import codecs
 import re
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from itertools import count, islice
 from typing import Any
 
@@ -13,7 +13,7 @@ from lxml import etree
 
 from bml_schema.canonical import xml_parser
 from bml_schema.dialects.recognition import has_words_of_dialects
-from bml_schema.dialects.translator import is_draft, made_ids, translate
+from bml_schema.dialects.translator import dialect_of, is_draft, made_ids, translate
 from bml_schema.document_splitter import (
     NEXT,
     WRAPPER_TAG,
@@ -253,7 +253,7 @@ class _Reader:
             )
 
         if self.strict_bml:
-            return block(notes)
+            return self._read_strictly(root, block)
         plain: Block | BMLError | None = None
         if not self.wrapper and not is_draft(root):
             # Nearly all documents are BML 1.0. Others have faults, or words that occur in dialects only.
@@ -275,6 +275,22 @@ class _Reader:
         if isinstance(plain, BMLError):
             raise plain
         return plain
+
+    def _read_strictly(self, root: etree._Element, block: Callable[[tuple[str, ...]], Block]) -> Block:
+        """Read BML 1.0 only; if there are faults, say of which dialect they are words."""
+        try:
+            plain = block(())
+        except BMLError as error:
+            if name := dialect_of(root, self.wrapper):
+                text = f"{error.text}; {_NOT_READ.format(name)}"
+                raise type(error)(text, line=error.line, path=error.path, block=error.block) from None
+            raise
+        if plain.problems and (name := dialect_of(root, self.wrapper)):
+            return block((_NOT_READ.format(name),))
+        return plain
+
+
+_NOT_READ = "this is {}, which is not read in strict BML"
 
 
 def _block(text: str, span: DocumentSpan, line: int, reader: _Reader, max_bytes: int) -> Block:

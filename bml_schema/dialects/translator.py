@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from copy import deepcopy
 from itertools import count
 from typing import Any
 
@@ -18,12 +19,13 @@ from bml_schema.nodes import BMLA, BMLT, CORE, DRAFTS, EXTENSIONS, OWN
 from bml_schema.undeclared_prefixes import SMARTBODY, remove_element
 from bml_schema.vocabulary import VOCABULARY
 
-__all__ = ["is_draft", "made_ids", "translate"]
+__all__ = ["dialect_of", "is_draft", "made_ids", "translate"]
 
 _SPACES = {"ext": EXTENSIONS, "bmla": BMLA, "bmlt": BMLT, "realizer": OWN}
 _OURS = frozenset({BMLA, BMLT, OWN})
 _MAX_LISTED = 12  # words in the warning
 _NAMES = {"SmartBody": "SmartBody's BML", "Greta": "Greta's BML", "draft": "a draft of BML"}
+_READ_AS = "read as "
 _POINTS = {local(tag): cls.sync_points for tag, cls in VOCABULARY.items()}
 _MARKS = {local(tag) for tag, cls in VOCABULARY.items() if cls.marks}
 _REFERENCE = re.compile(r"\s*([^:\s]+)\s*:\s*([A-Za-z_-]+?)(\s*[+-]\s*[0-9.]+\s*)?")
@@ -67,6 +69,12 @@ def translate(root: etree._Element, wrapper: str, block_ids: Iterator[str]) -> s
         root.set("id", next(block_ids))
         made = [f'the block as "{root.get("id")}"', *made]
     return _described(translation.applied, wrapper, made)
+
+
+def dialect_of(root: etree._Element, wrapper: str) -> str:
+    """Return the name of the dialect of a document, "" for BML 1.0; for the arguments see `translate`."""
+    note = translate(deepcopy(root), wrapper, made_ids())
+    return note.removeprefix(_READ_AS).partition(":")[0]
 
 
 class _Translation:
@@ -332,7 +340,7 @@ def _described(applied: Mapping[Row, None], wrapper: str, made: list[str]) -> st
             read[f"{row.name} as {_shown(row)}"] = None
     parts = [_listed(list(read) + made)] if read or made else []
     parts += [f"without {_listed(list(ignored))}"] if ignored else []
-    return f"read as {_NAMES[dialect]}: {', '.join(parts)}"
+    return f"{_READ_AS}{_NAMES[dialect]}: {', '.join(parts)}"
 
 
 def _shown(row: Row) -> str:

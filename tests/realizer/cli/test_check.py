@@ -380,6 +380,7 @@ def test_check_says_how_a_dialect_was_read_and_its_faults_in_strict_bml(tmp_path
     text = '<bml id="b"><head id="h" type="NOD"/><faceFacs id="f" au="4" side="left"/></bml>'
     (line,) = check(tmp_path, text).stdout.splitlines()
     assert """NOT_BML_1_0 b: line 1, /bml: read as SmartBody's BML: <head type="NOD"> as lexeme=NOD""" in line
-    head, face = check(tmp_path, text, "--strict-bml").stdout.splitlines()
+    dialect, head, face = check(tmp_path, text, "--strict-bml").stdout.splitlines()
+    assert "NOT_BML_1_0 b: line 1, /bml: this is SmartBody's BML, which is not read in strict BML" in dialect
     assert "b:h: line 1, /bml/head[1]: lexeme: wanted a word, got none" in head
     assert "b:f: line 1, /bml/faceFacs[1]: side: wanted LEFT, RIGHT or BOTH" in face

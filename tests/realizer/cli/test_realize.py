@@ -217,7 +217,7 @@ def test_strict_bml_refuses_what_is_read_as_a_dialect_otherwise(tmp_path: Path, 
             cli, [command, str(document), *options], env=variables, standalone_mode=False
         )
         assert strict.return_value == 1
-        assert "id: wanted one, got none" in strict.stderr
+        assert "id: wanted one, got none; this is SmartBody's BML, which is not read in" in strict.stderr
 
 
 def test_schedule_writes_a_dialect_as_bml_1_0(tmp_path: Path) -> None:
