@@ -75,7 +75,7 @@ class AsapTransport(TcpTransport):
                 await calling
 
     async def _read(self, reader: asyncio.StreamReader, number: int, link: CallBack) -> None:
-        framer, limiter = DocumentFramer(self._limit), RateLimiter(self._rate)
+        framer, limiter = DocumentFramer(self._limit, wraps=True), RateLimiter(self._rate)
         while data := await reader.read(READ):
             for item in framer.feed(data):
                 if isinstance(item, Fault):

@@ -22,7 +22,9 @@ class Fault:
 # The marks at which documents begin and end, and constructs that may hide such marks. The lookahead needs the
 # byte after a name, so that an incomplete mark is not taken for another one.
 _NAME = rb"(?:[\w.\x80-\xff-]{1,64}:)?bml(?=[\s/>])"
-_MARK = re.compile(rb"<!--|<!\[CDATA\[|<!DOCTYPE|<\?|<" + _NAME + rb"|</" + _NAME)
+# Tags around documents of dialects, and Greta's <fml>, which says what the documents are for.
+_WRAPPER = re.compile(rb"</?(act|fml-apml|participant|fml)(?=[\s/>])")
+_MARK = re.compile(rb"<!--|<!\[CDATA\[|<!DOCTYPE|<\?|<" + _NAME + rb"|</" + _NAME + rb"|" + _WRAPPER.pattern)
 # An end of the data that more data may turn into a mark; no mark is longer.
 _COMING = re.compile(rb"<[^\s<>]{0,79}\Z")
 # Constructs -> their ends, and how many bytes of an end may have arrived. "[" is the subset in a DOCTYPE.
@@ -32,6 +34,7 @@ _ENDS = {
     b"<?": (re.compile(rb"\?>"), 1),
     b"<!DOCTYPE": (re.compile(rb"[<>\[]"), 0),
     b"[": (re.compile(rb"\]\s{0,16}>"), 17),
+    b"<fml": (re.compile(rb"</fml\s{0,16}>"), 22),
 }
 _IN_TAG = re.compile(rb"[<>\"']")
 _IN_VALUE = {b'"': re.compile(rb'[<"]'), b"'": re.compile(rb"[<']")}
@@ -40,22 +43,28 @@ _ID = re.compile(rb"""\sid\s*=\s*(?:"([^"<]{1,256})"|'([^'<]{1,256})')""")
 _BLANKS = b" \t\r\n\xef\xbb\xbf"  # and the bytes of a BOM
 _SOLID = re.compile(rb"[^" + _BLANKS + rb"]")
 _SHOWN = 60  # bytes of a stray span that its message quotes
+_MAX_WRAPPER = 4096  # bytes of the tags around documents
 
 
 class DocumentFramer:
     """A splitter of one byte stream into documents.
 
-    Blanks, comments, declarations, processing instructions and DOCTYPEs between documents are skipped. A span
-    with anything else, a document that has not ended before the next one begins, and one that is too large
-    give one Fault each; reading resumes at the next `<bml`. The result does not depend on how the stream is
-    cut into reads, and each byte is examined a few times at most.
+    Blanks, comments, declarations, processing instructions, DOCTYPEs, and the elements that dialects have
+    around documents, are skipped between documents. A span with anything else, a document that has not ended
+    before the next one begins, and one that is too large give one Fault each; reading resumes at the next
+    `<bml`. The result does not depend on how the stream is cut into reads, and each byte is examined a few
+    times at most.
 
     Args:
         limit: most bytes of a document (the setting max_document), and of a comment between documents.
+        wraps: whether a document is returned in the <act> or <fml-apml> around it.
     """
 
-    def __init__(self, limit: int) -> None:
+    def __init__(self, limit: int, *, wraps: bool = False) -> None:
         self._limit = limit
+        self._wraps = wraps
+        self._wrapper = b""  # the tags around the documents
+        self._is_wrapper = False  # whether the open document is such a tag
         self._data = bytearray()
         self._parsed = 0  # the data before it is parsed
         self._document = -1  # where the open document begins; -1 outside
@@ -100,6 +109,10 @@ class DocumentFramer:
         self._report_stray()
         self._parsed, self._opened = end, start
         mark = match[0]
+        if match[1]:
+            if self._document < 0:
+                self._hidden, self._is_wrapper, self._document = b"<", True, start
+            return True
         if mark in _ENDS:
             if self._document < 0 and mark == b"<![CDATA[":
                 self._fault("got <![CDATA[ outside a document")
@@ -129,9 +142,37 @@ class DocumentFramer:
         self._hidden = b""
         if mark == b"<":
             self._parsed = match.start()
-        if self._closing or (mark == b">" and self._data[match.start() - 1 : match.start()] == b"/"):
+        if self._is_wrapper:
+            self._give_up()
+            if self._is_wrapper:
+                self._wrap()
+        elif self._closing or (mark == b">" and self._data[match.start() - 1 : match.start()] == b"/"):
             self._end()
         return True
+
+    def _wrap(self) -> None:
+        """Store a tag around documents; the end of the outermost element ends them."""
+        tag = bytes(self._data[self._document : self._parsed])
+        self._document, self._is_wrapper = -1, False
+        found = _WRAPPER.match(tag)
+        assert found is not None
+        name, ends = found[1], tag.startswith(b"</")
+        if not tag.endswith(b">") or len(self._wrapper) + len(tag) > _MAX_WRAPPER:
+            self._fault(f"wanted the end of a tag, got {tag[:_SHOWN].decode('utf-8', 'replace')!r}")
+        elif name == b"fml":
+            self._hidden = b"" if ends or tag.endswith(b"/>") else b"<fml"
+            self._opened = self._parsed - len(b"<fml")
+        elif name == b"participant":
+            self._wrapper += tag if self._wrapper else b""
+        else:
+            self._wrapper = b"" if ends or tag.endswith(b"/>") else tag
+
+    def _around(self, document: str) -> str:
+        """Return a document in the element around it."""
+        found = _WRAPPER.match(self._wrapper) if self._wraps else None
+        if found is None:
+            return document
+        return f"{self._wrapper.decode('utf-8', 'replace')}{document}</{found[1].decode()}>"
 
     def _past(self) -> bool:
         """Parse to the end of a comment or the like. Give up one longer than a document may be."""
@@ -164,7 +205,7 @@ class DocumentFramer:
             return
         raw = bytes(self._data[self._document : self._parsed])
         try:
-            self._items.append(raw.decode())
+            self._items.append(self._around(raw.decode()))
             self._broken = False
         except UnicodeDecodeError as wrong:
             self._broken = False
@@ -177,8 +218,8 @@ class DocumentFramer:
             words = f"wanted at most {self._limit} bytes in a document, got more"
             words = f"{words} {limit_hint('max_document')}"
             self._fault(words, self._id(self._document + self._limit))
-            self._orphans += 1
-            self._document = -1
+            self._orphans += not self._is_wrapper
+            self._document, self._is_wrapper = -1, False
 
     def _text(self, end: int) -> None:
         """Skip text without marks up to `end`; outside a document it should be blank."""

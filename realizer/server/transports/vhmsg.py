@@ -115,7 +115,7 @@ class Vhmsg:
                     return self._ended(speak, id)
             case PredictionFeedback(blocks=blocks, behaviours=behaviours):
                 for b in blocks:
-                    if b.global_end is not None and (known := self._speaks.get(b.id)) is not None:
+                    if b.status != "IN_PREP" and (known := self._speaks.get(b.id)) is not None:
                         known.planned.add(b.id)
                         known.plays |= bool(behaviours)
             case WarningFeedback(id=id, text=text) if speak := self._speaks.get(id.partition(":")[0]):

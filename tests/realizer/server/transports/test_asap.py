@@ -243,6 +243,25 @@ def test_asap_warns_once_of_a_broken_document_and_plays_the_next(broken, id: str
     serving(test, max_document=5000)
 
 
+def test_asap_reads_documents_of_dialects_in_their_elements() -> None:
+    async def test(server: Server, bml: int, feedback: int) -> None:
+        async with Client(bml, feedback) as client:
+            client.send('<act><participant id="Brad"/><bml id="s"><head type="NOD"/></bml></act>')
+            text = '<speech id="s"><tm id="tm1"/>Hello</speech>'
+            client.send(f'<fml-apml><bml id="g">{text}</bml><fml><x/></fml></fml-apml>')
+            client.send(NOD.format("plain"))
+            told = await client.until("plain:end")
+            notes = {f.id: f.text for f in told if isinstance(f, WarningFeedback)}
+            assert list(notes) == ["s", "g"]
+            assert "SmartBody's BML" in notes["s"]
+            assert "Greta's BML" in notes["g"]
+            characters = {f.id: f.character_id for f in told if isinstance(f, BlockProgress)}
+            assert characters["s:start"] == "Brad"
+            assert characters["plain:start"] is None
+
+    serving(test)
+
+
 def test_asap_gives_each_address_its_own_session() -> None:
     async def test(server: Server, bml: int, port: int) -> None:
         async with Client(bml, port) as one, Client(bml, port, "127.0.0.2") as other:

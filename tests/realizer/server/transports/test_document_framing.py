@@ -39,6 +39,10 @@ BETWEEN = {
     "declaration": '<?xml version="1.0" encoding="UTF-8"?>\n',
     "comment": "<!-- <bml> -- > -->",
     "doctype": '<!DOCTYPE bml SYSTEM "bml.dtd">',
+    "wrapper": '<act><participant id="Brad"/>',
+    "wrapper with a prolog": '<?xml version="1.0"?><!DOCTYPE fml-apml SYSTEM "fml-apml.dtd" []><fml-apml>',
+    "end of a wrapper": "</act>\n<act>",
+    "functions": '</fml-apml><fml-apml><fml><x y="</bml>"/><bml id="no"/></fml><fml/>',
     "doctype with subset": '<!DOCTYPE bml [<!ELEMENT bml ANY> <!ATTLIST bml id CDATA "x">\n ] >',
 }
 
@@ -53,7 +57,11 @@ def test_framer_returns_documents_as_they_were_sent(document: str, between: str,
 
 BROKEN = {
     "stray text": ("hello\n", "got 'hello'"),
-    "another element": ("<act>\n<fml/>\n</act>", "got '<act>'"),
+    "another element": ("<body>\n<fml/>\n</body>", "got '<body>'"),
+    "a wrapper without its end": ("<act <", "wanted the end of a tag, got '<act '"),
+    "a wrapper with a value without its end": ("<act x='" + "y" * LIMIT, "at most"),
+    "endless participants": ("<act>" + "<participant/>" * 300, "wanted the end of a tag"),
+    "an <fml> without its end": (f"<fml-apml><fml>{'y' * LIMIT}", "wanted an end of <fml"),
     "an end tag": ("</bml>", "got </bml> without <bml"),
     "a document without its end": ('<bml id="x"><head', "before the next <bml"),
     "a start tag without its end": ('<bml id="x" ', "before the next <bml"),
@@ -82,6 +90,18 @@ def test_framer_reports_a_broken_span_once_and_goes_on(
     assert says in fault.text
     assert fault.block == ("x" if b'id="x"' in raw else None)
     assert documents == [NOD, NOD]
+
+
+@pytest.mark.parametrize("step", [None, 1, 7])
+def test_framer_returns_documents_in_the_element_around_them(step: int | None) -> None:
+    brad, greta = '<act><participant id="Brad"/>', "<fml-apml>"
+    stream = f"{NOD}{brad}{NOD}{NOD}</act>{NOD}{greta}{NOD}<fml><bml/></fml></fml-apml>\n<act/>{NOD}"
+    framer, found = DocumentFramer(LIMIT, wraps=True), list[str | Fault]()
+    data = stream.encode()
+    for n in range(0, len(data), step or len(data)):
+        found += framer.feed(data[n : n + (step or len(data))])
+    wrapped = f"{brad}{NOD}</act>"
+    assert found == [NOD, wrapped, wrapped, NOD, f"{greta}{NOD}</fml-apml>", NOD]
 
 
 def test_framer_reports_no_fault_for_the_end_of_a_document_given_up() -> None:
