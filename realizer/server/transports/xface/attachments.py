@@ -1,7 +1,9 @@
 """Files attached to Xface tasks: scripts, FAP and sound."""
 
+import re
 from dataclasses import dataclass
 from html import unescape
+from itertools import count
 
 from bml_schema import Block, BMLError, read
 from realizer.animation.fap.fap_clip import FAPClip
@@ -18,6 +20,10 @@ from realizer.server.documents.document_queue import size_error
 from realizer.server.transports.xface.wire import Task
 
 ROOM = 2**10  # bytes of a document beside its keyframes
+_UNNAMED = "-without-id-"
+_NUMBERS = count(1)  # of documents without an id
+_NAME = re.compile(r"""<(?:[\w.-]+:)?bml(?=[\s/>])(?:[^<>"'/]|"[^<"]*"|'[^<']*')*""")
+_ID = re.compile(r"""\sid\s*=\s*["']([^"'<]*)["']""")
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,9 +62,11 @@ def prepare(task: Task, settings: Settings) -> FAPClip | Script | None:
             script = text if "<" in text else unescape(text)
             if (large := size_error(script, settings)) is not None:
                 raise RealizerError(large)
-            items = list(
-                read(script, VOCABULARY, max_bytes=settings.max_document, strict_bml=settings.strict_bml)
-            )
+            items = _read(script, settings)
+            if any(isinstance(item, Block) and item.id.startswith(_UNNAMED) for item in items):
+                # The session would make other ids than `_read`, and the script would never end.
+                script = _with_ids(script)
+                items = _read(script, settings)
             blocks = tuple(item.id for item in items if isinstance(item, Block))
             if not blocks:
                 wrong = next((str(item) for item in items if isinstance(item, BMLError)), "nothing")
@@ -69,6 +77,23 @@ def prepare(task: Task, settings: Settings) -> FAPClip | Script | None:
         case (("UPLOAD_FAP" | "LOAD_FAP" | "UPLOAD_SCRIPT"), _):
             raise MissingAttachment("wanted params, got none, or empty ones")
     return None
+
+
+def _read(script: str, settings: Settings) -> list[Block | BMLError]:
+    ids = (f"{_UNNAMED}{n}" for n in count(1))
+    most, strict = settings.max_document, settings.strict_bml
+    return list(read(script, VOCABULARY, max_bytes=most, strict_bml=strict, block_ids=ids))
+
+
+def _with_ids(script: str) -> str:
+    """Return a script whose documents all have an id."""
+
+    def tag(found: re.Match[str]) -> str:
+        if (id := _ID.search(found[0])) is None:
+            return f'{found[0]} id="script-{next(_NUMBERS)}"'
+        return found[0] if id[1].strip() else found[0].replace(id[0], f' id="script-{next(_NUMBERS)}"')
+
+    return _NAME.sub(tag, script)
 
 
 def _clip(text: str | bytes, settings: Settings) -> FAPClip:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from bml_schema import Block, read
 from realizer.animation.fap.fap_clip import FAPClip
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
@@ -45,6 +46,18 @@ def test_prepare_returns_the_documents_and_block_ids_of_a_script(
     script = prepare(Task("UPLOAD_SCRIPT", params=(text, processor)), Settings())
     assert isinstance(script, Script)
     assert script.blocks == blocks
+
+
+def test_prepare_gives_every_document_of_a_dialect_its_own_id() -> None:
+    act = '<act><bml><head type="NOD"/></bml><bml id=""><head type="NOD"/></bml><bml id="c"/></act>'
+    found: list[str] = []
+    for _ in range(2):
+        script = prepare(Task("UPLOAD_SCRIPT", params=(act, "BML")), Settings())
+        assert isinstance(script, Script)
+        assert script.blocks[-1] == "c"
+        assert [block.id for block in read(script.text) if isinstance(block, Block)] == list(script.blocks)
+        found += script.blocks[:-1]
+    assert len(set(found)) == 4
 
 
 @pytest.mark.parametrize("name", ["STOP_PLAYBACK", "RESUME_PLAYBACK", "DANCE"])

@@ -303,6 +303,16 @@ def test_xface_starts_and_finishes_a_script_with_its_blocks() -> None:
     serving(test)
 
 
+def test_xface_finishes_each_script_of_a_dialect_without_ids() -> None:
+    async def test(server: Server, transport: XfaceTransport) -> None:
+        async with Client(transport.port) as client:
+            for id in (9, 10):
+                client.send(task("UPLOAD_SCRIPT", 1, id, '<act><bml><head type="NOD"/></bml></act>', "BML"))
+                assert await client.statuses(id) == [1, 2, 3]
+
+    serving(test)
+
+
 def test_xface_ends_a_script_at_a_stop() -> None:
     async def test(server: Server, transport: XfaceTransport) -> None:
         async with Client(transport.port) as client:
