@@ -72,8 +72,11 @@ class AsapXml:
             if not text.lstrip("\ufeff \t\r\n").startswith("<"):
                 raise ValueError(f"wanted <bml>, got {text[:60]!r}")
             return [Inbound(text)]
-        except ValueError as error:  # also UnicodeDecodeError
-            refusal = WarningFeedback(id="<no id>", type="PARSING_FAILURE", text=str(error))
+        except ValueError as error:
+            text = str(error)
+            if isinstance(error, UnicodeDecodeError):
+                text = f"wanted UTF-8, got the byte 0x{error.object[error.start]:02X}"
+            refusal = WarningFeedback(id="<no id>", type="PARSING_FAILURE", text=text)
             return list(self.outgoing(refusal.to_xml()))
 
     def _decode(self, body: bytes) -> str:
