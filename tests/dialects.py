@@ -1,18 +1,24 @@
-"""The table of dialects as a page of the documentation.
+"""The table of dialects as a page of the documentation, and a document for each of its rows.
 
-`python -m tests.dialects` writes docs/dialects.md from bml_schema/dialects/rows.csv.
+`python -m tests.dialects` writes docs/dialects.md and tests/dialect_documents/rows.txt from the table,
+bml_schema/dialects/rows.csv.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
+from xml.sax.saxutils import quoteattr
 
+from bml_schema import Block, read, write
 from bml_schema.dialects.table import MISSING, Row, table
+from bml_schema.undeclared_prefixes import SMARTBODY
 
-__all__ = ["FILE", "render"]
+__all__ = ["FILE", "ROWS", "WRAPPERS", "cases", "render", "sample"]
 
 FILE = Path(__file__).parent.parent / "docs" / "dialects.md"
+ROWS = Path(__file__).parent / "dialect_documents" / "rows.txt"
 _TITLES = {
     "SmartBody": "SmartBody",
     "Greta": "Greta",
@@ -44,6 +50,55 @@ Independently of dialects, without a warning: words of closed lists may be in an
 `bmlt:interrupt`, `bmlt:activate` and `bmlt:parametervaluechange` are those of BMLA. A document whose only
 fault are undeclared prefixes is read without them, with one warning. `--strict-bml` turns these off too.
 """
+# Elements around documents -> a document in one, by the element.
+WRAPPERS = {
+    "act": '<act><bml id="b"><head type="NOD"/></bml></act>',
+    "participant": '<act><participant id="brad"/><bml id="b"><head type="NOD"/></bml></act>',
+    "fml-apml": '<fml-apml><bml id="b"><speech id="s">Hi<tm id="t"/></speech></bml></fml-apml>',
+    "fml": '<fml-apml><fml><x/></fml><bml id="b"><speech id="s">Hi<tm id="t"/></speech></bml></fml-apml>',
+}
+# Behaviours that need more than an id.
+NEEDS = {
+    "head": 'lexeme="NOD"',
+    "gesture": 'lexeme="BEAT"',
+    "face": 'type="facs" au="1"',
+    "faceLexeme": 'lexeme="SMILE"',
+    "faceFacs": 'au="1"',
+    "lexeme": 'lexeme="SMILE"',
+    "facs": 'au="1"',
+    "gaze": 'target="x"',
+    "gazeShift": 'target="x"',
+    "headDirectionShift": 'target="x"',
+    "locomotion": 'target="x"',
+    "pointing": 'target="x"',
+    "sbm:interrupt": 'act="A"',
+    "saccade": 'direction="45"',
+    "description": 'type="x"',
+}
+# Functions that make a lexeme.
+LEXEMES = ("@toss", "@orient", "@parameterized")
+# Values that fit an attribute without a pattern; 1 for the rest.
+VALUES = {
+    "direction": "LEFT",
+    "repeats": "2.4",
+    "repetitions": "2",
+    "angle": "20",
+    "offsetangle": "20",
+    "manner": "WALK",
+    "sbm:joint-range": "EYES",
+    "target": "x",
+    "lexeme": "SMILE",
+    "shape": "raise",
+    "influence": "EYES",
+    "modality": "EYES",
+    "offsetDirection": "UP_LEFT",
+    "offsetdirection": "up_left",
+    "amount": "-0.2",
+    "orientation": "UP",
+    "character": "Greta",
+    "text": "Hello",
+    "act": "A",
+}
 
 
 def render() -> str:
@@ -80,5 +135,61 @@ def _becomes(row: Row) -> Iterator[str]:
         yield row.says
 
 
+def sample(row: Row) -> str:
+    """Return a document in which a row of the table has its element, attribute and value."""
+    if row.element in WRAPPERS:
+        return WRAPPERS[row.element]
+    strange = {"relax": "gazeShift", "attackPeak": "head", "attack_peak": "head", "priority": "head"}
+    element = strange.get(row.attribute, "face") if row.element == "*" else row.element
+    given = {}
+    if row.attribute and row.value != MISSING:
+        value = row.value.replace("?*", "_1").replace("*", "1" if "AU" in row.value else "")
+        value = {"*": "SMILE" if element != "head" else "TILT", "*:*": "s:end"}.get(row.value, value)
+        given[row.attribute.replace("*", "0")] = value or VALUES.get(row.attribute, "1")
+    if row.element == "*" and not row.attribute:
+        given["start"] = "after(s:end)"
+    if element == "bml":
+        text = "".join(f" {n}={quoteattr(v)}" for n, v in given.items())
+        return f'<act><bml id="b" xmlns:xsi="x"{text}><head type="NOD"/></bml></act>'
+    drafted = row.element == "face" and row.dialect == "draft"
+    needs = "" if row.value == MISSING or drafted else NEEDS.get(element, "")
+    made = {*given, *re.findall(r"\w+", row.becomes)} | ({"lexeme"} if row.becomes in LEXEMES else set())
+    needs = " ".join(n for n in re.findall(r'\S+=".*?"', needs) if n.partition("=")[0] not in made)
+    text = "".join(f" {n}={quoteattr(v)}" for n, v in given.items())
+    if drafted and row.attribute == "type" and row.value != "*":
+        text += ' shape="raise"'
+    inside = f'<{element} id="e" {needs}{text}/>'
+    if element == "face" and row.attribute == "overshoot":
+        inside = f'<face id="e"{text}><lexeme lexeme="SMILE"/></face>'
+    if element in ("lexeme", "facs"):
+        inside = f'<face id="f"><{element} {needs}{text}/></face>'
+    if element in ("tm", "mark", "pitchaccent", "boundary"):
+        inside = f'<speech id="s0">a <{element} id="m" name="m"/>b</speech>'
+    if element == "text":
+        inside = '<speech id="s0"><text>a <tm id="m"/>b</text></speech>'
+    if element == "speech":
+        inside = f'<speech id="e"{text}>Hello</speech>' if row.attribute != "text" else f"<speech{text}/>"
+    if element == "description":
+        inside = f'<head id="e" lexeme="NOD"><description{text} {needs}/></head>'
+    speech = '<speech id="s"><text>Hello</text></speech>'
+    start = f'<act><bml id="b" xmlns:sbm="{SMARTBODY}" xmlns:xsi="x">'
+    return f'{start}{speech}{inside}<head type="NOD"/></bml></act>'
+
+
+def cases() -> str:
+    """Return the text of rows.txt: of each row a document, and the BML 1.0 that it becomes."""
+    lines = [
+        "# Generated by `python -m tests.dialects`: of each row of the table a document, and what is read.",
+        "",
+    ]
+    for row in table().rows:
+        (block,) = read(sample(row))
+        assert isinstance(block, Block)
+        lines += [f"{row.dialect}: {row.name}", sample(row), " ".join(write(block).split()), ""]
+    return "\n".join(lines)
+
+
 if __name__ == "__main__":
     FILE.write_text(render(), "utf-8")
+    ROWS.write_text(cases(), "utf-8")
+    print(f"written: {FILE}, {ROWS}")

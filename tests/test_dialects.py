@@ -1,9 +1,13 @@
-"""Tests of the page about dialects."""
+"""Tests of the page about dialects, and of a document for each row of their table."""
 
 from __future__ import annotations
 
-from bml_schema.dialects.table import table
-from tests.dialects import FILE, render
+from bml_schema import Block, read, write
+from bml_schema.dialects.table import Row, table
+from realizer.speech.silent import SilentVoice
+from tests.dialects import FILE, ROWS, cases, render, sample
+from tests.realizer.server.session.test_composition import events, live, offline
+from tests.rows import each_row
 
 
 def test_dialects_page_is_current() -> None:
@@ -12,3 +16,19 @@ def test_dialects_page_is_current() -> None:
 
 def test_dialects_page_has_a_line_for_each_row() -> None:
     assert sum(line.startswith(("| `<", "| every")) for line in render().splitlines()) == len(table().rows)
+
+
+def test_rows_become_what_their_file_says() -> None:
+    assert ROWS.read_text("utf-8") == cases(), "run: python -m tests.dialects, and review the changes"
+
+
+@each_row("row", table().rows)
+def test_rows_play_alike_live_and_offline_and_as_bml_1_0(row: Row) -> None:
+    voice, document = SilentVoice(), sample(row)
+    expected = events(offline([document], voice), ())
+    assert expected
+    assert events(live([document], voice), ()) == expected
+    (block,) = read(document)
+    assert isinstance(block, Block)
+    expected.subtract({("NOT_BML_1_0", "b", 0.0): 1})
+    assert events(offline([write(block)], voice), ()) == +expected

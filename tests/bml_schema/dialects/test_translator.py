@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from itertools import islice
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
 
 import pytest
 from hypothesis import given
@@ -13,39 +12,20 @@ from hypothesis import strategies as st
 from lxml import etree
 
 from bml_schema import CORE, Block, BMLError, Gaze, Head, made_ids, parse, read, write
-from bml_schema.dialects.table import MISSING, Row, table
+from bml_schema.dialects.table import Row, table
 from bml_schema.dialects.translator import is_draft, translate
 from bml_schema.node_schema import local
-from bml_schema.undeclared_prefixes import SMARTBODY
 from bml_schema.vocabulary import VOCABULARY
 from realizer.core.options import PlayOptions
 from realizer.pipeline import plan
 from realizer.playback.player import Player
 from realizer.speech.silent import SilentVoice
+from tests.dialects import WRAPPERS, sample
 from tests.example_counts import examples
 from tests.rows import each_row
 
 DOCUMENTS = Path(__file__).parents[2] / "dialect_documents"
-WRAPPERS = {"act", "participant", "fml-apml", "fml"}
 ROWS = [row for row in table().rows if row.element not in WRAPPERS]
-# Behaviours that need more than an id.
-NEEDS = {
-    "head": 'lexeme="NOD"',
-    "gesture": 'lexeme="BEAT"',
-    "face": 'type="facs" au="1"',
-    "faceLexeme": 'lexeme="SMILE"',
-    "faceFacs": 'au="1"',
-    "lexeme": 'lexeme="SMILE"',
-    "facs": 'au="1"',
-    "gaze": 'target="x"',
-    "gazeShift": 'target="x"',
-    "headDirectionShift": 'target="x"',
-    "locomotion": 'target="x"',
-    "pointing": 'target="x"',
-    "sbm:interrupt": 'act="A"',
-    "saccade": 'direction="45"',
-    "description": 'type="x"',
-}
 # What mutations put into documents.
 PIECES = (
     "",
@@ -59,61 +39,6 @@ PIECES = (
     "s1:stroke_start",
     "{id}",
 )
-# Values that fit an attribute without a pattern; 1 for the rest.
-VALUES = {
-    "direction": "LEFT",
-    "sbm:joint-range": "EYES",
-    "target": "x",
-    "lexeme": "SMILE",
-    "shape": "raise",
-    "influence": "EYES",
-    "modality": "EYES",
-    "offsetDirection": "UP_LEFT",
-    "offsetdirection": "up_left",
-    "amount": "-0.2",
-    "orientation": "UP",
-    "character": "Greta",
-    "text": "Hello",
-    "act": "A",
-}
-
-
-def sample(row: Row) -> str:
-    """Return a document in which a row of the table has its element, attribute and value."""
-    strange = {"relax": "gazeShift", "attackPeak": "head", "attack_peak": "head", "priority": "head"}
-    element = strange.get(row.attribute, "face") if row.element == "*" else row.element
-    given = {}
-    if row.attribute and row.value != MISSING:
-        value = row.value.replace("?*", "_1").replace("*", "1" if "AU" in row.value else "")
-        value = {"*": "SMILE" if element != "head" else "TILT", "*:*": "s:end"}.get(row.value, value)
-        given[row.attribute.replace("*", "0")] = value or VALUES.get(row.attribute, "1")
-    if row.element == "*" and not row.attribute:
-        given["start"] = "after(s:end)"
-    if element == "bml":
-        text = "".join(f" {n}={quoteattr(v)}" for n, v in given.items())
-        return f'<act><bml id="b" xmlns:xsi="x"{text}><head type="NOD"/></bml></act>'
-    drafted = row.element == "face" and row.dialect == "draft"
-    needs = "" if row.value == MISSING or drafted else NEEDS.get(element, "")
-    needs = " ".join(n for n in re.findall(r'\S+=".*?"', needs) if n.partition("=")[0] not in given)
-    text = "".join(f" {n}={quoteattr(v)}" for n, v in given.items())
-    if drafted and row.attribute == "type" and row.value != "*":
-        text += ' shape="raise"'
-    inside = f'<{element} id="e" {needs}{text}/>'
-    if element == "face" and row.attribute == "overshoot":
-        inside = f'<face id="e"{text}><lexeme lexeme="SMILE"/></face>'
-    if element in ("lexeme", "facs"):
-        inside = f'<face id="f"><{element} {needs}{text}/></face>'
-    if element in ("tm", "mark", "pitchaccent", "boundary"):
-        inside = f'<speech id="s0">a <{element} id="m" name="m"/>b</speech>'
-    if element == "text":
-        inside = '<speech id="s0"><text>a <tm id="m"/>b</text></speech>'
-    if element == "speech":
-        inside = f'<speech id="e"{text}>Hello</speech>' if row.attribute != "text" else f"<speech{text}/>"
-    if element == "description":
-        inside = f'<head id="e" lexeme="NOD"><description{text} {needs}/></head>'
-    speech = '<speech id="s"><text>Hello</text></speech>'
-    start = f'<act><bml id="b" xmlns:sbm="{SMARTBODY}" xmlns:xsi="x">'
-    return f'{start}{speech}{inside}<head type="NOD"/></bml></act>'
 
 
 @each_row("row", ROWS)
