@@ -269,9 +269,9 @@ class _Reader:
             line = any_node.sourceline
             any_node.sourceline = begins.get((line, local(str(node.tag))), line)
         begins = {}
-        note = translate(root, self.wrapper, self.block_ids)
-        if note or plain is None:
-            return block((*notes, note) if note else notes)
+        report = translate(root, self.wrapper, self.block_ids)
+        if report or plain is None:
+            return block((*notes, report.text) if report else notes)
         if isinstance(plain, BMLError):
             raise plain
         return plain

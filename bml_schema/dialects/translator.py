@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from copy import deepcopy
 from itertools import count
 from typing import Any
@@ -11,25 +11,19 @@ from typing import Any
 from lxml import etree
 
 from bml_schema.canonical import MAX_ATTRIBUTES
+from bml_schema.dialects.report import Report
 from bml_schema.dialects.speech_text import translate_speech
-from bml_schema.dialects.table import Row, point_row, squeezed, table
+from bml_schema.dialects.sync_points import POINTS, SyncPoints
+from bml_schema.dialects.table import Row, table
 from bml_schema.dialects.values import FUNCTIONS
 from bml_schema.node_schema import local
 from bml_schema.nodes import BMLA, BMLT, CORE, DRAFTS, EXTENSIONS, OWN
 from bml_schema.undeclared_prefixes import SMARTBODY, remove_element
-from bml_schema.vocabulary import VOCABULARY
 
 __all__ = ["dialect_of", "is_draft", "made_ids", "translate"]
 
 _SPACES = {"ext": EXTENSIONS, "bmla": BMLA, "bmlt": BMLT, "realizer": OWN}
 _OURS = frozenset({BMLA, BMLT, OWN})
-_MAX_LISTED = 12  # words in the warning
-_NAMES = {"SmartBody": "SmartBody's BML", "Greta": "Greta's BML", "draft": "a draft of BML"}
-_READ_AS = "read as "
-_POINTS = {local(tag): cls.sync_points for tag, cls in VOCABULARY.items()}
-_MARKS = {local(tag) for tag, cls in VOCABULARY.items() if cls.marks}
-_REFERENCE = re.compile(r"\s*([^:\s]+)\s*:\s*([A-Za-z_-]+?)(\s*[+-]\s*[0-9.]+\s*)?")
-_FUNCTION = re.compile(r"\s*(?:after|before)\s*\((.*)\)\s*")
 
 
 def is_draft(root: etree._Element) -> bool:
@@ -42,7 +36,7 @@ def made_ids() -> Iterator[str]:
     return (f"unnamed{n}" for n in count(1))
 
 
-def translate(root: etree._Element, wrapper: str, block_ids: Iterator[str]) -> str:
+def translate(root: etree._Element, wrapper: str, block_ids: Iterator[str]) -> Report:
     """Translate a document to BML 1.0 in place.
 
     Args:
@@ -51,15 +45,15 @@ def translate(root: etree._Element, wrapper: str, block_ids: Iterator[str]) -> s
         block_ids: ids for blocks of a dialect without an id.
 
     Returns:
-        The text of a warning that lists the translations; "" if nothing was translated.
+        What was translated.
     """
     space = str(root.tag).rpartition("}")[0][1:]
     if space not in ("", CORE, *DRAFTS):
-        return ""
+        return Report()
     translation = _Translation(root)
     translation.run()
     if not (translation.applied or wrapper or space in DRAFTS):
-        return ""
+        return Report()
     translation.in_dialect = True
     translation.run()
     made = translation.add_ids()
@@ -68,13 +62,13 @@ def translate(root: etree._Element, wrapper: str, block_ids: Iterator[str]) -> s
     if not root.get("id", "").strip():
         root.set("id", next(block_ids))
         made = [f'the block as "{root.get("id")}"', *made]
-    return _described(translation.applied, wrapper, made)
+    return Report(translation.applied, made, wrapper)
 
 
 def dialect_of(root: etree._Element, wrapper: str) -> str:
     """Return the name of the dialect of a document, "" for BML 1.0; for the arguments see `translate`."""
-    note = translate(deepcopy(root), wrapper, made_ids())
-    return note.removeprefix(_READ_AS).partition(":")[0]
+    report = translate(deepcopy(root), wrapper, made_ids())
+    return report.dialect if report else ""
 
 
 class _Translation:
@@ -98,11 +92,12 @@ class _Translation:
         self._children(self.root)
         timed = list(self._timed())
         kinds = {e.get("id", "").strip(): self._kind(e) for e in timed}
+        points = SyncPoints(kinds, self._apply, self.in_dialect)
         for element in timed:
-            self._sync_points(element, kinds)
+            points.translate(element)
         for sync in self.root.iter("{*}sync", "{*}before", "{*}after", "{*}synchronize", "{*}synchronise"):
             if "ref" in sync.attrib:
-                sync.set("ref", self._reference(sync.get("ref"), kinds))
+                sync.set("ref", points.reference(sync.get("ref")))
 
     def _children(self, parent: Any) -> None:
         for element in list(parent):
@@ -152,7 +147,7 @@ class _Translation:
             return True  # the parser will refuse it
         for attribute, value in element.items():
             short = attribute.rpartition("}")[2]
-            rows = known.get(short) or (everywhere.get(short) if name in _POINTS or key != name else None)
+            rows = known.get(short) or (everywhere.get(short) if name in POINTS or key != name else None)
             row = self._row(rows, value) if rows else None
             if row is not None and not self._attribute(element, attribute, value, row):
                 return False
@@ -227,8 +222,6 @@ class _Translation:
         space = _SPACES[prefix] if colon else str(self.root.tag).rpartition("}")[0][1:]
         element.tag = f"{{{space}}}{short}" if space else short
 
-    # sync points and references
-
     def _timed(self) -> Iterator[Any]:
         """Yield the behaviours."""
         for element in self.root:
@@ -239,56 +232,6 @@ class _Translation:
 
     def _kind(self, element: Any) -> str:
         return local(str(element.tag))
-
-    def _sync_points(self, element: Any, kinds: Mapping[str, str]) -> None:
-        """Rename the sync points of a behaviour, and those that it refers to, to their names in BML 1.0."""
-        kind = self._kind(element)
-        points = _POINTS.get(kind)
-        if points is None or len(element.attrib) > MAX_ATTRIBUTES:
-            return
-        for name, value in element.items():
-            point = name
-            if name not in points:
-                row = point_row(name)
-                meant = self._point(row, name, points) if row is not None else ""
-                if row is None or not meant:
-                    continue
-                self._apply(row)
-                del element.attrib[name]
-                if meant in element.attrib:
-                    continue
-                point = meant
-            reference = self._reference(value, kinds)
-            if reference != value or point != name:
-                element.set(point, reference)
-
-    def _point(self, row: Row, name: str, points: tuple[str, ...]) -> str:
-        """Return the first sync point of a row that a behaviour has, or "" if the row does not apply."""
-        meant = next((point for point in row.becomes.split("|") if point in points), "")
-        spelled = name.lower() != meant.lower() and squeezed(name) == squeezed(meant)
-        return meant if self.in_dialect or spelled else ""
-
-    def _reference(self, value: str, kinds: Mapping[str, str]) -> str:
-        """Return a reference with the name of its sync point in BML 1.0."""
-        if function := _FUNCTION.fullmatch(value):
-            self._apply(self.table.elements["*"])
-            value = function[1]
-        found = _REFERENCE.fullmatch(value)
-        if found is None:
-            return value
-        id, point, offset = found.groups()
-        if id == "act" and id not in kinds:
-            return f"bml:{point}{offset or ''}"
-        kind = kinds.get(id)
-        points = _POINTS.get(kind or "")
-        row = point_row(point)
-        if points is None or row is None or point in points:
-            return value
-        translated = self._point(row, point, points)
-        if not translated:
-            return value
-        self._apply(row)
-        return f"{id}:{translated}{offset or ''}"
 
     # ids
 
@@ -323,32 +266,3 @@ class _Translation:
             and "characterId" not in self.root.attrib
         ):
             self.root.set("characterId", id)
-
-
-def _described(applied: Mapping[Row, None], wrapper: str, made: list[str]) -> str:
-    """Return the text of the warning."""
-    if not applied and not made:
-        return ""
-    counts = {name: sum(row.dialect == name for row in applied) for name in _NAMES}
-    dialect = {"act": "SmartBody", "fml-apml": "Greta"}.get(wrapper) or max(counts, key=lambda n: counts[n])
-    read: dict[str, None] = {}
-    ignored: dict[str, None] = {}
-    for row in applied:
-        if row.becomes in ("-", "!"):
-            ignored[row.name] = None
-        else:
-            read[f"{row.name} as {_shown(row)}"] = None
-    parts = [_listed(list(read) + made)] if read or made else []
-    parts += [f"without {_listed(list(ignored))}"] if ignored else []
-    return f"{_READ_AS}{_NAMES[dialect]}: {', '.join(parts)}"
-
-
-def _shown(row: Row) -> str:
-    tag, _, becomes = row.becomes.rpartition(": ")
-    shown = becomes.replace("{value}", "...").replace("{id}:", "").replace(";", " ").replace("|", " or ")
-    return f"{tag} {row.says or row.attribute if becomes[:1] in ('@', '') else shown}".strip()
-
-
-def _listed(words: list[str]) -> str:
-    rest = len(words) - _MAX_LISTED
-    return ", ".join(words[:_MAX_LISTED]) + (f" and {rest} more" if rest > 0 else "")
