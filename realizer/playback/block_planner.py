@@ -231,7 +231,11 @@ class _PlanBuilder:
         stretchable = {b: timing for b, timing in flexible.items() if timing is not own.timings[b]}
         if not stretchable:
             return
-        stretched = self.solve(replace(own, timings=flexible), others, external_times)[0]
+
+        def solved(timings: Mapping[str, Timing]) -> Schedule:
+            return self.solve(replace(own, timings=timings), others, external_times)[0]
+
+        stretched = solved(flexible)
         if stretched.failed or len(stretched.times) <= len(rigid.times):
             return
         points = {b: stretched.times[b] - stretched.times[b][0] for b in stretchable if b in stretched.times}
@@ -245,10 +249,7 @@ class _PlanBuilder:
             gaps = own.timings[b].preferred
             rates = np.diff(points[b])[gaps > MIN_RATE_GAP] / gaps[gaps > MIN_RATE_GAP]
             for rate in sorted({round(float(r), 9) for r in rates}, key=lambda r: abs(r - 1.0)):
-                scaled = replace(own.timings[b], preferred=gaps * rate)
-                trial = self.solve(replace(own, timings={**own.timings, b: scaled}), others, external_times)[
-                    0
-                ]
+                trial = solved({**own.timings, b: replace(own.timings[b], preferred=gaps * rate)})
                 if not trial.failed and len(trial.times) > best_count:
                     best_count = len(trial.times)
                     points[b] = natural[b] * rate
