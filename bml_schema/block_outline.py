@@ -10,6 +10,7 @@ from bml_schema.behaviours import SpeechText, Sync
 from bml_schema.element_reader import ElementReader
 from bml_schema.node_schema import local, schema_of
 from bml_schema.nodes import Behaviour, Constraint, Description, Required
+from bml_schema.steps import next_element
 from bml_schema.sync_refs import Names, Points
 
 
@@ -68,6 +69,7 @@ class BlockOutline:
         kinds = self.kinds
         owners, points = self.owners, self.names.points
         for element in parent:
+            next_element()
             raw: Any = element.tag
             kind = kinds.get(raw)
             if kind is None:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from bml_schema.behaviours import Speech
 from bml_schema.nodes import Behaviour, Block, Constraint
+from bml_schema.steps import next_element
 from bml_schema.sync_refs import SyncRef
 
 MAX_LISTED = 10  # lost references in a warning's text; `Problem.lost_references` has all
@@ -65,6 +66,7 @@ class ReferenceRemover:
 
     def without(self, node: Behaviour | Constraint, required: bool = False) -> Behaviour | Constraint | None:
         """Return a node without references to dropped behaviours, or None if the node itself goes."""
+        next_element()
         if isinstance(node, Constraint):
             return self._constraint(node, required or node.required)
         return None if node.id in self.gone else self._behaviour(node)

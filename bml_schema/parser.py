@@ -33,6 +33,7 @@ from bml_schema.errors import (
 )
 from bml_schema.node_schema import local, schema_of
 from bml_schema.nodes import CORE, EXTENSIONS, Behaviour, Block, Constraint, Required
+from bml_schema.steps import next_element
 from bml_schema.sync_refs import Names
 from bml_schema.values import block_names, describe_mismatch
 
@@ -98,6 +99,7 @@ def read_block(
         )
     nodes: dict[int, Behaviour | Constraint] = {}
     for n, entry in enumerate(entries):
+        next_element()
         read = reader.constraint if entry.kind.tag == Constraint.tag else reader.behaviour
         node = read(entry)
         if node is not None:

@@ -21,6 +21,7 @@ from bml_schema.nodes import (
     Description,
     Required,
 )
+from bml_schema.steps import next_element
 from bml_schema.sync_refs import SyncRef
 from bml_schema.values import decimal
 
@@ -84,6 +85,7 @@ class Writer:
             yield self._element(node, indent)
 
     def _element(self, node: Any, indent: str) -> str:
+        next_element()
         schema = schema_of(type(node))
         name = self.name(node.tag)
         start = f"<{name}{self._attributes(node)}"

@@ -12,6 +12,7 @@ from realizer.animation.channel import Channel, Layer
 from realizer.animation.curves import Samples, sample, samples, weights
 from realizer.animation.frames import AUFrames
 from realizer.animation.idle.motion import Idle
+from realizer.core import work
 from realizer.core.array_types import Float32, Float64
 from realizer.tables.cooccurrence import Rules
 
@@ -19,6 +20,9 @@ from realizer.tables.cooccurrence import Rules
 REPLACING = (Layer.FAPS, Layer.DIRECT)
 # Layers that are summed separately before they join the others.
 SEPARATE = (Layer.BASE, Layer.GAZE)
+
+# Channels that are sampled at once; others have their turn after so many.
+TOGETHER = 256
 
 
 def blend(
@@ -78,7 +82,7 @@ def _visible(channels: Iterable[Channel], times: Float64) -> list[Channel]:
     if not len(times):
         return []
     first, last = float(times[0]), float(times[-1])
-    spans = ((channel, channel.span) for channel in channels)
+    spans = ((channel, channel.span) for channel in work.counted(channels, 3))
     return [channel for channel, (begin, end) in spans if begin <= last and end >= first]
 
 
@@ -92,7 +96,7 @@ def _layers(
     own = [channel for channel in channels if channel.layer not in REPLACING]
     layers = {Layer.EXPRESSION: 0}
     rows, adds, sums = [], [], _sums()
-    for channel in own:
+    for channel in work.counted(own, 3):
         column, layer = channel.target.column, channel.layer
         adds.append(layer is Layer.BASE or sums[column])
         apart = layer if adds[-1] and layer in SEPARATE else Layer.EXPRESSION
@@ -100,12 +104,14 @@ def _layers(
     whole = np.zeros((len(layers), len(place), len(times)))
     if idle is not None:
         _begin_idle(whole[0], idle, channels, place, times)
-    if own:
-        found = samples(own, times)
-        values = _idle_share(found, own, channels, times)
-        at = found.spread(np.array(rows) * len(times))
+    for first in range(0, len(own), TOGETHER):
+        part = slice(first, first + TOGETHER)
+        work.count(10 * len(own[part]))
+        found = samples(own[part], times)
+        values = _idle_share(found, own[part], channels, times)
+        at = found.spread(np.array(rows[part]) * len(times))
         at += found.frames
-        adding = found.spread(np.array(adds))
+        adding = found.spread(np.array(adds[part]))
         summed, strongest = adding.nonzero()[0], (~adding).nonzero()[0]
         np.add.at(whole.reshape(-1), at[summed], values[summed])
         np.maximum.at(whole.reshape(-1), at[strongest], values[strongest])

@@ -12,6 +12,7 @@ from bml_schema import Block, SyncRef, without
 from realizer.animation.channel import Channel, Gain, Layer, later
 from realizer.animation.crossfade import crossfade
 from realizer.behaviours.kind import BehaviourKind, PlanningContext
+from realizer.core import work
 from realizer.core.array_types import Float64
 from realizer.playback.block_planner import Plan
 from realizer.playback.block_states import BlockEvent, State, next_state
@@ -200,6 +201,7 @@ class ActiveBlock:
         if start == float("inf"):
             return
         for behaviour, times in self.schedule.times.items():
+            work.count(20)
             node = self.block[behaviour]
             kind = self.kinds[node.tag]
             own = self._placed(behaviour, plan.channels.get(behaviour, ()))

@@ -8,6 +8,7 @@ from itertools import islice
 
 from bml_schema import Block
 from realizer.behaviours.kind import BehaviourKind, BlockCommand, PlanningContext
+from realizer.core import work
 from realizer.playback import block_links
 from realizer.playback.active_block import ActiveBlock, Dependency
 from realizer.playback.block_commands import CommandError, execute
@@ -183,7 +184,7 @@ class BlockManager:
 
     def advance(self, now: float) -> None:
         """Process everything that is due, in order, each event at its own time."""
-        for event in self.timeline.events.due(now):
+        for event in work.counted(self.timeline.events.due(now), 5):
             self._handle_event(event, self.blocks[event.block])
 
     def next_deadline(self) -> float | None:

@@ -12,6 +12,7 @@ from bml_schema import Block, SyncRef, without
 from bml_schema.dropped_references import listed, without_constraints
 from realizer.animation.channel import Channel
 from realizer.behaviours.kind import BehaviourKind, PlanningContext
+from realizer.core import work
 from realizer.playback.references import external_refs
 from realizer.playback.resources import ResourceClaim, after_interrupts, claims, conflicts, interrupts, trims
 from realizer.scheduling import Member, schedule_together
@@ -128,7 +129,7 @@ class _PlanBuilder:
         """Step 2: check the behaviours, and find the timings that they prefer."""
         dropped: list[tuple[str, Warning]] = []
         context, utterances = self.context, self.context.utterances
-        for node in self.block.behaviours:
+        for node in work.counted(self.block.behaviours, 5):
             kind = self.kinds.get(node.tag)
             if kind is None:
                 text = f"<{node.tag.rpartition('}')[2]}> is not known here"
@@ -173,7 +174,8 @@ class _PlanBuilder:
                     sequences, may_sequence = [], False
                     continue
             warnings = [
-                replace(w, text=self.with_place(self.behaviour_of(w), w.text)) for w in schedule.warnings
+                replace(w, text=self.with_place(self.behaviour_of(w), w.text))
+                for w in work.counted(schedule.warnings, 5)
             ]
             if schedule.failed:
                 self.refuse(warnings[0])
@@ -197,16 +199,17 @@ class _PlanBuilder:
             if may_sequence and new_sequences:
                 sequences += new_sequences
                 continue
-            losers = ((conflict.claim.behaviour, str(conflict)) for conflict in found)
+            losers = ((conflict.claim.behaviour, str(conflict)) for conflict in work.counted(found, 10))
             self.drop((id, self.warning("CANNOT_CREATE_BEHAVIOR", id, text)) for id, text in losers)
 
     def expand(self, schedule: Schedule) -> dict[str, tuple[Channel, ...]]:
         """Step 4: return the channels of the scheduled behaviours, in seconds from block start."""
-        return {
-            node.id: self.kinds[node.tag].expand(node, schedule.times[node.id], self.context)
-            for node in self.block.behaviours
-            if node.id in schedule.times and self.context.animates
-        }
+        channels: dict[str, tuple[Channel, ...]] = {}
+        for node in self.block.behaviours if self.context.animates else ():
+            if node.id in schedule.times:
+                work.count(50)
+                channels[node.id] = self.kinds[node.tag].expand(node, schedule.times[node.id], self.context)
+        return channels
 
     def solve(
         self, own: Member, others: Sequence[Member], external_times: Callable[[SyncRef], float | None]
@@ -277,7 +280,7 @@ class _PlanBuilder:
         # The new warnings replace earlier ones about the behaviours.
         replaced = {warning.id for warning in dropped.values()}
         self.warnings = [w for w in self.warnings if w.id not in replaced]
-        for id, warning in dropped.items():
+        for id, warning in work.counted(dropped.items(), 5):
             self.timings.pop(id, None)
             if id in fatal:
                 self.refuse(warning, f" (a required constraint names {id})")

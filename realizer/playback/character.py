@@ -10,6 +10,7 @@ import numpy as np
 from realizer.animation.axis import axis, region
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.curves import sample, weights
+from realizer.core import work
 
 # Duration of the return to the base face after a release; about that of an expression.
 RELAX = 0.3  # s
@@ -78,20 +79,24 @@ class Character:
     def channels(self) -> list[Channel]:
         """Return base states, each until the next shift of its region, and direct values."""
         out: list[Channel] = []
-        for index, shift in enumerate(self.shifts):
-            for channel in shift.channels:
-                own = region(channel.target)
-                successor = next((s for s in self.shifts[index + 1 :] if own in s.regions), None)
+        successors: dict[str, BaseShift] = {}  # of each region
+        for shift in work.counted(self.shifts[::-1], 3):
+            for channel in shift.channels[::-1]:
+                successor = successors.get(region(channel.target))
                 out.append(channel if successor is None else channel.faded(successor.begin, successor.end))
-        return [*out, *self.emotion.values(), *self.direct.values()]
+            successors |= dict.fromkeys(shift.regions, shift)
+        return [*out[::-1], *self.emotion.values(), *self.direct.values()]
 
     def forget(self, before: float) -> None:
         """Drop channels that are invisible after `before`, so that the cost does not grow with time."""
-        self.shifts = [
-            shift
-            for index, shift in enumerate(self.shifts)
-            if not any(s.end < before and shift.regions <= s.regions for s in self.shifts[index + 1 :])
-        ]
+        left: list[BaseShift] = []
+        replacing: set[frozenset[str]] = set()  # the regions of later shifts that have ended
+        for shift in work.counted(self.shifts[::-1]):
+            if not any(shift.regions <= regions for regions in replacing):
+                left.append(shift)
+            if shift.end < before:
+                replacing.add(shift.regions)
+        self.shifts = left[::-1]
         self.direct = {n: c for n, c in self.direct.items() if c.faded_at > before}
         self.emotion = {n: c for n, c in self.emotion.items() if c.faded_at > before}
 

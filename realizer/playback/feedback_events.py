@@ -18,6 +18,7 @@ from bml_schema import (
     WarningFeedback,
     prediction_of,
 )
+from realizer.core import work
 from realizer.playback.block_states import State
 from realizer.scheduling.timing import UNKNOWN, Schedule, Warning
 
@@ -83,19 +84,12 @@ def prediction(
         global_end=end if isfinite(end) else None,
         status=state.value,
     )
-    known = {
-        id: {sync: time for sync, time in syncs.items() if time < UNKNOWN}
-        for id, syncs in (behaviours or {}).items()
-    }
-    return PredictionFeedback(
-        character_id=block.character_id,
-        blocks=(times,),
-        behaviours=tuple(
-            prediction_of(block[id], block.id, syncs, schedule.late.get(id, 0.0))
-            for id, syncs in known.items()
-            if syncs
-        ),
-    )
+    nodes = []
+    for id, syncs in (behaviours or {}).items():
+        work.count(20)
+        known = {sync: time for sync, time in syncs.items() if time < UNKNOWN}
+        nodes.append(prediction_of(block[id], block.id, known, schedule.late.get(id, 0.0)))
+    return PredictionFeedback(character_id=block.character_id, blocks=(times,), behaviours=tuple(nodes))
 
 
 def progress(block: Block, point: str, time: float, state: State, said: str | None = None) -> BlockProgress:
@@ -123,7 +117,7 @@ def events(block: Block, schedule: Schedule, order: int, number: int) -> list[Ev
     """Return an event for every sync point of a block; for `order` and `number` see Event."""
     due: list[Event] = []
     phase = Phase.SYNC
-    for place, node in enumerate(block.behaviours):
+    for place, node in enumerate(work.counted(block.behaviours, 10)):
         id = node.id
         if id not in schedule.times:
             continue

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from bml_schema import Behaviour, Block, Constraint, Speech, Synchronize, SyncRef
+from realizer.core import work
 
 
 def external_refs(block: Block) -> tuple[SyncRef, ...]:
@@ -15,9 +16,9 @@ def external_refs(block: Block) -> tuple[SyncRef, ...]:
 
 def references(block: Block) -> Iterator[SyncRef]:
     """Yield the references of its behaviours, of syncs in their text, and of its constraints."""
-    for behaviour in block.behaviours:
+    for behaviour in work.counted(block.behaviours):
         yield from (ref for _, ref in behaviour.references)
-    for constraint in block.constraints:
+    for constraint in work.counted(block.constraints):
         yield from constraint.references
 
 

@@ -11,6 +11,7 @@ from operator import itemgetter
 
 from bml_schema import Block, Interrupt
 from realizer.behaviours.kind import BehaviourKind, PlanningContext
+from realizer.core import work
 from realizer.scheduling.timing import Schedule
 
 # s; two claims may overlap by this much.
@@ -114,7 +115,7 @@ def claims(
     block: Block, schedule: Schedule, kinds: Mapping[str, BehaviourKind], context: PlanningContext
 ) -> Iterator[ResourceClaim]:
     """Yield the claims of the scheduled behaviours of a block, on the clock of `schedule.start`."""
-    for order, node in enumerate(block.behaviours):
+    for order, node in enumerate(work.counted(block.behaviours, 5)):
         wanted = kinds[node.tag].claims(node, context) if node.id in schedule.times else ()
         if not wanted:
             continue
@@ -195,7 +196,7 @@ def conflicts(
     for claim in sorted(new_claims, key=lambda c: c.rank):
         by_behaviour.setdefault(claim.behaviour, []).append(claim)
     found: list[ResourceConflict] = []
-    for own in by_behaviour.values():
+    for own in work.counted(by_behaviour.values(), 5):
         for claim in own:
             blocks = granted.get(claim.resource, {}).values()
             winners = [winner for block in blocks for winner in block.winners(claim, in_silence)]

@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from realizer.core import work
 from realizer.scheduling.problem import ORIGIN, Part, Problem, Relation
 
 
@@ -95,6 +96,7 @@ class ConstraintGraph:
         previous: dict[int, tuple[int, Relation] | None] = {begin: None}
         queue = deque([begin])
         while queue and end not in previous:
+            work.count()
             at = queue.popleft()
             for to, relation in self._neighbours.get(at, ()):
                 if to not in previous:

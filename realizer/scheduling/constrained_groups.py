@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from realizer.core import work
 from realizer.core.array_types import Float64
 from realizer.scheduling.conflict import Link
 from realizer.scheduling.convex import Quadratic, active_set, feasible_start, optimum
@@ -103,6 +104,7 @@ def _feasible(
 
 
 def _group_problem(model: Model, clusters: RigidClusters, groups: Sequence[Group]) -> _GroupProblem:
+    work.count(len(model.owner) // 4)
     owner, root, shift = model.owner, model.root, model.shift
     chosen, held = np.zeros(len(clusters.label), np.bool_), np.zeros(len(clusters.label), np.bool_)
     for group in groups:
@@ -157,7 +159,7 @@ def _yield_to_stated(model: Model, gaps: Index) -> bool:
     """Drop the least gaps within a length that the document states, except in bounded behaviours."""
     changed = False
     owners, firsts = np.unique(model.owner[model.gap[gaps]], return_index=True)
-    for b, k in zip(owners.tolist(), gaps[firsts].tolist(), strict=True):
+    for b, k in work.counted(zip(owners.tolist(), gaps[firsts].tolist(), strict=True), 10):
         first, last = int(model.first[b]), int(model.last[b])
         if (model.most[k : k + last - first] < np.inf).any():
             continue

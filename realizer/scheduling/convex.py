@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from realizer.core import work
 from realizer.core.array_types import Bool, Float64
 from realizer.scheduling.longest_paths import components, longest_path_levels
 from realizer.scheduling.model import LOOSE, TIGHT, Index
@@ -16,6 +17,8 @@ from realizer.scheduling.union_find import UnionFind
 GUESSES = 12
 # Corrections of the active set after the interior point method; mostly one is enough.
 ROUNDS = 20
+# Up to this many unknowns a thread costs more time than it leaves to others.
+SMALL = 100
 # A force counts as none below this part of the greatest stiffness.
 RESTS = 1e-11
 
@@ -49,6 +52,7 @@ def feasible_start(
     Returns:
         x and None; or an arbitrary x, and the numbers of inequalities that form a cycle of positive length.
     """
+    work.count(len(quadratic.u) // 2)
     u, v, w = quadratic.u, quadratic.v, quadratic.w
     order = np.argsort(start[u], kind="stable")
     edges = list(zip(u[order].tolist(), v[order].tolist(), w[order].tolist(), strict=True))
@@ -162,6 +166,7 @@ def _bound(quadratic: Quadratic, binding: Bool, x: Float64) -> tuple[Float64, Fl
         x, and the force of each inequality: positive if it pushes, negative if it should be inactive.
     """
     m = quadratic.size
+    work.count(m)
     root, shift, whole = np.arange(m), np.zeros(m), quadratic.piece
     beside: dict[int, list[tuple[int, int]]] = {}
     active = np.flatnonzero(binding)
@@ -220,6 +225,7 @@ def _forces(pull: list[float], beside: dict[int, list[tuple[int, int]]], quadrat
 
 def _interior_point(quadratic: Quadratic) -> tuple[Float64, Float64, Float64] | None:
     """Return Clarabel's solution x (m,), with force and slack of each inequality, or None if it fails."""
+    work.count(100 * quadratic.size)
     import clarabel
     from scipy.sparse import csc_array
 
@@ -248,7 +254,8 @@ def _interior_point(quadratic: Quadratic) -> tuple[Float64, Float64, Float64] | 
     # only succeeds with it.
     for scaled in (False, True):
         settings.equilibrate_enable = scaled
-        solution = clarabel.DefaultSolver(upper, linear, matrix, -w, cones, settings).solve()
+        solver = clarabel.DefaultSolver(upper, linear, matrix, -w, cones, settings)
+        solution = work.call_native(solver.solve) if m > SMALL else solver.solve()
         # Rounding limits the accuracy; the active set is solved again exactly.
         if str(solution.status) in ("Solved", "AlmostSolved", "InsufficientProgress"):
             force, room = np.zeros(len(quadratic.u)), np.ones(len(quadratic.u))

@@ -9,6 +9,7 @@ from heapq import heappop, heappush
 from itertools import count
 from math import inf
 
+from realizer.core import work
 from realizer.scheduling.conflict import Conflict, Link, conflict_of
 from realizer.scheduling.explain import choose
 from realizer.scheduling.model import LOOSE, drop_least_gaps
@@ -47,6 +48,7 @@ class ConstraintNetwork:
         # The point that rises most comes first; so each rises once, as in Dijkstra's algorithm.
         queue = [(0.0, next(order), edge)]
         while queue:
+            work.count()
             _, _, step = heappop(queue)
             v, time = step.v, level[step.u] + step.seconds
             if time <= level[v] + LOOSE:
@@ -74,10 +76,12 @@ class ConstraintNetwork:
                 if self._cause[edge.v] is edge:
                     lowered.append(edge.v)
         for point in lowered:
+            work.count()
             self._level[point], self._cause[point] = -inf, None
             lowered += [step.v for step in self._out[point] if self._cause[step.v] is step]
         queue = deque(step for point in dict.fromkeys(lowered) for step in self._in[point])
         while queue:
+            work.count()
             step = queue.popleft()
             time = self._level[step.u] + step.seconds
             if time > self._level[step.v] + LOOSE:
@@ -131,7 +135,7 @@ def conflicts_of(problem: Problem) -> list[Conflict]:
                 gone.add(id(constraint))
                 network.remove(edges[id(constraint)])
 
-    for relation, is_equality in relations:
+    for relation, is_equality in work.counted(relations, 2):
         u, v, seconds, part, _ = relation
         reason = relation if is_equality else Link(u, v, seconds, relation)
         if is_equality:  # time[u] = time[v] + seconds
@@ -156,11 +160,11 @@ def conflicts_of(problem: Problem) -> list[Conflict]:
 def _lengths(problem: Problem) -> Iterator[Edge]:
     """Return the inequalities that behaviours state by themselves: their lengths and earliest starts."""
     ties, tied = UnionFind(len(problem.owner)), dict[int, set[int]]()
-    for u, v, seconds, _, _ in problem.equalities:
+    for u, v, seconds, _, _ in work.counted(problem.equalities):
         ties.tie(u, v, seconds)
         for p in (u, v):
             tied.setdefault(problem.owner[p], set()).add(p)
-    for b, (timing, first) in enumerate(zip(problem.timings, problem.first, strict=True)):
+    for b, (timing, first) in enumerate(work.counted(zip(problem.timings, problem.first, strict=True), 5)):
         if (earliest := problem.earliest[b]) > -inf:
             yield Edge(ORIGIN, first, earliest, Link(ORIGIN, first, earliest))
         if timing.rigid:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from realizer.core import work
+
 Edge = tuple[int, int, float]
 
 
@@ -22,6 +24,7 @@ def longest_path_levels(level: list[float], edges: Sequence[Edge], slack: float)
     sweep = 0
     while True:
         sweep += 1
+        work.count(1 + len(edges) // 8)
         moved = False
         for k, (u, v, w) in enumerate(edges):
             need = level[u] + w
@@ -61,6 +64,7 @@ def components(n: int, edges: Sequence[Edge]) -> list[int]:
 
     Source: Tarjan (1972), without recursion.
     """
+    work.count(n + len(edges))
     after: list[list[int]] = [[] for _ in range(n)]
     for u, v, _ in edges:
         after[u].append(v)
@@ -70,9 +74,9 @@ def components(n: int, edges: Sequence[Edge]) -> list[int]:
     for root in range(n):
         if index[root] >= 0:
             continue
-        work = [(root, 0)]
-        while work:
-            at, k = work.pop()
+        todo = [(root, 0)]
+        while todo:
+            at, k = todo.pop()
             if index[at] < 0:
                 index[at] = low[at] = counter
                 counter += 1
@@ -80,7 +84,7 @@ def components(n: int, edges: Sequence[Edge]) -> list[int]:
             for step in range(k, len(after[at])):
                 to = after[at][step]
                 if index[to] < 0:
-                    work += [(at, step), (to, 0)]
+                    todo += [(at, step), (to, 0)]
                     break
                 if component[to] < 0:
                     low[at] = min(low[at], low[to])

@@ -7,6 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from realizer.core import work
 from realizer.scheduling.conflict import Conflict, ConstraintGraph, Link, conflict_of
 from realizer.scheduling.model import LOOSE, Model
 from realizer.scheduling.problem import ORIGIN, Relation
@@ -80,6 +81,7 @@ class _StepGraph:
                 if (ways := self._known.get(u)) is None:
                     ways = self._known[u] = list(self._from(u))
                 tried += len(ways)
+                work.count(len(ways))
                 for step in ways:
                     v, seconds, _ = step
                     total = so_far + seconds

@@ -9,6 +9,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from realizer.core import work
 from realizer.core.array_types import Bool, Float64
 from realizer.scheduling.problem import ORIGIN, Problem
 from realizer.scheduling.union_find import UnionFind
@@ -64,11 +65,12 @@ def model_of(problem: Problem) -> Model | list[int]:
     ties = UnionFind(n)
     contradicting = [
         k
-        for k, (u, v, seconds, _, _) in enumerate(problem.equalities)
+        for k, (u, v, seconds, _, _) in enumerate(work.counted(problem.equalities))
         if abs(ties.tie(u, v, seconds)) > LOOSE
     ]
     if contradicting:
         return contradicting
+    work.count(n // 4)
     named = {p for relation in problem.equalities for p in relation[:2]}
     named.discard(ORIGIN)
     tied = sorted(named)
@@ -76,6 +78,7 @@ def model_of(problem: Problem) -> Model | list[int]:
     root[tied] = [ties.find(p) for p in tied]
     shift[tied] = [ties.shift[p] for p in tied]
 
+    work.count(n // 4)
     timings = problem.timings
     size = len(timings)
     first = np.array(problem.first, np.intp)
@@ -94,6 +97,7 @@ def model_of(problem: Problem) -> Model | list[int]:
     if any(t.most is not None for t in timings):
         bounds = [np.full(t.preferred.shape, np.inf) if t.most is None else t.most for t in timings]
         most = np.concatenate(bounds)
+    work.count(n // 4)
     rigid = np.array([t.rigid for t in timings], np.bool_)
     if rigid.any():
         free = ~rigid[owner[every]]

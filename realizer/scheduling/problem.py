@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from bml_schema import After, Before, Synchronize
+from realizer.core import work
 from realizer.scheduling.timing import Timing
 
 if TYPE_CHECKING:
@@ -135,15 +136,15 @@ class Problem:
         gone.update((id(r.part), "") for r in (*self.equalities, *self.orders) if r.part.names & lost)
         number = {ORIGIN: ORIGIN}
         smaller = Problem()
-        for b, part in enumerate(self.behaviours):
+        for b, part in enumerate(work.counted(self.behaviours, 2)):
             if id(part) not in gone:
                 old, new = self.first[b], smaller.add(part, self.timings[b], self.earliest[b])
                 number.update((old + i, new + i) for i in range(len(self.timings[b].points)))
-        for u, v, seconds, part, words in self.equalities:
+        for u, v, seconds, part, words in work.counted(self.equalities):
             # `add` has already made the equalities of a rigid behaviour.
             if id(part) not in gone and u in number and v in number and words[1] != "rigid":
                 smaller.equalities.append(Relation(number[u], number[v], seconds, part, words))
-        for u, v, seconds, part, words in self.orders:
+        for u, v, seconds, part, words in work.counted(self.orders):
             if id(part) not in gone and u in number and v in number:
                 smaller.orders.append(Relation(number[u], number[v], seconds, part, words))
         smaller.faults = [fault for fault in self.faults if id(fault[0]) not in gone]
@@ -165,7 +166,7 @@ def problem_of(
     present: list[tuple[Member, Behaviour, Part]] = []
     for member in members:
         block, required, places = member.block, member.block.required, member.block.places
-        for order, node in enumerate(block.behaviours):
+        for order, node in enumerate(work.counted(block.behaviours, 3)):
             id = node.id
             if id not in member.timings or (block.id, id) in first:
                 continue
@@ -185,7 +186,7 @@ def problem_of(
     resolvers = {
         m.block.id: _ReferenceResolver(m, {o.block.id: o for o in members}, first, outside) for m in members
     }
-    for member, node, part in present:
+    for member, node, part in work.counted(present, 3):
         start, points = first[member.block.id, node.id], member.timings[node.id].points
         if node.id in member.passed_times:
             _pass(problem, member, part, start, points, member.passed_times[node.id])
@@ -210,7 +211,7 @@ def problem_of(
                 problem.external.append(part)
     for member in members:
         _add_sequences(problem, member, first)
-        for order, constraint in enumerate(member.block.constraints):
+        for order, constraint in enumerate(work.counted(member.block.constraints, 10)):
             _add_constraint(problem, resolvers[member.block.id], constraint, order)
     return problem
 

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from realizer.core import work
 from realizer.core.array_types import Bool, Float64
 from realizer.scheduling.model import Index, Model
 from realizer.scheduling.problem import ORIGIN
@@ -20,6 +22,8 @@ FITS = 1e-9  # s
 # From this many unknowns on a sparse factorisation is as fast; and OpenBLAS starts threads for a dense one of
 # 90, which costs hundreds of milliseconds if the cores are busy.
 SPARSE_FROM = 64
+# From this many unknowns on other work goes on while a matrix is factorised.
+MANY = 2_000
 
 
 @dataclass(slots=True, eq=False)
@@ -90,7 +94,7 @@ def attach(
     strained: list[int] = []
     held: list[tuple[int, float]] = []
     hook: dict[int, tuple[int, float]] = {}
-    for b, root, start in knots:
+    for b, root, start in work.counted(knots):
         if root == ORIGIN:
             held.append((b, start))
             continue
@@ -173,6 +177,7 @@ def least_squares(
     n = len(free)
     if not n:
         return x
+    work.count(5 * n)
     # Node n represents all fixed points, and is removed.
     number = np.full(len(x), n)
     all_free = np.arange(n)
@@ -193,7 +198,8 @@ def least_squares(
         from scipy.sparse.linalg import splu
 
         sparse = csc_array((values, (rows, columns)), shape=(n, n))
-        factors = splu(sparse, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+        factorise = partial(splu, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+        factors = work.call_native(factorise, sparse) if n > MANY else factorise(sparse)
         found = factors.solve(right)
     y = x.copy()
     y[free] = found

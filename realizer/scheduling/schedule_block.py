@@ -7,6 +7,7 @@ from dataclasses import replace
 from math import inf
 from typing import TYPE_CHECKING, NamedTuple
 
+from realizer.core import work
 from realizer.core.array_types import Float64
 from realizer.scheduling.explain import choose, fault_warning, refusal, warning_of
 from realizer.scheduling.model import TIGHT
@@ -98,7 +99,7 @@ def schedule_together(
         times: dict[str, Float64] = {}
         whole = found.time - member.start
         whole.setflags(write=False)
-        for node in member.block.behaviours:
+        for node in work.counted(member.block.behaviours):
             n = number.get(f"{member.block.id}:{node.id}")
             if n is not None and node.id not in times:
                 first, k = problem.first[n], len(problem.timings[n].points)
@@ -203,7 +204,7 @@ def _attempt(problem: Problem, block: str) -> Solution | list[tuple[Part, Warnin
         return clashes
     drops: list[tuple[Part, Warning]] = []
     dropped: set[int] = set()
-    for clash in clashes:
+    for clash in work.counted(clashes, 20):
         # A conflict that a drop of this round may have settled is examined again in the next.
         if any(id(part) in dropped for part in (*clash.parts, *clash.named)):
             continue

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from realizer.core import work
 from realizer.core.array_types import Float64
 from realizer.scheduling.conflict import Conflict, ConstraintGraph, Link
 from realizer.scheduling.constrained_groups import solve_groups
@@ -48,7 +49,9 @@ def solve(problem: Problem) -> Solution | list[Conflict]:
         return [graph.loop(k) for k in model]
     if isinstance(model, list):
         return _all_conflicts(problem)
+    work.count(len(problem.owner) // 4)
     clusters = clusters_of(model)
+    work.count(len(problem.owner) // 4)
     cycles = _keep_inequalities(model, clusters, is_small)
     if cycles and is_small:
         from realizer.scheduling.minimal_cycles import minimal_cycles  # only for contradicting documents
@@ -56,6 +59,7 @@ def solve(problem: Problem) -> Solution | list[Conflict]:
         return minimal_cycles(model, ConstraintGraph(problem), cycles)
     if cycles:
         return _all_conflicts(problem)
+    work.count(len(problem.owner) // 4)
     time = _slide(model, clusters)
     # Remove rounding errors from equalities, orders and earliest starts.
     time = time[model.root] + model.shift
@@ -87,6 +91,7 @@ def _keep_inequalities(model: Model, clusters: RigidClusters, find_all: bool) ->
     misfit = (length < model.least - TIGHT) | (length > model.most + TIGHT)
     soon = clusters.held[label[:-1]] & (at[model.first] < model.earliest - TIGHT)
     bad = {*label[model.owner[model.gap[misfit]]].tolist(), *label[:-1][soon].tolist()}
+    work.count(len(model.problem.orders))
     groups = groups_of(model, clusters)
     alone = bad.difference(*(group.clusters for group in groups))
     begin = _earliest(model, clusters)

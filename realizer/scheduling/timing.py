@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from realizer.core import work
 from realizer.core.array_types import Float64
 
 # s; a time that is so much later than the start of its block is not known yet: an open speech ends there.
@@ -178,7 +179,8 @@ class Schedule:
     @property
     def behaviours(self) -> dict[str, dict[str, float]]:
         """{behaviour id: {sync point: seconds from block start}}."""
-        return {b: dict(zip(self.points[b], times.tolist(), strict=True)) for b, times in self.times.items()}
+        spans = work.counted(self.times.items())
+        return {b: dict(zip(self.points[b], times.tolist(), strict=True)) for b, times in spans}
 
     @property
     def dropped(self) -> tuple[str, ...]:

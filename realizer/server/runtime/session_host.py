@@ -6,7 +6,7 @@ import itertools
 import logging
 import math
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from realizer.core.settings import Settings
@@ -17,7 +17,14 @@ from realizer.server.journal.replay import catch_up
 from realizer.server.runtime.engines import Engines
 from realizer.server.runtime.gc_policy import GcPolicy
 from realizer.server.runtime.session_factory import SessionFactory
-from realizer.server.runtime.session_registry import ANYBODY, SessionRegistry, Visitor, worker_of
+from realizer.server.runtime.session_registry import (
+    ANYBODY,
+    JoinError,
+    SessionRegistry,
+    Visitor,
+    worker_of,
+)
+from realizer.server.runtime.sliced_calls import SlicedCalls
 from realizer.server.session.effects import Close, Draw, Effect, MoveConnection, Send, Speak
 from realizer.server.session.session import Session
 from realizer.server.streams.connection import SLOW
@@ -61,15 +68,14 @@ class SessionHost:
 
         self.metrics = Metrics(worker)
         self._factory = SessionFactory(settings, self.metrics)
-        self._registry = SessionRegistry(self._factory.new, settings, is_local)
+        self._registry = SessionRegistry(self._factory.new, settings, is_local, self._call)
         self._engines = Engines(settings.deformer)
         self._clients: dict[int, Outbound] = {}
         self._wakeups: dict[Session, tuple[float, int]] = {}  # times, and the steps they are rounded up to
         self._steps: dict[int, dict[Session, None]] = {}  # the sessions of a step, which share a timer
         self._due: deque[tuple[int, Session]] = deque()  # those whose step has come, to be woken in turn
-        self._reading: dict[Session, None] = {}  # sessions with documents to parse or plan, in turn
+        self._reading: dict[Session, None] = {}  # sessions with paused calls or documents to read, in turn
         self._reader: asyncio.Handle | None = None  # the next call of `_read`
-        self._read_until = -math.inf  # when its last call ended
         self._numbers = itertools.count(1)
         self._expiry_timer: asyncio.TimerHandle | None = None
         self._gc_policy = GcPolicy()
@@ -88,6 +94,8 @@ class SessionHost:
             JournalError: the journal cannot be opened.
         """
         self._loop = asyncio.get_running_loop()
+        self._calls = SlicedCalls[Session](self._continue_later, self._loop.call_soon_threadsafe)
+        self._read_until = self._loop.time()  # when the last call of `_read` ended
         await self._factory.load()
         self._expiry_timer = self._loop.call_later(EXPIRY_INTERVAL, self._expire_sessions)
 
@@ -100,7 +108,8 @@ class SessionHost:
     @property
     def busy(self) -> bool:
         """Whether a block plays, waits or is being prepared."""
-        return any(session.busy for session in self._registry.sessions.values())
+        sessions = self._registry.sessions.values()
+        return any(self._calls.is_busy(session) or session.busy for session in sessions)
 
     async def close(self) -> None:
         """End every session and every engine."""
@@ -112,6 +121,7 @@ class SessionHost:
                 task.cancel()
         for session in self._registry.sessions.values():
             session.close()
+        self._calls.close()
         self._factory.close()
         await self._loop.run_in_executor(None, self._engines.close)
 
@@ -158,9 +168,11 @@ class SessionHost:
             await asyncio.shield(self._restoring[name])
         session = self._registry.sessions.get(name)
         if session is not None and name in self._resumed and session.feedback_log.newest < (seen or 0):
-            now = self._loop.time()
-            session.opened -= catch_up(session, now, seen or 0) - now
-            self._apply_effects(session)
+            self._call(session, functools.partial(self._catch_up, session, seen or 0))
+
+    def _catch_up(self, session: Session, seen: int) -> None:
+        now = self._loop.time()
+        session.opened -= catch_up(session, now, seen) - now
 
     def _is_live(self, name: str) -> bool:
         """Whether the session plays here. One that another process has taken over may still be registered."""
@@ -193,9 +205,12 @@ class SessionHost:
             JoinError: as `check`.
         """
         number = next(self._numbers)
-        session = self._registry.open(number, name, self._loop.time(), seen, visitor)
         self._clients[number] = client
-        self._apply_effects(session)
+        try:
+            self._registry.open(number, name, self._loop.time(), seen, visitor)
+        except JoinError:
+            del self._clients[number]
+            raise
         return number
 
     def receive(self, number: int, message: str | bytes) -> bool:
@@ -205,28 +220,60 @@ class SessionHost:
             return False
         self.metrics.counts["messages"] += 1
         began = self._loop.time()
-        try:
-            # A client that only asks and never reads must be noticed here: nothing else may ever be due.
-            session.update_backlog(number, self._clients[number].unsent_bytes)
-            session.receive(number, message, began)
-        except Exception:
-            self._fail(session)
-        self._apply_effects(session)
+        self._call(session, functools.partial(self._receive, session, number, message))
         self._report_slow_step(began, f"a message of {len(message)} characters", session, [number])
         return True
+
+    def _receive(self, session: Session, number: int, message: str | bytes) -> None:
+        if (present := self._registry.session_of.get(number)) is not session and present is not None:
+            self.receive(number, message)  # it has moved while the message waited
+            return
+        # A client that only asks and never reads must be noticed here: nothing else may ever be due.
+        self._update_backlog(session, number)
+        session.receive(number, message, self._loop.time())
+
+    def _update_backlog(self, session: Session, *numbers: int) -> None:
+        for number in numbers:
+            if (client := self._clients.get(number)) is not None:
+                session.update_backlog(number, client.unsent_bytes)
 
     def leave(self, number: int) -> None:
         """Remove a closed connection."""
         left = self._registry.session_of.get(number)
         if left is not None:
             self.metrics.counts["frames_dropped"] += left.dropped_count(number)
+            if not left.named and set(left.connections) <= {number}:
+                self._calls.cancel(left)  # nobody wants the result
         self._registry.leave(number, self._loop.time())
         self._clients.pop(number, None)
         self._gc_policy.ended_connections += 1
-        if left is not None:
-            self._schedule_wakeup(left)
 
     # sessions -----------------------------------------------------------------------------------
+
+    def _call(self, session: Session, function: Callable[[], None]) -> bool:
+        """Call a function that changes a session, and carry out the effects.
+
+        If it takes long, or if other calls of the session have not ended, it ends later.
+
+        Returns:
+            Whether it has ended.
+        """
+
+        def step() -> None:
+            try:
+                function()
+            except Exception:
+                self._fail(session)
+            self._apply_effects(session)
+
+        self._calls.call(session, step)
+        return not self._calls.is_busy(session)
+
+    def _continue_later(self, session: Session) -> None:
+        """Continue the call of a session, which was paused, when it is its turn."""
+        self._reading.setdefault(session)
+        if self._reader is None:
+            self._reader = self._loop.call_soon(self._read)
 
     def _apply_effects(self, session: Session) -> None:
         """Carry out the effects of a session, and schedule its next wake-up."""
@@ -243,9 +290,7 @@ class SessionHost:
             return
         self._wake_at(session, session.next_due())
         if session.has_documents:
-            self._reading.setdefault(session)
-            if self._reader is None:
-                self._reader = self._loop.call_soon(self._read)
+            self._continue_later(session)
 
     def _wake_at(self, session: Session, when: float) -> None:
         """Call `_tick` at a time, instead of the one before; infinite: never.
@@ -292,6 +337,8 @@ class SessionHost:
         """Send the frames and the feedback of a session that are due, and do what else is."""
         now = self._loop.time()
         self.metrics.late.pending.append(now - when)
+        if self._calls.is_busy(session):
+            return  # it is woken again when its call has ended
         run = session.fast_path
         if run is not None and (data := run.next_message(now)) is not None:
             client = self._clients[run.connection]
@@ -300,6 +347,9 @@ class SessionHost:
                 session.update_backlog(run.connection, waiting)
             self._wake_at(session, run.wake_at)
             return
+        self._calls.call(session, functools.partial(self._send_due, session, now))
+
+    def _send_due(self, session: Session, now: float) -> None:
         try:
             frames = session.frames(now)
         except Exception:
@@ -312,30 +362,39 @@ class SessionHost:
         for effect in effects:
             self._apply_effect(session, effect)
         for number in session.connections:
-            if (waiting := self._clients[number].unsent_bytes) > SLOW:
+            client = self._clients.get(number)
+            if client is not None and (waiting := client.unsent_bytes) > SLOW:
                 session.update_backlog(number, waiting)
         self._wake_at(session, due)
 
     def _read(self) -> None:
-        """Parse or plan documents, step by step, for their share of the time. Then frames come again."""
+        """Read documents and continue paused calls, for their share of the time. Then frames come again."""
         began = self._loop.time()
         end = began + min((began - self._read_until) * READING_SHARE, LONGEST_READING)
         while self._reading:
             session = next(iter(self._reading))
             del self._reading[session]
-            began, plans = self._loop.time(), session.player.version
-            self._work(session, began, read_documents=True)
+            began = self._loop.time()
+            if session.closed:
+                self._calls.cancel(session)
+            elif self._calls.is_busy(session):
+                self._calls.resume(session)
+            else:
+                self._calls.call(session, functools.partial(self._read_document, session, began))
             self._read_until = self._loop.time()
             self._report_slow_step(began, "a document", session)
-            if session.player.version != plans:
-                self.metrics.planning.pending.append(self._read_until - began)
             if self._read_until >= end:
                 break
         self._reader = self._loop.call_soon(self._read) if self._reading else None
 
+    def _read_document(self, session: Session, now: float) -> None:
+        plans = session.player.version
+        self._work(session, now, read_documents=True)
+        if session.player.version != plans:
+            self.metrics.planning.pending.append(self._loop.time() - now)
+
     def _work(self, session: Session, now: float, *, read_documents: bool) -> None:
-        for number in session.connections:
-            session.update_backlog(number, self._clients[number].unsent_bytes)
+        self._update_backlog(session, *session.connections)
         try:
             session.tick(now, read_documents=read_documents)
         except Exception:
@@ -395,23 +454,19 @@ class SessionHost:
     def _deliver_result(self, session: Session, deliver: Any, id: int, future: asyncio.Future[Any]) -> None:
         if not future.cancelled() and not self._closed:
             began = self._loop.time()
-            deliver(id, future.result(), began)
-            self._apply_effects(session)
+            self._call(session, lambda: deliver(id, future.result(), self._loop.time()))
             self._report_slow_step(began, "the result of a voice or a renderer", session)
 
     def _compact_journal(self, session: Session) -> None:
         if self._closed:
             return
         began = self._loop.time()
-        try:
-            session.compact_journal(began)
-        except Exception:
-            self._fail(session)
-        self._apply_effects(session)
+        self._call(session, lambda: session.compact_journal(self._loop.time()))
         self._report_slow_step(began, "a checkpoint of the journal", session)
 
     async def _check_takeovers(self) -> None:
         for session in await self._factory.taken_over(self._registry.sessions.values()):
+            self._calls.cancel(session)
             session.hand_over(TakenOver(session.id))
             self._apply_effects(session)
 

@@ -5,6 +5,7 @@ import secrets
 import zlib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings, limit_hint
@@ -49,6 +50,12 @@ class Visitor:
 ANYBODY = Visitor()
 
 
+def call_now(session: Session, function: Callable[[], None]) -> bool:
+    """Call a function at once."""
+    function()
+    return True
+
+
 class SessionRegistry:
     """All sessions of the service, by name and by connection.
 
@@ -56,6 +63,8 @@ class SessionRegistry:
         make: (id, now, named) -> Session.
         settings: the limits of sessions.
         is_local: (name) -> whether the session of that name belongs to this process.
+        call: (session, function) -> calls a function that changes a session, now or when its other calls have
+            ended; and returns whether it was now.
 
     Attributes:
         sessions: name -> session.
@@ -67,7 +76,9 @@ class SessionRegistry:
         make: Callable[[str, float, bool], Session],
         settings: Settings,
         is_local: Callable[[str], bool] = lambda name: True,
+        call: Callable[[Session, Callable[[], None]], bool] = call_now,
     ) -> None:
+        self._call = call
         self._is_local = is_local
         self._make = make
         self._settings = settings
@@ -137,7 +148,7 @@ class SessionRegistry:
             self._opened_by[id] = visitor.address
         session = self.session_of[connection] = self.sessions[id]
         self._visitors[connection] = visitor
-        session.connect(connection, now, seen)
+        self._call(session, partial(session.connect, connection, now, seen))
         return session
 
     def leave(self, connection: int, now: float) -> None:
@@ -145,10 +156,13 @@ class SessionRegistry:
         self._visitors.pop(connection, None)
         session = self.session_of.pop(connection, None)
         if session is not None:
-            session.disconnect(connection, now)
-            if session.closed:
-                session.journal.end()
-                self.remove(session)
+            self._call(session, partial(self._disconnect, session, connection, now))
+
+    def _disconnect(self, session: Session, connection: int, now: float) -> None:
+        session.disconnect(connection, now)
+        if session.closed:
+            session.journal.end()
+            self.remove(session)
 
     def remove(self, session: Session) -> None:
         """Remove a session that has ended."""
@@ -183,11 +197,15 @@ class SessionRegistry:
             except JoinError as error:  # the journal cannot store it, and the old session may have ended
                 effects.append(Close(effect.connection, 1013, str(error)))
                 continue
-            joined.send_welcome(effect.connection, now)
-            if effect.seen is not None:
-                joined.send_missed_feedback(effect.connection, effect.seen)
-            effects += joined.take_effects()
+            if self._call(joined, partial(self._welcome, joined, effect, now)):
+                effects += joined.take_effects()
         return effects
+
+    @staticmethod
+    def _welcome(joined: Session, move: MoveConnection, now: float) -> None:
+        joined.send_welcome(move.connection, now)
+        if move.seen is not None:
+            joined.send_missed_feedback(move.connection, move.seen)
 
     def _refusal(self, move: MoveConnection, left: Session, visitor: Visitor) -> str | None:
         """Return why a connection cannot move from a session to another, or None."""

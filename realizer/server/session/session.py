@@ -14,6 +14,7 @@ from typing import Any
 from bml_schema import WarningFeedback
 from realizer.behaviours.kind import Position
 from realizer.behaviours.registry import KINDS
+from realizer.core import work
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
 from realizer.playback.player import Player
@@ -509,7 +510,7 @@ class Session:
             self.broadcast.settle(change)
         texts: list[str] = []
         while due := self.player.due(t + EPSILON):
-            for event in due:
+            for event in work.counted(due, 20):
                 feedback, ending_blocks = self.submission.speeches.process_feedback(event)
                 texts.append(self.feedback_log.add(feedback, t))
                 if ending_blocks:

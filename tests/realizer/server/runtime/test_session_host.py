@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import selectors
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 
 import pytest
 
+from bml_schema.feedback import parse_feedback
 from realizer.core.settings import Settings
+from realizer.server.runtime import sliced_calls
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.streams.connection import SLOW
+from tests.worst_documents import document
 
 PERIOD = 1 / 25  # s
 PHASES = [k / 8 * PERIOD for k in range(8)]  # where between two frames something happens
@@ -129,5 +133,124 @@ def test_session_host_wakes_no_session_after_close() -> None:
         before = len(client.frames)
         await asyncio.sleep(1)
         assert len(client.frames) == before
+
+    hosted(test)
+
+
+def large(id: str, count: int = 300) -> str:
+    """A document of many behaviours."""
+    heads = "".join(f'<head id="h{i}" lexeme="NOD" start="{i}"/>' for i in range(count))
+    return f'<bml id="{id}">{heads}</bml>'
+
+
+def predicted(client: Client) -> list[str]:
+    """The blocks whose predictions a client has got, in order."""
+    texts = (text for text in client.texts if text.startswith("<predictionFeedback") and "<head" in text)
+    return [parse_feedback(text).blocks[0].id for text in texts]
+
+
+@pytest.fixture
+def in_tiny_slices(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each call is paused wherever it counts its work."""
+    monkeypatch.setattr(sliced_calls, "SLICE", 0.0)
+
+
+def test_session_host_answers_others_while_it_plans(in_tiny_slices) -> None:
+    async def test(host: SessionHost) -> None:
+        (busy, planning), (number, other) = subscribed(host), subscribed(host)
+        host.receive(busy, large("a"))
+        for n in range(20):
+            host.receive(number, f'{{"type": "ping", "id": "{n}"}}')
+            await asyncio.sleep(0)
+        assert sum("pong" in text for text in other.texts) == 20
+        assert predicted(planning) == []
+        await asyncio.sleep(60)
+        assert predicted(planning) == ["a"]
+
+    hosted(test)
+
+
+def test_session_host_keeps_the_order_of_messages_while_it_plans(in_tiny_slices) -> None:
+    async def test(host: SessionHost) -> None:
+        number, client = subscribed(host)
+        for id in "abc":
+            host.receive(number, large(id, 50))
+        host.receive(number, '{"type": "ping"}')
+        host.receive(number, large("d", 5))
+        await asyncio.sleep(60)
+        assert predicted(client) == ["a", "b", "c", "d"]
+
+    hosted(test)
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_session_host_lets_a_client_leave_while_it_plans(in_tiny_slices, named: bool) -> None:
+    async def test(host: SessionHost) -> None:
+        number, client = subscribed(host, "s" if named else None)
+        host.receive(number, large("a"))
+        await asyncio.sleep(0)
+        host.leave(number)
+        assert host.health()["sessions"] == named
+        await asyncio.sleep(30)
+        assert predicted(client) == []
+        _, again = subscribed(host, "s")
+        host.receive(number + 1, large("b", 5))
+        await asyncio.sleep(30)
+        assert predicted(again) == ["b"]
+        if named:
+            assert client.ends == []
+
+    hosted(test)
+
+
+def test_session_host_welcomes_a_client_after_it_has_planned(in_tiny_slices) -> None:
+    async def test(host: SessionHost) -> None:
+        number, client = subscribed(host, "s")
+        host.receive(number, large("a"))
+        _, other = subscribed(host, "s")
+        assert not other.frames
+        await asyncio.sleep(60)
+        assert other.frames
+        assert predicted(client) == ["a"]
+
+    hosted(test)
+
+
+def test_session_host_moves_a_client_whose_messages_wait(in_tiny_slices) -> None:
+    async def test(host: SessionHost) -> None:
+        number, client = subscribed(host, "here")
+        host.receive(number, large("a"))
+        host.receive(number, '{"type": "hello", "version": 1, "session": "there"}')
+        host.receive(number, large("b", 5))
+        await asyncio.sleep(60)
+        assert predicted(client) == ["b"]
+        assert any('"session":"there"' in text.replace(" ", "") for text in client.texts)
+
+    hosted(test)
+
+
+def test_session_host_plans_in_slices_as_at_once(monkeypatch) -> None:
+    results: list[list[str]] = []
+
+    async def test(host: SessionHost) -> None:
+        number, client = subscribed(host)
+        for pattern in ("linked", "impossible", "squeezed", "overlapping"):
+            host.receive(number, document(pattern, 60).replace('id="worst"', f'id="{pattern}"'))
+        await asyncio.sleep(300)
+        results.append([re.sub(r'(globalTime|global|posix)\w*="[^"]*"', "", text) for text in client.texts])
+
+    for seconds in (0.0, 1e9):
+        monkeypatch.setattr(sliced_calls, "SLICE", seconds)
+        hosted(test)
+    assert results[0] == results[1]
+    assert len(results[0]) > 20
+
+
+def test_session_host_closes_while_it_plans(in_tiny_slices) -> None:
+    async def test(host: SessionHost) -> None:
+        number, _ = subscribed(host)
+        host.receive(number, large("a"))
+        await asyncio.sleep(0)
+        assert host.busy
 
     hosted(test)

@@ -1,0 +1,147 @@
+"""Calls that take turns: one that takes long is paused, so that others have their turn."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Hashable
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any, Generic, ParamSpec, TypeVar
+
+from greenlet import getcurrent, greenlet
+
+from bml_schema.steps import on_element
+from realizer.core import work
+
+T = TypeVar("T", bound=Hashable)
+R = TypeVar("R")
+P = ParamSpec("P")
+
+SLICE = 0.004  # s; a call is paused where it counts its work after so long
+
+
+class _Stack(greenlet):
+    """A stack on which calls of an owner run."""
+
+    owner: Any = None
+    waits_for: Future[Any] | None = None  # the function that it called in another thread
+
+
+class SlicedCalls(Generic[T]):
+    """Calls on behalf of owners: those of one owner in order, those of different owners in slices.
+
+    A call runs on a stack of its own (a greenlet), and is paused where it counts its work
+    (`realizer.core.work`). So functions need not know that they may be paused. Only the calls of their owner
+    wait for them. All methods are called in one thread.
+
+    Args:
+        on_pause: called with the owner of a call that was paused; the caller passes it to `resume` later.
+        call_soon: calls a function in the thread of the other methods; called in any thread.
+        clock: seconds, rising while calls run.
+    """
+
+    def __init__(
+        self,
+        on_pause: Callable[[T], None],
+        call_soon: Callable[[Callable[[T], None], T], object],
+        clock: Callable[[], float] = time.perf_counter,
+    ) -> None:
+        self._on_pause = on_pause
+        self._call_soon = call_soon
+        self._clock = clock
+        self._end = 0.0  # of the present slice
+        self._stacks: dict[T, _Stack] = {}
+        self._waiting: dict[T, deque[Callable[[], None]]] = {}
+        self._free: list[_Stack] = []
+        self._threads = ThreadPoolExecutor(1, "solver")
+
+    def is_busy(self, owner: T) -> bool:
+        """Return whether a call of the owner has not ended."""
+        return owner in self._stacks
+
+    def call(self, owner: T, function: Callable[[], None]) -> None:
+        """Call a function for at most a slice of time, or after the earlier calls of its owner.
+
+        Within a call of the same owner it is called at once. Exceptions are raised here until the first
+        pause, and by `resume` after it.
+        """
+        stack = self._stacks.get(owner)
+        if stack is None:
+            self._stacks[owner] = stack = self._free.pop() if self._free else _Stack(self._run)
+            self._waiting[owner] = deque([function])
+            stack.owner = owner
+            self._switch(stack)
+        elif stack is getcurrent():
+            function()
+        else:
+            self._waiting[owner].append(function)
+
+    def resume(self, owner: T) -> None:
+        """Continue the calls of an owner for at most a slice of time, unless they wait for a thread."""
+        stack = self._stacks.get(owner)
+        if stack is not None and (stack.waits_for is None or stack.waits_for.done()):
+            self._switch(stack)
+
+    def cancel(self, owner: T) -> None:
+        """End the calls of an owner where they are, if this is not one of them."""
+        if (stack := self._stacks.get(owner)) is not None and stack is not getcurrent():
+            del self._stacks[owner], self._waiting[owner]
+            stack.parent = getcurrent()
+            stack.throw()
+
+    def close(self) -> None:
+        """End the calls of all owners."""
+        for owner in list(self._stacks):
+            self.cancel(owner)
+        self._threads.shutdown(wait=False, cancel_futures=True)
+
+    # work.Pauser, for the calls themselves --------------------------------------------------------
+
+    def pause(self) -> None:
+        """Let others have their turn if the slice of time is over."""
+        if self._clock() >= self._end:
+            self._parent().switch()
+
+    def wait_for(self, function: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
+        """Call a function in another thread, and let others have their turn until it returns."""
+        stack = getcurrent()
+        assert isinstance(stack, _Stack)
+        stack.waits_for = future = self._threads.submit(function, *args, **kwargs)
+        future.add_done_callback(lambda _: self._call_soon(self._on_pause, stack.owner))
+        self._parent().switch()
+        stack.waits_for = None
+        return future.result()
+
+    def _switch(self, stack: _Stack) -> None:
+        outer, self._end = self._end, self._clock() + SLICE
+        stack.parent, owner = getcurrent(), stack.owner
+        try:
+            stack.switch()
+        except BaseException:
+            self._stacks.pop(owner, None)
+            self._waiting.pop(owner, None)
+            raise
+        finally:
+            self._end = outer
+        if owner in self._stacks and stack.waits_for is None:
+            self._on_pause(owner)
+
+    def _run(self) -> None:
+        """Make the calls of an owner, then those of the next owner that this stack is used for."""
+        work.pause_with(self)
+        on_element.set(self.pause)
+        stack = getcurrent()
+        assert isinstance(stack, _Stack)
+        while True:
+            waiting = self._waiting[stack.owner]
+            while waiting:
+                waiting.popleft()()
+            del self._waiting[stack.owner], self._stacks[stack.owner]
+            self._free.append(stack)
+            self._parent().switch()
+
+    @staticmethod
+    def _parent() -> greenlet:
+        parent = getcurrent().parent
+        assert parent is not None
+        return parent
