@@ -104,10 +104,12 @@ def read_block(
         node = read(entry)
         if node is not None:
             nodes[n] = node
+    next_element()
     reader.prune(nodes)
     for node in nodes.values():
         if isinstance(node, Constraint) and node.id and node.place:
             reader.places.setdefault(node.id, node.place)
+    next_element()
     return Block(
         **values,
         children=_grouped(tree, nodes),

@@ -11,6 +11,7 @@ from bml_schema.behaviours import Face, FaceShift
 from bml_schema.dialects.table import table
 from bml_schema.node_schema import local, schema_of
 from bml_schema.nodes import Behaviour, Block
+from bml_schema.steps import next_element
 from bml_schema.undeclared_prefixes import SMARTBODY
 from bml_schema.vocabulary import VOCABULARY
 
@@ -48,6 +49,7 @@ def has_words_of_dialects(block: Block) -> bool:
 def _any(nodes: Iterable[Behaviour]) -> bool:
     words = _words()
     for node in nodes:
+        next_element()
         if (word := words.get(type(node))) is not None and _is_word(word[1], getattr(node, word[0])):
             return True
         if any(name.startswith(_SMARTBODY) for name in node.unknown_attributes):

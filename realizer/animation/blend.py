@@ -52,6 +52,7 @@ def blend(
     """
     times = np.asarray(times, np.float64)
     visible = _visible(channels, times)
+    work.count(len(visible))
     # Only columns that move are computed; `place` holds the row of each of them.
     moved = {channel.target.column for channel in visible}
     if idle is not None:
@@ -147,7 +148,8 @@ def _begin_idle(
 ) -> None:
     """Write blinks and idle motion, as far as no channel masks them, into rows that are still 0."""
     blinks = idle.blinks
-    if fewer := [channel for channel in channels if channel.target.column == mask_channel("blinks").column]:
+    column = mask_channel("blinks").column
+    if fewer := [channel for channel in channels if channel.target.column == column]:
         blinks = blinks.reduced(1.0 - sample(fewer, blinks.onsets).sum(axis=0))
     values[[place[lid] for lid in _lids()]] = blinks.at(times)
     moved = idle.motion.at(times)
@@ -179,6 +181,7 @@ def _override(
     Returns:
         (c, n) 0..1 how far each value was replaced, or None if nowhere.
     """
+    work.count(len(channels))
     overridden: Float64 | None = None
     for layer in REPLACING:
         if over := [channel for channel in channels if channel.layer is layer]:

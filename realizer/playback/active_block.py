@@ -168,8 +168,10 @@ class ActiveBlock:
         """When every behaviour is past its relax, or its end if it has no relax."""
         if self.stopped_at is not None:
             return self.stopped_at
-        last = 0.0
-        for points, times in zip(self.schedule.points.values(), self.schedule.times.values(), strict=True):
+        last, schedule = 0.0, self.schedule
+        for points, times in work.counted(
+            zip(schedule.points.values(), schedule.times.values(), strict=True)
+        ):
             last = max(last, float(times[points.index("relax") if "relax" in points else -1]))
         return self.start + last
 

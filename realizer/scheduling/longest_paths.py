@@ -42,6 +42,7 @@ def longest_path_levels(level: list[float], edges: Sequence[Edge], slack: float)
 
 def _cycle(cause: dict[int, int], edges: Sequence[Edge]) -> list[int]:
     """Return a cycle among the edges that raised their heads last, or []."""
+    work.count(len(cause) // 4)
     seen: dict[int, int] = {}
     for start in cause:
         at = start

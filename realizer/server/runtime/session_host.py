@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from realizer.core import work
 from realizer.core.settings import Settings
 from realizer.server.documents.limits import memory
 from realizer.server.http.metrics import Metrics
@@ -280,7 +281,7 @@ class SessionHost:
         effects = session.take_effects()
         if any(isinstance(effect, MoveConnection) for effect in effects):
             effects = self._registry.move_connections(session, effects, self._loop.time())
-        for effect in effects:
+        for effect in work.counted(effects, 5):
             self._apply_effect(session, effect)
         self._schedule_wakeup(session)
 

@@ -530,7 +530,8 @@ class Session:
 
     def _send_feedback(self, connection: Connection, texts: list[str]) -> None:
         if (filter := connection.feedback) is not None:
-            self._effects += [Send(connection.id, text) for text in texts if filter.accepts(text)]
+            sends = [Send(connection.id, text) for text in work.counted(texts) if filter.accepts(text)]
+            self._effects += sends
 
     def send_missed_feedback(self, connection: int, seen: int) -> None:
         """Send the feedback after `seen`, and `gap` first if some of it is not stored or never existed."""
