@@ -9,7 +9,7 @@ from bml_schema import parse
 from realizer import pipeline
 from realizer.behaviours.kind import Position
 from realizer.behaviours.registry import VOCABULARY
-from realizer.core.options import PlayOptions
+from realizer.core.options import DEFAULTS, PlayOptions
 from realizer.playback.player import Player
 from realizer.playback.speaking import open_voice, submit_with_speech
 from realizer.realization import Realization
@@ -34,6 +34,7 @@ def realize(
     prosody: bool = True,
     mapping: Path | None = None,
     grace: float = 0.5,
+    max_planning: int = DEFAULTS.max_planning,
     strict_bml: bool = False,
 ) -> Realization:
     """Play BML documents from start to end, without a clock.
@@ -42,7 +43,7 @@ def realize(
         documents: BML text, or several texts; all are submitted at t = 0, in order.
         voice: a voice or its name; None for espeak-ng, or the silent voice if that is not installed.
         face, deformer, fps, scene, seed, idle, language, media, expressions, cooccurrence, prosody, mapping,
-            grace, strict_bml: as in `realizer.core.options.PlayOptions`.
+            grace, max_planning, strict_bml: as in `realizer.core.options.PlayOptions`.
 
     Raises:
         FaceError: no such face.
@@ -64,6 +65,7 @@ def realize(
         prosody=prosody,
         mapping=mapping,
         grace=grace,
+        max_planning=max_planning,
         strict_bml=strict_bml,
     )
     texts = [documents] if isinstance(documents, str | bytes) else documents

@@ -10,6 +10,7 @@ from typing import Any
 from bml_schema import Activate, Interrupt, ParameterValueChange
 from realizer.animation.channel import Channel
 from realizer.core.array_types import Float64
+from realizer.core.options import DEFAULTS
 from realizer.expressions.library import Library, builtin
 from realizer.scheduling.timing import Timing
 from realizer.speech.utterance import Recording, SpeechRequest, Utterance
@@ -32,6 +33,7 @@ class PlanningContext:
         library: the expressions that documents can name.
         face_inputs: () -> the inputs of the character's face (`Face.inputs`), or None if unknown.
         grace: seconds by which a behaviour may come too late for its references into other blocks.
+        max_planning: steps of planning a block.
         animates: whether behaviours are expanded and played; False if only their times are wanted.
     """
 
@@ -44,6 +46,7 @@ class PlanningContext:
     library: Library = field(default_factory=builtin)
     face_inputs: Callable[[], Sequence[str] | None] = lambda: None
     grace: float = 0.0
+    max_planning: int = DEFAULTS.max_planning
     animates: bool = True
 
 

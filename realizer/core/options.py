@@ -26,6 +26,7 @@ class PlayOptions:
         prosody: whether nods, brows, blinks and glances accompany speech; needs `idle`.
         mapping: file that maps AUs to FAPs and overrides the face's mapping.
         grace: seconds by which a behaviour may come too late for its references into other blocks.
+        max_planning: steps of planning one block; about a million take a second.
         strict_bml: whether documents are read as BML 1.0 only, without dialects.
 
     Raises:
@@ -45,6 +46,7 @@ class PlayOptions:
     prosody: bool = True
     mapping: Path | None = None
     grace: float = 0.5
+    max_planning: int = 2_500_000
     strict_bml: bool = False
 
     def __post_init__(self) -> None:

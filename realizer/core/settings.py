@@ -338,6 +338,9 @@ class Settings:
     max_document: int = _row(2**20, _whole(1, 2**31), "bytes of BML in one message")
     max_elements: int = _row(100_000, _whole(1, 10**7), "XML elements in one message")
     max_behaviours: int = _row(10_000, _whole(1, 10**6), "behaviours in one block")
+    max_planning: int = _row(
+        2_500_000, _whole(1, 10**12), "steps of planning one block; about a million take a second"
+    )
     max_duration: float = _row(1_800.0, _real(1, 1e9), "planned duration of a block in seconds")
     max_blocks: int = _row(
         1_000,

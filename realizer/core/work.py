@@ -51,7 +51,7 @@ def count(steps: int = 1) -> None:
     if (limit := _limit.get()) is not None:
         limit.left -= steps
         if limit.left < 0:
-            raise WorkLimitError(f"wanted at most {limit.steps} steps of planning")
+            raise WorkLimitError(f"wanted at most {limit.steps} steps of planning, got more")
     if (pauser := _pauser.get()) is not None:
         pauser.pause()
 

@@ -151,7 +151,8 @@ class BlockManager:
             return planned.schedule
         self._announced.pop(block.id, None)
         if planned.schedule.failed:
-            return self._refuse(block, planned.schedule.warnings[0], now)
+            failed = self._refuse(block, planned.schedule.warnings[0], now)
+            return replace(failed, over_limit=planned.schedule.over_limit)
         if (words := self._veto(block, planned.schedule)) is not None:
             return self._refuse(block, Warning(block.id, "CANNOT_CREATE_BEHAVIOR", words), now)
         if not context.animates:

@@ -13,6 +13,7 @@ from bml_schema.dropped_references import listed, without_constraints
 from realizer.animation.channel import Channel
 from realizer.behaviours.kind import BehaviourKind, PlanningContext
 from realizer.core import work
+from realizer.core.settings import limit_hint
 from realizer.playback.references import external_refs
 from realizer.playback.resources import ResourceClaim, after_interrupts, claims, conflicts, interrupts, trims
 from realizer.scheduling import Member, schedule_together
@@ -73,20 +74,20 @@ def plan(
     """
     builder = _PlanBuilder(block, kinds, context, may_stretch)
     try:
-        builder.add_problems()
-        builder.find_timings()
-        schedule, *moved = builder.schedule(start, external_times, tuple(existing_claims), others)
+        with work.limited(context.max_planning):
+            builder.add_problems()
+            builder.find_timings()
+            schedule, *moved = builder.schedule(start, external_times, tuple(existing_claims), others)
+            channels = builder.expand(schedule)
+    except work.WorkLimitError as error:
+        text = f"{error}: wanted fewer behaviours, or fewer constraints {limit_hint('max_planning')}"
+        warning = Warning(block.id, "IMPOSSIBLE_TO_SCHEDULE", text)
+        fields: dict[str, Any] = {"warnings": (warning,), "failed": True, "over_limit": True}
     except _NoPlan as refusal:
-        return Plan(block, Schedule(block.id, {}, {}, start=start, **refusal.fields))
-    return Plan(
-        builder.block,
-        schedule,
-        builder.expand(schedule),
-        builder.claims,
-        builder.timings,
-        moved,
-        builder.trims,
-    )
+        fields = refusal.fields
+    else:
+        return Plan(builder.block, schedule, channels, builder.claims, builder.timings, moved, builder.trims)
+    return Plan(block, Schedule(block.id, {}, {}, start=start, **fields))
 
 
 class _NoPlan(Exception):

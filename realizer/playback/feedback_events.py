@@ -87,8 +87,8 @@ def prediction(
     nodes = []
     for id, syncs in (behaviours or {}).items():
         work.count(20)
-        known = {sync: time for sync, time in syncs.items() if time < UNKNOWN}
-        nodes.append(prediction_of(block[id], block.id, known, schedule.late.get(id, 0.0)))
+        if known := {sync: time for sync, time in syncs.items() if time < UNKNOWN}:
+            nodes.append(prediction_of(block[id], block.id, known, schedule.late.get(id, 0.0)))
     return PredictionFeedback(character_id=block.character_id, blocks=(times,), behaviours=tuple(nodes))
 
 

@@ -75,6 +75,7 @@ class Player(BlockManager):
             clips={} if clips is None else clips,
             library=library_of(options.expressions),
             grace=options.grace,
+            max_planning=options.max_planning,
             animates=animates,
         )
         self.idle = options.idle

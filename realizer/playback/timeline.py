@@ -9,6 +9,7 @@ from graphlib import TopologicalSorter
 
 from bml_schema import Block
 from realizer.behaviours.kind import BehaviourKind, PlanningContext
+from realizer.core import work
 from realizer.playback import block_links
 from realizer.playback.active_block import ActiveBlock, Dependency
 from realizer.playback.block_planner import Plan
@@ -298,7 +299,11 @@ class BlockTimeline:
         """Change the times of playing blocks to the best fit; if there is none, return why."""
         members = [member(p, origin, now) for p in blocks]
         instants = block_links.external_times(self.blocks.schedule_of, origin, self.blocks.first_schedule_of)
-        schedules = schedule_together(members, outside=instants)
+        try:
+            with work.limited(blocks[0].context.max_planning):
+                schedules = schedule_together(members, outside=instants)
+        except work.WorkLimitError as error:
+            return str(error)
         if not schedules[0].failed and not self._conflict(blocks, schedules):
             self.retime(blocks, schedules, now)
             return None

@@ -58,6 +58,7 @@ class ConstraintNetwork:
                 for point, (old, reason) in before.items():
                     level[point], cause[point] = old, reason
                 return cycle
+            work.count(2 + len(self._out[v]) // 2)
             before.setdefault(v, (level[v], cause[v]))
             level[v], cause[v] = time, step
             for following in self._out[v]:

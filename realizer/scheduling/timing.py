@@ -143,6 +143,7 @@ class Schedule:
         failed: the whole block was refused (a required part cannot hold); times is empty then.
         lengths: speech -> its points, with "end" -> seconds from its start that would let more of the block
             fit. If there are any, the block was not planned: plan it again with speech of these lengths.
+        over_limit: it failed because planning it takes too many steps.
         late: behaviour id -> seconds by which it is later than its references into other blocks say.
         lost_constraints: positions, in the block, of the constraints that were dropped by themselves.
     """
@@ -155,6 +156,7 @@ class Schedule:
     cost: float = 0.0
     failed: bool = False
     lengths: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    over_limit: bool = False
     late: Mapping[str, float] = field(default_factory=dict)
     lost_constraints: tuple[int, ...] = field(default=(), compare=False)
     character: str | None = field(default=None, compare=False)

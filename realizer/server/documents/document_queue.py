@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from math import inf
@@ -119,12 +119,14 @@ class Submission:
 
     Attributes:
         voices: index of a character -> name of its voice.
+        counts: counters of the service, by name.
     """
 
     def __init__(
         self, name: str, settings: Settings, player: Player, add_effects: Callable[[Iterable[Effect]], None]
     ) -> None:
         self.voices: dict[int, str] = {}
+        self.counts = Counter[str]()
         self.pending = PendingBlocks()
         self.speeches = SpeechStreams(player)
         self.tts = TtsRequests(player, self.pending)
@@ -247,6 +249,7 @@ class Submission:
             return True
         replaced = self.pending.replaced_by(pending)
         self.pending.remove([pending])
+        self.counts["over_limit"] += schedule.over_limit
         if schedule.failed:
             self.speeches.on_refused(pending.block.id)
         else:

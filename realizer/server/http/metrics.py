@@ -144,6 +144,7 @@ COUNTERS = {
     "messages": "Messages that came in.",
     "refused": "Connections that were refused.",
     "control_frames": "Pings, pongs and close frames of WebSockets that came in.",
+    "over_limit": "Blocks that were refused because planning them takes more than max_planning steps.",
     "rate_exceeded": "How often a WebSocket began to exceed max_rate, and was read more slowly.",
     "http_errors": "HTTP requests that were answered with a status of 400 to 499.",
     "http_failures": "HTTP requests that were answered with a status of 500 or more.",

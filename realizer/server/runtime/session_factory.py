@@ -157,7 +157,7 @@ class SessionFactory:
             epoch=epoch,
         )
         session.ending = self.ending
-        session.broadcast.counts = self._metrics.counts
+        session.broadcast.counts = session.submission.counts = self._metrics.counts
         return session
 
     def _journal_writer(

@@ -360,7 +360,7 @@ class SessionHost:
             self._work(session, now, read_documents=False)
             return
         effects, due = frames
-        for effect in effects:
+        for effect in work.counted(effects, 5):
             self._apply_effect(session, effect)
         for number in session.connections:
             client = self._clients.get(number)

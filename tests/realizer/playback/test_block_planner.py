@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
+
 import pytest
 
 from bml_schema import parse
@@ -10,6 +12,7 @@ from realizer.behaviours.registry import KINDS, VOCABULARY
 from realizer.offline import realize
 from realizer.playback.block_planner import Plan, plan
 from realizer.speech.silent import SilentVoice
+from tests.worst_documents import document
 
 
 def planned(content: str, world: PlanningContext = PlanningContext()) -> Plan:  # noqa: B008 - a frozen value
@@ -99,3 +102,25 @@ def test_plan_stretches_a_speech_tied_at_a_mark_to_the_rate_that_fits(mark: floa
     assert not played.warnings
     assert played.schedules[0].at("s", "m") == pytest.approx(mark)
     assert played.speech[0][1].marks["m"] == pytest.approx(mark)
+
+
+@pytest.mark.parametrize("pattern", ["linked", "impossible", "squeezed", "overlapping", "free"])
+def test_plan_refuses_a_block_that_takes_too_many_steps(pattern: str) -> None:
+    block = parse(document(pattern, 40), VOCABULARY)
+
+    def limited(steps: int) -> Plan:
+        return plan(block, KINDS, PlanningContext(max_planning=steps))
+
+    def fits(steps: int) -> bool:
+        return not limited(steps).schedule.over_limit
+
+    needed = bisect_left(range(1_000_000), True, key=fits)
+    assert 100 < needed < 1_000_000
+    assert limited(needed).schedule.behaviours == limited(10**9).schedule.behaviours
+    refused = limited(needed - 1)
+    assert refused.schedule.failed
+    assert not refused.channels
+    (warning,) = refused.schedule.warnings
+    assert (warning.id, warning.type) == ("worst", "IMPOSSIBLE_TO_SCHEDULE")
+    assert f"wanted at most {needed - 1} steps" in warning.text
+    assert "REALIZER_MAX_PLANNING" in warning.text

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from bml_schema.feedback import BlockProgress, WarningFeedback
 from realizer.core.errors import VoiceError
+from realizer.offline import realize
 from realizer.protocol.wire import unpack
 from realizer.server.journal.entry import Entry, JournalError, TakenOver
 from realizer.server.journal.journal_writer import JournalWriter
@@ -19,6 +20,7 @@ from realizer.server.session import feedback_log
 from realizer.server.session.effects import Close
 from realizer.speech.utterance import Phoneme, Utterance, Word
 from tests.realizer.server.conftest import NOD, RATE, TALK, Driver, spoken
+from tests.worst_documents import document
 
 FAP = {"type": "subscribe", "stream": "fap"}
 POINTS = ["start", "ready", "strokeStart", "stroke", "strokeEnd", "relax", "end"]
@@ -137,6 +139,21 @@ def test_session_refuses_a_block_that_lasts_too_long() -> None:
     driver.send('<bml id="b"><wait id="w" duration="60"/></bml>')  # whose id is free
     driver.run(61.0)
     assert {"a:end", "b:end"} <= set(client.ids)
+
+
+def test_session_refuses_a_block_that_takes_too_many_steps() -> None:
+    """With one warning, as offline; the next block plays."""
+    text = document("linked", 30)
+    driver = Driver(max_planning=2_000)
+    client = driver.send(text)
+    (warning,) = warnings(client)
+    (offline,) = realize(text, max_planning=2_000).schedules[0].warnings
+    assert (warning.id, warning.type, warning.text) == (offline.id, offline.type, offline.text)
+    assert "REALIZER_MAX_PLANNING" in warning.text
+    assert driver.session.submission.counts["over_limit"] == 1
+    driver.send('<bml id="b"><head id="h" lexeme="NOD"/></bml>')
+    driver.run(5.0)
+    assert "b:end" in client.ids
 
 
 @pytest.mark.parametrize(
