@@ -68,4 +68,4 @@ def test_pixel_rate_error_allows_large_pictures_at_a_low_rate() -> None:
 
 def test_limits_have_different_descriptions_in_the_settings() -> None:
     descriptions = {f.name: f.metadata["description"] for f in fields(Settings) if f.name.startswith("max_")}
-    assert len(descriptions) == len(set(descriptions.values())) == 14
+    assert len(descriptions) == len(set(descriptions.values())) == 15
