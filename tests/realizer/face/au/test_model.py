@@ -93,9 +93,10 @@ def test_model_opens_the_mouth_along_its_line(name: str, model: Model) -> None:
         assert apart[0, 1] > 0.0015, f"AU{au}"
 
 
-@pytest.mark.parametrize("size", [280, *(pytest.param(size, marks=pytest.mark.slow) for size in (454, 1762))])
-def test_model_drives_a_mesh_of_another_topology(name: str, model: Model, size: int) -> None:
+@pytest.mark.parametrize("size", [1762, *(pytest.param(size, marks=pytest.mark.slow) for size in (280, 454))])
+def test_model_drives_a_mesh_of_another_topology(name: str, size: int) -> None:
     """Her figure 4.3: each unit on a coarser mesh takes a vertex where it was measured to go there."""
+    models = [read_model(FOLDERS[name] / f"au_{form}.toml") for form in FORMS]
     measured = read_shapes(FOLDERS[name] / "au_shapes.npz")
     face = load_face(name)
     skin, (first, last) = skin_of(face), face.parts["skin"]
@@ -107,14 +108,15 @@ def test_model_drives_a_mesh_of_another_topology(name: str, model: Model, size: 
     off, place = (np.asarray(found) for found in cKDTree(measured[1].at).query(skin[index]))
     known = off < 5e-4
     assert known.sum() > 0.3 * size
-    misses = []
+    misses: list[list[float]] = [[] for _ in models]
     for au, one in measured.items():
         goes = one.moves[place[known]]
         far = np.linalg.norm(one.moves[one.visible], axis=1).max()
         counts = one.visible[place[known]] & (np.linalg.norm(goes, axis=1) > 0.01 * far)
-        miss = (model.displacement(au, skin[index][known]) - goes)[counts]
-        misses.append(np.linalg.norm(miss, axis=1).mean() / far)
-    assert np.mean(misses) < 0.1
+        for model, found in zip(models, misses, strict=True):
+            miss = (model.displacement(au, skin[index][known]) - goes)[counts]
+            found.append(np.linalg.norm(miss, axis=1).mean() / far)
+    assert max(np.mean(found) for found in misses) < 0.1
 
 
 def skin_of(face: Face) -> np.ndarray:
