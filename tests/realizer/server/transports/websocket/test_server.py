@@ -226,7 +226,7 @@ def test_websocket_survives_one_who_reconnects_again_and_again() -> None:
     async def test(server: Server) -> None:
         async with connect(server.url) as viewer:
             await ask(viewer, type="subscribe", stream="fap", fps=25)
-            for k in range(500):
+            for k in range(200):
                 # A name for each: the sessions stay, and make room for those that follow.
                 async with connect(f"{server.url}?session=many-{k}"):
                     pass
@@ -299,7 +299,7 @@ def test_websocket_answers_a_crowd_that_asks_for_everything() -> None:
                 await plays(socket, f"b{number}")
 
         async with asyncio.TaskGroup() as group:
-            for number in range(24):
+            for number in range(12):
                 group.create_task(one(number))
 
     serving(test)
