@@ -1,4 +1,4 @@
-"""The WebSocket protocol of the service: it answers other methods than GET, and limits what it reads."""
+"""The WebSocket protocol of the service: it answers requests that are no GET, and limits what it reads."""
 
 from __future__ import annotations
 
@@ -33,6 +33,7 @@ class Protocol(ServerProtocol):
     def __init__(self, counts: Counter[str], **options: Any) -> None:
         super().__init__(**options)
         self._counts = counts
+        self._has_answered = False
 
     def parse(self) -> Generator[None]:
         """Parse what the client sends. Refuse other methods here: the library cannot read their bodies."""
@@ -48,9 +49,18 @@ class Protocol(ServerProtocol):
         yield from super().parse()
 
     def send_response(self, response: Response) -> None:
+        self._has_answered = True
         if response.status_code >= 400:
             self._counts["http_errors" if response.status_code < 500 else "http_failures"] += 1
         super().send_response(response)
+
+    def send_eof(self) -> None:
+        """Answer a request that is none or has a body. The library ends the connection without a word."""
+        fault = self.handshake_exc and self.handshake_exc.__cause__
+        if fault is None or self.reader.eof or self._has_answered:
+            super().send_eof()
+        else:
+            self.send_response(self.reject(400, f"wanted GET, in HTTP/1.1 and without a body: {fault}\n"))
 
     def _refuse(self, method: bytes) -> None:
         response = self.reject(*((404, POST) if method == b"POST" else (405, OTHERS)))
