@@ -70,7 +70,7 @@ class HttpSite:
 
     def is_public(self, path: str) -> bool:
         """Return whether anybody may get what is at a path: the page, its files, and the health."""
-        return path in ("/", "/healthz") or path[1:] in self._names()
+        return path in ("/", "/healthz") or path[1:] in self._names
 
     def answer(self, target: str) -> HttpResponse:
         """Return the response to `GET target`. May block while a face is loaded for the first time."""
@@ -89,10 +89,11 @@ class HttpSite:
             return HttpResponse(500, TEXT, b"an error of the service: its log says which\n")
         return self._file(path[1:])
 
-    def _names(self) -> set[str]:
-        """Return the names of the page's files."""
+    @functools.cached_property
+    def _names(self) -> frozenset[str]:
+        """The names of the page's files, listed once: every request compares its path with them."""
         found = self._static.iterdir() if self._static.is_dir() else ()
-        return {f.name for f in found if not f.name.startswith(".")}
+        return frozenset(f.name for f in found if not f.name.startswith("."))
 
     def _pose(self, asked: dict[str, str]) -> HttpResponse:
         face = asked.get("face")
@@ -102,12 +103,12 @@ class HttpSite:
 
     def _file(self, name: str) -> HttpResponse:
         """Return a file of the page. Only names in its folder are accepted, so that no path can leave it."""
-        if name in self._names():
+        if name in self._names and (file := self._static.joinpath(name)).is_file():
             media_type = mimetypes.guess_type(name)[0] or "application/octet-stream"
             if media_type.startswith("text/") or media_type.endswith("svg+xml"):
                 media_type += "; charset=utf-8"
             headers = (("Cache-Control", "no-cache"), ("Content-Security-Policy", POLICY))
-            return HttpResponse(200, media_type, self._static.joinpath(name).read_bytes(), headers)
+            return HttpResponse(200, media_type, file.read_bytes(), headers)
         if name == "index.html":
             return HttpResponse(503, TEXT, NOT_BUILT.encode())
         words = f"/{name[:80]} is not here; there are / /ws /faces/NAME /healthz\n"

@@ -170,3 +170,14 @@ def test_site_has_its_page_and_its_health_for_everybody() -> None:
         "/.",
     ):
         assert not SITE.is_public(path)
+
+
+def test_site_lists_its_files_once(tmp_path, monkeypatch) -> None:
+    site = HttpSite(dict)
+    monkeypatch.setattr(site, "_static", tmp_path)
+    (tmp_path / "page.js").write_text("1")
+    assert site.is_public("/page.js")
+    (tmp_path / "page.js").rename(tmp_path / "other.js")
+    assert site.is_public("/page.js")
+    assert not site.is_public("/other.js")
+    assert site.answer("/page.js").status == 404
