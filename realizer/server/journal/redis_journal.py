@@ -18,6 +18,7 @@ ADDRESS = re.compile(
     r"(?P<scheme>rediss?)://([^/?#]*@)?(?P<place>(\[[0-9a-fA-F:.]+\]|[^@:/?#\[\]]*)(:\d+)?(/\d*)?)(\?[^#]*)?"
     r"|(?P<unix>unix)://([^/?#]*@)?(?P<path>/[^@?#]*)(\?[^#]*)?"
 )
+PLACE = re.compile(r" connecting to \S+\.(?= |$)")  # in an error
 
 # KEYS: the head (owner, epoch), the list of entries, and the parts by name. A script is atomic: no other
 # command runs between its check and its write, and a restarted server has all of its writes or none.
@@ -71,7 +72,7 @@ class RedisJournal:
                 "the journal: wanted redis://USER:PASSWORD@HOST:PORT/NUMBER, or unix:///PATH, got another; "
                 "in a password / ? # @ % are written as %2F %3F %23 %40 %25"
             )
-        self._url = f"{match['scheme']}://{match['place']}" if match["scheme"] else f"unix://{match['path']}"
+        place = f"{match['scheme']}://{match['place']}" if match["scheme"] else f"unix://{match['path']}"
         self._owner = secrets.token_hex(8)
         self._counts: dict[str, int] = {}  # session -> number of its entries
         self._pause_ends = 0.0
@@ -88,10 +89,10 @@ class RedisJournal:
             )
             self._store.connection_pool.make_connection()  # validates the query of the URL
         except (ValueError, TypeError) as error:
-            raise JournalError(f"the journal {self._url}: {error}") from None
+            raise JournalError(f"the journal {place}: {error}") from None
         scripts = map(self._store.register_script, (ADD, TAKE, COMPACT, END))
         self._add, self._take, self._compact, self._end = scripts
-        with self._translate_errors():
+        with self._translate_errors(f" {place}"):
             self._store.ping()
 
     def begin(self, session: str, epoch: float) -> None:
@@ -148,17 +149,16 @@ class RedisJournal:
             self._store.close()
 
     @contextlib.contextmanager
-    def _translate_errors(self) -> Iterator[None]:
+    def _translate_errors(self, place: str = "") -> Iterator[None]:
+        """Raise errors as JournalError, without the address: clients get the text."""
         if time.monotonic() < self._pause_ends:
-            raise JournalError(
-                f"the journal {self._url}: it did not answer, and is asked again in {PAUSE:g} s"
-            )
+            raise JournalError(f"the journal: it did not answer, and is asked again in {PAUSE:g} s")
         try:
             yield
         except self._faults as error:
             if isinstance(error, self._timeout):
                 self._pause_ends = time.monotonic() + PAUSE
-            raise JournalError(f"the journal {self._url}: {error}") from None
+            raise JournalError(f"the journal{place}: {PLACE.sub(':', str(error))}") from None
 
 
 def _keys(session: str) -> list[str]:

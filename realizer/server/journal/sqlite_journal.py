@@ -45,7 +45,7 @@ class SqliteJournal:
     def __init__(self, path: str | Path) -> None:
         self._path = path
         self._owner = secrets.token_hex(8)
-        with self._translate_errors():
+        with self._translate_errors(f" {path}"):
             # Each statement is its own transaction, so that an added entry is stored at once.
             self._file = sqlite3.connect(path, timeout=BUSY, isolation_level=None)
             self._file.execute("PRAGMA journal_mode=WAL")
@@ -125,8 +125,9 @@ class SqliteJournal:
                 raise
 
     @contextlib.contextmanager
-    def _translate_errors(self) -> Iterator[None]:
+    def _translate_errors(self, place: str = "") -> Iterator[None]:
+        """Raise errors as JournalError, without the path: clients get the text."""
         try:
             yield
         except (sqlite3.Error, OSError) as error:
-            raise JournalError(f"the journal {self._path}: {error}") from None
+            raise JournalError(f"the journal{place}: {error}") from None

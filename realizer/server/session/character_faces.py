@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import logging
 from typing import TYPE_CHECKING
 
 from realizer.animation.fap.au_fap_mapping import FapMapping
-from realizer.core.errors import FaceError
+from realizer.core.errors import FaceError, TableError
 from realizer.core.settings import Settings
 from realizer.face.fap_mapping import mapping_of
 
 if TYPE_CHECKING:
     from realizer.face.model import Face
+
+log = logging.getLogger(__name__)
 
 
 class CharacterFaces:
@@ -31,17 +34,21 @@ class CharacterFaces:
         """Check that a face is listed and can be loaded.
 
         Raises:
-            FaceError: no such face, or it cannot be loaded.
-            TableError: its mapping is invalid.
+            FaceError: no such face, or it cannot be loaded. Clients get the text: it names no folder.
         """
         from realizer.face.load import face_name, list_faces
 
         known = [info.name for info in list_faces()]
         if face_name(name) not in known:
-            # Clients must not learn the paths of folders.
             raise FaceError(f"wanted one of {', '.join(known)}, got {name!r}")
-        self._load(name)
-        mapping_of(name, self._settings.mapping)
+        try:
+            self._load(name)
+            mapping_of(name, self._settings.mapping)
+        except (FaceError, TableError) as error:
+            log.warning("face %s: %s", name, error)
+            raise FaceError(
+                f"wanted a face that can be loaded, got {name!r}: it is damaged, see the log"
+            ) from None
 
     def name(self, index: int) -> str:
         """Return the name of a character's face."""
