@@ -18,9 +18,12 @@ import numpy as np
 from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
 from realizer.face.glb_file import BINARY_CHUNK, JSON_CHUNK
+from realizer.facebuild.arkit.gltf_schema import document_fault
 
 KINDS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+MAX_NUMBERS = 2**26  # in all accessors together: a head of 24,000 vertices with 900 shapes
+MAX_PIXELS = 8192 * 8192  # of a texture
 # Required extensions that this reader supports; they change only how surfaces look.
 UNDERSTOOD = {"KHR_mesh_quantization", "KHR_texture_transform", "KHR_materials_unlit"}
 PACKED = {
@@ -53,12 +56,12 @@ class Gltf:
         text = self._chunks(raw) if raw[:4] == b"glTF" else raw
         try:
             self.json: dict[str, Any] = json.loads(text)
-        except (ValueError, UnicodeDecodeError):
+        except (ValueError, RecursionError):
             raise FaceError(
                 f"{path}: wanted a GLB file (binary glTF 2.0) or a .gltf, got neither; export the head again"
             ) from None
-        if not isinstance(self.json, dict) or not isinstance(self.json.get("asset"), dict):
-            raise FaceError(f"{path}: wanted a glTF document with an asset, got none; export the head again")
+        if fault := document_fault(self.json):
+            raise FaceError(f"{path}: {fault}; export the head again")
         version = str(self.json["asset"].get("version", ""))
         if not version.startswith("2."):
             raise FaceError(f"{path}: wanted glTF 2.0, got version {version!r}; export the head as glTF 2.0")
@@ -68,6 +71,7 @@ class Gltf:
             if name.startswith("KHR_draco") or (name.startswith("EXT_") and name not in UNDERSTOOD):
                 raise FaceError(f"{path}: it requires {name}, which is not understood; export it without")
         self._buffers: dict[int, bytes] = {}
+        self._room = MAX_NUMBERS
 
     def _chunks(self, raw: bytes) -> bytes:
         if len(raw) < 20:
@@ -77,7 +81,7 @@ class Gltf:
             raise FaceError(f"{self.path}: wanted GLB version 2, got {version}; export the head as glTF 2.0")
         if length > len(raw):
             raise FaceError(
-                f"{self.path}: truncated: its header says {length} bytes, there are {len(raw)}; "
+                f"{self.path}: wanted {length} bytes, as its header says, got {len(raw)}: it is truncated; "
                 "copy or export it again"
             )
         text, at = b"", 12
@@ -86,7 +90,7 @@ class Gltf:
             chunk = raw[at + 8 : at + 8 + size]
             if len(chunk) < size:
                 raise FaceError(
-                    f"{self.path}: truncated: a chunk says {size} bytes, there are {len(chunk)}; "
+                    f"{self.path}: wanted a chunk of {size} bytes, got {len(chunk)}: it is truncated; "
                     "copy or export it again"
                 )
             if kind == JSON_CHUNK and not text:
@@ -98,21 +102,21 @@ class Gltf:
 
     def list(self, name: str) -> list[dict[str, Any]]:
         """Return one of the document's lists, such as "meshes", or an empty list."""
-        found = self.json.get(name, [])
-        return found if isinstance(found, list) else []
+        found: list[dict[str, Any]] = self.json.get(name, [])
+        return found
 
-    def item(self, name: str, index: Any) -> dict[str, Any]:
+    def item(self, name: str, index: int) -> dict[str, Any]:
         """Return one of the document's objects by its index.
 
         Raises:
             FaceError: it is not there.
         """
         items = self.list(name)
-        if not isinstance(index, int) or not 0 <= index < len(items):
+        if not 0 <= index < len(items):
             raise FaceError(f"{self.path}: {name}: wanted an index 0..{len(items) - 1}, got {index!r}")
         return items[index]
 
-    def accessor(self, index: Any) -> Float64:
+    def accessor(self, index: int) -> Float64:
         """Return an accessor's values, (count, width) float64; normalised ones as -1..1 or 0..1.
 
         Raises:
@@ -120,25 +124,29 @@ class Gltf:
         """
         accessor = self.item("accessors", index)
         where = f"accessors[{index}]"
-        kind, width = accessor.get("componentType"), WIDTHS.get(accessor.get("type", ""))
-        count = accessor.get("count")
-        if kind not in KINDS or width is None or not isinstance(count, int) or count < 0:
-            raise FaceError(f"{self.path}: {where}: wanted a component type, type and count, got {accessor}")
+        kind, width, count = accessor["componentType"], WIDTHS[accessor["type"]], accessor["count"]
+        self._room -= count * width
+        if self._room < 0:  # zeros need no bytes in the file
+            raise FaceError(
+                f"{self.path}: {where}: wanted at most {MAX_NUMBERS} numbers in the file, got more: "
+                f"{count} x {width} here; export the head with fewer vertices or shapes"
+            )
         start = accessor.get("byteOffset", 0)
         values = self._strided(accessor.get("bufferView"), start, KINDS[kind], count, width, where)
         sparse = accessor.get("sparse")
-        if sparse:
+        if sparse is not None:
 
             def stored(part: dict[str, Any], kind: str, width: int) -> Any:
                 start = part.get("byteOffset", 0)
                 return self._strided(part["bufferView"], start, kind, sparse["count"], width, where)
 
             places = sparse["indices"]
-            rows = stored(places, KINDS.get(places.get("componentType"), "<u4"), 1).ravel()
+            rows = stored(places, KINDS[places["componentType"]], 1).ravel()
             if len(rows) and rows.max() >= count:
                 raise FaceError(f"{self.path}: {where}: sparse: wanted rows 0..{count - 1}, got {rows.max()}")
             values[rows] = stored(sparse["values"], KINDS[kind], width)
-        out = values.astype(np.float64)
+        with np.errstate(invalid="ignore"):  # NaN
+            out = values.astype(np.float64)
         if accessor.get("normalized") and kind != 5126:
             out = np.maximum(out / np.iinfo(KINDS[kind]).max, -1.0)
         return np.asarray(out)
@@ -190,16 +198,18 @@ class Gltf:
             try:
                 return base64.b64decode(uri.partition(",")[2], validate=False)
             except binascii.Error:
-                raise FaceError(f"{self.path}: a data URI is broken; export the head again") from None
+                raise FaceError(
+                    f"{self.path}: wanted base64 in a data URI, got something else; export the head again"
+                ) from None
         place = Path(unquote(uri))
         if "://" in uri or place.is_absolute() or ".." in place.parts:
             raise FaceError(f"{self.path}: {uri}: wanted a file beside this one; export the head as one GLB")
         try:
             return (self.path.parent / place).read_bytes()
-        except OSError as error:
+        except (OSError, ValueError) as error:
             raise FaceError(
-                f"{self.path.parent / place}: {error.strerror}; put it beside {self.path.name}, "
-                "or export the head as one GLB"
+                f"{self.path.parent / place}: {getattr(error, 'strerror', error)}; put it beside "
+                f"{self.path.name}, or export the head as one GLB"
             ) from None
 
     def pixels(self, image: Any) -> Any:
@@ -210,6 +220,11 @@ class Gltf:
         raw = self._view(found["bufferView"]) if "bufferView" in found else self._fetch(found.get("uri", ""))
         try:
             with Image.open(io.BytesIO(raw)) as picture:
-                return np.asarray(picture.convert("RGBA"))
-        except (UnidentifiedImageError, OSError):
+                if picture.width * picture.height <= MAX_PIXELS:
+                    return np.asarray(picture.convert("RGBA"))
+                got = f"{picture.width} x {picture.height}"
+        except Image.DecompressionBombError:
+            got = "more"
+        except (UnidentifiedImageError, OSError, SyntaxError, ValueError):  # of the decoders
             return None
+        raise FaceError(f"{self.path}: images[{image}]: wanted at most 8192 x 8192 pixels, got {got}")

@@ -71,7 +71,9 @@ def _world_matrices(gltf: Gltf) -> Iterator[tuple[int, Float64]]:
     while pending:
         number, parent = pending.pop(0)
         if number in seen:
-            raise FaceError(f"{gltf.path}: nodes[{number}] is its own ancestor or has two parents")
+            raise FaceError(
+                f"{gltf.path}: wanted a tree, got nodes[{number}] twice: of two parents or of itself"
+            )
         seen.add(number)
         node = gltf.item("nodes", number)
         world = parent @ _matrix(node)
@@ -107,15 +109,14 @@ def _piece(
     n = len(at)
     if at.shape[1:] != (3,) or not np.isfinite(at).all() or not np.isfinite(world).all():
         raise FaceError(f"{where}: POSITION: wanted finite x, y, z of each vertex; export the head again")
-    if "indices" in primitive:
-        corners = gltf.accessor(primitive["indices"]).ravel().astype(np.int64)
-    else:
-        corners = np.arange(n)
-    if len(corners) and corners.max() >= n:
-        raise FaceError(f"{where}: indices: wanted 0..{n - 1}, got {corners.max()}; export the head again")
+    corners = gltf.accessor(primitive["indices"]).ravel() if "indices" in primitive else np.arange(n)
+    if len(corners) and not (corners.min() >= 0 and corners.max() < n):
+        got = f"{corners.min():g}..{corners.max():g}"
+        raise FaceError(f"{where}: indices: wanted 0..{n - 1}, got {got}; export the head again")
+    corners = corners.astype(np.int64)
     material = gltf.item("materials", primitive["material"]) if "material" in primitive else {}
-    colours, textured, alpha = _colours(gltf, material, attributes, n)
-    skinning = _skinning(gltf, node, attributes, worlds, n)
+    colours, textured, alpha = _colours(gltf, material, attributes, n, where)
+    skinning = _skinning(gltf, node, attributes, worlds, n, where)
     matrices = np.broadcast_to(world, (n, 4, 4)) if skinning is None else skinning
     triangles = _triangles(corners, primitive.get("mode", TRIANGLES))
     if np.linalg.det(matrices[:, :3, :3]).mean() < 0:
@@ -139,6 +140,22 @@ def _piece(
         glass=material.get("alphaMode", "OPAQUE") == "BLEND" and alpha < MAX_GLASS_ALPHA,
         moves=moves,
     )
+
+
+def _attribute(
+    gltf: Gltf, attributes: dict[str, Any], name: str, n: int, widths: tuple[int, ...], where: str
+) -> Float64:
+    """Return an attribute (n, width) of the vertices of a primitive.
+
+    Raises:
+        FaceError: its shape is another, or a value is not finite.
+    """
+    values = gltf.accessor(attributes[name])
+    if len(values) != n or values.shape[1] not in widths or not np.isfinite(values).all():
+        wanted = f"{n} x {' or '.join(map(str, widths))} finite numbers"
+        got = " x ".join(map(str, values.shape))
+        raise FaceError(f"{where}: {name}: wanted {wanted}, got {got}; export the head again")
+    return values
 
 
 def _triangles(corners: Any, mode: int) -> Any:
@@ -173,22 +190,25 @@ def _target_names(gltf: Gltf, mesh: dict[str, Any], primitive: dict[str, Any]) -
 
 
 def _skinning(
-    gltf: Gltf, node: dict[str, Any], attributes: dict[str, Any], worlds: dict[int, Float64], n: int
-) -> Any:
+    gltf: Gltf, node: dict[str, Any], attributes: dict[str, Any], worlds: dict[int, Float64], n: int,
+    where: str,
+) -> Any:  # fmt: skip
     """Return the skinning matrix (n, 4, 4) of each vertex in the file's pose, or None without a skeleton."""
     if "skin" not in node or "JOINTS_0" not in attributes or "WEIGHTS_0" not in attributes:
         return None
     skin = gltf.item("skins", node["skin"])
     joints = skin.get("joints", [])
-    bind = (
-        gltf.accessor(skin["inverseBindMatrices"]).reshape(-1, 4, 4).transpose(0, 2, 1)
-        if "inverseBindMatrices" in skin
-        else np.broadcast_to(np.eye(4), (len(joints), 4, 4))
-    )
+    bind = np.tile(np.eye(4).ravel(), (len(joints), 1))
+    if "inverseBindMatrices" in skin:
+        bind = gltf.accessor(skin["inverseBindMatrices"])
+    if not joints or len(bind) < len(joints) or bind.shape[1] != 16:
+        got = f"{len(joints)} and {len(bind)} x {bind.shape[1]} numbers"
+        raise FaceError(f"{where}: skins[{node['skin']}]: wanted joints and a matrix for each, got {got}")
+    bind = bind.reshape(-1, 4, 4).transpose(0, 2, 1)
     posed = np.stack([worlds.get(joint, np.eye(4)) @ bind[k] for k, joint in enumerate(joints)])
-    index, weight = gltf.accessor(attributes["JOINTS_0"]).astype(int), gltf.accessor(attributes["WEIGHTS_0"])
+    index, weight = (_attribute(gltf, attributes, name, n, (4,), where) for name in ("JOINTS_0", "WEIGHTS_0"))
     weight = weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-9)
-    index = np.clip(index, 0, len(joints) - 1)
+    index = np.clip(index, 0, len(joints) - 1).astype(int)
     out = np.zeros((n, 4, 4))
     for k in range(index.shape[1]):
         out += posed[index[:, k]] * weight[:, k, None, None]
@@ -196,14 +216,14 @@ def _skinning(
 
 
 def _colours(
-    gltf: Gltf, material: dict[str, Any], attributes: dict[str, Any], n: int
+    gltf: Gltf, material: dict[str, Any], attributes: dict[str, Any], n: int, where: str
 ) -> tuple[Float64, bool, float]:
     """Return the colours (n, 3) in sRGB 0..255, whether they have a texture, and the mean alpha."""
     pbr = material.get("pbrMetallicRoughness", {})
     factor = np.array(pbr.get("baseColorFactor", (1, 1, 1, 1)), float)
     light, alpha, textured = np.tile(factor[:3], (n, 1)), np.full(n, factor[3]), False
     if "COLOR_0" in attributes:
-        vertex_colours = gltf.accessor(attributes["COLOR_0"])
+        vertex_colours = _attribute(gltf, attributes, "COLOR_0", n, (3, 4), where)
         light = light * vertex_colours[:, :3]
         alpha = alpha * (vertex_colours[:, 3] if vertex_colours.shape[1] > 3 else 1)
     texture = pbr.get("baseColorTexture")
@@ -213,7 +233,7 @@ def _colours(
         source = gltf.item("textures", texture.get("index")).get("source")
         pixels = gltf.pixels(source) if source is not None else None
         if pixels is not None and name in attributes:
-            uv = _transformed(gltf.accessor(attributes[name]), transform)
+            uv = _transformed(_attribute(gltf, attributes, name, n, (2,), where), transform)
             seen = sample(pixels, uv)
             light, alpha, textured = light * linear(seen[:, :3]), alpha * seen[:, 3] / 255, True
     return np.asarray(srgb(light.astype(np.float32)), np.float64) * 255, textured, float(alpha.mean())
@@ -232,5 +252,7 @@ def sample(pixels: Any, uv: Float64) -> Float64:
 
     height, width = pixels.shape[:2]
     at = np.stack([uv[:, 1] * height - 0.5, uv[:, 0] * width - 0.5])
-    channels = np.moveaxis(np.asarray(pixels, np.float64), 2, 0)
-    return np.stack([map_coordinates(channel, at, order=1, mode="grid-wrap") for channel in channels], 1)
+    channels = np.moveaxis(pixels, 2, 0)
+    return np.stack(
+        [map_coordinates(channel, at, np.float64, order=1, mode="grid-wrap") for channel in channels], 1
+    )

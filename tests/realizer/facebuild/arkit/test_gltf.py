@@ -73,6 +73,11 @@ def test_gltf_refuses_a_truncated_file(ada_glb: Path, tmp_path: Path, length: in
     lambda d: d["nodes"][0].update(children=[0]),
     lambda d: d["buffers"][0].update(uri="http://example.org/head.bin"),
     lambda d: d["buffers"][0].update(uri="../head.bin"),
+    lambda d: d["buffers"][0].update(uri="\0"),
+    lambda d: d["buffers"][0].update(uri=7),
+    lambda d: d.update(nodes=5),
+    lambda d: d["accessors"].__setitem__(0, {"componentType": 5126, "count": 2**31 - 1, "type": "MAT4"}),
+    lambda d: d["meshes"][0]["primitives"][0]["attributes"].update(COLOR_0=2),
 ])  # fmt: skip
 def test_gltf_refuses_a_broken_document_by_its_file(
     ada_glb: Path, tmp_path: Path, spoil: Callable[[dict[str, Any]], Any]
