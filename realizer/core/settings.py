@@ -6,7 +6,6 @@ import ipaddress
 import math
 import os
 import re
-import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import partial
@@ -15,6 +14,7 @@ from typing import Any, TypeVar
 
 from realizer.core.errors import RealizerError
 from realizer.core.options import PlayOptions
+from realizer.core.toml_text import parse_toml
 
 T = TypeVar("T")
 PREFIX = "REALIZER_"
@@ -103,7 +103,7 @@ def _path(value: Any) -> Path:
     return Path(value)
 
 
-def _existing(is_kind: Callable[[Path], bool], kind: str) -> Callable[[Any], Path]:
+def _existing(is_kind: Callable[[Path], object], kind: str) -> Callable[[Any], Path]:
     def read(value: Any) -> Path:
         if not is_kind(path := _path(value)):
             raise ValueError(f"an existing {kind}")
@@ -112,14 +112,15 @@ def _existing(is_kind: Callable[[Path], bool], kind: str) -> Callable[[Any], Pat
     return read
 
 
-_folder, _file = _existing(Path.is_dir, "folder"), _existing(Path.is_file, "file")
+_folder, _file = _existing(os.path.isdir, "folder"), _existing(os.path.isfile, "file")
 
 
 def _switch_or_file(value: Any) -> str:
     try:
         return "on" if _flag(value) else "off"
     except ValueError:
-        if not isinstance(value, str | Path) or not Path(value).is_file():
+        # Path.is_file raises for a text that is longer than a path can be.
+        if not isinstance(value, str | Path) or not os.path.isfile(value):  # noqa: PTH113
             raise ValueError("on, off, or an existing file") from None
         return str(value)
 
@@ -369,25 +370,28 @@ class Settings:
                 got = "something else" if f.metadata["secret"] else repr(value)
                 raise SettingsError(f"setting {f.name}: wanted {wanted}, got {got}", f.name) from None
         if self.tls_key is not None and self.tls_cert is None:
-            raise SettingsError("setting tls_key: wanted tls_cert too, got none")
+            raise SettingsError("setting tls_key: wanted tls_cert too, got none", "tls_key")
         if self.tls_cert is not None and self.workers > 1:
             raise SettingsError(
                 f"setting tls_cert: wanted workers = 1, got {self.workers}: connections are distributed to "
-                "workers by their first line; use TLS in a proxy in front of the service"
+                "workers by their first line; use TLS in a proxy in front of the service",
+                "tls_cert",
             )
         if self.jwt_audience is not None and self.jwt_key is None:
-            raise SettingsError("setting jwt_audience: wanted jwt_key too, got none")
+            raise SettingsError("setting jwt_audience: wanted jwt_key too, got none", "jwt_audience")
         if not is_loopback(self.host) and not self.insecure:
             if self.token is None and self.jwt_key is None:
                 raise SettingsError(
                     "setting host: wanted token, jwt_key or insecure too, because other machines can reach "
-                    f"{self.host}"
+                    f"{self.host}",
+                    "host",
                 )
             tokenless = [name for name in ("asap_ports", "xface_port") if getattr(self, name) is not None]
             if tokenless and not self.allow:
                 raise SettingsError(
                     f"setting {tokenless[0]}: wanted allow or insecure too, or host 127.0.0.1: its clients "
-                    "cannot send the token"
+                    "cannot send the token",
+                    tokenless[0],
                 )
 
     def play_options(self, scene: Mapping[str, tuple[float, float, float]] | None = None) -> PlayOptions:
@@ -418,9 +422,9 @@ class Settings:
         values: dict[str, Any] = {}
         if file is not None:
             try:
-                values |= tomllib.loads(file.read_text("utf-8-sig"))
-            except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-                raise SettingsError(f"{file}: {error}") from None
+                values |= parse_toml(file.read_text("utf-8-sig"))
+            except (OSError, ValueError) as error:
+                raise SettingsError(f"{file}: wanted settings in TOML, got: {error}") from None
         sources = dict.fromkeys(values, str(file))
         for name, value in environment.items():
             if name.startswith(PREFIX) and name not in OTHERS:

@@ -3,11 +3,11 @@
 import difflib
 import json
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from typing import Any, cast, get_args
 
 from realizer.core.errors import TableError
+from realizer.core.toml_text import parse_toml
 from realizer.expressions.timeline import Curve, Entry, Joins, Mixer, Timeline, Track
 from realizer.tables import action_units
 
@@ -39,7 +39,7 @@ def read_timeline(content: bytes) -> Timeline:
     """
     try:
         text = content.decode("utf-8-sig")
-        table = json.loads(text) if _is_json(text) else tomllib.loads(text)
+        table = json.loads(text) if _is_json(text) else parse_toml(text)
     except (ValueError, RecursionError) as error:  # also for integers of thousands of digits
         raise TableError(f"wanted a timeline in TOML or JSON, got: {error}") from None
     if not isinstance(table, dict):

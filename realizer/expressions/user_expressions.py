@@ -3,11 +3,11 @@
 import difflib
 import math
 import re
-import tomllib
 from pathlib import Path
 from typing import Any
 
 from realizer.core.errors import TableError
+from realizer.core.toml_text import parse_toml
 from realizer.expressions.expression import Expression, key
 from realizer.tables.lexemes import read_aus
 from realizer.tables.timing import Gap, gaps
@@ -39,11 +39,11 @@ def read_folder(folder: Path) -> tuple[Expression, ...]:
     faults: list[str] = []
     for path in sorted(folder.glob("*.toml")):
         try:
-            row = tomllib.loads(path.read_text("utf-8"))
+            row = parse_toml(path.read_text("utf-8"))
         except OSError as error:
             faults.append(f"{path}: {error.strerror}")
             continue
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        except ValueError as error:
             faults.append(f"{path}: wanted TOML, got: {error}")
             continue
         reader = _FileReader(path, row)

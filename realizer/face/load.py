@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -14,6 +13,7 @@ import numpy as np
 
 from realizer.core.errors import FaceError
 from realizer.core.registry import Registry
+from realizer.core.toml_text import parse_toml
 from realizer.face.basis import basis_from
 from realizer.face.features import fapu_of, read_features
 from realizer.face.mesh_checks import range_faults, value_faults
@@ -135,7 +135,7 @@ def read_head(folder: Path) -> dict[str, Any]:
     """
     path = folder / "face.toml"
     with face_errors(path, "a TOML file with name, source, licence and parts"):
-        head = tomllib.loads(path.read_text("utf-8"))
+        head = parse_toml(path.read_text("utf-8"))
     for key in ("name", "source", "licence"):
         if not isinstance(head.get(key), str):
             raise FaceError(f'{path}: wanted {key} = "...", got {_head_text(head, key)}')

@@ -1,16 +1,18 @@
 """Checked readers of the files in face folders."""
 
-import tomllib
 import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
 
 from realizer.core.errors import FaceError, TableError
+
+LARGEST = 2**28  # bytes of the arrays of a file; those of a shipped face have 330 kB
 
 
 @contextmanager
@@ -24,8 +26,8 @@ def face_errors(path: Path, wanted: str) -> Iterator[None]:
         raise FaceError(f"{path}: wanted {wanted}, got {error.strerror}") from None
     except UnicodeDecodeError:
         raise FaceError(f"{path}: wanted {wanted}, got bytes that are no UTF-8") from None
-    except tomllib.TOMLDecodeError as error:
-        raise FaceError(f"{path}: {error}") from None
+    except ValueError as error:
+        raise FaceError(f"{path}: wanted {wanted}, got: {error}") from None
     except TableError as error:
         raise FaceError(str(error)) from None
 
@@ -43,6 +45,8 @@ def read_arrays(path: Path, wanted: dict[str, int]) -> dict[str, Any]:
     try:
         # Opened by zipfile, because numpy reads a file that is no archive as a pickle or a single array.
         with zipfile.ZipFile(path) as archive:
+            if (size := sum(member.file_size for member in archive.infolist())) > LARGEST:
+                raise FaceError(f"{path}: wanted at most {LARGEST} bytes of arrays, got {size}; {again}")
             broken = archive.testzip()
         if broken:
             raise FaceError(f"{path}: {broken} is damaged; {again}")
@@ -56,7 +60,7 @@ def read_arrays(path: Path, wanted: dict[str, int]) -> dict[str, Any]:
         raise FaceError(
             f"{path}: wanted an .npz file, got one that is cut short or no archive; {again}"
         ) from None
-    except ValueError:
+    except (ValueError, TokenError, MemoryError):  # also of a header that claims too much
         raise FaceError(f"{path}: wanted arrays of numbers, got something else; {again}") from None
     for name, dimensions in wanted.items():
         if name not in arrays:

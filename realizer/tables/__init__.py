@@ -7,7 +7,6 @@ class for its rows.
 from __future__ import annotations
 
 import csv
-import tomllib
 import types
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -16,6 +15,7 @@ from importlib.resources import files
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from realizer.core.errors import TableError
+from realizer.core.toml_text import parse_toml
 
 __all__ = [
     "ActionUnit",
@@ -87,9 +87,9 @@ def read_toml(text: str, name: str) -> dict[str, Any]:
     """
     _check_head(text, name)
     try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise TableError(f"{name}: {error}") from None
+        return parse_toml(text)
+    except ValueError as error:
+        raise TableError(f"{name}: wanted TOML, got: {error}") from None
 
 
 def csv_rows(name: str, row_class: type[Row], package: str = __name__) -> tuple[Row, ...]:

@@ -126,7 +126,7 @@ class _Reader:
         what = f"a list of {count} numbers" if count else "a number"
         try:
             values = np.array(found if count else [found], np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             values = np.zeros(0)
         if values.shape != (max(count, 1),) or not np.isfinite(values).all():
             raise FaceError(f"{self.path}: {key}: wanted {what}, got {found!r}")

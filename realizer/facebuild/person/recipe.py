@@ -2,13 +2,13 @@
 
 import difflib
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
 from realizer.core.errors import FaceError
+from realizer.core.toml_text import parse_toml
 from realizer.face.reading import face_errors
 from realizer.facebuild.person import makehuman
 from realizer.facebuild.person.hair import style_of
@@ -68,7 +68,7 @@ def read_recipe(path: Path, data: Path) -> Recipe:
         FaceError: the file is missing or not TOML, or has faults: all are listed, each with key and reason.
     """
     with face_errors(path, "a recipe (copy the one of another face and change it)"):
-        raw = tomllib.loads(path.read_text("utf-8"))
+        raw = parse_toml(path.read_text("utf-8"))
     known = ("says", *TABLES)
     faults = [f"wanted one of {', '.join(known)}, got {key!r}" for key in raw if key not in known]
     if not isinstance(raw.get("says"), str) or not raw["says"].strip():

@@ -61,7 +61,7 @@ def test_arrays_of_objects_are_refused(tmp_path: Path) -> None:
         (FileNotFoundError(), "x: wanted a list, found none"),
         (PermissionError(13, "Permission denied"), "x: wanted a list, got Permission denied"),
         (UnicodeDecodeError("utf-8", b"\xff", 0, 1, "bad"), "x: wanted a list, got bytes that are no UTF-8"),
-        (tomllib.TOMLDecodeError("at line 1"), "x: at line 1"),
+        (tomllib.TOMLDecodeError("at line 1"), "x: wanted a list, got: at line 1"),
         (TableError("x, line 2: wanted 7 cells"), "x, line 2: wanted 7 cells"),
     ],
 )
