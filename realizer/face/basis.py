@@ -18,6 +18,7 @@ FAPS = 68
 JAW_COS, JAW_SIN, TONGUE_COS, TONGUE_SIN, JAW_DROP = range(FAPS, FAPS + 5)
 ROWS = FAPS + 5
 
+FARTHEST = 1e4  # m
 AGAIN = "build or import the face again"
 LOOKS = {23, 24, 25, 26}  # FAPs that turn eyeballs, or have fields where the eyes are no balls
 
@@ -98,13 +99,32 @@ def array_faults(stored: Mapping[str, Any], n: int) -> list[str]:
     for name, size, each in (("head", n, "vertex"), ("jaw_pivot", 3, "axis"), ("head_pivot", 3, "axis")):
         if len(stored[name]) != size:
             faults.append(f"{name}: wanted {size} values, one a {each}, got {len(stored[name])}; {AGAIN}")
-    for name in ("vertex", "lid"):
-        index = stored[name]
-        if len(index) and (index.min() < 0 or index.max() >= n):
-            faults.append(f"{name}: wanted 0..{n - 1}, got {index.min()}..{index.max()}; {AGAIN}")
+    row, count = stored["row"], len(stored["vertex"])
+    for name, low, high in (
+        *(("vertex", 0, n - 1), ("lid", 0, n - 1), ("lid_eye", 0, 1), ("row", 1, ROWS)),
+        *(("start", 0, count), ("head", 0, 255)),
+    ):
+        array = stored[name]
+        if array.dtype.kind not in "biu":
+            faults.append(f"{name}: wanted whole numbers, got {array.dtype}; {AGAIN}")
+        elif len(array) and (array.min() < low or array.max() > high):
+            faults.append(f"{name}: wanted {low}..{high}, got {array.min()}..{array.max()}; {AGAIN}")
+    for name, wanted in (
+        ("start", (len(row) + 1,)),
+        ("move", (count, 3)),
+        ("eye_centre", (2, 3)),
+        ("lid_eye", stored["lid"].shape),
+        ("lid_radius", stored["lid"].shape),
+    ):
+        if stored[name].shape != wanted:
+            faults.append(f"{name}: wanted an array {wanted}, got {stored[name].shape}; {AGAIN}")
+    if not count:
+        faults.append(f"vertex: wanted vertices that move, got none; {AGAIN}")
     for name in ("move", "lid_radius", "jaw_pivot", "head_pivot", "eye_centre"):
-        if not np.isfinite(stored[name]).all():
-            faults.append(f"{name}: wanted finite numbers, got NaN or infinity; {AGAIN}")
+        if not (np.abs(stored[name]) <= FARTHEST).all():
+            faults.append(
+                f"{name}: wanted finite numbers, got NaN, infinity or more than {FARTHEST:g}; {AGAIN}"
+            )
     return faults
 
 

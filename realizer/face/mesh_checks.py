@@ -9,6 +9,7 @@ from realizer.core.array_types import Float64, Int32
 from realizer.face.mesh_geometry import components, edges_of, half_edges, part_triangles
 
 NEEDED = ("skin", "left_eye", "right_eye")  # parts that every face has
+FARTHEST = 1e4  # m; more counts as infinite
 COLLAR = 1  # the clean cut at the bust's end is the hole that every head may have
 AT_EYE = 0.024  # m from an eyeball's middle; there skin may end at the lids
 AT_MOUTH = 0.045  # m from the lips' middle; there skin may end behind the lips
@@ -24,7 +25,7 @@ def value_faults(mesh: Mapping[str, Any]) -> list[str]:
     for name, array in (("vertices", vertices), ("triangles", triangles), ("colours", mesh["colours"])):
         if array.shape[1] != 3:
             faults.append(f"{name}: wanted 3 columns, got {array.shape[1]}; build the face again")
-    bad = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
+    bad = np.flatnonzero(~(np.abs(vertices) <= FARTHEST).all(axis=1))
     if len(bad):
         faults.append(f"vertices: {len(bad)} are not finite, the first is {bad[0]}; build the face again")
     if len(triangles) and (triangles.min() < 0 or triangles.max() >= n):

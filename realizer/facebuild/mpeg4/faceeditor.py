@@ -47,13 +47,13 @@ def read_faceeditor(path: Path) -> Setup:
     try:
         text = path.read_bytes()
     except OSError as error:
-        raise FaceError(f"{path}: {error.strerror}") from None
+        raise FaceError(f"{path}: wanted a file of FaceEditor, got {error.strerror}") from None
     if len(text) > LARGEST or b"<!ENTITY" in text:
         raise FaceError(f"{path}: wanted at most {LARGEST} bytes and no entities of its own")
     try:
         root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        raise FaceError(f"{path}: not well-formed XML: {error}") from None
+    except (ElementTree.ParseError, ValueError) as error:  # ValueError: of encodings
+        raise FaceError(f"{path}: wanted well-formed XML, got: {error}") from None
     found = tuple(child.tag for child in root)
     if root.tag != ROOT or found != CHILDREN:
         raise FaceError(
@@ -83,7 +83,7 @@ def read_faceeditor(path: Path) -> Setup:
     for element in masks:
         _attributes(path, element, "vertex-mask", ("fap",))
         words = (element.text or "").split()
-        if not all(word.isdecimal() for word in words):
+        if not all(word.isdecimal() and len(word) < 10 for word in words):
             raise FaceError(f"{path}: vertex-mask of FAP {element.get('fap')}: wanted indices of vertices")
         mask = np.unique(np.array(words, np.int64)).astype(np.int32)
         vertices[_fap(path, element, element.get("fap"))] = mask

@@ -1,7 +1,6 @@
 """The mpeg4.toml of a face folder: reader and writer."""
 
 import json
-import tomllib
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ import numpy as np
 
 from realizer.core.array_types import Int32
 from realizer.core.errors import FaceError
+from realizer.core.toml_text import parse_toml
 from realizer.face.reading import face_errors
 from realizer.facebuild.mpeg4.zones import Setup, Zone
 
@@ -18,6 +18,7 @@ HEAD = """\
 # The zones of the MPEG-4 deformer (Paul 2010, 4.3.3). `realizer faces zones NAME` makes fields.npz from them.
 # size and pivot in metres; points override those of features.csv; a mask's vertices as ranges, last included
 """
+MAX_VERTICES = 2**20
 KEYS = ("joined", "synced", "whole", "points", "zone", "masks")
 
 
@@ -28,7 +29,7 @@ def read_setup(path: Path) -> Setup:
         FaceError: no such file, not TOML, an unknown key, or a value of the wrong kind or out of range.
     """
     with face_errors(path, "a TOML file with the deformer's zones"):
-        read = tomllib.loads(path.read_text("utf-8"))
+        read = parse_toml(path.read_text("utf-8"))
     if unknown := sorted(set(read) - set(KEYS)):
         raise FaceError(f"{path}: wanted {', '.join(KEYS)}; got {', '.join(unknown)}")
     zones: dict[int, Zone] = {}
@@ -88,7 +89,10 @@ def _zone(where: str, entry: Any) -> Zone:
         name: readers[kinds[name]](f"{where}: {name}", value) if kinds[name] in readers else value
         for name, value in entry.items()
     }
-    return Zone(**values)
+    try:
+        return Zone(**values)
+    except FaceError as error:
+        raise FaceError(f"{where}: {error}") from None
 
 
 def _entry(path: Path, read: dict[str, Any], key: str, kind: type[list[Any]] | type[dict[str, Any]]) -> Any:
@@ -126,14 +130,17 @@ def _triple(where: str, value: Any) -> tuple[float, float, float]:
 
 def _expanded(where: str, ranges: Any) -> Int32:
     """Return the vertices of ranges: `"3-5 9"` is 3, 4, 5, 9."""
-    vertices: list[int] = []
-    try:
-        for word in str(ranges).split():
-            first, _, last = word.partition("-")
-            vertices += range(int(first), int(last or first) + 1)
-    except ValueError:
-        raise FaceError(f"{where}: wanted ranges such as '3-5 9', got {word!r}") from None
-    return np.unique(np.array(vertices, np.int32))
+    mask = np.zeros(MAX_VERTICES, bool)
+    for word in str(ranges).split():
+        first, _, last = word.partition("-")
+        try:
+            a, b = int(first), int(last or first)
+        except ValueError:
+            a, b = 0, -1
+        if not 0 <= a <= b < MAX_VERTICES:
+            raise FaceError(f"{where}: wanted ranges such as '3-5 9', got {word[:80]!r}")
+        mask[a : b + 1] = True
+    return np.flatnonzero(mask).astype(np.int32)
 
 
 def _ranges(mask: Int32) -> str:

@@ -77,6 +77,9 @@ def test_basis_of_eyes_with_fields_of_their_own_has_no_balls(
         ("lid", np.array([-1]), r"lid: wanted 0\.\.\d+, got -1\.\.-1"),
         ("vertex", np.array([7, 10**6]), r"vertex: wanted 0\.\.\d+, got 7\.\.1000000"),
         ("jaw_pivot", np.full(3, np.nan), "jaw_pivot: wanted finite numbers"),
+        ("row", np.array([0]), r"row: wanted 1\.\.73, got 0\.\.0"),
+        ("start", np.array([0, 1]), r"start: wanted an array \(\d+,\), got \(2,\)"),
+        ("lid", np.array([0.5]), "lid: wanted whole numbers, got float64"),
         ("move", np.zeros(2), r"move: wanted 2 dimensions, got \(2,\)"),
     ],
 )

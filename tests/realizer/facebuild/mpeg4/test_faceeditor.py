@@ -133,7 +133,7 @@ def test_read_faceeditor_makes_a_face_as_true(tmp_path: Path) -> None:
         ('use-vertex-mask="true"', 'use-vertex-mask="yes"', "wanted true or false, got 'yes'"),
         ("17 4", "17 -4", "vertex-mask of FAP 22: wanted indices"),
         ("<deformer x", "<spring x", "deformers: wanted ease-deformer"),
-        ("</faceeditor-parameters>", "", "not well-formed XML"),
+        ("</faceeditor-parameters>", "", "wanted well-formed XML"),
         ("<!ELEMENT vertex-mask (#PCDATA)>", '<!ENTITY a "aa">', "no entities"),
     ],
 )
@@ -146,7 +146,7 @@ def test_read_faceeditor_names_what_is_wrong(tmp_path: Path, old: str, new: str,
 
 
 def test_fitted_needs_a_file_and_common_points(tmp_path: Path) -> None:
-    with pytest.raises(FaceError, match=r"none\.xml: No such file"):
+    with pytest.raises(FaceError, match=r"none\.xml: wanted a file of FaceEditor, got No such file"):
         read_faceeditor(tmp_path / "none.xml")
     with pytest.raises(FaceError, match="at least three feature points"):
         fitted(read_faceeditor(written(tmp_path, FILE)), {"4.1": (0, 0, 0)})

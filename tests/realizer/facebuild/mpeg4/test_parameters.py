@@ -42,6 +42,8 @@ def test_read_setup_returns_points(tmp_path: Path) -> None:
         ('[[zone]]\nfap = 2\nfalloff = "cosine"\nsize = 1', "wanted a FAP from 3 to 68"),
         ('[masks]\n"4 x" = "1-3"', "wanted a FAP's number, got 'x'"),
         ('[masks]\n"4" = "1-b"', "wanted ranges such as '3-5 9', got '1-b'"),
+        ('[masks]\n"4" = "5-99999999999"', "wanted ranges such as '3-5 9', got '5-99999999999'"),
+        ('[[zone]]\nfap = 31\nfalloff = "x"\nsize = 1', "zone 1: zone of FAP 31: falloff: wanted one of"),
         ("a = ", "Invalid value"),
     ],
 )
@@ -51,4 +53,4 @@ def test_read_setup_names_what_is_wrong(tmp_path: Path, text: str, message: str)
     with pytest.raises(FaceError) as raised:
         read_setup(path)
     assert message in str(raised.value)
-    assert str(path) in str(raised.value) or "zone of FAP" in str(raised.value)
+    assert str(path) in str(raised.value)
