@@ -1,6 +1,6 @@
 """Whatever can come in, broken in every way: a seed in, an exception out where something does not stand it.
 
-Run: python -m tests.fuzz [--minutes 10] [--seed 0] [--only documents faps tasks controls sessions]
+Run: python -m tests.fuzz [--minutes 10] [--seed 0] [--only documents tasks heads ...]
 
 Each try prints nothing; one that fails prints its target and its seed, with which it fails again.
 """
@@ -18,10 +18,11 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from copy import deepcopy
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from random import Random
 from typing import TypeVar
+from urllib.parse import quote
 
 import numpy as np
 
@@ -38,6 +39,7 @@ from realizer.playback.player import Player
 from realizer.playback.speaking import submit_with_speech
 from realizer.protocol.messages.parse import parse_control
 from realizer.protocol.messages.replies import ErrorMessage
+from realizer.server.http.http_site import HttpSite
 from realizer.server.session.effects import Send
 from realizer.server.session.session import Session
 from realizer.server.transports.message_formats import Disconnect, Inbound
@@ -46,6 +48,7 @@ from realizer.server.transports.xface.reader import Fault, TaskReader
 from realizer.server.transports.xface.tasks import ABLE, UNABLE, Answer, TaskRunner
 from realizer.server.transports.xface.wire import Task, pack_task, read_notes
 from realizer.speech.silent import SilentVoice
+from tests.fuzz_files import FILES, file_tried
 from tests.interleavings import CONTROLS, FILTERS, Interleaving, no_error
 from tests.mutants import mutants
 
@@ -311,11 +314,52 @@ def sessions(seed: int, _: bytes) -> None:
     Interleaving(seed, corpus(), full=0.2 if seed % 3 == 2 else 0.0).run(STEPS)
 
 
+# addresses --------------------------------------------------------------------------------------
+
+
+@cache
+def site() -> HttpSite:
+    return HttpSite(dict)
+
+
+@cache
+def addresses() -> tuple[bytes, ...]:
+    """Return addresses that compute, with their queries."""
+    queries = {
+        "/pose.fap?face=ada&set=": {"type": "set", "aus": {"12": 0.5, "2L": 1}, "faps": {"open_jaw": 300}},
+        "/pose.fap?set=": {"type": "set", "emotion": {"name": "joy"}},
+        "/feeling.json?of=": {"angle": 67.5, "activation": 5, "profile": "own"},
+        "/look.json?light=evening&face=": "ada",
+        "/faces/": "ada.glb",
+    }
+    texts = (
+        start + quote(rest if isinstance(rest, str) else json.dumps(rest)) for start, rest in queries.items()
+    )
+    return tuple(text.encode() for text in texts)
+
+
+def urls(seed: int, mutant: bytes) -> None:
+    """Check that a broken address is answered, and that no answer names a folder."""
+    answer = site().answer(mutant.decode("latin-1"))
+    assert answer.status in (200, 400, 404), answer
+    if answer.status != 200:
+        assert str(CORPUS.parents[1]).encode() not in answer.body, answer
+
+
+# files ------------------------------------------------------------------------------------------
+
+
+def files(kind: str, seed: int, _: bytes) -> None:
+    """Check that a broken file of a kind is read, or refused by a message that says which file."""
+    file_tried(FILES[kind], seed)
+
+
 # What is broken for a target.
 SOURCES: Mapping[str, Callable[[], tuple[bytes, ...]]] = {
     "documents": corpus,
     "faps": fap_files,
     "tasks": task_streams,
+    "urls": addresses,
 }
 TARGETS: Mapping[str, Callable[[int, bytes], None]] = {
     "documents": documents,
@@ -323,6 +367,8 @@ TARGETS: Mapping[str, Callable[[int, bytes], None]] = {
     "tasks": tasks,
     "controls": controls,
     "sessions": sessions,
+    "urls": urls,
+    **{kind: partial(files, kind) for kind in FILES},
 }
 
 

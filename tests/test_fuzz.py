@@ -61,7 +61,13 @@ def test_fuzz_of_any_text_gives_errors_and_blocks_that_play_to_the_end(
 @pytest.mark.parametrize(
     ("target", "part"),
     # The number of tries for as many seeds as mutants: one try costs as much as several mutants.
-    [("faps", 10), ("tasks", 80), ("controls", 40), ("sessions", 300)],
+    [
+        *(("faps", 10), ("tasks", 80), ("controls", 40), ("sessions", 300), ("urls", 10)),
+        *(("heads", 30), ("clips", 20), ("settings", 5), ("expressions", 5), ("timelines", 10)),
+        *(("profiles", 10), ("mappings", 10), ("scenes", 10), ("zones", 20), ("faceeditor", 20)),
+        *(("recipes", 10), ("points", 20), ("faces", 150), ("models", 150), ("features", 150)),
+        *(("meshes", 150), ("fields", 150), ("plots", 40)),
+    ],
 )
 def test_fuzz_stands_every_kind_of_damage(target: str, part: int, count: int, seed: int) -> None:
     tried(target, range(seed, seed + max(1, count // part)))
