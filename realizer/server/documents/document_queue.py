@@ -101,6 +101,11 @@ class DocumentQueue:
         return None
 
     @property
+    def received(self) -> int:
+        """The number of the last message that came."""
+        return self._received
+
+    @property
     def message(self) -> int:
         """The number of the message that is read, or was read last."""
         return self._received - max(len(self._unread) - 1, 0)

@@ -150,6 +150,7 @@ COUNTERS = {
     "http_failures": "HTTP requests that were answered with a status of 500 or more.",
     "frames_dropped": "Frames, pictures and sound packets that slow clients did not get.",
     "taken_back": "How often frames that were sent ahead were taken back, because a plan had changed.",
+    "quarantined": "Documents that sessions were restored without, after two replays that did not end.",
     "failures": "Sessions that an internal error ended.",
     "records_stopped": "Recordings that could not be written to their end.",
 }

@@ -12,11 +12,12 @@ from realizer.core.errors import RealizerError
 
 # Sessions whose process died and that no client resumed are deleted after this time.
 RETENTION = 7 * 24 * 3600  # s
+NOTE = "replay"  # the part of a journal with the note about a replay
 ROUNDING = 1e-6  # s; error of times converted from one clock to another
 
 # join, leave: a connection joined or left. text, sound: a message of a connection. spoken: a voice finished.
-# tick: a pending document was parsed or planned.
-Kind = Literal["join", "leave", "text", "sound", "spoken", "tick"]
+# tick: a pending document was parsed or planned. aside: a text that is left out, as its replays did not end.
+Kind = Literal["join", "leave", "text", "sound", "spoken", "tick", "aside"]
 
 
 class JournalError(RealizerError):
@@ -169,6 +170,24 @@ class Journal(Protocol):
 
         Raises:
             JournalError: the session cannot be read.
+        """
+        ...
+
+    def note(self, session: str, text: str | None) -> None:
+        """Store a note about the replay as the part `replay`, or delete it (None).
+
+        Raises:
+            TakenOver: another process has taken the session over.
+            JournalError: it cannot be written.
+        """
+        ...
+
+    def replace(self, session: str, index: int, entry: Entry) -> None:
+        """Replace an entry after the checkpoint by another, and delete the note about the replay.
+
+        Raises:
+            TakenOver: another process has taken the session over.
+            JournalError: there is no such entry, or it cannot be written.
         """
         ...
 

@@ -27,6 +27,7 @@ class JournalWriter:
         recorder: of the session for replay, or None. The session does not depend on it.
         on_stopped: is called when the recording has failed and stops.
         saved: the content of the journal so far.
+        follow: is called after each entry, until it returns False.
     """
 
     def __init__(
@@ -37,12 +38,14 @@ class JournalWriter:
         *,
         on_stopped: Callable[[], None] = lambda: None,
         saved: SavedSession | None = None,
+        follow: Callable[[], bool] = lambda: False,
     ) -> None:
         self._session = session
         self._journal = journal
         self._recorder = recorder
         self._on_stopped = on_stopped
         self._failing = False
+        self._follow: Callable[[], bool] | None = follow
         entries = [] if saved is None else saved.entries
         self._entries = len(entries)
         self._bytes = sum(len(entry.body) for entry in entries)
@@ -87,6 +90,8 @@ class JournalWriter:
             if self._entries % ENDLESS == 0:
                 words = "session %s: %d entries in its journal and no checkpoint: some block always plays or"
                 log.warning(f"{words} waits", self._session, self._entries)
+            if self._follow is not None and not self._follow():
+                self._follow = None
         self._record(lambda recorder: recorder.add(self._session, entry))
 
     def try_append(self, at: float, kind: Kind, number: int = 0, body: str | bytes = "") -> None:

@@ -7,7 +7,7 @@ import time
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
-from realizer.server.journal.entry import RETENTION, Entry, JournalError, SavedSession, TakenOver
+from realizer.server.journal.entry import NOTE, RETENTION, Entry, JournalError, SavedSession, TakenOver
 
 PATIENCE = 1.0  # s for an answer
 # All sessions wait meanwhile: after a timeout the server is not asked again for this time.
@@ -46,6 +46,23 @@ redis.call('DEL', KEYS[2])
 for k = 4, 3 + ARGV[3] do redis.call('HDEL', KEYS[3], ARGV[k]) end
 for k = 4 + ARGV[3], #ARGV, 2 do redis.call('HSET', KEYS[3], ARGV[k], ARGV[k + 1]) end
 for _, key in ipairs(KEYS) do redis.call('EXPIRE', key, ARGV[2]) end
+return 1
+"""
+# ARGV: the owner, the name of the part, and its text; "" to delete it.
+SET_PART = """
+if redis.call('HGET', KEYS[1], 'owner') ~= ARGV[1] then return 0 end
+if ARGV[3] == '' then
+    redis.call('HDEL', KEYS[3], ARGV[2])
+else
+    redis.call('HSET', KEYS[3], ARGV[2], ARGV[3])
+end
+return 1
+"""
+# ARGV: the owner, the name of the part to delete, the index of the entry, and its line.
+REPLACE = """
+if redis.call('HGET', KEYS[1], 'owner') ~= ARGV[1] then return 0 end
+redis.call('LSET', KEYS[2], ARGV[3], ARGV[4])
+redis.call('HDEL', KEYS[3], ARGV[2])
 return 1
 """
 END = """
@@ -90,8 +107,8 @@ class RedisJournal:
             self._store.connection_pool.make_connection()  # validates the query of the URL
         except (ValueError, TypeError) as error:
             raise JournalError(f"the journal {place}: {error}") from None
-        scripts = map(self._store.register_script, (ADD, TAKE, COMPACT, END))
-        self._add, self._take, self._compact, self._end = scripts
+        scripts = map(self._store.register_script, (ADD, TAKE, COMPACT, SET_PART, REPLACE, END))
+        self._add, self._take, self._compact, self._set_part, self._replace, self._end = scripts
         with self._translate_errors(f" {place}"):
             self._store.ping()
 
@@ -121,6 +138,18 @@ class RedisJournal:
         epoch, lines, parts = answer
         self._counts[session] = len(lines)
         return SavedSession.read(float(epoch), lines, dict(zip(parts[::2], parts[1::2], strict=True)))
+
+    def note(self, session: str, text: str | None) -> None:
+        with self._translate_errors():
+            done = self._set_part(_keys(session), [self._owner, NOTE, text or ""])
+        if not done:
+            raise TakenOver(session)
+
+    def replace(self, session: str, index: int, entry: Entry) -> None:
+        with self._translate_errors():
+            done = self._replace(_keys(session), [self._owner, NOTE, index, entry.line()])
+        if not done:
+            raise TakenOver(session)
 
     def taken_over(self, sessions: Collection[str]) -> set[str]:
         with self._translate_errors():

@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from time import time
 
-from realizer.server.journal.entry import RETENTION, Entry, JournalError, SavedSession, TakenOver
+from realizer.server.journal.entry import NOTE, RETENTION, Entry, JournalError, SavedSession, TakenOver
 
 # The tables of version 1; later versions must read them.
 TABLES = """
@@ -80,6 +80,22 @@ class SqliteJournal:
             parts = dict(self._file.execute("SELECT name, text FROM parts WHERE session = ?", (session,)))
         return None if row is None else SavedSession.read(row[0], lines, parts)
 
+    def note(self, session: str, text: str | None) -> None:
+        with self._transaction():
+            self._check_owner(session)
+            self._set_part(session, NOTE, text)
+
+    def replace(self, session: str, index: int, entry: Entry) -> None:
+        with self._transaction():
+            self._check_owner(session)
+            places = "SELECT n FROM entries WHERE session = ? ORDER BY n LIMIT 1 OFFSET ?"
+            done = self._file.execute(
+                f"UPDATE entries SET line = ? WHERE n = ({places})", (entry.line(), session, index)
+            )
+            if not done.rowcount:
+                raise JournalError(f"the journal: wanted entry {index} of session {session}, found none")
+            self._set_part(session, NOTE, None)
+
     def taken_over(self, sessions: Collection[str]) -> set[str]:
         # The main connection belongs to the thread that writes.
         with self._translate_errors(), contextlib.closing(sqlite3.connect(self._path, timeout=BUSY)) as file:
@@ -87,14 +103,10 @@ class SqliteJournal:
 
     def compact(self, session: str, parts: Mapping[str, str | None]) -> None:
         with self._transaction():
-            if not self._owns(session):
-                raise TakenOver(session)
+            self._check_owner(session)
             self._file.execute("DELETE FROM entries WHERE session = ?", (session,))
             for name, text in parts.items():
-                if text is None:
-                    self._file.execute("DELETE FROM parts WHERE session = ? AND name = ?", (session, name))
-                else:
-                    self._file.execute("REPLACE INTO parts VALUES (?, ?, ?)", (session, name, text))
+                self._set_part(session, name, text)
 
     def end(self, session: str) -> None:
         with contextlib.suppress(JournalError), self._transaction():
@@ -108,6 +120,17 @@ class SqliteJournal:
     def _owns(self, session: str) -> bool:
         query = "SELECT 1 FROM sessions WHERE id = ? AND owner = ?"
         return self._file.execute(query, (session, self._owner)).fetchone() is not None
+
+    def _check_owner(self, session: str) -> None:
+        if not self._owns(session):
+            raise TakenOver(session)
+
+    def _set_part(self, session: str, name: str, text: str | None) -> None:
+        """Store a part of a session, or delete it (None)."""
+        if text is None:
+            self._file.execute("DELETE FROM parts WHERE session = ? AND name = ?", (session, name))
+        else:
+            self._file.execute("REPLACE INTO parts VALUES (?, ?, ?)", (session, name, text))
 
     def _forget(self, session: str) -> None:
         for table, column in (("entries", "session"), ("parts", "session"), ("sessions", "id")):

@@ -1,9 +1,11 @@
 """The factory of sessions: new ones, and those restored from a journal."""
 
 import asyncio
+import contextlib
 import logging
 import time
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from itertools import islice
 from typing import Any
 
@@ -12,11 +14,14 @@ from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
 from realizer.expressions.library import library_of
 from realizer.face.fap_mapping import mapping_of
+from realizer.server.documents.document_queue import block_id_of
 from realizer.server.http.metrics import Metrics
-from realizer.server.journal import Journal, JournalError, SavedSession, journal_at
+from realizer.server.journal import Entry, Journal, JournalError, SavedSession, TakenOver, journal_at
+from realizer.server.journal.entry import NOTE
 from realizer.server.journal.journal_writer import JournalWriter
 from realizer.server.journal.recordings import RecordingFolder, recording_head
 from realizer.server.journal.replay import catch_up, restore_session
+from realizer.server.journal.replay_watch import TRIES, ReplayNote, ReplayWatch
 from realizer.server.runtime.session_registry import JoinError
 from realizer.server.session.effects import Speak
 from realizer.server.session.session import Session
@@ -107,15 +112,24 @@ class SessionFactory:
         if self.journal is None or (saved := self.journal.claim(name)) is None:
             return None
         loop = asyncio.get_running_loop()
+        last = ReplayNote.read(saved.parts)
+        parts = {part: text for part, text in saved.parts.items() if part != NOTE}
+        saved = replace(saved, parts=parts)
+        if last is not None and last.begun >= TRIES:
+            self._put_aside(name, saved.entries, last.entry)
+        watch = ReplayWatch(
+            lambda text: asyncio.run_coroutine_threadsafe(self._note(name, text), loop).result(), last
+        )
         session = self._session(name, 0.0, named=True, epoch=saved.epoch)
         try:
-            at, unanswered = await loop.run_in_executor(None, restore_session, session, saved, speak)
+            at, unanswered = await loop.run_in_executor(None, restore_session, session, saved, speak, watch)
         except JournalError:
             raise
         except Exception:
             log.exception("session %s cannot be resumed", name)
             raise JournalError(f"session {name} cannot be resumed: internal error") from None
-        session.journal = self._journal_writer(name, self.journal, saved)
+        watch.write = lambda text: self._try_note(name, text)
+        session.journal = self._journal_writer(name, self.journal, saved, watch.follow)
         await loop.run_in_executor(None, session.journal.resume, saved)
         at = catch_up(session, at, seen)
         unanswered += [effect for effect in session.take_effects() if isinstance(effect, Speak)]
@@ -125,6 +139,43 @@ class SessionFactory:
             session.disconnect(connection, now)
         log.info("session %s is resumed, %d entries long", name, len(saved.entries))
         return session, unanswered
+
+    def _put_aside(self, session: str, entries: list[Entry], index: int) -> None:
+        """Replace a document in the journal by a note that it is left out.
+
+        Raises:
+            JournalError: it cannot be written.
+        """
+        assert self.journal is not None
+        if not index < len(entries) or entries[index].kind != "text":
+            return  # the note is not ours
+        entries[index] = replace(entries[index], kind="aside")
+        self.journal.replace(session, index, entries[index])
+        self._metrics.counts["quarantined"] += 1
+        log.warning(
+            "session %s: block %s, entry %d of the journal, is put aside: %d replays have not ended",
+            session, block_id_of(str(entries[index].body)), index, TRIES,
+        )  # fmt: skip
+
+    async def _note(self, session: str, text: str | None) -> None:
+        """Write a note about the replay. Without it, the replay goes on.
+
+        Raises:
+            TakenOver: another process has taken the session over.
+        """
+        assert self.journal is not None
+        try:
+            self.journal.note(session, text)
+        except TakenOver:
+            raise
+        except JournalError as error:
+            log.warning("session %s: its replay is not noted: %s", session, error)
+
+    def _try_note(self, session: str, text: str | None) -> None:
+        """Write a note about the documents that are left from the replay."""
+        assert self.journal is not None
+        with contextlib.suppress(JournalError):
+            self.journal.note(session, text)
 
     async def taken_over(self, sessions: Iterable[Session]) -> list[Session]:
         """Return those of the named sessions that another process has taken over.
@@ -161,9 +212,13 @@ class SessionFactory:
         return session
 
     def _journal_writer(
-        self, id: str, journal: Journal | None, saved: SavedSession | None = None
+        self,
+        id: str,
+        journal: Journal | None,
+        saved: SavedSession | None = None,
+        follow: Callable[[], bool] = lambda: False,
     ) -> JournalWriter:
         def on_stopped() -> None:
             self._metrics.counts["records_stopped"] += 1
 
-        return JournalWriter(id, journal, self._recorder, on_stopped=on_stopped, saved=saved)
+        return JournalWriter(id, journal, self._recorder, on_stopped=on_stopped, saved=saved, follow=follow)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 from realizer.server.http.metrics import COUNTERS, GAUGES, Metrics, sum_samples
 
+OPERATION = Path(__file__).parents[4] / "docs" / "operation.md"
 SAMPLE = re.compile(r'([a-z_]+)(?:\{([a-z]+="[^"]*"(?:,[a-z]+="[^"]*")*)\})? (\S+)')
 
 
@@ -26,6 +28,14 @@ def test_metrics_describe_each_series_once() -> None:
     names = re.findall(r"^# TYPE (\S+) (\S+)$", text, re.M)
     assert len(names) == len({name for name, _ in names}) == len(GAUGES) + len(COUNTERS) + 3
     assert re.findall(r"^# HELP (\S+) .+$", text, re.M) == [name for name, _ in names]
+
+
+def test_metrics_are_all_described_in_the_documentation() -> None:
+    text = sum_samples({0: Metrics(0).text(dict.fromkeys(GAUGES, 0), {})})
+    kinds = dict(re.findall(r"^# TYPE (\S+) (\S+)$", text, re.M))
+    rows = re.findall(r"^\| (realizer_\S+) \| (\w+) \| (.+) \|$", OPERATION.read_text("utf-8"), re.M)
+    helps = re.findall(r"^# HELP (\S+) (.+)$", text, re.M)
+    assert rows == [(name, kinds[name], words) for name, words in helps]
 
 
 def test_histogram_counts_rise_to_the_total() -> None:

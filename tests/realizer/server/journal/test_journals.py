@@ -119,6 +119,37 @@ def test_journal_refuses_the_checkpoint_of_a_session_taken_over(where: str, sess
     assert other.claim(session) == SavedSession(0.0, [ENTRIES[0]])
 
 
+def test_journal_stores_and_deletes_the_note_about_a_replay(where: str, session: str) -> None:
+    one, other = journal_at(where), journal_at(where)
+    one.begin(session, 0.0)
+    one.add(session, ENTRIES[0])
+    for text in ("first", "second"):
+        one.note(session, text)
+        assert one.claim(session) == SavedSession(0.0, [ENTRIES[0]], {"replay": text})
+    one.note(session, None)
+    assert other.claim(session) == SavedSession(0.0, [ENTRIES[0]])
+    with pytest.raises(TakenOver, match=session):
+        one.note(session, "mine")
+
+
+def test_journal_replaces_an_entry_and_deletes_the_note(where: str, session: str) -> None:
+    one, other, aside = journal_at(where), journal_at(where), Entry(0.25, "aside", 1, "<bml/>")
+    one.begin(session, 0.0)
+    other.begin(session + "~", 0.0)
+    for entry in ENTRIES[:3]:
+        one.add(session, entry)
+        other.add(session + "~", entry)
+    one.note(session, "second")
+    one.replace(session, 1, aside)
+    assert one.claim(session) == SavedSession(0.0, [ENTRIES[0], aside, ENTRIES[2]])
+    with pytest.raises(JournalError):
+        one.replace(session, 3, aside)
+    one.add(session, ENTRIES[4])
+    assert other.claim(session) == SavedSession(0.0, [ENTRIES[0], aside, ENTRIES[2], ENTRIES[4]])
+    with pytest.raises(TakenOver, match=session):
+        one.replace(session, 1, ENTRIES[1])
+
+
 def test_journal_keeps_sessions_apart(where: str, session: str) -> None:
     journal = journal_at(where)
     for name, entry in ((session, ENTRIES[0]), (session + "~", ENTRIES[1])):
