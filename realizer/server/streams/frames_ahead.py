@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from realizer.server.streams.frame_windows import (
     EPSILON,
@@ -30,11 +30,14 @@ class AheadSubscription(FrameSubscription):
         takes_back: whether rows were taken back since the last message.
     """
 
-    final: int = 0
+    final: int = field(init=False)
     version: int = -1
     takes_back: bool = False
     _due: float = -math.inf  # when the next message is due, if the plan does not change
     _window: FrameWindow | None = None  # has the rows `final` .. `next - 1`
+
+    def __post_init__(self) -> None:
+        self.final = self.next
 
     def next_due(self, *, is_slow: bool) -> float:
         """Return when `message` is due; negative infinity for now, since the plan has changed.

@@ -30,6 +30,7 @@ from realizer.core.settings import Settings
 from realizer.protocol.wire import unpack
 from realizer.server.serve import Server
 from realizer.speech.espeak.voice import EspeakVoice
+from tests.ahead import viewed
 from tests.benchmarks.packets import encode_text
 from tests.feedback_log import seq_numbers
 from tests.many_clients import (
@@ -301,6 +302,29 @@ def test_chaos_client_under_other_clocks_gets_all_feedback_once(
         assert seq_numbers(feedback) == list(range(1, len(feedback) + 1))
         times = [f.global_time for f in map(parse_feedback, feedback) if hasattr(f, "global_time")]
         assert times == sorted(times)
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize("step", [-3600.0, 3600.0])
+def test_chaos_clock_that_jumps_does_not_disturb_rows_ahead(
+    clock: Clock, kept: Settings, step: float
+) -> None:
+    async def jump(url: str) -> None:
+        async with connect(url) as client:
+            await client.send(json.dumps({"type": "subscribe", "stream": "fap", "fps": 10}))
+            async for _ in client:
+                clock.step = step - clock.step
+
+    async def run() -> None:
+        async with asyncio.timeout(LIMIT):
+            async with Server(kept) as server:
+                jumping = asyncio.create_task(jump(f"{server.url}?session=s"))
+                await viewed(f"{server.url}?session=s")
+                jumping.cancel()
+            clock.step = step
+            async with Server(kept) as server:
+                await viewed(f"{server.url}?session=s&seen=0")
 
     asyncio.run(run())
 

@@ -26,6 +26,7 @@ from realizer.server.runtime import worker_aggregation
 from realizer.server.runtime.session_registry import worker_of
 from realizer.server.runtime.workers import Workers
 from realizer.server.serve import run_worker
+from tests.ahead import viewed
 from tests.programs import SERVE, running
 
 pytestmark = pytest.mark.xdist_group("workers")
@@ -89,6 +90,14 @@ def test_workers_bring_clients_of_a_session_together(workers: Workers) -> None:
             async with connect(f"{url}?session={name}") as sends, connect(f"{url}?session={name}") as looks:
                 await sends.send(NOD.format(f"b{number}"))
                 assert "blockProgress" in await message_with(looks, f'"b{number}:start"')
+
+    played(test())
+
+
+def test_workers_send_rows_ahead_and_take_them_back(workers: Workers) -> None:
+    async def test() -> None:
+        urls = [f"{address(workers)}?session={one_of(number)}" for number in (0, 1)]
+        await asyncio.gather(*(viewed(url) for url in urls))
 
     played(test())
 

@@ -10,9 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from realizer.core.settings import Settings
 from realizer.protocol.wire import HEADER, unpack
+from realizer.server.journal import Entry, SavedSession
+from realizer.server.journal.replay import restore_session
+from realizer.server.session.session import Session
 from realizer.server.streams import frames_ahead
-from tests.realizer.server.conftest import NOD, TALK, Client, Driver
+from realizer.server.streams.frame_windows import FrameTimeline, FrameWindow
+from tests.realizer.server.conftest import NOD, TALK, Client, Driver, spoken
 
 FPS = 25
 DTYPES = {"fap": "<i4", "au": "<f4", "arkit": "<f4"}
@@ -235,3 +240,40 @@ def test_ahead_gives_the_frames_that_are_sent_in_time(actions, stream, ahead, to
     assert np.abs(got - np.stack(list(wanted.values()))).max() < 1e-5
     # Never after their time, and in the same session those that change at their own time with the others.
     assert all(batch.first / FPS >= batch.sent - 1e-6 for batch in batches(early.clients[one], stream))
+
+
+def test_ahead_computes_no_rows_before_the_subscription(driver, monkeypatch: pytest.MonkeyPatch) -> None:
+    computed: list[int] = []
+    window = FrameTimeline.window
+
+    def counted(timeline: FrameTimeline, first: int, last: int) -> FrameWindow:
+        computed.append(first)
+        return window(timeline, first, last)
+
+    monkeypatch.setattr(FrameTimeline, "window", counted)
+    driver.run(3600.0)
+    driver.send(subscribe())
+    first = batches(driver.run(3601.0))[0].first
+    assert first >= 3600 * FPS
+    assert min(computed) >= first
+
+
+def test_ahead_goes_on_in_a_restored_session(drive) -> None:
+    driver = drive()
+    session = driver.session = Session("test", Settings(), 0.0, named=True)
+    rows = [("join", ""), ("text", SMILE.format("a", 0.1, 1.2)), ("tick", ""), ("tick", "")]
+    entries = [Entry(0.5, kind, 1, body) for kind, body in rows]
+    restore_session(session, SavedSession(0.0, entries), lambda _: spoken())
+    session.opened, driver.now = driver.opened, 1.0
+    session.disconnect(1, session.opened + 1.0)
+    for connection, ahead in ((2, 0.2), (3, 0.0)):
+        driver.join(connection)
+        driver.send(subscribe(ahead=ahead), connection)
+    driver.run(2.01)
+    driver.send(SMILE.format("b", 0.1, 2), 2)
+    driver.run(4.0)
+    assert [batch.first for batch in batches(driver.clients[2]) if batch.flush] == [54]
+    early, late = shown(driver.clients[2]), shown(driver.clients[3])
+    assert list(early) == list(range(25, max(early) + 1))
+    assert list(late) == list(range(25, 101))
+    assert all(early[number] == row for number, row in late.items())
