@@ -8,7 +8,6 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from realizer.core.errors import RealizerError
-from realizer.core.options import PlayOptions
 from realizer.core.settings import Settings
 
 if TYPE_CHECKING:
@@ -54,14 +53,7 @@ def lint(text: str, settings: Settings) -> str:
         return json.dumps({"faults": [], "skipped": words})
     source = Source(text)
     findings: list[Finding] = []
-    player = Player(
-        PlayOptions(
-            idle=False,
-            media=settings.media,
-            expressions=settings.expressions,
-            strict_bml=settings.strict_bml,
-        )
-    )
+    player = Player(replace(settings.play_options(), idle=False))
     for part in check_document("document", source, text, player):
         findings += part.findings
         if part.block is not None and part.schedule is not None:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from realizer.core.errors import RealizerError, RenderError, VoiceError
+from realizer.server.runtime.fair_pool import FairPool
 from realizer.server.session.effects import Draw, RenderOptions, Speak
 from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.utterance import Utterance, Voice
@@ -52,8 +52,8 @@ class Engines:
         self._deformer = deformer
         self._clock = clock
         # Two threads each: a long text or a starting process must not delay all other sessions.
-        self.speech_pool = ThreadPoolExecutor(2, "voice")
-        self.render_pool = ThreadPoolExecutor(2, "renderer")
+        self.speech_pool = FairPool(2, "voice")
+        self.render_pool = FairPool(2, "renderer")
         self._voices: dict[str | None, Voice] = {}
         self._slots: dict[tuple[str, RenderOptions], _RendererSlot] = {}
         self._begun = clock()  # when a renderer last finished starting; until then the others may have waited
@@ -86,10 +86,15 @@ class Engines:
         except Exception as error:
             return RenderError(f"the picture could not be drawn: {error}")
 
+    def drop(self, owner: Hashable) -> None:
+        """Drop the requests of an owner that wait in the pools."""
+        self.speech_pool.drop(owner)
+        self.render_pool.drop(owner)
+
     def close(self) -> None:
         """Close all engines, and drop the requests that wait for them."""
-        self.speech_pool.shutdown(wait=False, cancel_futures=True)
-        self.render_pool.shutdown(wait=False, cancel_futures=True)
+        self.speech_pool.close()
+        self.render_pool.close()
         for voice in self._voices.values():
             voice.close()
         for slot in self._slots.values():

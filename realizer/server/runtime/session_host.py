@@ -283,6 +283,8 @@ class SessionHost:
             effects = self._registry.move_connections(session, effects, self._loop.time())
         for effect in work.counted(effects, 5):
             self._apply_effect(session, effect)
+        if session.closed:
+            self._engines.drop(session)
         self._schedule_wakeup(session)
 
     def _schedule_wakeup(self, session: Session) -> None:
@@ -439,12 +441,14 @@ class SessionHost:
                 if (client := self._clients.get(connection)) is not None:
                     client.send(data)
             case Speak(id):
-                speech = self._loop.run_in_executor(self._engines.speech_pool, self._engines.speak, effect)
+                speak = functools.partial(self._engines.speak, effect)
+                speech = asyncio.wrap_future(self._engines.speech_pool.submit(session, speak))
                 speech.add_done_callback(
                     functools.partial(self._deliver_result, session, session.on_speech, id)
                 )
             case Draw(id):
-                picture = self._loop.run_in_executor(self._engines.render_pool, self._engines.draw, effect)
+                draw = functools.partial(self._engines.draw, effect)
+                picture = asyncio.wrap_future(self._engines.render_pool.submit(session, draw))
                 picture.add_done_callback(
                     functools.partial(self._deliver_result, session, session.on_picture, id)
                 )

@@ -80,7 +80,7 @@ def test_engines_keep_a_renderer_that_takes_long_to_start(
     monkeypatch.setattr("realizer.server.runtime.engines.RENDERERS", 2)
     assert width(engines.draw(order(16))) == 16
     begins = clock.asked = threading.Event()
-    starting = engines.render_pool.submit(engines.draw, order(17))
+    starting = engines.render_pool.submit(0, lambda: engines.draw(order(17)))
     assert begins.wait(60)
     clock.now = IDLE + 1.0
     clock.asked = None
@@ -96,7 +96,7 @@ def test_engines_keep_a_renderer_that_takes_long_to_start(
 def test_engines_keep_a_renderer_that_draws(engines, clock, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("realizer.server.runtime.engines.RENDERERS", 1)
     begins = clock.asked = threading.Event()
-    drawing = engines.render_pool.submit(engines.draw, order(16))
+    drawing = engines.render_pool.submit(0, lambda: engines.draw(order(16)))
     assert begins.wait(60)
     clock.asked = None
     clock.now = 2 * IDLE
