@@ -182,7 +182,7 @@ class BlockWaiter:
                 # A warning about the block itself refuses it, unless a prediction has accepted it before.
                 self.last = self.last or feedback
             case PredictionFeedback():
-                self._planned |= any(b.id == self.block and b.global_end is not None for b in feedback.blocks)
+                self._planned |= any(b.id == self.block and b.status != "IN_PREP" for b in feedback.blocks)
 
     def on_error(self, error: dict[str, Any]) -> None:
         """Ignore errors: those of blocks are feedback."""

@@ -85,8 +85,9 @@ def test_router_treats_an_answer_with_values_as_an_answer(mail) -> None:
     assert not mail.frames
 
 
-def planned(end: float | None) -> PredictionFeedback:
-    return PredictionFeedback(blocks=(BlockPrediction(id="b", global_start=0.0, global_end=end),))
+def planned(status: str) -> PredictionFeedback:
+    """A prediction without an end, as it is while a block waits for the end of an open speech."""
+    return PredictionFeedback(blocks=(BlockPrediction(id="b", global_start=0.0, status=status),))
 
 
 def block(id: str, time: float) -> BlockProgress:
@@ -102,8 +103,8 @@ def warning(id: str) -> WarningFeedback:
     [
         ([block("b:start", 1.0), block("b:end", 2.0)], "b:end"),
         ([block("a:end", 1.0), block("b:end", 2.0)], "b:end"),
-        ([planned(None), warning("b")], "b"),
-        ([planned(3.0), warning("b"), block("b:end", 3.0)], "b:end"),
+        ([planned("IN_PREP"), warning("b")], "b"),
+        ([planned("LURKING"), warning("b"), block("b:end", 3.0)], "b:end"),
         ([warning("b:n"), block("b:start", 1.0)], None),
     ],
 )

@@ -1,5 +1,6 @@
 // The feedback log: one line per message, the newest at the bottom; filtered lines are hidden.
 import { make } from "./dom.js";
+import { BMLA } from "./realizer.js";
 
 const MOST = 600; // lines
 
@@ -30,8 +31,9 @@ export class Log {
         return this.line("warning", null, `${id}: ${element.textContent}`, element);
       case "predictionFeedback":
         for (const block of element.children) {
-          if (block.localName !== "bml" || !block.hasAttribute("globalEnd")) continue;
-          const [start, end] = ["globalStart", "globalEnd"].map((name) => Number(block.getAttribute(name)).toFixed(2));
+          if (block.localName !== "bml" || block.getAttributeNS(BMLA, "status") === "IN_PREP") continue;
+          // The end of a block that lasts as long as an open speech is not known.
+          const [start, end] = ["globalStart", "globalEnd"].map((name) => block.hasAttribute(name) ? Number(block.getAttribute(name)).toFixed(2) : "?");
           this.line("plan", this.now, `${block.getAttribute("id")} is planned, ${start} to ${end} s`, element);
         }
     }

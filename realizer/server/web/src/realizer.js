@@ -39,6 +39,7 @@ const ANSWERS = { hello: "welcome", subscribe: "subscribed", state: "state", pin
 // end of protocol
 
 const AHEAD = 0.2; // s; frames that are sent so long before their time survive most delays
+export const BMLA = "http://www.asap-project.org/bmla"; // namespace of the states of blocks
 const RETRY = [0.3, 0.6, 1.2, 2.5, 5]; // s
 const BLOCK = /<(?:\w+:)?bml\b[^<>]*?\sid\s*=\s*["']([^"'<>]+)["']/g;
 const COMMENT = /<!--[^]*?-->|<\?[^]*?\?>/g;
@@ -282,7 +283,7 @@ export class Realizer {
     const id = element.getAttribute("id");
     if (element.localName === "predictionFeedback") {
       for (const block of element.children) {
-        if (block.hasAttribute("globalEnd")) for (const one of this.#awaited.get(block.getAttribute("id")) ?? []) one.planned = true;
+        if (block.getAttributeNS(BMLA, "status") !== "IN_PREP") for (const one of this.#awaited.get(block.getAttribute("id")) ?? []) one.planned = true;
       }
     } else if (element.localName === "blockProgress" && id.endsWith(":end")) {
       this.#settle(id.slice(0, -4), (one) => one.resolve(element));
