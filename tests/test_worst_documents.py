@@ -3,11 +3,12 @@
 import pytest
 
 from realizer import schedule
-from tests.worst_documents import PATTERNS, document, growth
+from tests.worst_documents import PATTERNS, calls, document, growth, longest_stretch, mixed_document
 
 # A document of twice the size: n log n is 2.3 times as much, and by chance more of it conflicts.
 MOST_GROWTH = 3.5
 MOST_CALLS = 3000  # of a behaviour, half of them to read it
+MOST_TOGETHER = 40  # calls of a behaviour between two pauses: 30 ms for the largest documents
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -23,3 +24,16 @@ def test_worst_documents_cost_in_proportion_to_their_size(pattern: str, seed: in
     calls, times = growth(pattern, 120, seed=seed)
     assert calls <= 120 * MOST_CALLS
     assert times <= MOST_GROWTH
+
+
+@pytest.mark.parametrize("seeds", [range(40), pytest.param(range(40, 240), marks=pytest.mark.slow)])
+def test_worst_documents_found_at_random_cost_no_more(seeds: range) -> None:
+    costs = {seed: calls(lambda seed=seed: schedule(mixed_document(30, seed))) / 30 for seed in seeds}
+    worst = max(costs, key=lambda seed: costs[seed])
+    assert costs[worst] <= 2 * MOST_CALLS, f"seed {worst}"
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_worst_documents_are_paused_often(pattern: str) -> None:
+    number, where = longest_stretch(document(pattern, 200))
+    assert number <= 200 * MOST_TOGETHER, where

@@ -1,12 +1,14 @@
 """Documents that cost much: kinds of behaviours, timed in ways that conflict, overlap, wait or squeeze.
 
 `python -m tests.worst_documents [PATTERN ...] [--size N] [--kind KIND]` prints what the schedule of each
-costs at a size and at twice that size, in calls and in processor time.
+costs at a size and at twice that size, in calls and in processor time. `--search SECONDS` makes documents at
+random instead, and prints each that costs more than those before it.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextvars
 import random
 import sys
 import time
@@ -14,7 +16,11 @@ from collections.abc import Callable
 from types import FrameType
 from typing import Any
 
+from bml_schema.steps import on_element
 from realizer import schedule
+from realizer.core import work
+from realizer.core.settings import Settings
+from realizer.server.session.session import Session
 
 HEADER = (
     '<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0" xmlns:realizer="urn:bml-realizer:1"'
@@ -74,6 +80,18 @@ def document(pattern: str, size: int, kind: str | None = None, seed: int = 0) ->
     return f"{HEADER}{''.join(behaviours)}</bml>"
 
 
+def mixed_document(size: int, seed: int) -> str:
+    """Return a document of random kinds whose timings follow some of the patterns, chosen at random."""
+    chance = random.Random(seed)
+    patterns = chance.sample(list(PATTERNS), chance.randint(1, 4))
+    behaviours = []
+    for i in range(size):
+        tag, attributes, children = KINDS[chance.choice(NAMES)]
+        timing = PATTERNS[chance.choice(patterns)](i, chance)
+        behaviours.append(f'<{tag} id="b{i}" {attributes} {timing}>{children}</{tag}>')
+    return f"{HEADER}{''.join(behaviours)}</bml>"
+
+
 def calls(function: Callable[[], Any]) -> int:
     """Return how many functions of Python and C are called: work that does not depend on the machine."""
     number = 0
@@ -96,6 +114,69 @@ def growth(pattern: str, size: int, kind: str | None = None, seed: int = 0) -> t
     return small, large / small
 
 
+class _Stretches:
+    """A pauser that counts calls of functions between pauses.
+
+    Attributes:
+        longest: number of calls, and the function that was paused after them.
+    """
+
+    def __init__(self) -> None:
+        self.longest = (0, "")
+        self._calls = 0
+
+    def count(self, frame: FrameType, event: str, value: object) -> None:
+        self._calls += event in ("call", "c_call")
+
+    def pause(self) -> None:
+        """Note the calls since the last pause."""
+        if self._calls > self.longest[0]:
+            stack = sys._getframe(1)
+            while stack.f_back is not None and stack.f_code.co_filename.endswith(("work.py", "steps.py")):
+                stack = stack.f_back
+            self.longest = self._calls, f"{stack.f_code.co_filename}:{stack.f_lineno}"
+        self._calls = 0
+
+    def wait_for(self, function: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
+        """Call a function here."""
+        return function(*args, **kwargs)
+
+
+def longest_stretch(text: str) -> tuple[int, str]:
+    """Return the most calls between two pauses while a session plays a document, and where they ended."""
+    stretches = _Stretches()
+
+    def play() -> None:
+        session = Session("worst", Settings(voice="silent", max_duration=1e9), 0.0)
+        session.connect(1, 0.0)
+        session.receive(1, '{"type": "subscribe", "stream": "fap", "fps": 25}', 0.0)
+        work.pause_with(stretches)
+        on_element.set(stretches.pause)
+        sys.setprofile(stretches.count)
+        try:
+            session.receive(1, text, 0.0)
+            for step in range(100):
+                session.tick(step / 25)
+                stretches.pause()
+        finally:
+            sys.setprofile(None)
+
+    contextvars.copy_context().run(play)
+    return stretches.longest
+
+
+def search(seconds: float, size: int) -> None:
+    """Print the documents that cost most among random ones."""
+    worst, end, seed = 0.0, time.monotonic() + seconds, 0
+    while time.monotonic() < end:
+        text, began = mixed_document(size, seed), time.process_time()
+        schedule(text)
+        if (spent := time.process_time() - began) > worst:
+            worst = spent
+            print(f"seed {seed:6}: {spent:.3f} s for {size} behaviours, {len(text)} bytes", flush=True)
+        seed += 1
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -103,8 +184,12 @@ def main() -> None:
     parser.add_argument("pattern", nargs="*", default=list(PATTERNS))
     parser.add_argument("--size", type=int, default=500)
     parser.add_argument("--kind", choices=NAMES, help="default: all in turn")
+    parser.add_argument("--search", type=float, metavar="SECONDS")
     given = parser.parse_args()
     schedule(document("linked", 100))  # imports and caches
+    if given.search is not None:
+        search(given.search, given.size)
+        return
     print("pattern       kind        calls  twice the size:  calls   seconds")
     for pattern in given.pattern:
         for kind in [given.kind] if given.kind else NAMES:
