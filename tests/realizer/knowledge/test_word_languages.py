@@ -38,6 +38,7 @@ def test_language_of_is_that_of_the_nearest_element() -> None:
 
 def test_language_of_ignores_a_description_that_is_not_spoken() -> None:
     assert language(text="fr", ssml="pl", priority=-1) == "fr"
+    assert language(text="fr", ssml="pl", priority=0) == "pl"
 
 
 @pytest.mark.parametrize("tag", ["en", "en-GB", "EN", "en_US"])
