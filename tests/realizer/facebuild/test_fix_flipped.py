@@ -6,7 +6,7 @@ import numpy as np
 
 from realizer.core.array_types import Float64
 from realizer.face.mesh_geometry import grid
-from realizer.facebuild.fix_flipped import flipped_triangles, soften_flips
+from realizer.facebuild.fix_flipped import JAW, _groups, flipped_triangles, soften_flips
 
 SIDE = 15
 X, Y = np.meshgrid(np.linspace(-7, 7, SIDE), np.linspace(-7, 7, SIDE))
@@ -50,3 +50,14 @@ def test_soften_flips_keeps_sums_of_fields() -> None:
     one, other = mended([field, rest], [(np.array([2.5, 0.0]), 0.0, 0.0)], [MIDDLE])
     assert not np.array_equal(one, field)
     assert np.allclose(one + other, [1.0, 0, 0])
+
+
+def test_without_flips_mends_twins_all_lips_and_the_jaw_together() -> None:
+    rows = {number: np.zeros((1, 3)) for number in (*JAW, 4, 8, 19, 20, 31, 48)}
+    assert _groups(rows) == [
+        ([3], [69, 70, 73]),
+        ([19, 20], [19, 20]),
+        ([31, 32], [31, 32]),
+        ([48], [48]),
+        ([4, 8], [4, 8]),
+    ]
