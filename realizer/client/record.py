@@ -14,6 +14,7 @@ import numpy as np
 from bml_schema.feedback import BlockProgress
 from realizer.client.message_router import ClientError
 from realizer.core.array_types import Int16, UInt8
+from realizer.core.units import frame_count
 from realizer.protocol.wire import WireFrame
 
 RATE = 48_000  # Hz
@@ -56,7 +57,7 @@ async def record(
             raise ClientError.of(camera.errors[0])
         for task in taking:
             task.cancel()
-    count = int((end.global_time - until.start) * fps) + 1
+    count = frame_count(round(end.global_time - until.start, 5), fps)  # feedback has times to the microsecond
     shown = _film_frames(pictures, until.start, fps, count)
     sound = _sound(packets, until.start, count / fps)
 
