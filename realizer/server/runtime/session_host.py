@@ -16,6 +16,7 @@ from realizer.server.http.metrics import Metrics
 from realizer.server.journal import TakenOver
 from realizer.server.journal.replay import catch_up
 from realizer.server.runtime.engines import Engines
+from realizer.server.runtime.fair_pool import FairPool
 from realizer.server.runtime.gc_policy import GcPolicy
 from realizer.server.runtime.session_factory import SessionFactory
 from realizer.server.runtime.session_registry import (
@@ -440,27 +441,28 @@ class SessionHost:
             case Send(connection, data):
                 if (client := self._clients.get(connection)) is not None:
                     client.send(data)
-            case Speak(id):
-                speak = functools.partial(self._engines.speak, effect)
-                speech = asyncio.wrap_future(self._engines.speech_pool.submit(session, speak))
-                speech.add_done_callback(
-                    functools.partial(self._deliver_result, session, session.on_speech, id)
-                )
-            case Draw(id):
-                draw = functools.partial(self._engines.draw, effect)
-                picture = asyncio.wrap_future(self._engines.render_pool.submit(session, draw))
-                picture.add_done_callback(
-                    functools.partial(self._deliver_result, session, session.on_picture, id)
-                )
+            case Speak():
+                self._submit(self._engines.speech_pool, self._engines.speak, session, effect)
+            case Draw():
+                self._submit(self._engines.render_pool, self._engines.draw, session, effect)
             case Close(connection, code, reason):
                 if (client := self._clients.get(connection)) is not None:
                     client.disconnect(code, reason)
 
-    def _deliver_result(self, session: Session, deliver: Any, id: int, future: asyncio.Future[Any]) -> None:
-        if not future.cancelled() and not self._closed:
-            began = self._loop.time()
-            self._call(session, lambda: deliver(id, future.result(), self._loop.time()))
-            self._report_slow_step(began, "the result of a voice or a renderer", session)
+    def _submit(
+        self, pool: FairPool, compute: Callable[[Any], Any], session: Session, effect: Speak | Draw
+    ) -> None:
+        """Compute the answer to an effect in a thread, and pass it to the session."""
+        answer = session.on_speech if isinstance(effect, Speak) else session.on_picture
+
+        def deliver(future: asyncio.Future[Any]) -> None:
+            if not future.cancelled() and not self._closed:
+                began, result = self._loop.time(), future.result()
+                self._call(session, lambda: answer(effect.id, result, self._loop.time()))
+                self._report_slow_step(began, "the result of a voice or a renderer", session)
+
+        computed = pool.submit(session, functools.partial(compute, effect))
+        asyncio.wrap_future(computed, loop=self._loop).add_done_callback(deliver)
 
     def _compact_journal(self, session: Session) -> None:
         if self._closed:

@@ -99,13 +99,15 @@ class SlicedCalls(Generic[T]):
 
     def pause(self) -> None:
         """Let others have their turn if the slice of time is over."""
-        if self._clock() >= self._end:
+        # Callbacks that a call has scheduled have its context, but not its stack.
+        if self._clock() >= self._end and isinstance(getcurrent(), _Stack):
             self._parent().switch()
 
     def wait_for(self, function: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
         """Call a function in another thread, and let others have their turn until it returns."""
         stack = getcurrent()
-        assert isinstance(stack, _Stack)
+        if not isinstance(stack, _Stack):
+            return function(*args, **kwargs)
         stack.waits_for = future = self._threads.submit(function, *args, **kwargs)
         future.add_done_callback(lambda _: self._call_soon(self._on_pause, stack.owner))
         self._parent().switch()

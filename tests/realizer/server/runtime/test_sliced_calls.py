@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextvars
 import threading
 from collections.abc import Callable, Iterator
 from queue import SimpleQueue
@@ -96,6 +97,15 @@ def test_sliced_calls_pause_within_a_call_of_another_owner(calls) -> None:
     assert (done, calls.is_busy("a"), calls.is_busy("b")) == (["a"], False, True)
     calls.finish()
     assert done == ["a", "b"]
+
+
+def test_sliced_calls_leave_callbacks_alone_that_a_call_has_scheduled(calls) -> None:
+    """They have its context: asyncio copies it."""
+    contexts: list[contextvars.Context] = []
+    calls.call("a", lambda: contexts.append(contextvars.copy_context()))
+    contexts[0].run(calls.work_for, 2)
+    assert contexts[0].run(work.call_native, max, 1, 2) == 2
+    assert calls.paused == []
 
 
 def test_sliced_calls_cancel_a_call_where_it_is(calls) -> None:
