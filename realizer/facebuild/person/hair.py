@@ -55,7 +55,7 @@ def style_of(table: Mapping[str, Any]) -> Style:
     """
     known = toml_table("hair.toml")
     name = table.get("style", "short")
-    if name not in known["styles"]:
+    if not isinstance(name, str) or name not in known["styles"]:
         raise FaceError(f"hair: style: wanted one of {', '.join(known['styles'])}, got {name!r}")
     own = {key: value for key, value in table.items() if key != "style"}
     names = [field.name for field in fields(Style)]

@@ -67,6 +67,7 @@ def test_read_recipe_keeps_what_is_written(data: Path) -> None:
         ("[colours]", "[colours]\nnose = [1, 2, 3]", "colours: nose: wanted one of skin, "),
         ("says = 'Eve'", "says = 'Eve'\nhair = 3", "hair: wanted a table, got 3"),
         ("says = 'Eve'", "says = 'Eve'\nhair = {style = 'mohawk'}", "hair: style: wanted one of bun, "),
+        ("says = 'Eve'", "says = 'Eve'\nhair = {style = ['bun']}", "hair: style: wanted one of bun, "),
         ("says = 'Eve'", "says = 'Eve'\nhair = {colour = 3}", "got 'colour'"),
         ("says = 'Eve'", "says = 'Eve'\nlook = {beard = 1}", "look: wanted one of brow_thick, "),
         ("says = 'Eve'", "says = 'Eve'\nlook = {lips = nan}", "look: lips: wanted a number, got nan"),
