@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import signal
 import socket
+import sys
 from collections.abc import Awaitable, Coroutine, Iterator
 
 from realizer.animation import arkit
@@ -22,6 +23,10 @@ from realizer.server.transports.transport import Transport
 from realizer.server.transports.websocket.server import WebSocketTransport, startup_lines
 
 DRAIN_STEP = 0.05  # s; how often the drain checks whether everything has ended
+# s; a thread waits so long before it takes Python's lock from the event loop. While documents are planned the
+# loop pauses every 4 ms (`sliced_calls.SLICE`) and takes the lock back at once: with the usual 5 ms threads
+# would wait until the end.
+THREAD_WAIT = 0.001
 
 
 async def serve(settings: Settings | None = None) -> None:
@@ -98,6 +103,7 @@ def run_worker(settings: Settings, number: int, control: socket.socket) -> None:
 
 async def _serve(server: Server, ending: Awaitable[None]) -> None:
     disable_automatic_gc()
+    sys.setswitchinterval(THREAD_WAIT)
     printing = [asyncio.create_task(_print_lines(transport)) for transport in server.transports]
     try:
         await ending
