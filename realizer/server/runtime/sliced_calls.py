@@ -86,6 +86,8 @@ class SlicedCalls(Generic[T]):
         """End the calls of an owner where they are, if this is not one of them."""
         if (stack := self._stacks.get(owner)) is not None and stack is not getcurrent():
             del self._stacks[owner], self._waiting[owner]
+            if stack.waits_for is not None:
+                stack.waits_for.cancel()
             stack.parent = getcurrent()
             stack.throw()
 
@@ -140,6 +142,7 @@ class SlicedCalls(Generic[T]):
                 waiting.popleft()()
             del self._waiting[stack.owner], self._stacks[stack.owner]
             self._free.append(stack)
+            stack.owner = None
             self._parent().switch()
 
     @staticmethod

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextvars
 import threading
+import weakref
 from collections.abc import Callable, Iterator
 from queue import SimpleQueue
 
@@ -151,6 +152,31 @@ def test_sliced_calls_ignore_the_thread_of_a_call_that_was_cancelled(calls) -> N
     calls.resume("a")
     calls.finish()
     assert done == ["new"]
+
+
+def test_sliced_calls_call_no_function_for_a_call_that_was_cancelled(calls) -> None:
+    done: list[str] = []
+    may_end = threading.Event()
+    calls.call("a", lambda: work.call_native(may_end.wait))
+    calls.call("b", lambda: work.call_native(done.append, "b"))
+    calls.call("c", lambda: work.call_native(done.append, "c"))
+    calls.cancel("b")
+    may_end.set()
+    while calls.returned.get() != "c":
+        pass
+    assert done == ["c"]
+
+
+def test_sliced_calls_let_go_of_owners_whose_calls_have_ended() -> None:
+    class Owner:
+        pass
+
+    calls = SlicedCalls[Owner](lambda owner: None, lambda function, owner: None)
+    calls.call(owner := Owner(), lambda: None)
+    ended = weakref.ref(owner)
+    del owner
+    assert ended() is None
+    calls.close()
 
 
 def test_sliced_calls_raise_the_exception_of_a_thread_in_its_call(calls) -> None:
