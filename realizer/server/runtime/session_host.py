@@ -70,7 +70,9 @@ class SessionHost:
 
         self.metrics = Metrics(worker)
         self._factory = SessionFactory(settings, self.metrics)
-        self._registry = SessionRegistry(self._factory.new, settings, is_local, self._call)
+        self._registry = SessionRegistry(
+            self._factory.new, settings, is_local, self._call, lambda session: self._calls.cancel(session)
+        )
         self._engines = Engines(settings.deformer)
         self._clients: dict[int, Outbound] = {}
         self._wakeups: dict[Session, tuple[float, int]] = {}  # times, and the steps they are rounded up to
@@ -244,8 +246,6 @@ class SessionHost:
         left = self._registry.session_of.get(number)
         if left is not None:
             self.metrics.counts["frames_dropped"] += left.dropped_count(number)
-            if not left.named and set(left.connections) <= {number}:
-                self._calls.cancel(left)  # nobody wants the result
         self._registry.leave(number, self._loop.time())
         self._clients.pop(number, None)
         self._gc_policy.ended_connections += 1
@@ -379,11 +379,9 @@ class SessionHost:
             session = next(iter(self._reading))
             del self._reading[session]
             began = self._loop.time()
-            if session.closed:
-                self._calls.cancel(session)
-            elif self._calls.is_busy(session):
+            if self._calls.is_busy(session):
                 self._calls.resume(session)
-            else:
+            elif not session.closed:
                 self._calls.call(session, functools.partial(self._read_document, session, began))
             self._read_until = self._loop.time()
             self._report_slow_step(began, "a document", session)
@@ -474,8 +472,11 @@ class SessionHost:
     async def _check_takeovers(self) -> None:
         for session in await self._factory.taken_over(self._registry.sessions.values()):
             self._calls.cancel(session)
-            session.hand_over(TakenOver(session.id))
+            waiting = self._registry.joined(session).difference(session.connections)
+            session.hand_over(error := TakenOver(session.id))
             self._apply_effects(session)
+            for number in waiting:
+                self._apply_effect(session, Close(number, 1012, str(error)))
 
     def _expire_sessions(self) -> None:
         self._gc_policy.collect_if_needed(len(self._clients))

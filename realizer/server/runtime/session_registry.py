@@ -65,6 +65,7 @@ class SessionRegistry:
         is_local: (name) -> whether the session of that name belongs to this process.
         call: (session, function) -> calls a function that changes a session, now or when its other calls have
             ended; and returns whether it was now.
+        cancel: ends the calls of a session that have not ended.
 
     Attributes:
         sessions: name -> session.
@@ -77,13 +78,16 @@ class SessionRegistry:
         settings: Settings,
         is_local: Callable[[str], bool] = lambda name: True,
         call: Callable[[Session, Callable[[], None]], bool] = call_now,
+        cancel: Callable[[Session], None] = lambda session: None,
     ) -> None:
         self._call = call
+        self._cancel = cancel
         self._is_local = is_local
         self._make = make
         self._settings = settings
         self.sessions: dict[str, Session] = {}
         self.session_of: dict[int, Session] = {}
+        self._joined: dict[Session, set[int]] = {}  # `session_of` by session
         self._visitors: dict[int, Visitor] = {}
         self._opened_by: dict[str, str] = {}  # session -> the address that opened it
 
@@ -147,6 +151,7 @@ class SessionRegistry:
                 self.sessions[id] = self._make(id, now, name is not None)
             self._opened_by[id] = visitor.address
         session = self.session_of[connection] = self.sessions[id]
+        self._joined.setdefault(session, set()).add(connection)
         self._visitors[connection] = visitor
         self._call(session, partial(session.connect, connection, now, seen))
         return session
@@ -155,12 +160,24 @@ class SessionRegistry:
         """Remove a closed connection, and its session if that ends with it."""
         self._visitors.pop(connection, None)
         session = self.session_of.pop(connection, None)
-        if session is not None:
-            self._call(session, partial(self._disconnect, session, connection, now))
+        if session is None:
+            return
+        self._joined[session].remove(connection)
+        if not self._joined[session]:
+            del self._joined[session]
+            if not session.named:
+                self._cancel(session)  # nobody wants the result
+        self._call(session, partial(self._disconnect, session, connection, now))
+
+    def joined(self, session: Session) -> frozenset[int]:
+        """Return the connections of a session, also those that it will connect when its calls have ended."""
+        return frozenset(self._joined.get(session, ()))
 
     def _disconnect(self, session: Session, connection: int, now: float) -> None:
-        session.disconnect(connection, now)
-        if session.closed:
+        joined = self.joined(session)
+        for left in {connection, *session.connections} - joined:  # the calls of others may be cancelled
+            session.disconnect(left, now, is_awaited=bool(joined))
+        if session.closed and self.sessions.get(session.id) is session:
             session.journal.end()
             self.remove(session)
 
@@ -184,6 +201,8 @@ class SessionRegistry:
             if not isinstance(effect, MoveConnection):
                 effects.append(effect)
                 continue
+            if self.session_of.get(effect.connection) is not session:
+                continue  # it has left while its message waited
             visitor = self._visitors.get(effect.connection, ANYBODY)
             words = self._refusal(effect, session, visitor)
             if words is not None:
@@ -204,7 +223,7 @@ class SessionRegistry:
     @staticmethod
     def _welcome(joined: Session, move: MoveConnection, now: float) -> None:
         joined.send_welcome(move.connection, now)
-        if move.seen is not None:
+        if move.seen is not None and not joined.closed:
             joined.send_missed_feedback(move.connection, move.seen)
 
     def _refusal(self, move: MoveConnection, left: Session, visitor: Visitor) -> str | None:
@@ -220,7 +239,7 @@ class SessionRegistry:
 
     def remove_expired(self, now: float) -> None:
         """End the sessions that have had no connection for too long."""
-        for session in [s for s in self.sessions.values() if s.is_expired(now)]:
+        for session in [s for s in self.sessions.values() if s.is_expired(now) and not self.joined(s)]:
             self._end(session)
 
     def _abandoned(self, address: str | None = None) -> list[Session]:
@@ -232,7 +251,8 @@ class SessionRegistry:
         abandoned = [
             (s.empty_since, s.id, s)
             for s in self.sessions.values()
-            if s.empty_since is not None and address in (None, self._opened_by.get(s.id))
+            if s.empty_since is not None and not self.joined(s)
+            if address in (None, self._opened_by.get(s.id))
         ]
         return [session for *_, session in sorted(abandoned)]
 
@@ -240,6 +260,7 @@ class SessionRegistry:
         return list(self._opened_by.values()).count(address)
 
     def _end(self, session: Session) -> None:
+        self._cancel(session)
         session.close()
         session.journal.end()
         self.remove(session)

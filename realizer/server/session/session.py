@@ -138,6 +138,9 @@ class Session:
 
     def connect(self, connection: int, now: float, seen: int | None = None) -> None:
         """Add a connection. With `seen` it gets all feedback after that one, without it only new feedback."""
+        if self.closed:  # it ended while the client waited for it
+            self._effects.append(Close(connection, 1012, f"session {self.id} has ended: reconnect"))
+            return
         self._forget_deadline()
         self._connections[connection] = Connection(connection)
         if not self.log_entry(now - self.opened, "join", connection):
@@ -146,8 +149,12 @@ class Session:
         if seen is not None:
             self.send_missed_feedback(connection, seen)
 
-    def disconnect(self, connection: int, now: float) -> None:
-        """Remove a connection. An unnamed session closes with its last connection."""
+    def disconnect(self, connection: int, now: float, *, is_awaited: bool = False) -> None:
+        """Remove a connection. An unnamed session closes with its last connection.
+
+        Args:
+            is_awaited: whether other clients will connect at once: then it stays open.
+        """
         if self._connections.pop(connection, None) is not None:
             self.log_entry(now - self.opened, "leave", connection)
         self.submission.speeches.on_disconnect(connection)
@@ -155,7 +162,7 @@ class Session:
         self._forget_deadline()
         if not self._connections:
             self.empty_since = now
-            if not self.named:
+            if not self.named and not is_awaited:
                 self.close()
 
     def dropped_count(self, connection: int) -> int:

@@ -254,3 +254,98 @@ def test_session_host_closes_while_it_plans(in_tiny_slices) -> None:
         assert host.busy
 
     hosted(test)
+
+
+def moved_to(session: str) -> str:
+    """A message that moves its client into a session."""
+    return f'{{"type": "hello", "version": 1, "session": "{session}"}}'
+
+
+def test_session_host_moves_no_client_that_has_left_meanwhile(in_tiny_slices) -> None:
+    async def test(host: SessionHost) -> None:
+        number, _ = subscribed(host, "here")
+        host.receive(number, large("a", 20))
+        host.receive(number, moved_to("there"))
+        host.leave(number)
+        await asyncio.sleep(30)
+        assert host.health() == {"sessions": 1, "connections": 0}
+        await asyncio.sleep(host.settings.keep + 60)
+        assert host.health()["sessions"] == 0
+
+    hosted(test)
+
+
+def test_session_host_joins_a_client_while_the_last_one_leaves(in_tiny_slices) -> None:
+    async def test(host: SessionHost) -> None:
+        number, _ = subscribed(host)
+        await asyncio.sleep(1)
+        (session,) = host._registry.sessions
+        host.receive(number, large("a", 20))
+        _, other = subscribed(host, session)
+        host.leave(number)
+        await asyncio.sleep(30)
+        assert len(other.frames) > 10
+        assert host.health() == {"sessions": 1, "connections": 1}
+
+    hosted(test)
+
+
+def test_session_host_joins_a_client_to_a_session_that_expires(in_tiny_slices) -> None:
+    async def test(host: SessionHost) -> None:
+        number, _ = subscribed(host, "s")
+        host.receive(number, large("a", 20))
+        host.receive(number, large("b", 200))
+        host.leave(number)
+        session = host._registry.sessions["s"]
+        while session.connections:
+            await asyncio.sleep(0)
+        assert host.busy
+        for _ in range(20):
+            await asyncio.sleep(0)
+        _, other = subscribed(host, "s")
+        assert not session.connections
+        host._registry.remove_expired(asyncio.get_running_loop().time() + host.settings.keep)
+        await asyncio.sleep(30)
+        assert len(other.frames) > 10 or other.ends
+
+    hosted(test)
+
+
+def test_session_host_keeps_the_order_of_messages_while_a_client_moves(in_tiny_slices) -> None:
+    async def test(host: SessionHost) -> None:
+        number, client = subscribed(host, "here")
+        other, _ = subscribed(host, "here")
+        await asyncio.sleep(1)
+        host.receive(other, large("x", 20))
+        host.receive(number, moved_to("there"))
+        host.receive(other, large("y", 50))
+        host.receive(number, large("a", 3))
+        while host._registry.session_of[number].id == "here":
+            await asyncio.sleep(0)
+        host.receive(number, large("b", 3))
+        await asyncio.sleep(60)
+        assert predicted(client) == ["a", "b"]
+
+    hosted(test)
+
+
+@pytest.mark.parametrize("joins_late", [True, False])
+def test_session_host_closes_clients_of_a_taken_session(in_tiny_slices, tmp_path, joins_late: bool) -> None:
+    settings = Settings(voice="silent", journal=str(tmp_path / "journal"))
+
+    async def run() -> None:
+        first, second = SessionHost(settings), SessionHost(settings)
+        for host in (first, second):
+            await host.start()
+        number, client = subscribed(first, "s")
+        await asyncio.sleep(1)
+        first.receive(number, large("a", 20))
+        late = subscribed(first, "s")[1] if joins_late else client
+        await second.restore("s")
+        await asyncio.sleep(60)
+        assert (client.ends, late.ends) == ([1012], [1012])
+        for host in (first, second):
+            await host.close()
+
+    with asyncio.Runner(loop_factory=Loop) as runner:
+        runner.run(run())
