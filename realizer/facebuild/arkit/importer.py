@@ -130,9 +130,6 @@ def _read(path: Path) -> _Head:
         )
     try:
         surface = merge_pieces(pieces)
-        bad = np.flatnonzero(~np.isfinite(surface.vertices).all(axis=1))
-        if len(bad) or not all(np.isfinite(move).all() for move in surface.moves.values()):
-            raise FaceError("wanted finite places and moves, got NaN or infinity; export the head again")
         pose = pose_of(surface)
         surface = oriented(surface, pose)
         surface = cut(surface, surface.vertices[:, 1] - FLOOR)

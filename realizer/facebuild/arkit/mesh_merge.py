@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Bool, Float64, Int32
+from realizer.core.errors import FaceError
 from realizer.face.mesh_geometry import components, half_edges
 from realizer.facebuild.arkit.scene import Piece
 from realizer.tables.arkit_names import canonical
 
+LARGEST = 1e6  # of the size of all; int64 holds the places in steps of `SAME`
 SAME = 2e-6  # of the size of all; vertices nearer than that, that move alike, are one
 
 
@@ -76,7 +78,11 @@ class Surface:
 
 
 def merge_pieces(pieces: Sequence[Piece]) -> Surface:
-    """Return the pieces as one surface, without transparent pieces."""
+    """Return the pieces as one surface, without transparent pieces.
+
+    Raises:
+        FaceError: places or moves are not finite, or far larger than the head.
+    """
     pieces = [piece for piece in pieces if not piece.glass]
     counts = np.cumsum([0] + [len(piece.vertices) for piece in pieces])
     total = int(counts[-1])
@@ -101,9 +107,13 @@ def merge_pieces(pieces: Sequence[Piece]) -> Surface:
 
 def _welded(surface: Surface) -> Surface:
     """Merge vertices at one place that move alike: files double them along every seam of a texture."""
-    size = float(np.ptp(surface.vertices, axis=0).max()) or 1.0
-    columns = [surface.vertices, *surface.moves.values()]
-    key = np.rint(np.concatenate(columns, axis=1) / (size * SAME)).astype(np.int64)
+    values = np.concatenate([surface.vertices, *surface.moves.values()], axis=1)
+    is_finite = bool(np.isfinite(values).all())
+    size = (float(np.ptp(surface.vertices, axis=0).max()) or 1.0) if is_finite else 0.0
+    if not is_finite or np.abs(values).max() > LARGEST * size:
+        wanted = f"wanted finite places and moves, up to {LARGEST:g} times the size of the head"
+        raise FaceError(f"{wanted}, got NaN, infinity or more; export the head again")
+    key = np.rint(values / (size * SAME)).astype(np.int64)
     _, first, group = np.unique(key, axis=0, return_index=True, return_inverse=True)
     group = group.ravel()
     corners = group[surface.triangles]

@@ -117,7 +117,7 @@ def _number(where: str, value: Any) -> float:
 def _whole(where: str, value: Any) -> int:
     try:
         return int(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise FaceError(f"{where}: wanted a FAP's number, got {value!r}") from None
 
 

@@ -22,6 +22,7 @@ OTHER = {
     "cooccurrence": "off",
     "prosody": False,
     "grace": 0.1,
+    "max_planning": 1_000_000,
     "strict_bml": True,
     "size": (64, 64),
     "camera": "close",

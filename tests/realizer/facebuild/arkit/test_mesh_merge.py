@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from realizer.core.errors import FaceError
 from realizer.facebuild.arkit.mesh_merge import Surface, cut, merge_pieces
 from realizer.facebuild.arkit.scene import Piece
 
@@ -38,6 +39,18 @@ def test_merge_pieces_uses_arkit_names_and_drops_glass() -> None:
     surface = merge_pieces([piece(Mouth_Smile_L=1.0, hat=1.0), piece(5, glass=True)])
     assert list(surface.moves) == ["mouthSmileLeft"]
     assert len(surface.vertices) == 4
+
+
+@pytest.mark.parametrize("amount", [np.nan, np.inf, -np.inf, 1e300, -2e6])
+def test_merge_pieces_refuses_moves_far_larger_than_the_head(amount: float) -> None:
+    with pytest.raises(FaceError, match="wanted finite places and moves"):
+        merge_pieces([piece(jawOpen=amount)])
+
+
+@pytest.mark.parametrize("aside", [np.nan, np.inf, 1e300])
+def test_merge_pieces_refuses_places_that_are_not_of_a_head(aside: float) -> None:
+    with pytest.raises(FaceError, match="wanted finite places and moves"):
+        merge_pieces([piece(aside, jawOpen=0.1)])
 
 
 def test_surface_subset_keeps_triangles_between_its_vertices() -> None:
