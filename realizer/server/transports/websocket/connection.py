@@ -6,10 +6,13 @@ import asyncio
 import contextlib
 import http
 import logging
+from functools import lru_cache
 
-from websockets.asyncio.server import ServerConnection, broadcast
+from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
+from websockets.frames import Frame, Opcode
 from websockets.http11 import Request
+from websockets.protocol import State
 
 from realizer.core.settings import Settings, limit_hint
 from realizer.protocol.messages.replies import ErrorMessage
@@ -159,8 +162,11 @@ class WebSocketWriter:
         return 0 if transport is None else transport.get_write_buffer_size()
 
     def send(self, data: str | bytes) -> None:
-        if self._end is None:
-            broadcast((self._socket,), data)  # it needs no task for each message
+        # Past the library's `send`, which needs a task for each message.
+        if self._end is None and self._socket.protocol.state is State.OPEN:
+            text = isinstance(data, str)
+            payload = data.encode() if isinstance(data, str) else data
+            self._socket.transport.write(_head(text, len(payload)) + payload)
 
     def disconnect(self, code: int, reason: str) -> None:
         if self._end is None:
@@ -178,3 +184,10 @@ class WebSocketWriter:
                 await self._socket.close(code, reason)
         except TimeoutError:
             self._socket.transport.abort()
+
+
+@lru_cache(maxsize=1024)
+def _head(text: bool, length: int) -> bytes:
+    """Return the head of a frame of so many bytes."""
+    frame = Frame(Opcode.TEXT if text else Opcode.BINARY, bytes(length)).serialize(mask=False)
+    return frame[: len(frame) - length]
