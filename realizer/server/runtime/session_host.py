@@ -43,6 +43,7 @@ TURN = 0.004  # s; so long sessions are woken before the loop looks for messages
 # due than can be done, frames are late and documents are still read.
 READING_SHARE = 0.25
 LONGEST_READING = 0.02  # s
+MOST_WAITING = 100  # messages to a session that plans; then its clients are read more slowly
 SLOW_STEP = 0.05  # s; a step of the loop that takes so long is logged
 EXPIRY_INTERVAL = 5.0  # s; how often expired sessions and due checkpoints are looked for
 
@@ -227,6 +228,11 @@ class SessionHost:
         self._call(session, functools.partial(self._receive, session, number, message))
         self._report_slow_step(began, f"a message of {len(message)} characters", session, [number])
         return True
+
+    def is_congested(self, number: int) -> bool:
+        """Return whether so many messages of a connection's session wait that no more should be read."""
+        session = self._registry.session_of.get(number)
+        return session is not None and self._calls.count_waiting(session) >= MOST_WAITING
 
     def _receive(self, session: Session, number: int, message: str | bytes) -> None:
         if (present := self._registry.session_of.get(number)) is not session and present is not None:

@@ -59,6 +59,10 @@ class SlicedCalls(Generic[T]):
         """Return whether a call of the owner has not ended."""
         return owner in self._stacks
 
+    def count_waiting(self, owner: T) -> int:
+        """Return how many calls of the owner have not begun."""
+        return len(self._waiting.get(owner, ()))
+
     def call(self, owner: T, function: Callable[[], None]) -> None:
         """Call a function for at most a slice of time, or after the earlier calls of its owner.
 

@@ -13,7 +13,7 @@ import pytest
 from bml_schema.feedback import parse_feedback
 from realizer.core.settings import Settings
 from realizer.server.runtime import sliced_calls
-from realizer.server.runtime.session_host import SessionHost
+from realizer.server.runtime.session_host import MOST_WAITING, SessionHost
 from realizer.server.streams.connection import SLOW
 from tests.worst_documents import document
 
@@ -225,6 +225,24 @@ def test_session_host_moves_a_client_whose_messages_wait(in_tiny_slices) -> None
         await asyncio.sleep(60)
         assert predicted(client) == ["b"]
         assert any('"session":"there"' in text.replace(" ", "") for text in client.texts)
+
+    hosted(test)
+
+
+def test_session_host_is_congested_while_many_messages_wait(in_tiny_slices) -> None:
+    async def test(host: SessionHost) -> None:
+        number, client = subscribed(host)
+        other, _ = subscribed(host)
+        host.receive(number, large("a"))
+        congested = []
+        for n in range(MOST_WAITING + 5):
+            host.receive(number, f'{{"type": "ping", "id": "{n}"}}')
+            congested.append(host.is_congested(number))
+        assert congested == sorted(congested)
+        assert (congested[0], congested[-1], host.is_congested(other)) == (False, True, False)
+        await asyncio.sleep(60)
+        assert not host.is_congested(number)
+        assert sum("pong" in text for text in client.texts) == MOST_WAITING + 5
 
     hosted(test)
 
