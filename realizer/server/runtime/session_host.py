@@ -366,7 +366,7 @@ class SessionHost:
             self._fail(session)
             return
         if frames is None:
-            self._work(session, now, read_documents=False)
+            self._call(session, functools.partial(self._work, session, now, read_documents=False))
             return
         effects, due = frames
         for effect in work.counted(effects, 5):
@@ -388,7 +388,7 @@ class SessionHost:
             if self._calls.is_busy(session):
                 self._calls.resume(session)
             elif not session.closed:
-                self._calls.call(session, functools.partial(self._read_document, session, began))
+                self._call(session, functools.partial(self._read_document, session, began))
             self._read_until = self._loop.time()
             self._report_slow_step(began, "a document", session)
             if self._read_until >= end:
@@ -403,11 +403,7 @@ class SessionHost:
 
     def _work(self, session: Session, now: float, *, read_documents: bool) -> None:
         self._update_backlog(session, *session.connections)
-        try:
-            session.tick(now, read_documents=read_documents)
-        except Exception:
-            self._fail(session)
-        self._apply_effects(session)
+        session.tick(now, read_documents=read_documents)
 
     def _report_slow_step(
         self, began: float, action: str, session: Session, connections: Iterable[int] | None = None

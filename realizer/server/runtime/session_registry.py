@@ -175,7 +175,8 @@ class SessionRegistry:
 
     def _disconnect(self, session: Session, connection: int, now: float) -> None:
         joined = self.joined(session)
-        for left in {connection, *session.connections} - joined:  # the calls of others may be cancelled
+        # Others have left too whose own call was cancelled.
+        for left in {connection, *session.connections} - joined:
             session.disconnect(left, now, is_awaited=bool(joined))
         if session.closed and self.sessions.get(session.id) is session:
             session.journal.end()

@@ -104,13 +104,13 @@ class SlicedCalls(Generic[T]):
     # work.Pauser, for the calls themselves --------------------------------------------------------
 
     def pause(self) -> None:
-        """Let others have their turn if the slice of time is over."""
+        """Pause the present call if its slice of time is over."""
         # Callbacks that a call has scheduled have its context, but not its stack.
         if self._clock() >= self._end and isinstance(getcurrent(), _Stack):
             self._parent().switch()
 
     def wait_for(self, function: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
-        """Call a function in another thread, and let others have their turn until it returns."""
+        """Pause the present call until a function has returned in another thread."""
         stack = getcurrent()
         if not isinstance(stack, _Stack):
             return function(*args, **kwargs)

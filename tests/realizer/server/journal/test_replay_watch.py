@@ -47,7 +47,7 @@ def entry_of(where: str, word: str) -> int:
 
 
 async def killed_at(where: str, note: ReplayNote) -> None:
-    """Let a service restore the session, and kill it when it has written a note."""
+    """Start a service that restores the session, and kill it when it has written a note."""
     with serving("--journal", where) as (url, service):
         async with connect(f"{url}?session=s&seen=0"):
             while noted(where) != note:

@@ -118,7 +118,7 @@ class Broker:
         self._process = Process(command, "Connector stomp started", folder)
 
     def freeze(self) -> None:
-        """Let it keep its connections and do nothing."""
+        """Stop the process, which keeps its connections."""
         assert self._process is not None
         self._process.send(signal.SIGSTOP)
 
