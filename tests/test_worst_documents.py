@@ -16,6 +16,7 @@ def modules_and_tables() -> None:
     """Load what the first documents load."""
     schedule(document("in a row", 99))
     schedule(document("linked", 99))
+    schedule(mixed_document(30, 73))  # needs the solver of large problems
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 6))])

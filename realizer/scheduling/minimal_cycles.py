@@ -12,7 +12,7 @@ from realizer.scheduling.conflict import Conflict, ConstraintGraph, Link, confli
 from realizer.scheduling.model import LOOSE, Model
 from realizer.scheduling.problem import ORIGIN, Relation
 
-# Steps tried for one conflict, some tens of milliseconds.
+# Steps tried for the conflicts of one solution, some tens of milliseconds.
 MAX_STEPS = 50_000
 
 # The next point, the seconds to it, and the reason.
@@ -26,9 +26,9 @@ def minimal_cycles(model: Model, web: ConstraintGraph, cycles: Sequence[Sequence
     shorter cycle passes through any of its points.
     """
     ways = _StepGraph(model)
-    conflicts = []
+    conflicts, left = [], MAX_STEPS
     for cycle in cycles:
-        clash, left = web.cycle(cycle), MAX_STEPS
+        clash = web.cycle(cycle)
         points = {end for r in clash.relations for end in (r.u, r.v)}
         # Statements meet at points that relations name, or at the first point of what starts too soon.
         points |= {end for link in cycle if link.u == ORIGIN or not points for end in (link.u, link.v)}
@@ -62,7 +62,7 @@ class _StepGraph:
         self._least, self._most = np.zeros(n), np.zeros(n)
         self._least[model.gap + 1], self._most[model.gap + 1] = model.least, model.most
         self._rigid = [timing.rigid for timing in problem.timings]
-        self._known: dict[int, list[Step]] = {}
+        self._known: list[list[Step] | None] = [None] * n
 
     def back_to(self, start: int, statements: int, steps: int) -> tuple[list[Step], int]:
         """Return the positive cycle through a point with the fewest statements, up to a maximum.
@@ -71,29 +71,30 @@ class _StepGraph:
             The steps, [] if there is no such cycle or the search takes too many steps; and the number of
             steps tried.
         """
-        best, layer = {start: 0.0}, {start: 0.0}
+        best, layer = [-np.inf] * len(self._least), {start: 0.0}
+        best[start] = 0.0
         previous: list[dict[int, tuple[int, Step]]] = []
-        tried = 0
+        tried = counted = 0
         for _ in range(statements):
             after: dict[int, float] = {}
             previous.append({})
             for u, so_far in layer.items():
-                if (ways := self._known.get(u)) is None:
+                if (ways := self._known[u]) is None:
                     ways = self._known[u] = list(self._from(u))
                 tried += len(ways)
-                work.count(len(ways))
                 for step in ways:
                     v, seconds, _ = step
                     total = so_far + seconds
                     if v == start:
                         if total > LOOSE:
                             return _walk(previous, u, step), tried
-                    elif total > best.get(v, -np.inf) + LOOSE / 100:
+                    elif total > best[v] + LOOSE / 100:
                         best[v] = after[v] = total
                         previous[-1][v] = (u, step)
-                if tried > steps:
-                    return [], tried
-            layer = after
+            work.count(tried - counted)
+            if tried > steps:
+                break
+            layer, counted = after, tried
         return [], tried
 
     def _from(self, u: int) -> Iterator[Step]:
