@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import ParamSpec, Protocol, TypeVar
@@ -57,7 +57,15 @@ def count(steps: int = 1) -> None:
 
 
 def counted(items: Iterable[T], steps: int = 1) -> Iterator[T]:
-    """Yield items, and count so many steps for each."""
+    """Return an iterator over items that counts so many steps for each."""
+    if isinstance(items, Sized) and len(items) <= TOGETHER:
+        if items:
+            count(steps * len(items))
+        return iter(items)
+    return _counted(items, steps)
+
+
+def _counted(items: Iterable[T], steps: int) -> Iterator[T]:
     for number, item in enumerate(items):
         if number % TOGETHER == 0:
             count(steps * TOGETHER)

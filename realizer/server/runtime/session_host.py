@@ -353,6 +353,8 @@ class SessionHost:
         if run is not None and (data := run.next_message(now)) is not None:
             client = self._clients[run.connection]
             client.send(data)
+            while run.wake_at <= now and (data := run.next_message(now)) is not None:
+                client.send(data)
             if (waiting := client.unsent_bytes) > SLOW:
                 session.update_backlog(run.connection, waiting)
             self._wake_at(session, run.wake_at)

@@ -140,14 +140,13 @@ class FrameRun:
         self.wake_at = min(self._due, until)
 
     def next_message(self, now: float) -> bytes | None:
-        """Return the message of the due frame; None if not exactly one frame and nothing else is due."""
+        """Return the message of the next frame; None if it is not due, far too late, or more is due."""
         number, passed = self._next, now + EPSILON
-        following = (number + 1) / self._fps + self._zero
-        if not self._due <= passed < min(following, self.until) or number >= self._packed.end:
+        if not self._due <= passed < self.until or passed > self._due + LATE or number >= self._packed.end:
             return None
         self._subscription.next = self._next = number + 1
-        self._due = following
-        self.wake_at = min(following, self.until)
+        self._due = (number + 1) / self._fps + self._zero
+        self.wake_at = min(self._due, self.until)
         return self._packed[number]
 
 

@@ -14,6 +14,7 @@ from realizer.protocol.wire import unpack
 from realizer.server.streams.audio_stream import AudioStream
 from realizer.server.streams.broadcast import FrameRun
 from realizer.server.streams.frame_windows import FrameSubscription, FrameTimeline, PackedFrames
+from realizer.server.streams.frames_ahead import LATE
 from tests.realizer.server.conftest import NOD
 
 FAP = {"type": "subscribe", "stream": "fap"}
@@ -58,11 +59,18 @@ def test_next_message_returns_none_after_the_last_frame() -> None:
     assert frames.next_message(at(FRAMES)) is None
 
 
-def test_next_message_returns_none_if_two_frames_are_due() -> None:
+def test_next_message_returns_late_frames_one_after_the_other() -> None:
     frames, subscription = run()
-    assert frames.next_message(at(1)) is None
-    assert frames.next_message(at(0.99)) is not None
-    assert subscription.next == 1
+    numbers = [unpack(data).frame for data in iter(lambda: frames.next_message(at(2.5)), None)]
+    assert numbers == [0, 1, 2]
+    assert subscription.next == 3
+    assert frames.wake_at == pytest.approx(at(3))
+
+
+def test_next_message_returns_none_if_a_frame_is_far_too_late() -> None:
+    frames, subscription = run()
+    assert frames.next_message(ZERO + LATE + 0.01) is None
+    assert subscription.next == 0
 
 
 def test_next_message_returns_none_if_another_event_is_due() -> None:
