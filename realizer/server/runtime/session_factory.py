@@ -131,7 +131,7 @@ class SessionFactory:
         watch.write = lambda text: self._try_note(name, text)
         session.journal = self._journal_writer(name, self.journal, saved, watch.follow)
         await loop.run_in_executor(None, session.journal.resume, saved)
-        at = catch_up(session, at, seen)
+        at = await loop.run_in_executor(None, catch_up, session, at, seen)
         unanswered += [effect for effect in session.take_effects() if isinstance(effect, Speak)]
         now = loop.time()
         session.opened = now - max(at, time.time() - saved.epoch)
