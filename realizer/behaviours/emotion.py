@@ -14,6 +14,7 @@ from bml_schema import Emotion, Mood
 from realizer.animation.axis import Target, fap
 from realizer.animation.channel import Channel
 from realizer.behaviours import pose_channels
+from realizer.behaviours.expressive_channels import express
 from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext, claiming
 from realizer.behaviours.table_timing import table_timing, timing_from_table
 from realizer.core.array_types import Float64
@@ -68,7 +69,8 @@ def _timing(feeling: EmotionRequest) -> Timing:
 
 def expand(node: Emotion, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     """Return channels with the emotion from attackPeak to relax."""
-    return pose_channels.hold(values_of(node), times, node.id)
+    channels = pose_channels.hold(values_of(node), times, node.id)
+    return channels if node.profile in PUBLISHED else express(channels, context)
 
 
 def expand_mood(node: Mood, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:

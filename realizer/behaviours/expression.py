@@ -5,6 +5,7 @@ from __future__ import annotations
 from bml_schema import Expression
 from realizer.animation.channel import Channel
 from realizer.behaviours import pose_channels
+from realizer.behaviours.expressive_channels import express
 from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
 from realizer.behaviours.table_timing import from_gaps
 from realizer.core.array_types import Float64
@@ -20,9 +21,8 @@ def timing(node: Expression, context: PlanningContext) -> Timing:
 
 def expand(node: Expression, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     """Return channels with the expression from attackPeak to relax."""
-    return pose_channels.hold(
-        pose_channels.columns(context.library[node.name].aus, node.intensity), times, node.id
-    )
+    values = pose_channels.columns(context.library[node.name].aus, node.intensity)
+    return express(pose_channels.hold(values, times, node.id), context)
 
 
 def check(node: Expression, context: PlanningContext) -> tuple[Fault, ...]:

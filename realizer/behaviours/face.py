@@ -12,6 +12,7 @@ from realizer import tables
 from realizer.animation.axis import Target, au
 from realizer.animation.channel import Channel
 from realizer.behaviours import pose_channels
+from realizer.behaviours.expressive_channels import express
 from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext, claiming
 from realizer.behaviours.table_timing import from_gaps, table_timing
 from realizer.core.array_types import Float64
@@ -30,9 +31,9 @@ def timing_of_lexeme(node: FaceLexeme, context: PlanningContext) -> Timing:
 
 def expand_part(node: Part, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     """Return channels: (1 + overshoot) amount at attackPeak, then amount to relax."""
-    return _rise_and_fall(
-        {t: {node.overshoot: v} for t, v in _targets(node, context).items()}, times, node.id
-    )
+    curves = {t: {node.overshoot: v} for t, v in _targets(node, context).items()}
+    channels = _rise_and_fall(curves, times, node.id)
+    return express(channels, context) if isinstance(node, FaceLexeme) else channels
 
 
 def expand_face(node: Face, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
@@ -44,7 +45,9 @@ def expand_face(node: Face, times: Float64, context: PlanningContext) -> tuple[C
             overshoot = (1 + node.overshoot) * (1 + part.overshoot) - 1
             curve = curves.setdefault(target, {})
             curve[overshoot] = max(curve.get(overshoot, 0.0), value * node.amount)
-    return _rise_and_fall(curves, times, node.id)
+    channels = _rise_and_fall(curves, times, node.id)
+    is_expression = all(isinstance(part, FaceLexeme) for part in node.parts)
+    return express(channels, context) if is_expression else channels
 
 
 def expand_shift(node: FaceShift, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:

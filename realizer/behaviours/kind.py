@@ -34,6 +34,7 @@ class PlanningContext:
         face_inputs: () -> the inputs of the character's face (`Face.inputs`), or None if unknown.
         grace: seconds by which a behaviour may come too late for its references into other blocks.
         max_planning: steps of planning a block.
+        liveliness: 0..1, how much expressions vary as people's do; 0: sides are equal, holds are still.
         animates: whether behaviours are expanded and played; False if only their times are wanted.
     """
 
@@ -47,6 +48,7 @@ class PlanningContext:
     face_inputs: Callable[[], Sequence[str] | None] = lambda: None
     grace: float = 0.0
     max_planning: int = DEFAULTS.max_planning
+    liveliness: float = 0.0
     animates: bool = True
 
 

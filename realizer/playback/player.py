@@ -76,6 +76,7 @@ class Player(BlockManager):
             library=library_of(options.expressions),
             grace=options.grace,
             max_planning=options.max_planning,
+            liveliness=float(options.idle),
             animates=animates,
         )
         self.idle = options.idle
