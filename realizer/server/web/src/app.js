@@ -151,7 +151,7 @@ at("live").onclick = () => timeline.look(null);
 
 function draw() {
   const now = sound.playhead() ?? clock.playhead(performance.now() / 1000);
-  stage.draw(timeline.scrub ?? now);
+  stage.draw(timeline.scrub ?? now, recorder.on);
   if (recorder.on) {
     recorder.draw();
     at("record").lastElementChild.textContent = `Stop ${recorder.seconds.toFixed(0)} s`;

@@ -9,6 +9,7 @@ const KEPT = 20; // s of frames, for looking back
 // The width of the head over the height of the front camera's picture: narrower pictures step back.
 const HEAD = 0.66;
 const RANGE = { yaw: 1.6, pitch: 0.7 }; // rad
+const STILL = 1e-4; // rad, or of the zoom: the camera does not move
 
 export class Stage {
   constructor(canvas) {
@@ -20,6 +21,8 @@ export class Stage {
     this.material = new ShaderMaterial({ vertexShader: vertex, fragmentShader: fragment, side: DoubleSide });
     this.frames = [];
     this.shownFrames = 0;
+    this.stale = true; // whether the picture differs from the one on the canvas
+    canvas.addEventListener("webglcontextrestored", () => (this.stale = true));
     this.light = null; // name of a preset; null: the service's default
     this.want = { yaw: 0, pitch: 0, zoom: 1 };
     this.view = { yaw: 0, pitch: 0, zoom: 1 };
@@ -65,6 +68,7 @@ export class Stage {
       this.material.uniforms[uniform].value = value;
     }
     this.canvas.parentElement.style.background = this.look.background ?? backdrop(this.lit);
+    this.stale = true;
   }
 
   // Draw the backdrop on another canvas, for a film.
@@ -97,12 +101,20 @@ export class Stage {
     return this.frames[0]?.time ?? Infinity;
   }
 
-  draw(playhead) {
+  // Draw the face if something has changed, or `always`: the canvas keeps its picture on the page only.
+  draw(playhead, always = false) {
     if (!this.mesh) return;
     this.fit();
     if (playhead !== null) this.pose(playhead);
     const ease = 0.18;
-    for (const axis of ["yaw", "pitch", "zoom"]) this.view[axis] += (this.want[axis] - this.view[axis]) * ease;
+    for (const axis of ["yaw", "pitch", "zoom"]) {
+      const away = this.want[axis] - this.view[axis];
+      if (Math.abs(away) < STILL) continue;
+      this.view[axis] += away * ease;
+      this.stale = true;
+    }
+    if (!this.stale && !always) return;
+    this.stale = false;
     this.aim();
     this.glints.pose(this.mesh.geometry, this.lit, this.camera);
     this.renderer.render(this.scene, this.camera);
@@ -122,11 +134,18 @@ export class Stage {
     this.shownAt = t;
     const out = position.array;
     const { scale, offset } = this;
-    for (let i = 0; i < out.length; i++) out[i] = (a.values[i] + (b.values[i] - a.values[i]) * t) * scale + offset[i % 3];
+    this.shownFrames += 1;
+    let moved = false;
+    for (let i = 0; i < out.length; i++) {
+      const before = out[i];
+      out[i] = (a.values[i] + (b.values[i] - a.values[i]) * t) * scale + offset[i % 3];
+      moved ||= out[i] !== before;
+    }
+    if (!moved) return;
+    this.stale = true;
     position.needsUpdate = true;
     this.mesh.geometry.computeVertexNormals();
     this.furrows.pose(this.mesh.geometry);
-    this.shownFrames += 1;
   }
 
   fit() {
@@ -134,7 +153,7 @@ export class Stage {
     const height = this.canvas.clientHeight;
     const ratio = Math.min(devicePixelRatio, 2);
     if (this.width === width && this.height === height && this.ratio === ratio) return;
-    Object.assign(this, { width, height, ratio });
+    Object.assign(this, { width, height, ratio, stale: true });
     this.renderer.setPixelRatio(ratio);
     this.renderer.setSize(width, height, false);
   }
