@@ -31,6 +31,7 @@ ARGUMENTS = [
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
     "--ignore-gpu-blocklist",
+    "--disable-gpu-compositing",  # which takes a core without a graphics card; WebGL stays
     "--disable-background-networking",
     "--autoplay-policy=no-user-gesture-required",
 ]
@@ -55,8 +56,8 @@ def serving(command: list[str]) -> Iterator[str]:
 
 @pytest.fixture(scope="module")
 def address() -> Iterator[str]:
-    """A service on a free port of loopback."""
-    with serving([sys.executable, "-m", "realizer", "serve", "--port", "0"]) as address:
+    """A service on a free port of loopback, without idle motion: pages draw only what a test moves."""
+    with serving([sys.executable, "-m", "realizer", "serve", "--port", "0", "--no-idle"]) as address:
         yield address
 
 
@@ -124,14 +125,16 @@ def still(light: str, aus: dict[int, float]):  # type: ignore[no-untyped-def]
     from realizer.animation.frames import AUFrames
     from realizer.animation.pose import poses
     from realizer.face.load import input_names
-    from realizer.render import Renderer
+    from tests.pictures import drawn_here
 
     row = np.zeros((1, len(axis())), np.float32)
     for number, amount in aus.items():
         row[0, [target.column for target in au(number)]] = amount
-    with Renderer("default", (STILL, STILL), light=light) as renderer:
-        (picture,) = renderer.draw(poses(AUFrames(np.zeros(1), row), input_names("default")))
-    return picture.astype(float)
+    pose = poses(AUFrames(np.zeros(1), row), input_names("default"))
+    return drawn_here("default", (STILL, STILL), pose, light=light)[0].astype(float)
+
+
+NEXT_PICTURE = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
 
 
 def stage_of(page):  # type: ignore[no-untyped-def]
@@ -140,7 +143,7 @@ def stage_of(page):  # type: ignore[no-untyped-def]
 
     last = None
     for _ in range(40):
-        page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        page.evaluate(NEXT_PICTURE)
         image = np.asarray(picture(page), float)
         if last is not None and np.array_equal(image, last):
             break
@@ -150,18 +153,16 @@ def stage_of(page):  # type: ignore[no-untyped-def]
 
 
 @pytest.fixture(scope="module")
-def quiet_page(browser):  # type: ignore[no-untyped-def]
-    """The page of a service without idle motion, its stage as high as a still."""
-    command = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--no-idle"]
-    with serving(command) as address:
-        opened = browser.new_page(viewport={"width": 960, "height": 540}, bypass_csp=True)
-        opened.set_default_timeout(PATIENCE)
-        opened.goto(address)
-        style = f"#stage {{ flex: none; width: {STILL + 60}px; height: {STILL}px; min-height: 0 }}"
-        opened.add_style_tag(content=style + " .choice, #time { display: none !important }")
-        opened.wait_for_function("realizerPage.stage.shownFrames > 0")
-        yield opened
-        opened.close()
+def quiet_page(browser, address):  # type: ignore[no-untyped-def]
+    """The page with its stage as high as a still."""
+    opened = browser.new_page(viewport={"width": 960, "height": 540}, bypass_csp=True)
+    opened.set_default_timeout(PATIENCE)
+    opened.goto(address)
+    style = f"#stage {{ flex: none; width: {STILL + 60}px; height: {STILL}px; min-height: 0 }}"
+    opened.add_style_tag(content=style + " .choice, #time { display: none !important }")
+    opened.wait_for_function("realizerPage.stage.shownFrames > 0")
+    yield opened
+    opened.close()
 
 
 def face_of(image):  # type: ignore[no-untyped-def]
@@ -244,10 +245,18 @@ def test_page_shows_a_face_that_another_client_chose(page) -> None:  # type: ign
 
 
 def test_page_shows_a_moving_face(page) -> None:  # type: ignore[no-untyped-def]
-    page.wait_for_function("realizerPage.stage.shownFrames > 5")
-    skin = pixel(picture(page), 0.5, 0.5)
+    mine = page.locator("#faces button:first-child").text_content().lower()
+    page.wait_for_function(f"realizerPage.stage.name === '{mine}' && realizerPage.stage.shownFrames > 5")
+    rest = picture(page)
+    skin = pixel(rest, 0.5, 0.5)
     assert skin[0] > skin[1] > skin[2], "skin is warmer than the backdrop"
-    assert pixel(picture(page), 0.02, 0.02) != skin
+    assert pixel(rest, 0.02, 0.02) != skin
+    turned = '<head id="h" lexeme="SHAKE" repetition="100"/>'
+    page.fill("#document", f'<bml id="moves">{turned}</bml>')
+    page.click("#play")
+    page.wait_for_selector("#log li:has-text('h stroke')")
+    shown = [picture(page) for _ in range(3)]
+    assert len({one.tobytes() for one in (rest, *shown)}) > 2
 
 
 def test_page_plays_a_typed_document_and_shows_feedback(page) -> None:  # type: ignore[no-untyped-def]
