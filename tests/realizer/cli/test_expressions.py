@@ -10,6 +10,7 @@ from click.testing import CliRunner, Result
 
 from realizer.cli import cli
 from realizer.expressions.library import builtin
+from tests.pictures import drawn_here
 
 
 def run(*words: str) -> Result:
@@ -73,20 +74,18 @@ def test_find_without_a_match_exits_with_1() -> None:
     assert "no expression matches 'qqqq'" in done.stderr
 
 
+@pytest.mark.xdist_group("picture_search")
 @pytest.mark.slow
 def test_find_like_a_neutral_face_that_idles_has_no_match(tmp_path: Path) -> None:
     import numpy as np
     from PIL import Image
 
-    from realizer.render import Renderer
-
     pose = np.zeros((1, 68), np.float32)
     pose[0, 47:50] = 442, -442, -343  # a head that idles
-    with Renderer("ida", (256, 256), "front") as renderer:
-        Image.fromarray(renderer.draw(pose)[0]).save(tmp_path / "ida.png")
+    Image.fromarray(drawn_here("ben", (300, 400), pose)[0]).save(tmp_path / "ben.png")
     done = CliRunner().invoke(
         cli,
-        ["expressions", "find", "--like", str(tmp_path / "ida.png"), "--face", "ida"],
+        ["expressions", "find", "--like", str(tmp_path / "ben.png"), "--face", "ben"],
         standalone_mode=False,
     )
     assert done.stdout == ""

@@ -28,7 +28,7 @@ HELD = f'<bml id="b">{LOOK.format(au=12, amount=1)}{LOOK.format(au=26, amount=0.
 def test_record_films_what_is_drawn_without_a_clock(tmp_path: Path) -> None:
     av = pytest.importorskip("av", reason="needs the film extra")
     import realizer
-    from realizer.render import Renderer
+    from tests.pictures import drawn_here
 
     film = tmp_path / "live.mp4"
 
@@ -39,9 +39,7 @@ def test_record_films_what_is_drawn_without_a_clock(tmp_path: Path) -> None:
 
     serving(test, LIMIT, idle=False)
     played = realizer.realize(HELD, fps=FPS, idle=False)
-    with Renderer("default", (SIZE, SIZE)) as renderer:
-        (still,) = renderer.draw(played.poses[8:9])
-        (calm,) = renderer.draw(played.poses[:1])
+    still, calm = drawn_here("default", (SIZE, SIZE), played.poses[[8, 0]])
     with av.open(str(film)) as container:
         assert [stream.type for stream in container.streams] == ["video", "audio"]
         pictures = [f.to_ndarray(format="rgb24").astype(int) for f in container.decode(video=0)]

@@ -11,6 +11,7 @@ from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.render import Renderer
 from realizer.render.cameras import camera_for
+from tests.pictures import drawn_here
 
 pytestmark = [pytest.mark.gl, pytest.mark.xdist_group("render")]
 
@@ -105,8 +106,7 @@ def test_face_lids_hide_the_eyes_and_their_glints(renderer, face):
 
 @pytest.mark.slow
 def test_face_eyes_have_a_glint_in_the_iris(face):
-    with Renderer("default", (1024, 1024)) as renderer:
-        picture = renderer.draw(row())[0]
+    (picture,) = drawn_here("default", (1024, 1024), row())
     for point in ("3.5", "3.6"):
         x, y = camera_for(face).project(face.points[point], (1024, 1024))[0][0].round().astype(int)
         eye = picture[y - 12 : y + 4, x - 14 : x + 4]
@@ -126,8 +126,7 @@ def test_face_turned_to_its_left_looks_to_the_right(renderer, face):
 )
 @pytest.mark.slow
 def test_face_is_shown_by_every_camera(camera):
-    with Renderer("default", (128, 128), camera) as renderer:
-        (picture,) = renderer.draw(row())
+    (picture,) = drawn_here("default", (128, 128), row(), camera)
     warm = picture[..., 0].astype(int) - picture[..., 2] > 35
     assert warm.mean() > 0.1
     assert not warm[:, :2].any()

@@ -18,6 +18,7 @@ from PIL import Image
 import realizer
 from realizer.core.errors import RealizerError, RenderError
 from realizer.render import Renderer, drawing_process
+from tests.pictures import drawn_here
 
 pytestmark = pytest.mark.xdist_group("render")
 
@@ -219,8 +220,7 @@ def test_renderer_encodes_every_form(renderer, form):
 @pytest.mark.parametrize("way", [pytest.param(way, marks=pytest.mark.gl(way)) for way in ("gl", "onboard")])
 @pytest.mark.slow
 def test_renderer_draws_transparent_pictures(way):
-    with Renderer("default", SIZE, background="#000000", backend=way) as renderer:
-        black = renderer.draw(rows(2)).astype(int)
+    black = drawn_here("default", SIZE, rows(2), background="#000000", backend=way).astype(int)
     with Renderer("default", SIZE, background="transparent", backend=way) as renderer:
         clear = renderer.draw(rows(2)).astype(int)
         assert Image.open(io.BytesIO(renderer.encoded(rows(1)[0]))).mode == "RGB"

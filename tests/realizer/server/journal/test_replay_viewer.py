@@ -15,7 +15,6 @@ from realizer.core.array_types import Int32
 from realizer.core.settings import Settings
 from realizer.outputs.output import RenderSettings
 from realizer.protocol.wire import ClipPiece, pack_clip, unpack
-from realizer.render import Renderer
 from realizer.server.journal.entry import SavedSession
 from realizer.server.journal.journal_writer import JournalWriter
 from realizer.server.journal.playback import replay_recording
@@ -24,6 +23,7 @@ from realizer.server.session.effects import Send, Speak
 from realizer.server.session.session import Session
 from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.silent import SilentVoice
+from tests.pictures import drawn_here
 from tests.wake_times import next_wake
 
 SETTINGS = Settings(voice="silent", seed=3)
@@ -211,8 +211,7 @@ def test_viewer_sees_the_face_of_the_time(tmp_path: Path) -> None:
     size = (48, 48)
     pictures = list(RenderSettings(size=size).pictures(realization, size, [25, 26]))
     assert len(pictures) == 2
-    with Renderer("ben", size) as renderer:
-        shown = renderer.draw(realization.poses[[25, 26]])
+    shown = drawn_here("ben", size, realization.poses[[25, 26]])
     assert np.array_equal(pictures[1], shown[1])
     assert np.abs(pictures[0].astype(int) - shown[0]).mean() > 5
 

@@ -249,7 +249,7 @@ HELD = (
 @pytest.mark.slow
 def test_websocket_video_shows_what_is_drawn_without_a_clock() -> None:
     import realizer
-    from realizer.render import Renderer
+    from tests.pictures import drawn_here
 
     size, shown = (96, 80), {}
 
@@ -268,8 +268,7 @@ def test_websocket_video_shows_what_is_drawn_without_a_clock() -> None:
                             shown[form] = np.asarray(picture.convert("RGB")).astype(int)
 
     serving(test, idle=False)
-    with Renderer("default", size) as renderer:
-        (still,) = renderer.draw(realizer.realize(HELD, fps=1, idle=False).poses[1:2])
+    (still,) = drawn_here("default", size, realizer.realize(HELD, fps=1, idle=False).poses[1:2])
     assert np.abs(shown["png"] - still).max() <= 2
     assert np.abs(shown["webp"] - still).mean() < 2
 
