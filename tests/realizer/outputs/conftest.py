@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +17,10 @@ import pytest
 from bml_schema import BlockProgress
 from realizer.animation.axis import AU_NAMES, axis
 from realizer.animation.frames import AUFrames, FAPFrames
+from realizer.outputs.output import RenderSettings
 from realizer.playback.active_block import ScheduledSpeech
 from realizer.realization import Performance, Realization
+from realizer.render import Renderer
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.utterance import Phoneme, Utterance, Word
 
@@ -58,6 +62,27 @@ def realization() -> Realization:
         warnings=(Warning("greeting:wave", "IMPOSSIBLE_TO_SCHEDULE", "too short"),),
         speeches=(ScheduledSpeech(0.25, 1.25, hello, 0),),
     )
+
+
+class OpenRenderer(Renderer):
+    """A renderer that stays open between outputs: it takes longer to start than to draw them."""
+
+    def __exit__(self, *_: object) -> None:
+        return
+
+
+@pytest.fixture(scope="session")
+def rendering() -> Iterator[Callable[..., RenderSettings]]:
+    """Settings with an open renderer of a size, the same one for the same `copy`."""
+    with ExitStack() as stack:
+
+        @cache
+        def settings(size: tuple[int, int], copy: int = 0) -> RenderSettings:
+            renderer = OpenRenderer("default", size)
+            stack.callback(renderer.close)
+            return RenderSettings(size, renderer=renderer)
+
+        yield settings
 
 
 @pytest.fixture(scope="session")

@@ -5,12 +5,12 @@ from __future__ import annotations
 import logging
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from realizer.outputs.film import FORMATS, RATE, encode_film
-from realizer.outputs.output import RenderSettings
 from realizer.outputs.registry import OUTPUTS
 from realizer.outputs.speech_spans import Span
 
@@ -140,9 +140,9 @@ def test_film_without_pyav_says_what_to_install(tmp_path):
 @pytest.mark.gl
 @pytest.mark.parametrize("suffix", FORMATS)
 @pytest.mark.slow
-def test_film_of_a_realization_shows_its_face(realization, tmp_path, suffix):
+def test_film_of_a_realization_shows_its_face(realization, tmp_path, rendering, suffix):
     path = tmp_path / f"x{suffix}"
-    OUTPUTS[suffix].write(realization, path, RenderSettings(size=(129, 128)))
+    OUTPUTS[suffix].write(realization, path, replace(rendering((130, 128)), size=(129, 128)))
     shown = seen(path)
     assert len(shown) == 38
     assert shown[0][1].shape == (128, 130, 3)

@@ -39,9 +39,9 @@ def test_output_is_read_by_the_reader_that_it_names(suffix):
 
 
 @pytest.mark.parametrize("suffix", EACH)
-def test_output_is_deterministic(realization, tmp_path, suffix):
-    for name in ("a", "b"):
-        OUTPUTS[suffix].write(realization, tmp_path / f"{name}{suffix}", SMALL)
+def test_output_is_deterministic(realization, tmp_path, rendering, suffix):
+    for copy in range(2):
+        OUTPUTS[suffix].write(realization, tmp_path / f"{copy}{suffix}", rendering(SMALL.size, copy))
     first, second = (path.read_bytes() for path in sorted(tmp_path.iterdir()))
     assert first == second
     assert first
