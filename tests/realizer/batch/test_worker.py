@@ -108,7 +108,7 @@ def test_worker_keeps_renderers_that_draw_the_same_in_any_order(
 ) -> None:
     pytest.importorskip("av")
     monkeypatch.setenv("REALIZER_DRAW", "onboard")
-    drawn = replace(options, formats=(".mp4", ".png"), size=(64, 64))
+    drawn = replace(options, formats=(".mp4",), size=(64, 64))
     forwards, backwards = Worker(drawn), Worker(drawn)
     try:
         first = [forwards.perform(tasks[0])]
