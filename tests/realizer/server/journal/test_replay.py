@@ -69,13 +69,6 @@ def test_restored_session_sends_all_feedback_once_and_in_order(where: str) -> No
     with serving("--journal", where) as (url, service):
         first = asyncio.run(before(url, service))
     seen = seq_numbers(first)[-1]
-    with serving("--journal", where) as (url, _):
-        rest = asyncio.run(after(url, seen))
-    seqs = seq_numbers(first + rest)
-    assert seqs == list(range(1, len(seqs) + 1))
-    assert any('id="a:end"' in text for text in rest)
-    for text in first + rest:
-        parse_feedback(text)
 
     async def whole(url: str) -> list[str]:
         async with asyncio.timeout(LIMIT), connect(f"{url}?session=whole") as client:
@@ -85,7 +78,13 @@ def test_restored_session_sends_all_feedback_once_and_in_order(where: str) -> No
             return await read_feedback(client, "b:end")
 
     with serving("--journal", where) as (url, _):
+        rest = asyncio.run(after(url, seen))
         undisturbed = asyncio.run(whole(url))
+    seqs = seq_numbers(first + rest)
+    assert seqs == list(range(1, len(seqs) + 1))
+    assert any('id="a:end"' in text for text in rest)
+    for text in first + rest:
+        parse_feedback(text)
     # The order of two unrelated messages depends on when the documents came.
     assert sorted(points(first + rest)) == sorted(points(undisturbed))
 
@@ -99,10 +98,9 @@ def in_a_checkpoint(where: str, session: str) -> bool:
         return file.execute("SELECT 1 FROM parts WHERE session = ?", (session,)).fetchone() is not None
 
 
+@pytest.mark.parametrize("where", ["redis"], indirect=True)
 @pytest.mark.slow
-def test_restored_session_has_the_state_of_its_checkpoint(
-    where: str,
-) -> None:
+def test_restored_session_has_the_state_of_its_checkpoint(where: str) -> None:
     hold = json.dumps({"type": "set", "aus": {"12L": 0.5}})
     tied = '<bml id="c"><head id="n" lexeme="NOD" start="a:n:end+120"/></bml>'
 
@@ -163,10 +161,9 @@ def test_restored_session_writes_a_checkpoint_without_messages(
     asyncio.run(run())
 
 
+@pytest.mark.parametrize("where", ["redis"], indirect=True)
 @pytest.mark.slow
-def test_restored_sessions_of_fifty_clients_repeat_no_feedback(
-    where: str,
-) -> None:
+def test_restored_sessions_of_fifty_clients_repeat_no_feedback(where: str) -> None:
     block = '<bml id="b"><head id="n" lexeme="NOD" start="{:.2f}" end="{:.2f}"/></bml>'
     received: dict[int, list[str]] = {k: [] for k in range(50)}
 
@@ -205,6 +202,7 @@ def test_restored_sessions_of_fifty_clients_repeat_no_feedback(
         assert points(texts) == ["b:start", *(f"b:n:{point}" for point in POINTS), "b:end"]
 
 
+@pytest.mark.parametrize("where", ["file"], indirect=True)
 @pytest.mark.slow
 def test_restored_session_holds_set_values(where: str) -> None:
     async def hold(url: str) -> None:
@@ -341,6 +339,7 @@ def test_restored_session_catches_up_for_a_second_client_without_a_gap(clock: Cl
     asyncio.run(run())
 
 
+@pytest.mark.parametrize("where", ["file"], indirect=True)
 @pytest.mark.slow
 def test_restored_session_is_not_replaced_by_a_hello(where: str) -> None:
     async def play(url: str) -> list[str]:

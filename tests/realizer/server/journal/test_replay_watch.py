@@ -55,6 +55,7 @@ async def killed_at(where: str, note: ReplayNote) -> None:
             service.kill()
 
 
+@pytest.mark.parametrize("where", ["file"], indirect=True)
 @pytest.mark.slow
 def test_watch_of_a_document_whose_replay_is_killed_twice_puts_it_aside(where: str) -> None:
     async def test() -> None:
