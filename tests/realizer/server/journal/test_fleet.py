@@ -27,6 +27,8 @@ from bml_schema.feedback import parse_feedback
 from tests.feedback_log import read_feedback, seq_numbers
 
 CONFIGURATION = Path(__file__).parents[4] / "docker" / "haproxy.cfg"
+pytestmark = pytest.mark.xdist_group("fleet")
+
 LIMIT = 60  # s; a hung test ends
 FIRST = """<bml id="a"><head id="n" lexeme="NOD" start="0.6"/>
 <speech id="s" start="0.3"><text>What is said <sync id="m"/> before it dies</text></speech></bml>"""
@@ -79,13 +81,26 @@ def proxy(nodes: Sequence[Node], log: IO[str], **settings: str) -> Iterator[str]
             process.wait()
 
 
-@pytest.fixture
-def nodes(redis_url: str) -> Iterator[tuple[Node, Node]]:
+@contextmanager
+def two_nodes(redis_url: str) -> Iterator[tuple[Node, Node]]:
     with ExitStack() as stack:
         one, other = Node(redis_url), Node(redis_url)  # which start at the same time
         stack.callback(one.close)
         stack.callback(other.close)
         yield one, other
+
+
+@pytest.fixture
+def nodes(redis_url: str) -> Iterator[tuple[Node, Node]]:
+    """Two that the test may kill."""
+    with two_nodes(redis_url) as nodes:
+        yield nodes
+
+
+@pytest.fixture(scope="module")
+def lasting_nodes(redis_url: str) -> Iterator[tuple[Node, Node]]:
+    with two_nodes(redis_url) as nodes:
+        yield nodes
 
 
 @pytest.mark.slow
@@ -126,8 +141,11 @@ def test_fleet_repeats_no_feedback_to_a_client_that_comes_back(
 
 
 @pytest.mark.slow
-def test_fleet_distributes_sessions_and_joins_their_clients(nodes: tuple[Node, Node], tmp_path: Path) -> None:
-    names = [f"show-{number}" for number in range(16)]
+def test_fleet_distributes_sessions_and_joins_their_clients(
+    lasting_nodes: tuple[Node, Node], tmp_path: Path
+) -> None:
+    nodes, names = lasting_nodes, [f"show-{number}" for number in range(16)]
+    before = [node.sessions() for node in nodes]
 
     async def test(at: str) -> None:
         async with asyncio.timeout(LIMIT), AsyncExitStack() as stack:
@@ -135,7 +153,7 @@ def test_fleet_distributes_sessions_and_joins_their_clients(nodes: tuple[Node, N
                 await stack.enter_async_context(connect(f"ws://{at}/ws?session={name}"))
                 for name in names + names
             ]
-            counts = [node.sessions() for node in nodes]
+            counts = [node.sessions() - others for node, others in zip(nodes, before, strict=True)]
             assert sum(counts) == len(names)
             assert min(counts) > 0
             for client in clients:
@@ -147,14 +165,15 @@ def test_fleet_distributes_sessions_and_joins_their_clients(nodes: tuple[Node, N
 
 
 @pytest.mark.slow
-def test_fleet_limits_the_connections_of_an_address(nodes: tuple[Node, Node], tmp_path: Path) -> None:
+def test_fleet_limits_the_connections_of_an_address(lasting_nodes: tuple[Node, Node], tmp_path: Path) -> None:
     async def test(url: str) -> None:
         async with asyncio.timeout(LIMIT), connect(url), connect(url):
             with pytest.raises(InvalidStatus) as refused:
                 await connect(url)
             assert refused.value.response.status_code == 429
 
-    with (tmp_path / "proxy.log").open("w") as log, proxy(nodes, log, REALIZER_MAX_CONNECTIONS="2") as at:
+    limit = {"REALIZER_MAX_CONNECTIONS": "2"}
+    with (tmp_path / "proxy.log").open("w") as log, proxy(lasting_nodes, log, **limit) as at:
         asyncio.run(test(f"ws://{at}/ws?session=one"))
 
 
@@ -174,8 +193,8 @@ def test_fleet_is_healthy_while_one_node_is(nodes: tuple[Node, Node], tmp_path: 
 
 
 @pytest.mark.slow
-def test_fleet_hides_the_metrics_of_its_nodes(nodes: tuple[Node, Node], tmp_path: Path) -> None:
-    with (tmp_path / "proxy.log").open("w") as log, proxy(nodes, log) as at:
+def test_fleet_hides_the_metrics_of_its_nodes(lasting_nodes: tuple[Node, Node], tmp_path: Path) -> None:
+    with (tmp_path / "proxy.log").open("w") as log, proxy(lasting_nodes, log) as at:
         with urllib.request.urlopen(f"http://{at}/healthz") as answer:
             assert json.load(answer)["status"] == "ok"
         with pytest.raises(urllib.error.HTTPError, match="404") as refused:

@@ -299,8 +299,10 @@ def test_workers_do_not_wait_for_clients_that_send_half_a_line(workers: Workers)
 
 
 @pytest.mark.slow
-def test_workers_of_the_command_drain_and_end() -> None:
-    with running([*SERVE, "--workers", "2"]) as service:
+def test_workers_of_the_command_log_with_their_number_drain_and_end() -> None:
+    command = [sys.executable, "-m", "realizer", "-v", *SERVE[3:], "--workers", "2"]
+    command += ["--token", "a-token-nobody-knows"]
+    with running(command, stderr=subprocess.PIPE) as service:
         assert service.stdout is not None
         url = service.stdout.readline().split()[2]
         page = service.stdout.readline().split()[2]
@@ -308,14 +310,19 @@ def test_workers_of_the_command_drain_and_end() -> None:
             assert json.loads(answer.read())["status"] == "ok"
 
         async def play() -> None:
-            async with connect(url) as client:
+            async with connect(f"{url}?token=a-token-nobody-knows") as client:
                 await client.send(NOD.format("b"))
                 await message_with(client, '"b:start"')
                 service.send_signal(signal.SIGTERM)
                 await message_with(client, '"b:end"')
 
+        with pytest.raises(urllib.error.HTTPError) as refused:
+            urllib.request.urlopen(page + "metrics?worker=1", timeout=LIMIT)
+        refused.value.close()
         played(play())
-        assert service.wait(LIMIT) == 0
+        _, logged = service.communicate(timeout=LIMIT)
+        assert service.returncode == 0
+    assert any(line.startswith("realizer: worker 1: ") and "token" in line for line in logged.splitlines())
 
 
 @pytest.mark.slow
@@ -337,21 +344,6 @@ def test_workers_that_hang_do_not_keep_the_service_from_ending(
 
     played(test())
     assert "worker 1 does not end: it is killed" in caplog.text
-
-
-@pytest.mark.slow
-def test_workers_log_at_the_level_of_the_command_with_their_number() -> None:
-    command = [sys.executable, "-m", "realizer", "-v", "serve", "--port", "0", "--voice", "silent"]
-    command += ["--workers", "2", "--token", "a-token-nobody-knows"]
-    with running(command, stderr=subprocess.PIPE) as service:
-        assert service.stdout is not None
-        page = service.stdout.readline() and service.stdout.readline().split()[2]
-        with pytest.raises(urllib.error.HTTPError) as refused:
-            urllib.request.urlopen(page + "metrics?worker=1", timeout=LIMIT)
-        refused.value.close()
-        service.send_signal(signal.SIGTERM)
-        _, logged = service.communicate(timeout=LIMIT)
-    assert any(line.startswith("realizer: worker 1: ") and "token" in line for line in logged.splitlines())
 
 
 @pytest.mark.slow
