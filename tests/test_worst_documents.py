@@ -19,7 +19,7 @@ def modules_and_tables() -> None:
     schedule(mixed_document(30, 73))  # needs the solver of large problems
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 6))])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 3))])
 @pytest.mark.parametrize("pattern", PATTERNS)
 def test_worst_documents_cost_in_proportion_to_their_size(pattern: str, seed: int) -> None:
     calls, times = growth(pattern, 120, seed=seed)
@@ -27,7 +27,7 @@ def test_worst_documents_cost_in_proportion_to_their_size(pattern: str, seed: in
     assert times <= MOST_GROWTH
 
 
-@pytest.mark.parametrize("seeds", [range(40), pytest.param(range(40, 240), marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seeds", [range(40), pytest.param(range(40, 120), marks=pytest.mark.slow)])
 def test_worst_documents_found_at_random_cost_no_more(seeds: range) -> None:
     costs = {seed: calls(lambda seed=seed: schedule(mixed_document(30, seed))) / 30 for seed in seeds}
     worst = max(costs, key=lambda seed: costs[seed])

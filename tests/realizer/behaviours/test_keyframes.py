@@ -41,10 +41,11 @@ def test_keyframes_of_action_units_have_sides(play) -> None:
 @pytest.mark.slow
 def test_keyframes_that_are_not_at_rest_are_eased(play) -> None:
     played = play(keyframe("FACS", "12.BOTH", "0 1\n2 1"))
-    course = [played.aus(t / 100).get("12L", 0) for t in range(201)]
+    times = [t / 100 for t in (*range(21), *range(40, 180, 20), *range(179, 201))]
+    course = [played.aus(t).get("12L", 0) for t in times]
     assert course[0] == course[-1] == 0
     assert max(abs(b - a) for a, b in pairwise(course)) < 0.1
-    assert course[20:180] == [1] * 160
+    assert course[20:-21] == [1] * 9
 
 
 @pytest.mark.parametrize(

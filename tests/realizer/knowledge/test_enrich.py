@@ -139,7 +139,9 @@ def test_block_enriched_twice_is_the_same(text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ['Are you sure? What a horror, he said; "nonsense!" ' * 1000, "No! & yes. " * 2000, "x" * 30_000]
+    "text",
+    ['Are you sure? What a horror, he said; "nonsense!" ' * 500, "No! & yes. " * 2000, "x" * 30_000],
+    ids=["sentences", "short sentences", "one word"],
 )
 @pytest.mark.slow
 def test_texts_splits_a_long_text_into_playable_blocks(text: str) -> None:

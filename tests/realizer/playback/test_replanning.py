@@ -7,7 +7,7 @@ import pytest
 
 from bml_schema import Block, PredictionFeedback, SyncPointProgress, parse
 from realizer.core.options import PlayOptions
-from realizer.playback.block_manager import ANTICIPATORS
+from realizer.playback import block_manager
 from realizer.playback.player import Player
 from realizer.playback.replanning import affected_blocks
 from realizer.scheduling.timing import Schedule
@@ -159,14 +159,17 @@ def test_anticipate_moves_a_behaviour_tied_to_the_point(stage: Stage) -> None:
 
 
 @pytest.mark.slow
-def test_anticipate_forgets_the_oldest_that_no_block_is_tied_to(stage: Stage) -> None:
+def test_anticipate_forgets_the_oldest_that_no_block_is_tied_to(
+    stage: Stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(block_manager, "ANTICIPATORS", most := 20)
     stage.player.anticipate("clock", {"beat": 3.0}, 0.0)
     stage.send("a", BEAT)
-    for number in range(ANTICIPATORS + 5):
+    for number in range(most + 5):
         stage.player.anticipate(f"other-{number}", {"beat": 9.0}, 0.0)
     known = stage.player.blocks.anticipators
-    assert len(known) == ANTICIPATORS
-    assert {"clock", f"other-{ANTICIPATORS + 4}"} <= set(known)
+    assert len(known) == most
+    assert {"clock", f"other-{most + 4}"} <= set(known)
     assert "other-0" not in known
     stage.player.anticipate("clock", {"beat": 4.0}, 1.0)
     assert stage.times()["a:n:stroke"] == pytest.approx(4.0)

@@ -45,7 +45,7 @@ def landmarks(model: Model, aus: tuple[int, ...], count: int = 120) -> str:
 @pytest.mark.slow
 def test_fit_models_recovers_a_published_unit(known: Model, tmp_path: Path) -> None:
     path = tmp_path / "landmarks.csv"
-    path.write_text(landmarks(known, (1, 15)))
+    path.write_text(landmarks(known, (1, 15), 60))
     measured = read_measurements(path)
     lines: list[str] = []
     model = fit_models(load_face(), measured, ("published",), lines.append)["published"]
@@ -73,16 +73,16 @@ def test_table_text_prints_wojdel_s_columns(known: Model) -> None:
 @pytest.mark.slow
 def test_fit_models_come_nearer_with_more_gaussians() -> None:
     folder = next(info.path for info in list_faces() if info.name == load_face().name)
-    shapes = read_shapes(folder / "au_shapes.npz")
-    models = fit_models(load_face(), {1: shapes[1]})
-    (few,), (many,) = (table(models[form], {1: shapes[1]}) for form in ("published", "extended"))
+    measured = {1: read_shapes(folder / "au_shapes.npz")[1]}
+    models = fit_models(load_face(), measured)
+    (few,), (many,) = (table(models[form], measured) for form in ("published", "extended"))
     assert many.ratio < 0.95 * few.ratio
     assert len(models["extended"].units[1].motions["whole"].gaussians) <= 4
 
 
 @pytest.mark.slow
 def test_fit_command_fits_landmarks_and_prints_the_table(known: Model, tmp_path: Path) -> None:
-    (tmp_path / "landmarks.csv").write_text(landmarks(known, (2,)))
+    (tmp_path / "landmarks.csv").write_text(landmarks(known, (2,), 30))
     command = [sys.executable, "-m", "realizer", "faces", "fit", "default", "--from", "landmarks.csv"]
     done = subprocess.run(
         [*command, "--form", "published", "-o", "mine.toml"],

@@ -200,14 +200,14 @@ def test_checkpoint_restores_a_session_as_if_it_had_never_died(
     eager: None,
 ) -> None:
     taken = restored = 0
-    for seed in range(10):
+    for seed in range(5):
         pair = Pair(seed)
         with no_error():
             pair.run(60)
         taken += pair.journal.compacted
         restored += pair.restored
-    assert taken > 100
-    assert restored > 50
+    assert taken > 50
+    assert restored > 25
 
 
 NUMBER = st.floats(-1e6, 1e6)
