@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 from collections.abc import Iterator
+from functools import cache
 
 import pytest
 from hypothesis import HealthCheck, Phase, settings
@@ -44,8 +46,17 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
     All that draw run in one process of pytest-xdist: each would find out anew what the machine can draw with.
     The first picture in a new checkout compiles loops, which takes most of a minute on a busy machine.
+
+    CI finds modules with slow tests by a word, so that thousands of other tests are not collected again.
     """
+    found = cache(
+        lambda path: re.search(r"/browser/|\b(slow|shipped)\b", f"{path}\n{path.read_text('utf-8')}")
+    )
     for item in items:
+        if item.get_closest_marker("slow") and not found(item.path):
+            raise pytest.UsageError(
+                f"{item.path}: wanted the word slow or shipped, by which .ci/run finds it"
+            )
         if item.get_closest_marker("gl") and not item.get_closest_marker("xdist_group"):
             item.add_marker(pytest.mark.xdist_group("render"))
         patient = any(map(item.get_closest_marker, ("slow", "browser", "gl")))
