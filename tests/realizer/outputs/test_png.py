@@ -52,11 +52,11 @@ def drawn(realization, path, drawing) -> np.ndarray:
 @pytest.mark.gl
 @pytest.mark.slow
 def test_png_at_an_instant_is_one_picture(realization, tmp_path, rendering):
-    settings = rendering((160, 120))
+    settings = rendering((97, 96))
     picture, later = (
         drawn(realization, tmp_path / "x.png", replace(settings, at=seconds)) for seconds in (0.4, 0.8)
     )
-    assert picture.shape == (120, 160, 3)
+    assert picture.shape == (96, 97, 3)
     assert picture.std() > 15
     assert not np.array_equal(picture, later)
 

@@ -12,7 +12,7 @@ from realizer.face.model import Face
 from realizer.facebuild.au.fit import table, table_text
 from realizer.facebuild.au.measure import read_shapes
 from tests.benchmarks.decimate import decimated
-from tests.shipped import FACES, FOLDERS
+from tests.shipped import DEFAULT, FACES, FOLDERS
 
 FORMS = ("published", "extended")
 # Mean and worst e/d_max; her own mean is 0.12.
@@ -93,7 +93,10 @@ def test_model_opens_the_mouth_along_its_line(name: str, model: Model) -> None:
         assert apart[0, 1] > 0.0015, f"AU{au}"
 
 
-@pytest.mark.parametrize("size", [1762, pytest.param(280, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("name", "size"),
+    [(DEFAULT, 1762), *(pytest.param(name, 280, marks=pytest.mark.slow) for name in FOLDERS)],
+)
 def test_model_drives_a_mesh_of_another_topology(name: str, size: int) -> None:
     """Her figure 4.3: each unit on a coarser mesh takes a vertex where it was measured to go there."""
     models = [read_model(FOLDERS[name] / f"au_{form}.toml") for form in FORMS]
