@@ -251,7 +251,7 @@ def test_page_shows_a_moving_face(page) -> None:  # type: ignore[no-untyped-def]
     skin = pixel(rest, 0.5, 0.5)
     assert skin[0] > skin[1] > skin[2], "skin is warmer than the backdrop"
     assert pixel(rest, 0.02, 0.02) != skin
-    turned = '<head id="h" lexeme="SHAKE" repetition="100"/>'
+    turned = '<head id="h" lexeme="SHAKE" repetition="9"/>'
     page.fill("#document", f'<bml id="moves">{turned}</bml>')
     page.click("#play")
     page.wait_for_selector("#log li:has-text('h stroke')")
@@ -368,7 +368,7 @@ def test_page_fits_a_phone(page) -> None:  # type: ignore[no-untyped-def]
 
 def test_page_passes_its_token_on(browser) -> None:  # type: ignore[no-untyped-def]
     command = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--token", "a-word"]
-    with serving([*command, "--voice", "silent"]) as address:
+    with serving([*command, "--voice", "silent", "--no-idle"]) as address:
         page = browser.new_page(bypass_csp=True)
         page.set_default_timeout(PATIENCE)
         faults: list[str] = []
