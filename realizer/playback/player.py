@@ -244,10 +244,10 @@ class Player(BlockManager):
         if not self.idle:
             return channels, None
         seed = self.context.seed + 7919 * character
-        speeches = (s for p in blocks for s in p.speech.values()) if self.prosody else ()
         talks = [
-            SpeechSpan(s.start + at, s.until, part)
-            for s in speeches
+            SpeechSpan(s.start + at, s.until, part, tuple(p.moving_channels()))
+            for p in (blocks if self.prosody else ())
+            for s in p.speech.values()
             for at, part in s.utterance.sections or [(0.0, s.utterance)]
         ]
         near = [t for t in talks if t.start - NEAR <= last and t.start + t.utterance.duration + NEAR >= first]

@@ -1,4 +1,4 @@
-"""Motion that accompanies speech: nods and raised brows on accents, glances, and ends of phrases for blinks.
+"""Motion that accompanies speech: of the head, nods and raised brows on accents, glances, ends of phrases.
 
 It depends on the seed, the utterances and their start times, but not on the requested frames.
 """
@@ -15,6 +15,7 @@ from realizer.animation.axis import AU_NAMES, au, axis, region
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.idle.blinks import PhraseEnd
 from realizer.animation.idle.rng import uniform
+from realizer.animation.idle.speaking_head import head_channels, style_of
 from realizer.core.array_types import Float64
 from realizer.speech.accents import Phrase, phrases, prosody_facts
 from realizer.speech.utterance import Utterance
@@ -30,11 +31,15 @@ SOURCE = "prosody"
 
 
 class SpeechSpan(NamedTuple):
-    """An utterance that starts at `start` and is cut off at `until`; seconds on the session clock."""
+    """An utterance that starts at `start` and is cut off at `until`; seconds on the session clock.
+
+    `face` has the channels of its block, which show what it is said with.
+    """
 
     start: float
     until: float
     utterance: Utterance
+    face: tuple[Channel, ...] = ()
 
 
 class KnownMotion(NamedTuple):
@@ -79,11 +84,11 @@ def prosody_channels(
     seed: int,
     known_motions: Iterable[KnownMotion] = (),
 ) -> list[Channel]:
-    """Return the channels, visible in start..end, of nods, brow raises and glances during speech.
+    """Return the channels, visible in start..end, of the head, nods, brow raises and glances during speech.
 
     They are in the idle layer, so that a document that reduces idle motion reduces them too. A movement is
     dropped if a document moves the same part of the face during it; if that becomes known after the movement
-    has begun, it is faded out.
+    has begun, it is faded out. The continuous motion of the head gives way and comes back.
 
     Args:
         talks: what the character says.
@@ -95,11 +100,16 @@ def prosody_channels(
     fade = prosody_facts()["yield"]["fade"]
     claims: list[tuple[str, float, float, float]] | None = None
     for talk in talks:
+        if talk.start > end or min(talk.start + talk.utterance.duration, talk.until) + AFTERMATH < start:
+            continue
+        if claims is None:  # computed only when needed: characters are silent most of the time
+            claims = list(_claims(known_motions))
+        head = (claim[1:] for claim in claims if claim[0] == "head")
+        style = style_of(talk.face, talk.start + 0.5)
+        shown += head_channels(talk.utterance, talk.start, talk.until, seed, style, head)
         for gesture in _gestures(phrases(talk.utterance), talk.start, seed):
             if gesture.end < start or gesture.begin > end or gesture.begin >= talk.until:
                 continue
-            if claims is None:  # computed only when needed: characters are silent most of the time
-                claims = list(_claims(known_motions))
             leaves = talk.until
             for part, known, first, last in claims:
                 if part == gesture.region and first < gesture.end and last > gesture.begin:

@@ -39,9 +39,9 @@ def talk(start: float = 0.0, until: float = FOREVER, said: Utterance = SAID) -> 
 def shown(
     talks: Sequence[SpeechSpan], seed: int, times: Float64, asked: Sequence[KnownMotion] = ()
 ) -> dict[str, Float64]:
-    """Degrees of the head (down positive) and of the eyes, and how far the brows are up."""
+    """Degrees of the head (down positive) and of the eyes, and how far the brows are up, by gestures."""
     channels = prosody_channels(talks, float(times[0]), float(times[-1]), seed, asked)
-    frames = blend(channels, times)
+    frames = blend([channel for channel in channels if channel.curve != "linear"], times)
     faps = to_fap(frames).values.astype(np.float64)
     degrees = np.degrees(faps * 1e-5)
     brows = frames.aus[:, [AU_NAMES().index(name) for name in ("1L", "1R", "2L", "2R")]]
@@ -267,3 +267,20 @@ def test_phrase_ends_do_not_move_blinks_before_the_speech() -> None:
         idle = blinks(seed, 20.0, [])
         late = talk(float(idle[1]) + 0.01)
         assert blinks(seed, 20.0, [late])[1] == idle[1]
+
+
+def test_prosody_moves_the_head_with_the_melody_and_gives_way_to_documents() -> None:
+    times = np.arange(0.0, 4.0, 0.04)
+    said = talk()
+
+    def pitch(asked: Sequence[KnownMotion] = ()) -> Float64:
+        channels = prosody_channels([said], 0.0, 4.0, 1, asked)
+        moving = [channel for channel in channels if channel.curve == "linear"]
+        return to_fap(blend(moving, times)).values[:, 47].astype(np.float64)
+
+    free = pitch()
+    assert np.ptp(np.degrees(free * 1e-5)) > 1.0
+    nod = Channel(au(54)[0], np.array([1.0, 1.3, 1.6]), np.array([0.0, 0.3, 0.0]), layer=Layer.HEAD)
+    beside = pitch([KnownMotion(0.0, nod)])
+    assert not beside[(times > 1.0) & (times < 1.6)].any()
+    assert beside[times > 2.0] == pytest.approx(free[times > 2.0])

@@ -1,0 +1,174 @@
+"""The continuous motion of the head during speech, which follows the melody of the voice."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from realizer import tables
+from realizer.animation.axis import au
+from realizer.animation.channel import Channel, Gain, Layer
+from realizer.animation.curves import sample, smooth
+from realizer.animation.idle.rng import uniform
+from realizer.core.array_types import Float64
+from realizer.speech.accents import Phrase, phrases, prosody_facts
+from realizer.speech.melody import RATE, Melody, melody
+from realizer.speech.utterance import Utterance
+
+# Signed angles: AUs of (negative, positive). The eyes turn back by as much, to stay on their target.
+YAW, PITCH, ROLL = (52, 51), (54, 53), (56, 55)
+EYES = {YAW: (62, 61), PITCH: (64, 63)}
+SOURCE = "prosody"
+# Kinds of random numbers: times of poses, and their yaw, pitch and roll.
+KINDS = range(480, 484)
+
+
+class Style(NamedTuple):
+    """How a feeling changes the motion: its size, its pace, and the pitch of the head in degrees."""
+
+    size: float = 1.0
+    pace: float = 1.0
+    pitch: float = 0.0
+
+
+NEUTRAL = Style()
+
+
+def style_of(channels: Iterable[Channel], time: float) -> Style:
+    """Return the style of a face that shows these channels at a time, if they are not interrupted."""
+    rows = prosody_facts()["style"]
+    wanted = {target.column: number for row in rows for number in row["aus"] for target in au(number)}
+    whole = {"gains": (), "until": np.inf, "crossfade": None}
+    active = [c.changed(whole) for c in channels if c.target.column in wanted]
+    if not active:
+        return NEUTRAL
+    shown: dict[int, float] = {}
+    for channel, (value,) in zip(active, sample(active, np.array([time])).tolist(), strict=True):
+        number = wanted[channel.target.column]
+        shown[number] = max(shown.get(number, 0.0), value)
+    size, pace, pitch = NEUTRAL
+    for row in rows:
+        strength = min(shown.get(number, 0.0) for number in row["aus"])
+        size += strength * (row["size"] - 1.0)
+        pace += strength * (row["pace"] - 1.0)
+        pitch += strength * row["pitch"]
+    return Style(round(size, 3), round(pace, 3), round(pitch, 3))
+
+
+def head_channels(
+    utterance: Utterance,
+    start: float,
+    until: float,
+    seed: int,
+    style: Style = NEUTRAL,
+    claims: Iterable[tuple[float, float, float]] = (),
+) -> list[Channel]:
+    """Return channels of the head, and of the eyes that stay on their target, during an utterance.
+
+    Args:
+        start: seconds on the session clock.
+        until: the speech is cut off then.
+        seed: of the character.
+        style: of what the face shows.
+        claims: (known, first, last) of movements of the head that a document asks for: the time at which
+            each became known, and the times between which it moves. The motion gives way to them.
+    """
+    times, angles = _angles(melody(utterance), phrases(utterance), start, seed, style)
+    if not len(times):
+        return []
+    give = prosody_facts()["yield"]["fade"]
+    gains = tuple(_gains(claims, give, float(times[0]), float(times[-1])))
+    channels = []
+    for sides, degrees in zip((YAW, PITCH, ROLL), angles, strict=True):
+        for turned, sign in ((sides, 1.0), (EYES.get(sides, ()), -1.0)):
+            for number, direction in zip(turned, (-sign, sign), strict=False):
+                values = np.maximum(direction * degrees, 0.0) / tables.by_number()[number].degrees
+                channel = Channel(
+                    au(number)[0], times, values, "linear", Layer.IDLE, gains=gains, source=SOURCE
+                )
+                channels.append(channel.faded(until, until + give) if until < times[-1] else channel)
+    return channels
+
+
+def _gains(
+    claims: Iterable[tuple[float, float, float]], give: float, begin: float, end: float
+) -> Iterator[Gain]:
+    """Yield gains that fade the motion out during claims; overlapping ones count as one."""
+    spans: list[list[float]] = []
+    for known, first, last in sorted(claims, key=lambda claim: claim[1]):
+        if last <= begin or first >= end:
+            continue
+        if spans and max(known, first - give) <= spans[-1][1] + give:
+            spans[-1][1] = max(spans[-1][1], last)
+        else:
+            spans.append([max(known, first - give), last])
+    for first, last in spans:
+        yield Gain(first, first + give, 0.0)
+        if last < end:
+            yield Gain(max(last, first + give), max(last, first + give) + give, 1.0)
+
+
+@lru_cache(maxsize=64)
+def _angles(
+    heard: Melody, all_phrases: tuple[Phrase, ...], start: float, seed: int, style: Style
+) -> tuple[Float64, Float64]:
+    """Return times (n,) on the session clock, and yaw, pitch and roll (3, n) in degrees."""
+    if not all_phrases:
+        return np.zeros(0), np.zeros((3, 0))
+    facts = prosody_facts()["head"]
+    begin, end = all_phrases[0].start, all_phrases[-1].end
+    count = int((end + facts["settle"] / 2 - begin) * RATE) + 2
+    at = begin + np.arange(count) / RATE  # seconds from the start of the utterance
+    place = np.arange(len(heard.pitch)) / RATE
+    pitch = np.interp(at, place, heard.pitch)
+    loudness = np.interp(at, place, heard.loudness)
+    semitones = _averaged(np.clip(pitch, -facts["semitones"], facts["semitones"]), 0.5)
+    angles = _poses(at, start, seed, style)
+    angles[1] += facts["melody"] * semitones - facts["beat"] * (loudness - _averaged(loudness, 1.0))
+    angles *= style.size
+    # It settles before the end of the speech, and while the voice is silent in between.
+    envelope = smooth(np.clip((at - begin) / facts["begin"], 0.0, 1.0))
+    envelope *= smooth(np.clip((at[-1] - at) / facts["settle"], 0.0, 1.0))
+    angles[1] += style.pitch
+    angles *= envelope
+    angles[2] += _tilt(at, pitch, all_phrases[-1], uniform(seed, KINDS[0], np.array([-1]))[0] < 0.5)
+    return start + at, angles
+
+
+def _averaged(values: Float64, seconds: float) -> Float64:
+    """Return the average of the values around each."""
+    around = round(seconds * RATE / 2)
+    weights = np.full(2 * around + 1, 1.0 / (2 * around + 1))
+    averaged: Float64 = np.convolve(np.pad(values, around, "edge"), weights, "valid")
+    return averaged
+
+
+def _poses(at: Float64, start: float, seed: int, style: Style) -> Float64:
+    """Return the slow motion from pose to pose, (3, n) degrees."""
+    facts = prosody_facts()["head"]
+    period = facts["period"] / style.pace
+    numbers = np.arange(int((at[-1] - at[0]) / period) + 3)
+    late, *draws = uniform(seed, list(KINDS), round(start * 1000.0) * 65536 + numbers)
+    keys = at[0] + (numbers - 0.5 + 0.4 * late) * period
+    most = np.array([facts["yaw"], facts["pitch"], facts["roll"]])[:, None]
+    poses = most * (2.0 * np.array(draws) - 1.0)
+    last = np.clip(np.searchsorted(keys, at, "right") - 1, 0, len(keys) - 2)
+    part = smooth(np.clip((at - keys[last]) / (keys[last + 1] - keys[last]), 0.0, 1.0))
+    moved: Float64 = poses[:, last] + part * (poses[:, last + 1] - poses[:, last])
+    return moved
+
+
+def _tilt(at: Float64, pitch: Float64, last: Phrase, left: bool) -> Float64:
+    """Return the tilt (n,) in degrees at the end of a question, whose pitch rises."""
+    facts = prosody_facts()["head"]
+    closing = pitch[(at > last.end - 0.5) & (at <= last.end)]
+    if len(closing) < 3 or closing[-1] - closing.min() < facts["rise"]:
+        return np.zeros(len(at))
+    begin = max(last.start, last.end - 0.8)
+    rise = smooth(np.clip((at - begin) / (last.end - begin), 0.0, 1.0))
+    rise *= smooth(np.clip((at[-1] - at) / (facts["settle"] / 2), 0.0, 1.0))
+    tilt: Float64 = (1.0 if left else -1.0) * facts["question"] * rise
+    return tilt

@@ -1,0 +1,121 @@
+"""The melody of an utterance: its loudness and pitch over time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from realizer.core.array_types import Float64
+from realizer.speech.accents import phrases
+from realizer.speech.utterance import Utterance
+
+RATE = 25.0  # values a second
+CLOSING = 0.5  # s of silence after the last phrase
+# Analysis of pitch, in samples of about `ANALYSED` Hz.
+ANALYSED = 7000
+WINDOW = 320
+LOWEST, HIGHEST = 65.0, 400.0  # Hz
+VOICED = 0.35  # least autocorrelation of a voiced window, beside that of no delay
+QUIET = 0.04  # a window this much quieter than the loud ones has no pitch
+# Without sound: the melody of an accent, and the fall of the voice within a phrase. Ours.
+ACCENT_WIDTH = 0.12  # s
+ACCENT_RISE, NUCLEAR_RISE, FALL = 2.0, 3.5, 2.5  # semitones
+OCTAVE = 12.0  # semitones
+
+
+@dataclass(frozen=True, eq=False)
+class Melody:
+    """Loudness and pitch, `RATE` values a second from the start of the utterance to `CLOSING` after its end.
+
+    Attributes:
+        loudness: (n,) 0..1; 1 is the loud parts of the utterance.
+        pitch: (n,) semitones above the utterance's median; interpolated where there is no voice.
+    """
+
+    loudness: Float64
+    pitch: Float64
+
+
+# Results are cached as long as the utterance is in use.
+_known: WeakKeyDictionary[Utterance, Melody] = WeakKeyDictionary()
+
+
+def melody(utterance: Utterance) -> Melody:
+    """Return the melody: of the sound, or without sound the one that accents and phrases suggest."""
+    found = _known.get(utterance)
+    if found is None:
+        has_sound = utterance.pcm is not None and utterance.sample_rate and utterance.pcm.any()
+        found = _known[utterance] = (_heard if has_sound else _suggested)(utterance)
+    return found
+
+
+def _end(utterance: Utterance) -> float:
+    """Return the end of the last phrase. A closing silence, which may be cut off later, changes nothing."""
+    return found[-1].end if (found := phrases(utterance)) else 0.0
+
+
+def _count(utterance: Utterance) -> int:
+    return int((_end(utterance) + CLOSING) * RATE) + 1
+
+
+def _heard(utterance: Utterance) -> Melody:
+    assert utterance.pcm is not None
+    step = max(1, round(utterance.sample_rate / ANALYSED))
+    rate = utterance.sample_rate / step
+    count = round(_end(utterance) * rate)
+    pcm = utterance.pcm[: count * step]
+    parts = np.pad(pcm, (0, count * step - len(pcm))).reshape(-1, step).astype(np.float32)
+    samples = parts @ np.full(step, 1.0 / step, np.float32)
+    count = _count(utterance)
+    begins = (np.arange(count) * rate / RATE).astype(int)
+    padded = np.pad(samples, (WINDOW // 2, max(0, int(begins[-1]) + WINDOW // 2 - len(samples))))
+    windows = padded[begins[:, None] + np.arange(WINDOW)] * np.hanning(WINDOW).astype(np.float32)
+    power = np.sqrt(np.square(windows).mean(axis=1))
+    loud = float(np.quantile(power, 0.9)) or 1.0
+    # Autocorrelation by the Fourier transform, divided by that of the window (Boersma 1993).
+    half = WINDOW // 2
+    correlation = np.fft.irfft(np.abs(np.fft.rfft(windows, 2 * WINDOW)) ** 2)[:, :half]
+    own = np.fft.irfft(np.abs(np.fft.rfft(np.hanning(WINDOW), 2 * WINDOW)) ** 2)[:half]
+    correlation /= np.maximum(correlation[:, :1], 1e-9) * own / own[0]
+    least, most = int(rate / HIGHEST), min(int(rate / LOWEST), half - 2)
+    # Of almost equal maxima the shortest delay counts: longer ones are its multiples.
+    inside = correlation[:, least:most] - 0.1 * np.arange(least, most) / most
+    delay = least + inside.argmax(axis=1)
+    before, at, after = (correlation[np.arange(count), delay + k] for k in (-1, 0, 1))
+    bend = np.minimum(before - 2 * at + after, -1e-9)
+    peak = delay + np.clip((before - after) / (2 * bend), -0.5, 0.5)  # of the parabola through the three
+    is_voiced = (at > VOICED) & (power > QUIET * loud)
+    return Melody(_smoothed(np.minimum(power / loud, 1.0)), _pitch(rate / peak, is_voiced))
+
+
+def _pitch(hertz: Float64, is_voiced: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Float64:
+    """Return semitones above the median; octaves that the analysis has mistaken are corrected."""
+    at = np.flatnonzero(is_voiced)
+    if len(at) < 3:
+        return np.zeros(len(hertz))
+    semitones = OCTAVE * np.log2(hertz[at])
+    semitones -= np.median(semitones)
+    semitones -= OCTAVE * np.round(semitones / (1.5 * OCTAVE))
+    return _smoothed(np.interp(np.arange(len(hertz)), at, np.clip(semitones, -OCTAVE, OCTAVE)))
+
+
+def _suggested(utterance: Utterance) -> Melody:
+    times = np.arange(_count(utterance)) / RATE
+    loudness, pitch = np.zeros(len(times)), np.zeros(len(times))
+    for phrase in phrases(utterance):
+        inside = (times >= phrase.start) & (times <= phrase.end)
+        loudness[inside] = 0.5
+        pitch[inside] -= FALL * (times[inside] - phrase.start) / max(phrase.end - phrase.start, 0.1)
+        for accent in phrase.accents:
+            bump = np.exp(-(((times - accent.time) / ACCENT_WIDTH) ** 2))
+            loudness += 0.5 * bump * inside
+            pitch += (NUCLEAR_RISE if accent.nuclear else ACCENT_RISE) * bump
+    return Melody(_smoothed(np.minimum(loudness, 1.0)), _smoothed(pitch))
+
+
+def _smoothed(values: Float64) -> Float64:
+    """Return the values after a short low-pass filter without delay, about 4 Hz."""
+    smooth: Float64 = np.convolve(np.pad(values, 2, "edge"), [0.1, 0.2, 0.4, 0.2, 0.1], "valid")
+    return smooth

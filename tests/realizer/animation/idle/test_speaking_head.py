@@ -1,0 +1,107 @@
+import numpy as np
+import pytest
+
+from realizer.animation.axis import au
+from realizer.animation.channel import Channel
+from realizer.animation.curves import sample
+from realizer.animation.idle.speaking_head import NEUTRAL, Style, head_channels, style_of
+from realizer.speech.utterance import Phoneme, Utterance, Word
+from realizer.tables import by_number
+
+TURNS = {"yaw": (51, 52), "pitch": (53, 54), "roll": (55, 56), "eyes": (63, 64)}
+
+
+def said(seconds=6.0):
+    """An utterance without sound: a stressed syllable every half second."""
+    starts = np.arange(0.0, seconds, 0.25)
+    phonemes = [Phoneme(t, t + 0.25, "a", k % 2) for k, t in enumerate(starts.tolist())]
+    return Utterance(seconds, (Word(0.0, seconds, "word"),), tuple(phonemes), {})
+
+
+def turned(channels, times):
+    """Return direction -> signed degrees at the times."""
+    rows = sample(channels, times)
+    found = {name: np.zeros(len(times)) for name in TURNS}
+    for name, pair in TURNS.items():
+        for number, sign in zip(pair, (1, -1), strict=True):
+            for channel, row in zip(channels, rows, strict=True):
+                if channel.target == au(number)[0]:
+                    found[name] += sign * by_number()[number].degrees * row
+    return found
+
+
+TIMES = np.arange(0.0, 8.0, 0.04)
+
+
+def test_head_channels_move_while_somebody_speaks_and_settle() -> None:
+    head = turned(head_channels(said(), 1.0, np.inf, seed=1), TIMES)
+    for name, least, most in (("yaw", 1.0, 5.0), ("pitch", 1.5, 8.0), ("roll", 0.5, 4.0)):
+        assert least <= np.ptp(head[name]) <= most, name
+        assert not head[name][(TIMES < 1.0) | (TIMES > 7.5)].any()
+    speed = np.hypot(np.gradient(head["pitch"], 0.04), np.gradient(head["yaw"], 0.04))
+    speaking = (TIMES > 1.3) & (TIMES < 6.5)
+    assert (speed[speaking] > 1.5).mean() > 0.7
+    assert speed.max() < 60
+
+
+def test_head_channels_leave_the_eyes_on_their_target() -> None:
+    head = turned(head_channels(said(), 0.0, np.inf, seed=2), TIMES)
+    assert head["eyes"] == pytest.approx(-head["pitch"], abs=1e-9)
+
+
+def test_head_channels_depend_on_seed_and_start_alone() -> None:
+    first, again, other = (
+        turned(head_channels(said(), 0.0, np.inf, seed), TIMES)["yaw"] for seed in (1, 1, 2)
+    )
+    assert (first == again).all()
+    assert np.abs(first - other).max() > 0.5
+
+
+def test_head_channels_give_way_to_a_movement_and_come_back() -> None:
+    free = turned(head_channels(said(), 0.0, np.inf, 1), TIMES)["pitch"]
+    claimed = turned(head_channels(said(), 0.0, np.inf, 1, claims=[(0.0, 2.0, 3.0), (0.0, 2.5, 3.5)]), TIMES)
+    claimed = claimed["pitch"]
+    assert (claimed[TIMES < 1.7] == free[TIMES < 1.7]).all()
+    assert not claimed[(TIMES >= 2.0) & (TIMES <= 3.5)].any()
+    assert claimed[TIMES > 4.0] == pytest.approx(free[TIMES > 4.0])
+
+
+def test_head_channels_change_nothing_before_a_movement_is_known() -> None:
+    free, late = (
+        turned(head_channels(said(), 0.0, np.inf, 1, claims=claims), TIMES)["pitch"]
+        for claims in ((), [(2.4, 2.0, 3.0)])
+    )
+    assert (free == late)[TIMES <= 2.4].all()
+
+
+def test_head_channels_end_when_the_speech_is_cut_off() -> None:
+    free, cut = (turned(head_channels(said(), 0.0, until, 1), TIMES)["yaw"] for until in (np.inf, 2.0))
+    assert (free == cut)[TIMES <= 2.0].all()
+    assert not cut[TIMES > 2.5].any()
+
+
+def test_head_channels_of_silence_are_none() -> None:
+    assert head_channels(Utterance(1.0, (), (), {}), 0.0, np.inf, 1) == []
+
+
+def test_style_of_follows_the_feeling_that_is_shown() -> None:
+    def shown(*aus):
+        keys, values = np.array([0.0, 0.5, 5.0, 6.0]), np.array([0.0, 1.0, 1.0, 0.0])
+        return [Channel(target, keys, values) for number in aus for target in au(number)]
+
+    anger, sadness, joy = (style_of(shown(*aus), 1.0) for aus in ((4, 5, 7), (1, 4, 15), (6, 12)))
+    assert style_of(shown(4, 12), 1.0) == style_of([], 1.0) == NEUTRAL == Style()
+    assert anger.size > joy.size > 1 > sadness.size
+    assert anger.pace > 1 > sadness.pace
+    assert joy.pitch > 0 > anger.pitch > sadness.pitch
+    assert style_of(shown(6, 12), 7.0) == NEUTRAL
+    interrupted = [channel.faded(0.6, 0.8) for channel in shown(6, 12)]
+    assert style_of(interrupted, 1.0) == joy  # what was planned when it began
+
+
+def test_head_channels_of_anger_move_more_than_those_of_sadness() -> None:
+    anger, sadness = (
+        turned(head_channels(said(), 0.0, np.inf, 1, style), TIMES)["yaw"]
+        for style in (Style(1.5, 1.4, -2.0), Style(0.6, 0.6, -3.0))
+    )
+    assert np.abs(np.gradient(anger)).mean() > 2 * np.abs(np.gradient(sadness)).mean()
