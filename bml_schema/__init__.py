@@ -35,7 +35,7 @@ from bml_schema.dialects.translator import made_ids
 from bml_schema.documents import MAX_BYTES, MAX_DOCUMENTS, parse, read
 from bml_schema.dropped_references import ReducedBlock, without
 from bml_schema.errors import BMLError, BMLSizeError, BMLSyntaxError, Place, Problem
-from bml_schema.extensions import Blink, Emotion, Expression, Fap, FapFile, Faps, Idle, Mood, Timeline
+from bml_schema.extensions import Blink, Emotion, Expression, Fap, FapFile, Faps, Idle, Listen, Mood, Timeline
 from bml_schema.feedback import (
     BlockPrediction,
     BlockProgress,
@@ -112,6 +112,7 @@ __all__ = [
     "HeadDirectionShift",
     "Idle",
     "Interrupt",
+    "Listen",
     "Locomotion",
     "Mood",
     "ParameterValueChange",

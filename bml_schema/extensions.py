@@ -134,3 +134,15 @@ class Idle(Behaviour):
     tag = own("idle")
     blinks: float = attribute(AMOUNT, default=1.0)
     motion: float = attribute(AMOUNT, default=1.0)
+
+
+@node
+class Listen(Behaviour):
+    """Respond as a listener does: nods, raised brows, small smiles.
+
+    Attributes:
+        intensity: how often and how much; 0 for not at all.
+    """
+
+    tag = own("listen")
+    intensity: float = attribute(AMOUNT, default=0.5)

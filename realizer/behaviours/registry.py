@@ -30,6 +30,7 @@ FAMILIES: Registry[tuple[BehaviourKind, ...]] = Registry(
         "keyframes": "realizer.behaviours.keyframes:KINDS",
         "blink": "realizer.behaviours.blink:KINDS",
         "idle_control": "realizer.behaviours.idle_control:KINDS",
+        "listen": "realizer.behaviours.listen:KINDS",
         "audio": "realizer.behaviours.audio:KINDS",
         "block_control": "realizer.behaviours.block_control:KINDS",
     },

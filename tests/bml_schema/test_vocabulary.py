@@ -10,7 +10,7 @@ ELEMENTS = {
     EXTENSIONS: "faceFacs",
     BMLA: "interrupt activate parametervaluechange",
     BMLT: "audiofile facekeyframe",
-    OWN: "emotion mood expression faps fapFile timeline blink idle",
+    OWN: "emotion mood expression faps fapFile timeline blink idle listen",
 }
 
 

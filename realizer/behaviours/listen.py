@@ -1,0 +1,80 @@
+"""listen: nods, raised brows and smiles of somebody who listens."""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Iterator
+
+import numpy as np
+
+from bml_schema import Listen
+from realizer import tables
+from realizer.animation.axis import au
+from realizer.animation.channel import Channel, Layer
+from realizer.animation.idle.rng import uniform
+from realizer.behaviours.expressive_channels import express
+from realizer.behaviours.kind import BehaviourKind, PlanningContext
+from realizer.behaviours.pose_channels import columns, hold
+from realizer.behaviours.table_timing import table_timing
+from realizer.core import work
+from realizer.core.array_types import Float64
+
+# Kinds of random numbers: interval, which response, size, number of nods.
+KINDS_DRAWN = range(9200, 9204)
+DOWN, EYES_UP = 54, 63
+
+
+def expand(node: Listen, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
+    """Return channels of all responses from start to end, which depend on the seed and the id."""
+    facts = tables.toml_table("listening.toml")
+    start, end = times.tolist()
+    channels: list[Channel] = []
+    share = facts["share"]
+    for begin, kind, size, count in work.counted(_responses(node, start, end, context), 20):
+        if kind < share["nod"]:
+            channels += _nods(
+                begin, size, 1 + int(np.searchsorted(np.cumsum(facts["nod"]["counts"]), count)), node
+            )
+        else:
+            name = "brows" if kind < share["nod"] + share["brows"] else "smile"
+            row = facts[name]
+            keys = begin + np.cumsum([0.0, row["attack"], row["hold"], row["relax"]])
+            pose = columns({(int(number), "BOTH"): value for number, value in row["aus"].items()}, size)
+            channels += express(hold(pose, keys, f"{node.id} {begin:.3f}"), context)
+    return tuple(channel for channel in channels if channel.times[-1] <= end)
+
+
+def _responses(
+    node: Listen, start: float, end: float, context: PlanningContext
+) -> Iterator[tuple[float, float, float, float]]:
+    """Yield the time of each response, and random numbers: its kind, its size, how often it is repeated."""
+    if node.intensity <= 0.0:
+        return
+    facts = tables.toml_table("listening.toml")["interval"]
+    id, time, k = zlib.crc32(node.id.encode()), start, 0
+    while True:
+        way, kind, size, count = uniform(context.seed, list(KINDS_DRAWN), np.array([id * 65536 + k]))[:, 0]
+        # The inverse of the logistic function is near enough to that of the normal distribution.
+        spread = math.log(max(way, 1e-6) / max(1.0 - way, 1e-6)) / 1.7
+        interval = max(facts["least"], facts["median"] * math.exp(facts["sigma"] * spread)) / node.intensity
+        # Nobody responds at once.
+        time += interval if k else 0.5 * interval
+        if time >= end:
+            return
+        yield time, float(kind), node.intensity * (0.6 + 0.4 * float(size)), float(count)
+        k += 1
+
+
+def _nods(begin: float, size: float, count: int, node: Listen) -> Iterator[Channel]:
+    nod = tables.toml_table("listening.toml")["nod"]
+    most = nod["degrees"] * max(size, nod["least"] * node.intensity)
+    keys = begin + nod["seconds"] / 2 * np.arange(2 * count + 1)
+    degrees = np.zeros(len(keys))
+    degrees[1::2] = most * nod["decay"] ** np.arange(count)
+    for number in (DOWN, EYES_UP):
+        values = degrees / tables.by_number()[number].degrees
+        yield Channel(au(number)[0], keys, values, layer=Layer.HEAD, source=node.id)
+
+
+KINDS = (BehaviourKind(Listen, table_timing("listen"), expand, parameters={"intensity": "intensity"}),)
