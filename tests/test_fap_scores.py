@@ -10,6 +10,8 @@ from realizer.face.load import list_faces, load_face
 from realizer.face.model import Face
 from tests.fap_scores import PEERS, FapScore, mean_score, score_faps
 
+pytestmark = pytest.mark.xdist_group("scores")
+
 FACES = [info.name for info in list_faces()]
 FINE = {"error": 0.0, "mirror": 0.0, "others": 0.0, "flips": 0.0, "rough": 0.1}
 
@@ -68,9 +70,34 @@ def test_mean_score_gives_back_paul_s_own_figures() -> None:
     assert mean_score(tuple(t for t in his if t.fap not in missing)) == pytest.approx(2.88, abs=0.005)
 
 
+@pytest.fixture(scope="module")
+def found() -> dict[tuple[int, int], FapScore]:
+    """Scores of a face with several faults, each of other FAPs."""
+    face = load_face()
+    first, last = face.basis["moving"]
+    both = face.basis["fields"].toarray()[:, 3]
+    sharp = np.zeros((last - first, 3), np.float32)
+    sharp[face.feature_points["5.1"] - first] = [0.0003, 0.0003, 0]
+
+    def spike(field: np.ndarray) -> np.ndarray:
+        vertex = face.feature_points["4.5"] - first
+        alone = np.zeros_like(field).reshape(-1, 3)
+        alone[vertex] = field.reshape(-1, 3)[vertex]
+        return alone.ravel()
+
+    return spoiled(
+        {
+            31: lambda field: field * 1.1,
+            33: lambda field: -field,
+            5: lambda field: field - 0.4 * both,
+            35: spike,
+            39: lambda field: sharp.ravel(),
+        }
+    )
+
+
 @pytest.mark.slow
-def test_score_faps_finds_wrong_lengths_and_directions() -> None:
-    found = spoiled({31: lambda field: field * 1.1, 33: lambda field: -field})
+def test_score_faps_finds_wrong_lengths_and_directions(found: dict[tuple[int, int], FapScore]) -> None:
     assert found[31, 1].error == pytest.approx(0.1, abs=0.001)
     assert found[31, 1].score == 2
     assert found[33, 1].error == pytest.approx(2, abs=0.001)
@@ -79,33 +106,17 @@ def test_score_faps_finds_wrong_lengths_and_directions() -> None:
 
 
 @pytest.mark.slow
-def test_score_faps_finds_a_lip_that_drags_the_other() -> None:
-    face = load_face()
-    both = face.basis["fields"].toarray()[:, 3]
-    found = spoiled({5: lambda field: field - 0.4 * both})
+def test_score_faps_finds_a_lip_that_drags_the_other(found: dict[tuple[int, int], FapScore]) -> None:
     assert found[5, 1].others == pytest.approx(0.4, abs=0.02)
     assert found[5, 1].score < 2
 
 
 @pytest.mark.slow
-def test_score_faps_calls_a_spike_rough() -> None:
-    face = load_face()
-    vertex = face.feature_points["4.1"] - face.basis["moving"][0]
-
-    def spike(field: np.ndarray) -> np.ndarray:
-        alone = np.zeros_like(field).reshape(-1, 3)
-        alone[vertex] = field.reshape(-1, 3)[vertex]
-        return alone.ravel()
-
-    assert spoiled({31: spike})[31, 1].rough > 0.9
+def test_score_faps_calls_a_spike_rough(found: dict[tuple[int, int], FapScore]) -> None:
+    assert found[35, 1].rough > 0.9
 
 
 @pytest.mark.slow
-def test_score_faps_finds_flipped_skin() -> None:
-    face = load_face()
-    sharp = np.zeros((face.basis["moving"][1] - face.basis["moving"][0], 3), np.float32)
-    vertex = face.feature_points["5.1"] - face.basis["moving"][0]
-    sharp[vertex] = [0.0003, 0.0003, 0]
-    found = spoiled({39: lambda field: sharp.ravel()})
+def test_score_faps_finds_flipped_skin(found: dict[tuple[int, int], FapScore]) -> None:
     assert found[39, 1].flips > 0
     assert found[39, 1].score < 3

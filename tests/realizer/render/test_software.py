@@ -32,8 +32,10 @@ def pose(face, **faps):
 
 
 @pytest.mark.gl("gl")
-@pytest.mark.parametrize("camera", ["front", "three-quarter", "profile", "close"])
-@pytest.mark.parametrize("light", ["portrait", "evening"])
+@pytest.mark.parametrize(
+    ("camera", "light"),
+    [("front", "portrait"), ("three-quarter", "evening"), ("profile", "portrait"), ("close", "evening")],
+)
 @pytest.mark.slow
 def test_software_canvas_draws_the_picture_of_opengl(face, camera, light):
     from realizer.render.opengl import OpenGLCanvas
