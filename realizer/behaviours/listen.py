@@ -29,20 +29,39 @@ def expand(node: Listen, times: Float64, context: PlanningContext) -> tuple[Chan
     """Return channels of all responses from start to end, which depend on the seed and the id."""
     facts = tables.toml_table("listening.toml")
     start, end = times.tolist()
+    shares = np.cumsum(list(facts["share"].values()))
+    counts = np.cumsum(facts["nod"]["counts"])
     channels: list[Channel] = []
-    share = facts["share"]
     for begin, kind, size, count in work.counted(_responses(node, start, end, context), 20):
-        if kind < share["nod"]:
-            channels += _nods(
-                begin, size, 1 + int(np.searchsorted(np.cumsum(facts["nod"]["counts"]), count)), node
-            )
-        else:
-            name = "brows" if kind < share["nod"] + share["brows"] else "smile"
-            row = facts[name]
-            keys = begin + np.cumsum([0.0, row["attack"], row["hold"], row["relax"]])
-            pose = columns({(int(number), "BOTH"): value for number, value in row["aus"].items()}, size)
-            channels += express(hold(pose, keys, f"{node.id} {begin:.3f}"), context)
+        name = list(facts["share"])[min(int(np.searchsorted(shares, kind)), len(shares) - 1)]
+        movements = 1 + min(int(np.searchsorted(counts, count)), len(counts) - 1)
+        channels += respond(name, begin, size, node.id, context, movements=movements)
     return tuple(channel for channel in channels if channel.times[-1] <= end)
+
+
+def respond(
+    name: str, begin: float, size: float, source: str, context: PlanningContext, *, movements: int = 1
+) -> tuple[Channel, ...]:
+    """Return the channels of one response.
+
+    Args:
+        name: "nod", "brows" or "smile".
+        begin: seconds on the clock of the channels.
+        size: 0..1.
+        movements: how often the head goes down and up in a nod.
+    """
+    row = tables.toml_table("listening.toml")[name]
+    if name != "nod":
+        keys = begin + np.cumsum([0.0, row["attack"], row["hold"], row["relax"]])
+        pose = columns({(int(number), "BOTH"): value for number, value in row["aus"].items()}, size)
+        return express(hold(pose, keys, f"{source} {begin:.3f}"), context)
+    keys = begin + row["seconds"] / 2 * np.arange(2 * movements + 1)
+    degrees = np.zeros(len(keys))
+    degrees[1::2] = row["degrees"] * size * row["decay"] ** np.arange(movements)
+    return tuple(
+        Channel(au(n)[0], keys, degrees / tables.by_number()[n].degrees, layer=Layer.HEAD, source=source)
+        for n in (DOWN, EYES_UP)
+    )
 
 
 def _responses(
@@ -64,17 +83,6 @@ def _responses(
             return
         yield time, float(kind), node.intensity * (0.6 + 0.4 * float(size)), float(count)
         k += 1
-
-
-def _nods(begin: float, size: float, count: int, node: Listen) -> Iterator[Channel]:
-    nod = tables.toml_table("listening.toml")["nod"]
-    most = nod["degrees"] * max(size, nod["least"] * node.intensity)
-    keys = begin + nod["seconds"] / 2 * np.arange(2 * count + 1)
-    degrees = np.zeros(len(keys))
-    degrees[1::2] = most * nod["decay"] ** np.arange(count)
-    for number in (DOWN, EYES_UP):
-        values = degrees / tables.by_number()[number].degrees
-        yield Channel(au(number)[0], keys, values, layer=Layer.HEAD, source=node.id)
 
 
 KINDS = (BehaviourKind(Listen, table_timing("listen"), expand, parameters={"intensity": "intensity"}),)

@@ -41,6 +41,7 @@ class Character:
     shifts: list[BaseShift] = field(default_factory=list)
     direct: dict[str, Channel] = field(default_factory=dict)
     emotion: dict[str, Channel] = field(default_factory=dict)
+    responses: list[Channel] = field(default_factory=list)
 
     def add_shifts(self, shifts: Collection[BaseShift]) -> None:
         """Add base states, in order of their begin."""
@@ -85,7 +86,7 @@ class Character:
                 successor = successors.get(region(channel.target))
                 out.append(channel if successor is None else channel.faded(successor.begin, successor.end))
             successors |= dict.fromkeys(shift.regions, shift)
-        return [*out[::-1], *self.emotion.values(), *self.direct.values()]
+        return [*out[::-1], *self.responses, *self.emotion.values(), *self.direct.values()]
 
     def forget(self, before: float) -> None:
         """Drop channels that are invisible after `before`, so that the cost does not grow with time."""
@@ -99,6 +100,7 @@ class Character:
         self.shifts = left[::-1]
         self.direct = {n: c for n, c in self.direct.items() if c.faded_at > before}
         self.emotion = {n: c for n, c in self.emotion.items() if c.faded_at > before}
+        self.responses = [c for c in self.responses if c.span[1] > before]
 
 
 def _hold(

@@ -28,12 +28,14 @@ from realizer.playback.active_block import ScheduledSpeech
 from realizer.playback.block_manager import BlockManager
 from realizer.playback.block_states import BlockEvent, State, next_state
 from realizer.playback.character import RELAX, Character
+from realizer.playback.listener import responses
 from realizer.scheduling.timing import UNKNOWN, Schedule
 from realizer.speech.utterance import Recording, SpeechRequest, Utterance
 from realizer.tables.cooccurrence import load_rules
 
 # Frames up to this long before `now` can still be computed.
 HISTORY = 1.0  # s
+SEED_STEP = 7919  # from the seed of one character to that of the next
 # Motion that accompanies speech is at most this far from it.
 NEAR = 5.0  # s
 
@@ -148,6 +150,18 @@ class Player(BlockManager):
         self._characters[character].set_direct(values, now)
         self.timeline.mark_changed()
 
+    def hear(self, now: float, *, is_speaking: bool, text: str | None = None, character: int = 0) -> None:
+        """Let a character respond to what another one says.
+
+        Args:
+            is_speaking: whether the other still speaks: then the character listens.
+            text: the next piece of what the other says, if it is known.
+        """
+        own = self._characters[character]
+        context = replace(self.context, seed=self.context.seed + SEED_STEP * character)
+        own.responses = responses(own.responses, now, context, is_speaking=is_speaking, text=text)
+        self.timeline.mark_changed()
+
     def direct_names(self, character: int = 0) -> tuple[str, ...]:
         """Return the names of the AUs and FAPs that are held directly, or have just been released."""
         return tuple(self._characters[character].direct)
@@ -243,7 +257,7 @@ class Player(BlockManager):
         channels = [c for p in blocks for c in p.moving_channels()] + own
         if not self.idle:
             return channels, None
-        seed = self.context.seed + 7919 * character
+        seed = self.context.seed + SEED_STEP * character
         talks = [
             SpeechSpan(s.start + at, s.until, part, tuple(p.moving_channels()))
             for p in (blocks if self.prosody else ())

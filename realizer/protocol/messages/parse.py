@@ -13,6 +13,7 @@ from realizer.protocol.messages.replies import ErrorMessage
 from realizer.protocol.messages.requests import (
     Anticipate,
     CharacterMessage,
+    Heard,
     Hello,
     Ping,
     SceneMessage,
@@ -35,6 +36,7 @@ Control = (
     | SceneMessage
     | CharacterMessage
     | SetMessage
+    | Heard
     | Anticipate
     | SpeechMessage
     | Stop

@@ -172,6 +172,23 @@ class SetMessage(Message):
     character: str | None = Field(None, max_length=256)
 
 
+class Heard(Message):
+    """Tell a listening character what another one says: it nods, raises its brows and smiles.
+
+    It listens for a minute after each message with `speaking`, and shows that it has understood after one
+    without.
+    """
+
+    model_config = examples({"type": "heard", "character": "Ada", "speaking": True, "text": "Good morning,"})
+
+    type: Literal["heard"]
+    character: str | None = Field(None, max_length=256, description="who listens; default: the first")
+    speaking: bool = Field(description="whether the other speaks now")
+    text: str | None = Field(
+        None, max_length=10_000, description="what the other has said since the last message"
+    )
+
+
 SyncName = Annotated[str, Field(pattern=r"^[^\s:]{1,256}$")]
 
 

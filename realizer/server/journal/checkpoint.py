@@ -116,6 +116,7 @@ def character_to_json(character: Character) -> dict[str, Any]:
         ],
         "direct": {name: _channel_to_json(channel) for name, channel in character.direct.items()},
         "feeling": {name: _channel_to_json(channel) for name, channel in character.emotion.items()},
+        "responses": [_channel_to_json(channel) for channel in character.responses],
     }
 
 
@@ -138,7 +139,9 @@ def character_from_json(data: Mapping[str, Any]) -> Character:
         {name: _channel_from_json(channel) for name, channel in data[key].items()}
         for key in ("direct", "feeling")
     )
-    return Character(data["id"], shifts, direct, emotion)
+    # Journals of 0.1 have no responses.
+    responses = [_channel_from_json(channel) for channel in data.get("responses", ())]
+    return Character(data["id"], shifts, direct, emotion, responses)
 
 
 def schedule_to_json(schedule: Schedule) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from realizer.protocol.messages.replies import ErrorCode, ErrorMessage
 from realizer.protocol.messages.requests import (
     Anticipate,
     CharacterMessage,
+    Heard,
     SceneMessage,
     SetMessage,
     Stop,
@@ -79,6 +80,9 @@ class ControlHandlers:
                 self._character(message)
             case SetMessage():
                 self._set(message, t)
+            case Heard(speaking=speaking, text=text):
+                index = character_index(self.player, message.character)
+                self.player.hear(t, is_speaking=speaking, text=text, character=index)
             case Anticipate():
                 self.player.anticipate(message.id, message.syncs, t)
             case SpeechMessage():
