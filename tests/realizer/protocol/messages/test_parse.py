@@ -21,6 +21,7 @@ def test_parse_control_accepts_every_type() -> None:
         "scene": ',"objects":{"cup":{"x":0.2,"y":0,"z":1}}',
         "character": ',"id":"Ada"',
         "speech": ',"id":"turn","append":"Hello. "',
+        "heard": ',"speaking":true',
         "anticipate": ',"id":"clock","syncs":{"beat":2.5}',
     }
     for kind in SUPPORTED:
