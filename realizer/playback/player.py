@@ -259,17 +259,21 @@ class Player(BlockManager):
             return channels, None
         seed = self.context.seed + SEED_STEP * character
         talks = [
-            SpeechSpan(s.start + at, s.until, part, tuple(p.moving_channels()))
+            (SpeechSpan(s.start + at, s.until, part), p)
             for p in (blocks if self.prosody else ())
             for s in p.speech.values()
             for at, part in s.utterance.sections or [(0.0, s.utterance)]
         ]
-        near = [t for t in talks if t.start - NEAR <= last and t.start + t.utterance.duration + NEAR >= first]
+        near = [
+            t._replace(face=tuple(p.moving_channels()))
+            for t, p in talks
+            if t.start - NEAR <= last and t.start + t.utterance.duration + NEAR >= first
+        ]
         if near:
             known = [KnownMotion(p.not_before, c) for p in blocks for c in p.moving_channels()]
             known += [KnownMotion(c.span[0], c) for c in own]
             channels += prosody_channels(near, first, last, seed, known)
-        return channels, idle_face(first, last, seed, phrase_ends(talks))
+        return channels, idle_face(first, last, seed, phrase_ends(talk for talk, _ in talks))
 
     @property
     def end(self) -> float:
