@@ -166,10 +166,10 @@ class Realization:
             character: its index in `characters`.
         """
         from realizer.animation.lips.viseme_weights import viseme_weights
-        from realizer.animation.lips.visemes import lip_shapes
+        from realizer.animation.lips.visemes import VISEME_COUNT
 
         times = self.aus.times
-        weights = np.eye(1, len(lip_shapes())).repeat(len(times), axis=0)
+        weights = np.eye(1, VISEME_COUNT).repeat(len(times), axis=0)
         for speaking in self.speeches:
             if speaking.character == character:
                 spoken = viseme_weights(speaking.utterance.phonemes, times - speaking.start)

@@ -10,7 +10,7 @@ import numpy as np
 from realizer import tables
 from realizer.animation.fap.fap_clip import FAPClip
 from realizer.animation.lips.mouth_faps import mouth_faps
-from realizer.animation.lips.visemes import shape_table
+from realizer.animation.lips.visemes import VISEME_COUNT, shape_table
 from realizer.core.array_types import Float64, Int32
 from realizer.emotions.archetypes import archetypes
 
@@ -109,8 +109,9 @@ def _defines(flags: Int32, name: str, notes: list[str]) -> None:
 @cache
 def _mouths() -> Float64:
     """Return (15, 68) FAPU, a row a viseme."""
-    out = np.zeros((len(shape_table()[0]), 68))
-    for number, values in mouth_faps(shape_table()[0]).items():
+    shapes = shape_table()[0][:VISEME_COUNT]
+    out = np.zeros((len(shapes), 68))
+    for number, values in mouth_faps(shapes).items():
         out[:, number - 1] = values
     return out
 

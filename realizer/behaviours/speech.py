@@ -101,9 +101,10 @@ _cached_lips: WeakKeyDictionary[Utterance, tuple[float, tuple[Channel, ...]]] = 
 def _lips(utterance: Utterance, start: float) -> tuple[Channel, ...]:
     # Imported here, because it reads tables that a block without speech does not need.
     from realizer.animation.lips.lip_sync import lip_channels
+    from realizer.speech.loudness import with_loudness
 
     if utterance not in _cached_lips:
-        _cached_lips[utterance] = start, lip_channels(utterance.phonemes, start, room=max(start, 0.0))
+        _cached_lips[utterance] = start, lip_channels(with_loudness(utterance), start, room=max(start, 0.0))
     before, channels = _cached_lips[utterance]
     if start != before:
         channels = tuple(channel.shifted(start - before) for channel in channels)

@@ -9,16 +9,20 @@ from realizer.core.array_types import Bool, Float64
 BILABIAL, LABIODENTAL = 1, 2  # visemes
 
 
-def lip_weight(track: Track, times: Float64) -> Float64:
+def lip_weight(track: Track, times: Float64, longest: float | None = None) -> Float64:
     """Return how far speech masks the lips, (n,) 0..1; 0 at the ends and in long pauses.
 
     It is 1 from the first sound that closes the lips to the last, because an expression would part them.
+
+    Args:
+        longest: seconds above which a pause is long; None for the table's `released`.
     """
     facts = coarticulation()
     pauses = facts["pauses"]
+    longest = pauses["released"] if longest is None else longest
     ends = np.zeros(len(track.rest), bool)
     ends[[0, -1]] = True
-    let_go = track.rest & (ends | (track.end - track.begin > pauses["released"]))
+    let_go = track.rest & (ends | (track.end - track.begin > longest))
     middle = (track.begin + track.end) / 2
     closing = track.mix[:, list(facts["closure"]["visemes"])].sum(axis=1) > 0.5
     half = np.maximum(facts["closure"]["hold"], track.end - track.begin) / 2
@@ -59,7 +63,7 @@ def closure_mask(track: Track, times: Float64) -> tuple[Bool, Bool]:
     near = np.clip((closure["apart"] - np.diff(middle)[differ]) / 2, 0.0, closure["moved"])
     np.subtract.at(middle, differ, near)
     np.add.at(middle, differ + 1, near)
-    half = np.maximum(closure["hold"], length - 2 * pad) / 2 + pad
+    half = np.maximum(closure["hold"], (length - 2 * pad) * _firmness(track)[which]) / 2 + pad
     opens, closes = middle - half, middle + half
     for k in differ:
         if closes[k] > opens[k + 1]:
@@ -71,3 +75,27 @@ def closure_mask(track: Track, times: Float64) -> tuple[Bool, Bool]:
         begun = np.searchsorted(np.sort(opens[kind]), times, "right")
         row[:] = begun > np.searchsorted(np.sort(closes[kind]), times, "left")
     return holds[0], holds[1]
+
+
+def pressure(track: Track, times: Float64) -> Float64:
+    """Return how firmly the lips meet, or the lower one is bitten, at each time, (n,) 0..1.
+
+    Each closure has its own pressure, by its sound and the vowel after it, and is firmest in its middle.
+    """
+    which = np.flatnonzero(track.mix[:, [BILABIAL, LABIODENTAL]].max(axis=1) > 0.5)
+    if not len(which):
+        return np.ones(len(times))
+    bend, hold = coarticulation()["pressure"]["bend"], coarticulation()["closure"]["hold"]
+    middle = (track.begin + track.end)[which] / 2
+    near = np.searchsorted((middle[1:] + middle[:-1]) / 2, times)
+    half = np.maximum(hold, (track.end - track.begin)[which])[near] / 2
+    away = np.minimum(np.abs(times - middle[near]) / half, 1.0)
+    firm: Float64 = _firmness(track)[which][near] * (1 - bend * away**2)
+    return firm
+
+
+def _firmness(track: Track) -> Float64:
+    """Return (m,) the pressure of each sound, not below the table's least."""
+    facts = coarticulation()["pressure"]
+    found: Float64 = facts["least"] + (1 - facts["least"]) * track.pressure.clip(0.0, 1.0)
+    return found

@@ -10,16 +10,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from realizer.animation.lips.visemes import SHAPE_COLUMNS, VISEME_COUNT, coarticulation, shape_table, sounds
+from realizer.animation.lips.visemes import (
+    ARTICULATORS,
+    PAUSE,
+    VISEME_COUNT,
+    Mix,
+    coarticulation,
+    own_shapes,
+    shape_table,
+    sounds,
+)
 from realizer.core.array_types import Bool, Float64, Index
 from realizer.speech.utterance import Phoneme
 
-CLASSES = {
-    "jaw": ("jaw",),
-    "lips": ("upper", "lower"),
-    "shape": SHAPE_COLUMNS[3:7],
-    "tongue": SHAPE_COLUMNS[7:],
-}
 STRESS = {0: "none", 1: "primary", 2: "secondary"}
 
 
@@ -30,28 +33,36 @@ class Track:
     Attributes:
         begin, end: (m,) float64 seconds.
         mix: (m, 15) float64, part of each viseme.
+        target: (m, 11) float64 FAPU, the shape of the mouth, with columns as `SHAPE_COLUMNS`.
+        weight: (m, 6) float64, its priority for each of `ARTICULATORS`.
         vowel: (m,) whether it is a vowel.
         size: (m,) float64, the part of its shape that it reaches.
         effort: (m,) float64, factor for the opening of jaw and lips, usually 1.
+        pressure: (m,) float64 0..1, how firmly the lips meet, if it closes them.
         rest: (m,) whether it is a pause.
     """
 
     begin: Float64
     end: Float64
     mix: Float64
+    target: Float64
+    weight: Float64
     vowel: Bool
     size: Float64
     effort: Float64
+    pressure: Float64
     rest: Bool
 
 
 class _Row(NamedTuple):
     begin: float
     end: float
-    mix: tuple[tuple[int, float], ...]
+    mix: Mix
+    shape: Mix
     vowel: bool = False
     size: float = 1.0
     effort: float = 1.0
+    pressure: float = 1.0
 
 
 SILENT = ((0, 1.0),)
@@ -59,49 +70,76 @@ SILENT = ((0, 1.0),)
 
 def track_of(phonemes: Sequence[Phoneme]) -> Track | None:
     """Return the sounds of phonemes (in order, "" is a pause), or None if there are only pauses."""
-    facts = coarticulation()
-    rows: list[_Row] = []
-    for phoneme in phonemes:
-        parts = sounds(phoneme.ipa)
-        if not parts:
-            if rows and rows[-1].mix == SILENT:  # two pauses are one
-                rows[-1] = rows[-1]._replace(end=phoneme.end)
-            else:
-                rows.append(_Row(phoneme.start, phoneme.end, SILENT))
-            continue
-        at, length = phoneme.start, phoneme.end - phoneme.start
-        for part in parts:
-            until = at + part.share * length
-            if part.vowel:
-                rows.append(_Row(at, until, part.mix, True, _size(phoneme, until - at), _effort(phoneme)))
-            else:
-                rows.append(_Row(at, until, part.mix))
-            at = until
+    rows = _rows(phonemes)
     if all(row.mix in (SILENT, ()) for row in rows):
         return None
-    # The mouth does not come to rest in a short pause between sounds, but always does at the ends.
     inner = range(1, len(rows) - 1)
-    absorbed = facts["pauses"]["absorbed"]
+    absorbed = coarticulation()["pauses"]["absorbed"]
     rows = [
         row
         for k, row in enumerate(rows)
         if not (k in inner and row.mix == SILENT and row.end - row.begin < absorbed)
     ]
+    # The mouth is at rest at the ends, and its lips are parted in pauses between sounds.
+    parted = ((own_shapes()[PAUSE], 1.0),)
+    rows[1:-1] = [row._replace(shape=parted) if row.mix == SILENT else row for row in rows[1:-1]]
     begin, end = np.array([row.begin for row in rows]), np.array([row.end for row in rows])
     middle = (end[:-1] + begin[1:]) / 2  # sounds touch, or extend to the middle of a short pause
-    mix = np.zeros((len(rows), VISEME_COUNT))
+    targets, weights = shape_table()
+    mix, shape = np.zeros((len(rows), VISEME_COUNT)), np.zeros((len(rows), len(targets)))
     for k, row in enumerate(rows):
-        for viseme, amount in row.mix:
-            mix[k, viseme] = amount
+        for parts, into in ((row.mix, mix), (row.shape, shape)):
+            for number, amount in parts:
+                into[k, number] = amount
+    size = np.array([row.size for row in rows])
+    vowel = np.array([row.vowel for row in rows])
     return Track(
         begin=np.concatenate((begin[:1], middle)),
         end=np.concatenate((middle, end[-1:])),
         mix=mix,
-        vowel=np.array([row.vowel for row in rows]),
-        size=np.array([row.size for row in rows]),
+        target=shape @ targets,
+        weight=shape @ weights,
+        vowel=vowel,
+        size=size,
         effort=np.array([row.effort for row in rows]),
+        pressure=np.array([row.pressure for row in rows]) * _next(size, vowel),
         rest=np.array([row.mix == SILENT for row in rows]),
     )
+
+
+def _rows(phonemes: Sequence[Phoneme]) -> list[_Row]:
+    """Return a row for each sound, and for each pause; two pauses are one."""
+    pressure = coarticulation()["pressure"]
+    rows: list[_Row] = []
+    for phoneme in phonemes:
+        parts = sounds(phoneme.ipa)
+        if not parts:
+            if rows and rows[-1].mix == SILENT:
+                rows[-1] = rows[-1]._replace(end=phoneme.end)
+            else:
+                rows.append(_Row(phoneme.start, phoneme.end, SILENT, SILENT))
+            continue
+        at, length = phoneme.start, phoneme.end - phoneme.start
+        firm = pressure["sounds"].get(phoneme.ipa[:1], pressure["other"])
+        for part in parts:
+            until = at + part.share * length
+            row = _Row(at, until, part.mix, part.shape, pressure=firm)
+            if part.vowel:
+                size, effort = _size(phoneme, until - at), _effort(phoneme)
+                row = row._replace(vowel=True, size=size, effort=effort)
+            rows.append(row)
+            at = until
+    return rows
+
+
+def _next(size: Float64, vowel: Bool) -> Float64:
+    """Return (m,) the size of the vowel after each sound, or of the last one."""
+    at = np.flatnonzero(vowel)
+    if not len(at):
+        return size
+    following = np.searchsorted(at, np.arange(len(size))).clip(0, len(at) - 1)
+    found: Float64 = size[at[following]]
+    return found
 
 
 def _size(phoneme: Phoneme, length: float) -> float:
@@ -128,11 +166,11 @@ def key_times(phonemes: Sequence[Phoneme], lead: float = 0.0) -> Float64:
 
 
 def dominances(track: Track, times: Float64) -> Iterator[tuple[Index, Float64, tuple[str, ...]]]:
-    """Yield the dominance of the sounds around each time for each class of articulators.
+    """Yield the dominance of the sounds around each time for each of `ARTICULATORS`.
 
     Yields:
         The sounds, (k, n); their parts, (k, n), which add up to a little less than 1, as the rest belongs to
-        the neutral mouth; the columns of `SHAPE_COLUMNS` that the class moves.
+        the neutral mouth; the columns of `SHAPE_COLUMNS` that the articulator moves.
     """
     facts = coarticulation()
     rule = facts["dominance"]
@@ -140,7 +178,7 @@ def dominances(track: Track, times: Float64) -> Iterator[tuple[Index, Float64, t
     base = np.where(track.vowel, rule["base_vowel"], rule["base_consonant"])
     rate = base * (rule["length"] / length) ** rule["exponent"]
     strength = np.where(track.vowel, rule["strength_vowel"], rule["strength_consonant"])
-    weight = (track.mix @ shape_table()[1]).T * strength
+    weight = track.weight.T * strength
     # A pause is at rest except at its edges; a sound is strongest in its middle part.
     edge = np.where(track.rest, np.minimum(0.1, length / 3), length * (1 - rule["core"]) / 2)
     core_begin, core_end = track.begin + edge, track.end - edge
@@ -156,7 +194,7 @@ def dominances(track: Track, times: Float64) -> Iterator[tuple[Index, Float64, t
     after = fall * np.maximum(times - _at(core_end, near), 0)
     before[beyond] = np.inf
 
-    for own, (name, members) in zip(weight, CLASSES.items(), strict=True):
+    for own, (name, members) in zip(weight, ARTICULATORS.items(), strict=True):
         pace = facts["articulators"][name]
         d = np.exp(-pace["before"] * before - pace["after"] * after)
         d *= _at(own, near)

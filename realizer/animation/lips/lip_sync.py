@@ -2,23 +2,38 @@
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from realizer.animation.axis import fap, mask_channel
 from realizer.animation.channel import Channel, Layer
-from realizer.animation.lips.closures import BILABIAL, LABIODENTAL, closure_mask, lip_weight
-from realizer.animation.lips.dominance import CLASSES, Track, dominances, key_times, track_of
+from realizer.animation.lips.closures import BILABIAL, LABIODENTAL, closure_mask, lip_weight, pressure
+from realizer.animation.lips.dominance import Track, dominances, key_times, track_of
 from realizer.animation.lips.mouth_faps import mouth_faps
-from realizer.animation.lips.visemes import SHAPE_COLUMNS, coarticulation, shape_table
+from realizer.animation.lips.visemes import ARTICULATORS, SHAPE_COLUMNS, coarticulation, shape_table
 from realizer.core.array_types import Float64
 from realizer.speech.utterance import Phoneme
 
-OPENING = (*CLASSES["jaw"], *CLASSES["lips"])  # they open further in loud speech
+OPENING = (*ARTICULATORS["jaw"], *ARTICULATORS["lips"])  # they open further in loud speech
 
 
-def lip_channels(phonemes: Sequence[Phoneme], start: float, room: float = 0.0) -> tuple[Channel, ...]:
+class LipStyle(NamedTuple):
+    """How far the jaw and the lips move: 0 mumbles, 1 is usual, 2 over-articulates; closures stay.
+
+    Source: the two axes of Edwards et al. 2016, "JALI", ACM Trans. Graphics 35(4).
+    """
+
+    jaw: float = 1.0
+    lips: float = 1.0
+
+
+USUAL = LipStyle()
+
+
+def lip_channels(
+    phonemes: Sequence[Phoneme], start: float, room: float = 0.0, style: LipStyle = USUAL
+) -> tuple[Channel, ...]:
     """Return channels of the speech layer that move the mouth, in FAPU, and of the mask "lips", 0..1.
 
     All values are 0 at the first and the last key. The gap between the inner lips (-FAP 4 - FAP 5, and at
@@ -29,9 +44,10 @@ def lip_channels(phonemes: Sequence[Phoneme], start: float, room: float = 0.0) -
         phonemes: in order, seconds from the start of the utterance; "" is a pause.
         start: seconds at which the utterance starts on the block's clock.
         room: seconds before `start` in which the mouth may prepare for the first sound.
+        style: how far jaw and lips move.
 
     Returns:
-        Channels for FAPs 3-13, 16, 17, 44-46, 51-60 and the mask "lips"; () if there are only pauses.
+        Channels for FAPs 3-13, 16, 17, 44-47, 51-60 and the mask "lips"; () if there are only pauses.
 
     Source: Cohen & Massaro 1993, "Modeling coarticulation in synthetic visual speech".
     """
@@ -41,7 +57,8 @@ def lip_channels(phonemes: Sequence[Phoneme], start: float, room: float = 0.0) -
         return ()
     times = key_times(phonemes, min(room, facts["pauses"]["attack"]))
     masked = lip_weight(track, times)
-    mouth = _mouth(track, times) * masked
+    # In a pause the lips are given back to expressions before they stop being parted.
+    mouth = _mouth(track, times, style) * lip_weight(track, times, facts["pauses"]["closed"])
     _constrain(mouth, track, times, masked, facts)
     mouth[:, [0, -1]] = 0.0  # smoothing leaves traces of very short sounds
     moved = {mask_channel("lips"): masked}
@@ -50,15 +67,27 @@ def lip_channels(phonemes: Sequence[Phoneme], start: float, room: float = 0.0) -
     return tuple(Channel(target, times, values, "linear", Layer.SPEECH) for target, values in moved.items())
 
 
-def _mouth(track: Track, times: Float64) -> Float64:
-    """Return the weighted mean of the sounds around each time, (10, n) float64; rows as `SHAPE_COLUMNS`."""
-    target = (track.mix @ shape_table()[0]).T * track.size
+def _mouth(track: Track, times: Float64, style: LipStyle) -> Float64:
+    """Return the weighted mean of the sounds around each time, (11, n) float64; rows as `SHAPE_COLUMNS`."""
+    target = track.target.T * track.size
     target[[SHAPE_COLUMNS.index(name) for name in OPENING]] *= track.effort
+    if style != USUAL:
+        _restyle(dict(zip(SHAPE_COLUMNS, target, strict=True)), style)
     mouth = np.empty((len(SHAPE_COLUMNS), len(times)))
     for near, parts, articulators in dominances(track, times):
         rows = _rows(articulators)
         mouth[rows] = np.einsum("kn,skn->sn", parts, target[rows].take(near, axis=1, mode="clip"))
     return mouth
+
+
+def _restyle(target: dict[str, Float64], style: LipStyle) -> None:
+    """Scale the movements of the jaw, which carries the lower lip, and the lips' own, in place."""
+    carried = coarticulation()["style"]["carried"] * target["jaw"]
+    target["lower"] -= carried
+    target["jaw"] *= style.jaw
+    for name in ("upper", "lower", *ARTICULATORS["rounding"], *ARTICULATORS["spread"]):
+        target[name] *= style.lips
+    target["lower"] += style.jaw * carried
 
 
 def _rows(articulators: Sequence[str]) -> slice:
@@ -73,18 +102,18 @@ def _constrain(mouth: Float64, track: Track, times: Float64, masked: Float64, fa
     closed, bitten = closure_mask(track, times)
     upper, lower, jaw = mouth[column["upper"]], mouth[column["lower"]], mouth[column["jaw"]]
     speed = facts["speed"]["lips"]
+    firm = pressure(track, times) * masked
     # The upper lip uncovers the teeth for f v: it is raised there, and then lowered where p b m close.
-    raised = shapes[LABIODENTAL, column["upper"]] * masked
+    raised = shapes[LABIODENTAL, column["upper"]] * firm
     upper[:] = _limit_speed(upper, times, speed)
     upper[:] = -_limit_speed(-np.where(bitten, np.maximum(upper, raised), upper), times, speed)
     upper[[0, -1]] = 0.0
     for lip, name in ((upper, "upper"), (lower, "lower")):
-        lip[:] = np.where(closed, np.minimum(lip, shapes[BILABIAL, column[name]] * masked), lip)
-    lower[:] = np.where(
-        bitten & ~closed, np.minimum(lower, shapes[LABIODENTAL, column["lower"]] * masked), lower
-    )
+        lip[:] = np.where(closed, np.minimum(lip, shapes[BILABIAL, column[name]] * firm), lip)
+    bite = np.minimum(lower, shapes[LABIODENTAL, column["lower"]] * firm)
+    lower[:] = np.where(bitten & ~closed, bite, lower)
     jaw[:] = np.where(closed | bitten, np.minimum(jaw, facts["closure"]["jaw"]), jaw)
-    for name, articulators in CLASSES.items():
+    for name, articulators in ARTICULATORS.items():
         limit = facts["speed"]["jaw" if name == "jaw" else "lips"]
         reach = facts["articulators"][name]["smooth"] * facts["rate"]
         rows = _rows(articulators)

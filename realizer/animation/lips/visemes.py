@@ -3,7 +3,7 @@
 import unicodedata
 from dataclasses import dataclass, fields
 from functools import cache, lru_cache
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -18,15 +18,26 @@ SHAPE_COLUMNS = (
     "jaw",
     "upper",
     "lower",
-    "width",
     "push_upper",
     "push_lower",
+    "width",
     "corner",
     "tip",
     "thrust",
     "body",
+    "roll",
 )
-WEIGHT_COLUMNS = ("weight_jaw", "weight_lips", "weight_shape", "weight_tongue")
+# Articulators that move on their own, and their columns.
+ARTICULATORS = {
+    "jaw": ("jaw",),
+    "lips": ("upper", "lower"),
+    "rounding": ("push_upper", "push_lower"),
+    "spread": ("width", "corner"),
+    "tip": ("tip", "thrust"),
+    "body": ("body", "roll"),
+}
+PAUSE = "pause"  # example of the parted lips of a pause
+Mix: TypeAlias = tuple[tuple[int, float], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,24 +51,27 @@ class VisemeRule:
 
 @dataclass(frozen=True, slots=True)
 class LipShape:
-    """The mouth shape of a viseme in FAPU, and its weights; the columns of `visemes.csv`."""
+    """The target of each articulator in a viseme, in FAPU, and weights; the columns of `visemes.csv`."""
 
     viseme: int
     example: str
     jaw: float
     upper: float
     lower: float
-    width: float
     push_upper: float
     push_lower: float
+    width: float
     corner: float
     tip: float
     thrust: float
     body: float
+    roll: float
     weight_jaw: float
     weight_lips: float
-    weight_shape: float
-    weight_tongue: float
+    weight_rounding: float
+    weight_spread: float
+    weight_tip: float
+    weight_body: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,17 +82,26 @@ class Articulation:
         mix: (viseme, part) pairs whose parts add up to 1; () if it has no lip shape.
         vowel: whether it is a vowel.
         share: part of the phoneme's time, 0..1.
+        shape: the same for the shapes of `lip_shapes`; differs from `mix` if the sound has its own targets.
     """
 
-    mix: tuple[tuple[int, float], ...]
+    mix: Mix
     vowel: bool
     share: float
+    shape: Mix
 
 
 @cache
 def lip_shapes() -> tuple[LipShape, ...]:
-    """Return the 15 mouth shapes; index = viseme."""
+    """Return the 15 mouth shapes of visemes, index = viseme, then those of sounds that differ from them."""
     return tables.read_csv(tables.text_of("visemes.csv"), LipShape, "visemes.csv")
+
+
+@cache
+def own_shapes() -> dict[str, int]:
+    """Return IPA symbol -> its index in `lip_shapes`, for sounds with targets of their own."""
+    rows = enumerate(lip_shapes()[VISEME_COUNT:], VISEME_COUNT)
+    return {ipa: number for number, row in rows for ipa in row.example.split()}
 
 
 @cache
@@ -89,11 +112,9 @@ def coarticulation() -> dict[str, Any]:
 
 @cache
 def shape_table() -> tuple[Float64, Float64]:
-    """Return shapes (15, 10) in FAPU and weights (15, 4), with SHAPE_COLUMNS and WEIGHT_COLUMNS."""
-    assert {f.name for f in fields(LipShape)} >= {*SHAPE_COLUMNS, *WEIGHT_COLUMNS}
-    shapes = np.array([[getattr(row, name) for name in SHAPE_COLUMNS] for row in lip_shapes()], np.float64)
-    weights = np.array([[getattr(row, name) for name in WEIGHT_COLUMNS] for row in lip_shapes()], np.float64)
-    return shapes, weights
+    """Return shapes (k, 11) in FAPU and weights (k, 6), with SHAPE_COLUMNS and ARTICULATORS as columns."""
+    values = np.array([[getattr(row, f.name) for f in fields(LipShape)[2:]] for row in lip_shapes()])
+    return values[:, : len(SHAPE_COLUMNS)], values[:, len(SHAPE_COLUMNS) :]
 
 
 @lru_cache(maxsize=2048)
@@ -103,21 +124,27 @@ def sounds(ipa: str) -> tuple[Articulation, ...]:
     A string may hold several sounds ("oʊ", "əl", "ɔːɹ", "tʃ"). Length, stress, tone and diacritics are
     ignored; unknown letters are replaced by their base letter or ignored.
     """
-    found: list[tuple[tuple[tuple[int, float], ...], bool]] = []
+    found: list[tuple[Mix, Mix, bool]] = []
     for symbol, labialised in _symbols(ipa):
         row = phoneme_features()[symbol]
         viseme = _viseme_of(row.place, row.manner)
-        mix = _vowel_mix(row) if row.kind == "vowel" else ((viseme, 1.0),) if viseme else ()
+        mix: Mix = _vowel_mix(row) if row.kind == "vowel" else ((viseme, 1.0),) if viseme else ()
+        shape: Mix = ((own_shapes()[symbol], 1.0),) if symbol in own_shapes() else mix
         if labialised and mix and mix[0][0] not in coarticulation()["closure"]["visemes"]:
-            mix = (*((number, part / 2) for number, part in mix), (ROUNDED, 0.5))
-        found.append((mix, row.kind == "vowel"))
+            mix, shape = (
+                (*((number, part / 2) for number, part in parts), (ROUNDED, 0.5)) for parts in (mix, shape)
+            )
+        found.append((mix, shape, row.kind == "vowel"))
     consonant = coarticulation()["diphthong"]["consonant"]
     first_share = coarticulation()["diphthong"]["first"]
-    lengths = [1.0 if vowel else consonant for _, vowel in found]
-    if len(found) == 2 and all(vowel for _, vowel in found):
+    lengths = [1.0 if vowel else consonant for *_, vowel in found]
+    if len(found) == 2 and all(vowel for *_, vowel in found):
         lengths = [first_share, 1 - first_share]
     whole = sum(lengths)
-    return tuple(Articulation(mix, vowel, t / whole) for (mix, vowel), t in zip(found, lengths, strict=True))
+    return tuple(
+        Articulation(mix, vowel, t / whole, shape)
+        for (mix, shape, vowel), t in zip(found, lengths, strict=True)
+    )
 
 
 def _symbols(ipa: str) -> list[tuple[str, bool]]:
@@ -139,7 +166,7 @@ def _symbols(ipa: str) -> list[tuple[str, bool]]:
     return symbols
 
 
-def _vowel_mix(row: PhonemeFeatures) -> tuple[tuple[int, float], ...]:
+def _vowel_mix(row: PhonemeFeatures) -> Mix:
     """Interpolate by height between the vowels of MPEG-4, separately for unrounded and rounded ones."""
     anchors = coarticulation()["vowels"]
     mix: dict[int, float] = {}

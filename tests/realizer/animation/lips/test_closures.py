@@ -108,7 +108,7 @@ def test_closure_mask_moves_closures_and_bites_apart(kinds: str, length: float) 
 
 
 @pytest.mark.parametrize("kinds", ["pf", "fp"])
-@given(st.floats(0.03, 0.06))
+@given(st.floats(0.03, 0.04))
 def test_closure_mask_of_a_bite_lasts_longer_beside_a_closure(kinds: str, length: float) -> None:
     _, closed, bitten = shown(kinds, length)
     assert bitten.sum() > closed.sum()

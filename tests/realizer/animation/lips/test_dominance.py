@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.animation.lips.dominance import CLASSES, Track, dominances, key_times, track_of
-from realizer.animation.lips.visemes import SHAPE_COLUMNS, coarticulation
+from realizer.animation.lips.dominance import Track, dominances, key_times, track_of
+from realizer.animation.lips.visemes import ARTICULATORS, SHAPE_COLUMNS, coarticulation
 from realizer.speech.utterance import Phoneme
 
 
@@ -41,7 +41,7 @@ def test_track_absorbs_short_pauses_between_sounds() -> None:
     assert not track(("a", 0.1), ("", short), ("a", 0.1)).rest.any()
     assert track(("a", 0.1), ("", short + 0.02), ("a", 0.1)).rest.tolist() == [False, True, False]
     # An absorbed pause is divided between the sounds on either side.
-    assert track(("a", 0.1), ("", 0.2), ("a", 0.1)).end[0] == pytest.approx(0.2)
+    assert track(("a", 0.1), ("", short), ("a", 0.1)).end[0] == pytest.approx(0.1 + short / 2)
 
 
 def test_track_divides_a_diphthong_into_two_vowels() -> None:
@@ -58,8 +58,8 @@ def test_key_times_cover_all_sounds_at_their_rate() -> None:
     assert len(key_times(phonemes(("a", 0.0)))) >= 2
 
 
-def test_classes_have_every_column_of_a_mouth_once() -> None:
-    assert [name for members in CLASSES.values() for name in members] == list(SHAPE_COLUMNS)
+def test_articulators_have_every_column_of_a_mouth_once() -> None:
+    assert [name for members in ARTICULATORS.values() for name in members] == list(SHAPE_COLUMNS)
 
 
 def test_dominances_add_up_to_a_little_less_than_1() -> None:
@@ -70,7 +70,7 @@ def test_dominances_add_up_to_a_little_less_than_1() -> None:
         assert near.shape == parts.shape
         assert (parts >= 0).all()
         assert (parts.sum(axis=0) < 1).all()
-        assert (parts.sum(axis=0) > 0.75).all()
+        assert (parts.sum(axis=0) > 0.6).all()
 
 
 def test_dominances_are_greatest_in_the_middle_of_a_sound() -> None:
@@ -88,7 +88,7 @@ def test_dominances_of_rounding_start_before_those_of_opening() -> None:
         members: np.where(near == 2, parts, 0).sum()
         for near, parts, members in dominances(found, np.array([0.12]))
     }
-    assert ahead[CLASSES["shape"]] > 2 * ahead[CLASSES["lips"]]
+    assert ahead[ARTICULATORS["rounding"]] > 2 * ahead[ARTICULATORS["lips"]]
 
 
 def test_dominances_of_long_sounds_fall_more_slowly() -> None:

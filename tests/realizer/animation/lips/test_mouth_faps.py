@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from realizer import tables
-from realizer.animation.lips.mouth_faps import mouth_faps
+from realizer.animation.lips.mouth_faps import ROLL, mouth_faps
 from realizer.animation.lips.visemes import SHAPE_COLUMNS, shape_table
 
 
@@ -31,8 +31,17 @@ def test_mouth_faps_move_both_sides_and_contours() -> None:
 
 
 def test_mouth_faps_push_the_lips_and_move_the_tongue() -> None:
-    got = mouth_faps(shape(push_lower=1, push_upper=2, tip=3, thrust=4, body=5))
-    assert {fap: values[0] for fap, values in got.items() if values[0]} == {16: 1, 17: 2, 44: 3, 45: 4, 46: 5}
+    got = mouth_faps(shape(push_lower=1, push_upper=2, tip=3, thrust=4, body=5, roll=6))
+    wanted = {16: 1, 17: 2, 44: 3, 45: 4, 46: 5, 47: 6 * ROLL}
+    assert {fap: values[0] for fap, values in got.items() if values[0]} == wanted
+
+
+def test_mouth_faps_of_pressed_lips_are_thin_and_roll_in() -> None:
+    got = mouth_faps(shape(upper=-16, lower=-20))
+    assert got[51][0] > got[4][0]
+    assert got[52][0] > got[5][0]
+    assert got[16][0] < 0
+    assert got[17][0] < 0
 
 
 @pytest.mark.parametrize("viseme", range(15))
