@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Final
 
 from bml_schema.node_schema import attribute, child, children, mixed, node, sync_ref
-from bml_schema.nodes import Behaviour, Part, core, extension
+from bml_schema.nodes import Behaviour, Part, core, extension, own
 from bml_schema.sync_refs import SyncRef
 from bml_schema.values import integer, name, number, one_of, string, word
 
@@ -25,6 +25,7 @@ AMOUNT = number(0, 1)
 # Relative excess of attackPeak over the sustained amount; at -1 the peak is 0.
 _OVERSHOOT = number(-1, 10)
 _ANGLE = number(-360, 360)
+_STYLE = number(0, 2)
 
 
 @node
@@ -142,11 +143,18 @@ class SpeechText(Part):
 
 @node
 class Speech(Behaviour):
-    """Say something; each <sync id> in the text is a sync point too."""
+    """Say something; each <sync id> in the text is a sync point too.
+
+    Attributes:
+        jaw, lips: how far the jaw, or the lips, move: 0 mumbles, 1 is usual, 2 over-articulates; without it
+            the setting of the realizer.
+    """
 
     tag = core("speech")
     marks = True
     text: SpeechText | None = child(SpeechText, default=None)
+    jaw: float | None = attribute(_STYLE, default=None, name=own("jaw"))
+    lips: float | None = attribute(_STYLE, default=None, name=own("lips"))
 
     @property
     def marked(self) -> tuple[str, ...]:

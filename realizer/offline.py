@@ -32,6 +32,8 @@ def realize(
     expressions: Path | None = None,
     cooccurrence: str = "on",
     prosody: bool = True,
+    jaw: float = 1.0,
+    lips: float = 1.0,
     mapping: Path | None = None,
     grace: float = 0.5,
     max_planning: int = DEFAULTS.max_planning,
@@ -42,8 +44,8 @@ def realize(
     Args:
         documents: BML text, or several texts; all are submitted at t = 0, in order.
         voice: a voice or its name; None for espeak-ng, or the silent voice if that is not installed.
-        face, deformer, fps, scene, seed, idle, language, media, expressions, cooccurrence, prosody, mapping,
-            grace, max_planning, strict_bml: as in `realizer.core.options.PlayOptions`.
+        face, deformer, fps, scene, seed, idle, language, media, expressions, cooccurrence, prosody, jaw,
+            lips, mapping, grace, max_planning, strict_bml: as in `realizer.core.options.PlayOptions`.
 
     Raises:
         FaceError: no such face.
@@ -63,6 +65,8 @@ def realize(
         expressions=expressions,
         cooccurrence=cooccurrence,
         prosody=prosody,
+        jaw=jaw,
+        lips=lips,
         mapping=mapping,
         grace=grace,
         max_planning=max_planning,

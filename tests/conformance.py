@@ -116,7 +116,7 @@ def _attributes(name: str, cls: type[Any], chapter: str, core: bool, without: se
             continue
         known = prefixed(spec.name)
         ours = core and ":" not in known
-        where = chapter if ours == core else "BMLA"
+        where = "BMLA" if core and known.startswith("bmla:") else chapter
         id = f"{name}.{known}"
         yield Rule(id, where, "attribute", f"`{known}`: {spec.value.wanted}", ours, cls, spec.name)
         for word in spec.value.words:

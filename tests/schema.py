@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import escape, quoteattr
@@ -52,10 +53,21 @@ def render() -> str:
     lines = [HEAD]
     for space, file in FILES.items():
         lines.append(f'  <xs:import namespace="{space}" schemaLocation="{file}"/>')
+    for spec, says in _attributes_elsewhere():
+        local = replace(spec, name=spec.name.rpartition("}")[2])
+        lines += ["", *(line[4:] for line in _attribute(local, says))]
     for name, cls in classes().items():
         lines += ["", f'  <xs:element name="{name}">', *_documentation("    ", _first_line(cls))]
         lines += ["    <xs:complexType>", *_content(cls), "    </xs:complexType>", "  </xs:element>"]
     return "\n".join([*lines, "</xs:schema>", ""])
+
+
+def _attributes_elsewhere() -> Iterator[tuple[Attribute, str]]:
+    """Yield the attributes in our namespace of elements in another, and what their classes say of them."""
+    for cls in VOCABULARY.values():
+        for spec in schema_of(cls).attributes.values():
+            if spec.name.startswith(f"{{{OWN}}}"):
+                yield spec, _attributes_of(cls).get(spec.field, "")
 
 
 def _content(cls: type[Any]) -> Iterator[str]:

@@ -27,6 +27,7 @@ class PlanningContext:
             +z forward; None while the session has no scene (then any target is straight ahead).
         utterances: behaviour id -> its utterance.
         language: BCP-47 of speech without its own.
+        jaw, lips: how far the jaw and the lips move in speech without its own style (`LipStyle`).
         seed: for random choices.
         media: the folder of the files that documents can name, or None.
         clips: id -> sound of a client, which documents name as `clip:ID`.
@@ -41,6 +42,8 @@ class PlanningContext:
     scene: Mapping[str, Position] | None = None
     utterances: Mapping[str, Utterance] = field(default_factory=dict)
     language: str = "en-US"
+    jaw: float = 1.0
+    lips: float = 1.0
     seed: int = 0
     media: Path | None = None
     clips: Mapping[str, Recording] = field(default_factory=dict)

@@ -23,6 +23,7 @@ SSML = "application/ssml+xml"
 STIFFNESS = 1000.0
 MIN_GAP = 0.01  # s; limits the stiffness of very short gaps
 MIN_DURATION = 0.1  # s, for text without words such as a full stop
+Style = tuple[float, float]  # of jaw and lips
 LANG = "{http://www.w3.org/XML/1998/namespace}lang"
 
 
@@ -90,25 +91,30 @@ def expand(node: Speech, times: Float64, context: PlanningContext) -> tuple[Chan
     """Return the channels of lips, jaw and tongue, from the phonemes."""
     utterance, start = context.utterances[node.id], float(times[0])
     parts = utterance.sections or ((0.0, utterance),)
-    lips = (channel for at, part in parts for channel in _lips(part, start + at))
+    style = (
+        context.jaw if node.jaw is None else node.jaw,
+        context.lips if node.lips is None else node.lips,
+    )
+    lips = (channel for at, part in parts for channel in _lips(part, start + at, style))
     return tuple(channel.changed({"source": node.id}) for channel in lips)
 
 
-# Utterance -> its start and lips. A long text grows part by part, and the lips of earlier parts are reused.
-_cached_lips: WeakKeyDictionary[Utterance, tuple[float, tuple[Channel, ...]]] = WeakKeyDictionary()
+# Utterance -> style, start, lips. A long text grows part by part, and the lips of earlier parts are reused.
+_cached_lips: WeakKeyDictionary[Utterance, tuple[Style, float, tuple[Channel, ...]]] = WeakKeyDictionary()
 
 
-def _lips(utterance: Utterance, start: float) -> tuple[Channel, ...]:
+def _lips(utterance: Utterance, start: float, style: Style) -> tuple[Channel, ...]:
     # Imported here, because it reads tables that a block without speech does not need.
-    from realizer.animation.lips.lip_sync import lip_channels
+    from realizer.animation.lips.lip_sync import LipStyle, lip_channels
     from realizer.speech.loudness import with_loudness
 
-    if utterance not in _cached_lips:
-        _cached_lips[utterance] = start, lip_channels(with_loudness(utterance), start, room=max(start, 0.0))
-    before, channels = _cached_lips[utterance]
-    if start != before:
+    known, before, channels = _cached_lips.get(utterance, (None, start, ()))
+    if known != style:
+        phonemes = with_loudness(utterance)
+        channels = lip_channels(phonemes, start, max(start, 0.0), LipStyle(*style))
+    elif start != before:
         channels = tuple(channel.shifted(start - before) for channel in channels)
-        _cached_lips[utterance] = start, channels
+    _cached_lips[utterance] = style, start, channels
     return channels
 
 

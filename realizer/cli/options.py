@@ -59,6 +59,19 @@ prosody = click.option(
     help="Small nods, raised brows, blinks and glances that accompany speech; off with --no-idle.  "
     "[default: on]",
 )
+
+
+def _style(name: str) -> Callable[[Command], Command]:
+    return click.option(
+        f"--{name}",
+        metavar="0..2",
+        type=click.FloatRange(0, 2),
+        help=f"How far the {name} move{'s' * (name == 'jaw')} in speech: 0 mumbles, 2 over-articulates.  "
+        "[default: 1]",
+    )
+
+
+jaw, lips = _style("jaw"), _style("lips")
 deformer = click.option(
     "--deformer",
     type=click.Choice(["mpeg4", "au"]),

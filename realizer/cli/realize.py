@@ -33,6 +33,8 @@ performance_options = options.several(
     click.option("--seed", type=int, help="Seed of idle motion: equal seeds give equal files.  [default: 0]"),
     click.option("--no-idle", is_flag=True, help="No blinks or small head motion of an idle face."),
     options.prosody,
+    options.jaw,
+    options.lips,
     options.cooccurrence,
     options.mapping,
     options.playback_options,

@@ -75,6 +75,8 @@ def setting_options(*rows: tuple[str, str]) -> Callable[[options.Command], optio
 @setting_option("seed", "N")
 @click.option("--idle/--no-idle", default=None, help="Blinks and small head motion of an idle face.")
 @options.prosody
+@options.jaw
+@options.lips
 @options.cooccurrence
 @options.mapping
 @options.strict_bml

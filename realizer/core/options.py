@@ -23,6 +23,8 @@ class PlayOptions:
         media: folder of the files that documents may refer to; None: they may not.
         expressions: folder of a user's expressions, which override built-in ones.
         cooccurrence: rules for AUs that no face shows together: "on" (built in), "off", or a file.
+        jaw, lips: how far the jaw and the lips move in speech that does not say: 0 mumbles, 1 is usual, 2
+            over-articulates.
         prosody: whether nods, brows, blinks and glances accompany speech; needs `idle`.
         mapping: file that maps AUs to FAPs and overrides the face's mapping.
         grace: seconds by which a behaviour may come too late for its references into other blocks.
@@ -44,6 +46,8 @@ class PlayOptions:
     expressions: Path | None = None
     cooccurrence: str = "on"
     prosody: bool = True
+    jaw: float = 1.0
+    lips: float = 1.0
     mapping: Path | None = None
     grace: float = 0.5
     max_planning: int = 2_500_000

@@ -326,6 +326,8 @@ class Settings:
         "on", _switch_or_file, "rules for AUs that no face shows together: on, off, or a file"
     )
     prosody: bool = _row(True, _flag, "nods, brows, blinks and glances that accompany speech: on or off")
+    jaw: float = _row(1.0, _real(0, 2), "how far the jaw opens in speech: 0 mumbles, 2 over-articulates")
+    lips: float = _row(1.0, _real(0, 2), "how far the lips move in speech: 0 mumbles, 2 over-articulates")
     mapping: Path | None = _row(None, _file, "file that maps AUs to FAPs; none: each face's own mapping")
     strict_bml: bool = _row(False, _flag, "read documents as BML 1.0 only, without dialects")
     grace: float = _row(

@@ -73,6 +73,8 @@ class Player(BlockManager):
             scene=options.scene,
             seed=options.seed,
             language=options.language,
+            jaw=options.jaw,
+            lips=options.lips,
             media=options.media,
             clips={} if clips is None else clips,
             library=library_of(options.expressions),

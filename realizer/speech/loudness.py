@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from realizer.core.array_types import Float64
@@ -11,7 +9,7 @@ from realizer.speech.accents import phrases, prosody_facts
 from realizer.speech.utterance import Phoneme, Utterance
 from realizer.tables.phonemes import vowels
 
-STEP = 4  # every so many samples are measured, which is enough for a mean
+STEP = 8  # every so many samples are measured, which is enough for a mean
 
 
 def with_loudness(utterance: Utterance) -> tuple[Phoneme, ...]:
@@ -32,7 +30,8 @@ def with_loudness(utterance: Utterance) -> tuple[Phoneme, ...]:
         loud[(spans[:, 0] <= accent) & (accent < spans[:, 1])] *= prosody_facts()["accents"]["louder"]
     heard = list(phonemes)
     for k, factor in zip(sung, loud.tolist(), strict=True):
-        heard[k] = replace(phonemes[k], volume=phonemes[k].volume * factor)
+        one = phonemes[k]
+        heard[k] = Phoneme(one.start, one.end, one.ipa, one.stress, one.volume * factor)
     return tuple(heard)
 
 

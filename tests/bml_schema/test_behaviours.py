@@ -8,6 +8,7 @@ from bml_schema import (
     BMLA,
     CORE,
     EXTENSIONS,
+    OWN,
     VOCABULARY,
     Behaviour,
     Block,
@@ -96,7 +97,8 @@ def test_behaviour_refuses_invalid_numbers(cls: type[Behaviour]) -> None:
     for spec in schema_of(cls).attributes.values():
         if spec.value.low is not None and not spec.required:
             for bad in ("nan", "inf", "1e308", "x", "", "99999999999"):
-                extra = f"{spec.name}='{bad}'".replace(f"{{{BMLA}}}", "a:") + f" xmlns:a='{BMLA}'"
+                name = spec.name.replace(f"{{{BMLA}}}", "a:").replace(f"{{{OWN}}}", "o:")
+                extra = f"{name}='{bad}' xmlns:a='{BMLA}' xmlns:o='{OWN}'"
                 assert len(parse(sample(cls, extra=extra)).problems) == 1, (spec.name, bad)
 
 

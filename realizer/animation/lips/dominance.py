@@ -6,6 +6,7 @@ Source: Cohen & Massaro 1993, "Modeling coarticulation in synthetic visual speec
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -85,20 +86,16 @@ def track_of(phonemes: Sequence[Phoneme]) -> Track | None:
     rows[1:-1] = [row._replace(shape=parted) if row.mix == SILENT else row for row in rows[1:-1]]
     begin, end = np.array([row.begin for row in rows]), np.array([row.end for row in rows])
     middle = (end[:-1] + begin[1:]) / 2  # sounds touch, or extend to the middle of a short pause
-    targets, weights = shape_table()
-    mix, shape = np.zeros((len(rows), VISEME_COUNT)), np.zeros((len(rows), len(targets)))
-    for k, row in enumerate(rows):
-        for parts, into in ((row.mix, mix), (row.shape, shape)):
-            for number, amount in parts:
-                into[k, number] = amount
+    facts = np.array([_facts(row.mix, row.shape) for row in rows])
+    mix, target, weight = np.split(facts, (VISEME_COUNT, -len(ARTICULATORS)), axis=1)
     size = np.array([row.size for row in rows])
     vowel = np.array([row.vowel for row in rows])
     return Track(
         begin=np.concatenate((begin[:1], middle)),
         end=np.concatenate((middle, end[-1:])),
         mix=mix,
-        target=shape @ targets,
-        weight=shape @ weights,
+        target=target,
+        weight=weight,
         vowel=vowel,
         size=size,
         effort=np.array([row.effort for row in rows]),
@@ -123,13 +120,25 @@ def _rows(phonemes: Sequence[Phoneme]) -> list[_Row]:
         firm = pressure["sounds"].get(phoneme.ipa[:1], pressure["other"])
         for part in parts:
             until = at + part.share * length
-            row = _Row(at, until, part.mix, part.shape, pressure=firm)
             if part.vowel:
                 size, effort = _size(phoneme, until - at), _effort(phoneme)
-                row = row._replace(vowel=True, size=size, effort=effort)
-            rows.append(row)
+                rows.append(_Row(at, until, part.mix, part.shape, True, size, effort))
+            else:
+                rows.append(_Row(at, until, part.mix, part.shape, pressure=firm))
             at = until
     return rows
+
+
+@lru_cache(maxsize=2048)
+def _facts(mix: Mix, shape: Mix) -> Float64:
+    """Return (15 + 11 + 6,) the visemes, target and weights of a sound."""
+    visemes, (targets, weights) = np.zeros(VISEME_COUNT), shape_table()
+    for number, part in mix:
+        visemes[number] = part
+    parts = np.zeros(len(targets))
+    for number, part in shape:
+        parts[number] = part
+    return np.concatenate((visemes, parts @ targets, parts @ weights))
 
 
 def _next(size: Float64, vowel: Bool) -> Float64:

@@ -21,6 +21,8 @@ OTHER = {
     "language": "nl",
     "cooccurrence": "off",
     "prosody": False,
+    "jaw": 0.5,
+    "lips": 0.5,
     "grace": 0.1,
     "max_planning": 1_000_000,
     "strict_bml": True,

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from realizer.animation.channel import Layer
@@ -31,6 +34,21 @@ SPEECH = '<speech id="x"><text>A &lt;b&gt; &amp; <sync id="m"/>c<sync id="n"/></
 SSML = """<description priority="{}" type="application/ssml+xml"><speak xml:lang="de-DE"
     xmlns="http://www.w3.org/2001/10/synthesis">Eins &amp; <emphasis>zwei <mark name="m"/></emphasis>
     drei</speak></description>"""
+
+
+def test_speech_moves_jaw_and_lips_by_its_attributes_or_the_settings() -> None:
+    given = "xmlns:r='urn:bml-realizer:1' r:jaw='{}' r:lips='{}'"
+
+    def moved(attributes: str, **settings: float) -> tuple[float, float]:
+        world = replace(spoken(2.0), **settings)
+        element = f"<speech id='x' {attributes}><text>ma</text></speech>"
+        found = {c.target.name: np.abs(c.values).max() for c in expand(element, [0.0, 2.0], world)}
+        return float(found["open_jaw"]), float(found["lower_t_midlip"])
+
+    jaw, lips = moved("")
+    assert moved(given.format(1, 1)) == moved(given.format(1, 1), jaw=0, lips=0) == (jaw, lips)
+    assert moved(given.format(0.5, 1)) == moved("", jaw=0.5) == pytest.approx((0.5 * jaw, lips), rel=0.2)
+    assert moved(given.format(1, 0.5)) == moved("", lips=0.5) == pytest.approx((jaw, 0.5 * lips), rel=0.2)
 
 
 def test_speech_request_has_syncs_as_marks() -> None:
