@@ -408,6 +408,7 @@ KINDS: dict[str, Callable[[Author, str], Tag]] = {
     "timeline": _with("timeline", "r", fileName=("no-such.toml", "../out.json")),
     "blink": _with("blink", "r", side=("BOTH", "LEFT"), amount=Author.amount),
     "idle": _with("idle", "r", blinks=Author.amount, motion=Author.amount),
+    "listen": _with("listen", "r", intensity=Author.amount),
     "interrupt": _interrupt,
     "activate": lambda a, id: Tag("bmla", "activate", (("target", a.pick(list(a.known.blocks))),)),
     "parametervaluechange": _change,
