@@ -23,7 +23,7 @@ GROUPS = {
     "face": (
         "face", "faceFacs", "faceLexeme", "faceShift", "facekeyframe", "faps", "fapFile", "timeline", "blink",
     ),
-    "mood": ("emotion", "expression", "mood", "idle"),
+    "mood": ("emotion", "expression", "mood", "idle", "listen"),
     "body": ("gesture", "pointing", "posture", "postureShift", "locomotion"),
 }  # fmt: skip
 QUIET = ("IN_PREP", "LURKING", "IN_EXEC", "DONE")  # states that a chart need not name
