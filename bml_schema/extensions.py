@@ -12,6 +12,7 @@ _AFFECT = number(-1, 1)
 _SEED = integer(0, 2**31 - 1)
 _ACTIVATION = number(0, 7)  # 7 is the maximum on Paul's scale of Whissel's words
 _FAPU = number(-1e5, 1e5)
+EYES = ("WAITING", "LISTENING", "THINKING")
 
 
 @node
@@ -128,12 +129,17 @@ class Idle(Behaviour):
 
     Attributes:
         blinks: the share of its usual blinks, 0 for none.
-        motion: the share of its usual small movements of head and eyes, 0 for none.
+        motion: the share of its usual small movements, 0 for none.
+        liveliness: of these, the share of breathing, drift of the posture, small movements of the face and
+            swallows.
+        eyes: whether they move as usual, as those of a listener, or of someone who thinks.
     """
 
     tag = own("idle")
     blinks: float = attribute(AMOUNT, default=1.0)
     motion: float = attribute(AMOUNT, default=1.0)
+    liveliness: float = attribute(AMOUNT, default=1.0)
+    eyes: str = attribute(one_of(*EYES), default="WAITING")
 
 
 @node

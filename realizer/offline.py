@@ -27,6 +27,7 @@ def realize(
     scene: Mapping[str, Position] | None = None,
     seed: int = 0,
     idle: bool = True,
+    liveliness: float = 1.0,
     language: str = "en-US",
     media: Path | None = None,
     expressions: Path | None = None,
@@ -44,13 +45,14 @@ def realize(
     Args:
         documents: BML text, or several texts; all are submitted at t = 0, in order.
         voice: a voice or its name; None for espeak-ng, or the silent voice if that is not installed.
-        face, deformer, fps, scene, seed, idle, language, media, expressions, cooccurrence, prosody, jaw,
-            lips, mapping, grace, max_planning, strict_bml: as in `realizer.core.options.PlayOptions`.
+        face, deformer, fps, scene, seed, idle, liveliness, language, media, expressions, cooccurrence,
+            prosody, jaw, lips, mapping, grace, max_planning, strict_bml: as in
+            `realizer.core.options.PlayOptions`.
 
     Raises:
         FaceError: no such face.
         TableError: a file of rules, a mapping or an expression that cannot be used.
-        ValueError: `fps` is not a number above 0.
+        ValueError: `fps` is not a number above 0, or `liveliness` not one from 0 to 1.
         VoiceError: the named voice is not installed.
     """
     options = PlayOptions(
@@ -60,6 +62,7 @@ def realize(
         scene=scene,
         seed=seed,
         idle=idle,
+        liveliness=liveliness,
         language=language,
         media=media,
         expressions=expressions,

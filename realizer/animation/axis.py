@@ -6,9 +6,11 @@ from typing import NamedTuple
 from realizer import tables
 
 # Each has a mask channel (0..1), which suppresses other sources of the region: speech masks the lips, a
-# temporary gaze masks eyes and head for the base gaze, a document masks blinks and small idle movements, and
-# the successive mixer masks the action units for the additive one.
-MASKED_REGIONS = ("lips", "eyes", "head", "blinks", "motion", "successive")
+# temporary gaze masks eyes and head for the base gaze, a document masks blinks, small idle movements, slow
+# idle motion and the usual saccades (by those of a listener or a thinker), and the successive mixer masks the
+# action units for the additive one.
+IDLE_MASKS = ("blinks", "motion", "life", "listening", "thinking")
+MASKED_REGIONS = ("lips", "eyes", "head", *IDLE_MASKS, "successive")
 
 
 class Target(NamedTuple):
@@ -79,7 +81,7 @@ def region(target: Target) -> str:
     if name == "successive" or name.startswith("rank "):
         return "face"
     if name in MASKED_REGIONS:
-        return {"lips": "face", "blinks": "idle", "motion": "idle"}.get(name, name)
+        return "idle" if name in IDLE_MASKS else "face" if name == "lips" else name
     if not name.rstrip("LR").isdigit():
         number = next(row.fap for row in tables.faps() if row.name == name)
         return "eyes" if 23 <= number <= 28 else "head" if 48 <= number <= 50 else "face"

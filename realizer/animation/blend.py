@@ -7,11 +7,12 @@ from functools import cache
 import numpy as np
 
 from realizer import tables
-from realizer.animation.axis import AU_NAMES, au, axis, mask_channel, region
+from realizer.animation.axis import AU_NAMES, axis, region
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.curves import Samples, sample, samples, weights
 from realizer.animation.frames import AUFrames
-from realizer.animation.idle.motion import Idle
+from realizer.animation.idle.idle_face import Idle
+from realizer.animation.idle.idle_layer import idle_layer, lids, motion_left
 from realizer.core import work
 from realizer.core.array_types import Float32, Float64
 from realizer.tables.cooccurrence import Rules
@@ -20,6 +21,9 @@ from realizer.tables.cooccurrence import Rules
 REPLACING = (Layer.FAPS, Layer.DIRECT)
 # Layers that are summed separately before they join the others.
 SEPARATE = (Layer.BASE, Layer.GAZE)
+
+# Small movements of an idle face yield to what is shown in the same part of the face, all at this intensity.
+YIELDS = 0.02
 
 # Channels that are sampled at once; others have their turn after so many.
 TOGETHER = 256
@@ -56,7 +60,7 @@ def blend(
     # Only columns that move are computed; `place` holds the row of each of them.
     moved = {channel.target.column for channel in visible}
     if idle is not None:
-        moved |= {*idle.motion.columns, *_lids()}
+        moved |= {*idle.motion.columns, *lids(), *(() if idle.life is None else idle.life.face)}
     columns = sorted(moved)
     place = {column: i for i, column in enumerate(columns)}
     values, base, gaze = _layers(visible, idle, place, times)
@@ -103,8 +107,9 @@ def _layers(
         apart = layer if adds[-1] and layer in SEPARATE else Layer.EXPRESSION
         rows.append(layers.setdefault(apart, len(layers)) * len(place) + place[column])
     whole = np.zeros((len(layers), len(place), len(times)))
-    if idle is not None:
-        _begin_idle(whole[0], idle, channels, place, times)
+    alone = None if idle is None else idle_layer(idle, channels, times)
+    if alone is not None:
+        whole[0, [place[column] for column in alone.columns]] = alone.values
     for first in range(0, len(own), TOGETHER):
         part = slice(first, first + TOGETHER)
         work.count(10 * len(own[part]))
@@ -116,6 +121,13 @@ def _layers(
         summed, strongest = adding.nonzero()[0], (~adding).nonzero()[0]
         np.add.at(whole.reshape(-1), at[summed], values[summed])
         np.maximum.at(whole.reshape(-1), at[strongest], values[strongest])
+    if alone is not None and alone.face:
+        driven = {channel.target.column for channel in own}
+        for own_rows, columns in alone.areas:
+            if shown := [place[column] for column in columns & driven]:
+                alone.small[own_rows] *= 1.0 - np.minimum(whole[:, shown].max(axis=(0, 1)) / YIELDS, 1.0)
+        face = [place[column] for column in alone.face]
+        whole[0, face] = np.maximum(whole[0, face], alone.small)
     one, base, gaze = (
         whole[layers[layer]] if layer in layers else None for layer in (Layer.EXPRESSION, *SEPARATE)
     )
@@ -143,34 +155,12 @@ def _share_regions(gaze: Float64, base: Float64 | None, place: dict[int, int]) -
             base[part] *= 1.0 - np.minimum(share, 1.0)
 
 
-def _begin_idle(
-    values: Float64, idle: Idle, channels: list[Channel], place: dict[int, int], times: Float64
-) -> None:
-    """Write blinks and idle motion, as far as no channel masks them, into rows that are still 0."""
-    blinks = idle.blinks
-    column = mask_channel("blinks").column
-    if fewer := [channel for channel in channels if channel.target.column == column]:
-        blinks = blinks.reduced(1.0 - sample(fewer, blinks.onsets).sum(axis=0))
-    values[[place[lid] for lid in _lids()]] = blinks.at(times)
-    moved = idle.motion.at(times)
-    if (still := _idle_weight(channels, times)) is not None:
-        moved *= still
-    values[[place[column] for column in idle.motion.columns]] = moved
-
-
 def _idle_share(found: Samples, own: list[Channel], channels: list[Channel], times: Float64) -> Float64:
     """Return the sampled values (e,), with the mask "motion" applied to the idle layer."""
     idle = [channel.layer is Layer.IDLE for channel in own]
-    if any(idle) and (still := _idle_weight(channels, times)) is not None:
+    if any(idle) and (still := motion_left(channels, times)) is not None:
         return found.values * np.where(found.spread(np.array(idle)), still[found.frames], 1.0)
     return found.values
-
-
-def _idle_weight(channels: list[Channel], times: Float64) -> Float64 | None:
-    """Return the weight (n,) of idle motion that the mask "motion" leaves, or None for all of it."""
-    column = mask_channel("motion").column
-    taking = [channel for channel in channels if channel.target.column == column]
-    return 1.0 - np.minimum(sample(taking, times).sum(axis=0), 1.0) if taking else None
 
 
 def _override(
@@ -195,12 +185,6 @@ def _override(
             values += shown
             overridden = 1.0 - left if overridden is None else 1.0 - (1.0 - overridden) * left
     return overridden
-
-
-@cache
-def _lids() -> tuple[int, ...]:
-    """Return the columns of blinks."""
-    return tuple(lid.column for lid in au(45))
 
 
 @cache

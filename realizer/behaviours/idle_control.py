@@ -1,4 +1,4 @@
-"""idle: scales the blinks and small movements of a face."""
+"""idle: scales the blinks and small movements of a face, and chooses where its eyes look."""
 
 from __future__ import annotations
 
@@ -7,27 +7,33 @@ import numpy as np
 from bml_schema import Idle
 from realizer.animation.axis import mask_channel
 from realizer.animation.channel import Channel, Layer
-from realizer.animation.idle.blinks import BlinkReduction
+from realizer.animation.idle.blinks import OnsetMask
 from realizer.behaviours.kind import BehaviourKind, PlanningContext, claiming
 from realizer.behaviours.table_timing import table_timing
 from realizer.core.array_types import Float64
 
 
 def expand(node: Idle, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
-    """Return channels that reduce blinks and motion from start to end, and stay.
+    """Return channels that mask parts of the idle motion from start to end, and stay.
 
-    Both channels exist even without a reduction: they replace an earlier one.
+    All exist even if they mask nothing: they replace earlier ones.
     """
+    masks: list[tuple[type[Channel], str, float]] = [
+        (OnsetMask, "blinks", 1.0 - node.blinks),
+        (Channel, "motion", 1.0 - node.motion),
+        (Channel, "life", 1.0 - node.liveliness),
+        *((OnsetMask, name, float(node.eyes == name.upper())) for name in ("listening", "thinking")),
+    ]
     return tuple(
         channel(
             mask_channel(name),
             times,
-            np.array([0.0, 1.0 - part]),
+            np.array([0.0, masked]),
             layer=Layer.BASE,
             keeps_last=True,
             source=node.id,
         )
-        for channel, name, part in ((BlinkReduction, "blinks", node.blinks), (Channel, "motion", node.motion))
+        for channel, name, masked in masks
     )
 
 

@@ -105,6 +105,13 @@ def parse_size(context: click.Context, parameter: click.Parameter, value: str) -
 
 
 fps = click.option("--fps", type=Number(0, 240, min_open=True), help="Frames per second.  [default: 25]")
+liveliness = click.option(
+    "--liveliness",
+    metavar="0..1",
+    type=Number(0, 1),
+    help="How much an idle face breathes, changes its posture and varies its blinks; 0 with --no-idle.  "
+    "[default: 1]",
+)
 size = click.option(
     "--size",
     metavar="WxH",

@@ -32,6 +32,7 @@ performance_options = options.several(
     options.background,
     click.option("--seed", type=int, help="Seed of idle motion: equal seeds give equal files.  [default: 0]"),
     click.option("--no-idle", is_flag=True, help="No blinks or small head motion of an idle face."),
+    options.liveliness,
     options.prosody,
     options.jaw,
     options.lips,

@@ -74,6 +74,7 @@ def setting_options(*rows: tuple[str, str]) -> Callable[[options.Command], optio
 @options.expressions
 @setting_option("seed", "N")
 @click.option("--idle/--no-idle", default=None, help="Blinks and small head motion of an idle face.")
+@options.liveliness
 @options.prosody
 @options.jaw
 @options.lips

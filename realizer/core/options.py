@@ -19,6 +19,8 @@ class PlayOptions:
         scene: target name -> (x, y, z) in metres, origin between the eyes; None: no scene declared.
         seed: of all random motion; the same seed gives the same frames.
         idle: whether the face blinks and its head moves slightly.
+        liveliness: 0..1: how much an idle face breathes, changes its posture and moves single muscles, and
+            how much its blinks vary; needs `idle`.
         language: BCP-47 tag of speech without xml:lang.
         media: folder of the files that documents may refer to; None: they may not.
         expressions: folder of a user's expressions, which override built-in ones.
@@ -32,7 +34,7 @@ class PlayOptions:
         strict_bml: whether documents are read as BML 1.0 only, without dialects.
 
     Raises:
-        ValueError: `fps` is not a number above 0.
+        ValueError: `fps` is not a number above 0, or `liveliness` not one from 0 to 1.
     """
 
     face: str = "default"
@@ -41,6 +43,7 @@ class PlayOptions:
     scene: Mapping[str, tuple[float, float, float]] | None = None
     seed: int = 0
     idle: bool = True
+    liveliness: float = 1.0
     language: str = "en-US"
     media: Path | None = None
     expressions: Path | None = None
@@ -56,6 +59,8 @@ class PlayOptions:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.fps) and self.fps > 0):
             raise ValueError(f"fps: wanted a number above 0, got {self.fps}")
+        if not 0.0 <= self.liveliness <= 1.0:
+            raise ValueError(f"liveliness: wanted a number 0..1, got {self.liveliness}")
 
 
 DEFAULTS = PlayOptions()

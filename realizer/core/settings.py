@@ -322,6 +322,9 @@ class Settings:
     expressions: Path | None = _row(None, _folder, "folder of a user's expressions; none: only built-in ones")
     seed: int = _row(0, _whole(-(2**63), 2**63 - 1), "seed of idle motion")
     idle: bool = _row(True, _flag, "blinks and small head motion")
+    liveliness: float = _row(
+        1.0, _real(0, 1), "how much an idle face breathes, changes its posture and varies its blinks, 0 to 1"
+    )
     cooccurrence: str = _row(
         "on", _switch_or_file, "rules for AUs that no face shows together: on, off, or a file"
     )

@@ -17,7 +17,8 @@ from realizer.animation.axis import AU_NAMES, axis
 from realizer.animation.blend import blend
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.frames import AUFrames
-from realizer.animation.idle.motion import Idle, idle_face
+from realizer.animation.idle.gaze_shifts import gaze_shifts
+from realizer.animation.idle.idle_face import Idle, idle_face
 from realizer.animation.idle.prosody import AFTERMATH, KnownMotion, SpeechSpan, phrase_ends, prosody_channels
 from realizer.behaviours.kind import BehaviourKind, PlanningContext, Position
 from realizer.behaviours.registry import KINDS
@@ -80,10 +81,11 @@ class Player(BlockManager):
             library=library_of(options.expressions),
             grace=options.grace,
             max_planning=options.max_planning,
-            liveliness=float(options.idle),
+            liveliness=options.liveliness if options.idle else 0.0,
             animates=animates,
         )
         self.idle = options.idle
+        self.liveliness = options.liveliness
         self.prosody = options.prosody
         self.strict_bml = options.strict_bml
         self.history = history
@@ -275,7 +277,9 @@ class Player(BlockManager):
             known = [KnownMotion(p.not_before, c) for p in blocks for c in p.moving_channels()]
             known += [KnownMotion(c.span[0], c) for c in own]
             channels += prosody_channels(near, first, last, seed, known)
-        return channels, idle_face(first, last, seed, phrase_ends(talk for talk, _ in talks))
+        shifts = gaze_shifts(channels, first, last) if self.liveliness else ()
+        ends = phrase_ends(talk for talk, _ in talks)
+        return channels, idle_face(first, last, seed, ends, liveliness=self.liveliness, shifts=shifts)
 
     @property
     def end(self) -> float:

@@ -213,6 +213,20 @@ def test_prosody_can_be_switched_off() -> None:
     assert wrong.returncode == 2
 
 
+def test_liveliness_can_be_turned_down() -> None:
+    wait = '<bml id="b"><wait id="w" duration="2"/></bml>'
+    usual, alive, calm, wrong = (
+        run("realize", "-", *flags, stdin=wait)
+        for flags in ((), ("--liveliness", "1"), ("--liveliness", "0"), ("--liveliness", "2"))
+    )
+    assert usual.stdout == alive.stdout
+    names, *shown = (json.loads(done.stdout)["au"] for done in (alive, alive, calm))
+    nostrils = [max(row[names["names"].index("38L")] for row in aus["values"]) for aus in shown]
+    assert nostrils[0] > 0.1
+    assert nostrils[1] == 0
+    assert wrong.returncode == 2
+
+
 def test_realize_refuses_a_file_of_rules_that_cannot_be_read(tmp_path: Path) -> None:
     (tmp_path / "rules.toml").write_text("[domination]\nrules = ['5<99']\n")
     done = run("realize", "-", "--cooccurrence", str(tmp_path / "rules.toml"), stdin=GOOD)

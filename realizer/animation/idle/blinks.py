@@ -1,41 +1,43 @@
-"""Blinks of a face, aligned with the ends of its phrases.
+"""Blinks of a face, aligned with the ends of its phrases, with saccades and with large gaze shifts.
 
 Blinks are numbered k = 0, 1, 2, ..., and their random numbers depend on (seed, kind, k) alone, so that any
-two windows of time agree where they overlap.
+two windows of time agree where they overlap. Further blinks, at the ends of phrases and at gaze shifts, have
+random numbers that depend on their time.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
 
+from realizer import tables
 from realizer.animation.channel import Channel
 from realizer.animation.curves import smooth
 from realizer.animation.idle.rng import uniform
-from realizer.core.array_types import Float64
+from realizer.core.array_types import Bool, Float64, Index
 from realizer.speech.accents import prosody_facts
 
-# s between two blinks: log-normal, as measured inter-blink times are; median and limits are our choice.
-BLINK_MEDIAN, BLINK_SPREAD, BLINK_LEAST, BLINK_MOST = 3.8, 0.3, 2.5, 6.0
-# s: lids close faster than they open; they are shut for 0.05 s, at least one frame at 25 fps.
-BLINK_TIMES = np.array([0.0, 0.08, 0.13, 0.3])
-BLINK_VALUES = np.array([0.0, 1.0, 1.0, 0.0])
-BLINK = float(BLINK_TIMES[-1])
+idle_facts = partial(tables.toml_table, "idle.toml")
+LIDS = np.array([0.0, 1.0, 1.0, 0.0])  # at the key times of a blink
+NUMBERED, FURTHER = 310, 320  # the first kinds of random numbers for the shapes of blinks
 
 
 @dataclass(frozen=True, eq=False)
-class BlinkReduction(Channel):
-    """A channel of the mask "blinks"; its span includes the end of the last blink that it suppresses."""
+class OnsetMask(Channel):
+    """A mask that is read at the onset of a blink or saccade.
+
+    Its span includes the end of the last movement whose onset it masks.
+    """
 
     @cached_property
     def span(self) -> tuple[float, float]:
         first, last = super().span
-        return first, last + BLINK
+        return first, last + 4.0  # s: two fixations
 
 
 class PhraseEnd(NamedTuple):
@@ -45,6 +47,24 @@ class PhraseEnd(NamedTuple):
     at: float
 
 
+class GazeShift(NamedTuple):
+    """A gaze shift that begins `at` seconds on the session clock, by `degrees` of eyes and head together."""
+
+    at: float
+    degrees: float
+
+
+class Occasions(NamedTuple):
+    """What moves blinks or adds some: ends of phrases, saccades (k,) and gaze shifts, in order of time."""
+
+    ends: Sequence[PhraseEnd]
+    saccades: Float64
+    shifts: Sequence[GazeShift]
+
+
+NOTHING = Occasions((), np.zeros(0), ())
+
+
 @dataclass(frozen=True, eq=False)
 class Blinks:
     """The blinks in a span of time.
@@ -52,70 +72,152 @@ class Blinks:
     Attributes:
         onsets: (b,) float64 seconds.
         draws: (b,) 0..1, random; a blink is shown if the wanted part of blinks exceeds its draw.
+        keys: (4, b) seconds from the onset: lids begin to move, are closed, begin to open, are open.
+        amounts: (b,) 0..1 how far the lids close.
+        lags: (b,) seconds by which the right lid is later than the left one; if negative, the left one is.
     """
 
     onsets: Float64
     draws: Float64
+    keys: Float64
+    amounts: Float64
+    lags: Float64
+
+    def only(self, kept: Bool) -> Blinks:
+        """Return the blinks where `kept` (b,) is true."""
+        return Blinks(*(values[..., kept] for values in vars(self).values()))
+
+    def together(self, other: Blinks) -> Blinks:
+        """Return these blinks and others."""
+        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
+        return Blinks(*(np.concatenate(pair, axis=-1) for pair in pairs))
 
     def reduced(self, part: Float64) -> Blinks:
         """Return a random part (b,), 0..1, of the blinks; each is kept whole or not at all."""
-        kept = part > self.draws
-        return Blinks(self.onsets[kept], self.draws[kept])
+        return self.only(part > self.draws)
+
+    @property
+    def ends(self) -> Float64:
+        """(b,) the seconds at which both lids are open again."""
+        latest: Float64 = self.onsets + self.keys[-1] + np.abs(self.lags)
+        return latest
 
     def at(self, times: Float64) -> Float64:
-        """Return how far the lids are shut, (n,) 0..1, at times (n,), not falling."""
-        shut = np.zeros(len(times))
-        firsts, lasts = times.searchsorted(self.onsets), times.searchsorted(self.onsets + BLINK)
-        for onset, first, last in zip(self.onsets.tolist(), firsts.tolist(), lasts.tolist(), strict=True):
-            seen = shut[first:last]
-            np.maximum(seen, np.interp(times[first:last] - onset, BLINK_TIMES, BLINK_VALUES), out=seen)
-        return smooth(shut)
+        """Return how far the left and the right lid are shut, (2, n) 0..1, at times (n,), not falling."""
+        shut = np.zeros((2, len(times)))
+        lids = self.onsets[:, None] + np.maximum(np.stack([-self.lags, self.lags], axis=1), 0.0)
+        firsts, lasts = times.searchsorted(self.onsets).tolist(), times.searchsorted(self.ends).tolist()
+        for k, (first, last) in enumerate(zip(firsts, lasts, strict=True)):
+            if first < last:
+                seen = shut[:, first:last]
+                closed = smooth(np.interp(times[first:last] - lids[k, :, None], self.keys[:, k], LIDS))
+                np.maximum(seen, self.amounts[k] * closed, out=seen)
+        return shut
 
 
-def blinks_between(start: float, end: float, seed: int, ends: Sequence[PhraseEnd] = ()) -> Blinks:
+@lru_cache(maxsize=64)
+def blink_facts(liveliness: float) -> dict[str, float]:
+    """Return the values of the section "blinks" of `idle.toml` at a liveliness."""
+    pairs = idle_facts()["blinks"].items()
+    return {name: still + liveliness * (alive - still) for name, (still, alive) in pairs}
+
+
+def blinks_between(
+    start: float, end: float, seed: int, occasions: Occasions = NOTHING, liveliness: float = 0.0
+) -> Blinks:
     """Return the blinks visible in start..end, seconds on the session clock; the first is after 0.
 
     Args:
         seed: of the character.
-        ends: the ends of its phrases, in order of time; a blink near one is moved there.
+        occasions: what moves blinks, or adds some.
+        liveliness: 0..1; see `idle.toml`.
     """
-    moved = prosody_facts()["blinks"]["reach"] + prosody_facts()["blinks"]["delay"] if ends else 0.0
+    limits, moves = idle_facts()["blink_limits"], prosody_facts()["blinks"]
+    reach = limits["longest"] + moves["reach"] + moves["delay"]
     count = 64
-    while (drawn := _draws(seed, count))[0, -1] <= end + moved:
+    while (drawn := _draws(seed, count, liveliness))[0, -1] <= end + reach:
         count *= 2
-    first, last = drawn[0].searchsorted((start - BLINK - moved, end + moved), "right")
+    first, last = drawn[0].searchsorted((start - reach, end + reach), "right").tolist()
+    first = max(first - 1, 0)  # it may wait for what the next one waits for
     onsets, draws, late = drawn[:, first:last]
-    if ends:
-        onsets = np.array(
-            [_blink_time(at, part, ends) for at, part in zip(onsets.tolist(), late.tolist(), strict=True)]
-        )
-        seen = (onsets + BLINK >= start) & (onsets <= end)
-        onsets, draws = onsets[seen], draws[seen]
-    return Blinks(onsets, draws)
+    blinks = Blinks(onsets, draws, *_shapes(seed, first, last, liveliness))
+    if occasions is not NOTHING:
+        due = [_due(*one, occasions, liveliness) for one in zip(onsets.tolist(), late.tolist(), strict=True)]
+        waits = [target for target, _ in due]
+        further = _further(start - limits["longest"], end, seed, occasions, set(waits), liveliness)
+        onsets = np.array([onset for _, onset in due])
+        kept = np.array([not k or at is None or at != waits[k - 1] for k, at in enumerate(waits)], bool)
+        for onset in further.onsets.tolist():
+            kept &= (onsets <= onset) | (onsets >= onset + limits["clear"])
+        blinks = replace(blinks, onsets=onsets).only(kept).together(further)
+    return blinks.only((blinks.ends >= start) & (blinks.onsets <= end))
 
 
-def _blink_time(at: float, late: float, ends: Sequence[PhraseEnd]) -> float:
-    """Return the time of a blink due `at`: the nearest end of a phrase of a speech that has begun by then.
+def _due(at: float, late: float, occasions: Occasions, liveliness: float) -> tuple[float | None, float]:
+    """Return the moment that a blink due `at` waits for, or None, and its onset.
 
-    No blink depends on another one, so that past blinks can be forgotten.
+    It waits for the nearest end of a phrase of a speech that has begun by then, or else of a long fixation.
+    No blink depends on later ones, so that past blinks can be forgotten.
     """
-    facts = prosody_facts()["blinks"]
-    first = bisect_left(ends, at - facts["reach"], key=lambda end: end.at)
-    last = bisect_left(ends, at + facts["reach"], lo=first, key=lambda end: end.at)
-    near = [end for end in ends[first:last] if end.since <= at]
-    if not near:
-        return at
-    # A later speech must not move a blink that may have been shown.
-    best = min(near, key=lambda end: (end.since, abs(end.at - at)))
-    return best.at + late * float(facts["delay"])
+    moves, limits = prosody_facts()["blinks"], idle_facts()["blink_limits"]
+    first = bisect_left(occasions.ends, at - moves["reach"], key=lambda end: end.at)
+    last = bisect_left(occasions.ends, at + moves["reach"], lo=first, key=lambda end: end.at)
+    near = [end for end in occasions.ends[first:last] if end.since <= at]
+    if near:
+        # A later speech must not move a blink that may have been shown.
+        best = min(near, key=lambda end: (end.since, abs(end.at - at)))
+        return best.at, best.at + late * float(moves["delay"])
+    if late < blink_facts(liveliness)["fixation"]:
+        first, last = np.searchsorted(occasions.saccades, (at - limits["near"], at + limits["near"])).tolist()
+        saccades = occasions.saccades[max(first - 1, 0) : last]
+        long = saccades[1:][np.diff(saccades) > limits["fixation"]]
+        if len(long):
+            return float(long[0]), float(long[0])
+    return None, at
+
+
+def _further(
+    start: float, end: float, seed: int, occasions: Occasions, taken: set[float | None], liveliness: float
+) -> Blinks:
+    """Return blinks at the ends of phrases that no blink has `taken`, and at gaze shifts."""
+    facts, (least, most) = blink_facts(liveliness), idle_facts()["blink_limits"]["shift"]
+    delay = float(prosody_facts()["blinks"]["delay"])
+    found = [(e.at, facts["phrase"], delay) for e in occasions.ends if e.at not in taken]
+    sizes = ((shift.at, (shift.degrees - least) / (most - least)) for shift in occasions.shifts)
+    found += [(at, facts["shift"] * min(part, 1.0), 0.0) for at, part in sizes if part > 0.0]
+    at, chances, delays = np.array([one for one in found if start - delay <= one[0] <= end]).reshape(-1, 3).T
+    numbers = np.round(at * 1000.0).astype(np.int64)
+    chance, draws, late = uniform(seed, range(FURTHER - 3, FURTHER), numbers)
+    blinks = Blinks(at + late * delays, draws, *_shape(seed, FURTHER, numbers, liveliness))
+    return blinks.only(chance < chances)
+
+
+@lru_cache(maxsize=256)
+def _shapes(seed: int, first: int, last: int, liveliness: float) -> tuple[Float64, Float64, Float64]:
+    return _shape(seed, NUMBERED, np.arange(first, last), liveliness)
+
+
+def _shape(seed: int, kind: int, numbers: Index, liveliness: float) -> tuple[Float64, Float64, Float64]:
+    """Return keys, amounts and lags of blinks."""
+    facts, limits = blink_facts(liveliness), idle_facts()["blink_limits"]
+    *length, partial, amount, lag = uniform(seed, range(kind, kind + 6), numbers)
+    # The sum of three draws is nearly normal; its standard deviation is a half.
+    lengths = np.clip(1.0 + facts["vary"] * 2.0 * (sum(length) - 1.5), 0.5, 1.5)
+    keys = np.array([0.0, facts["closed"], facts["opens"], facts["ends"]])[:, None] * lengths
+    least, most = limits["partly"]
+    amounts = np.where(partial < facts["partial"], least + (most - least) * amount, 1.0)
+    side = 2.0 * lag - 1.0
+    return keys, amounts, facts["lag"] * np.copysign((1.0 + 2.0 * np.abs(side)) / 3.0, side)
 
 
 @lru_cache(maxsize=64)
-def _draws(seed: int, count: int) -> Float64:
+def _draws(seed: int, count: int, liveliness: float) -> Float64:
     """Return (3, count) for the first blinks: rising seconds at which they are due, two random numbers."""
-    normal, turn, draw, late = uniform(seed, (301, 302, 304, 305), np.arange(count))
+    facts, (least, most) = blink_facts(liveliness), idle_facts()["blink_limits"]["again"]
+    normal, turn, draw, late, again, soon = uniform(seed, (301, 302, 304, 305, 307, 308), np.arange(count))
     # Box-Muller: two uniform numbers make a normal one.
     normal = np.sqrt(-2.0 * np.log1p(-normal)) * np.cos(2.0 * np.pi * turn)
-    gaps = np.clip(BLINK_MEDIAN * np.exp(BLINK_SPREAD * normal), BLINK_LEAST, BLINK_MOST)
+    gaps = np.clip(facts["median"] * np.exp(facts["spread"] * normal), facts["least"], facts["most"])
+    gaps = np.where(again < facts["double"], least + (most - least) * soon, gaps)
     gaps[0] *= uniform(seed, 303, np.arange(1))[0]  # so that not all characters blink first at the same time
     return np.stack([np.cumsum(gaps), draw, late])

@@ -1,22 +1,24 @@
-"""Idle motion of a face: blinks, small head motion, saccades.
+"""Idle motion of head and eyes: sway and saccades.
 
 It is a function of (seed, time) alone. Movements are numbered k = 0, 1, 2, ..., and their random numbers
 depend on (seed, kind, k), so that any two windows of time agree where they overlap.
 """
 
+from __future__ import annotations
+
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from functools import lru_cache
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, lru_cache
 
 import numpy as np
 
 from realizer import tables
 from realizer.animation.axis import au
 from realizer.animation.curves import smooth
-from realizer.animation.idle.blinks import Blinks, PhraseEnd, blinks_between
+from realizer.animation.idle.blinks import idle_facts
 from realizer.animation.idle.rng import uniform
-from realizer.core.array_types import Float64, Index
+from realizer.core.array_types import Bool, Float64, Index
 
 # Small head motion (our values): a new pose every 1.9 s, within the given degrees. AUs: (negative, positive).
 SWAY_PERIOD = 1.9  # s
@@ -46,6 +48,8 @@ class Motion:
         durations: (j,) seconds of saccades.
         points, leaps: (e, j) 0..1: the points of fixation, added to the last e columns, and their differences
             to the one before.
+        aims: (2, j) degrees: the points of fixation, directions as in `SACCADE`.
+        seed, number: of the character, and of the first saccade.
     """
 
     columns: tuple[int, ...]
@@ -58,6 +62,21 @@ class Motion:
     durations: Float64
     points: Float64
     leaps: Float64
+    aims: Float64
+    seed: int
+    number: int
+
+    def looking(self, patterns: Mapping[str, Bool]) -> Motion:
+        """Return the motion with other points of fixation.
+
+        Args:
+            patterns: "listening" or "thinking" -> (j,) whether it holds at each saccade.
+        """
+        aims = self.aims
+        for name, held in patterns.items():
+            aims = np.where(held, _pattern(self.seed, name, self.number, len(held)), aims)
+        durations, points, leaps = _looks(aims)
+        return replace(self, durations=durations, points=points, leaps=leaps, aims=aims)
 
     def at(self, times: Float64) -> Float64:
         """Return the columns, (m, n) 0..1, at times (n,), not falling, within the span."""
@@ -80,24 +99,9 @@ def _latest(keys: Float64, times: Float64) -> Index:
     return np.maximum(keys.searchsorted(times, "right") - 1, 0)
 
 
-@dataclass(frozen=True, eq=False)
-class Idle:
-    """The idle animation of a face in a span of time."""
-
-    blinks: Blinks
-    motion: Motion
-
-
-def idle_face(start: float, end: float, seed: int, ends: Sequence[PhraseEnd] = ()) -> Idle:
-    """Return blinks, head sway and saccades.
-
-    Args:
-        start, end: seconds on the session clock, both included.
-        seed: of the character.
-        ends: the ends of its phrases, in order of time; a blink near one is moved there.
-    """
-    sways, jumps = _numbers(start, end, SWAY_PERIOD), _numbers(start, end, SACCADE_PERIOD)
-    return Idle(blinks_between(start, end, seed, ends), _motion(seed, sways, jumps))
+def motion_between(start: float, end: float, seed: int) -> Motion:
+    """Return the motion of head and eyes from start to end, seconds on the session clock, both included."""
+    return _motion(seed, _numbers(start, end, SWAY_PERIOD), _numbers(start, end, SACCADE_PERIOD))
 
 
 def _numbers(start: float, end: float, period: float) -> tuple[int, int]:
@@ -115,15 +119,14 @@ def _motion(seed: int, sways: tuple[int, int], jumps: tuple[int, int]) -> Motion
         column: (way, values)
         for way, sides in enumerate(SWAY)
         for moved in (sides, COUNTER.get(sides, ()))
-        for column, values in _turn(moved, degrees[way])
+        for column, values in turned(moved, degrees[way])
     }
     # A saccade moves both directions at the same instant.
     looks = [(10, 11 + kind, most) for kind, most in enumerate(SACCADE.values())]
     times, aims = _poses(seed, looks, jumps, SACCADE_PERIOD)
-    leaps = np.hypot(*np.diff(aims, prepend=aims[:, :1]))
-    looks_at = dict(pair for sides, row in zip(SACCADE, aims, strict=True) for pair in _turn(sides, row))
-    columns = (*(column for column in poses if column not in looks_at), *looks_at)
-    values, points = np.array([poses[column][1] for column in columns]), np.array(list(looks_at.values()))
+    saccades = _looks(aims)
+    columns = motion_columns()
+    values = np.array([poses[column][1] for column in columns])
     return Motion(
         columns,
         keys,
@@ -132,13 +135,42 @@ def _motion(seed: int, sways: tuple[int, int], jumps: tuple[int, int]) -> Motion
         np.diff(values, append=values[:, -1:]),
         np.array([poses[column][0] for column in columns]),
         times[0],
-        SACCADE_LEAST + SACCADE_DEGREE * leaps,
-        points,
-        np.diff(points, prepend=points[:, :1]),
+        *saccades,
+        aims,
+        seed,
+        jumps[0],
     )
 
 
-def _turn(sides: Sequence[int], degrees: Float64) -> Iterator[tuple[int, Float64]]:
+@cache
+def motion_columns() -> tuple[int, ...]:
+    """Return the columns of AU51-56 and, last, AU61-64."""
+    return tuple(au(number)[0].column for sides in (*SWAY, *SACCADE) for number in sides)
+
+
+def _looks(aims: Float64) -> tuple[Float64, Float64, Float64]:
+    """Return durations, points and leaps of saccades to `aims`, (2, j) degrees."""
+    points = np.array(
+        [row for sides, way in zip(SACCADE, aims, strict=True) for _, row in turned(sides, way)]
+    )
+    durations = SACCADE_LEAST + SACCADE_DEGREE * np.hypot(*np.diff(aims, prepend=aims[:, :1]))
+    return durations, points, np.diff(points, prepend=points[:, :1])
+
+
+def _pattern(seed: int, name: str, first: int, count: int) -> Float64:
+    """Return the points, (2, count) degrees as in `SACCADE`, at which a listening or thinking face looks."""
+    facts, k = idle_facts()[name], np.arange(first, first + count)
+    place, *spread = uniform(seed, (20,), k // facts["stay"])[0], *uniform(seed, (21, 22), k)
+    shares = np.cumsum([one["share"] for one in facts["places"]])
+    chosen = np.minimum(shares.searchsorted(place * shares[-1], "right"), len(shares) - 1)
+    yaw, pitch, most = (
+        np.array([one[key] for one in facts["places"]])[chosen] for key in ("yaw", "pitch", "spread")
+    )
+    sides, up = (most * (2.0 * draw - 1.0) for draw in spread)
+    return np.stack([yaw + sides, -(pitch + up)])
+
+
+def turned(sides: Sequence[int], degrees: Float64) -> Iterator[tuple[int, Float64]]:
     """Yield column and values of the two AUs that represent signed degrees."""
     for number, sign in zip(sides, (-1.0, 1.0), strict=False):
         most = tables.by_number()[number].degrees

@@ -9,7 +9,7 @@ import numpy as np
 
 from realizer.animation.axis import axis
 from realizer.animation.channel import Channel, Crossfade, Gain, Layer
-from realizer.animation.idle.blinks import BlinkReduction
+from realizer.animation.idle.blinks import OnsetMask
 from realizer.playback.character import BaseShift, Character
 from realizer.playback.player import Player
 from realizer.scheduling.timing import Schedule
@@ -21,7 +21,7 @@ from realizer.server.speech.audio_clips import AudioClips, Clip
 
 VERSION = 1
 STATE, CLIP = "state", "clip:"
-CHANNELS = {"channel": Channel, "fewer": BlinkReduction}
+CHANNELS = {"channel": Channel, "fewer": OnsetMask}
 
 
 @dataclass(eq=False)

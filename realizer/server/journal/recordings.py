@@ -145,8 +145,8 @@ def _write(file: FileIO, line: str) -> None:
 
 # Settings that change what a session shows, or which messages it accepts.
 RECORDED_SETTINGS = (
-    *("face", "deformer", "voice", "language", "fps", "seed", "idle", "prosody", "cooccurrence"),
-    *("jaw", "lips"),
+    *("face", "deformer", "voice", "language", "fps", "seed", "idle", "liveliness", "prosody"),
+    *("jaw", "lips", "cooccurrence"),
     *("mapping", "media", "expressions", "strict_bml", "grace", "max_planning"),
     *("max_document", "max_elements", "max_behaviours", "max_duration", "max_blocks", "max_speech"),
 )

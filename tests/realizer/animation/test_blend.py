@@ -11,8 +11,9 @@ from realizer.animation.axis import AU_NAMES, Target, au, axis, fap, mask_channe
 from realizer.animation.blend import REPLACING, blend
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.fap.conversion import to_fap
-from realizer.animation.idle.blinks import BlinkReduction, Blinks
-from realizer.animation.idle.motion import Idle, Motion, idle_face
+from realizer.animation.idle.blinks import Blinks, OnsetMask
+from realizer.animation.idle.idle_face import Idle, idle_face
+from realizer.animation.idle.motion import Motion
 from realizer.core.array_types import Float64
 
 ONE = np.array([0.0])
@@ -142,8 +143,12 @@ def lid_of(taking: Channel, draw: float, time: float) -> float:
         durations=np.ones(1),
         points=nothing,
         leaps=nothing,
+        aims=np.zeros((2, 1)),
+        seed=0,
+        number=0,
     )
-    idle = Idle(Blinks(np.array([1.0]), np.array([draw])), still)
+    keys = np.array([0.0, 0.08, 0.13, 0.3])[:, None]
+    idle = Idle(Blinks(np.array([1.0]), np.array([draw]), keys, np.ones(1), np.zeros(1)), still)
     return float(blend([taking], np.array([time]), idle=idle).values[0, au(45)[0].column])
 
 
@@ -158,9 +163,9 @@ def test_blend_finishes_a_blink_in_any_window() -> None:
     )
     assert lid_of(soon, 0.0, 1.1) == 1
     # The mask at its onset counts, although it ends before this window.
-    gone = BlinkReduction(
-        mask_channel("blinks"), ONE, np.array([1.0]), layer=Layer.BASE, keeps_last=True
-    ).faded(1.02, 1.1)
+    gone = OnsetMask(mask_channel("blinks"), ONE, np.array([1.0]), layer=Layer.BASE, keeps_last=True).faded(
+        1.02, 1.1
+    )
     assert lid_of(gone, 0.0, 1.11) == 0
 
 
@@ -177,6 +182,18 @@ def test_blend_masks_idle_motion_in_part() -> None:
     assert alone.max() > 0.005
     np.testing.assert_allclose(less, alone / 4, atol=1e-6)
     assert not still_.any()
+
+
+def test_blend_shows_amounts_of_documents_without_small_movements() -> None:
+    times, frown, brow = np.arange(0, 60, 0.04), au(4)[0], au(1)[0]
+    idle = idle_face(0.0, 60.0, 3, liveliness=1.0)
+    shown = Channel(frown, np.array([0.0, 60.0]), np.full(2, 0.03), layer=Layer.EXPRESSION)
+    alone, both = (blend(some, times, idle=idle).values for some in ([], [shown]))
+    assert alone[:, frown.column].max() > 0.03
+    assert both[:, frown.column] == pytest.approx(0.03)
+    assert alone[:, brow.column].max() > 0.03
+    assert not both[:, brow.column].any()
+    np.testing.assert_array_equal(both[:, SMILE.column], alone[:, SMILE.column])
 
 
 def test_blend_adds_a_document_to_idle_motion() -> None:

@@ -20,6 +20,7 @@ OTHER = {
     "idle": False,
     "language": "nl",
     "cooccurrence": "off",
+    "liveliness": 0.5,
     "prosody": False,
     "jaw": 0.5,
     "lips": 0.5,

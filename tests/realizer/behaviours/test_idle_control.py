@@ -72,9 +72,10 @@ def test_idle_motion_fades_and_no_lid_jumps(play) -> None:
     control = f'<own:idle id="i" blinks="0" motion="0" start="{begin}" end="{begin + 0.1}"/>'
     frames = aus(play, control)
     steps = np.abs(np.diff(frames, axis=0)).max(axis=0)
-    assert np.all(steps <= np.abs(np.diff(usual, axis=0)).max(axis=0) + 0.02)
-    np.testing.assert_array_equal(frames[: blinks(usual)[3] + 31, LID], usual[: blinks(usual)[3] + 31, LID])
-    assert not frames[blinks(usual)[3] + 31 :, LID].any()
+    assert np.all(steps <= np.abs(np.diff(usual, axis=0)).max(axis=0) + 0.04)
+    end = blinks(usual)[3] + int((usual[blinks(usual)[3] + 1 :, LID] == 0).argmax()) + 1
+    np.testing.assert_array_equal(frames[:end, LID], usual[:end, LID])
+    assert not frames[end:, LID].any()
 
 
 @pytest.mark.parametrize("late", [-0.06, -0.02, 0.02, 0.1, 0.2])
@@ -95,3 +96,14 @@ def test_idle_frames_live_are_those_offline_when_blinks_return(late: float) -> N
 def test_idle_leaves_blinks_of_the_document(play) -> None:
     frames = aus(play, '<own:idle id="i" blinks="0" start="0" end="0.1"/><own:blink id="k" start="5"/>')
     assert blinks(frames) == [500]
+
+
+def test_idle_eyes_and_liveliness_are_masks(play) -> None:
+    control = '<own:idle id="i" liveliness="{}" eyes="{}" start="0" end="0.1"/>'
+    usual, calm = aus(play, ""), aus(play, control.format(0, "WAITING"))
+    assert usual[10:, AU_NAMES().index("38L")].max() > 0.1
+    assert not calm[10:, AU_NAMES().index("38L")].any()
+    thinks = aus(play, control.format(1, "THINKING"))
+    up, down = (AU_NAMES().index(str(number)) for number in (63, 64))
+    assert np.mean((thinks - usual)[200:, up] - (thinks - usual)[200:, down]) > 0.02
+    np.testing.assert_array_equal(np.delete(thinks, MOVING, 1), np.delete(usual, MOVING, 1))

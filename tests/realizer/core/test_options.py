@@ -17,3 +17,9 @@ def test_play_options_refuse_a_rate_that_is_not_above_0(fps: float) -> None:
 
 def test_play_options_are_25_frames_a_second_with_idle_motion_by_default() -> None:
     assert (PlayOptions().fps, PlayOptions().idle, PlayOptions().prosody) == (25.0, True, True)
+
+
+@pytest.mark.parametrize("liveliness", [-0.1, 1.1, math.nan])
+def test_play_options_refuse_a_liveliness_outside_0_to_1(liveliness: float) -> None:
+    with pytest.raises(ValueError, match=r"liveliness: wanted a number 0\.\.1"):
+        PlayOptions(liveliness=liveliness)

@@ -13,7 +13,7 @@ from realizer.animation.axis import AU_NAMES, au, fap
 from realizer.animation.blend import blend
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.fap.conversion import to_fap
-from realizer.animation.idle.motion import idle_face
+from realizer.animation.idle.idle_face import idle_face
 from realizer.animation.idle.prosody import KnownMotion, SpeechSpan, phrase_ends, prosody_channels
 from realizer.core.array_types import Float64
 from realizer.speech.accents import phrases, prosody_facts

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from realizer.animation.axis import axis
 from realizer.animation.channel import Channel, Crossfade, Gain, Layer
-from realizer.animation.idle.blinks import BlinkReduction
+from realizer.animation.idle.blinks import OnsetMask
 from realizer.core.settings import Settings
 from realizer.playback.character import BaseShift, Character
 from realizer.protocol.wire import ClipPiece, pack_clip
@@ -220,7 +220,7 @@ def channels(draw: st.DrawFn) -> Channel:
     times = draw(TIMES)
     values = st.lists(NUMBER, min_size=len(times), max_size=len(times)).map(np.array)
     gains = draw(st.lists(st.builds(Gain, NUMBER, NUMBER, NUMBER, st.sampled_from(("smooth", "linear")))))
-    return draw(st.sampled_from((Channel, BlinkReduction)))(
+    return draw(st.sampled_from((Channel, OnsetMask)))(
         axis()[draw(st.sampled_from(sorted(axis())))],
         np.array(times),
         draw(values),

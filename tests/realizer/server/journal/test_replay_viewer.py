@@ -222,5 +222,5 @@ def test_viewer_has_later_characters_from_the_first_frame(tmp_path: Path) -> Non
     realization, _ = replay_recording(record)
     first, second = realization.characters.values()
     assert first.faps.values.shape == second.faps.values.shape
-    assert not second.aus.aus[:24, BROW].any()
+    assert second.aus.aus[:24, BROW].max() < 0.15  # no more than an idle face shows
     assert second.aus.aus[40, BROW] == pytest.approx(1)
