@@ -224,7 +224,7 @@ def test_mood_is_below_an_expression(play) -> None:
         f'<own:expression id="e" name="SMILE" intensity="1" {AT.replace("2", "3")}/>'
     )
     assert asked(played, 1.0)["15L"] == pytest.approx(SAD)
-    assert asked(played, 1.0)["12L"] == pytest.approx(0.85)
+    assert asked(played, 1.0)["12L"] == pytest.approx(1.0)
 
 
 @each_row("word", known_words())
