@@ -179,7 +179,10 @@ def _with_closures(begins: Sequence[int], sounds: Sequence[str], pcm: Int16, rat
     mostly = [True, *loud.take([start - 1 for start in begins[1:]], mode="wrap").tolist()]
     for k in range(1, len(begins)):
         before, start = begins[k - 1], begins[k]
-        if mostly[k] or before == start or not sounds[k] or not sounds[k - 1] or _is_vowel(sounds[k]):
+        # In fast speech, the last sounds may begin after the end of the sound.
+        if mostly[k] or before >= min(start, len(loud)):
+            continue
+        if not sounds[k] or not sounds[k - 1] or _is_vowel(sounds[k]):
             continue
         backwards = loud[before:start][::-1]
         still = int(backwards.argmax())  # 0 also if nothing is loud

@@ -30,6 +30,11 @@ def same(a: Utterance, b: Utterance) -> bool:
     return times(a) == times(b) and np.array_equal(a.pcm, b.pcm)
 
 
+def test_espeak_says_fast_sentences(voice: EspeakVoice) -> None:
+    said = voice.say(SpeechRequest("They saw a saw in the hall of the law.", rate=450 / 175))
+    assert said.phonemes[-1].end <= said.duration
+
+
 def test_espeak_duration_is_that_of_the_sound(voice: EspeakVoice) -> None:
     said = voice.say(HELLO)
     assert said.pcm is not None
