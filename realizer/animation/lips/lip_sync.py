@@ -82,11 +82,14 @@ def _mouth(track: Track, times: Float64, style: LipStyle) -> Float64:
 
 def _restyle(target: dict[str, Float64], style: LipStyle) -> None:
     """Scale the movements of the jaw, which carries the lower lip, and the lips' own, in place."""
-    carried = coarticulation()["style"]["carried"] * target["jaw"]
+    facts = coarticulation()["style"]
+    carried = facts["carried"] * target["jaw"]
     target["lower"] -= carried
     target["jaw"] *= style.jaw
-    for name in ("upper", "lower", *ARTICULATORS["rounding"], *ARTICULATORS["spread"]):
+    for name in ARTICULATORS["lips"]:
         target[name] *= style.lips
+    for name in (*ARTICULATORS["rounding"], *ARTICULATORS["spread"]):
+        target[name] *= min(style.lips, 1.0) + facts["further"] * max(style.lips - 1.0, 0.0)
     target["lower"] += style.jaw * carried
 
 
