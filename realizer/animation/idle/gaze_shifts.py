@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import cache
-from typing import TypeAlias
-
-import numpy as np
-import numpy.typing as npt
 
 from realizer import tables
 from realizer.animation.axis import au
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.idle.blinks import GazeShift
-from realizer.core.array_types import Float64
 
 # AUs that turn eyes or head -> direction on the plane: left and up are positive.
 TURNS = {51: 1, 52: -1, 61: 1, 62: -1, 53: 1j, 54: -1j, 63: 1j, 64: -1j}
-Turns: TypeAlias = npt.NDArray[np.complex128]  # on the plane
 STILL = 0.01  # degrees
 SHOWN = 2.0  # s after its begin, in which a shift may matter
 
@@ -28,27 +22,28 @@ def gaze_shifts(channels: Iterable[Channel], start: float, end: float) -> list[G
     Args:
         channels: those of a gaze or a gaze shift share their key times.
     """
-    turns = dict[int, tuple[Float64, Turns]]()
+    turns = dict[int, tuple[list[float], list[complex]]]()
     for channel in channels:
         if channel.layer in (Layer.GAZE, Layer.BASE) and (most := _degrees().get(channel.target.column)):
-            times = channel.times
-            if times[0] <= end and times[-1] >= start - SHOWN:
-                before = turns.get(id(times))
-                turn: Turns = np.multiply(most, channel.values, dtype=np.complex128)
-                turns[id(times)] = times, turn if before is None else before[1] + turn
+            keys = channel.times
+            if keys[0] <= end and keys[-1] >= start - SHOWN:
+                times, turn = turns.get(id(keys)) or (keys.tolist(), [0j] * len(keys))
+                values = zip(turn, channel.values.tolist(), strict=True)
+                turns[id(keys)] = times, [before + most * value for before, value in values]
     found = [shift for times, turn in turns.values() for shift in _shifts(times, turn)]
     return sorted(shift for shift in found if start - SHOWN <= shift.at <= end)
 
 
-def _shifts(times: Float64, turn: Turns) -> list[GazeShift]:
-    """Return the shifts of a gaze: from one key where it rests to the next one."""
-    moves = np.abs(np.diff(turn)) > STILL
-    edges = np.diff(np.concatenate([[0], moves, [0]]).astype(int))
-    firsts, lasts = np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist()
-    return [
-        GazeShift(float(times[first]), float(abs(turn[last] - turn[first])))
-        for first, last in zip(firsts, lasts, strict=True)
-    ]
+def _shifts(times: list[float], turn: list[complex]) -> Iterator[GazeShift]:
+    """Yield the shifts of a gaze: from a key where it rests to the next one."""
+    rest = 0
+    for k in range(1, len(times)):
+        moves = abs(turn[k] - turn[k - 1]) > STILL
+        if not moves or k == len(times) - 1:
+            to = k if moves else k - 1
+            if to > rest:
+                yield GazeShift(times[rest], abs(turn[to] - turn[rest]))
+            rest = k
 
 
 @cache
