@@ -81,7 +81,7 @@ def test_timeline_channels_play_together_and_the_stronger_shows(timeline) -> Non
     second = {"start": 0.5, "entries": [{"expression": "smile", "intensity": 1.0, "duration": 1.3}, SURPRISE]}
     played = timeline(first, second)
     mouth = course(played, "12L")
-    assert mouth[45] == pytest.approx(0.425, abs=1e-5)
+    assert mouth[45] == pytest.approx(0.5, abs=1e-5)
     assert mouth[98] == pytest.approx(0.85, abs=1e-2)
     assert course(played, "1L")[210] > 0.85
     assert played.times("t")["end"] == pytest.approx(2.8)
