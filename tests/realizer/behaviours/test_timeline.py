@@ -82,7 +82,7 @@ def test_timeline_channels_play_together_and_the_stronger_shows(timeline) -> Non
     played = timeline(first, second)
     mouth = course(played, "12L")
     assert mouth[45] == pytest.approx(0.5, abs=1e-5)
-    assert mouth[98] == pytest.approx(0.85, abs=1e-2)
+    assert mouth[98] == pytest.approx(1.0, abs=1e-2)
     assert course(played, "1L")[210] > 0.85
     assert played.times("t")["end"] == pytest.approx(2.8)
 
