@@ -15,7 +15,7 @@ from realizer.animation.axis import AU_NAMES, au, axis, region
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.idle.blinks import PhraseEnd
 from realizer.animation.idle.rng import uniform
-from realizer.animation.idle.speaking_head import head_channels, style_of
+from realizer.animation.idle.speaking_head import SOURCE, head_channels, style_of, turn_channels
 from realizer.core.array_types import Float64
 from realizer.speech.accents import Phrase, phrases, prosody_facts
 from realizer.speech.utterance import Utterance
@@ -27,7 +27,6 @@ AFTERMATH = 2.0
 PITCH, EYES_PITCH, EYES_YAW = (54, 53), (64, 63), (62, 61)
 BROWS = {1, 2, 4}
 BROW_FAPS = range(31, 39)
-SOURCE = "prosody"
 
 
 class SpeechSpan(NamedTuple):
@@ -185,7 +184,7 @@ def _nod(time: float, degrees: float) -> Gesture:
     nod = prosody_facts()["nod"]
     keys = np.array([time - nod["attack"], time, time + nod["relax"]])
     down = np.array([0.0, -degrees, 0.0])
-    return Gesture("head", (*_turn(PITCH, keys, down), *_turn(EYES_PITCH, keys, -down)))
+    return Gesture("head", (*turn_channels(PITCH, keys, down), *turn_channels(EYES_PITCH, keys, -down)))
 
 
 def _raise(time: float, most: float) -> Gesture:
@@ -215,7 +214,10 @@ def _looks_aside(all_phrases: tuple[Phrase, ...], start: float, seed: int) -> It
         pitch = np.interp(pitches[k], (0.0, 1.0), aside["pitch"])
         keys = begin + np.array([0.0, aside["saccade"], away, away + aside["saccade"]])
         curve = np.array([0.0, 1.0, 1.0, 0.0])
-        yield Gesture("eyes", (*_turn(EYES_YAW, keys, yaw * curve), *_turn(EYES_PITCH, keys, pitch * curve)))
+        yield Gesture(
+            "eyes",
+            (*turn_channels(EYES_YAW, keys, yaw * curve), *turn_channels(EYES_PITCH, keys, pitch * curve)),
+        )
 
 
 def _draws(seed: int, kind: int, start: float, count: int, kinds: int = 3) -> list[Float64]:
@@ -225,11 +227,3 @@ def _draws(seed: int, kind: int, start: float, count: int, kinds: int = 3) -> li
     """
     k = round(start * 1000.0) * 65536 + np.arange(count, dtype=np.int64)
     return list(uniform(seed, range(kind, kind + kinds), k))
-
-
-def _turn(sides: tuple[int, int], times: Float64, degrees: Float64) -> Iterator[Channel]:
-    """Yield the channels of signed degrees."""
-    for number, sign in zip(sides, (-1.0, 1.0), strict=True):
-        values = np.maximum(sign * degrees, 0.0) / tables.by_number()[number].degrees
-        if values.any():
-            yield Channel(au(number)[0], times, values, layer=Layer.IDLE, source=SOURCE)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -12,15 +12,13 @@ from realizer import tables
 from realizer.animation.axis import au
 from realizer.animation.channel import Channel, Gain, Layer
 from realizer.animation.curves import sample, smooth
+from realizer.animation.idle.life import TURNS
 from realizer.animation.idle.rng import uniform
 from realizer.core.array_types import Float64
 from realizer.speech.accents import Phrase, phrases, prosody_facts
 from realizer.speech.melody import RATE, Melody, melody
 from realizer.speech.utterance import Utterance
 
-# Signed angles: AUs of (negative, positive). The eyes turn back by as much, to stay on their target.
-YAW, PITCH, ROLL = (52, 51), (54, 53), (56, 55)
-EYES = {YAW: (62, 61), PITCH: (64, 63)}
 SOURCE = "prosody"
 # Kinds of random numbers: times of poses, and their yaw, pitch and roll.
 KINDS = range(480, 484)
@@ -81,16 +79,21 @@ def head_channels(
         return []
     give = prosody_facts()["yield"]["fade"]
     gains = tuple(_gains(claims, give, float(times[0]), float(times[-1])))
-    channels = []
-    for sides, degrees in zip((YAW, PITCH, ROLL), angles, strict=True):
-        for turned, sign in ((sides, 1.0), (EYES.get(sides, ()), -1.0)):
-            for number, direction in zip(turned, (-sign, sign), strict=False):
-                values = np.maximum(direction * degrees, 0.0) / tables.by_number()[number].degrees
-                channel = Channel(
-                    au(number)[0], times, values, "linear", Layer.IDLE, gains=gains, source=SOURCE
-                )
-                channels.append(channel.faded(until, until + give) if until < times[-1] else channel)
-    return channels
+    channels = [
+        channel.changed({"curve": "linear", "gains": gains})
+        for both, degrees in zip(TURNS.values(), angles, strict=True)
+        for sides in both
+        for channel in turn_channels(sides, times, degrees)
+    ]
+    return [channel.faded(until, until + give) for channel in channels] if until < times[-1] else channels
+
+
+def turn_channels(sides: Sequence[int], times: Float64, degrees: Float64) -> Iterator[Channel]:
+    """Yield the channels of signed degrees (n,) at key times (n,), by AUs of (negative, positive)."""
+    for number, sign in zip(sides, (-1.0, 1.0), strict=False):
+        values = np.maximum(sign * degrees, 0.0) / tables.by_number()[number].degrees
+        if values.any():
+            yield Channel(au(number)[0], times, values, layer=Layer.IDLE, source=SOURCE)
 
 
 def _gains(
