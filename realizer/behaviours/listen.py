@@ -1,4 +1,4 @@
-"""listen: nods, raised brows and smiles of somebody who listens."""
+"""listen: the nods, raised brows and smiles of a listener."""
 
 from __future__ import annotations
 

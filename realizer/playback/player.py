@@ -155,7 +155,7 @@ class Player(BlockManager):
         self.timeline.mark_changed()
 
     def hear(self, now: float, *, is_speaking: bool, text: str | None = None, character: int = 0) -> None:
-        """Let a character respond to what another one says.
+        """Add the responses of a character to what another one says.
 
         Args:
             is_speaking: whether the other still speaks: then the character listens.

@@ -182,7 +182,7 @@ class Heard(Message):
     model_config = examples({"type": "heard", "character": "Ada", "speaking": True, "text": "Good morning,"})
 
     type: Literal["heard"]
-    character: str | None = Field(None, max_length=256, description="who listens; default: the first")
+    character: str | None = Field(None, max_length=256, description="the listener; default: the first")
     speaking: bool = Field(description="whether the other speaks now")
     text: str | None = Field(
         None, max_length=10_000, description="what the other has said since the last message"

@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 from realizer.animation.axis import au
 from realizer.animation.curves import sample
-from realizer.behaviours.expressive_channels import express
+from realizer.behaviours.expressive_channels import express, expression_facts, order
 from realizer.behaviours.kind import PlanningContext
 from realizer.behaviours.pose_channels import hold
-from realizer.tables.expression_motion import expression_motion
+from realizer.tables import by_number
 
 JOY = {6: 0.9, 12: 0.8, 25: 0.6}
 LIVELY = PlanningContext(liveliness=1.0, seed=3)
@@ -61,13 +61,13 @@ def test_express_begins_with_the_cheeks_after_the_corners_of_the_mouth() -> None
 
 
 def test_express_makes_one_side_weaker_and_later() -> None:
-    table = expression_motion().asymmetry
+    facts = expression_facts()["asymmetry"]
     sides = set()
     for number in range(40):
         at = values(smile(source=f"smile {number}"), 0.5)
         left, right = at["12L"][0], at["12R"][0]
         less = 1 - min(left, right) / max(left, right)
-        assert table.least <= less <= table.most
+        assert facts["least"] <= less <= facts["most"]
         sides.add(left > right)
     assert sides == {True, False}
 
@@ -75,7 +75,7 @@ def test_express_makes_one_side_weaker_and_later() -> None:
 def test_express_prefers_the_side_of_the_face() -> None:
     stronger = [values(smile(source=f"smile {n}"), 0.5) for n in range(200)]
     left = np.mean([at["12L"][0] > at["12R"][0] for at in stronger])
-    habit = expression_motion().asymmetry.habit
+    habit = expression_facts()["asymmetry"]["habit"]
     assert min(abs(left - habit), abs(1 - left - habit)) < 0.1
 
 
@@ -98,3 +98,14 @@ def test_express_is_the_same_for_the_same_seed_and_id() -> None:
     assert once == again
     other = smile(replace(LIVELY, seed=4))
     assert once != [channel.values.tolist() for channel in other]
+
+
+def test_order_of_onsets_has_known_aus_from_0_to_1() -> None:
+    places = order()
+    assert set(places) <= set(by_number())
+    assert (min(places.values()), max(places.values())) == (0.0, 1.0)
+    assert places[5] < places[1] < places[12] < places[26]
+
+
+def test_expression_facts_name_even_aus() -> None:
+    assert {43, 45} <= set(expression_facts()["asymmetry"]["even"]) <= set(by_number())
