@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Mapping, Sequence
-from functools import cache, partial
+from functools import cache, lru_cache, partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,12 +13,13 @@ from realizer import tables
 from realizer.animation.channel import Channel
 from realizer.animation.idle.rng import uniform
 from realizer.behaviours.kind import PlanningContext
-from realizer.core.array_types import Float64
+from realizer.core.array_types import Float64, Index
 
 expression_facts = partial(tables.toml_table, "expression_motion.toml")
-# Kinds of random numbers: which side is stronger, by how much, how much earlier, depth of the drift, turning
-# points of the drift.
-SIDE, WEAKER, LEAD, DEPTH, TURN = range(9100, 9105)
+# Kinds of random numbers: a face's stronger side, whether it is that of an expression, by how much the other
+# one is weaker, how much earlier it is, depth and turning points of the drift.
+HABIT, SIDE, WEAKER, LEAD, DEPTH, TURN = range(9100, 9106)
+MOST_TURNS = 60  # parts of a hold, between turning points
 
 
 def express(channels: Sequence[Channel], context: PlanningContext) -> tuple[Channel, ...]:
@@ -33,25 +35,24 @@ def express(channels: Sequence[Channel], context: PlanningContext) -> tuple[Chan
     if not channels or context.liveliness <= 0.0:
         return tuple(channels)
     stagger, amount = expression_facts()["stagger"], context.liveliness
-    names = [channel.target.name for channel in channels]
-    aus = [int(name.rstrip("LR")) for name in names]
-    start, peak = channels[0].times[0], channels[0].times[1]
-    relax, end = channels[0].times[-2:]
+    which = _aus(tuple(channel.target.name for channel in channels))
+    keys = np.tile(channels[0].times, (len(channels), 1))
+    start, peak, relax, end = keys[0, [0, 1, -2, -1]].tolist()
     onset = min(amount * stagger["onset"], stagger["share"] * (peak - start))
     offset = min(amount * stagger["offset"], stagger["share"] * (end - relax))
-    factors, leads = _sides(names, aus, channels[0].source, context)
-    leads = np.minimum(leads, stagger["share"] * (peak - start) - onset).clip(0.0)
-    found = []
-    for channel, au, place, factor, lead in zip(channels, aus, _places(aus), factors, leads, strict=True):
-        keys, values = channel.times.copy(), channel.values * factor
-        keys[0] += place * onset
-        keys[1] -= (1 - place) * onset + lead
-        keys[-2] += place * offset
-        keys[-1] -= (1 - place) * offset
-        if au not in expression_facts()["asymmetry"]["even"]:
-            keys, values = _drifting(keys, values, zlib.crc32(channel.target.name.encode()), context)
-        found.append(channel.changed({"times": keys, "values": values}))
-    return tuple(found)
+    id = zlib.crc32(channels[0].source.encode())
+    factors, leads = _sides(which, id, context)
+    values = np.array([channel.values for channel in channels]) * factors[:, None]
+    keys[:, 0] += which.places * onset
+    keys[:, 1] -= (1.0 - which.places) * onset + np.minimum(leads, stagger["share"] * (peak - start) - onset)
+    keys[:, -2] += which.places * offset
+    keys[:, -1] -= (1.0 - which.places) * offset
+    if (count := min(int((relax - peak) / expression_facts()["hold"]["every"]), MOST_TURNS)) > 1:
+        keys, values = _drifting(keys, values, count, amount * which.drifts, context.seed, id)
+    return tuple(
+        channel.changed({"times": own, "values": shown})
+        for channel, own, shown in zip(channels, keys, values, strict=True)
+    )
 
 
 @cache
@@ -61,42 +62,69 @@ def order() -> Mapping[int, float]:
     return {au: rank / (len(groups) - 1) for rank, aus in enumerate(groups) for au in aus}
 
 
-def _places(aus: Sequence[int]) -> Float64:
-    """Return the place of each AU in the order of onsets, from 0 for the first to 1 for the last of these."""
-    places = np.array([order().get(au, 0.5) for au in aus])
+class _Aus(NamedTuple):
+    """The AUs of an expression.
+
+    Attributes:
+        numbers: (n + 1,) 0, for the face itself, and the number of each.
+        places: (n,) in the order of onsets, from 0 for the first to 1 for the last of these.
+        sides: (n,) 1 for the left, -1 for the right one of a pair whose sides differ, otherwise 0.
+        drifts: (n,) 1 for those whose hold drifts, otherwise 0.
+    """
+
+    numbers: Index
+    places: Float64
+    sides: Float64
+    drifts: Float64
+
+
+@lru_cache(maxsize=512)
+def _aus(names: tuple[str, ...]) -> _Aus:
+    """Return the facts about AUs that do not depend on a face."""
+    numbers = np.array([int(name.rstrip("LR")) for name in names])
+    places = np.array([order().get(au, 0.5) for au in numbers.tolist()])
     places -= places.min()
-    return places / most if (most := places.max()) > 0.0 else np.ones(len(places))
+    places = places / most if (most := places.max()) > 0.0 else np.ones(len(places))
+    drifts = np.isin(numbers, expression_facts()["asymmetry"]["even"], invert=True).astype(np.float64)
+    paired = np.array([{f"{au}L", f"{au}R"} <= {*names} for au in numbers.tolist()])
+    sides = drifts * paired * [1.0 if name.endswith("L") else -1.0 for name in names]
+    return _Aus(np.concatenate([[0], numbers]), places, sides, drifts)
 
 
-def _sides(
-    names: Sequence[str], aus: Sequence[int], source: str, context: PlanningContext
-) -> tuple[Float64, Float64]:
+def _sides(which: _Aus, id: int, context: PlanningContext) -> tuple[Float64, Float64]:
     """Return the factor of each AU's value, and by how many seconds it is early, since sides differ."""
-    facts, whole = expression_facts()["asymmetry"], set(names)
-    id = zlib.crc32(source.encode())
-    chance = uniform(context.seed, (WEAKER, LEAD), id + np.array(aus))
-    habit = uniform(context.seed, SIDE, np.array([0]))[0] < 0.5
-    is_habitual = uniform(context.seed, SIDE, np.array([id + 1]))[0] < facts["habit"]
-    strong = "L" if habit == is_habitual else "R"
-    paired = np.array([au not in facts["even"] and {f"{au}L", f"{au}R"} <= whole for au in aus])
-    is_strong = np.array([name.endswith(strong) for name in names])
-    less = context.liveliness * (facts["least"] + (facts["most"] - facts["least"]) * chance[0])
-    lead = context.liveliness * (facts["lead_least"] + (facts["lead_most"] - facts["lead_least"]) * chance[1])
-    return np.where(paired & ~is_strong, 1.0 - less, 1.0), np.where(paired & is_strong, lead, 0.0)
+    facts = expression_facts()["asymmetry"]
+    side, chance, early = uniform(context.seed, (SIDE, WEAKER, LEAD), id + which.numbers)
+    strong = which.sides if (side[0] < facts["habit"]) == _is_left_habitual(context.seed) else -which.sides
+    less = facts["least"] + (facts["most"] - facts["least"]) * chance[1:]
+    lead = facts["lead_least"] + (facts["lead_most"] - facts["lead_least"]) * early[1:]
+    return 1.0 - context.liveliness * less * (strong < 0), context.liveliness * lead * (strong > 0)
+
+
+@lru_cache(maxsize=256)
+def _is_left_habitual(seed: int) -> bool:
+    return bool(uniform(seed, HABIT, np.zeros(1, np.int64))[0] < 0.5)
 
 
 def _drifting(
-    keys: Float64, values: Float64, number: int, context: PlanningContext
+    keys: Float64, values: Float64, count: int, depths: Float64, seed: int, id: int
 ) -> tuple[Float64, Float64]:
-    """Return keys and values with turning points in the hold, which are lower than the held value."""
-    facts, begin, end = expression_facts()["hold"], keys[-3], keys[-2]
-    count = min(int((end - begin) / facts["every"]), facts["most"])
-    if count < 2:
-        return keys, values
-    turns = number + np.arange(count)
-    depth = facts["least"] + (facts["drift"] - facts["least"]) * uniform(context.seed, DEPTH, turns)
+    """Return keys and values, (n, k + count - 1), with turning points in the hold that lower the held value.
+
+    Args:
+        keys, values: (n, k) of each AU.
+        count: of the parts into which turning points divide the hold.
+        depths: (n,) 0..1, scales the drift of each AU.
+    """
+    facts, turns = expression_facts()["hold"], np.arange(1, count)
+    numbers = id + MOST_TURNS * np.arange(len(keys))[:, None] + turns
+    depth, late = uniform(seed, (DEPTH, TURN), numbers.ravel()).reshape(2, *numbers.shape)
     # Turning points between the two ends are low and high in turn, at uneven distances.
-    away = np.arange(1, count) + 0.3 * (uniform(context.seed, TURN, turns[1:]) - 0.5)
-    between = begin + (end - begin) * away / count
-    low = 1.0 - context.liveliness * depth[1:] * np.where(np.arange(1, count) % 2, 1.0, 0.2)
-    return np.insert(keys, -2, between), np.insert(values, -2, values[-2] * low)
+    depth = (facts["least"] + (facts["drift"] - facts["least"]) * depth) * np.where(turns % 2, 1.0, 0.2)
+    begin, end, held = keys[:, -3:-2], keys[:, -2:-1], values[:, -2:-1]
+    between = begin + (end - begin) * (turns + 0.3 * (late - 0.5)) / count
+    lower = held * (1.0 - depths[:, None] * depth)
+    return (
+        np.concatenate([keys[:, :-2], between, keys[:, -2:]], axis=1),
+        np.concatenate([values[:, :-2], lower, values[:, -2:]], axis=1),
+    )
