@@ -43,7 +43,7 @@ TURN = 0.004  # s; so long sessions are woken before the loop looks for messages
 # due than can be done, frames are late and documents are still read.
 READING_SHARE = 0.25
 LONGEST_READING = 0.02  # s
-LONGEST_FRAMES = 0.02  # s; frames that take longer to compute are continued with the documents, in turn
+FRAME_SLICES = 5  # of time; frames that take longer to compute are continued with the documents, in turn
 MOST_WAITING = 100  # messages to a session that plans; then its clients are read more slowly
 SLOW_STEP = 0.05  # s; a step of the loop that takes so long is logged
 EXPIRY_INTERVAL = 5.0  # s; how often expired sessions and due checkpoints are looked for
@@ -360,7 +360,7 @@ class SessionHost:
                 session.update_backlog(run.connection, waiting)
             self._wake_at(session, run.wake_at)
             return
-        self._calls.call(session, functools.partial(self._send_due, session, now), LONGEST_FRAMES)
+        self._calls.call(session, functools.partial(self._send_due, session, now), FRAME_SLICES)
 
     def _send_due(self, session: Session, now: float) -> None:
         try:

@@ -63,8 +63,8 @@ class SlicedCalls(Generic[T]):
         """Return how many calls of the owner have not begun."""
         return len(self._waiting.get(owner, ()))
 
-    def call(self, owner: T, function: Callable[[], None], seconds: float = SLICE) -> None:
-        """Call a function for at most some seconds, or after the earlier calls of its owner.
+    def call(self, owner: T, function: Callable[[], None], slices: int = 1) -> None:
+        """Call a function for at most some slices of time, or after the earlier calls of its owner.
 
         Within a call of the same owner it is called at once. Exceptions are raised here until the first
         pause, and by `resume` after it.
@@ -74,7 +74,7 @@ class SlicedCalls(Generic[T]):
             self._stacks[owner] = stack = self._free.pop() if self._free else _Stack(self._run)
             self._waiting[owner] = deque([function])
             stack.owner = owner
-            self._switch(stack, seconds)
+            self._switch(stack, slices)
         elif stack is getcurrent():
             function()
         else:
@@ -120,8 +120,8 @@ class SlicedCalls(Generic[T]):
         stack.waits_for = None
         return future.result()
 
-    def _switch(self, stack: _Stack, seconds: float = SLICE) -> None:
-        outer, self._end = self._end, self._clock() + seconds
+    def _switch(self, stack: _Stack, slices: int = 1) -> None:
+        outer, self._end = self._end, self._clock() + slices * SLICE
         stack.parent, owner = getcurrent(), stack.owner
         try:
             stack.switch()

@@ -57,6 +57,18 @@ def test_sliced_calls_pause_long_calls(calls) -> None:
     assert (done, calls.is_busy("a")) == ([1], False)
 
 
+def test_sliced_calls_pause_a_call_after_as_many_slices_as_it_may_have(calls) -> None:
+    done: list[int] = []
+    calls.call("a", lambda: (calls.work_for(2.5), done.append(1)), slices=3)
+    assert (done, calls.paused) == ([1], [])
+    calls.call("a", lambda: (calls.work_for(4.5), done.append(2)), slices=3)
+    assert (done, calls.paused) == ([1], ["a"])
+    calls.resume("a")  # then it has one slice at a time
+    assert done == [1]
+    calls.resume("a")
+    assert done == [1, 2]
+
+
 def test_sliced_calls_give_others_their_turn(calls) -> None:
     done: list[str] = []
     for owner, slices in (("long", 5), ("short", 2), ("tiny", 0)):
