@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from math import inf
 from typing import TYPE_CHECKING, NamedTuple
@@ -11,10 +11,13 @@ from realizer.core import work
 from realizer.core.array_types import Float64
 from realizer.scheduling.explain import choose, fault_warning, refusal, warning_of
 from realizer.scheduling.model import TIGHT
-from realizer.scheduling.problem import Member, Part, Problem, problem_of
+from realizer.scheduling.problem import ORIGIN, Member, Part, Problem, problem_of
 from realizer.scheduling.solve import Solution, solve
 from realizer.scheduling.timing import Schedule, Timing, Warning
 from realizer.scheduling.union_find import UnionFind
+
+# Behaviours may begin so much earlier where it is asked how late they are.
+LONG_AGO = 1e6  # s
 
 if TYPE_CHECKING:
     from bml_schema import Block, SyncRef
@@ -163,8 +166,8 @@ def _lateness(problem: Problem, block: str) -> dict[str, float]:
     named = {part.id for part in problem.external}.union(*(part.names for part in problem.external))
     tied = {groups.find(n) for n, part in own.items() if part.id in named}
     own = {n: part for n, part in own.items() if groups.find(n) in tied}
-    anytime = replace(problem, earliest=[-inf if n in own else t for n, t in enumerate(problem.earliest)])
-    outcome = _settle(anytime, block)
+    earliest = [t - LONG_AGO if n in own else t for n, t in enumerate(problem.earliest)]
+    outcome = _settle(replace(problem, earliest=earliest), block)
     if outcome.solution is None:
         return {}
     starts = {
@@ -175,11 +178,36 @@ def _lateness(problem: Problem, block: str) -> dict[str, float]:
     for n, part in own.items():
         too_early = problem.earliest[n] - starts.get(part.id, inf)
         late[groups.find(n)] = max(late.get(groups.find(n), 0.0), too_early)
+    group = [groups.find(number[b.id]) if b.id in number else None for b in outcome.problem.behaviours]
+    for free, later in _room(outcome, group, {g for g, by in late.items() if by > LONG_AGO / 2}).items():
+        late[free] -= later
     return {
         part.id.removeprefix(f"{block}:"): seconds
         for n, part in own.items()
         if (seconds := late[groups.find(n)]) > TIGHT
     }
+
+
+def _room(outcome: _Outcome, group: Sequence[int | None], free: Collection[int]) -> dict[int, float]:
+    """Return by how many seconds each free group, which nothing keeps from starting earlier, can be later.
+
+    Args:
+        group: (behaviours,) the group of each behaviour of the outcome; None for those of no group.
+    """
+    assert outcome.solution is not None
+    time, orders = outcome.solution.time, list[tuple[int, int | None, float]]()
+    for u, v, seconds, *_ in outcome.problem.orders if free else ():
+        before, after = (None if point == ORIGIN else group[outcome.problem.owner[point]] for point in (u, v))
+        if before in free and before is not None and before != after:
+            orders.append((before, after if after in free else None, float(time[v] - time[u]) - seconds))
+    room = dict.fromkeys(free, inf)
+    for _ in work.counted(free):  # each round reaches the groups before those of the last one
+        known = dict(room)
+        for before, after, gap in work.counted(orders):
+            room[before] = min(room[before], gap + (0.0 if after is None else room[after]))
+        if room == known:
+            break
+    return room
 
 
 def _with_lateness(warning: Warning, late: float, grace: float) -> Warning:

@@ -64,8 +64,7 @@ def solve(problem: Problem) -> Solution | list[Conflict]:
     # Remove rounding errors from equalities, orders and earliest starts.
     time = time[model.root] + model.shift
     time[model.first] = np.maximum(time[model.first], model.earliest)
-    with np.errstate(invalid="ignore"):  # behaviours that nothing keeps from starting earlier are at -inf
-        length = time[model.gap + 1] - time[model.gap]
+    length = time[model.gap + 1] - time[model.gap]
     if (length < 0).any():
         for b in np.unique(model.owner[model.gap[length < 0]]).tolist():
             points = slice(model.first[b], model.last[b] + 1)

@@ -250,6 +250,19 @@ def test_schedule_together_delays_what_a_constraint_ties_together() -> None:
     assert dict(found.late) == pytest.approx({"a": 0.2, "b": 0.2})
 
 
+@given(st.floats(0.001, 0.2), st.sampled_from([("start", 0.0), ("end", 0.3)]))
+def test_schedule_together_starts_what_had_to_be_before_at_once(
+    seconds: float, point: tuple[str, float]
+) -> None:
+    body = f"""<wait id="a"/><wait id="b"/><wait id="c"/><constraint><before ref="old:w:end">
+    <sync ref="a:{point[0]}"/></before><before ref="a:start"><sync ref="b:end"/></before></constraint>"""
+    found = late(seconds, body, {"a": lasting(0.3), "b": lasting(0.2), "c": lasting(1.0)}, grace=1.0)
+    assert [found.at(name, "start") for name in "bac"] == pytest.approx([0.0, 0.2, 0.0], abs=1e-9)
+    by = seconds + point[1] + 0.2  # all that a constraint names is equally late
+    assert dict(found.late) == pytest.approx({"a": by, "b": by})
+    assert not found.warnings
+
+
 def test_schedule_together_drops_what_is_late_without_grace() -> None:
     found = late(0.01, '<wait id="a" start="old:w:end"/>', {"a": lasting(1.0)}, grace=0.0)
     assert not found.times
