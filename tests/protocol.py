@@ -79,7 +79,8 @@ FLAGS = (
 CLIP = (
     f"A part of a sound clip: u8 kind 4, u8 version {VERSION}, u16 flags ({FINAL:#x}: the last part), u32 "
     "number of the part, f64 0, u32 rate in Hz of raw mono int16 PCM (0: the parts are a sound file), u8 "
-    "length of the id, the id, sound. Documents refer to it as `clip:ID`."
+    "length of the id, the id, sound. Documents refer to it as `clip:ID`. PCM with the id `heard:CHARACTER` "
+    "is what that character hears."
 )
 ABOUT = (
     "Clients send BML and receive feedback and a moving face. `hello` names the version of the protocol. If "

@@ -10,8 +10,9 @@ import numpy as np
 
 from bml_schema import Listen
 from realizer import tables
-from realizer.animation.axis import au
+from realizer.animation.axis import au, mask_channel
 from realizer.animation.channel import Channel, Layer
+from realizer.animation.idle.blinks import OnsetMask
 from realizer.animation.idle.rng import uniform
 from realizer.behaviours.expressive_channels import express
 from realizer.behaviours.kind import BehaviourKind, PlanningContext
@@ -25,18 +26,25 @@ KINDS_DRAWN = range(9200, 9204)
 DOWN, EYES_UP = 54, 63
 
 
-def expand(node: Listen, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
-    """Return channels of all responses from start to end, which depend on the seed and the id."""
+def expand(
+    node: Listen, times: Float64, context: PlanningContext, *, quiet: float = 0.0
+) -> tuple[Channel, ...]:
+    """Return channels of the eyes and of all responses, which depend on the seed and the id."
+
+    Args:
+        quiet: seconds from the start without a response.
+    """
     facts = tables.toml_table("listening.toml")
     start, end = times.tolist()
     shares = np.cumsum(list(facts["share"].values()))
     counts = np.cumsum(facts["nod"]["counts"])
     channels: list[Channel] = []
-    for begin, kind, size, count in work.counted(_responses(node, start, end, context), 20):
+    for begin, kind, size, count in work.counted(_responses(node, start + quiet, end, context), 20):
         name = list(facts["share"])[min(int(np.searchsorted(shares, kind)), len(shares) - 1)]
         movements = 1 + min(int(np.searchsorted(counts, count)), len(counts) - 1)
         channels += respond(name, begin, size, node.id, context, movements=movements)
-    return tuple(channel for channel in channels if channel.times[-1] <= end)
+    shown = tuple(channel for channel in channels if channel.times[-1] <= end)
+    return (_eyes(start, end, node.id), *shown) if node.intensity > 0.0 else shown
 
 
 def respond(
@@ -62,6 +70,12 @@ def respond(
         Channel(au(n)[0], keys, degrees / tables.by_number()[n].degrees, layer=Layer.HEAD, source=source)
         for n in (DOWN, EYES_UP)
     )
+
+
+def _eyes(start: float, end: float, source: str) -> Channel:
+    """Return the mask with which the eyes stay with the speaker, from start to end."""
+    times, held = np.array([start, end]), np.ones(2)
+    return OnsetMask(mask_channel("listening"), times, held, layer=Layer.BASE, source=source)
 
 
 def _responses(

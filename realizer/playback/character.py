@@ -11,6 +11,7 @@ from realizer.animation.axis import axis, region
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.curves import sample, weights
 from realizer.core import work
+from realizer.speech.voice_activity import VoiceActivity
 
 # Duration of the return to the base face after a release; about that of an expression.
 RELAX = 0.3  # s
@@ -35,13 +36,18 @@ class BaseShift:
 
 @dataclass(eq=False)
 class Character:
-    """The state of a face outside any block."""
+    """The state of a face outside any block.
+
+    Attributes:
+        heard: the voice of another one that the character hears, if its sound is sent.
+    """
 
     id: str | None
     shifts: list[BaseShift] = field(default_factory=list)
     direct: dict[str, Channel] = field(default_factory=dict)
     emotion: dict[str, Channel] = field(default_factory=dict)
     responses: list[Channel] = field(default_factory=list)
+    heard: VoiceActivity | None = None
 
     def add_shifts(self, shifts: Collection[BaseShift]) -> None:
         """Add base states, in order of their begin."""

@@ -9,6 +9,7 @@ import numpy as np
 from bml_schema import Listen
 from realizer import tables
 from realizer.animation.channel import Channel
+from realizer.animation.idle.blinks import OnsetMask
 from realizer.behaviours.kind import PlanningContext
 from realizer.behaviours.listen import expand, respond
 
@@ -31,15 +32,16 @@ def responses(
     """
     facts = tables.toml_table("listening.toml")["heard"]
     found = [channel for channel in known if channel.times[0] <= now]
+    # The eyes listen until the next news, responses that have begun go on to their end.
+    found = [c.changed({"until": min(c.until, now)}) if isinstance(c, OnsetMask) else c for c in found]
     last = (text or "").rstrip()[-1:]
     name, movements = facts.get(last) or ("", 0)
     if not is_speaking and not name:
         name, movements = facts["."]
     begin = now + facts["after"]
-    if name and all(channel.times[-1] <= begin for channel in found):
+    if name and all(min(channel.times[-1], channel.until) <= begin for channel in found):
         found += respond(name, begin, facts["size"], SOURCE, context, movements=movements)
     if is_speaking:
         node = Listen(id=f"{SOURCE} {now:.3f}", intensity=facts["intensity"])
-        times = np.array([now + facts["quiet"], now + facts["quiet"] + facts["horizon"]])
-        found += expand(node, times, context)
+        found += expand(node, np.array([now, now + facts["horizon"]]), context, quiet=facts["quiet"])
     return found

@@ -22,7 +22,7 @@ from realizer.animation.idle.idle_face import Idle, idle_face
 from realizer.animation.idle.prosody import AFTERMATH, KnownMotion, SpeechSpan, phrase_ends, prosody_channels
 from realizer.behaviours.kind import BehaviourKind, PlanningContext, Position
 from realizer.behaviours.registry import KINDS
-from realizer.core.array_types import Float64
+from realizer.core.array_types import Float64, Int16
 from realizer.core.options import DEFAULTS, PlayOptions
 from realizer.expressions.library import library_of
 from realizer.playback.active_block import ScheduledSpeech
@@ -32,6 +32,7 @@ from realizer.playback.character import RELAX, Character
 from realizer.playback.listener import responses
 from realizer.scheduling.timing import UNKNOWN, Schedule
 from realizer.speech.utterance import Recording, SpeechRequest, Utterance
+from realizer.speech.voice_activity import Turn, VoiceActivity
 from realizer.tables.cooccurrence import load_rules
 
 # Frames up to this long before `now` can still be computed.
@@ -165,6 +166,26 @@ class Player(BlockManager):
         context = replace(self.context, seed=self.context.seed + SEED_STEP * character)
         own.responses = responses(own.responses, now, context, is_speaking=is_speaking, text=text)
         self.timeline.mark_changed()
+
+    def hear_sound(
+        self, sound: Int16, rate: int, now: float, *, is_last: bool = False, character: int = 0
+    ) -> None:
+        """Add the responses of a character to the voice of another one.
+
+        Args:
+            sound: (n,) the next samples, mono.
+            rate: Hz.
+            is_last: whether no more sound follows.
+        """
+        own = self._characters[character]
+        if own.heard is None or own.heard.rate != rate:
+            own.heard = VoiceActivity(rate)
+        turns = [*own.heard.add(sound), *(own.heard.end() if is_last else ())]
+        if is_last:
+            own.heard = None
+        for turn in turns:
+            text = "," if turn is Turn.PAUSES else None
+            self.hear(now, is_speaking=turn is not Turn.ENDS, text=text, character=character)
 
     def direct_names(self, character: int = 0) -> tuple[str, ...]:
         """Return the names of the AUs and FAPs that are held directly, or have just been released."""

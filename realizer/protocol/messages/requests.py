@@ -176,7 +176,7 @@ class Heard(Message):
     """Tell a listening character what another one says: it nods, raises its brows and smiles.
 
     It listens for a minute after each message with `speaking`, and shows that it has understood after one
-    without.
+    without. Sound of a clip with the id `heard:CHARACTER` does the same: a voice in it, its pauses, its end.
     """
 
     model_config = examples({"type": "heard", "character": "Ada", "speaking": True, "text": "Good morning,"})

@@ -21,11 +21,12 @@ from realizer.protocol.messages.requests import (
     Unsubscribe,
 )
 from realizer.protocol.messages.speech import SpeechMessage
+from realizer.protocol.wire import ClipPiece
 from realizer.server.documents.document_queue import Submission
 from realizer.server.session.character_faces import CharacterFaces
 from realizer.server.session.control_fields import FieldError, character_index, direct_values, emotion_values
 from realizer.server.session.subscriptions import Subscriptions
-from realizer.server.speech.audio_clips import AudioClips, ClipError
+from realizer.server.speech.audio_clips import HEARD, AudioClips, ClipError, heard_samples
 from realizer.server.streams.connection import Connection
 
 
@@ -89,6 +90,17 @@ class ControlHandlers:
                 self._speech(connection, message, t)
             case Stop():
                 self._stop(message, t)
+
+    def hear(self, piece: ClipPiece, t: float) -> None:
+        """Let a character hear the next sound of another one.
+
+        Raises:
+            ClipError: the sound is not mono int16 PCM of a usual rate.
+            FieldError: the session has too many characters.
+        """
+        sound = heard_samples(piece)
+        index = character_index(self.player, piece.id.removeprefix(HEARD) or None)
+        self.player.hear_sound(sound, piece.rate, t, is_last=piece.final, character=index)
 
     def _stop(self, message: Stop, t: float) -> None:
         """End blocks. A block that has just ended by itself is no error.

@@ -38,12 +38,13 @@ from realizer.server.journal.checkpoint import Checkpoint
 from realizer.server.journal.entry import Kind
 from realizer.server.journal.journal_writer import JournalWriter
 from realizer.server.session.character_faces import CharacterFaces
+from realizer.server.session.control_fields import FieldError
 from realizer.server.session.control_handlers import ControlHandlers
 from realizer.server.session.effects import Close, Effect, MoveConnection, Send
 from realizer.server.session.feedback_log import FeedbackLog
 from realizer.server.session.subscriptions import Subscriptions
 from realizer.server.session.welcome import build_welcome
-from realizer.server.speech.audio_clips import AudioClips, ClipError
+from realizer.server.speech.audio_clips import HEARD, AudioClips
 from realizer.server.streams.broadcast import Broadcast, FrameRun
 from realizer.server.streams.connection import SLOW, STUCK, Connection
 from realizer.server.streams.frame_windows import EPSILON
@@ -232,19 +233,23 @@ class Session:
             else:
                 self.reply(connection.id, ErrorMessage(code="journal", message=refused))
         elif isinstance(message, bytes):
-            self._add_sound(connection, message)
+            self._add_sound(connection, message, t)
         elif control is not None:
             self._handle(connection, control, t)
         else:
             self.submission.enqueue(message)
         return refused is None
 
-    def _add_sound(self, connection: Connection, message: bytes) -> None:
+    def _add_sound(self, connection: Connection, message: bytes, t: float) -> None:
         try:
-            self.clips.add_chunk(unpack_clip(message))
+            piece = unpack_clip(message)
+            if piece.id.startswith(HEARD):
+                self._controls.hear(piece, t)
+            else:
+                self.clips.add_chunk(piece)
         except WireError as error:
             self.reply(connection.id, ErrorMessage(code="unsupported", message=str(error)))
-        except ClipError as error:
+        except FieldError as error:
             self.reply(connection.id, ErrorMessage(code="clip", message=str(error), where=error.where))
 
     def _handle_passing(self, connection: Connection, control: Control, t: float) -> None:

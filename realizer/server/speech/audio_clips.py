@@ -22,6 +22,7 @@ from realizer.speech.utterance import Phoneme, Recording, Word
 
 MAX_BYTES = 64 * 2**20  # of all clips of a session: half an hour of speech; the oldest are removed
 MAX_CLIPS = 1000  # of a session
+HEARD = "heard:"  # before the id of a character: a sound that it hears
 MAX_TIMES = 20_000  # words, or phonemes, of one clip
 
 
@@ -133,10 +134,8 @@ class AudioClips:
             raise ClipError(where, f"wanted piece {len(pieces)}, got {piece.number}")
         if not begins and piece.rate != clip.rate:
             raise ClipError(where, f"wanted {clip.rate} Hz as in piece 0, got {piece.rate}")
-        if piece.rate and not RATES[0] <= piece.rate <= RATES[1]:
-            raise ClipError(where, f"wanted {RATES[0]}..{RATES[1]} Hz, or 0 for a file, got {piece.rate}")
-        if piece.rate and len(piece.sound) % 2:
-            raise ClipError(where, f"wanted samples of two bytes, got {len(piece.sound)} bytes")
+        if piece.rate:
+            _check_pcm(piece, " or 0 for a file,")
         if size > MAX_BYTES:
             raise ClipError(where, f"wanted at most {MAX_BYTES} bytes, got {size}")
         if begins:
@@ -219,6 +218,24 @@ class AudioClips:
             del sizes[oldest], self._clips[oldest]
             self._changed.add(oldest)
             self.recordings.pop(oldest, None)
+
+
+def heard_samples(piece: ClipPiece) -> Int16:
+    """Return the samples of a part of the sound that a character hears.
+
+    Raises:
+        ClipError: it is not raw PCM, or of an unusual rate.
+    """
+    _check_pcm(piece)
+    return _samples(piece.sound)
+
+
+def _check_pcm(piece: ClipPiece, otherwise: str = "") -> None:
+    where = f"clip:{piece.id}"
+    if not RATES[0] <= piece.rate <= RATES[1]:
+        raise ClipError(where, f"wanted {RATES[0]}..{RATES[1]} Hz,{otherwise} got {piece.rate}")
+    if len(piece.sound) % 2:
+        raise ClipError(where, f"wanted samples of two bytes, got {len(piece.sound)} bytes")
 
 
 def _base64(data: bytes) -> str:

@@ -1,12 +1,15 @@
 import numpy as np
 import pytest
 
-from bml_schema import Listen
-from realizer.animation.axis import au
+from bml_schema import Listen, parse
+from realizer.animation.axis import AU_NAMES, au, mask_channel
 from realizer.animation.curves import sample
 from realizer.behaviours.kind import PlanningContext
 from realizer.behaviours.listen import expand
+from realizer.behaviours.registry import VOCABULARY
+from realizer.playback.player import Player
 
+EYES = mask_channel("listening")
 NOD, BROWS, SMILE = (au(number)[0] for number in (54, 1, 12))
 TIMES = np.arange(0.0, 600.0, 0.04)
 
@@ -32,7 +35,9 @@ def test_listen_nods_raises_brows_and_smiles_every_few_seconds() -> None:
 
 def test_listen_keeps_within_its_time() -> None:
     for end in (0.1, 1.0, 3.0, 10.0):
-        for channel in responses(start=2.0, end=2.0 + end):
+        eyes, *channels = responses(start=2.0, end=2.0 + end)
+        assert (eyes.times == [2.0, 2.0 + end]).all()
+        for channel in channels:
             assert 2.0 < channel.times[0] < channel.times[-1] <= 2.0 + end
 
 
@@ -46,7 +51,7 @@ def test_listen_nods_by_some_degrees_and_keeps_its_eyes_on_the_other() -> None:
 
 @pytest.mark.parametrize("intensity", [0.2, 0.5])
 def test_listen_responds_less_at_less_intensity(intensity) -> None:
-    much, less = (responses(value) for value in (1.0, intensity))
+    much, less = ([c for c in responses(value) if c.target != EYES] for value in (1.0, intensity))
     assert len(less) < (intensity + 0.2) * len(much)
     most = [max(channel.values.max() for channel in found) for found in (much, less)]
     assert most[1] < 1.1 * intensity * most[0]
@@ -68,3 +73,18 @@ def test_listen_depends_on_seed_and_id_alone() -> None:
 def test_listen_begins_in_the_same_way_however_long_it_lasts() -> None:
     short, long = (begins(responses(end=end), NOD) for end in (60.0, 600.0))
     assert (short == long[: len(short)]).all()
+
+
+def test_listen_looks_at_the_speaker_as_listening_idle_eyes_do() -> None:
+    rows = [row for row, name in enumerate(AU_NAMES()) if name in ("61", "62", "63", "64")]
+    looks = {}
+    for name, body in {
+        "listen": '<listen xmlns="urn:bml-realizer:1" id="x" intensity="0.001" start="0" end="25"/>',
+        "idle": '<idle xmlns="urn:bml-realizer:1" id="x" eyes="LISTENING" start="0" end="0"/>',
+        "usual": '<wait id="x" duration="25"/>',
+    }.items():
+        player = Player()
+        player.submit(parse(f'<bml id="b">{body}</bml>', VOCABULARY), 0.0)
+        looks[name] = player.frames(TIMES[50:600]).aus[:, rows]
+    assert np.abs(looks["listen"] - looks["idle"]).max() < 1e-6
+    assert np.abs(looks["listen"] - looks["usual"]).max() > 0.05

@@ -42,7 +42,9 @@ def test_responses_end_with_the_turn_and_a_nod() -> None:
     ended = hear(listening, now=30.0, is_speaking=False)
     late = [item for item in shown(ended) if item[1] > 30.0]
     assert late in ([("nod", pytest.approx(30.25))], [])
-    assert {id(c) for c in listening if c.times[0] <= 30.0} <= {id(c) for c in ended}
+    eyes, *shown_before = (c for c in listening if c.times[0] <= 30.0)
+    assert {id(c) for c in shown_before} <= {id(c) for c in ended}
+    assert [c.until for c in ended if c.target == eyes.target] == [30.0]
 
 
 def test_responses_that_have_begun_are_not_doubled() -> None:

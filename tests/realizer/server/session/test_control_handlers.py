@@ -10,6 +10,7 @@ import pytest
 
 from bml_schema.feedback import WarningFeedback
 from realizer.animation.axis import axis
+from realizer.playback.player import Player
 from realizer.protocol.wire import ClipPiece, pack_clip
 from realizer.server.journal.checkpoint import Checkpoint
 from realizer.server.speech import speech_streams
@@ -362,3 +363,39 @@ def test_character_message_refuses_an_unknown_voice(driver) -> None:
     (error,) = client.of("error")
     assert (error["code"], error["where"]) == ("voice", "character.voice")
     assert "nope" in error["message"]
+
+
+def heard(driver, id: str, seconds: float = 3.0, rate: int = 16_000):
+    """A second of noise and then silence, as pieces of 0.1 s in time."""
+    noise = 3000 * np.random.default_rng(0).standard_normal(rate)
+    sound = np.concatenate([noise, np.zeros(round((seconds - 1) * rate))]).astype("<i2")
+    for number, piece in enumerate(np.split(sound, round(10 * seconds))):
+        driver.run(driver.now + 0.1)
+        driver.send(pack_clip(ClipPiece(id, number, rate, piece.tobytes(), False)))
+
+
+def test_heard_sound_is_answered_by_the_character_that_it_names(drive) -> None:
+    downs = []
+    for id in ("heard:Bo", "heard:"):
+        driver = drive()
+        driver.send({"type": "character", "id": "Ada"})
+        driver.send({"type": "character", "id": "Bo"})
+        heard(driver, id)
+        times, nod = np.arange(2.0, driver.now, 0.04), axis()["54"].column
+        turned = [driver.session.player.frames(times, character).values[:, nod] for character in (0, 1)]
+        still = [Player().frames(times).values[:, nod] for character in (0, 1)]
+        downs.append([float(np.abs(one - other).max()) for one, other in zip(turned, still, strict=True)])
+        assert not driver.session.clips.ids
+    (ada, bo), (first, _) = downs
+    assert min(bo, first) > 0.05
+    assert ada < bo
+
+
+@pytest.mark.parametrize(
+    ("rate", "sound", "text"), [(0, b"RIFF", "wanted 1000"), (16_000, b"abc", "wanted samples of two bytes")]
+)
+def test_heard_sound_that_is_no_pcm_is_an_error(drive, rate, sound, text) -> None:
+    client = drive().send(pack_clip(ClipPiece("heard:Ada", 0, rate, sound, False)))
+    (error,) = client.of("error")
+    assert (error["code"], error["where"]) == ("clip", "clip:heard:Ada")
+    assert text in error["message"]

@@ -1,0 +1,66 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from realizer.speech.voice_activity import Turn, VoiceActivity
+
+RATE = 16_000
+
+
+def sound(*spans, rate=RATE):
+    """Return noise; each span is (seconds, root mean square)."""
+    random = np.random.default_rng(1)
+    parts = [level * random.standard_normal(round(seconds * rate)) for seconds, level in spans]
+    return np.concatenate(parts).clip(-32768, 32767).astype(np.int16)
+
+
+TALK = sound((1.0, 30), (2.0, 3000), (0.5, 30), (1.0, 2000), (1.5, 30))
+
+
+def turns(heard, rate=RATE, step=0.02):
+    """Return (turn, seconds) at which each is known."""
+    activity, size = VoiceActivity(rate), round(step * rate)
+    return [
+        (turn, round((at + size) / rate, 2))
+        for at in range(0, len(heard), size)
+        for turn in activity.add(heard[at : at + size])
+    ]
+
+
+def test_voice_activity_tells_begins_pauses_and_ends() -> None:
+    assert turns(TALK) == [
+        (Turn.BEGINS, 1.1), (Turn.PAUSES, 3.3), (Turn.PAUSES, 4.8), (Turn.ENDS, 5.4)
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("rate", [8000, 44_100])
+def test_voice_activity_is_the_same_at_other_rates(rate) -> None:
+    spans = (1.0, 30), (2.0, 3000), (1.5, 30)
+    assert [turn for turn, _ in turns(sound(*spans, rate=rate), rate)] == [
+        Turn.BEGINS, Turn.PAUSES, Turn.ENDS
+    ]  # fmt: skip
+
+
+@given(st.lists(st.integers(0, 40_000), max_size=12))
+def test_voice_activity_does_not_depend_on_the_pieces(cuts) -> None:
+    pieces, activity = np.split(TALK, sorted(cuts)), VoiceActivity(RATE)
+    assert [turn for piece in pieces for turn in activity.add(piece)] == [turn for turn, _ in turns(TALK)]
+
+
+def test_voice_activity_gets_used_to_a_louder_background() -> None:
+    fan = sound((0.5, 30), (20.0, 400))
+    assert [turn for turn, _ in turns(fan)] == [Turn.BEGINS, Turn.PAUSES, Turn.ENDS]
+    over = np.concatenate([fan, sound((1.0, 4000)), sound((1.5, 400))])
+    assert [turn for turn, _ in turns(over)][3:] == [Turn.BEGINS, Turn.PAUSES, Turn.ENDS]
+
+
+def test_voice_activity_ignores_clicks_and_offsets() -> None:
+    assert turns(np.concatenate([sound((1.0, 30), (0.05, 9000), (1.0, 30)), sound((1.0, 30)) + 5000])) == []
+
+
+def test_voice_activity_ends_a_turn_with_the_sound() -> None:
+    activity = VoiceActivity(RATE)
+    assert activity.end() == []
+    activity.add(TALK[: 2 * RATE])
+    assert activity.end() == [Turn.ENDS]
