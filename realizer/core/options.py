@@ -34,7 +34,7 @@ class PlayOptions:
         strict_bml: whether documents are read as BML 1.0 only, without dialects.
 
     Raises:
-        ValueError: `fps` is not a number above 0, or `liveliness` not one from 0 to 1.
+        ValueError: `fps` is not a number above 0, or another number is out of its range.
     """
 
     face: str = "default"
@@ -59,8 +59,9 @@ class PlayOptions:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.fps) and self.fps > 0):
             raise ValueError(f"fps: wanted a number above 0, got {self.fps}")
-        if not 0.0 <= self.liveliness <= 1.0:
-            raise ValueError(f"liveliness: wanted a number 0..1, got {self.liveliness}")
+        for name, most in (("liveliness", 1), ("jaw", 2), ("lips", 2)):
+            if not 0.0 <= (value := getattr(self, name)) <= most:
+                raise ValueError(f"{name}: wanted a number 0..{most}, got {value}")
 
 
 DEFAULTS = PlayOptions()

@@ -56,6 +56,12 @@ def test_schedule_is_what_a_player_plays(case) -> None:
     assert (scheduled.cost, scheduled.failed, scheduled.late) == (played.cost, played.failed, played.late)
 
 
+def test_schedule_reads_dialects_unless_it_is_strict() -> None:
+    draft = '<bml id="b"><head id="n" type="NOD"/></bml>'
+    assert schedule(draft).behaviours == schedule(NOD).behaviours
+    assert not schedule(draft, strict_bml=True).behaviours
+
+
 def test_schedule_refuses_a_document_without_a_block() -> None:
     with pytest.raises(BMLError, match="id"):
         schedule("<bml/>")

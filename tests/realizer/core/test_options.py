@@ -19,7 +19,9 @@ def test_play_options_are_25_frames_a_second_with_idle_motion_by_default() -> No
     assert (PlayOptions().fps, PlayOptions().idle, PlayOptions().prosody) == (25.0, True, True)
 
 
-@pytest.mark.parametrize("liveliness", [-0.1, 1.1, math.nan])
-def test_play_options_refuse_a_liveliness_outside_0_to_1(liveliness: float) -> None:
-    with pytest.raises(ValueError, match=r"liveliness: wanted a number 0\.\.1"):
-        PlayOptions(liveliness=liveliness)
+@pytest.mark.parametrize(("name", "most"), [("liveliness", 1), ("jaw", 2), ("lips", 2)])
+def test_play_options_refuse_numbers_out_of_range(name: str, most: int) -> None:
+    for value in (-0.1, most + 0.1, math.nan):
+        with pytest.raises(ValueError, match=rf"{name}: wanted a number 0\.\.{most}, got {value}"):
+            PlayOptions(**{name: value})
+    assert getattr(PlayOptions(**{name: most}), name) == most
