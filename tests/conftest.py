@@ -31,7 +31,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--update-golden", action="store_true", help="write tests/golden anew, then review the diff"
     )
     parser.addoption("--documents", type=int, help="how many random documents test_grammar plays (200)")
-    parser.addoption("--mutants", type=int, default=1000, help="how many broken documents test_fuzz reads")
+    parser.addoption("--mutants", type=int, default=500, help="how many broken documents test_fuzz reads")
     parser.addoption(
         "--sessions", type=int, default=100, help="how many random sessions test_composition plays"
     )

@@ -23,7 +23,7 @@ def in_arrays(recipe: Recipe, earliest: float = 0.0) -> solver.Solution:
     return found
 
 
-@examples(3)
+@examples(1.5)
 @given(possible() | wild, tenths)
 def test_solve_small_agrees_with_the_solver_in_arrays(recipe: Recipe, earliest: float) -> None:
     recipe = recipe._replace(orders=[])

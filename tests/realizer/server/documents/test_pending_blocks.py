@@ -322,7 +322,7 @@ def test_tts_requests_finish_or_cut_off_every_text_in_any_order(acts) -> None:
                 driver.run(driver.now + float(what))
     while answer(driver):
         driver.run(driver.now + 0.1)
-    client = driver.run(driver.now + 600)
+    client = driver.run(driver.now + 100)
     faults = [f.text for f in client.feedback if isinstance(f, WarningFeedback)]
     assert not [text for text in faults if "internal" in text]
     assert driver.send({"type": "state"}).of("state")[-1]["blocks"] == []

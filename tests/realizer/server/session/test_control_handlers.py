@@ -78,7 +78,7 @@ def test_set_gives_the_same_face_in_any_order(drive, pause: float) -> None:
 
 def test_set_gives_the_same_face_before_and_after_documents(drive) -> None:
     faces = []
-    for chosen in permutations((*BLOCKS, SETS[0], SETS[1])):
+    for chosen in list(permutations((*BLOCKS, SETS[0], SETS[1])))[::3]:
         face = Face(drive)
         for one in chosen:
             if isinstance(one, str):
