@@ -69,14 +69,14 @@ def spoken(
 ) -> Sounds:
     """Return the sounds of a face, with noise of so many metres."""
     face = load_face(name)
-    rest, at = face.vertices, [face.feature_points[point] for point in POINTS]
+    rest, at = face.vertices.astype(np.float64), [face.feature_points[point] for point in POINTS]
     parts = {
         part: first + np.flatnonzero(np.abs(rest[slice(*face.parts[part]), 0]) < near)
         for part, near in (("upper_teeth", TEETH), ("lower_teeth", TEETH), ("tongue", TONGUE))
         for first in face.parts[part][:1]
     }
     unit = np.array([face.fapu.mw0, face.fapu.mns0, face.fapu.mns0])
-    found, classes, sentences = [], [], []
+    found, classes, sentences = list[Float64](), list[int](), list[int]()
     for number, (language, text) in enumerate(texts):
         document = BML.format(shown="", language=language, text=escape(text))
         played = realize(document, voice=voice, fps=FPS, idle=False, face=name)
