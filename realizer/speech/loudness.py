@@ -1,6 +1,8 @@
-"""The loudness of vowels in the sound of an utterance, raised at the accents of its phrases."""
+"""The loudness of vowels in the sound of an utterance, raised at accents, and the silence around pauses."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,15 +12,19 @@ from realizer.speech.utterance import Phoneme, Utterance
 from realizer.tables.phonemes import vowels
 
 STEP = 8  # every so many samples are measured, which is enough for a mean
+WINDOW, QUIET = 0.01, 0.03  # s; of the loud parts, below which a window is silent
+STOPS = "pbtdkɡgqʔ"  # they begin and end with silence
+LEAST = 0.02  # s of a sound beside a pause
 
 
 def with_loudness(utterance: Utterance) -> tuple[Phoneme, ...]:
     """Return its phonemes; vowels have the requested volume times the loudness at which they are heard.
 
     The loudness is relative to the median of the vowels, and the last accent of a phrase, which is the most
-    prominent one, is louder by the table's factor.
+    prominent one, is louder by the table's factor. Pauses include the silence that a voice counts to the
+    sounds beside them.
     """
-    phonemes = utterance.phonemes
+    phonemes = _with_whole_pauses(utterance)
     sung = [k for k, phoneme in enumerate(phonemes) if phoneme.ipa[:1] in vowels()]
     if not sung:
         return phonemes
@@ -35,14 +41,44 @@ def with_loudness(utterance: Utterance) -> tuple[Phoneme, ...]:
     return tuple(heard)
 
 
+def _with_whole_pauses(utterance: Utterance) -> tuple[Phoneme, ...]:
+    """Return the phonemes, with the silence beside a pause in the pause."""
+    phonemes = list(utterance.phonemes)
+    pauses = [k for k in range(1, len(phonemes) - 1) if not phonemes[k].ipa]
+    if not pauses or utterance.pcm is None or not utterance.sample_rate:
+        return utterance.phonemes
+    begins = np.arange(int(utterance.duration / WINDOW)) * WINDOW
+    levels = _levels(utterance, np.stack([begins, begins + WINDOW], axis=1))
+    heard = begins[levels > QUIET * np.quantile(levels, 0.9)]
+    for k in pauses:
+        before, pause, after = phonemes[k - 1 : k + 2]
+        if before.ipa[:1] not in STOPS:
+            last = heard[(heard >= before.start) & (heard < before.end)]
+            end = max(last[-1] + WINDOW if len(last) else 0.0, before.start + LEAST)
+            before = replace(before, end=min(before.end, end))
+        if after.ipa[:1] not in STOPS:
+            first = heard[(heard >= after.start) & (heard < after.end)]
+            start = min(first[0] if len(first) else np.inf, after.end - LEAST)
+            after = replace(after, start=max(after.start, start))
+        phonemes[k - 1 : k + 2] = before, replace(pause, start=before.end, end=after.start), after
+    return tuple(phonemes)
+
+
+def _levels(utterance: Utterance, spans: Float64) -> Float64:
+    """Return the root mean square (m,) of the sound in each span (m, 2) of seconds."""
+    assert utterance.pcm is not None
+    power = np.square(utterance.pcm[::STEP].astype(np.float32)).cumsum(dtype=np.float64)
+    power = np.concatenate(([0.0], power))
+    first, last = np.rint(spans.T * utterance.sample_rate / STEP).astype(int).clip(0, len(power) - 1)
+    levels: Float64 = np.sqrt((power[last] - power[first]) / np.maximum(last - first, 1))
+    return levels
+
+
 def _relative_levels(utterance: Utterance, spans: Float64) -> Float64:
     """Return the root mean square (m,) of the sound in each span over their median; 1 without sound."""
     if utterance.pcm is None or not utterance.sample_rate:
         return np.ones(len(spans))
-    power = np.square(utterance.pcm[::STEP].astype(np.float32)).cumsum(dtype=np.float64)
-    power = np.concatenate(([0.0], power))
-    first, last = np.rint(spans.T * utterance.sample_rate / STEP).astype(int).clip(0, len(power) - 1)
-    levels = np.sqrt((power[last] - power[first]) / np.maximum(last - first, 1))
+    levels = _levels(utterance, spans)
     usual = float(np.median(levels))
     limit = prosody_facts()["accents"]["range"]
     return np.clip(levels / usual, 1 / limit, limit) if usual > 0 else np.ones(len(spans))

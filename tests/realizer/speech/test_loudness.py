@@ -54,3 +54,22 @@ def test_with_loudness_leaves_pauses_and_silence_alone() -> None:
     quiet = said(stressed=0)
     quiet = Utterance(1.0, (), quiet.phonemes, {}, RATE, np.zeros(RATE, np.int16))
     assert volumes(quiet) == pytest.approx([LOUDER, 1, 1, 1, 1])
+
+
+def test_with_loudness_extends_pauses_by_the_silence_beside_them() -> None:
+    tone = 4000 * np.sin(np.arange(RATE) * 0.7)
+    tone[int(0.3 * RATE) : int(0.6 * RATE)] = 0
+    sounds = (("a", 0.0, 0.4), ("", 0.4, 0.5), ("m", 0.5, 0.7), ("", 0.7, 0.8), ("t", 0.8, 1.0))
+    utterance = Utterance(
+        1.0,
+        (),
+        tuple(Phoneme(start, end, ipa) for ipa, start, end in sounds),
+        {},
+        RATE,
+        tone.astype(np.int16),
+    )
+    found = [(p.ipa, p.start, p.end) for p in with_loudness(utterance)]
+    assert [ipa for ipa, *_ in found] == ["a", "", "m", "", "t"]
+    assert np.array([times for _, *times in found]) == pytest.approx(
+        np.array([(0, 0.3), (0.3, 0.6), (0.6, 0.7), (0.7, 0.8), (0.8, 1.0)]), abs=0.011
+    )
