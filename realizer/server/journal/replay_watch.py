@@ -1,6 +1,7 @@
 """Notes about a replay: which document is worked on, in case the process dies or stalls there."""
 
 import json
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -8,6 +9,7 @@ from realizer.server.journal.entry import NOTE, Entry
 from realizer.server.session.session import Session
 
 TRIES = 2  # a document whose replay was begun so often, and never ended, is put aside
+STALLS = 10.0  # s; a document that takes longer stalls its replay
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,11 +44,19 @@ class ReplayWatch:
     Args:
         write: stores the text of a note, or deletes it (None).
         last: the note that the replay before left behind.
+        clock: seconds.
     """
 
-    def __init__(self, write: Callable[[str | None], None], last: ReplayNote | None = None) -> None:
+    def __init__(
+        self,
+        write: Callable[[str | None], None],
+        last: ReplayNote | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         self.write = write
         self._last = last
+        self._clock = clock
+        self._since = 0.0  # when the document was noted
         self._session: Session | None = None
         self._noted: int | None = None
         self._entries: dict[int, int] = {}  # number of a message with documents -> index of its entry
@@ -67,6 +77,15 @@ class ReplayWatch:
         self._note(unfinished)
         return unfinished is not None
 
+    def withdraw(self, write: Callable[[str | None], None]) -> None:
+        """Withdraw the note, because the process ends in order; unless the document has stalled the replay.
+
+        Args:
+            write: as for the class.
+        """
+        if self._noted is not None and self._clock() - self._since < STALLS:
+            write(None if self._last is None else self._last.text())
+
     def _unfinished(self) -> int | None:
         """Return the entry of the first document that is not planned and does not wait for a client."""
         if self._session is None or self._session.closed:
@@ -83,7 +102,7 @@ class ReplayWatch:
     def _note(self, index: int | None) -> None:
         if index == self._noted:
             return
-        self._noted = index
+        self._noted, self._since = index, self._clock()
         if index is None:
             self.write(None)
             return

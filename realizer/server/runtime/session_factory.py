@@ -2,12 +2,14 @@
 
 import asyncio
 import contextlib
+import functools
 import logging
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from itertools import islice
 from typing import Any
+from weakref import WeakValueDictionary
 
 from realizer.behaviours.kind import Position
 from realizer.core.errors import RealizerError
@@ -53,6 +55,9 @@ class SessionFactory:
         self._recorder: RecordingFolder | None = None
         self._scene: Mapping[str, Position] | None = None
         self._capabilities: dict[str, Any] = {}
+        self._watches = WeakValueDictionary[
+            str, ReplayWatch
+        ]()  # by session, of replays and what is left of them
 
     async def load(self) -> None:
         """Load what all sessions share. Raises as `SessionHost.start`."""
@@ -74,7 +79,9 @@ class SessionFactory:
         self._capabilities = await loop.run_in_executor(None, capabilities_of, settings)
 
     def close(self) -> None:
-        """Close the journal and the recordings."""
+        """Close the journal and the recordings; what is still replayed has not failed."""
+        for name, watch in self._watches.items():
+            watch.withdraw(functools.partial(self._try_note, name))
         for log_ in (self.journal, self._recorder):
             if log_ is not None:
                 log_.close()
@@ -120,6 +127,7 @@ class SessionFactory:
         watch = ReplayWatch(
             lambda text: asyncio.run_coroutine_threadsafe(self._note(name, text), loop).result(), last
         )
+        self._watches[name] = watch
         session = self._session(name, 0.0, named=True, epoch=saved.epoch)
         try:
             at, unanswered = await loop.run_in_executor(None, restore_session, session, saved, speak, watch)

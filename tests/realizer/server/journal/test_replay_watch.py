@@ -16,7 +16,7 @@ from realizer.core.settings import Settings
 from realizer.server.journal import Entry, SavedSession, journal_at
 from realizer.server.journal.entry import NOTE
 from realizer.server.journal.replay import restore_session
-from realizer.server.journal.replay_watch import ReplayNote, ReplayWatch
+from realizer.server.journal.replay_watch import STALLS, ReplayNote, ReplayWatch
 from realizer.server.session.session import Session
 from tests.feedback_log import read_feedback, seq_numbers
 from tests.programs import serving
@@ -124,6 +124,21 @@ def test_watch_notes_the_first_of_several_unread_documents() -> None:
 def test_watch_counts_how_often_a_replay_of_the_same_entry_was_begun() -> None:
     assert notes_of(entries(JOIN, A, *READ, B), ReplayNote(4, 1)) == [(1, 1), (4, 2)]
     assert notes_of(entries(JOIN, A, *READ, B), ReplayNote(1, 2)) == [(1, 3), (4, 1)]
+
+
+@pytest.mark.parametrize("last", [None, ReplayNote(1, 1)])
+def test_watch_withdraws_the_note_of_a_replay_that_ends_in_order(last: ReplayNote | None) -> None:
+    now, notes = 0.0, list[str | None]()
+    session = Session("s", Settings(idle=False), 0.0, named=True)
+    watch = ReplayWatch(notes.append, last, lambda: now)
+    restore_session(session, SavedSession(0.0, entries(JOIN, A)), lambda _: spoken(), watch)
+    assert notes[-1] != (before := None if last is None else last.text())
+    now = STALLS - 0.1
+    watch.withdraw(notes.append)
+    assert notes[-1] == before
+    count, now = len(notes), STALLS
+    watch.withdraw(notes.append)
+    assert len(notes) == count, "a document that stalls has failed"
 
 
 def test_watch_of_a_session_without_documents_writes_nothing() -> None:
