@@ -45,6 +45,7 @@ READING_SHARE = 0.25
 LONGEST_READING = 0.02  # s
 FRAME_SLICES = 5  # of time; frames that take longer to compute are continued with the documents, in turn
 MOST_WAITING = 100  # messages to a session that plans; then its clients are read more slowly
+CONGESTION = 0.02  # s; how often a client looks whether its session can take messages again
 SLOW_STEP = 0.05  # s; a step of the loop that takes so long is logged
 EXPIRY_INTERVAL = 5.0  # s; how often expired sessions and due checkpoints are looked for
 
@@ -234,6 +235,11 @@ class SessionHost:
         """Return whether so many messages of a connection's session wait that no more should be read."""
         session = self._registry.session_of.get(number)
         return session is not None and self._calls.count_waiting(session) >= MOST_WAITING
+
+    async def wait_for_room(self, number: int) -> None:
+        """Wait while a connection's session is congested."""
+        while self.is_congested(number):
+            await asyncio.sleep(CONGESTION)
 
     def _receive(self, session: Session, number: int, message: str | bytes) -> None:
         if (present := self._registry.session_of.get(number)) is not session and present is not None:

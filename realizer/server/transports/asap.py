@@ -83,6 +83,7 @@ class AsapTransport(TcpTransport):
                 elif not self._sessions.receive(number, item):
                     return
                 await limiter.pause(lambda notice: link.warn("IOException", notice))
+                await self._sessions.wait_for_room(number)
 
 
 class CallBack(asyncio.Protocol):

@@ -12,7 +12,7 @@ from bml_schema import WarningFeedback
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings, limit_hint
 from realizer.server.http.access import RateLimiter
-from realizer.server.runtime.session_host import SessionHost
+from realizer.server.runtime.session_host import CONGESTION, SessionHost
 from realizer.server.runtime.session_registry import JoinError
 from realizer.server.transports.broker import BrokerConnection, check_installed
 from realizer.server.transports.message_formats import (
@@ -111,13 +111,13 @@ class StompTransport(ReconnectingTransport):
         pause = self._limiter.wait(self._loop.time())
         if self._limiter.notice is not None:
             log.warning("stomp: %s", self._limiter.notice)
+        link = self._links[topic]
         if pause:
-            self._loop.call_later(pause, broker.handled)
+            self._loop.call_later(pause, self._read_on, broker, link)
         else:
-            broker.handled()
+            self._read_on(broker, link)
         if broker is not self._broker or self._leaving is not None:
             return
-        link = self._links[topic]
         if len(body) > self._settings.max_message:
             words = f"wanted at most {self._settings.max_message} bytes in a message, got {len(body)}"
             log.warning("stomp: %s: %s", link.name, words)
@@ -134,6 +134,13 @@ class StompTransport(ReconnectingTransport):
                     log.warning("stomp: vrKillComponent: the transport closes")
                     self._leaving = asyncio.create_task(self._leave())
                     return
+
+    def _read_on(self, broker: BrokerConnection, link: "_SessionLink") -> None:
+        """Read the next message as soon as the session of the last one is not congested."""
+        if link.is_congested:
+            self._loop.call_later(CONGESTION, self._read_on, broker, link)
+        else:
+            broker.handled()
 
     # the connection -----------------------------------------------------------------------------
 
@@ -223,6 +230,11 @@ class _SessionLink:
                 sessions.receive(self._number, text)
         except JoinError as error:
             log.warning("stomp: %s: %s", self.name, error)
+
+    @property
+    def is_congested(self) -> bool:
+        """Whether no more should be read for the session."""
+        return self._number is not None and self._transport._sessions.is_congested(self._number)
 
     @property
     def unsent_bytes(self) -> int:

@@ -27,7 +27,6 @@ from realizer.server.transports.websocket.request import address_of, headers_of,
 
 log = logging.getLogger(__name__)
 
-CONGESTION = 0.02  # s; how often a client looks whether its session can take messages again
 GOODBYE = 2.0  # s; a client that has not answered a close frame by then is gone
 REASON = 123  # bytes of a reason in a close frame
 
@@ -110,8 +109,7 @@ class WebSocketConnections:
             if not self._sessions.receive(number, message):
                 return
             await asyncio.sleep(0)  # one read may hold many messages
-            while self._sessions.is_congested(number):
-                await asyncio.sleep(CONGESTION)
+            await self._sessions.wait_for_room(number)
 
     async def _first_message(self, socket: ServerConnection) -> tuple[str | bytes, Grant]:
         """Return the first message of a client without a token, and the grant of the token in it.

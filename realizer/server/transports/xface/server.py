@@ -92,6 +92,7 @@ class XfaceTransport(TcpTransport):
                     lambda notice: log.warning("xface: client %d: %s", link.tasks.owner, notice)
                 )
                 await writer.drain()  # the client may not read its notifications
+                await self._sessions.wait_for_room(link.number)
 
     async def _prepared(self, task: Task) -> Attachment:
         """Return what a task needs, or the error."""
@@ -114,11 +115,11 @@ class _SessionLink:
         self.has_left = False
         self._sessions = sessions
         self._writer = writer
-        self._number: int
+        self.number: int
 
     def attach(self, number: int) -> None:
         """Subscribe to feedback, and greet the client."""
-        self._number = number
+        self.number = number
         self._sessions.receive(number, FEEDBACK)
         self._writer.write(pack_note("CONNECTION_OK", self.tasks.owner, 0, Status.UNKNOWN))
 
@@ -127,7 +128,7 @@ class _SessionLink:
         for answer in answers:
             match answer:
                 case Inbound(text):
-                    self.has_left = self.has_left or not self._sessions.receive(self._number, text)
+                    self.has_left = self.has_left or not self._sessions.receive(self.number, text)
                 case Disconnect():
                     self.has_left = True
                 case bytes() as note:

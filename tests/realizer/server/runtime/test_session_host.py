@@ -240,8 +240,11 @@ def test_session_host_is_congested_while_many_messages_wait(in_tiny_slices) -> N
             congested.append(host.is_congested(number))
         assert congested == sorted(congested)
         assert (congested[0], congested[-1], host.is_congested(other)) == (False, True, False)
-        await asyncio.sleep(60)
+        await host.wait_for_room(other)
+        assert host.is_congested(number)
+        await host.wait_for_room(number)
         assert not host.is_congested(number)
+        await asyncio.sleep(60)
         assert sum("pong" in text for text in client.texts) == MOST_WAITING + 5
 
     hosted(test)
