@@ -17,7 +17,10 @@ SIDES = {"": "BOTH", "L": "LEFT", "R": "RIGHT"}
 
 @dataclass(frozen=True, slots=True)
 class FaceLexeme:
-    """A facial expression: (AU, side LEFT | RIGHT | BOTH) -> intensity 0..1 at amount 1."""
+    """A facial expression: (AU, side LEFT | RIGHT | BOTH) -> intensity at amount 1.
+
+    An intensity above 1 is reached at a smaller amount.
+    """
 
     name: str
     aus: Mapping[tuple[int, str], float]
@@ -47,7 +50,7 @@ class HeadLexeme:
 def face_lexemes() -> Mapping[str, FaceLexeme]:
     """Return upper-case name -> lexeme."""
     return {
-        name: FaceLexeme(name, read_aus(row["aus"], f"{FILE}, face.{name}"))
+        name: FaceLexeme(name, read_aus(row["aus"], f"{FILE}, face.{name}", most=2.0))
         for name, row in _rows("face").items()
     }
 
@@ -74,14 +77,15 @@ def _rows(part: str) -> dict[str, Mapping[str, Any]]:
     return {name: rows[row.get("same_as", name)] for name, row in rows.items()}
 
 
-def read_aus(cells: Mapping[str, float], place: str) -> dict[tuple[int, str], float]:
+def read_aus(cells: Mapping[str, float], place: str, most: float = 1.0) -> dict[tuple[int, str], float]:
     """Parse action units such as { 1 = 0.5, 12L = 1.0 } to (AU, side LEFT | RIGHT | BOTH) -> intensity.
 
     Args:
         place: name of the row in messages.
+        most: greatest intensity.
 
     Raises:
-        TableError: an unknown action unit or side, or an intensity outside 0..1.
+        TableError: an unknown action unit or side, or an intensity outside 0..most.
     """
     known = tables.by_number()
     aus = {}
@@ -90,7 +94,7 @@ def read_aus(cells: Mapping[str, float], place: str) -> dict[tuple[int, str], fl
         au = known.get(int(match[1])) if match else None
         if match is None or au is None or (match[2] and not au.sides):
             raise TableError(f"{place}: wanted an action unit such as 12 or 12L, got {cell!r}")
-        if not 0 < amount <= 1:
-            raise TableError(f"{place}, {cell}: wanted an intensity above 0 and to 1, got {amount}")
+        if not 0 < amount <= most:
+            raise TableError(f"{place}, {cell}: wanted an intensity above 0 and to {most:g}, got {amount}")
         aus[au.au, SIDES[match[2]]] = float(amount)
     return aus
