@@ -217,8 +217,10 @@ class Player(BlockManager):
         if forgotten := self.blocks.forget(forgettable):
             for playing in forgotten:
                 self.timeline.events.drop(playing)
-            for character in self._characters:
-                character.forget(now - self.history)
+            for index, character in enumerate(self._characters):
+                # The mood at the start of a speech shows in the motion of the head until its end.
+                spoken = (s.start for p in self.blocks.of_character(index) for s in p.speech.values())
+                character.forget(min([now, *spoken]) - self.history)
         return out
 
     @property
@@ -289,8 +291,9 @@ class Player(BlockManager):
             for s in p.speech.values()
             for at, part in s.utterance.sections or [(0.0, s.utterance)]
         ]
+        moods = [channel for channel in own if channel.layer is Layer.BASE]
         near = [
-            t._replace(face=tuple(p.moving_channels()))
+            t._replace(face=(*p.moving_channels(), *moods))
             for t, p in talks
             if t.start - NEAR <= last and t.start + t.utterance.duration + NEAR >= first
         ]

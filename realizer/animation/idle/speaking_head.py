@@ -33,18 +33,32 @@ class Style(NamedTuple):
 
 
 NEUTRAL = Style()
+SHOWN = 0.5  # s after the start of a speech, at which its style is found
 
 
-def style_of(channels: Iterable[Channel], time: float) -> Style:
-    """Return the style of a face that shows these channels at a time, if they are not interrupted."""
+def style_of(channels: Iterable[Channel], start: float) -> Style:
+    """Return the style of a face that shows these channels shortly after a speech has started.
+
+    It depends on nothing that happens later: a base state counts if it has begun before, and whatever is
+    interrupted later counts as whole.
+    """
     rows = prosody_facts()["style"]
     wanted = {target.column: number for row in rows for number in row["aus"] for target in au(number)}
-    whole = {"gains": (), "until": np.inf, "crossfade": None}
-    active = [c.changed(whole) for c in channels if c.target.column in wanted]
+    active = [
+        channel.changed(
+            {
+                "gains": tuple(gain for gain in channel.gains if gain.begin <= start),
+                "until": channel.until if channel.until <= start else np.inf,
+                "crossfade": None,
+            }
+        )
+        for channel in channels
+        if channel.target.column in wanted and (channel.layer is not Layer.BASE or channel.times[0] <= start)
+    ]
     if not active:
         return NEUTRAL
     shown: dict[int, float] = {}
-    for channel, (value,) in zip(active, sample(active, np.array([time])).tolist(), strict=True):
+    for channel, (value,) in zip(active, sample(active, np.array([start + SHOWN])).tolist(), strict=True):
         number = wanted[channel.target.column]
         shown[number] = max(shown.get(number, 0.0), value)
     size, pace, pitch = NEUTRAL

@@ -260,6 +260,10 @@ def test_due_gives_the_same_feedback_however_often_it_is_called(asked: list[floa
 OWN = ("1L", "1R", "2L", "2R", "45L", "45R", *map(str, range(51, 57)), *map(str, range(61, 65)))
 WORDS = "Whoever follows the river to the tower, will discover a little door."
 TALK = f'<speech id="t"><text>{WORDS}</text></speech>'
+MOODS = [
+    f'<faceShift id="m" end="0.4"><faceLexeme id="l" lexeme="{name}" amount="{amount}"/></faceShift>'
+    for name, amount in (("JOY", 1.0), ("SADNESS", 0.1))
+]
 
 
 def test_prosody_off_leaves_a_speaking_face_as_idle_as_a_silent_one() -> None:
@@ -305,14 +309,33 @@ def test_prosody_leaves_a_nod_of_the_document_unchanged(seed: int) -> None:
     np.testing.assert_array_equal(shown, wanted)
 
 
+def test_frames_of_the_head_in_speech_follow_the_mood() -> None:
+    def lifted(*shifts: str) -> float:
+        player = Player(PlayOptions(seed=3, liveliness=0.0))
+        for shift in shifts:
+            submit(player, shift, "a")
+        submit(player, TALK, "b", now=1.0)
+        up, down = (au(player, name, *np.arange(2.0, 4.0, 0.02)) for name in ("53", "54"))
+        return float(np.mean(up) - np.mean(down))
+
+    assert lifted(MOODS[0]) > lifted() + 0.01
+
+
 @settings(max_examples=12)
-@given(st.integers(0, 1000), st.lists(st.floats(0.0, 12.0), min_size=1, max_size=3), st.floats(0.0, 12.0))
+@given(
+    st.integers(0, 1000),
+    st.lists(st.floats(0.0, 12.0), min_size=1, max_size=3),
+    st.floats(0.0, 12.0),
+    st.lists(st.floats(0.0, 14.0), max_size=2),
+)
 def test_frames_while_speech_grows_are_those_of_the_playback(
-    seed: int, starts: list[float], nod: float
+    seed: int, starts: list[float], nod: float, moods: list[float]
 ) -> None:
     """Dropping ended blocks changes neither past nor future frames."""
     live, played = Player(PlayOptions(seed=seed)), Player(PlayOptions(seed=seed), history=float("inf"))
-    todo = sorted([(start, TALK) for start in starts] + [(nod, '<head id="n" lexeme="NOD"/>')])
+    others = [(nod, '<head id="n" lexeme="NOD"/>')]
+    others += [(mood, MOODS[k]) for k, mood in enumerate(sorted(moods))]
+    todo = sorted([(start, TALK) for start in starts] + others)
     own = [AU_NAMES().index(name) for name in OWN]
     seen = []
     times = np.arange(0.0, 26.0, 0.16)
