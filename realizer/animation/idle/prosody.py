@@ -1,11 +1,14 @@
-"""Motion that accompanies speech: of the head, nods and raised brows on accents, glances, ends of phrases.
+"""Motion that accompanies speech: of the head, nods and raised brows on accents, glances, breaths.
 
 It depends on the seed, the utterances and their start times, but not on the requested frames.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, lru_cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -25,14 +28,20 @@ AFTERMATH = 2.0
 
 # Signed angles: AUs of (negative, positive). When the head turns down, the eyes turn up by as much.
 PITCH, EYES_PITCH, EYES_YAW = (54, 53), (64, 63), (62, 61)
-BROWS = {1, 2, 4}
-BROW_FAPS = range(31, 39)
+# Where a document shows one of these AUs or FAPs, gestures of the part give way; in a frown, raised brows get
+# smaller.
+PARTS = {
+    "brows": ({1, 2}, range(31, 39)),
+    "frown": ({4}, ()),
+    "nose": ({38, 39}, range(61, 63)),
+    "mouth": ({8, *range(10, 38)}, (*range(3, 19), *range(51, 61))),
+}
 
 
 class SpeechSpan(NamedTuple):
     """An utterance that starts at `start` and is cut off at `until`; seconds on the session clock.
 
-    `face` has the channels of its block, which show what it is said with.
+    `face` has the channels of its block and the base states of the character, which show its mood.
     """
 
     start: float
@@ -50,7 +59,7 @@ class KnownMotion(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Gesture:
-    """A movement of "head", "eyes" or "brows"."""
+    """A movement of "head", "eyes" or one of `PARTS`."""
 
     region: str
     channels: tuple[Channel, ...]
@@ -62,6 +71,10 @@ class Gesture:
     @property
     def end(self) -> float:
         return float(self.channels[0].times[-1])
+
+    def reduced(self, part: float) -> Gesture:
+        """Return a part of the movement, 0..1."""
+        return replace(self, channels=tuple(c.changed({"values": part * c.values}) for c in self.channels))
 
 
 def phrase_ends(talks: Iterable[SpeechSpan]) -> tuple[PhraseEnd, ...]:
@@ -104,15 +117,19 @@ def prosody_channels(
         if claims is None:  # computed only when needed: characters are silent most of the time
             claims = list(_claims(known_motions))
         head = (claim[1:] for claim in claims if claim[0] == "head")
-        style = style_of(talk.face, talk.start + 0.5)
+        style = style_of(talk.face, talk.start)
         shown += head_channels(talk.utterance, talk.start, talk.until, seed, style, head)
-        for gesture in _gestures(phrases(talk.utterance), talk.start, seed):
+        last_sound = talk.utterance.phonemes[-1].end if talk.utterance.phonemes else talk.utterance.duration
+        for gesture in _gestures(phrases(talk.utterance), last_sound, talk.start, seed):
             if gesture.end < start or gesture.begin > end or gesture.begin >= talk.until:
                 continue
             leaves = talk.until
             for part, known, first, last in claims:
-                if part == gesture.region and first < gesture.end and last > gesture.begin:
-                    leaves = min(leaves, known)
+                if first < gesture.end and last > gesture.begin:
+                    if part == gesture.region:
+                        leaves = min(leaves, known)
+                    elif (part, gesture.region) == ("frown", "brows") and known <= gesture.begin:
+                        gesture = gesture.reduced(prosody_facts()["brows"]["frown"])
             if gesture.begin < leaves:
                 shown += [
                     c if leaves >= gesture.end else c.faded(leaves, leaves + fade) for c in gesture.channels
@@ -132,22 +149,31 @@ def _claims(known_motions: Iterable[KnownMotion]) -> Iterator[tuple[str, float, 
 
 @cache
 def _parts() -> dict[int, str]:
-    """Return the part of the face, "head", "eyes" or "brows", of the columns that prosody may move."""
+    """Return the part of the face, "head", "eyes" or one of `PARTS`, of the columns that prosody may move."""
     parts = {}
     numbers = {row.name: row.fap for row in tables.faps()}
     for name, target in axis().items():
-        is_au = target.column < len(AU_NAMES())
         if region(target) in ("head", "eyes"):
             parts[target.column] = region(target)
-        elif (is_au and int(name.rstrip("LR")) in BROWS) or numbers.get(name) in BROW_FAPS:
-            parts[target.column] = "brows"
+            continue
+        unit = int(name.rstrip("LR")) if target.column < len(AU_NAMES()) else None
+        for part, (units, faps) in PARTS.items():
+            if unit in units or numbers.get(name) in faps:
+                parts[target.column] = part
     return parts
 
 
 @lru_cache(maxsize=64)
-def _gestures(all_phrases: tuple[Phrase, ...], start: float, seed: int) -> tuple[Gesture, ...]:
+def _gestures(
+    all_phrases: tuple[Phrase, ...], last_sound: float, start: float, seed: int
+) -> tuple[Gesture, ...]:
     """Return all movements that may accompany an utterance that starts at `start`."""
-    return (*_accents(all_phrases, start, seed), *_looks_aside(all_phrases, start, seed))
+    return (
+        *_accents(all_phrases, start, seed),
+        *_looks_aside(all_phrases, start, seed),
+        *_breaths(all_phrases, start),
+        *_moistening(all_phrases, last_sound, start, seed),
+    )
 
 
 def _accents(all_phrases: tuple[Phrase, ...], start: float, seed: int) -> Iterator[Gesture]:
@@ -180,6 +206,40 @@ def _size(facts: Mapping[str, float], draw: float, nuclear: bool) -> float:
     return facts["most"] * part * (1.0 if nuclear else facts["other"])
 
 
+def _breaths(all_phrases: tuple[Phrase, ...], start: float) -> Iterator[Gesture]:
+    """Yield the flare of the nostrils as the speaker inhales in pauses that are long enough."""
+    breath = prosody_facts()["breath"]
+    for before, after in pairwise(all_phrases):
+        if (length := after.start - before.end) >= breath["pause"]:
+            inhales = min(length, breath["longest"])
+            yield _shown(
+                "nose", 38, start + after.start - inhales * np.array([1.0, 0.4, 0.0]), breath["most"]
+            )
+
+
+def _moistening(
+    all_phrases: tuple[Phrase, ...], last_sound: float, start: float, seed: int
+) -> Iterator[Gesture]:
+    """Yield the lips that are drawn in after a long turn."""
+    lips = prosody_facts()["moistening"]
+    chance, size, late = (draw[0] for draw in _draws(seed, 460, start, 1))
+    if (
+        all_phrases
+        and all_phrases[-1].end - all_phrases[0].start >= lips["least"]
+        and chance < lips["chance"]
+    ):
+        begin = start + last_sound + lips["delay"] * (0.5 + 0.5 * late)
+        keys = begin + np.cumsum([0.0, lips["attack"], lips["hold"], lips["relax"]])
+        yield _shown("mouth", 28, keys, lips["most"] * (0.6 + 0.4 * size))
+
+
+def _shown(part: str, number: int, keys: Float64, most: float) -> Gesture:
+    """Return an AU that rises from the first key to the second and falls to the last from the one before."""
+    values = np.array([0.0, *[most] * (len(keys) - 2), 0.0])
+    channels = (Channel(t, keys, values, layer=Layer.IDLE, source=SOURCE) for t in au(number))
+    return Gesture(part, tuple(channels))
+
+
 def _nod(time: float, degrees: float) -> Gesture:
     nod = prosody_facts()["nod"]
     keys = np.array([time - nod["attack"], time, time + nod["relax"]])
@@ -191,9 +251,8 @@ def _raise(time: float, most: float) -> Gesture:
     brows = prosody_facts()["brows"]
     top = time + brows["hold"]
     keys = np.array([time - brows["attack"], time, top, top + brows["relax"]])
-    values = np.array([0.0, most, most, 0.0])
-    lifts = (target for number in (1, 2) for target in au(number))
-    return Gesture("brows", tuple(Channel(t, keys, values, layer=Layer.IDLE, source=SOURCE) for t in lifts))
+    lifts = (channel for number in (1, 2) for channel in _shown("brows", number, keys, most).channels)
+    return Gesture("brows", tuple(lifts))
 
 
 def _looks_aside(all_phrases: tuple[Phrase, ...], start: float, seed: int) -> Iterator[Gesture]:

@@ -18,7 +18,7 @@ from realizer.animation.idle.prosody import KnownMotion, SpeechSpan, phrase_ends
 from realizer.core.array_types import Float64
 from realizer.speech.accents import phrases, prosody_facts
 from realizer.speech.silent import SilentVoice
-from realizer.speech.utterance import SpeechRequest, Utterance
+from realizer.speech.utterance import Phoneme, SpeechRequest, Utterance, Word
 
 SAID = SilentVoice().say(
     SpeechRequest(
@@ -183,7 +183,7 @@ def whole_at(times: Float64, seed: int, asked: Sequence[KnownMotion]) -> dict[st
 @pytest.mark.parametrize(
     ("channel", "part"),
     [
-        (Channel(au(4)[0], np.array([0.0, 12.0]), np.array([0.5, 0.5])), "brows"),
+        (Channel(au(2)[0], np.array([0.0, 12.0]), np.array([0.5, 0.5])), "brows"),
         *(
             (Channel(fap(number), np.array([0.0, 12.0]), np.array([90.0, 90.0]), layer=Layer.FAPS), "brows")
             for number in range(31, 39)
@@ -193,7 +193,7 @@ def whole_at(times: Float64, seed: int, asked: Sequence[KnownMotion]) -> dict[st
         (Channel(au(62)[0], np.array([0.0]), np.array([0.2]), layer=Layer.BASE, keeps_last=True), "yaw"),
         (Channel(au(55)[0], np.array([0.0, 12.0]), np.array([0.2, 0.2]), layer=Layer.HEAD), "head"),
     ],
-    ids=["frown", *(f"FAP {number}" for number in range(31, 39)), "mood", "gaze", "base gaze", "tilt"],
+    ids=["raise", *(f"FAP {number}" for number in range(31, 39)), "mood", "gaze", "base gaze", "tilt"],
 )
 def test_prosody_yields_only_parts_that_a_document_moves(channel: Channel, part: str) -> None:
     for seed in range(10):
@@ -201,6 +201,49 @@ def test_prosody_yields_only_parts_that_a_document_moves(channel: Channel, part:
         assert np.abs(beside[part]).max() == 0.0
         for name in {"head", "brows", "yaw"} - {part}:
             np.testing.assert_array_equal(alone[name], beside[name])
+
+
+def test_prosody_raises_brows_less_in_a_frown() -> None:
+    frown = KnownMotion(0.0, Channel(au(4)[0], np.array([0.0, 12.0]), np.array([0.5, 0.5])))
+    alone, beside = (
+        np.stack([whole(seed, asked=asked)["brows"] for seed in range(5)]) for asked in ([], [frown])
+    )
+    np.testing.assert_allclose(beside, prosody_facts()["brows"]["frown"] * alone, atol=1e-6)
+    assert alone.max() > 0.2
+
+
+def units(number: int, times: Float64, asked: Sequence[KnownMotion] = (), seed: int = 0) -> Float64:
+    channels = prosody_channels([talk()], 0.0, float(times[-1]), seed, asked)
+    return blend(channels, times).aus[:, AU_NAMES().index(au(number)[0].name)].astype(np.float64)
+
+
+def test_prosody_inhales_in_pauses_between_phrases() -> None:
+    sounds = [
+        (0.0, 1.0, "a"),
+        (1.0, 1.2, ""),
+        (1.2, 2.0, "a"),
+        (2.0, 2.5, ""),
+        (2.5, 3.5, "a"),
+        (3.5, 4.5, ""),
+    ]
+    words = (Word(0.0, 4.5, "words"),)
+    said = Utterance(5.5, words, tuple(Phoneme(*one, 1) for one in (*sounds, (4.5, 5.5, "a"))), {})
+    times = np.arange(0.0, 6.0, 0.01)
+    channels = prosody_channels([talk(said=said)], 0.0, 6.0, 0)
+    flared = blend(channels, times).aus[:, AU_NAMES().index("38L")]
+    seen = times[flared > 0.05]
+    assert flared.max() == pytest.approx(prosody_facts()["breath"]["most"], rel=0.02)
+    assert seen[np.diff(seen, prepend=-1) > 0.1] == pytest.approx([2.1, 4.0], abs=0.05)
+    assert seen[np.diff(seen, append=9) > 0.1] == pytest.approx([2.5, 4.5], abs=0.1)
+
+
+def test_prosody_moistens_the_lips_after_a_turn_unless_they_move() -> None:
+    times = np.arange(0.0, SAID.duration + 2.0, 0.01)
+    seen = np.stack([units(28, times, seed=seed) for seed in range(20)])
+    assert 3 < (seen.max(axis=1) > 0.2).sum() < 17
+    assert seen[:, times < phrases(SAID)[-1].end].max() == seen[:, -1].max() == 0
+    smile = KnownMotion(0.0, Channel(au(12)[0], np.array([0.0, 14.0]), np.array([0.5, 0.5])))
+    assert max(units(28, times, [smile], seed).max() for seed in range(20)) == 0
 
 
 def test_prosody_goes_on_with_a_smile_and_a_base_head_direction() -> None:
