@@ -23,6 +23,7 @@ from tests.rows import each_row
         ("repeats", "<head/>", "9" * 30, {"repetition": "100"}),
         ("toss", "<head amount='0.2'/>", "TOSS", {"lexeme": "TILT_LEFT"}),
         ("toss", "<head amount='-0.2'/>", "TOSS", {"lexeme": "TILT_RIGHT"}),
+        ("parameterized", "<head/>", "PARAMETERIZED", {"lexeme": "TILT_LEFT"}),
         ("parameterized", "<head x='-30'/>", "PARAMETERIZED", {"lexeme": "TILT_LEFT"}),
         ("parameterized", "<head x='20'/>", "PARAMETERIZED", {"lexeme": "TILT_RIGHT"}),
         ("orient", "<head direction='upleft'/>", "ORIENT", {"lexeme": "UP_LEFT"}),

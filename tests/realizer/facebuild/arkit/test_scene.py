@@ -34,6 +34,20 @@ def test_read_pieces_decodes_quantised_places_in_a_turned_node(
     assert np.abs(piece.vertices - wanted).max() < 2 * step
 
 
+@pytest.mark.parametrize(("scale", "wanted"), [([2.0, 2.0, 2.0], [0, 1, 2]), ([-2.0, 2.0, 2.0], [2, 1, 0])])
+def test_read_pieces_keeps_the_outside_of_a_reflected_head(
+    new_glb: Callable[[], Any], tmp_path: Path, scale: list[float], wanted: list[int]
+) -> None:
+    glb = new_glb()
+    glb.mesh("head", np.eye(3), np.array([[0, 1, 2]]), None, {})
+    glb.json["nodes"][0] |= {"scale": scale}
+    path = tmp_path / "r.glb"
+    path.write_bytes(glb.bytes())
+    (piece,) = read_pieces(Gltf(path))
+    assert piece.vertices == pytest.approx(np.eye(3) * scale)
+    assert piece.triangles.tolist() == [wanted]
+
+
 def test_read_pieces_poses_vertices_by_their_skeleton(new_glb: Callable[[], Any], tmp_path: Path) -> None:
     glb = new_glb()
     at = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]])
