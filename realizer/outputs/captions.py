@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 from typing import TYPE_CHECKING, Any
 
 from realizer.outputs import speech_spans
@@ -54,7 +54,7 @@ def _lines(speaking: ScheduledSpeech) -> Iterator[Span]:
                 lines[-1] = Span(line.start, word.end, text)
                 continue
         lines.append(word)
-    for line, after in zip(lines, [*lines[1:], None], strict=True):
+    for line, after in zip_longest(lines, lines[1:]):
         end = line.end + LINGER
         yield Span(line.start, end if after is None else min(end, max(after.start, line.end)), line.text)
 

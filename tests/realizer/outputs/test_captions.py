@@ -45,6 +45,10 @@ def test_captions_have_lines_of_one_long_word(realization):
     assert [line.text for line in found] == ["x" * 60, "y"]
 
 
+def test_captions_of_speech_without_words_are_empty(realization):
+    assert captions(spoken(realization)) == ()
+
+
 def test_captions_show_simultaneous_speech_in_separate_lines(realization):
     found = captions(spoken(realization, (0.0, 1.0, "one"), also=((0.5, 1.5, "two"),)))
     assert found == (
