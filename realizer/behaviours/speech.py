@@ -40,7 +40,7 @@ def speech_request(node: Speech, context: PlanningContext) -> SpeechRequest | No
     """Return the request for the SSML description of highest priority, or for the text with its marks.
 
     A description with an audio file replaces the voice. The text is then in another description, or in the
-    sound clip; without text, the mouth follows the loudness.
+    sound clip; without text, the lips follow the sound alone.
     """
     recording = _recording(node, context)
     spoken = _spoken_content(node)

@@ -24,6 +24,7 @@ class Recording:
         pcm: (n,) int16 mono.
         text: the plain text, if known.
         words, phonemes: in order, in seconds from its start; () if unknown.
+        heard: the phonemes that were recognised in the sound when it arrived, or None.
     """
 
     rate: int
@@ -31,6 +32,7 @@ class Recording:
     text: str | None = None
     words: tuple[Word, ...] = ()
     phonemes: tuple[Phoneme, ...] = ()
+    heard: tuple[Phoneme, ...] | None = None
 
 
 @dataclass(frozen=True, slots=True)

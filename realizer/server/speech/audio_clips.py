@@ -18,12 +18,15 @@ from realizer.protocol.messages.speech import SpeechMessage, TimedText
 from realizer.protocol.wire import ClipPiece
 from realizer.server.session.control_fields import FieldError
 from realizer.speech.recorded.viseme_names import sound_of
+from realizer.speech.sound_visemes.recogniser import LOWEST, VisemeRecogniser
 from realizer.speech.utterance import Phoneme, Recording, Word
 
 MAX_BYTES = 64 * 2**20  # of all clips of a session: half an hour of speech; the oldest are removed
 MAX_CLIPS = 1000  # of a session
 HEARD = "heard:"  # before the id of a character: a sound that it hears
 MAX_TIMES = 20_000  # words, or phonemes, of one clip
+# Mouth shapes are recognised in pieces as they arrive, unless one is so long that it would delay others.
+MAX_PIECE = 2.0  # s
 
 
 class ClipError(FieldError):
@@ -39,6 +42,8 @@ class Clip:
         rate: Hz of raw PCM; 0 for a sound file.
         sound: rate and int16 samples; None until the last piece has arrived.
         is_annotated: whether the annotation is complete.
+        recogniser: recognises mouth shapes in the pieces; None if they come too fast, or are not needed.
+        heard: the phonemes that it has recognised.
     """
 
     pieces: list[bytes] = field(default_factory=list)
@@ -48,13 +53,20 @@ class Clip:
     words: list[TimedText] = field(default_factory=list)
     phonemes: list[TimedText] = field(default_factory=list)
     is_annotated: bool = True
+    recogniser: VisemeRecogniser | None = None
+    heard: list[Phoneme] = field(default_factory=list)
 
     @property
     def size(self) -> int:
         return sum(map(len, self.pieces)) if self.sound is None else self.sound[1].nbytes
 
+    @property
+    def is_described(self) -> bool:
+        """Whether its text or its times are known, so that mouth shapes need not be recognised."""
+        return bool(self.text or self.words or self.phonemes)
+
     def to_json(self) -> dict[str, Any]:
-        """Return all fields as JSON values."""
+        """Return the fields as JSON values, without what can be recognised again."""
         sound = None
         if self.sound is not None:
             sound = {"rate": self.sound[0], "pcm": _base64(self.sound[1].astype("<i2").tobytes())}
@@ -142,7 +154,13 @@ class AudioClips:
             self.recordings.pop(piece.id, None)
             self._clips[piece.id] = clip
             clip.rate, clip.pieces = piece.rate, pieces
+            clip.recogniser = VisemeRecogniser(piece.rate) if piece.rate >= LOWEST else None
+            clip.heard = []
         pieces.append(piece.sound)
+        if clip.is_described or len(piece.sound) > 2 * MAX_PIECE * piece.rate:
+            clip.recogniser = None
+        if clip.recogniser is not None:
+            clip.heard += clip.recogniser.feed(_samples(piece.sound))
         self._changed.add(piece.id)
         if piece.final:
             self._complete(piece.id, clip)
@@ -189,6 +207,8 @@ class AudioClips:
                 clip.sound = clip.rate, _samples(content)
                 if not len(clip.sound[1]):
                     raise RealizerError("wanted sound, got none")
+                if clip.recogniser is not None:
+                    clip.heard += clip.recogniser.close()
             else:
                 sound = read_sound(content)
                 clip.sound = sound.rate, sound.pcm
@@ -208,7 +228,8 @@ class AudioClips:
         text = clip.text
         if text is None and words:
             text = " ".join(word.text for word in words)
-        self.recordings[id] = Recording(rate, pcm, text, words, phonemes)
+        heard = None if clip.recogniser is None else tuple(clip.heard)
+        self.recordings[id] = Recording(rate, pcm, text, words, phonemes, heard)
 
     def _make_room(self, newest: str) -> None:
         """Remove the oldest clips if there are too many. Blocks that play have their own reference."""

@@ -1,29 +1,34 @@
-"""Utterances from recordings, by known times, alignment or loudness."""
+"""Utterances from recordings, by known times, by alignment, or by their sound alone."""
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
 
 from realizer import tables
-from realizer.core.array_types import Float64, Int16
+from realizer.core.array_types import Bool, Float64, Int16
+from realizer.speech.sound_visemes.mel_stream import viseme_facts
+from realizer.speech.sound_visemes.recogniser import recognised
 from realizer.speech.utterance import Phoneme, Recording, SpeechRequest, Utterance, Word, tile
 
 # Words of a voice are adjacent, while those of a recording may have gaps: the end of a word is mapped as a
 # time this much before the start of the next one.
 EDGE = 1e-4  # s
 SIDE = 1e-3  # letters
+STEP = 0.02  # s between the instants at which sounds are compared
+CACHED = 8  # recordings; a document is planned more than once before it plays
 
 Timed = TypeVar("Timed", Word, Phoneme)
 
 
 def utterance_of(request: SpeechRequest, recording: Recording) -> Utterance:
-    """Return a recording as an utterance, by its times if known, else by alignment, else by loudness.
+    """Return a recording as an utterance, by its times if known, else by alignment, else by its sound.
 
     Known phonemes are used unchanged; if only words are known, each has the phonemes of the reference voice.
-    Marks are placed before their words. Without times the text is aligned with the sound; without a text the
-    mouth opens with the loudness.
+    Marks are placed before their words. Without times the text is aligned with the sound; without a text
+    mouth shapes are recognised in the sound, or if it is no speech, the mouth opens with the loudness.
 
     Raises:
         VoiceError: if the text is too long, or the reference voice died.
@@ -35,12 +40,8 @@ def utterance_of(request: SpeechRequest, recording: Recording) -> Utterance:
     if not recording.words and not recording.phonemes:
         if request.ssml.strip():
             found = align_recording(request, recording)
-            return (
-                found
-                if found.phonemes
-                else replace(found, phonemes=by_loudness(recording.pcm, recording.rate))
-            )
-        return _utterance(recording, (), by_loudness(recording.pcm, recording.rate), {})
+            return found if found.phonemes else replace(found, phonemes=_by_sound(recording))
+        return _utterance(recording, (), _by_sound(recording), {})
     words, phonemes = recording.words, recording.phonemes
     if request.ssml.strip() and (request.marks or not words or not phonemes):
         # Its times only count relatively.
@@ -58,7 +59,7 @@ def utterance_of(request: SpeechRequest, recording: Recording) -> Utterance:
         words = words or tuple(map(moved, reference.words))
         phonemes = phonemes or tuple(map(moved, reference.phonemes))
         return _utterance(recording, words, phonemes, marks)
-    return _utterance(recording, words, phonemes or by_loudness(recording.pcm, recording.rate), {})
+    return _utterance(recording, words, phonemes or _by_sound(recording), {})
 
 
 def _utterance(
@@ -114,6 +115,33 @@ def _letters(words: Sequence[Word]) -> tuple[Float64, Float64]:
     letters = np.column_stack([np.append(0.0, ends)[:-1], ends]).ravel()
     times = np.array([time for word, _ in spoken for time in (word.start, word.end)], np.float64)
     return letters, np.maximum.accumulate(times)
+
+
+@lru_cache(CACHED)
+def _by_sound(recording: Recording) -> tuple[Phoneme, ...]:
+    """Return the phonemes that are heard; if the sound is no speech, vowels that follow the loudness."""
+    pcm, rate = recording.pcm, recording.rate
+    loudness = by_loudness(pcm, rate)
+    heard = recognised(pcm, rate) if recording.heard is None else recording.heard
+    return heard if _is_speech(heard, loudness) else loudness
+
+
+def _is_speech(heard: Sequence[Phoneme], loudness: Sequence[Phoneme]) -> bool:
+    """Return whether the loud parts of a sound are heard as sounds that are loud in speech."""
+    if not heard or not loudness:
+        return False
+    facts = viseme_facts()
+    resonant = {row["ipa"] for row in facts["class"] if row.get("resonant")}
+    loudest = tables.toml_table("envelope.toml")["opening"][0]["ipa"]
+    times = np.arange(0.0, loudness[-1].end, STEP)
+    is_loud = _at([p.ipa == loudest for p in loudness], loudness, times)
+    is_resonant = _at([p.ipa in resonant for p in heard], heard, times)
+    return bool((is_loud & is_resonant).sum() > facts["resonant"] * is_loud.sum())
+
+
+def _at(values: Sequence[bool], phonemes: Sequence[Phoneme], times: Float64) -> Bool:
+    """Return (n,) the value of the phoneme at each time."""
+    return np.array(values)[np.searchsorted([p.start for p in phonemes], times, "right") - 1]
 
 
 def by_loudness(pcm: Int16, rate: int) -> tuple[Phoneme, ...]:

@@ -18,6 +18,7 @@ from realizer.protocol.wire import ClipPiece, pack_clip, unpack
 from realizer.server.serve import Server
 from realizer.server.speech import audio_clips
 from realizer.server.speech.audio_clips import AudioClips, ClipError
+from realizer.speech.sound_visemes.recogniser import recognised
 
 RATE = 16000
 SOUND = np.rint(9000 * np.sin(np.arange(RATE) * 0.05)).astype("<i2")
@@ -57,6 +58,21 @@ def test_add_chunk_joins_pieces_of_a_file() -> None:
     known.add_chunk(ClipPiece("c", 1, 0, content[777:]))
     assert known.recordings["c"].rate == RATE
     assert np.array_equal(known.recordings["c"].pcm, SOUND)
+
+
+def test_add_chunk_recognises_mouth_shapes_as_they_arrive() -> None:
+    known = AudioClips()
+    for number, piece in enumerate(np.split(SOUND, 20)):
+        known.add_chunk(ClipPiece("c", number, RATE, piece.tobytes(), final=number == 19))
+    assert known.recordings["c"].heard == recognised(SOUND.astype(np.int16), RATE)
+
+
+def test_add_chunk_recognises_nothing_in_described_or_long_sound() -> None:
+    known = AudioClips()
+    known.annotate(annotation(clip="c", text="Hello"))
+    known.add_chunk(ClipPiece("c", 0, RATE, SOUND.tobytes()))
+    known.add_chunk(ClipPiece("d", 0, RATE, np.tile(SOUND, 3).tobytes()))
+    assert known.recordings["c"].heard is known.recordings["d"].heard is None
 
 
 def test_annotate_accepts_times_before_and_after_the_sound() -> None:

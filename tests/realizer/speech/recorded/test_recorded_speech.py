@@ -9,7 +9,8 @@ import pytest
 
 from realizer.animation.lips.lip_sync import lip_channels
 from realizer.speech.duration_fit import speak_to_length
-from realizer.speech.recorded.recorded_speech import by_loudness
+from realizer.speech.recorded.recorded_speech import by_loudness, utterance_of
+from realizer.speech.registry import find_voice
 from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Phoneme, Recording, SpeechRequest, Word
 
@@ -58,10 +59,28 @@ def test_utterance_of_keeps_known_phonemes() -> None:
     assert 0.5 < utterance.marks["m"] < 1.8
 
 
-def test_utterance_of_sound_alone_uses_loudness() -> None:
-    utterance = said(SpeechRequest(""))
-    assert {p.ipa for p in utterance.phonemes} == {"a"}
+@pytest.mark.espeak
+def test_utterance_of_sound_alone_recognises_mouth_shapes() -> None:
+    pytest.importorskip("espeakng_loader")
+    voice = find_voice("espeak")
+    spoken = voice.say(SpeechRequest("Bob may buy a map."))
+    voice.close()
+    assert spoken.pcm is not None
+    utterance = utterance_of(SpeechRequest(""), Recording(spoken.sample_rate, spoken.pcm))
     assert utterance.words == ()
+    assert {"p", "a", "ɪ"} < {p.ipa for p in utterance.phonemes}
+    assert (utterance.phonemes[0].start, utterance.phonemes[-1].end) == (0.0, utterance.duration)
+
+
+def test_utterance_of_sound_alone_uses_what_was_heard() -> None:
+    heard = (Phoneme(0.0, 1.0, "p"), Phoneme(1.0, 2.0, "a"))
+    assert said(SpeechRequest(""), heard=heard).phonemes == heard
+
+
+def test_utterance_of_sound_that_is_no_speech_uses_loudness() -> None:
+    utterance = utterance_of(SpeechRequest(""), Recording(4000, SOUND))  # no consonant has so low a rate
+    assert {p.ipa for p in utterance.phonemes} == {"a"}
+    assert said(SpeechRequest(""), heard=(Phoneme(0.0, 2.0, ""),)).phonemes == by_loudness(SOUND, RATE)
 
 
 def test_utterance_of_text_without_times_is_aligned() -> None:

@@ -1,0 +1,1 @@
+"""Phonemes from sound alone, as far as the lips show them."""
