@@ -115,7 +115,7 @@ def _bands() -> Float32:
     places = np.fft.rfftfreq(SPECTRUM, 1 / RATE)[:, None]
     rise = (places - edges[:-2]) / np.diff(edges[:-1])
     fall = (edges[2:] - places) / np.diff(edges[1:])
-    return (np.maximum(0.0, np.minimum(rise, fall)) / (WINDOW / 4) ** 2).astype(np.float32)
+    return np.asarray(np.maximum(0.0, np.minimum(rise, fall)) / (WINDOW / 4) ** 2, np.float32)
 
 
 def _taps(rate: int) -> int:
@@ -128,4 +128,4 @@ def _sincs(rate: int) -> Float32:
     taps, scale = _taps(rate), min(1.0, RATE / rate)
     distance = np.arange(taps) - taps // 2 + 1 - np.arange(PHASES)[:, None] / PHASES
     shape = scale * np.sinc(scale * distance) * np.cos(np.pi * distance / (taps + 2)) ** 2
-    return (shape / shape.sum(axis=1, keepdims=True)).astype(np.float32)
+    return np.asarray(shape / shape.sum(axis=1, keepdims=True), np.float32)
