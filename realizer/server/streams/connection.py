@@ -1,6 +1,7 @@
 """The state of one connection of a session: its subscriptions and its place in the feedback log."""
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from realizer.server.session.effects import RenderOptions
 from realizer.server.session.feedback_log import FeedbackFilter
@@ -13,15 +14,21 @@ SLOW = 512 * 1024
 STUCK = 32 * 2**20
 
 
+class Drawing(NamedTuple):
+    """A picture that is being drawn: id of its effect `Draw`, number of the frame, and when it was begun."""
+
+    id: int
+    frame: int
+    begun: float
+
+
 @dataclass(eq=False)
 class VideoView:
     """A view, drawn once for all its subscribers.
 
     Attributes:
         next: number of the next frame to draw.
-        busy: id of the effect `Draw` in progress; None while there is none.
-        drawing: number of the frame that is being drawn.
-        started_at: when its drawing started.
+        drawing: the picture in progress; None while there is none.
     """
 
     timeline: FrameTimeline
@@ -29,9 +36,7 @@ class VideoView:
     face: str
     options: RenderOptions
     next: int
-    busy: int | None = None
-    drawing: int = 0
-    started_at: float = 0.0
+    drawing: Drawing | None = None
 
     @property
     def key(self) -> tuple[object, ...]:

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from realizer.protocol.wire import pack
 from realizer.server.session.character_faces import CharacterFaces
 from realizer.server.session.effects import Draw, Effect, RenderOptions, Send
-from realizer.server.streams.connection import Connection, VideoSubscription, VideoView
+from realizer.server.streams.connection import Connection, Drawing, VideoSubscription, VideoView
 from realizer.server.streams.frame_windows import EPSILON, FrameTimeline, first_frame_at, last_frame_at
 
 # A picture that takes longer is given up.
@@ -40,14 +40,14 @@ class VideoStream:
         self._views = {s.view.key: s.view for s in subscribers}
         for view in self._views.values():
             fps = view.timeline.fps
-            if view.busy is not None and now + EPSILON >= view.started_at + DEADLINE:
-                view.busy = None
+            if view.drawing is not None and now + EPSILON >= view.drawing.begun + DEADLINE:
+                view.drawing = None
             newest = last_frame_at(now, fps)
-            if view.busy is not None or newest < view.next:
+            if view.drawing is not None or newest < view.next:
                 continue
             window = view.timeline.window(newest, newest)
             self._draws += 1
-            view.busy, view.drawing, view.started_at, view.next = self._draws, newest, now, newest + 1
+            view.drawing, view.next = Drawing(self._draws, newest, now), newest + 1
             pose = window.poses[newest - window.first]
             window.drop_source()
             effects.append(Draw(self._draws, view.face, pose, view.options))
@@ -56,8 +56,8 @@ class VideoStream:
     def next(subscribers: list[VideoSubscription]) -> float:
         """Return the time of the next picture; infinity without subscribers."""
         times = (
-            s.view.started_at + DEADLINE if s.view.busy is not None else s.view.next / s.view.timeline.fps
-            for s in subscribers
+            view.drawing.begun + DEADLINE if view.drawing is not None else view.next / view.timeline.fps
+            for view in (s.view for s in subscribers)
         )
         return min(times, default=math.inf)
 
@@ -65,10 +65,10 @@ class VideoStream:
         self, draw: int, picture: bytes | None, connections: Iterable[Connection]
     ) -> tuple[list[Effect], list[Connection]]:
         """Take a picture, or None if it failed. Return what to send, and the view's connections."""
-        view = next((v for v in self._views.values() if v.busy == draw), None)
-        if view is None:
+        view = next((v for v in self._views.values() if v.drawing and v.drawing.id == draw), None)
+        if view is None or view.drawing is None:
             return [], []
-        view.busy = None
+        frame, view.drawing = view.drawing.frame, None
         effects: list[Effect] = []
         viewers = []
         for connection in connections:
@@ -76,12 +76,12 @@ class VideoStream:
                 if not isinstance(s, VideoSubscription) or s.view is not view:
                     continue
                 viewers.append(connection)
-                if picture is None or view.drawing < s.next:
+                if picture is None or frame < s.next:
                     continue
-                connection.dropped += view.drawing - s.next + connection.is_slow
-                s.next = view.drawing + 1
+                connection.dropped += frame - s.next + connection.is_slow
+                s.next = frame + 1
                 if not connection.is_slow:
-                    time = view.drawing / view.timeline.fps
-                    data = pack("video", view.drawing, time, picture, character=s.index)
+                    time = frame / view.timeline.fps
+                    data = pack("video", frame, time, picture, character=s.index)
                     effects.append(Send(connection.id, data))
         return effects, viewers
