@@ -50,8 +50,9 @@ ERRORS = re.compile(r"(\w+\.)*\w*Error$")
 TUNING = {"maxsize", "maxlen", "timeout", "indent", "stacklevel", "max_workers", "limit", "ndigits", "repr"}
 # Numbers and sums there are a matter of taste: where a curl lies, how thick a line is.
 TASTE = re.compile("realizer/(charts|facebuild/person)/")
-# Numbers so small only keep rounding errors and divisions by 0 out: any other would do.
-TOLERANCE = 5e-6
+# Numbers so small only keep rounding errors and divisions by 0 out; those so large are limits, and one more
+# or less is the same to all who stay below them.
+TOLERANCE, LIMIT_OF_MANY = 5e-6, 1000
 # Limits of pydantic for what clients send; those beyond BOUND only keep nonsense out.
 LIMITS, BOUND = {"ge", "gt", "le", "lt", "min_length", "max_length"}, 100
 # Which random numbers are drawn: others would do.
@@ -134,7 +135,7 @@ def _end(node: ast.expr | ast.stmt) -> tuple[int, int]:
 
 
 def _is_tolerance(value: float) -> bool:
-    return 0 < value < TOLERANCE
+    return 0 < value < TOLERANCE or (isinstance(value, int) and value >= LIMIT_OF_MANY)
 
 
 def _nodes(tree: ast.AST) -> Iterator[ast.AST]:

@@ -42,7 +42,11 @@ class EventQueue:
             yield first
 
     def add(self, playing: ActiveBlock, only: Collection[tuple[str, str]] | None = None) -> None:
-        """Add the future events of a block; of its sync points all, or `only` these (behaviour, sync)."""
+        """Add the future events of a block instead of those it has.
+
+        Args:
+            only: (behaviour, sync) of its future sync points; None for all.
+        """
         number, order = playing.number, playing.order
         due = events(playing.block, playing.schedule, order, number)
         if only is not None:

@@ -159,7 +159,6 @@ class BlockTimeline:
             first.order = self._order
             self._order += 1
             if first.start < FOREVER:
-                self.events.drop(first)
                 self.events.add(first)
 
     def update_followers(self, playing: ActiveBlock, now: float) -> None:
