@@ -18,7 +18,6 @@ BANDS, LOWEST, HIGHEST = 32, 80.0, 7600.0  # of the mel scale, Hz
 QUIETEST = 1e-10  # power of a band; full scale is about 1
 # The resampler: a sinc with a Hann window, tabulated in so many steps between two samples.
 ZEROS, PHASES = 6, 64
-AT_ONCE = 16_000  # samples that are resampled at once; limits the memory
 # Natural logarithms of power. The loud level falls slowly, so that it follows the speaker.
 FIRST_LEVEL, FALL = -9.0, 0.002  # a frame
 ACTIVE = 7.0  # frames this much below the loud level are no speech
@@ -75,16 +74,16 @@ class MelStream:
         taps, table = _taps(self._rate), _sincs(self._rate)
         known = self._first + len(self._pcm) - taps // 2 - 1  # the last place with all neighbours
         count = max(0, known * RATE // self._rate + 1 - self._count)
-        parts = [np.zeros(0, np.float32)]
-        for begin in range(self._count, self._count + count, AT_ONCE):
-            at = np.arange(begin, min(begin + AT_ONCE, self._count + count)) * self._rate
-            place, phase = at // RATE, (at % RATE) * PHASES // RATE
-            near = np.lib.stride_tricks.sliding_window_view(self._pcm, taps)
-            parts.append((near[place - self._first - taps // 2 + 1] * table[phase]).sum(axis=1))
+        if not count:
+            return np.zeros(0, np.float32)
+        at = np.arange(self._count, self._count + count) * self._rate
+        place, phase = at // RATE, (at % RATE) * PHASES // RATE
+        near = np.lib.stride_tricks.sliding_window_view(self._pcm, taps)
+        parts: Float32 = (near[place - self._first - taps // 2 + 1] * table[phase]).sum(axis=1)
         self._count += count
         done = max(0, self._count * self._rate // RATE - taps // 2 - self._first)
         self._pcm, self._first = self._pcm[done:], self._first + done
-        return np.concatenate(parts)
+        return parts
 
     def _follow(self, log: Float32) -> tuple[Float32, Float32]:
         """Return the loud level and the mean spectrum after each frame."""

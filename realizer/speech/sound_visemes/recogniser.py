@@ -21,7 +21,7 @@ LOWEST = 8000  # Hz; in sound of a lower rate consonants are missing
 EARLY = FUTURE % BLOCK  # frames
 LAG = 2  # frames after which the class of a frame is final
 TAIL = 0.25  # s of silence after the end, in which all contexts end
-AT_ONCE = 250  # blocks; limits the memory for contexts
+AT_ONCE = 5  # s; longer pieces are divided, which limits the memory
 
 
 class VisemeRecogniser:
@@ -49,7 +49,9 @@ class VisemeRecogniser:
     def feed(self, pcm: Int16) -> list[Phoneme]:
         """Return the phonemes, "" for a pause, whose end is known with this piece, without gaps."""
         self._length += len(pcm)
-        return self._advance(pcm)
+        size = AT_ONCE * self._rate
+        parts = (pcm[at : at + size] for at in range(0, len(pcm), size))
+        return [phoneme for part in parts for phoneme in self._advance(part)]
 
     def close(self) -> list[Phoneme]:
         """Return the rest of the phonemes, up to the end of the sound."""
@@ -64,17 +66,13 @@ class VisemeRecogniser:
         self._level = np.concatenate((self._level, frames.level))
         self._mean = np.concatenate((self._mean, frames.mean))
         blocks = max(0, (len(self._log) - PAST - FUTURE) // BLOCK)
-        found: list[Phoneme] = []
-        for begin in range(0, blocks, AT_ONCE):
-            first = np.arange(begin, min(begin + AT_ONCE, blocks)) * BLOCK + PAST
-            at = first[:, None] + np.arange(BLOCK)
-            now = at + FUTURE
-            inputs = context(self._log[at[..., None] + OFFSETS], self._level[now], self._mean[now])
-            for number in self._path.advance(log_probabilities(inputs).reshape(at.size, -1)):
-                found += self._decide(number)
+        at = (np.arange(blocks) * BLOCK + PAST)[:, None] + np.arange(BLOCK)
+        now = at + FUTURE
+        inputs = context(self._log[at[..., None] + OFFSETS], self._level[now], self._mean[now])
+        numbers = self._path.advance(log_probabilities(inputs).reshape(at.size, -1)) if blocks else []
         used = blocks * BLOCK
         self._log, self._level, self._mean = self._log[used:], self._level[used:], self._mean[used:]
-        return found
+        return [phoneme for number in numbers for phoneme in self._decide(number)]
 
     def _decide(self, number: int) -> list[Phoneme]:
         """Add a frame of a class; return the phoneme that ends with it, if any."""
@@ -97,21 +95,20 @@ class _Path:
         self._added = np.array([c.get("added", 0.0) for c in facts["class"]]) - facts["rarity"] * np.log(
             shares()
         )
-        self._best = np.zeros(len(self._added))
+        self._best = [0.0] * len(self._added)
         self._before: list[list[int]] = []  # of the last frames: the class before, for each class
 
     def advance(self, scores: Float32) -> list[int]:
         """Return the classes that are final with further frames, by their (n, classes) log probabilities."""
         found = []
-        for row in scores + self._added:
-            top = int(self._best.argmax())
-            jump = float(self._best[top]) - self._cost
-            stays = self._best >= jump
-            self._before.append(np.where(stays, np.arange(len(row)), top).tolist())
-            self._best = row + np.where(stays, self._best, jump)
-            self._best -= self._best.max()
+        for row in (scores + self._added).tolist():
+            jump = max(self._best)
+            top = self._best.index(jump)
+            jump -= self._cost
+            self._before.append([k if best >= jump else top for k, best in enumerate(self._best)])
+            self._best = [score + max(best, jump) for score, best in zip(row, self._best, strict=True)]
             if len(self._before) > LAG:
-                number = int(self._best.argmax())
+                number = self._best.index(max(self._best))
                 for before in reversed(self._before[-LAG:]):
                     number = before[number]
                 found.append(number)
