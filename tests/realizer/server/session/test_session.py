@@ -105,8 +105,11 @@ def test_session_reports_a_bug_in_planning_with_the_id_of_the_block(driver, monk
         raise ZeroDivisionError("secret")
 
     monkeypatch.setattr(driver.session.player, "submit", bug)
+    logged: list[str] = []
+    monkeypatch.setattr(driver.session, "log_entry", lambda t, kind: logged.append(kind) or True)
     client = driver.send(NOD.format("b"))
     (warning,) = warnings(client)
+    assert logged == ["tick", "tick"], "one reads it, one refuses it, and so does a replay"
     assert (warning.id, "internal error" in warning.text, "secret" in warning.text) == ("b", True, False)
     assert "ZeroDivisionError" in caplog.text
 
