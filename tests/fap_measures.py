@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ UPPER = ("2.2", "2.6", "2.7", "8.1", "8.5", "8.6")
 LOWER = ("2.3", "2.8", "2.9", "8.2", "8.7", "8.8")
 CORNERS = ("2.4", "2.5", "8.3", "8.4")
 LIDS = {"3.1": "3.3", "3.3": "3.1", "3.2": "3.4", "3.4": "3.2"}
+TONGUE = {43, 44, 45, 46, 47}
 INNER = 0.30  # baked occlusion under which the skin is behind the lips or in a socket
 
 
@@ -55,7 +57,14 @@ class Measure:
         row = np.zeros((1, 68), np.float32)
         for fap, value in values.items():
             row[0, fap - 1] = value
-        return np.asarray(deform(self.face, row)[0], np.float64)
+        face = self.toothless if set(values) <= TONGUE else self.face
+        return np.asarray(deform(face, row)[0], np.float64)
+
+    @cached_property
+    def toothless(self) -> Face:
+        """The face without the teeth that stop its tongue."""
+        parts = {name: part for name, part in self.face.parts.items() if "teeth" not in name}
+        return dataclasses.replace(self.face, parts=parts)
 
     def moves(self, values: dict[int, float]) -> Float64:
         """The same, less the neutral face."""
@@ -154,6 +163,9 @@ def others_of(measure: Measure, row: Fap, asked: list[float], moves: list[Float6
     else:
         return 0.0
     index = [measure.face.feature_points[name] for name in still]
+    if row.name == "open_jaw":
+        # Stretched cheeks draw the lips' corners backwards, which no FAP of the lips does.
+        moves = [move * [1, 1, 0] for move in moves]
     unit = measure.face.fapu.metres(row.unit)
     return max(
         float(np.linalg.norm(m[index], axis=1).max() / abs(v * unit))

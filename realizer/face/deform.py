@@ -10,6 +10,7 @@ from realizer.face.au.deformer import moves_of
 from realizer.face.basis import FAPS, JAW_COS, JAW_DROP, JAW_SIN, ROWS, TONGUE_COS, TONGUE_SIN
 from realizer.face.contours import couple_lips
 from realizer.face.model import Face
+from realizer.face.tongue import tongue_room
 
 # Columns of poses.
 OPEN_JAW, TONGUE_ROLL, HEAD, EYES, THRUST = 2, 46, slice(47, 50), slice(22, 26), slice(26, 28)
@@ -40,7 +41,7 @@ def deform(face: Face, poses: Any) -> Float32:
     rows = complete_poses(poses, face.inputs)
     if not np.isfinite(rows).all():
         raise ValueError("poses: wanted finite values, got NaN or infinity")
-    basis, units = face.basis, moves_of(face)
+    basis, units, room = face.basis, moves_of(face), tongue_room(face)
     rows, unit_values = rows[:, :FAPS], rows[:, FAPS:]
     moved: Bool = np.logical_or(rows[:, LIDS].any(axis=1), rows[:, THRUST].any(axis=1))
     if units is not None:
@@ -64,6 +65,8 @@ def deform(face: Face, poses: Any) -> Float32:
         here.reshape(len(here), -1)[:, 3 * first : 3 * last] += moves.T
         if units is not None:
             units(shown[part], lips[part], mixing[part], here)
+        if room is not None:
+            room(here)
         _turn_eyes(basis, rows[part], here)
         _keep_lids_over_balls(basis, rows[part], moved[part], here)
         _turn_head(basis, rows[part], here)

@@ -1,4 +1,4 @@
-"""Generated parts that the base mesh lacks: eyeballs and teeth."""
+"""The parts of a face that is being built, and the generated eyeballs."""
 
 from __future__ import annotations
 
@@ -97,78 +97,3 @@ def eyeball(name: str, centre: Float64, radius: float, look: dict[str, list[floa
     # A unit of IRISD widens the pupil, both edges together, by that much: half at each edge.
     part.fields[29 if name == "left_eye" else 30] = ways * (share * 0.5)[:, None]
     return part
-
-
-UPPER = (8.4, 6.8, 7.6, 7.0, 6.6, 9.5)  # mm: widths of the teeth of one side, from the middle
-LOWER = (5.4, 5.9, 6.7, 7.0, 7.0, 10.0)
-# The share of the light that reaches a tooth, from the gum at the tongue to the gum at the lips.
-SHADES = (0.55, 0.78, 0.75, 1, 1, 0.8, 0.55, 0.4)
-SHINES = (0.1, 0.15, 0.35, 1, 1, 1, 1, 1)  # gloss by ring
-IN_LIP = 0.62  # the share of the light that reaches the lower teeth past the upper ones and the lips
-WARM = np.array([1.0, 0.78, 0.64])  # the light behind the teeth comes from tongue and cheeks
-
-
-def teeth(name: str, front: Float64, width: float, depth: float, colours: dict[str, list[float]]) -> Part:
-    """Return an arch of twelve teeth with gums, closed towards the lips and towards the tongue.
-
-    Args:
-        front: (3,) the biting edge between the two middle teeth.
-        width, depth: metres; half axes of the arch (an ellipse).
-    """
-    up = 1.0 if name == "upper_teeth" else -1.0
-    sizes = UPPER if up > 0 else LOWER
-    crown = (9.8, 8.8, 9.6, 8.0, 7.4, 6.6) if up > 0 else (8.2, 8.4, 9.0, 7.8, 7.2, 6.4)
-    lift = (0.0, 0.7, 0.1, 0.6, 0.9, 1.1) if up > 0 else (0.0, 0.0, 0.0, 0.3, 0.5, 0.6)
-    # Arc length along the ellipse, by small steps from the middle.
-    t = np.linspace(0, np.pi * 0.62, 2000)
-    x, z = width * np.sin(t), depth * (np.cos(t) - 1)
-    run = np.concatenate([[0], np.cumsum(np.hypot(np.diff(x), np.diff(z)))])
-    # Gap and two ridges a tooth; the gaps stand back and are darker.
-    stations: list[tuple[float, int, bool]] = []
-    at = 0.0
-    for k, size in enumerate(sizes):
-        size /= 1000
-        stations += [(at, k, True), (at + 0.18 * size, k, False), (at + 0.82 * size, k, False)]
-        at += size
-    stations.append((at, len(sizes) - 1, True))
-    side = [(-s, k, gap) for s, k, gap in stations[:0:-1]] + stations
-    rows = []
-    tints = []
-    white, root, gum = (np.array(colours[key], float) for key in ("tooth", "root", "gum"))
-    for s, k, gap in side:
-        sign = np.sign(s) or 1.0
-        px, pz = sign * np.interp(abs(s), run, x), np.interp(abs(s), run, z)
-        tangent = np.array(
-            [np.interp(abs(s) + 1e-4, run, x) - abs(px), np.interp(abs(s) + 1e-4, run, z) - pz]
-        )
-        tangent /= np.hypot(*tangent)
-        normal = np.array([-tangent[1] * sign, tangent[0]])  # outwards, in x and z
-        back = 0.0007 if gap else 0.0
-        edge = (lift[k] + (0.5 if gap else 0.0)) / 1000
-        height = crown[k] / 1000
-        dark = (0.72 if gap else 1.0) * (1 - 0.05 * k)
-        # From the gum at the tongue over the biting edge and the front to the gum at the lips.
-        for dy, dn, tint in (
-            (height + 0.0030, -0.0064, gum * WARM * 0.8),
-            (height * 0.80, -0.0050, root * dark * WARM),
-            (edge + 0.0012, -0.0024, white * dark * (0.4 + 0.4 * WARM)),
-            (edge, -0.0002, white * dark),
-            (height * 0.45, 0.0004, white * dark),
-            (height * 0.86 - (0.001 if gap else 0), 0.0000, root * dark),
-            (height - (0.0016 if gap else 0), 0.0004, gum),
-            (height + 0.0045, 0.0002, gum * 0.85),
-        ):
-            x_out = front[0] + px + normal[0] * (dn - back)
-            rows.append([x_out, front[1] + up * dy, front[2] + pz + normal[1] * (dn - back)])
-            tints.append(tint)
-    vertices = np.array(rows)
-    triangles = grid(len(side), len(SHADES))
-    if up < 0:
-        triangles = triangles[:, [0, 2, 1]]
-    # Light reaches the front teeth between open lips and not the back of the mouth.
-    depth_in = (front[2] - vertices[:, 2]) / depth
-    near = smooth(depth_in, 0.75, 0.02)
-    occlusion = 0.86 * near + 0.12
-    occlusion *= np.tile(SHADES, len(side)) * (1 if up > 0 else IN_LIP)
-    gloss = 0.75 * near * np.tile(SHINES, len(side))
-    return Part(name, None, vertices, triangles, np.array(tints), gloss, occlusion)

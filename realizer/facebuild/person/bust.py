@@ -5,9 +5,11 @@ import numpy as np
 from realizer.core.array_types import Bool, Float64
 from realizer.face.mesh_geometry import vertex_normals
 from realizer.facebuild import parts
+from realizer.facebuild.mpeg4.rigid import opening_rows, tongue_bends
 from realizer.facebuild.parts import Part, smooth
 from realizer.facebuild.person import clothing, skin_colours
 from realizer.facebuild.person.brows import brow, lashes
+from realizer.facebuild.person.fap_fields import SINKS
 from realizer.facebuild.person.hair import hair, shadow, style_of
 from realizer.facebuild.person.lids import Lid
 from realizer.facebuild.person.lips import Lips
@@ -15,19 +17,24 @@ from realizer.facebuild.person.person import Person
 from realizer.facebuild.person.recipe import Recipe, appearance_of
 from realizer.facebuild.person.scalp import Scalp
 from realizer.facebuild.submesh import Submesh
+from realizer.facebuild.teeth import teeth
 
 ORDER = (
     "skin", "brows", "lashes", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue", "hair",
     "shirt",
 )  # fmt: skip
-# Behind closed lips, or too thin: they cast no shadow.
-SHADOWLESS = ("upper_teeth", "lower_teeth", "tongue", "brows", "lashes")
+# Too thin to cast a shadow.
+SHADOWLESS = ("brows", "lashes")
 MARGIN = 0.08  # m below the floor that the body is cut at by whole triangles first
 # Metres from the middle of the closed lips (2.2): how far the biting edges lie behind it and above it.
-BITE = {"upper_teeth": (0.0068, -0.0012), "lower_teeth": (0.0098, 0.0014)}
+# A resting jaw hangs a little: the rows do not touch.
+BITE = {"upper_teeth": (0.0068, -0.0008), "lower_teeth": (0.0098, -0.0014)}
 RED_RINGS = 9  # of the lips' rings, from inside to just beyond the border of the red
 LOWER_ARCH = 0.0015  # m that the lower arch is narrower at each side
-TONGUE = np.array([0, -0.0085, -0.0055])  # m that the tongue rests lower and further back than in the data
+# The tongue at rest: m that its tip lies behind the biting edge of the lower teeth, and below it; half its
+# width in half widths of the arch.
+TONGUE = 0.0082, 0.0055, 0.70
+TIP = 0.32  # the share of its width that the tip loses, as in the data it is as broad as the arch
 
 
 def assemble(person: Person, lips: Lips, lids: list[Lid], recipe: Recipe) -> list[Part]:
@@ -99,7 +106,7 @@ def _line_mouth(skin: Part, person: Person, lips: Lips, colours: dict[str, list[
 
 def _decimate_hidden(part: Part, person: Person, scalp: Scalp, stays: Bool) -> Part:
     """Decimate hidden and plain surface; feature points, lips and the mouth behind them stay."""
-    if part.name not in ("skin", "tongue", "shirt") or part.patch is None:
+    if part.name not in ("skin", "shirt") or part.patch is None:
         return part
     own = part.patch.sources()
     keep = (own >= 0) & stays[own]
@@ -114,31 +121,42 @@ def _teeth(person: Person, recipe: Recipe) -> list[Part]:
     for name, (back, rise) in BITE.items():
         front = np.array([0, bite[1] + rise, bite[2] - back])
         narrow = LOWER_ARCH if name == "lower_teeth" else 0
-        made.append(parts.teeth(name, front, width - narrow, depth, recipe.colours))
+        made.append(teeth(name, front, width - narrow, depth, recipe.colours))
     return made
 
 
 def _tongue(person: Person, recipe: Recipe) -> Part:
     ground = person.ground
     tongue = Submesh.of_quads(ground.mesh.quads["helper-tongue"], len(ground.at))
-    tongue = tongue.moved(np.repeat(TONGUE[None], len(tongue), 0))
+    back, drop, wide = TONGUE
+    bite, rest = ground.point("2.2"), tongue.positions(ground.at)
+    edge = np.array([0, bite[1] + BITE["lower_teeth"][1] - drop, bite[2] - BITE["lower_teeth"][0] - back])
+    fit = rest + edge - ground.point("6.1")
+    along = (fit[:, 2] - fit[:, 2].min()) / np.ptp(fit[:, 2])
+    narrow = 1 - TIP * smooth(along, 0.55, 1.0)
+    fit[:, 0] = rest[:, 0] * narrow * wide * person.arch[0] / np.abs(rest[:, 0]).max()
+    tongue = tongue.moved(fit - rest)
     place = tongue.positions(ground.at)
     # Darker in the groove along the middle and at the sides.
     across = np.abs(place[:, 0]) / np.abs(place[:, 0]).max()
     shade = 1 - 0.30 * smooth(across, 0.14, 0.0) - 0.35 * smooth(across, 0.55, 1.0)
     colours: Float64 = np.array(recipe.colours["tongue"], float) * shade[:, None]
     deep = (place[:, 2].max() - place[:, 2]) / np.ptp(place[:, 2])
-    light = 0.60 * smooth(deep, 0.58, 0.0) + 0.06
-    return Part("tongue", tongue, place, tongue.triangles, colours, np.full(len(place), 0.35), light)
+    light = 0.50 * smooth(deep, 0.70, 0.0) + 0.22
+    moves = opening_rows(place, person.jaw_pivot, np.interp(along, (0, 1), SINKS))
+    moves |= tongue_bends(place, along, np.ones(len(place)))[2]
+    gloss = np.full(len(place), 0.35)
+    return Part("tongue", tongue, place, tongue.triangles, colours, gloss, light, moves)
 
 
 def _bake(made: list[Part]) -> None:
-    count = np.cumsum([0] + [len(part.vertices) for part in made])
-    vertices = np.concatenate([part.vertices for part in made])
-    ups = np.concatenate([vertex_normals(part.vertices, part.triangles) for part in made])
-    each = list(zip(made, count, strict=False))
+    """Bake the occlusion of the parts that have none; all others cast no shadow."""
+    lit = [part for part in made if part.occlusion is None]
+    count = np.cumsum([0] + [len(part.vertices) for part in lit])
+    vertices = np.concatenate([part.vertices for part in lit])
+    ups = np.concatenate([vertex_normals(part.vertices, part.triangles) for part in lit])
+    each = list(zip(lit, count, strict=False))
     casts = np.concatenate([part.triangles + first for part, first in each if part.name not in SHADOWLESS])
     sees = skin_colours.occlusion(vertices, ups, casts)
     for part, first in each:
-        if part.occlusion is None:
-            part.occlusion = 0.25 + 0.75 * sees[first : first + len(part.vertices)]
+        part.occlusion = 0.25 + 0.75 * sees[first : first + len(part.vertices)]

@@ -6,6 +6,7 @@ Every field is scaled so that its feature point moves one metre per metre of FAP
 import numpy as np
 
 from realizer.core.array_types import Float64
+from realizer.face.basis import JAW_SIN
 from realizer.facebuild.fix_flipped import symmetrize, without_flips
 from realizer.facebuild.mpeg4.rigid import opening_rows, tongue_bends
 from realizer.facebuild.parts import smooth
@@ -16,8 +17,10 @@ from realizer.facebuild.person.lips import Lips, lip_fields
 BEND = 0.45  # of the slope of a cardinal spline: less dips between the stations, more roundness at them
 PUFFED_FROM = np.array([0.034, 0.0, 0.010])  # m, from the middle of the cheek inwards, down and back
 SINKS = 0.35, 0.70  # how far the tongue's back and tip sink with the jaw; more would hide it
-CLIMB = 0.4  # metres that the tongue's tip rises for each metre forwards
 SLACK = 30  # times that the throat's part in the jaw is softened
+BACKWARDS = 0.45  # metres that the corners of the mouth go back for each metre that the chin falls,
+FROM_MIDDLE = 0.1, 1.0  # along the lips more and more between these u,
+CHEEK = 0.035  # m beside them less and less up to there
 LOWEST = -0.16  # m; below it only the head's FAPs move anything
 
 
@@ -63,7 +66,13 @@ def _jaw(ground: Ground, lips: Lips, pivot: Float64) -> dict[int, Float64]:
     )
     slides = drag * (1 - lips.lips + lips.lips * lip) + tongue
     slides /= slides[chin]
-    return opening_rows(ground.at, pivot, opens) | {
+    rows = opening_rows(ground.at, pivot, opens)
+    # The cheeks are stretched: the corners go backwards while the chin falls.
+    corners = smooth(np.abs(lips.u), *FROM_MIDDLE) * smooth(lips.away, CHEEK, 0.0)
+    corners *= np.where(lips.fade > 0, lips.fade, ground.body & (ground.at[:, 2] > -0.05))
+    fall = ground.point("2.1")[2] - pivot[2]
+    rows[JAW_SIN + 1] -= BACKWARDS * fall * ground.smoothed(corners, 2)[:, None] * FORWARD
+    return rows | {
         14: slides[:, None] * FORWARD,
         15: -slides[:, None] * LEFT,
     }
@@ -212,7 +221,6 @@ def _tongue(ground: Ground) -> dict[int, Float64]:
     return roll | {
         43: scaled(bend[:, None] * -LEFT, tip, -LEFT),
         44: scaled(bend[:, None] * UP, tip, UP),
-        # On its way out it climbs over the lower teeth.
-        45: scaled((along**1.5)[:, None] * (FORWARD + CLIMB * UP), tip, FORWARD),
+        45: scaled((along**1.5)[:, None] * FORWARD, tip, FORWARD),
         46: scaled(arch[:, None] * UP, body, UP),
     }

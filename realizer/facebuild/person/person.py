@@ -23,6 +23,9 @@ FLOOR = 0.61  # the bust ends that far below the collarbones
 NECK_TOP, NECK_LENGTH = 0.092, 0.433  # below the chin the head's turn fades out, over that length,
 NECK_TILT = 0.30  # along a plane that falls with the jaw by that much
 NOD = np.array([0.0, -0.082, -0.012])  # the head nods about a point below and behind the head's joint
+# m from the joint to the axis that the jaw turns about in effect: the joint slides forwards while it turns
+# (Ostry, Vatikiotis-Bateson & Gribble 1997, JSLHR 40), so that the axis lies below and behind it.
+JAW_AXIS = np.array([0, -0.028, -0.004])
 CORNER = (0.007, 0.006, 0.009)  # m; half axes of the region smoothed at a corner of the mouth,
 RELAXED = 5  # and how many times
 ARCH = 0.74, 0.80  # half axes of the teeth's arch, in half widths and depths of the data's arches
@@ -79,7 +82,7 @@ def person_of(data: Path, targets: Mapping[str, float]) -> Person:
         ground=ground,
         balls=tuple((centre, radius - EYE_INSET) for centre, radius in balls),
         face=face,
-        jaw_pivot=_joint(mesh, at, "joint-mouth") + np.array([0, 0.002, 0.006]),
+        jaw_pivot=_joint(mesh, at, "joint-mouth") + JAW_AXIS,
         head_pivot=_joint(mesh, at, "joint-head") + NOD * face,
         floor=float(_joint(mesh, at, "joint-l-clavicle")[1]) - FLOOR * face,
         arch=(ARCH[0] * float(arch[0]) / 2, ARCH[1] * float(arch[2])),

@@ -119,7 +119,7 @@ def paint_lips(
 
 # Metres behind the lips that the mouth's lining is darkest from; how much light reaches it there, and right
 # behind the lips.
-DEEP, LIT = 0.055, (0.10, 0.62)
+DEEP, LIT = 0.060, (0.24, 0.66)
 
 
 def paint_mouth(

@@ -1,67 +1,34 @@
-"""Tests of generated eyes, teeth and tongue, also as an open mouth shows them."""
+"""Tests of the parts of a face that is being built, and of generated eyeballs."""
 
 import numpy as np
 import pytest
 
-from realizer.face.deform import deform
-from realizer.face.load import list_faces, load_face
-from realizer.face.model import Face
-from realizer.face.surface import normals
-from realizer.facebuild.parts import SHADES, teeth
-from realizer.render.cameras import camera_for
-from realizer.render.light import preset
-from realizer.render.software import SoftwareCanvas
+from realizer.facebuild.parts import IRIS, eyeball, smooth
 
-COLOURS = {"tooth": [240.0, 232, 214], "root": [228.0, 206, 180], "gum": [196.0, 112, 106]}
-WIDE = {3: 1100, 4: -80, 5: -1535, 10: -1245, 11: -1245, 52: -1525, 57: -1315, 58: -1315, 12: -480, 13: -480}
+LOOK = {
+    name: [float(k)] * 3
+    for k, name in enumerate(("pupil", "iris_inner", "iris_middle", "iris_outer", "ring", "white", "corner"))
+}
 
 
-def opened(face: Face) -> np.ndarray:
-    """(n_vertices, 3): a mouth as wide as AU27 and AU25 open it."""
-    pose = np.zeros((1, 68), np.float32)
-    for fap, value in WIDE.items():
-        pose[0, fap - 1] = value
-    shape: np.ndarray = deform(face, pose)[0]
-    return shape
+def test_eyeball_is_a_ball_whose_pupil_grows_by_half_at_each_edge() -> None:
+    centre = np.array([0.03, 0, 0])
+    ball = eyeball("left_eye", centre, 0.012, LOOK, -1.0)
+    away = ball.vertices - centre
+    assert np.linalg.norm(away, axis=1) == pytest.approx(0.012)
+    moves = np.linalg.norm(ball.fields[29], axis=1)
+    assert moves.max() == pytest.approx(0.5)
+    white = np.hypot(away[:, 0], away[:, 1]) > 1.1 * IRIS / 1000
+    assert not moves[white].any()
 
 
-@pytest.mark.parametrize("name", ["upper_teeth", "lower_teeth"])
-def test_teeth_are_closed_towards_the_tongue(name: str) -> None:
-    arch = teeth(name, np.zeros(3), 0.021, 0.040, COLOURS)
-    a, b, c = (arch.vertices[arch.triangles[:, k]] for k in range(3))
-    ups = np.cross(b - a, c - a)
-    middle = np.abs(a[:, 0]) < 0.008
-    assert (ups[middle, 2] > 0).any()  # those that face the lips
-    assert (ups[middle, 2] < 0).any()  # and those that face the tongue
-    rows = arch.vertices.reshape(-1, len(SHADES), 3)
-    assert (rows[:, 0, 2] < rows[:, -1, 2]).all()
+def test_part_subset_takes_its_fields_along() -> None:
+    ball = eyeball("right_eye", np.zeros(3), 0.012, LOOK, 1.0)
+    few = ball.subset(np.array([3, 1]), np.zeros((0, 3), np.int32))
+    assert np.array_equal(few.vertices, ball.vertices[[3, 1]])
+    assert np.array_equal(few.fields[30], ball.fields[30][[3, 1]])
 
 
-@pytest.mark.parametrize("name", [info.name for info in list_faces()])
-@pytest.mark.slow
-def test_parts_of_an_open_mouth_are_dark_red_not_black(name: str) -> None:
-    face = load_face(name)
-    shape = opened(face)
-    camera = camera_for(face, "three-quarter")
-    canvas = SoftwareCanvas(face, (512, 512), camera, preset("portrait"))
-    picture = canvas.draw(shape, normals(face, shape[None])[0]).astype(float)
-    canvas.close()
-    upper, lower = camera.project(
-        shape[[face.feature_points["2.2"], face.feature_points["2.3"]]], (512, 512)
-    )[0]
-    for share in (0.4, 0.5, 0.6):
-        x, y = np.rint(upper + share * (lower - upper)).astype(int)
-        red, green, blue = picture[y - 1 : y + 2, x - 1 : x + 2].mean(axis=(0, 1))
-        assert 42 < red < 140, share
-        assert red > 1.6 * green, share
-        assert abs(green - blue) < 15, share
-
-
-@pytest.mark.parametrize("name", [info.name for info in list_faces()])
-def test_tongue_sinks_less_than_the_jaw_and_stays_behind(name: str) -> None:
-    face = load_face(name)
-    shape = opened(face)
-    fall = face.vertices[:, 1] - shape[:, 1]
-    tip, edge = face.feature_points["6.1"], face.feature_points["9.11"]
-    assert 0.004 < fall[tip] < 0.8 * fall[edge]
-    assert shape[tip, 2] < shape[edge, 2]
+def test_smooth_rises_and_falls_between_its_ends() -> None:
+    assert smooth([0.0, 1.5, 3.0], 1, 2).tolist() == [0, 0.5, 1]
+    assert smooth([0.0, 1.5, 3.0], 2, 1).tolist() == [1, 0.5, 0]

@@ -1,0 +1,145 @@
+"""The room that teeth, palate and lips leave to the tongue.
+
+FAPs displace a tongue along straight lines. Here it is moved back to where a tongue can be: inside the rows
+of teeth, or between them as far as they are apart, under the palate, and between the lips.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from realizer.core.array_types import Float32, Index
+from realizer.face.model import Face
+
+STATIONS = 25  # directions around the arch, from the right over the front to the left
+HALF = 0.14  # rad; a station sees the teeth up to so far beside it
+CROWN = 0.0065  # m from the biting edge; the thickness of the teeth is measured down to there
+STEEP = 4.0  # metres up (down) from a biting edge for each metre inwards: the teeth's inner sides,
+GENTLE = 0.6  # and for each metre outwards, or in front of the lips
+DEEP = 0.014, 0.030  # m above the upper edge that the palate, and below the lower one that the floor is
+THIN = 0.0012  # m; the tongue does not go between teeth or lips that are closer
+NARROW = 0.45  # of the mouth's half width that a tongue takes between the lips
+PASSES = 7.0  # metres beyond them for each metre that they are further apart
+APART = 0.0004  # m between tongue and teeth
+NEAR = 0.003  # m
+SOFT = 0.0028  # m more between tongue and lips, which bulge between their points
+LIP, RED = 0.004, 0.010  # m behind and before the line where the lips meet: their thickness
+UPPER, LOWER = ("2.5", "2.7", "2.2", "2.6", "2.4"), ("2.5", "2.9", "2.3", "2.8", "2.4")
+
+
+class TongueRoom:
+    """Moves a face's tongue out of teeth, palate and lips."""
+
+    def __init__(self, face: Face) -> None:
+        at = face.vertices
+        self._tongue = slice(*face.parts["tongue"])
+        upper = np.arange(*face.parts["upper_teeth"])
+        self._back = float(at[upper[np.abs(at[upper, 0]).argmax()], 2])
+        self._upper = self._row(at, upper, -1)
+        self._lower = self._row(at, np.arange(*face.parts["lower_teeth"]), 1)
+        self._lips = [np.array([face.feature_points[name] for name in names]) for names in (UPPER, LOWER)]
+        tip = np.array([face.feature_points[name] for name in ("6.1", "6.2", "6.3", "6.4")])
+        self._watched = np.concatenate([*self._lips, self._lower[0], tip])
+        self._rest = at[self._watched]
+        # Where a tongue at rest is outside by itself, it may be as far outside while it is near its rest.
+        self._out = at[self._tongue] - self._inside(at[None], at[None, self._tongue])[0]
+        self._home = at[self._tongue]
+
+    def __call__(self, out: Float32) -> None:
+        """Move the tongue of deformed faces (n, n_vertices, 3) inside, before their heads turn, in place."""
+        moved = np.abs(out[:, self._watched] - self._rest).max(axis=(1, 2)) > 1e-6
+        frames = np.flatnonzero(moved)
+        if len(frames):
+            faces = out if len(frames) == len(out) else out[frames]
+            tongue = faces[:, self._tongue]
+            away = np.linalg.norm(tongue - self._home, axis=2, keepdims=True)
+            slack = self._out * np.maximum(1 - away / NEAR, 0)
+            out[frames, self._tongue] = self._inside(faces, tongue - slack) + slack
+
+    def _row(self, at: Float32, part: Index, up: int) -> tuple[Index, Float32, Float32]:
+        """Return the vertex of the biting edge at each station, and how far teeth reach beside it."""
+        around, turn = self._polar(at[part, 0], at[part, 2])
+        edge, inner, outer = [], [], []
+        for station in np.linspace(-np.pi / 2, np.pi / 2, STATIONS):
+            beside = np.abs(turn - station)
+            near = np.flatnonzero(beside < max(HALF, float(beside.min()) + 1e-6))
+            crest = near[(at[part[near], 1] * up).argmax()]
+            tooth = near[np.abs(at[part[near], 1] - at[part[crest], 1]) < CROWN]
+            edge.append(part[crest])
+            inner.append(around[crest] - around[tooth].min())
+            outer.append(around[tooth].max() - around[crest])
+        # Thick teeth count for their neighbours too.
+        thick = [np.pad(np.array(row, np.float32), 1, mode="edge") for row in (inner, outer)]
+        inner, outer = (np.max([row[:-2], row[1:-1], row[2:]], axis=0) for row in thick)
+        return np.array(edge), inner, outer
+
+    def _polar(self, x: Any, z: Any) -> tuple[Any, Any]:
+        """Return distance and direction from the middle of the arch; behind it only x counts."""
+        ahead = np.maximum(z - self._back, 0)
+        return np.hypot(x, ahead), np.arctan2(x, ahead)
+
+    def _inside(self, faces: Float32, tongue: Float32) -> Float32:
+        """Return the tongue (n, m, 3) inside the room of its face (n, n_vertices, 3)."""
+        x, y, z = tongue.transpose(2, 0, 1)
+        # It narrows where it goes between the lips.
+        corners = faces[:, self._lips[0]][:, [0, -1]]
+        wide = NARROW * np.abs(corners[..., 0]).min(axis=1)[:, None]
+        wide = wide + np.maximum(faces[:, self._lips[0][2], 2][:, None] - LIP - z, 0)
+        x = np.clip(x, -wide, wide)
+        lips = [_along(faces[:, line], x) for line in self._lips]
+        meet = np.minimum(lips[0][1], lips[1][1])
+        behind = meet - LIP
+        opening = np.maximum(lips[0][0] - lips[1][0] - THIN, 0)
+        z = np.minimum(z, behind + PASSES * opening)
+        around, turn = self._polar(x, z)
+        rows = [self._teeth(faces, row, turn) for row in (self._upper, self._lower)]
+        gap = np.maximum(rows[0][2] - rows[1][2] - THIN, 0)
+        reach = np.minimum(rows[0][0], rows[1][0]) - APART + PASSES * gap
+        share = np.minimum(reach / np.maximum(around, 1e-6), 1)
+        x, z, around = x * share, np.minimum(z, self._back + (z - self._back) * share), around * share
+        # The lips leave more room behind them and well before them.
+        free = STEEP * np.maximum(behind - z, 0) + GENTLE * np.maximum(z - meet - RED, 0)
+        bounds = []
+        for (inner, outer, edge), lip, up in zip(rows, lips, (1, -1), strict=True):
+            deep = DEEP[up < 0]
+            vault = deep * np.tanh(STEEP / deep * np.maximum(inner - around, 0))
+            teeth = up * edge + vault + GENTLE * np.maximum(around - outer, 0)
+            bounds.append(up * (np.minimum(teeth, up * lip[0] + free - SOFT) - APART))
+        high, low = bounds
+        middle = (high + low) / 2
+        y = np.clip(y, np.minimum(low, middle), np.maximum(high, middle))
+        return np.stack([x, y, z], axis=-1)
+
+    def _teeth(self, faces: Float32, row: tuple[Index, Float32, Float32], turn: Any) -> list[Any]:
+        """Return inner and outer distance and the height of the teeth's edges in directions (n, m)."""
+        edge, inner, outer = row
+        at = faces[:, edge]
+        around = self._polar(at[..., 0], at[..., 2])[0]
+        place = (turn / np.pi + 0.5) * (STATIONS - 1)
+        first = np.minimum(place.astype(np.intp), STATIONS - 2)
+        share = (place - first).astype(np.float32)
+        each = np.arange(len(faces))[:, None]
+        return [
+            values[each, first] * (1 - share) + values[each, first + 1] * share
+            for values in (around - inner, around + outer, at[..., 1])
+        ]
+
+
+@lru_cache(maxsize=8)
+def tongue_room(face: Face) -> TongueRoom | None:
+    """Return the room of a face's tongue, or None if the face lacks tongue or teeth."""
+    parts = ("tongue", "upper_teeth", "lower_teeth")
+    return TongueRoom(face) if all(part in face.parts for part in parts) else None
+
+
+def _along(line: Float32, x: Any) -> tuple[Any, Any]:
+    """Return y and z (n, m) of polylines (n, k, 3), whose x ascends, at x (n, m)."""
+    y, z = line[:, :1, 1], line[:, :1, 2]
+    for k in range(line.shape[1] - 1):
+        a, b = line[:, k, None], line[:, k + 1, None]
+        span = np.clip((x - a[..., 0]) / np.maximum(b[..., 0] - a[..., 0], 1e-6), 0, 1)
+        y, z = y + span * (b[..., 1] - a[..., 1]), z + span * (b[..., 2] - a[..., 2])
+    return y, z

@@ -1,0 +1,104 @@
+"""Tests of the tongue's room: no pose brings it into teeth, palate or lips."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from realizer.animation.axis import axis
+from realizer.animation.frames import AUFrames
+from realizer.animation.lips.mouth_faps import mouth_faps
+from realizer.animation.lips.visemes import shape_table
+from realizer.animation.pose import poses
+from realizer.core.array_types import Float32, Float64, Int32
+from realizer.face.deform import deform
+from realizer.face.load import load_face
+from realizer.face.mesh_geometry import edges_of, part_triangles, triangle_normals
+from realizer.face.model import Face
+from realizer.tables import action_units, faps
+from tests.shipped import FACES
+
+DEEPEST = 0.0003  # m
+USUAL = 512
+OUT = 300  # of FAP 45, while another FAP moves the tongue that is out: 1.4 cm
+OTHERS = {15: 200, 43: 250, 47: 60000}  # 1 cm of jaw, 12 mm of tongue to the side, 34 degrees of roll
+OPEN = {3: 600, 4: -60, 5: -650, 8: -60, 9: -60, 10: -560, 11: -560, 52: -650, 57: -560, 58: -560}
+LIPS = 0.022  # m around the lips' middle that the skin is looked at
+NEAR = 0.002  # m; what goes deeper than that passes it on its way
+SIDE = 0.7  # least cosine: a point beside an edge is not inside
+
+
+def units() -> Iterator[Float32]:
+    """Every action unit alone, with a dropped jaw and with a wide mouth."""
+    columns = {name: target.column for name, target in axis().items()}
+    for unit in action_units():
+        for jaw in ((), ("25L", "25R", "25", "26"), ("25L", "25R", "25", "27")):
+            row = np.zeros(len(axis()), np.float32)
+            for name in (*(f"{unit.au}{side}" for side in ("", "L", "R")), *jaw):
+                if name in columns:
+                    row[columns[name]] = 1
+            yield row
+
+
+def fap_rows() -> Float32:
+    """Visemes, and every FAP of jaw, lips and tongue both ways with a closed and an open mouth."""
+    rows = []
+    target = shape_table()[0]
+    for fap, values in mouth_faps(target).items():
+        rows = rows or [{} for _ in values]
+        for row, value in zip(rows, values, strict=True):
+            row[fap] = value
+    for fap in faps()[2:]:
+        if fap.group in (2, 6, 8):
+            size = OTHERS.get(fap.fap, USUAL)
+            for value in (np.clip(size, fap.least, fap.most), np.clip(-size, fap.least, fap.most)):
+                rows += [{fap.fap: value}, OPEN | {fap.fap: value}]
+                rows += [OPEN | {45: OUT, fap.fap: value}] if fap.group == 6 else []
+    out = np.zeros((len(rows), 68), np.float32)
+    for k, row in enumerate(rows):
+        for number, value in row.items():
+            out[k, number - 1] = value
+    return out
+
+
+def spread(at: Float64, triangles: Int32, steps: int) -> tuple[Float64, Float64]:
+    """Points on triangles, and their normals."""
+    i, j = np.meshgrid(np.arange(steps + 1), np.arange(steps + 1))
+    u, v = i[i + j <= steps] / steps, j[i + j <= steps] / steps
+    corners = at[triangles]
+    share = np.stack([1 - u - v, u, v])
+    normals = triangle_normals(at, triangles)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-12)[:, None]
+    return np.einsum("tcx,cp->tpx", corners, share).reshape(-1, 3), np.repeat(normals, len(u), axis=0)
+
+
+def inner(triangles: Int32) -> Int32:
+    """The triangles that do not touch the rim of their surface: beyond it there is no inside."""
+    pairs, count = edges_of(triangles)
+    return triangles[~np.isin(triangles, pairs[count == 1]).any(axis=1)]
+
+
+def deepest(face: Face, shape: Float64) -> float:
+    """The largest depth of a point of the tongue in teeth, palate or lips, metres."""
+    parts = {name: part_triangles(face.triangles, face.parts[name]) + face.parts[name][0]
+             for name in ("tongue", "upper_teeth", "lower_teeth", "skin")}  # fmt: skip
+    skin = face.vertices[parts["skin"]].mean(axis=1) - face.points["2.2"]
+    parts["skin"] = parts["skin"][(np.linalg.norm(skin, axis=1) < LIPS) & (skin[:, 2] > -0.02)]
+    walls = [spread(shape, inner(parts[name]), 3) for name in ("upper_teeth", "lower_teeth", "skin")]
+    points, normals = (np.concatenate(arrays) for arrays in zip(*walls, strict=True))
+    tongue = spread(shape, parts["tongue"], 2)[0]
+    away, nearest = cKDTree(points).query(tongue, distance_upper_bound=NEAR)
+    near = np.isfinite(away)
+    depth = np.einsum("pc,pc->p", points[nearest[near]] - tongue[near], normals[nearest[near]])
+    return float(np.where(depth > SIDE * away[near], depth, 0).max(initial=0))
+
+
+@pytest.mark.parametrize("name", FACES)
+def test_tongue_room_keeps_the_tongue_out_of_teeth_and_lips(name: str) -> None:
+    face = load_face(name)
+    rows = np.array(list(units()))
+    aus = poses(AUFrames(np.arange(len(rows), dtype=np.float64), rows), face.inputs)
+    shapes = deform(face, np.concatenate([aus, fap_rows()])).astype(np.float64)
+    depths = np.array([deepest(face, shape) for shape in shapes])
+    assert depths.max() < DEEPEST, np.argsort(-depths)[:5]
