@@ -39,12 +39,14 @@ def row(**values: float) -> np.ndarray:
 
 def test_faps_from_points_measures_each_fap_at_its_point(face: Face) -> None:
     local = [fap for fap in faps()[2:] if fap.unit not in ("none", "angle_unit") and fap.fap not in (29, 30)]
-    frames = np.stack([row(**{f"F{fap.fap}": 50}) for fap in local])
+    # Behind closed teeth there is little room for the tongue.
+    values = [20 if fap.group == 6 else 50 for fap in local]
+    frames = np.stack([row(**{f"F{fap.fap}": value}) for fap, value in zip(local, values, strict=True)])
     read, seen = faps_from_points(points_of(face, deform(face, frames)), rest(face), face.fapu)
-    for k, fap in enumerate(local):
+    for k, (fap, value) in enumerate(zip(local, values, strict=True)):
         assert seen[fap.fap - 1]
         # What lifts the chin's boss lifts the chin a little too, which its measure is relative to.
-        assert read[k, fap.fap - 1] == pytest.approx(50, abs=9 if fap.fap == 18 else 1), fap.name
+        assert read[k, fap.fap - 1] == pytest.approx(value, abs=9 if fap.fap == 18 else 1), fap.name
 
 
 def test_faps_from_points_removes_the_pose_of_the_head(face: Face) -> None:
