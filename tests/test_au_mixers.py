@@ -96,7 +96,7 @@ def test_mix_turns_the_head_with_eyes_that_look(model: Model) -> None:
 def test_mix_moves_the_lower_teeth_with_the_jaw_only(model: Model) -> None:
     teeth = part("lower_teeth")
     dropped = mix(model, teeth, {27: 1.0}, "jaw") - teeth
-    assert (dropped[:, 1] < -0.008).all()
+    assert (dropped[:, 1] < -0.006).all()  # those at the back are nearer to the hinge
     assert (mix(model, teeth, {12: 1.0, 25: 1.0}, "jaw") == teeth).all()
     assert (mix(model, part("upper_teeth"), {27: 1.0}, "fixed") == part("upper_teeth")).all()
 
