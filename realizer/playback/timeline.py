@@ -245,7 +245,6 @@ class BlockTimeline:
             if not changed:
                 continue
             self.characters[playing.character].replace_shifts(before, playing.shifts)
-            self.events.drop(playing)
             self.events.add(playing, None if playing.is_waiting else pending)
             self.mark_changed()
             self.predict(playing, now, changed)

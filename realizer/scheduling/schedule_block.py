@@ -16,11 +16,11 @@ from realizer.scheduling.solve import Solution, solve
 from realizer.scheduling.timing import Schedule, Timing, Warning
 from realizer.scheduling.union_find import UnionFind
 
-# Behaviours may begin so much earlier where it is asked how late they are.
-LONG_AGO = 1e6  # s
-
 if TYPE_CHECKING:
     from bml_schema import Block, SyncRef
+
+# Behaviours may begin so much earlier where it is asked how late they are.
+LONG_AGO = 1e6  # s
 
 
 def schedule_block(

@@ -48,7 +48,7 @@ def _with_whole_pauses(utterance: Utterance) -> tuple[Phoneme, ...]:
     if not pauses or utterance.pcm is None or not utterance.sample_rate:
         return utterance.phonemes
     begins = np.arange(int(utterance.duration / WINDOW)) * WINDOW
-    levels = _levels(utterance, np.stack([begins, begins + WINDOW], axis=1))
+    levels = levels_of(utterance, np.stack([begins, begins + WINDOW], axis=1))
     heard = begins[levels > QUIET * np.quantile(levels, 0.9)]
     for k in pauses:
         before, pause, after = phonemes[k - 1 : k + 2]
@@ -64,7 +64,7 @@ def _with_whole_pauses(utterance: Utterance) -> tuple[Phoneme, ...]:
     return tuple(phonemes)
 
 
-def _levels(utterance: Utterance, spans: Float64) -> Float64:
+def levels_of(utterance: Utterance, spans: Float64) -> Float64:
     """Return the root mean square (m,) of the sound in each span (m, 2) of seconds."""
     assert utterance.pcm is not None
     power = np.square(utterance.pcm[::STEP].astype(np.float32)).cumsum(dtype=np.float64)
@@ -78,7 +78,7 @@ def _relative_levels(utterance: Utterance, spans: Float64) -> Float64:
     """Return the root mean square (m,) of the sound in each span over their median; 1 without sound."""
     if utterance.pcm is None or not utterance.sample_rate:
         return np.ones(len(spans))
-    levels = _levels(utterance, spans)
+    levels = levels_of(utterance, spans)
     usual = float(np.median(levels))
     limit = prosody_facts()["accents"]["range"]
     return np.clip(levels / usual, 1 / limit, limit) if usual > 0 else np.ones(len(spans))

@@ -23,9 +23,9 @@ from realizer.face.load import load_face
 from realizer.offline import realize
 from realizer.playback.active_block import ScheduledSpeech
 from realizer.realization import Realization
+from realizer.speech.loudness import levels_of
 from realizer.speech.melody import RATE, melody
 from realizer.speech.registry import find_voice
-from realizer.speech.utterance import Utterance
 from realizer.tables import faps
 from tests.benchmarks.lips import SENTENCES
 from tests.benchmarks.motion import DEGREES, FPS, MOVING, runs
@@ -108,18 +108,8 @@ class Film:
                 frames, tune = self.frames(speech), melody(speech.utterance)
                 at = np.arange(frames.start, frames.stop) / FPS - speech.start
                 places = np.arange(len(tune.pitch)) / RATE
-                yield frames, envelope(speech.utterance, at), np.interp(at, places, tune.pitch)
-
-
-def envelope(utterance: Utterance, at: Any) -> Any:
-    """Return the root mean square of 40 ms of the sound around each time, (n,)."""
-    assert utterance.pcm is not None
-    power = np.concatenate([[0.0], np.square(utterance.pcm.astype(np.float64)).cumsum()])
-    first, last = (
-        np.rint((at + side) * utterance.sample_rate).astype(int).clip(0, len(power) - 1)
-        for side in (-0.02, 0.02)
-    )
-    return np.sqrt((power[last] - power[first]) / np.maximum(last - first, 1))
+                sides = np.stack([at - 0.02, at + 0.02], axis=1)
+                yield frames, levels_of(speech.utterance, sides), np.interp(at, places, tune.pitch)
 
 
 Measure = Callable[[list[Film]], str]

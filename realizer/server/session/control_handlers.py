@@ -92,7 +92,7 @@ class ControlHandlers:
                 self._stop(message, t)
 
     def hear(self, piece: ClipPiece, t: float) -> None:
-        """Let a character hear the next sound of another one.
+        """Pass sound that a character hears to the player.
 
         Raises:
             ClipError: the sound is not mono int16 PCM of a usual rate.
