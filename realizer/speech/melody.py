@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from weakref import WeakKeyDictionary
 
 import numpy as np
+import numpy.typing as npt
 
 from realizer.core.array_types import Float64
 from realizer.speech.accents import phrases
@@ -16,6 +18,7 @@ CLOSING = 0.5  # s of silence after the last phrase
 # Analysis of pitch, in samples of about `ANALYSED` Hz.
 ANALYSED = 7000
 WINDOW = 320
+TRANSFORMED = 512  # at least a window and the longest delay
 LOWEST, HIGHEST = 65.0, 400.0  # Hz
 VOICED = 0.35  # least autocorrelation of a voiced window, beside that of no delay
 QUIET = 0.04  # a window this much quieter than the loud ones has no pitch
@@ -72,13 +75,12 @@ def _heard(utterance: Utterance) -> Melody:
     begins = (np.arange(count) * rate / RATE).astype(int)
     padded = np.pad(samples, (WINDOW // 2, max(0, int(begins[-1]) + WINDOW // 2 - len(samples))))
     windows = padded[begins[:, None] + np.arange(WINDOW)] * np.hanning(WINDOW).astype(np.float32)
-    power = np.sqrt(np.square(windows).mean(axis=1))
+    power = np.sqrt(np.einsum("ij,ij->i", windows, windows) / WINDOW)
     loud = float(np.quantile(power, 0.9)) or 1.0
     # Autocorrelation by the Fourier transform, divided by that of the window (Boersma 1993).
     half = WINDOW // 2
-    correlation = np.fft.irfft(np.abs(np.fft.rfft(windows, 2 * WINDOW)) ** 2)[:, :half]
-    own = np.fft.irfft(np.abs(np.fft.rfft(np.hanning(WINDOW), 2 * WINDOW)) ** 2)[:half]
-    correlation /= np.maximum(correlation[:, :1], 1e-9) * own / own[0]
+    correlation = _autocorrelation(windows)[:, :half]
+    correlation /= np.maximum(correlation[:, :1], 1e-9) * _own()[:half]
     least, most = int(rate / HIGHEST), min(int(rate / LOWEST), half - 2)
     # Of almost equal maxima the shortest delay counts: longer ones are its multiples.
     inside = correlation[:, least:most] - 0.1 * np.arange(least, most) / most
@@ -88,6 +90,22 @@ def _heard(utterance: Utterance) -> Melody:
     peak = delay + np.clip((before - after) / (2 * bend), -0.5, 0.5)  # of the parabola through the three
     is_voiced = (at > VOICED) & (power > QUIET * loud)
     return Melody(_smoothed(np.minimum(power / loud, 1.0)), _pitch(rate / peak, is_voiced))
+
+
+def _autocorrelation(windows: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    from scipy import fft  # unlike numpy's, it transforms several float32 rows at once
+
+    spectrum = fft.rfft(windows, TRANSFORMED)
+    found: npt.NDArray[np.float32] = fft.irfft(spectrum.real**2 + spectrum.imag**2)
+    return found
+
+
+@cache
+def _own() -> npt.NDArray[np.float32]:
+    """Return the autocorrelation of the window itself, beside that of no delay."""
+    own = _autocorrelation(np.hanning(WINDOW).astype(np.float32))
+    own /= own[0]
+    return own
 
 
 def _pitch(hertz: Float64, is_voiced: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Float64:

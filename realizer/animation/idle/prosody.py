@@ -110,25 +110,24 @@ def prosody_channels(
     """
     shown: list[Channel] = []
     fade = prosody_facts()["yield"]["fade"]
-    claims: list[tuple[str, float, float, float]] | None = None
+    claims: dict[str, list[KnownMotion]] | None = None
     for talk in talks:
         if talk.start > end or min(talk.start + talk.utterance.duration, talk.until) + AFTERMATH < start:
             continue
         if claims is None:  # computed only when needed: characters are silent most of the time
-            claims = list(_claims(known_motions))
-        head = (claim[1:] for claim in claims if claim[0] == "head")
+            claims = _claims(known_motions)
+        head = [(known, *channel.span) for known, channel in claims.get("head", ()) if channel.values.any()]
         style = style_of(talk.face, talk.start)
         shown += head_channels(talk.utterance, talk.start, talk.until, seed, style, head)
         last_sound = talk.utterance.phonemes[-1].end if talk.utterance.phonemes else talk.utterance.duration
         for gesture in _gestures(phrases(talk.utterance), last_sound, talk.start, seed):
             if gesture.end < start or gesture.begin > end or gesture.begin >= talk.until:
                 continue
-            leaves = talk.until
-            for part, known, first, last in claims:
-                if first < gesture.end and last > gesture.begin:
-                    if part == gesture.region:
-                        leaves = min(leaves, known)
-                    elif (part, gesture.region) == ("frown", "brows") and known <= gesture.begin:
+            leaves = min(_moving(claims, gesture.region, gesture), default=np.inf)
+            leaves = min(leaves, talk.until)
+            if gesture.region == "brows":
+                for known in _moving(claims, "frown", gesture):
+                    if known <= gesture.begin:
                         gesture = gesture.reduced(prosody_facts()["brows"]["frown"])
             if gesture.begin < leaves:
                 shown += [
@@ -137,14 +136,24 @@ def prosody_channels(
     return shown
 
 
-def _claims(known_motions: Iterable[KnownMotion]) -> Iterator[tuple[str, float, float, float]]:
-    """Yield part of the face, time at which it is known, first and last second of motions."""
-    for known, channel in known_motions:
-        part = _parts().get(channel.target.column)
+def _claims(known_motions: Iterable[KnownMotion]) -> dict[str, list[KnownMotion]]:
+    """Return the motions of each part of the face that prosody may move."""
+    claims: dict[str, list[KnownMotion]] = {}
+    for motion in known_motions:
+        part = _parts().get(motion.channel.target.column)
         # Nods, like sway, are added to the base direction of the head.
-        if part is None or (part == "head" and channel.layer is Layer.BASE) or not channel.values.any():
-            continue
-        yield part, known, *channel.span
+        if part is not None and not (part == "head" and motion.channel.layer is Layer.BASE):
+            claims.setdefault(part, []).append(motion)
+    return claims
+
+
+def _moving(claims: Mapping[str, list[KnownMotion]], part: str, gesture: Gesture) -> Iterator[float]:
+    """Yield the times at which motions of a part, which overlap the gesture in time, became known."""
+    begin, end = gesture.begin, gesture.end
+    for known, channel in claims.get(part, ()):
+        first, last = channel.span
+        if first < end and last > begin and channel.values.any():
+            yield known
 
 
 @cache

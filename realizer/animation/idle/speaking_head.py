@@ -45,13 +45,7 @@ def style_of(channels: Iterable[Channel], start: float) -> Style:
     rows = prosody_facts()["style"]
     wanted = {target.column: number for row in rows for number in row["aus"] for target in au(number)}
     active = [
-        channel.changed(
-            {
-                "gains": tuple(gain for gain in channel.gains if gain.begin <= start),
-                "until": channel.until if channel.until <= start else np.inf,
-                "crossfade": None,
-            }
-        )
+        _without_later(channel, start)
         for channel in channels
         if channel.target.column in wanted and (channel.layer is not Layer.BASE or channel.times[0] <= start)
     ]
@@ -68,6 +62,14 @@ def style_of(channels: Iterable[Channel], start: float) -> Style:
         pace += strength * (row["pace"] - 1.0)
         pitch += strength * row["pitch"]
     return Style(round(size, 3), round(pace, 3), round(pitch, 3))
+
+
+def _without_later(channel: Channel, start: float) -> Channel:
+    gains = tuple(gain for gain in channel.gains if gain.begin <= start)
+    until = channel.until if channel.until <= start else np.inf
+    if (gains, until, None) == (channel.gains, channel.until, channel.crossfade):
+        return channel
+    return channel.changed({"gains": gains, "until": until, "crossfade": None})
 
 
 def head_channels(
