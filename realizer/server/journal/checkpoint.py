@@ -18,6 +18,7 @@ from realizer.server.journal.entry import JournalError
 from realizer.server.session.character_faces import CharacterFaces
 from realizer.server.session.feedback_log import FeedbackLog
 from realizer.server.speech.audio_clips import AudioClips, Clip
+from realizer.speech.voice_activity import VoiceActivity
 
 VERSION = 1
 STATE, CLIP = "state", "clip:"
@@ -117,6 +118,7 @@ def character_to_json(character: Character) -> dict[str, Any]:
         "direct": {name: _channel_to_json(channel) for name, channel in character.direct.items()},
         "feeling": {name: _channel_to_json(channel) for name, channel in character.emotion.items()},
         "responses": [_channel_to_json(channel) for channel in character.responses],
+        "heard": character.heard and {**vars(character.heard), "rest": character.heard.rest.tolist()},
     }
 
 
@@ -139,9 +141,11 @@ def character_from_json(data: Mapping[str, Any]) -> Character:
         {name: _channel_from_json(channel) for name, channel in data[key].items()}
         for key in ("direct", "feeling")
     )
-    # Journals of 0.1 have no responses.
+    # Journals of 0.1 have no responses and hear no sound.
     responses = [_channel_from_json(channel) for channel in data.get("responses", ())]
-    return Character(data["id"], shifts, direct, emotion, responses)
+    if (heard := data.get("heard")) is not None:
+        heard = VoiceActivity(**{**heard, "rest": np.array(heard["rest"], np.int16)})
+    return Character(data["id"], shifts, direct, emotion, responses, heard)
 
 
 def schedule_to_json(schedule: Schedule) -> dict[str, Any]:

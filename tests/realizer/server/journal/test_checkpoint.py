@@ -30,6 +30,7 @@ from realizer.server.journal.journal_writer import JournalWriter
 from realizer.server.journal.replay import restore_session
 from realizer.server.session.effects import Speak
 from realizer.server.session.session import Session
+from realizer.speech.voice_activity import VoiceActivity
 from tests.interleavings import BODIES, CONTROLS, HEADS, NAMES, Memory, no_error, spoken
 from tests.wake_times import next_wake
 
@@ -100,7 +101,7 @@ class Pair:
     def run(self, steps: int) -> None:
         for _ in range(steps):
             self.random.choice(
-                (self._send, self._send, self._control, self._clip, self._answer, self._rest)
+                (self._send, self._send, self._control, self._clip, self._hear, self._answer, self._rest)
             )()
             self._pass(self.random.choice((0.0, 0.02, 0.3, 1.0)))
             self._agree()
@@ -127,6 +128,12 @@ class Pair:
         number, rate = self.random.choice((0, 0, 1)), self.random.choice((RATE, RATE, 0))
         sound = self.random.randbytes(2 * RATE // 10)
         self._both(pack_clip(ClipPiece(self.random.choice("cd"), number, rate, sound, number == 1)))
+
+    def _hear(self) -> None:
+        """Let a character hear half a turn, which another call may go on with."""
+        sound = self.random.choice((bytes(RATE), self.random.randbytes(RATE)))
+        id = self.random.choice(("heard:", "heard:Ben"))
+        self._both(pack_clip(ClipPiece(id, 0, RATE, sound, self.random.random() < 0.1)))
 
     def _answer(self) -> None:
         """Answer speech requests, in another order."""
@@ -243,7 +250,12 @@ SHIFTS = st.builds(
     st.lists(channels(), max_size=2).map(tuple),
 )
 HELD = st.dictionaries(ANY_NAME, channels(), max_size=2)
-CHARACTERS = st.builds(Character, st.none() | ANY_NAME, st.lists(SHIFTS, max_size=2), HELD, HELD)
+SAMPLES = st.lists(st.integers(-32768, 32767), max_size=5).map(lambda samples: np.array(samples, np.int16))
+COUNT = st.integers(0, 100)
+HEARD = st.none() | st.builds(VoiceActivity, COUNT, SAMPLES, NUMBER, COUNT, COUNT, st.booleans())
+CHARACTERS = st.builds(
+    Character, st.none() | ANY_NAME, st.lists(SHIFTS, max_size=2), HELD, HELD, st.just([]), HEARD
+)
 
 
 def same(one: object, other: object) -> bool:
@@ -252,7 +264,7 @@ def same(one: object, other: object) -> bool:
         return False
     if isinstance(one, np.ndarray):
         return one.dtype == other.dtype and np.array_equal(one, other)  # type: ignore[attr-defined]
-    if isinstance(one, Channel | BaseShift | Character | Schedule):
+    if isinstance(one, Channel | BaseShift | Character | Schedule | VoiceActivity):
         return all(same(getattr(one, f.name), getattr(other, f.name)) for f in fields(one))
     if isinstance(one, dict):
         assert isinstance(other, dict)
