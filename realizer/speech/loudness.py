@@ -24,12 +24,13 @@ def with_loudness(utterance: Utterance) -> tuple[Phoneme, ...]:
     prominent one, is louder by the table's factor. Pauses include the silence that a voice counts to the
     sounds beside them.
     """
-    phonemes = _with_whole_pauses(utterance)
+    sound = Levels(utterance) if utterance.pcm is not None and utterance.sample_rate else None
+    phonemes = utterance.phonemes if sound is None else _with_whole_pauses(utterance, sound)
     sung = [k for k, phoneme in enumerate(phonemes) if phoneme.ipa[:1] in vowels()]
     if not sung:
         return phonemes
     spans = np.array([(phonemes[k].start, phonemes[k].end) for k in sung])
-    loud = _relative_levels(utterance, spans)
+    loud = np.ones(len(spans)) if sound is None else _relative(sound.of(spans))
     for accent in (
         accent.time for phrase in phrases(utterance) for accent in phrase.accents if accent.nuclear
     ):
@@ -41,14 +42,14 @@ def with_loudness(utterance: Utterance) -> tuple[Phoneme, ...]:
     return tuple(heard)
 
 
-def _with_whole_pauses(utterance: Utterance) -> tuple[Phoneme, ...]:
+def _with_whole_pauses(utterance: Utterance, sound: Levels) -> tuple[Phoneme, ...]:
     """Return the phonemes, with the silence beside a pause in the pause."""
     phonemes = list(utterance.phonemes)
     pauses = [k for k in range(1, len(phonemes) - 1) if not phonemes[k].ipa]
-    if not pauses or utterance.pcm is None or not utterance.sample_rate:
+    if not pauses:
         return utterance.phonemes
     begins = np.arange(int(utterance.duration / WINDOW)) * WINDOW
-    levels = levels_of(utterance, np.stack([begins, begins + WINDOW], axis=1))
+    levels = sound.of(np.stack([begins, begins + WINDOW], axis=1))
     heard = begins[levels > QUIET * np.quantile(levels, 0.9)]
     for k in pauses:
         before, pause, after = phonemes[k - 1 : k + 2]
@@ -64,21 +65,24 @@ def _with_whole_pauses(utterance: Utterance) -> tuple[Phoneme, ...]:
     return tuple(phonemes)
 
 
-def levels_of(utterance: Utterance, spans: Float64) -> Float64:
-    """Return the root mean square (m,) of the sound in each span (m, 2) of seconds."""
-    assert utterance.pcm is not None
-    power = np.square(utterance.pcm[::STEP].astype(np.float32)).cumsum(dtype=np.float64)
-    power = np.concatenate(([0.0], power))
-    first, last = np.rint(spans.T * utterance.sample_rate / STEP).astype(int).clip(0, len(power) - 1)
-    levels: Float64 = np.sqrt((power[last] - power[first]) / np.maximum(last - first, 1))
-    return levels
+class Levels:
+    """The levels of the sound of an utterance, summed once for any spans."""
+
+    def __init__(self, utterance: Utterance) -> None:
+        assert utterance.pcm is not None
+        power = np.square(utterance.pcm[::STEP].astype(np.float32)).cumsum(dtype=np.float64)
+        self._power = np.concatenate(([0.0], power))
+        self._rate = utterance.sample_rate / STEP
+
+    def of(self, spans: Float64) -> Float64:
+        """Return the root mean square (m,) in each span (m, 2) of seconds."""
+        first, last = np.rint(spans.T * self._rate).astype(int).clip(0, len(self._power) - 1)
+        levels: Float64 = np.sqrt((self._power[last] - self._power[first]) / np.maximum(last - first, 1))
+        return levels
 
 
-def _relative_levels(utterance: Utterance, spans: Float64) -> Float64:
-    """Return the root mean square (m,) of the sound in each span over their median; 1 without sound."""
-    if utterance.pcm is None or not utterance.sample_rate:
-        return np.ones(len(spans))
-    levels = levels_of(utterance, spans)
+def _relative(levels: Float64) -> Float64:
+    """Return levels (m,) over their median, within the table's limits; 1 for silence."""
     usual = float(np.median(levels))
     limit = prosody_facts()["accents"]["range"]
-    return np.clip(levels / usual, 1 / limit, limit) if usual > 0 else np.ones(len(spans))
+    return np.clip(levels / usual, 1 / limit, limit) if usual > 0 else np.ones(len(levels))

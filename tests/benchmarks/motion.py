@@ -10,7 +10,7 @@ at, its name, what is known of people and from where, and a function of the film
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -197,8 +197,9 @@ def apart(films: list[Film]) -> str:
     return f"{max(np.abs(left - right).max() for left, right in pairs):.2f}"
 
 
-# Film -> rows: what is measured, what is known of people, the source, the measure.
-MEASURES: dict[str, list[tuple[str, str, str, Callable[[list[Film]], str]]]] = {
+# What is measured, what is known of people, the source, the measure of films.
+Row = tuple[str, str, str, Callable[[Any], str]]
+MEASURES: dict[str, list[Row]] = {
     "idle": [
         ("blinks a minute", "17", "Bentivoglio 1997", a_minute(lambda film: len(film.blinks))),
         ("length, ms", "334, sd 67", "VanderWerff 2003", of_blinks(lambda b: b.milliseconds, mean)),
@@ -229,6 +230,18 @@ MEASURES: dict[str, list[tuple[str, str, str, Callable[[list[Film]], str]]]] = {
 }
 
 
+def print_measures(title: str, films: Mapping[str, Any], rows: Iterable[Row]) -> None:
+    """Print a row for each measure, with a column for each name of films, beside what is known of people."""
+    heads = [title, *films, "people", "source"]
+    cells = [
+        [name, *(measure(f) for f in films.values()), people, source]
+        for name, people, source, measure in rows
+    ]
+    widths = [max(map(len, column)) for column in zip(heads, *cells, strict=True)]
+    for row in (heads, *cells):
+        print("  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip())
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -240,9 +253,7 @@ def main() -> None:
     options = parser.parse_args()
     for kind in options.only.split(","):
         films = [FILMS[kind](seed, options.seconds, options.liveliness) for seed in range(options.seeds)]
-        print(f"{kind:<36}{'ours':<44}{'people':<15}source")
-        for name, people, source, measure in MEASURES[kind]:
-            print(f"{name:<36}{measure(films):<44}{people:<15}{source}")
+        print_measures(kind, {"ours": films}, MEASURES[kind])
 
 
 if __name__ == "__main__":

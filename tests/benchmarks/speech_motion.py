@@ -23,12 +23,12 @@ from realizer.face.load import load_face
 from realizer.offline import realize
 from realizer.playback.active_block import ScheduledSpeech
 from realizer.realization import Realization
-from realizer.speech.loudness import levels_of
+from realizer.speech.loudness import Levels
 from realizer.speech.melody import RATE, melody
 from realizer.speech.registry import find_voice
 from realizer.tables import faps
 from tests.benchmarks.lips import SENTENCES
-from tests.benchmarks.motion import DEGREES, FPS, MOVING, runs
+from tests.benchmarks.motion import DEGREES, FPS, MOVING, Row, print_measures, runs
 from tests.mouths import Mouth
 
 MOODS = {"neutral": "", "angry": "ANGER", "sad": "SADNESS", "joyful": "JOY"}
@@ -109,7 +109,7 @@ class Film:
                 at = np.arange(frames.start, frames.stop) / FPS - speech.start
                 places = np.arange(len(tune.pitch)) / RATE
                 sides = np.stack([at - 0.02, at + 0.02], axis=1)
-                yield frames, levels_of(speech.utterance, sides), np.interp(at, places, tune.pitch)
+                yield frames, Levels(speech.utterance).of(sides), np.interp(at, places, tune.pitch)
 
 
 Measure = Callable[[list[Film]], str]
@@ -179,8 +179,8 @@ def rounding(films: list[Film]) -> str:
                 if ipa[:1] and ipa[0] in letters and len(ipa.rstrip("ː")) == 1:
                     middle = path[(frames.start + frames.stop) // 2]
                     found[letters].append((middle[2, 0] - middle[3, 0], middle[0, 2] - rest))
-    each = [np.mean(values, axis=0) for values in found.values()]
-    return ", ".join(f"{width:.0f} {forward:+.1f}" for width, forward in each)
+    each = [np.mean(values, axis=0) if values else None for values in found.values()]
+    return ", ".join("-" if one is None else f"{one[0]:.0f} {one[1]:+.1f}" for one in each)
 
 
 def lip_speed(films: list[Film]) -> str:
@@ -233,7 +233,7 @@ def brows(films: list[Film]) -> str:
     return f"{len(sizes) / minutes:.0f}, {number(sizes, 2)} sd {np.std(sizes or [0.0]):.2f}"
 
 
-MEASURES: list[tuple[str, str, str, Measure]] = [
+MEASURES: list[Row] = [
     ("head speed with loudness, r", "above 0", "Hadar 1983", correlation(lambda f: f.speed, True)),
     ("head speed with pitch, r", "above 0", "Hadar 1983", correlation(lambda f: f.speed, False)),
     ("variance of pitch by head", "0.63", "Munhall 2004", explained),
@@ -275,9 +275,7 @@ def main() -> None:
                 played = realize(documents, voice=voice, fps=FPS, face=mouth.face.name)
                 films[mood].append(Film(played, mouth))
         voice.close()
-    print(f"{'':30}" + "".join(f"{mood:<18}" for mood in MOODS) + f"{'people':<17}source")
-    for name, people, source, measure in MEASURES:
-        print(f"{name:<30}" + "".join(f"{measure(f):<18}" for f in films.values()) + f"{people:<17}{source}")
+    print_measures("", films, MEASURES)
 
 
 if __name__ == "__main__":
