@@ -66,7 +66,7 @@ def signs_of(sentence: Sequence[Token]) -> tuple[str, tuple[int, ...]]:
 def sounds(sentence: Sequence[Token], lengths: Sequence[int]) -> list[Sound]:
     """Return phonemes and pauses in order, which cover the sentence from 0 without gaps.
 
-    The length of a stress sign is added to its vowel, that of a blank to the phoneme before.
+    The length of a stress sign is added to its vowel; a blank is divided between the phonemes beside it.
 
     Args:
         lengths: in samples: of the silence before, of each sign, and of the silence after.
@@ -74,22 +74,23 @@ def sounds(sentence: Sequence[Token], lengths: Sequence[int]) -> list[Sound]:
     signs, owners = signs_of(sentence)
     at, *each, tail = lengths
     found = [Sound("", 0, 0, at, 0)]
-    opened: tuple[int, int] | None = None  # stress, and the start of its sign
+    stress = 0
     for sign, owner, length in zip(signs, owners, each, strict=True):
         ipa, role = _role(sign)
         end = at + length
         last = found[-1]
         if role in ("primary", "secondary"):
-            opened = (1 if role == "primary" else 2, at if opened is None else opened[1])
+            stress = 1 if role == "primary" else 2
         elif role == "sound":
-            stress, start = opened or (0, at)
-            found.append(Sound(ipa, stress, start, end, owner))
-            opened = None
+            found.append(Sound(ipa, stress, last.end, end, owner))
+            stress = 0
         elif role == "pause" and last.ipa:
             found.append(Sound("", 0, last.end, end, owner))
+        elif role == "joint" and last.ipa:
+            found[-1] = replace(last, end=at + length // 2)
         else:
             mark = "ː" if sign == "ː" and last.ipa else ""
-            found[-1] = Sound(last.ipa + mark, last.stress, last.start, end, last.token)
+            found[-1] = replace(last, ipa=last.ipa + mark, end=end)
         at = end
     last = found[-1]
     end = at + tail

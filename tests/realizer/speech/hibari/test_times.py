@@ -16,16 +16,16 @@ from realizer.speech.hibari.times import (
 )
 
 
-def test_sounds_add_stress_signs_to_vowels_and_blanks_to_the_sound_before() -> None:
+def test_sounds_add_stress_signs_to_vowels_and_divide_blanks() -> None:
     sentence = [("Hi", "hˈI", True), ("you", "jˌu", False), (".", ".", False)]
-    found = sounds(sentence, [10, 2, 3, 4, 1, 5, 6, 7, 8, 9])
+    found = sounds(sentence, [10, 2, 3, 4, 4, 5, 6, 7, 8, 9])
     assert [(s.ipa, s.stress, s.start, s.end, s.token) for s in found] == [
         ("", 0, 0, 10, 0),
         ("h", 0, 10, 12, 0),
-        ("aɪ", 1, 12, 20, 0),
-        ("j", 0, 20, 25, 1),
-        ("u", 2, 25, 38, 1),
-        ("", 0, 38, 55, 2),
+        ("aɪ", 1, 12, 21, 0),
+        ("j", 0, 21, 28, 1),
+        ("u", 2, 28, 41, 1),
+        ("", 0, 41, 58, 2),
     ]
 
 
