@@ -18,7 +18,8 @@ from realizer.animation.axis import AU_NAMES, au, axis, region
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.idle.blinks import PhraseEnd
 from realizer.animation.idle.rng import uniform
-from realizer.animation.idle.speaking_head import SOURCE, head_channels, style_of, turn_channels
+from realizer.animation.idle.speaking_head import SOURCE, head_channels, turn_channels
+from realizer.animation.speaking_style import style_of
 from realizer.core.array_types import Float64
 from realizer.speech.accents import Phrase, phrases, prosody_facts
 from realizer.speech.utterance import Utterance

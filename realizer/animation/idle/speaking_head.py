@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
 from realizer import tables
 from realizer.animation.axis import au
 from realizer.animation.channel import Channel, Gain, Layer
-from realizer.animation.curves import sample, smooth
+from realizer.animation.curves import smooth
 from realizer.animation.idle.life import TURNS
 from realizer.animation.idle.rng import uniform
+from realizer.animation.speaking_style import NEUTRAL, Style
 from realizer.core.array_types import Float64
 from realizer.speech.accents import Phrase, phrases, prosody_facts
 from realizer.speech.melody import RATE, Melody, melody
@@ -22,54 +22,6 @@ from realizer.speech.utterance import Utterance
 SOURCE = "prosody"
 # Kinds of random numbers: times of poses, and their yaw, pitch and roll.
 KINDS = range(480, 484)
-
-
-class Style(NamedTuple):
-    """How a feeling changes the motion: its size, its pace, and the pitch of the head in degrees."""
-
-    size: float = 1.0
-    pace: float = 1.0
-    pitch: float = 0.0
-
-
-NEUTRAL = Style()
-SHOWN = 0.5  # s after the start of a speech, at which its style is found
-
-
-def style_of(channels: Iterable[Channel], start: float) -> Style:
-    """Return the style of a face that shows these channels shortly after a speech has started.
-
-    It depends on nothing that happens later: a base state counts if it has begun before, and whatever is
-    interrupted later counts as whole.
-    """
-    rows = prosody_facts()["style"]
-    wanted = {target.column: number for row in rows for number in row["aus"] for target in au(number)}
-    active = [
-        _without_later(channel, start)
-        for channel in channels
-        if channel.target.column in wanted and (channel.layer is not Layer.BASE or channel.times[0] <= start)
-    ]
-    if not active:
-        return NEUTRAL
-    shown: dict[int, float] = {}
-    for channel, (value,) in zip(active, sample(active, np.array([start + SHOWN])).tolist(), strict=True):
-        number = wanted[channel.target.column]
-        shown[number] = max(shown.get(number, 0.0), value)
-    size, pace, pitch = NEUTRAL
-    for row in rows:
-        strength = min(shown.get(number, 0.0) for number in row["aus"])
-        size += strength * (row["size"] - 1.0)
-        pace += strength * (row["pace"] - 1.0)
-        pitch += strength * row["pitch"]
-    return Style(round(size, 3), round(pace, 3), round(pitch, 3))
-
-
-def _without_later(channel: Channel, start: float) -> Channel:
-    gains = tuple(gain for gain in channel.gains if gain.begin <= start)
-    until = channel.until if channel.until <= start else np.inf
-    if (gains, until, None) == (channel.gains, channel.until, channel.crossfade):
-        return channel
-    return channel.changed({"gains": gains, "until": until, "crossfade": None})
 
 
 def head_channels(

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from realizer.animation.axis import au
-from realizer.animation.channel import Channel, Layer
 from realizer.animation.curves import sample
-from realizer.animation.idle.speaking_head import NEUTRAL, Style, head_channels, style_of
+from realizer.animation.idle.speaking_head import head_channels
+from realizer.animation.speaking_style import Style
 from realizer.speech.utterance import Phoneme, Utterance, Word
 from realizer.tables import by_number
 
@@ -84,39 +84,9 @@ def test_head_channels_of_silence_are_none() -> None:
     assert head_channels(Utterance(1.0, (), (), {}), 0.0, np.inf, 1) == []
 
 
-def test_style_of_follows_the_feeling_that_is_shown() -> None:
-    def shown(*aus):
-        keys, values = np.array([0.0, 0.5, 5.0, 6.0]), np.array([0.0, 1.0, 1.0, 0.0])
-        return [Channel(target, keys, values) for number in aus for target in au(number)]
-
-    anger, sadness, joy = (style_of(shown(*aus), 0.5) for aus in ((4, 5, 7), (1, 4, 15), (6, 12)))
-    assert style_of(shown(4, 12), 0.5) == style_of([], 0.5) == NEUTRAL == Style()
-    assert anger.size > joy.size > 1 > sadness.size
-    assert anger.pace > 1 > sadness.pace
-    assert joy.pitch > 0 > anger.pitch > sadness.pitch
-    assert style_of(shown(6, 12), 7.0) == NEUTRAL
-    interrupted = [channel.faded(0.6, 0.8) for channel in shown(6, 12)]
-    assert style_of(interrupted, 0.5) == joy  # what was planned when it began
-
-
 def test_head_channels_of_anger_move_more_than_those_of_sadness() -> None:
     anger, sadness = (
         turned(head_channels(said(), 0.0, np.inf, 1, style), TIMES)["yaw"]
         for style in (Style(1.5, 1.4, -2.0), Style(0.6, 0.6, -3.0))
     )
     assert np.abs(np.gradient(anger)).mean() > 2 * np.abs(np.gradient(sadness)).mean()
-
-
-def test_style_of_follows_the_base_states_that_began_before_the_speech() -> None:
-    keys, values = np.array([1.0, 1.4]), np.array([0.0, 1.0])
-    mood = [
-        Channel(target, keys, values, layer=Layer.BASE, keeps_last=True)
-        for number in (6, 12)
-        for target in au(number)
-    ]
-    assert style_of(mood, 0.9) == NEUTRAL
-    assert style_of(mood, 1.0).size > 1
-    assert style_of(mood, 100.0) == style_of(mood, 1.0)
-    replaced = [channel.faded(50.0, 50.4) for channel in mood]
-    assert style_of(replaced, 49.0) == style_of(mood, 49.0)
-    assert style_of(replaced, 50.0) == NEUTRAL
