@@ -14,11 +14,18 @@ from realizer.speech.accents import prosody_facts
 
 
 class Style(NamedTuple):
-    """How a feeling changes the motion: its size, its pace, and the pitch of the head in degrees."""
+    """How a feeling changes speech.
+
+    Attributes:
+        size, pace: factors of the motion of the head.
+        pitch: of the head, degrees.
+        opening: factor of the opening of the mouth.
+    """
 
     size: float = 1.0
     pace: float = 1.0
     pitch: float = 0.0
+    opening: float = 1.0
 
 
 NEUTRAL = Style()
@@ -44,13 +51,14 @@ def style_of(channels: Iterable[Channel], start: float) -> Style:
     for channel, (value,) in zip(active, sample(active, np.array([start + SHOWN])).tolist(), strict=True):
         number = wanted[channel.target.column]
         shown[number] = max(shown.get(number, 0.0), value)
-    size, pace, pitch = NEUTRAL
+    size, pace, pitch, opening = NEUTRAL
     for row in rows:
         strength = min(shown.get(number, 0.0) for number in row["aus"])
         size += strength * (row["size"] - 1.0)
         pace += strength * (row["pace"] - 1.0)
         pitch += strength * row["pitch"]
-    return Style(round(size, 3), round(pace, 3), round(pitch, 3))
+        opening += strength * (row["opening"] - 1.0)
+    return Style(round(size, 3), round(pace, 3), round(pitch, 3), round(opening, 3))
 
 
 def _without_later(channel: Channel, start: float) -> Channel:

@@ -5,7 +5,7 @@ It has no clock and no I/O: every call has the argument `now`, seconds on the se
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -20,12 +20,14 @@ from realizer.animation.frames import AUFrames
 from realizer.animation.idle.gaze_shifts import gaze_shifts
 from realizer.animation.idle.idle_face import Idle, idle_face
 from realizer.animation.idle.prosody import AFTERMATH, KnownMotion, SpeechSpan, phrase_ends, prosody_channels
+from realizer.animation.lips.effort import opened
+from realizer.animation.speaking_style import style_of
 from realizer.behaviours.kind import BehaviourKind, PlanningContext, Position
 from realizer.behaviours.registry import KINDS
 from realizer.core.array_types import Float64, Int16
 from realizer.core.options import DEFAULTS, PlayOptions
 from realizer.expressions.library import library_of
-from realizer.playback.active_block import ScheduledSpeech
+from realizer.playback.active_block import ActiveBlock, ScheduledSpeech
 from realizer.playback.block_manager import BlockManager
 from realizer.playback.block_states import BlockEvent, State, next_state
 from realizer.playback.character import RELAX, Character
@@ -281,7 +283,8 @@ class Player(BlockManager):
         first, last = float(times[0]), float(times[-1])
         blocks = self.blocks.of_character(character)
         own = self._characters[character].channels()
-        channels = [c for p in blocks for c in p.moving_channels()] + own
+        moods = [channel for channel in own if channel.layer is Layer.BASE]
+        channels = [c for p in blocks for c in _with_feeling(p, moods, first, last)] + own
         if not self.idle:
             return channels, None
         seed = self.context.seed + SEED_STEP * character
@@ -291,7 +294,6 @@ class Player(BlockManager):
             for s in p.speech.values()
             for at, part in s.utterance.sections or [(0.0, s.utterance)]
         ]
-        moods = [channel for channel in own if channel.layer is Layer.BASE]
         near = [
             t._replace(face=(*p.moving_channels(), *moods))
             for t, p in talks
@@ -350,6 +352,18 @@ class Player(BlockManager):
                 layers[layer.name.lower()] = {"aus": aus, "faps": faps}
         visible = _up(blend(channels, times, self.rules, idle))
         return {"character": self._characters[character].id, "aus": visible, "layers": layers}
+
+
+def _with_feeling(
+    playing: ActiveBlock, moods: Sequence[Channel], first: float, last: float
+) -> Iterator[Channel]:
+    """Yield the channels of a block; the lips of speech near these times open by what the face shows."""
+    for behaviour, channels in playing.channels.items():
+        speech = playing.speech.get(behaviour)
+        if speech is not None and channels and channels[0].span[0] <= last and channels[0].span[1] >= first:
+            style = style_of((*playing.moving_channels(), *moods), speech.start)
+            channels = opened(channels, style.opening)
+        yield from channels
 
 
 def _up(frames: AUFrames) -> dict[str, float]:

@@ -14,6 +14,7 @@ def test_style_of_follows_the_feeling_that_is_shown() -> None:
     assert style_of(shown(4, 12), 0.5) == style_of([], 0.5) == NEUTRAL == Style()
     assert anger.size > joy.size > 1 > sadness.size
     assert anger.pace > 1 > sadness.pace
+    assert anger.opening > joy.opening > 1 > sadness.opening
     assert joy.pitch > 0 > anger.pitch > sadness.pitch
     assert style_of(shown(6, 12), 7.0) == NEUTRAL
     interrupted = [channel.faded(0.6, 0.8) for channel in shown(6, 12)]

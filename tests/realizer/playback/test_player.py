@@ -321,6 +321,16 @@ def test_frames_of_the_head_in_speech_follow_the_mood() -> None:
     assert lifted(MOODS[0]) > lifted() + 0.01
 
 
+@pytest.mark.parametrize("idle", [True, False])
+def test_frames_of_the_mouth_in_speech_follow_what_the_face_shows(idle: bool) -> None:
+    def open_jaw(lexeme: str) -> float:
+        player = Player(PlayOptions(idle=idle, liveliness=0.0))
+        submit(player, TALK + f'<faceLexeme id="f" lexeme="{lexeme}" start="t:start" end="t:end"/>')
+        return float(player.frames(np.arange(0.0, 4.0, 0.04)).faps[:, 2].max())
+
+    assert open_jaw("ANGER") > 1.1 * open_jaw("DISGUST") > 1.1 * open_jaw("SADNESS")
+
+
 @settings(max_examples=12)
 @given(
     st.integers(0, 1000),
