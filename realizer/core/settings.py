@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import ipaddress
-import math
 import os
-import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
-from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
+from realizer.core import setting_types as kind
 from realizer.core.errors import RealizerError
 from realizer.core.options import PlayOptions
 from realizer.core.toml_text import parse_toml
 
-T = TypeVar("T")
 PREFIX = "REALIZER_"
 # Variables that are read elsewhere.
 OTHERS = frozenset({"REALIZER_DRAW", "REALIZER_FACES", "REALIZER_HEAD_DATA", "REALIZER_NO_PAGE"})
-MIN_SECRET = 32  # characters, the key length of HS256 (RFC 7518, 3.2)
 
 
 class SettingsError(RealizerError):
@@ -35,128 +31,9 @@ class SettingsError(RealizerError):
         self.setting = setting
 
 
-def _number(kind: type[int] | type[float], low: float, high: float) -> Callable[[Any], Any]:
-    wanted = f"{'a whole number' if kind is int else 'a number'} {low:g}..{high:g}"
-
-    def read(value: Any) -> Any:
-        try:
-            number = kind(value)
-        except (TypeError, ValueError, OverflowError):
-            raise ValueError(wanted) from None
-        cut = kind is int and isinstance(value, float) and number != value
-        if isinstance(value, bool) or cut or not math.isfinite(number) or not low <= number <= high:
-            raise ValueError(wanted)
-        return number
-
-    return read
-
-
-_whole, _real = partial(_number, int), partial(_number, float)
-
-
 def limit_hint(name: str) -> str:
     """Return the part of a message that says which variable sets a limit."""
     return f"({PREFIX}{name.upper()} sets it)"
-
-
-def _flag(value: Any) -> bool:
-    word = str(value).strip().lower()
-    if word not in ("1", "true", "yes", "on", "0", "false", "no", "off"):
-        raise ValueError("true or false")
-    return word in ("1", "true", "yes", "on")
-
-
-def _ports(value: Any) -> tuple[int, int]:
-    port = _whole(0, 65535)
-    ports = value.replace(",", " ").split() if isinstance(value, str) else value
-    if not isinstance(ports, list | tuple) or len(ports) != 2 or port(ports[1]) == 0:
-        raise ValueError("two ports, of which the first may be 0")
-    return port(ports[0]), port(ports[1])
-
-
-def _address(value: Any) -> str:
-    host, _, port = str(value).rpartition(":")
-    if not host or not port.isascii() or not port.isdecimal() or not 0 < int(port) < 65536:
-        raise ValueError("HOST:PORT")
-    return f"{host}:{int(port)}"
-
-
-def _matching(pattern: str, wanted: str) -> Callable[[Any], str]:
-    def read(value: Any) -> str:
-        if not isinstance(value, str) or not re.fullmatch(pattern, value):
-            raise ValueError(wanted)
-        return value
-
-    return read
-
-
-def _word_of(*words: str) -> Callable[[Any], str]:
-    return _matching("|".join(words), " or ".join(words))
-
-
-_text = _matching(r"(?s).*\S.*", "a word")
-
-
-def _path(value: Any) -> Path:
-    if not isinstance(value, str | Path):
-        raise ValueError("the name of a file or folder")
-    return Path(value)
-
-
-def _existing(is_kind: Callable[[Path], object], kind: str) -> Callable[[Any], Path]:
-    def read(value: Any) -> Path:
-        if not is_kind(path := _path(value)):
-            raise ValueError(f"an existing {kind}")
-        return path
-
-    return read
-
-
-_folder, _file = _existing(os.path.isdir, "folder"), _existing(os.path.isfile, "file")
-
-
-def _switch_or_file(value: Any) -> str:
-    try:
-        return "on" if _flag(value) else "off"
-    except ValueError:
-        # Path.is_file raises for a text that is longer than a path can be.
-        if not isinstance(value, str | Path) or not os.path.isfile(value):  # noqa: PTH113
-            raise ValueError("on, off, or an existing file") from None
-        return str(value)
-
-
-def _several(read: Callable[[str], str], wanted: str) -> Callable[[Any], tuple[str, ...]]:
-    """Return a parser of several values, from a list or a text; `read` parses one of them."""
-
-    def parse(value: Any) -> tuple[str, ...]:
-        items = value.replace(",", " ").split() if isinstance(value, str) else value
-        try:
-            if isinstance(items, list | tuple):
-                return tuple(read(str(item)) for item in items)
-        except ValueError:
-            pass
-        raise ValueError(wanted)
-
-    return parse
-
-
-# An origin has a scheme and a host, but no path.
-_origins = _several(
-    _matching(r"[a-z][a-z0-9+.-]*://[^/\s]+/?|null|\*", ""), "addresses such as https://example.org, or *"
-)
-
-
-def _host_name(text: str) -> str:
-    name = text.lower().strip("[]")
-    if ":" in name:
-        return str(ipaddress.IPv6Address(name))
-    return _matching(r"[a-z0-9._-]+", "")(name)
-
-
-_hosts = _several(_host_name, "names or addresses without a port, such as face.example")
-_networks = _several(
-    lambda text: str(ipaddress.ip_network(text, strict=False)), "addresses or networks such as 192.168.1.0/24"
-)
 
 
 def is_loopback(host: str) -> bool:
@@ -167,35 +44,11 @@ def is_loopback(host: str) -> bool:
         return host == "localhost" or host.endswith(".localhost")
 
 
-def _key(value: Any) -> str:
-    """Return a public key in PEM or a secret; `value` is the key or its file."""
-    wanted = f"an existing PEM file, or a secret of at least {MIN_SECRET} characters"
-    if not isinstance(value, str | Path) or not str(value).strip():
-        raise ValueError(wanted)
-    text = str(value)
-    try:
-        if "-----BEGIN" not in text and Path(text).is_file():
-            text = Path(text).read_text("utf-8")
-    except OSError:
-        pass  # a secret may be longer than a file name can be
-    except UnicodeDecodeError:
-        raise ValueError(wanted) from None
-    text = text.strip()
-    # A misspelt file name must not become a secret.
-    if "-----BEGIN" not in text and (len(text) < MIN_SECRET or text.endswith((".pem", ".key", ".pub"))):
-        raise ValueError(wanted)
-    return text
-
-
 def _closest(name: str, known: Iterable[str]) -> str | None:
     """Return the setting with the most similar name, or None."""
     from difflib import get_close_matches
 
     return next(iter(get_close_matches(name, known, cutoff=0.8)), None)
-
-
-def _optional(read: Callable[[Any], T], empty: bool = True) -> Callable[[Any], T | None]:
-    return lambda value: None if value is None or (empty and value == "") else read(value)
 
 
 def _row(
@@ -211,7 +64,7 @@ def _row(
         empty: whether "" means None for a setting that may be None.
     """
     if default is None:
-        read = _optional(read, empty)
+        read = kind.optional(read, empty)
     metadata = {"read": read, "description": description, "secret": secret}
     return field(default=default, repr=not secret, metadata=metadata)
 
@@ -225,145 +78,161 @@ class Settings:
         SettingsError: a value of the wrong kind or out of range.
     """
 
-    host: str = _row("127.0.0.1", _text, "address to listen on")
-    port: int = _row(8765, _whole(0, 65535), "port; 0: any free one")
-    workers: int = _row(1, _whole(1, 64), "number of processes that share the port")
+    host: str = _row("127.0.0.1", kind.text, "address to listen on")
+    port: int = _row(8765, kind.whole(0, 65535), "port; 0: any free one")
+    workers: int = _row(1, kind.whole(1, 64), "number of processes that share the port")
     # An empty token must not open the service by mistake.
     token: str | None = _row(
         None,
-        _text,
+        kind.text,
         "password for WebSocket clients; REALIZER_TOKEN hides it from other users; none: no password",
         secret=True,
         empty=False,
     )
     jwt_key: str | None = _row(
         None,
-        _key,
+        kind.key,
         "key of the JWTs that clients may present: PEM file of a public key, or a secret; none: no JWTs",
         secret=True,
         empty=False,
     )
-    jwt_audience: str | None = _row(None, _text, "required claim aud of a JWT; none: it must have none")
-    insecure: bool = _row(False, _flag, "listen beyond this machine without a token, a key or addresses")
+    jwt_audience: str | None = _row(None, kind.text, "required claim aud of a JWT; none: it must have none")
+    insecure: bool = _row(False, kind.flag, "listen beyond this machine without a token, a key or addresses")
     hosts: tuple[str, ...] = _row(
         (),
-        _hosts,
+        kind.hosts,
         "names under which clients reach the service, beside its addresses, the machine's name and localhost",
     )
     allow: tuple[str, ...] = _row(
-        (), _networks, "addresses and networks of the clients of Asap and Xface; none: all"
+        (), kind.networks, "addresses and networks of the clients of Asap and Xface; none: all"
     )
-    origins: tuple[str, ...] = _row((), _origins, "origins of pages that may connect; *: all")
-    tls_cert: Path | None = _row(None, _file, "certificate chain in PEM; none: no TLS")
-    tls_key: Path | None = _row(None, _file, "private key in PEM; none: it is in the file tls_cert")
-    log: str = _row("text", _word_of("text", "json"), "format of log messages")
+    origins: tuple[str, ...] = _row((), kind.origins, "origins of pages that may connect; *: all")
+    tls_cert: Path | None = _row(None, kind.file, "certificate chain in PEM; none: no TLS")
+    tls_key: Path | None = _row(None, kind.file, "private key in PEM; none: it is in the file tls_cert")
+    log: str = _row("text", kind.word_of("text", "json"), "format of log messages")
     # The URL may contain a password.
     journal: str | None = _row(
         None,
-        _text,
+        kind.text,
         "file or redis://HOST:PORT/N that saves named sessions for a restart; none: not saved",
         secret=True,
     )
     record: Path | None = _row(
-        None, _path, "folder for recordings, for `realizer replay`; none: not recorded"
+        None, kind.path, "folder for recordings, for `realizer replay`; none: not recorded"
     )
     asap_ports: tuple[int, int] | None = _row(
         None,
-        _ports,
+        kind.ports,
         "ports of ASAP's TCP, such as 7500 7501: BML in, feedback to that port of the client; none: off",
     )
-    xface_port: int | None = _row(None, _whole(0, 65535), "port for clients of an Xface player; none: off")
+    xface_port: int | None = _row(
+        None, kind.whole(0, 65535), "port for clients of an Xface player; none: off"
+    )
     xface_player: str | None = _row(
-        None, _address, "HOST:PORT of an Xface player that shows a session; none: off"
+        None, kind.address, "HOST:PORT of an Xface player that shows a session; none: off"
     )
     xface_player_session: str = _row(
         "xface-player",
-        _matching(r"[A-Za-z0-9._~-]{1,64}", "1..64 letters, digits or . _ ~ -"),
+        kind.matching(r"[A-Za-z0-9._~-]{1,64}", "1..64 letters, digits or . _ ~ -"),
         "session that xface_player shows",
     )
     xface_player_interval: float = _row(
-        0.25, _real(0, 60), "seconds between frames for xface_player; it stops at shorter ones"
+        0.25, kind.real(0, 60), "seconds between frames for xface_player; it stops at shorter ones"
     )
-    stomp: str | None = _row(None, _address, "HOST:PORT of a STOMP broker; none: off")
-    stomp_login: str | None = _row(None, _text, "login for the broker")
-    stomp_password: str | None = _row(None, _text, "password for the broker", secret=True)
-    stomp_host: str | None = _row(None, _text, 'virtual host; "/" for RabbitMQ')
+    stomp: str | None = _row(None, kind.address, "HOST:PORT of a STOMP broker; none: off")
+    stomp_login: str | None = _row(None, kind.text, "login for the broker")
+    stomp_password: str | None = _row(None, kind.text, "password for the broker", secret=True)
+    stomp_host: str | None = _row(None, kind.text, 'virtual host; "/" for RabbitMQ')
     stomp_json_in: str | None = _row(
-        "/topic/bmlRequests", _optional(_text), "destination of BML in JSON; none: not read"
+        "/topic/bmlRequests", kind.optional(kind.text), "destination of BML in JSON; none: not read"
     )
-    stomp_json_out: str = _row("/topic/bmlFeedback", _text, "destination of feedback in JSON")
+    stomp_json_out: str = _row("/topic/bmlFeedback", kind.text, "destination of feedback in JSON")
     stomp_xml_in: str | None = _row(
-        "/topic/asap.bml.request", _optional(_text), "destination of BML; none: not read"
+        "/topic/asap.bml.request", kind.optional(kind.text), "destination of BML; none: not read"
     )
-    stomp_xml_out: str = _row("/topic/asap.bml.feedback", _text, "destination of feedback")
+    stomp_xml_out: str = _row("/topic/asap.bml.feedback", kind.text, "destination of feedback")
     stomp_vhmsg: str | None = _row(
-        "/topic/DEFAULT_SCOPE", _optional(_text), "destination of VHMSG; none: not read"
+        "/topic/DEFAULT_SCOPE", kind.optional(kind.text), "destination of VHMSG; none: not read"
     )
-    face: str = _row("default", _text, "default face of characters")
+    face: str = _row("default", kind.text, "default face of characters")
     deformer: str | None = _row(
-        None, _word_of("mpeg4", "au"), "what moves faces: mpeg4 or au; none: each face's own choice"
+        None, kind.word_of("mpeg4", "au"), "what moves faces: mpeg4 or au; none: each face's own choice"
     )
     voice: str | None = _row(
-        None, _text, "default voice; see `realizer voices`; none: espeak-ng if installed, else silent"
+        None, kind.text, "default voice; see `realizer voices`; none: espeak-ng if installed, else silent"
     )
-    language: str = _row("en-US", _text, "BCP-47 tag of speech without xml:lang")
+    language: str = _row("en-US", kind.text, "BCP-47 tag of speech without xml:lang")
     camera: str = _row(
-        "front", _text, "default camera of pictures: front, three-quarter, profile, close, or the face's own"
+        "front",
+        kind.text,
+        "default camera of pictures: front, three-quarter, profile, close, or the face's own",
     )
-    light: str | None = _row(None, _text, "default light of pictures; none: portrait")
+    light: str | None = _row(None, kind.text, "default light of pictures; none: portrait")
     background: str | None = _row(
         None,
-        _matching(r"#[0-9a-fA-F]{6}|transparent", "transparent or a colour such as #d8dde2"),
+        kind.matching(r"#[0-9a-fA-F]{6}|transparent", "transparent or a colour such as #d8dde2"),
         "default background of pictures; none: the light's own",
     )
-    fps: float = _row(25.0, _real(0.01, 240), "default frames per second of streams")
-    scene: Path | None = _row(None, _path, "file of targets for all sessions: NAME X Y Z, in metres")
-    media: Path | None = _row(None, _folder, "folder of the files that documents may refer to")
-    expressions: Path | None = _row(None, _folder, "folder of a user's expressions; none: only built-in ones")
-    seed: int = _row(0, _whole(-(2**63), 2**63 - 1), "seed of idle motion")
-    idle: bool = _row(True, _flag, "blinks and small head motion")
+    fps: float = _row(25.0, kind.real(0.01, 240), "default frames per second of streams")
+    scene: Path | None = _row(None, kind.path, "file of targets for all sessions: NAME X Y Z, in metres")
+    media: Path | None = _row(None, kind.folder, "folder of the files that documents may refer to")
+    expressions: Path | None = _row(
+        None, kind.folder, "folder of a user's expressions; none: only built-in ones"
+    )
+    seed: int = _row(0, kind.whole(-(2**63), 2**63 - 1), "seed of idle motion")
+    idle: bool = _row(True, kind.flag, "blinks and small head motion")
     liveliness: float = _row(
-        1.0, _real(0, 1), "how much an idle face breathes, changes its posture and varies its blinks, 0 to 1"
+        1.0,
+        kind.real(0, 1),
+        "how much an idle face breathes, changes its posture and varies its blinks, 0 to 1",
     )
     cooccurrence: str = _row(
-        "on", _switch_or_file, "rules for AUs that no face shows together: on, off, or a file"
+        "on", kind.switch_or_file, "rules for AUs that no face shows together: on, off, or a file"
     )
-    prosody: bool = _row(True, _flag, "nods, brows, blinks and glances that accompany speech: on or off")
-    jaw: float = _row(1.0, _real(0, 2), "how far the jaw opens in speech: 0 mumbles, 2 over-articulates")
-    lips: float = _row(1.0, _real(0, 2), "how far the lips move in speech: 0 mumbles, 2 over-articulates")
-    mapping: Path | None = _row(None, _file, "file that maps AUs to FAPs; none: each face's own mapping")
-    strict_bml: bool = _row(False, _flag, "read documents as BML 1.0 only, without dialects")
+    prosody: bool = _row(True, kind.flag, "nods, brows, blinks and glances that accompany speech: on or off")
+    jaw: float = _row(1.0, kind.real(0, 2), "how far the jaw opens in speech: 0 mumbles, 2 over-articulates")
+    lips: float = _row(1.0, kind.real(0, 2), "how far the lips move in speech: 0 mumbles, 2 over-articulates")
+    mapping: Path | None = _row(None, kind.file, "file that maps AUs to FAPs; none: each face's own mapping")
+    strict_bml: bool = _row(False, kind.flag, "read documents as BML 1.0 only, without dialects")
     grace: float = _row(
         0.5,
-        _real(0, 60),
+        kind.real(0, 60),
         "seconds by which a behaviour may come too late for its references into other blocks",
     )
-    keep: float = _row(60.0, _real(0, 1e9), "seconds that a named session lives after its last connection")
-    drain: float = _row(5.0, _real(0, 3600), "seconds that blocks may go on playing when the service stops")
-    max_message: int = _row(16 * 2**20, _whole(1, 2**31), "bytes of one WebSocket message")
-    max_document: int = _row(2**20, _whole(1, 2**31), "bytes of BML in one message")
-    max_elements: int = _row(100_000, _whole(1, 10**7), "XML elements in one message")
-    max_behaviours: int = _row(10_000, _whole(1, 10**6), "behaviours in one block")
-    max_planning: int = _row(
-        2_500_000, _whole(1, 10**12), "steps of planning one block; about a million take a second"
+    keep: float = _row(
+        60.0, kind.real(0, 1e9), "seconds that a named session lives after its last connection"
     )
-    max_duration: float = _row(1_800.0, _real(1, 1e9), "planned duration of a block in seconds")
+    drain: float = _row(
+        5.0, kind.real(0, 3600), "seconds that blocks may go on playing when the service stops"
+    )
+    max_message: int = _row(16 * 2**20, kind.whole(1, 2**31), "bytes of one WebSocket message")
+    max_document: int = _row(2**20, kind.whole(1, 2**31), "bytes of BML in one message")
+    max_elements: int = _row(100_000, kind.whole(1, 10**7), "XML elements in one message")
+    max_behaviours: int = _row(10_000, kind.whole(1, 10**6), "behaviours in one block")
+    max_planning: int = _row(
+        2_500_000, kind.whole(1, 10**12), "steps of planning one block; about a million take a second"
+    )
+    max_duration: float = _row(1_800.0, kind.real(1, 1e9), "planned duration of a block in seconds")
     max_blocks: int = _row(
         1_000,
-        _whole(1, 10**6),
+        kind.whole(1, 10**6),
         "blocks that play or wait in one session, and messages that wait with further blocks",
     )
-    max_connections: int = _row(2_000, _whole(1, 10**6), "open connections per address, at each transport")
-    max_sessions: int = _row(5_000, _whole(1, 10**6), "sessions of each worker")
-    max_address_sessions: int = _row(2_000, _whole(1, 10**6), "live sessions that one address has opened")
-    max_size: int = _row(2048, _whole(16, 16384), "pixels of a picture's longer side")
-    max_pixels: float = _row(
-        125e6, _real(256, 1e12), "pixels per second of all pictures of a session: 1920x1080 at 60"
+    max_connections: int = _row(
+        2_000, kind.whole(1, 10**6), "open connections per address, at each transport"
     )
-    max_speech: int = _row(20_000, _whole(1, 10**7), "characters of one speech in a document")
-    max_rate: float = _row(500.0, _real(0.1, 1e6), "messages per second that are read from one connection")
+    max_sessions: int = _row(5_000, kind.whole(1, 10**6), "sessions of each worker")
+    max_address_sessions: int = _row(2_000, kind.whole(1, 10**6), "live sessions that one address has opened")
+    max_size: int = _row(2048, kind.whole(16, 16384), "pixels of a picture's longer side")
+    max_pixels: float = _row(
+        125e6, kind.real(256, 1e12), "pixels per second of all pictures of a session: 1920x1080 at 60"
+    )
+    max_speech: int = _row(20_000, kind.whole(1, 10**7), "characters of one speech in a document")
+    max_rate: float = _row(
+        500.0, kind.real(0.1, 1e6), "messages per second that are read from one connection"
+    )
     max_memory: int | None = _row(
-        None, _whole(64, 10**7), "MB of the process above which no session is opened; none: no limit"
+        None, kind.whole(64, 10**7), "MB of the process above which no session is opened; none: no limit"
     )
 
     def __post_init__(self) -> None:

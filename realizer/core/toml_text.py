@@ -1,9 +1,9 @@
-"""A parser of TOML that refuses what no setting needs."""
+"""A parser of TOML that also refuses text which other parts of the program could not handle."""
 
 import tomllib
 from typing import Any
 
-LARGEST = 2**63  # TOML promises 64 bits; more digits could not even be printed in a message
+LARGEST = 2**63  # TOML promises 64 bits; Python does not print numbers of thousands of digits
 
 
 def parse_toml(text: str) -> dict[str, Any]:
