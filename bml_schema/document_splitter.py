@@ -110,7 +110,8 @@ def document_spans(text: str, first: int = 0, last: int | None = None) -> Iterat
         elif mark.kind == "close" and opened:
             ends[opened.pop()] = mark.end
     roots = [n for n, mark in enumerate(marks) if mark.kind in ("open", "whole")]
-    after = dict(zip(roots, [marks[n].start for n in roots[1:]], strict=False))
+    # A document without an end tag ends where the next one begins.
+    next_starts = dict(zip(roots, [marks[n].start for n in roots[1:]], strict=False))
     offset = first
     junk = doctype = -1  # start of a broken stretch that was not reported yet, or -1
     for n, mark in enumerate([*marks, _Mark("end", last, last)]):
@@ -126,7 +127,7 @@ def document_spans(text: str, first: int = 0, last: int | None = None) -> Iterat
         offset = mark.end
         if mark.kind not in ("open", "whole", "end"):
             continue
-        end = ends.get(n) or after.get(n, last)
+        end = ends.get(n) or next_starts.get(n, last)
         if mark.kind == "end":
             if doctype >= 0:
                 yield DocumentSpan(doctype, offset, fault=_NO_DTD)

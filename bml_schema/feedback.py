@@ -56,12 +56,12 @@ class BlockProgress:
     def to_xml(self, seq: int | None = None, epoch: float | None = None) -> str:
         """Return the element as XML text; for `seq` and `epoch` see the module."""
         posix = _posix("bmla:posixTime", self.global_time, epoch, self.posix_time)
-        said = _given("realizer:said", self.said) + _given("realizer:lastWord", self.last_word)
+        said = _optional("realizer:said", self.said) + _optional("realizer:lastWord", self.last_word)
         return (
             f'<blockProgress{_CORE} id="{sanitized_value(self.id)}" globalTime="{_seconds(self.global_time)}"'
-            f"{_given('characterId', self.character_id)}"
-            f"{_bmla(posix + _given('bmla:status', self.status))}"
-            f"{_ours(said + _number(self.seq if seq is None else seq))}/>"
+            f"{_optional('characterId', self.character_id)}"
+            f"{_with_bmla(posix + _optional('bmla:status', self.status))}"
+            f"{_with_own(said + _seq(seq, self.seq))}/>"
         )
 
 
@@ -86,9 +86,9 @@ class SyncPointProgress:
         """Return the element as XML text; for `seq` and `epoch` see the module."""
         return (
             f'<syncPointProgress{_CORE} id="{sanitized_value(self.id)}" time="{_seconds(self.time)}"'
-            f' globalTime="{_seconds(self.global_time)}"{_given("characterId", self.character_id)}'
-            f"{_bmla(_posix('bmla:posixTime', self.global_time, epoch, self.posix_time))}"
-            f"{_ours(_number(self.seq if seq is None else seq))}/>"
+            f' globalTime="{_seconds(self.global_time)}"{_optional("characterId", self.character_id)}'
+            f"{_with_bmla(_posix('bmla:posixTime', self.global_time, epoch, self.posix_time))}"
+            f"{_with_own(_seq(seq, self.seq))}/>"
         )
 
 
@@ -112,7 +112,7 @@ class WarningFeedback:
         """Return the element as XML text, without CDATA and child elements, which some clients refuse."""
         start = (
             f'<warningFeedback{_CORE} id="{sanitized_value(self.id)}" type="{sanitized_value(self.type)}"'
-            f"{_given('characterId', self.character_id)}{_ours(_number(self.seq if seq is None else seq))}"
+            f"{_optional('characterId', self.character_id)}{_with_own(_seq(seq, self.seq))}"
         )
         return f"{start}>{escape(sanitized(self.text))}</warningFeedback>" if self.text else f"{start}/>"
 
@@ -158,7 +158,7 @@ class PredictionFeedback:
             posix = (
                 _posix("bmla:posixStartTime", start, epoch, block.posix_start)
                 + _posix("bmla:posixEndTime", end, epoch, block.posix_end)
-                + _given("bmla:status", block.status)
+                + _optional("bmla:status", block.status)
             )
             if posix:
                 writer.prefixes[BMLA] = "bmla"
@@ -169,8 +169,8 @@ class PredictionFeedback:
         inner.extend(writer.behaviour(b) for b in self.behaviours)
         declared = writer.declarations()
         tag = (
-            f"<predictionFeedback{_CORE}{declared}{_given('characterId', self.character_id)}"
-            f"{_ours(_number(self.seq if seq is None else seq), declared)}"
+            f"<predictionFeedback{_CORE}{declared}{_optional('characterId', self.character_id)}"
+            f"{_with_own(_seq(seq, self.seq), declared)}"
         )
         return "\n".join((f"{tag}>", *inner, "</predictionFeedback>")) if inner else f"{tag}/>"
 
@@ -228,7 +228,7 @@ def parse_feedback(text: str, vocabulary: Mapping[str, type[Behaviour]] = VOCABU
     common: dict[str, Any] = {"character_id": root.get("characterId"), "seq": seq}
     if kind == core("blockProgress"):
         return BlockProgress(
-            id=_needed(root, "id"),
+            id=_required(root, "id"),
             global_time=_time(root, "globalTime"),
             status=root.get(bmla("status")),
             said=root.get(own("said")),
@@ -237,7 +237,7 @@ def parse_feedback(text: str, vocabulary: Mapping[str, type[Behaviour]] = VOCABU
         )
     if kind == core("syncPointProgress"):
         return SyncPointProgress(
-            id=_needed(root, "id"),
+            id=_required(root, "id"),
             time=_time(root, "time"),
             global_time=_time(root, "globalTime"),
             posix_time=_milliseconds(root),
@@ -245,7 +245,7 @@ def parse_feedback(text: str, vocabulary: Mapping[str, type[Behaviour]] = VOCABU
         )
     if kind == core("warningFeedback"):
         text = "".join(str(t) for t in root.itertext())
-        return WarningFeedback(id=_needed(root, "id"), type=_needed(root, "type"), text=text, **common)
+        return WarningFeedback(id=_required(root, "id"), type=_required(root, "type"), text=text, **common)
     if kind == core("predictionFeedback"):
         blocks = tuple(_block(e) for e in root if e.tag == core("bml"))
         behaviours = (read_behaviour(e, vocabulary) for e in root if e.tag != core("bml"))
@@ -258,7 +258,7 @@ def parse_feedback(text: str, vocabulary: Mapping[str, type[Behaviour]] = VOCABU
 def _block(child: etree._Element) -> BlockPrediction:
     start, end = (_time(child, n) if n in child.attrib else None for n in ("globalStart", "globalEnd"))
     return BlockPrediction(
-        id=_needed(child, "id"),
+        id=_required(child, "id"),
         global_start=start,
         global_end=end,
         status=child.get(bmla("status")),
@@ -267,7 +267,7 @@ def _block(child: etree._Element) -> BlockPrediction:
     )
 
 
-def _needed(source: etree._Element, name: str) -> str:
+def _required(source: etree._Element, name: str) -> str:
     value = source.get(name)
     if value is None:
         raise BMLError(f"{name}: wanted one, got none", line=_line(source), path=f"/{local(str(source.tag))}")
@@ -275,7 +275,7 @@ def _needed(source: etree._Element, name: str) -> str:
 
 
 def _time(source: etree._Element, name: str) -> float:
-    value = _needed(source, name).strip()
+    value = _required(source, name).strip()
     # Java programs write 1.0E-4: feedback of other realizers may have exponents, ours never has.
     if not NUMBER.fullmatch(value.partition("E")[0].partition("e")[0]):
         raise BMLError(f"{name}: wanted seconds, got {quoted(value)}", line=_line(source))
@@ -301,7 +301,7 @@ def _whole(value: str) -> int | None:
 # s; up to here a double resolves microseconds.
 _EXACT = 1e9
 _CORE = f' xmlns="{CORE}"'
-_OURS = f' xmlns:realizer="{OWN}"'
+_OWN = f' xmlns:realizer="{OWN}"'
 
 
 def _seconds(time: float) -> str:
@@ -311,8 +311,8 @@ def _seconds(time: float) -> str:
     return decimal(round(time, 6))
 
 
-def _given(name: str, value: str | None) -> str:
-    """Return an attribute, or "" without a value."""
+def _optional(name: str, value: str | None) -> str:
+    """Return an attribute, or "" for None."""
     return "" if value is None else f' {name}="{sanitized_value(value)}"'
 
 
@@ -323,15 +323,17 @@ def _posix(name: str, time: float | None, epoch: float | None, read: int | None)
     return "" if read is None else f' {name}="{read}"'
 
 
-def _number(seq: int | None) -> str:
-    return "" if seq is None else f' realizer:seq="{seq}"'
+def _seq(seq: int | None, read: int | None) -> str:
+    """Return the attribute of a number in the session; without one, of that which was read."""
+    number = read if seq is None else seq
+    return "" if number is None else f' realizer:seq="{number}"'
 
 
-def _bmla(attributes: str) -> str:
-    """Return attributes of BMLA with the declaration of their namespace."""
+def _with_bmla(attributes: str) -> str:
+    """Return attributes of BMLA with the declaration of its namespace."""
     return f' xmlns:bmla="{BMLA}"{attributes}' if attributes else ""
 
 
-def _ours(attributes: str, declared: str = "") -> str:
-    """Return attributes of ours with our namespace, unless a predicted behaviour of ours has declared it."""
-    return attributes if not attributes or _OURS in declared else _OURS + attributes
+def _with_own(attributes: str, declared: str = "") -> str:
+    """Return attributes of our namespace with its declaration, unless `declared` has it already."""
+    return attributes if not attributes or _OWN in declared else _OWN + attributes

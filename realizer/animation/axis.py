@@ -5,10 +5,10 @@ from typing import NamedTuple
 
 from realizer import tables
 
-# Each has a mask channel (0..1), which suppresses other sources of the region: speech masks the lips, a
-# temporary gaze masks eyes and head for the base gaze, a document masks blinks, small idle movements, slow
-# idle motion and the usual saccades (by those of a listener or a thinker), and the successive mixer masks the
-# action units for the additive one.
+# Each has a mask channel (0..1), by which one source suppresses another: speech suppresses other movements of
+# the lips, a temporary gaze the base gaze of eyes and head, a document a kind of idle motion (blinks, small
+# movements, slow motion, or the usual saccades while the character listens or thinks), and the successive
+# mixer the additive one.
 IDLE_MASKS = ("blinks", "motion", "life", "listening", "thinking")
 MASKED_REGIONS = ("lips", "eyes", "head", *IDLE_MASKS, "successive")
 

@@ -52,7 +52,7 @@ def direct_values(message: SetMessage, before: Collection[str]) -> dict[str, flo
         if not names:
             raise FieldError("aus", f"wanted an AU number, with L or R for one side, got {name!r}")
         values |= dict.fromkeys(names, value)
-    movable = {row.name for row in rows[2:]}
+    movable = {row.name for row in rows[2:]}  # FAP 1 and 2 select visemes and expressions
     for name, value in (message.faps or {}).items():
         if name.isascii() and name.isdigit() and 3 <= int(name) <= len(rows):
             name = rows[int(name) - 1].name
