@@ -91,7 +91,7 @@ def check_target(node: Gaze | GazeShift | HeadDirectionShift, context: PlanningC
     if context.scene is None or is_known(node.target, context):
         return ()
     target = node.target
-    near = difflib.get_close_matches(target, list(context.scene), n=3) or sorted(context.scene)[:5]
+    near = difflib.get_close_matches(target, list(context.scene)) or sorted(context.scene)[:5]
     wanted = f"one of {', '.join(near)}" if near else 'a point such as "0,0,1", as the scene is empty'
     return (
         Fault(

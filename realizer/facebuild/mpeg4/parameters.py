@@ -134,12 +134,12 @@ def _expanded(where: str, ranges: Any) -> Int32:
     for word in str(ranges).split():
         first, _, last = word.partition("-")
         try:
-            a, b = int(first), int(last or first)
+            vertices = range(int(first), int(last or first) + 1)
         except ValueError:
-            a, b = 0, -1
-        if not 0 <= a <= b < MAX_VERTICES:
+            vertices = range(0)
+        if not vertices or vertices[-1] >= MAX_VERTICES:
             raise FaceError(f"{where}: wanted ranges such as '3-5 9', got {word[:80]!r}")
-        mask[a : b + 1] = True
+        mask[vertices.start : vertices.stop] = True
     return np.flatnonzero(mask).astype(np.int32)
 
 

@@ -40,6 +40,12 @@ def test_check_target_suggests_a_point_in_an_empty_scene() -> None:
     assert "0,0,1" in fault.text
 
 
+def test_check_target_names_five_if_none_is_similar() -> None:
+    context = PlanningContext(scene=dict.fromkeys("fedcba", (0.0, 0.0, 1.0)))
+    (fault,) = check('<gaze id="x" target="cup"/>', context)
+    assert "wanted one of a, b, c, d, e, got 'cup'" in fault.text
+
+
 @pytest.mark.parametrize(
     ("target", "left", "up"),
     [

@@ -213,6 +213,11 @@ def test_speech_of_the_sync_client_does_the_same() -> None:
             with pytest.raises(ZeroDivisionError):
                 broken()
             assert [getattr(f, "id", "") for f in client.until_end("s3")][-1] == "s3:end"
+            with client.speech("s4") as fourth:
+                fourth.append("One. ")
+                fourth.close()
+                with pytest.raises(ClientError, match="s4 was closed"):
+                    fourth.append("Two. ")
 
     async def test(url: str) -> None:
         await asyncio.to_thread(plain, url)

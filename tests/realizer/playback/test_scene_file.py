@@ -20,7 +20,7 @@ def test_parse_scene_reads_named_axes() -> None:
     assert parse_scene("cup 1, 2, 3") == {"cup": (1.0, 2.0, 3.0)}
 
 
-@pytest.mark.parametrize("number", ["1e5", "nan", "-inf"])
+@pytest.mark.parametrize("number", ["10001", "nan", "-inf"])
 def test_parse_scene_refuses_positions_beyond_10_km(number: str) -> None:
     with pytest.raises(ValueError, match="cup: wanted metres within 10 km, got"):
         parse_scene(f"cup 0 {number} 0")

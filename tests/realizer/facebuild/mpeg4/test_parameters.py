@@ -44,6 +44,8 @@ def test_read_setup_returns_points(tmp_path: Path) -> None:
         ('[[zone]]\nfap = inf\nfalloff = "cosine"\nsize = 1', "wanted a FAP's number, got inf"),
         ('[masks]\n"4" = "1-b"', "wanted ranges such as '3-5 9', got '1-b'"),
         ('[masks]\n"4" = "5-99999999999"', "wanted ranges such as '3-5 9', got '5-99999999999'"),
+        ('[masks]\n"4" = "5-3"', "wanted ranges such as '3-5 9', got '5-3'"),
+        ('[masks]\n"4" = "-3"', "wanted ranges such as '3-5 9', got '-3'"),
         ('[[zone]]\nfap = 31\nfalloff = "x"\nsize = 1', "zone 1: zone of FAP 31: falloff: wanted one of"),
         ("a = ", "Invalid value"),
     ],
