@@ -2,9 +2,10 @@
 
 Run: python -m tests.mutations [--count 60] [--seed 0] [--module realizer/playback] [--jobs 2]
 
-A module is drawn first, then a place in it. Each change is made in a copy of the checkout. The test module
-of the same name runs there, then the tests of the package and those that import the module, then those beside
-the package and the corpus, up to the first that fails.
+A module is drawn first, then a place in it. A seed draws the same places of a module until that module
+changes. Each change is made in a copy of the checkout. The test module of the same name runs there, then the
+tests of the package and those that import the module, then those beside the package and the corpus, up to the
+first that fails.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
+from itertools import zip_longest
+from operator import itemgetter
 from pathlib import Path
 from queue import SimpleQueue
 from random import Random
@@ -159,6 +162,8 @@ def _is_unseen(node: ast.AST) -> bool:
             return bool(ERRORS.match(ast.unparse(func)))
         case ast.If(test=test):
             return bool(re.search("TYPE_CHECKING|__name__", ast.unparse(test)))
+        case ast.BinOp(left=ast.Constant(value=2), op=ast.Pow(), right=ast.Constant(value=int() as power)):
+            return _is_tolerance(2**power)
         case ast.ExceptHandler(type=ast.expr() as kind):
             return "ImportError" in ast.unparse(kind)
         case ast.keyword(arg=str() as name, value=value):
@@ -267,7 +272,8 @@ class Copy:
     def run(self, *arguments: str) -> tuple[int | None, str]:
         """Run tests up to the first that fails; the status is None where they hang."""
         command = [sys.executable, "-m", "pytest", "-x", "-q", "-m", "", *arguments]
-        environment = {**os.environ, "PYTHONPATH": str(self.root), "PYTHONDONTWRITEBYTECODE": "1"}
+        environment = {**os.environ, "PYTHONPATH": str(self.root)}
+        environment.pop("PYTHONDONTWRITEBYTECODE", None)  # so that test modules are rewritten once only
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
         with subprocess.Popen(
             command, cwd=self.root, env=environment, text=True, start_new_session=True, **pipes
@@ -281,15 +287,19 @@ class Copy:
 
 
 def sample(count: int, seed: int, prefix: str) -> list[Mutation]:
-    """Return some mutations, each once, of modules under a path: each module is as likely."""
+    """Return some mutations, each once, of modules under a path: one of each module before the second of any.
+
+    Each module has its own random numbers, so that a change to one leaves what is drawn of the others.
+    """
     paths = [p for package in PACKAGES for p in sorted((ROOT / package).rglob("*.py"))]
     names = [p.relative_to(ROOT).as_posix() for p in paths if "node_modules" not in p.parts]
-    modules = [list(mutations(n, (ROOT / n).read_bytes())) for n in names if n.startswith(prefix)]
-    random, chosen = Random(seed), []
-    while len(chosen) < count and (modules := [module for module in modules if module]):
-        module = random.choice(modules)
-        chosen.append(module.pop(random.randrange(len(module))))
-    return chosen
+    drawn: list[tuple[float, list[Mutation]]] = []
+    for name in names:
+        if name.startswith(prefix):
+            random, found = Random(f"{seed} {name}"), list(mutations(name, (ROOT / name).read_bytes()))
+            drawn.append((random.random(), random.sample(found, len(found))))
+    rounds = zip_longest(*(found for _, found in sorted(drawn, key=itemgetter(0))))
+    return [mutation for one in rounds for mutation in one if mutation is not None][:count]
 
 
 def main() -> None:

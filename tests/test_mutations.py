@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from pathlib import Path
 
 import pytest
 
@@ -40,6 +41,7 @@ def f(x: "1 + 1" = None) -> "0":
         ("é + b", ["é - b"]),
         ("a + 'b'", []),
         ("a * 2", ["a / 2", "a * 3"]),
+        ("x = 2**9, 2**20", ["x = 3**9, 2**20", "x = 2**10, 2**20"]),
         ("not a", ["(a)"]),
         ("if a:\n    pass", ["if not a:\n    pass"]),
         ("a = True", ["a = False"]),
@@ -78,6 +80,20 @@ def test_a_sample_is_the_same_for_a_seed_and_every_mutation_is_python() -> None:
         changed = mutation.apply(source)
         assert changed != source
         ast.parse(changed)
+
+
+def test_a_sample_draws_the_same_places_if_another_module_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tests.mutations.ROOT", tmp_path)
+    (tmp_path / "realizer").mkdir()
+    for name in "abc":
+        (tmp_path / "realizer" / f"{name}.py").write_text("x = 1, 2, 3, 4, 5\n")
+    before = sample(9, 3, "")
+    (tmp_path / "realizer" / "a.py").write_text("y = 1, 2 < 3, 4 + 5\n")
+    after = sample(9, 3, "")
+    assert [m.path for m in before[:3]] == [m.path for m in after[:3]]
+    assert {m for m in before if m.path != "realizer/a.py"} == {m for m in after if m.path != "realizer/a.py"}
 
 
 def test_the_tests_of_a_module_come_nearest_first() -> None:
