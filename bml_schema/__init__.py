@@ -31,8 +31,7 @@ from bml_schema.bmla import (
     ParameterValueChange,
     Trajectory,
 )
-from bml_schema.dialects.translator import made_ids
-from bml_schema.documents import MAX_BYTES, MAX_DOCUMENTS, parse, read
+from bml_schema.documents import MAX_BYTES, MAX_DOCUMENTS, made_ids, parse, read
 from bml_schema.dropped_references import ReducedBlock, without
 from bml_schema.errors import BMLError, BMLSizeError, BMLSyntaxError, Place, Problem
 from bml_schema.extensions import Blink, Emotion, Expression, Fap, FapFile, Faps, Idle, Listen, Mood, Timeline

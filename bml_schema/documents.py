@@ -12,8 +12,7 @@ from typing import Any
 from lxml import etree
 
 from bml_schema.canonical import xml_parser
-from bml_schema.dialects.recognition import has_words_of_dialects
-from bml_schema.dialects.translator import dialect_of, is_draft, made_ids, translate
+from bml_schema.dialects.recognition import has_words_of_dialects, is_draft
 from bml_schema.document_splitter import (
     NEXT,
     WRAPPER_TAG,
@@ -41,6 +40,11 @@ _ID = re.compile(r"""\sid\s*=\s*(?:"([^"<]*)"|'([^'<]*)')""")
 _ENCODING = re.compile(rb"""<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
 # Some of Python's other codecs are slow enough for an attack.
 _CODECS = {"utf-8", "utf-16", "ascii", "iso8859-1", "iso8859-15", "cp1252"}
+
+
+def made_ids() -> Iterator[str]:
+    """Yield ids for blocks without one: unnamed1, unnamed2 ..."""
+    return (f"unnamed{n}" for n in count(1))
 
 
 def parse(
@@ -263,6 +267,8 @@ class _Reader:
                 plain = error
             if isinstance(plain, Block) and not plain.problems and not has_words_of_dialects(plain):
                 return plain
+        from bml_schema.dialects.translator import translate
+
         for node in root.iter() if begins else ():
             # Translation may change the names by which `begins` finds lines.
             any_node: Any = node
@@ -278,14 +284,20 @@ class _Reader:
 
     def _read_strictly(self, root: etree._Element, block: Callable[[tuple[str, ...]], Block]) -> Block:
         """Read BML 1.0 only; if there are faults, say of which dialect they are words."""
+
+        def dialect() -> str:
+            from bml_schema.dialects.translator import dialect_of
+
+            return dialect_of(root, self.wrapper)
+
         try:
             plain = block(())
         except BMLError as error:
-            if name := dialect_of(root, self.wrapper):
+            if name := dialect():
                 text = f"{error.text}; {_NOT_READ.format(name)}"
                 raise type(error)(text, line=error.line, path=error.path, block=error.block) from None
             raise
-        if plain.problems and (name := dialect_of(root, self.wrapper)):
+        if plain.problems and (name := dialect()):
             return block((_NOT_READ.format(name),))
         return plain
 

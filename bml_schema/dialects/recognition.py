@@ -1,4 +1,4 @@
-"""Recognition of blocks with words of a dialect that are no fault in BML 1.0, such as Greta's lexemes."""
+"""Recognition of documents in a dialect; what they mean in BML 1.0 is in the translator."""
 
 from __future__ import annotations
 
@@ -7,17 +7,24 @@ from collections.abc import Iterable, Mapping, Sequence
 from fnmatch import translate
 from functools import cache, lru_cache
 
+from lxml import etree
+
 from bml_schema.behaviours import Face, FaceShift
 from bml_schema.dialects.table import table
 from bml_schema.node_schema import local, schema_of
-from bml_schema.nodes import Behaviour, Block
+from bml_schema.nodes import DRAFTS, Behaviour, Block
 from bml_schema.steps import next_element
 from bml_schema.undeclared_prefixes import SMARTBODY
 from bml_schema.vocabulary import VOCABULARY
 
-__all__ = ["has_words_of_dialects"]
+__all__ = ["has_words_of_dialects", "is_draft"]
 
 _SMARTBODY = f"{{{SMARTBODY}}}"
+
+
+def is_draft(root: etree._Element) -> bool:
+    """Return whether a document is in the namespace of a draft."""
+    return str(root.tag).rpartition("}")[0][1:] in DRAFTS
 
 
 @cache
@@ -42,7 +49,7 @@ def _is_word(pattern: re.Pattern[str], value: str) -> bool:
 
 
 def has_words_of_dialects(block: Block) -> bool:
-    """Return whether a block has words of a dialect."""
+    """Return whether a block has words of a dialect that are no fault in BML 1.0, such as Greta's lexemes."""
     return _any(block.behaviours)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from copy import deepcopy
-from itertools import count
+from itertools import count, repeat
 from typing import Any
 
 from lxml import etree
@@ -20,20 +20,10 @@ from bml_schema.node_schema import local
 from bml_schema.nodes import BMLA, BMLT, CORE, DRAFTS, EXTENSIONS, OWN
 from bml_schema.undeclared_prefixes import SMARTBODY, remove_element
 
-__all__ = ["dialect_of", "is_draft", "made_ids", "translate"]
+__all__ = ["dialect_of", "translate"]
 
 _SPACES = {"ext": EXTENSIONS, "bmla": BMLA, "bmlt": BMLT, "realizer": OWN}
 _OURS = frozenset({BMLA, BMLT, OWN})
-
-
-def is_draft(root: etree._Element) -> bool:
-    """Return whether a document is in the namespace of a draft."""
-    return str(root.tag).rpartition("}")[0][1:] in DRAFTS
-
-
-def made_ids() -> Iterator[str]:
-    """Yield ids for blocks without one: unnamed1, unnamed2 ..."""
-    return (f"unnamed{n}" for n in count(1))
 
 
 def translate(root: etree._Element, wrapper: str, block_ids: Iterator[str]) -> Report:
@@ -67,7 +57,7 @@ def translate(root: etree._Element, wrapper: str, block_ids: Iterator[str]) -> R
 
 def dialect_of(root: etree._Element, wrapper: str) -> str:
     """Return the name of the dialect of a document, "" for BML 1.0; for the arguments see `translate`."""
-    report = translate(deepcopy(root), wrapper, made_ids())
+    report = translate(deepcopy(root), wrapper, repeat("b"))
     return report.dialect if report else ""
 
 

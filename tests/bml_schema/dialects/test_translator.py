@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from lxml import etree
 
 from bml_schema import CORE, Block, BMLError, Gaze, Head, made_ids, parse, read, write
+from bml_schema.dialects.recognition import is_draft
 from bml_schema.dialects.table import Row, table
-from bml_schema.dialects.translator import is_draft, translate
+from bml_schema.dialects.translator import translate
 from bml_schema.node_schema import local
 from bml_schema.vocabulary import VOCABULARY
 from realizer.core.options import PlayOptions
