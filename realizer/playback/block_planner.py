@@ -13,7 +13,6 @@ from bml_schema.dropped_references import listed, without_constraints
 from realizer.animation.channel import Channel
 from realizer.behaviours.kind import BehaviourKind, PlanningContext
 from realizer.core import work
-from realizer.core.settings import limit_hint
 from realizer.playback.references import external_refs
 from realizer.playback.resources import ResourceClaim, after_interrupts, claims, conflicts, interrupts, trims
 from realizer.scheduling import Member, schedule_together
@@ -80,6 +79,8 @@ def plan(
             schedule, *moved = builder.schedule(start, external_times, tuple(existing_claims), others)
             channels = builder.expand(schedule)
     except work.WorkLimitError as error:
+        from realizer.core.settings import limit_hint
+
         text = f"{error}: wanted fewer behaviours, or fewer constraints {limit_hint('max_planning')}"
         warning = Warning(block.id, "IMPOSSIBLE_TO_SCHEDULE", text)
         fields: dict[str, Any] = {"warnings": (warning,), "failed": True, "over_limit": True}

@@ -11,7 +11,9 @@ from itertools import islice
 from typing import Any
 from weakref import WeakValueDictionary
 
+from bml_schema import Emotion
 from realizer.behaviours.kind import Position
+from realizer.behaviours.registry import KINDS
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
 from realizer.expressions.library import library_of
@@ -74,6 +76,8 @@ class SessionFactory:
         from realizer.face.load import load_face
 
         await loop.run_in_executor(None, lambda: load_face(settings.face, deformer=settings.deformer))
+        # Emotions take half a frame to import: too long for the event loop.
+        await loop.run_in_executor(None, KINDS.__getitem__, Emotion.tag)
         mapping_of(settings.face, settings.mapping)
         library_of(settings.expressions)
         self._capabilities = await loop.run_in_executor(None, capabilities_of, settings)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+import textwrap
 from importlib import import_module
 from pkgutil import iter_modules
 
@@ -11,10 +14,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bml_schema import VOCABULARY as CORE
+from bml_schema.node_schema import local
 from realizer import behaviours
 from realizer.animation.channel import Layer
 from realizer.animation.curves import sample
 from realizer.behaviours.kind import BehaviourKind
+from realizer.behaviours.registry import ELEMENTS as FAMILY_ELEMENTS
 from realizer.behaviours.registry import FAMILIES, KINDS, VOCABULARY
 from tests.realizer.behaviours.elements import ELEMENTS, check, expand, keys, node, timing
 
@@ -35,6 +40,25 @@ def test_families_are_all_modules_with_behaviours() -> None:
     assert families
     missing = [name for name, family in families.items() if family not in FAMILIES.values()]
     assert not missing, f"add rows to realizer/behaviours/registry.py for {', '.join(missing)}"
+    elements = {name: " ".join(local(kind.tag) for kind in FAMILIES[name]) for name in FAMILY_ELEMENTS}
+    assert elements == FAMILY_ELEMENTS, "name the elements of each module in realizer/behaviours/registry.py"
+
+
+def test_kinds_import_a_family_on_first_use() -> None:
+    code = """
+        import sys
+        from bml_schema import Blink, parse
+        from realizer.behaviours.registry import FAMILIES, KINDS, VOCABULARY
+        parse('<bml id="b"><blink id="x" xmlns="urn:bml-realizer:1"/></bml>', VOCABULARY)
+        assert len(KINDS) == len(VOCABULARY) == len(list(KINDS))
+        assert Blink.tag in KINDS
+        assert "realizer.behaviours.blink" not in sys.modules
+        assert KINDS[Blink.tag].node is Blink
+        assert "realizer.behaviours.blink" in sys.modules
+        assert "realizer.behaviours.emotion" not in sys.modules
+        assert KINDS.get("x") is None
+    """
+    subprocess.run([sys.executable, "-c", textwrap.dedent(code)], check=True)
 
 
 def test_wanted_type_exists() -> None:
