@@ -22,6 +22,7 @@ from realizer.animation.idle.speaking_head import SOURCE, head_channels, turn_ch
 from realizer.animation.speaking_style import style_of
 from realizer.core.array_types import Float64
 from realizer.speech.accents import Phrase, phrases, prosody_facts
+from realizer.speech.melody import RATE, Melody, melody
 from realizer.speech.utterance import Utterance
 
 # s after the end of a block, in which it may still affect visible blinks.
@@ -73,9 +74,9 @@ class Gesture:
     def end(self) -> float:
         return float(self.channels[0].times[-1])
 
-    def reduced(self, part: float) -> Gesture:
-        """Return a part of the movement, 0..1."""
-        return replace(self, channels=tuple(c.changed({"values": part * c.values}) for c in self.channels))
+    def scaled(self, factor: float) -> Gesture:
+        """Return the movement, multiplied by a factor."""
+        return replace(self, channels=tuple(c.changed({"values": factor * c.values}) for c in self.channels))
 
 
 def phrase_ends(talks: Iterable[SpeechSpan]) -> tuple[PhraseEnd, ...]:
@@ -121,15 +122,18 @@ def prosody_channels(
         style = style_of(talk.face, talk.start)
         shown += head_channels(talk.utterance, talk.start, talk.until, seed, style, head)
         last_sound = talk.utterance.phonemes[-1].end if talk.utterance.phonemes else talk.utterance.duration
-        for gesture in _gestures(phrases(talk.utterance), last_sound, talk.start, seed):
+        heard = phrases(talk.utterance), melody(talk.utterance)
+        for gesture in _gestures(*heard, last_sound, talk.start, seed):
             if gesture.end < start or gesture.begin > end or gesture.begin >= talk.until:
                 continue
+            if gesture.region == "head" and style.size != 1.0:
+                gesture = gesture.scaled(style.size)
             leaves = min(_moving(claims, gesture.region, gesture), default=np.inf)
             leaves = min(leaves, talk.until)
             if gesture.region == "brows":
                 for known in _moving(claims, "frown", gesture):
                     if known <= gesture.begin:
-                        gesture = gesture.reduced(prosody_facts()["brows"]["frown"])
+                        gesture = gesture.scaled(prosody_facts()["brows"]["frown"])
             if gesture.begin < leaves:
                 shown += [
                     c if leaves >= gesture.end else c.faded(leaves, leaves + fade) for c in gesture.channels
@@ -175,20 +179,23 @@ def _parts() -> dict[int, str]:
 
 @lru_cache(maxsize=64)
 def _gestures(
-    all_phrases: tuple[Phrase, ...], last_sound: float, start: float, seed: int
+    all_phrases: tuple[Phrase, ...], heard: Melody, last_sound: float, start: float, seed: int
 ) -> tuple[Gesture, ...]:
     """Return all movements that may accompany an utterance that starts at `start`."""
     return (
-        *_accents(all_phrases, start, seed),
+        *_accents(all_phrases, heard, start, seed),
         *_looks_aside(all_phrases, start, seed),
         *_breaths(all_phrases, start),
         *_moistening(all_phrases, last_sound, start, seed),
     )
 
 
-def _accents(all_phrases: tuple[Phrase, ...], start: float, seed: int) -> Iterator[Gesture]:
+def _accents(all_phrases: tuple[Phrase, ...], heard: Melody, start: float, seed: int) -> Iterator[Gesture]:
     nod, brows = prosody_facts()["nod"], prosody_facts()["brows"]
-    nods, raises, sizes = _draws(seed, 400, start, sum(len(phrase.accents) for phrase in all_phrases))
+    times = [accent.time for phrase in all_phrases for accent in phrase.accents]
+    nods, raises, sizes = _draws(seed, 400, start, len(times))
+    # Half of the size follows the loudness of the accent.
+    sizes = (sizes + np.interp(times, np.arange(len(heard.loudness)) / RATE, heard.loudness)) / 2
     k = 0
     nodded = raised = -np.inf
     for phrase in all_phrases:

@@ -20,8 +20,9 @@ from realizer.speech.melody import RATE, Melody, melody
 from realizer.speech.utterance import Utterance
 
 SOURCE = "prosody"
-# Kinds of random numbers: times of poses, and their yaw, pitch and roll.
-KINDS = range(480, 484)
+# Kinds of random numbers: yaw, pitch and roll of poses.
+KINDS = range(481, 484)
+PARTS = 8  # of the curve from one pose to the next
 
 
 def head_channels(
@@ -97,7 +98,7 @@ def _angles(
     pitch = np.interp(at, place, heard.pitch)
     loudness = np.interp(at, place, heard.loudness)
     semitones = _averaged(np.clip(pitch, -facts["semitones"], facts["semitones"]), 0.5)
-    angles = _poses(at, start, seed, style)
+    angles = _poses(loudness, start, seed, style)
     angles[1] += facts["melody"] * semitones - facts["beat"] * (loudness - _averaged(loudness, 1.0))
     angles *= style.size
     # It settles before the end of the speech, and while the voice is silent in between.
@@ -117,19 +118,29 @@ def _averaged(values: Float64, seconds: float) -> Float64:
     return averaged
 
 
-def _poses(at: Float64, start: float, seed: int, style: Style) -> Float64:
-    """Return the slow motion from pose to pose, (3, n) degrees."""
+def _poses(loudness: Float64, start: float, seed: int, style: Style) -> Float64:
+    """Return the motion from pose to pose, (3, n) degrees, which is the faster the louder the voice is.
+
+    It passes through the poses without a stop, on the curve of Catmull & Rom 1974.
+    """
     facts = prosody_facts()["head"]
-    period = facts["period"] / style.pace
-    numbers = np.arange(int((at[-1] - at[0]) / period) + 3)
-    late, *draws = uniform(seed, list(KINDS), round(start * 1000.0) * 65536 + numbers)
-    keys = at[0] + (numbers - 0.5 + 0.4 * late) * period
+    pace = facts["rest"] + (1.0 - facts["rest"]) * loudness / facts["loudness"]
+    passed = np.cumsum(facts["speed"] * style.pace * pace) / RATE  # degrees
     most = np.array([facts["yaw"], facts["pitch"], facts["roll"]])[:, None]
-    poses = most * (2.0 * np.array(draws) - 1.0)
-    last = np.clip(np.searchsorted(keys, at, "right") - 1, 0, len(keys) - 2)
-    part = smooth(np.clip((at - keys[last]) / (keys[last + 1] - keys[last]), 0.0, 1.0))
-    moved: Float64 = poses[:, last] + part * (poses[:, last + 1] - poses[:, last])
-    return moved
+    # From pose to pose it is 0.8 times as far on average.
+    numbers = np.arange(6 + int(2 * passed[-1] / np.linalg.norm(most)))
+    poses = most * (2.0 * np.array(uniform(seed, KINDS, round(start * 1000.0) * 65536 + numbers)) - 1.0)
+    before, this, following, after = (poses[:, k : len(numbers) - 3 + k, None] for k in range(4))
+    u = np.arange(PARTS) / PARTS
+    curve = this + 0.5 * u * (
+        following
+        - before
+        + u * (2 * before - 5 * this + 4 * following - after)
+        + u**2 * (3 * (this - following) + after - before)
+    )
+    curve = curve.reshape(3, -1)
+    way = np.append(0.0, np.linalg.norm(np.diff(curve), axis=0)).cumsum()
+    return np.array([np.interp(passed, way, turn) for turn in curve])
 
 
 def _tilt(at: Float64, pitch: Float64, last: Phrase, left: bool) -> Float64:

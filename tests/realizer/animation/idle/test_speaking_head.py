@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -42,6 +44,23 @@ def test_head_channels_move_while_somebody_speaks_and_settle() -> None:
     speaking = (TIMES > 1.3) & (TIMES < 6.5)
     assert (speed[speaking] > 1.5).mean() > 0.7
     assert speed.max() < 60
+
+
+def test_head_channels_move_faster_while_the_voice_is_loud() -> None:
+    rate, quiet = 16_000, (2.0, 4.0)
+    tone = 8000 * np.sin(np.arange(6 * rate) * 2 * np.pi * 120 / rate)
+    tone[int(quiet[0] * rate) : int(quiet[1] * rate)] *= 0.1
+    sound = replace(said(), sample_rate=rate, pcm=tone.astype(np.int16))
+    speeds = []
+    for seed in range(5):
+        head = turned(head_channels(sound, 0.0, np.inf, seed), TIMES)
+        speeds.append(
+            np.linalg.norm([np.gradient(head[name], 0.04) for name in ("yaw", "pitch", "roll")], axis=0)
+        )
+    speed = np.mean(speeds, axis=0)
+    inside = (quiet[0] + 0.6 < TIMES) & (quiet[1] - 0.6 > TIMES)
+    loud = ((TIMES > 0.5) & (TIMES < 1.4)) | ((TIMES > 4.6) & (TIMES < 5.4))
+    assert speed[loud].mean() > 3 * speed[inside].mean()
 
 
 def test_head_channels_leave_the_eyes_on_their_target() -> None:
