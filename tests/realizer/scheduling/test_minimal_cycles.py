@@ -83,19 +83,20 @@ def ways(problem: Problem) -> Float64:
     """Return (n, n) the greatest gain from row to column by one statement; -inf for none."""
     n = len(problem.owner)
     found = np.full((n, n), -np.inf)
-    edges = [edge for r in problem.equalities for edge in both(r)]
-    edges += [(r.u, r.v, r.seconds) for r in problem.orders]
-    edges += [(ORIGIN, u, e) for u, e in zip(problem.first, problem.earliest, strict=True)]
     for s in spans(problem):
-        edges += [(s.point, s.point + 1, s.least), (s.point + 1, s.point, -s.most)]
-    for u, v, seconds in edges:
-        found[u, v] = max(found[u, v], seconds)
+        found[s.point, s.point + 1], found[s.point + 1, s.point] = s.least, -s.most
+    # The gaps between two points of a behaviour are one statement, but no equality between its points is.
     for first, timing in zip(problem.first, problem.timings, strict=True):
         for steps in range(2, 0 if timing.rigid else len(timing.points)):
             for u in range(first, first + len(timing.points) - steps):
                 v = u + steps
                 found[u, v] = max(found[u, v], found[u, v - 1] + found[v - 1, v])
                 found[v, u] = max(found[v, u], found[v, v - 1] + found[v - 1, u])
+    edges = [edge for r in problem.equalities for edge in both(r)]
+    edges += [(r.u, r.v, r.seconds) for r in problem.orders]
+    edges += [(ORIGIN, u, e) for u, e in zip(problem.first, problem.earliest, strict=True)]
+    for u, v, seconds in edges:
+        found[u, v] = max(found[u, v], seconds)
     return found
 
 
