@@ -6,13 +6,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from realizer.face.load import list_faces, load_face
+from realizer.face.load import load_face
 from realizer.face.model import Face
 from tests.fap_scores import PEERS, FapScore, mean_score, score_faps
+from tests.shipped import DEFAULT, FACES
 
 pytestmark = pytest.mark.xdist_group("scores")
 
-FACES = [info.name for info in list_faces()]
 FINE = {"error": 0.0, "mirror": 0.0, "others": 0.0, "flips": 0.0, "rough": 0.1}
 
 
@@ -64,7 +64,7 @@ def test_mean_score_gives_back_paul_s_own_figures() -> None:
             | ({"error": 9.0} if t.fap in missing else {})
             | ({"error": 0.1} if (t.fap, t.sign) in odd else {}),
         )
-        for t in truth_of(FACES[0])
+        for t in truth_of(DEFAULT)
     )
     assert mean_score(his) == pytest.approx(2.60, abs=0.005)
     assert mean_score(tuple(t for t in his if t.fap not in missing)) == pytest.approx(2.88, abs=0.005)

@@ -36,5 +36,5 @@ def test_worst_documents_found_at_random_cost_no_more(seeds: range) -> None:
 
 @pytest.mark.parametrize("pattern", PATTERNS)
 def test_worst_documents_are_paused_often(pattern: str) -> None:
-    number, where = longest_stretch(document(pattern, 200))
-    assert number <= 200 * MOST_TOGETHER, where
+    number, where = longest_stretch(document(pattern, 100))
+    assert number <= 100 * MOST_TOGETHER, where

@@ -79,15 +79,23 @@ def inner(triangles: Int32) -> Int32:
     return triangles[~np.isin(triangles, pairs[count == 1]).any(axis=1)]
 
 
-def deepest(face: Face, shape: Float64) -> float:
-    """The largest depth of a point of the tongue in teeth, palate or lips, metres."""
+def surfaces(face: Face) -> tuple[Int32, list[Int32]]:
+    """The triangles of the tongue, and those of teeth, palate and lips."""
     parts = {name: part_triangles(face.triangles, face.parts[name]) + face.parts[name][0]
              for name in ("tongue", "upper_teeth", "lower_teeth", "skin")}  # fmt: skip
     skin = face.vertices[parts["skin"]].mean(axis=1) - face.points["2.2"]
     parts["skin"] = parts["skin"][(np.linalg.norm(skin, axis=1) < LIPS) & (skin[:, 2] > -0.02)]
-    walls = [spread(shape, inner(parts[name]), 3) for name in ("upper_teeth", "lower_teeth", "skin")]
-    points, normals = (np.concatenate(arrays) for arrays in zip(*walls, strict=True))
-    tongue = spread(shape, parts["tongue"], 2)[0]
+    return parts["tongue"], [inner(parts[name]) for name in ("upper_teeth", "lower_teeth", "skin")]
+
+
+def deepest(shape: Float64, flesh: Int32, walls: list[Int32]) -> float:
+    """The largest depth of a point of the tongue in teeth, palate or lips, metres."""
+    tongue = spread(shape, flesh, 2)[0]
+    low, high = tongue.min(axis=0) - 0.01, tongue.max(axis=0) + 0.01
+    close = [w[((shape[w] > low) & (shape[w] < high)).all(axis=2).any(axis=1)] for w in walls]
+    points, normals = (
+        np.concatenate(arrays) for arrays in zip(*(spread(shape, w, 3) for w in close), strict=True)
+    )
     away, nearest = cKDTree(points).query(tongue, distance_upper_bound=NEAR)
     near = np.isfinite(away)
     depth = np.einsum("pc,pc->p", points[nearest[near]] - tongue[near], normals[nearest[near]])
@@ -100,5 +108,6 @@ def test_tongue_room_keeps_the_tongue_out_of_teeth_and_lips(name: str) -> None:
     rows = np.array(list(units()))
     aus = poses(AUFrames(np.arange(len(rows), dtype=np.float64), rows), face.inputs)
     shapes = deform(face, np.concatenate([aus, fap_rows()])).astype(np.float64)
-    depths = np.array([deepest(face, shape) for shape in shapes])
+    flesh, walls = surfaces(face)
+    depths = np.array([deepest(shape, flesh, walls) for shape in shapes])
     assert depths.max() < DEEPEST, np.argsort(-depths)[:5]

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from bml_schema import parse
@@ -133,7 +133,6 @@ def test_schedule_block_does_not_depend_on_the_order_of_elements(document: Docum
     check_same(again, found)
 
 
-@settings(max_examples=40)
 @given(documents(fixed=False), st.integers(0, 500).map(lambda k: k / 10))
 def test_schedule_block_moves_with_the_earliest_start(document: Document, earliest: float) -> None:
     found = document.schedule()

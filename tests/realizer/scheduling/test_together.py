@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bml_schema import Block, parse
@@ -129,7 +129,6 @@ def test_schedule_together_of_unrelated_blocks_is_as_alone(one: Faces, other: Fa
     assert both[1].start == -late
 
 
-@settings(max_examples=40)
 @given(tied, st.integers(-50, 5000).map(lambda k: k / 10))
 def test_schedule_together_does_not_depend_on_the_origin_of_the_clock(faces: Faces, origin: float) -> None:
     first, timings = drawn("a", faces)

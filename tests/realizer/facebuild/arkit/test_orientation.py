@@ -19,8 +19,14 @@ WAYS = {
 }
 
 
-@pytest.mark.parametrize("way", WAYS)
-@pytest.mark.parametrize(("scale", "unit"), [(1.0, "metres"), (10.0, "decimetres"), (100.0, "centimetres")])
+@pytest.mark.parametrize(
+    ("way", "scale", "unit"),
+    [
+        pytest.param(way, *scale, marks=() if k == n else pytest.mark.slow)
+        for k, way in enumerate(WAYS)
+        for n, scale in enumerate([(1.0, "metres"), (10.0, "decimetres"), (100.0, "centimetres")])
+    ],
+)
 def test_pose_of_finds_unit_and_direction_by_the_shapes(
     write_head: Callable[..., Path], way: str, scale: float, unit: str
 ) -> None:

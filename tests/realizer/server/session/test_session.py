@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bml_schema.feedback import BlockProgress, WarningFeedback
@@ -500,7 +500,6 @@ def act(driver: Driver, kind: str, value) -> None:
             driver.session.close()
 
 
-@settings(max_examples=40, deadline=None)
 @given(st.lists(ACTIONS, max_size=14))
 def test_session_numbers_frames_and_feedback_in_any_order_of_events(actions) -> None:
     driver, twin = Driver(mute=True), Driver(mute=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer.core.settings import Settings
@@ -18,6 +18,7 @@ from realizer.server.session.session import Session
 from realizer.server.streams import frames_ahead
 from realizer.server.streams.frame_windows import FrameTimeline, FrameWindow
 from realizer.server.streams.frames_ahead import AheadRun
+from tests.example_counts import examples
 from tests.realizer.server.conftest import NOD, TALK, Client, Driver, spoken
 
 FPS = 25
@@ -229,7 +230,7 @@ TIMES = st.one_of(st.floats(0, 0.5), st.integers(0, 12).map(lambda k: k / FPS))
     ahead=st.sampled_from([0.05, 0.2, 0.7, 2.0]),
     together=st.booleans(),
 )
-@settings(max_examples=40, deadline=None)
+@examples(0.6)
 def test_ahead_gives_the_frames_that_are_sent_in_time(actions, stream, ahead, together) -> None:
     drivers = [Driver()] if together else [Driver(), Driver()]
     if together:
