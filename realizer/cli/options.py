@@ -98,9 +98,10 @@ class Number(click.FloatRange):
 def parse_size(context: click.Context, parameter: click.Parameter, value: str) -> tuple[int, int]:
     """512x512 -> (512, 512)."""
     match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", value)
-    width, height = (int(n) for n in match.groups()) if match else (0, 0)
-    if not (16 <= width <= 4096 and 16 <= height <= 4096):
+    sides = [int(n) for n in match.groups()] if match else []
+    if not sides or not all(16 <= side <= 4096 for side in sides):
         raise click.BadParameter(f"wanted WIDTHxHEIGHT between 16x16 and 4096x4096, got {value!r}")
+    width, height = sides
     return width, height
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from enum import IntEnum
+from enum import IntEnum, auto
 from math import isfinite
 from typing import NamedTuple
 
@@ -26,10 +26,10 @@ from realizer.scheduling.timing import UNKNOWN, Schedule, Warning
 class Phase(IntEnum):
     """The kind of an event, in the order of report at one instant."""
 
-    START = 0
-    SYNC = 1
-    SUBSIDES = 2
-    END = 3
+    START = auto()
+    SYNC = auto()
+    SUBSIDES = auto()
+    END = auto()
 
 
 class Event(NamedTuple):

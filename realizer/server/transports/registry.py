@@ -22,6 +22,6 @@ TRANSPORTS: Registry[Callable[..., Transport | None]] = Registry(
 
 def requested(settings: Settings) -> Iterator[Callable[..., Transport | None]]:
     """Yield the factories of the transports that the settings request."""
-    names = [name for name in TRANSPORTS if getattr(settings, name, True) is not None]
+    names = [name for name in TRANSPORTS if getattr(settings, name, name) is not None]
     for _, make in TRANSPORTS.working(names):
         yield make

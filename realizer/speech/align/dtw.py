@@ -52,7 +52,7 @@ def distance(features: Float64, others: Float64) -> Float64:
     """Return the root mean square differences (t, j) of features (t, d) and (j, d)."""
     squares = (features**2).sum(axis=1)[:, None] + (others**2).sum(axis=1)
     squares = np.maximum(squares - 2 * (features @ others.T), 0.0)
-    return np.asarray(np.sqrt(squares / max(1, features.shape[1])), np.float64)
+    return np.asarray(np.sqrt(squares / features.shape[1]), np.float64)
 
 
 def usual(features: Float64, others: Float64) -> float:
