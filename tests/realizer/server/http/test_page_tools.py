@@ -34,6 +34,11 @@ def test_lint_marks_advice() -> None:
     assert fault["type"] == "ADVICE"
 
 
+def test_lint_names_a_hundred_faults_at_most() -> None:
+    nods = "".join(f'<head id="n{k}" lexeme="NIX"/>' for k in range(102))
+    assert len(faults_of(f'<bml id="a">{nods}</bml>')) == 100
+
+
 @pytest.mark.parametrize("text", ["", "no markup", "<", "<bml", "\ud800", "<bml id='a'>" * 300])
 def test_lint_answers_any_text(text: str) -> None:
     assert isinstance(faults_of(text), list)
