@@ -6,6 +6,7 @@ bml_schema/dialects/rows.csv.
 
 from __future__ import annotations
 
+import csv
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,10 +16,12 @@ from bml_schema import Block, read, write
 from bml_schema.dialects.table import MISSING, Row, table
 from bml_schema.undeclared_prefixes import SMARTBODY
 
-__all__ = ["FILE", "ROWS", "WRAPPERS", "cases", "render", "sample"]
+__all__ = ["FILE", "ROWS", "WRAPPERS", "cases", "published", "render", "sample"]
 
 FILE = Path(__file__).parent.parent / "docs" / "dialects.md"
 ROWS = Path(__file__).parent / "dialect_documents" / "rows.txt"
+# The attributes of each element, with a value where not every value will do.
+PUBLISHED = Path(__file__).parent / "dialect_documents" / "published.csv"
 _TITLES = {
     "SmartBody": "SmartBody",
     "Greta": "Greta",
@@ -152,11 +155,14 @@ def sample(row: Row) -> str:
         text = "".join(f" {n}={quoteattr(v)}" for n, v in given.items())
         return f'<act><bml id="b" xmlns:xsi="x"{text}><head type="NOD"/></bml></act>'
     drafted = row.element == "face" and row.dialect == "draft"
+    shaped = (
+        drafted and row.attribute not in ("shape", "lexeme") and (row.attribute, row.value) != ("type", "*")
+    )
     needs = "" if row.value == MISSING or drafted else NEEDS.get(element, "")
     made = {*given, *re.findall(r"\w+", row.becomes)} | ({"lexeme"} if row.becomes in LEXEMES else set())
     needs = " ".join(n for n in re.findall(r'\S+=".*?"', needs) if n.partition("=")[0] not in made)
     text = "".join(f" {n}={quoteattr(v)}" for n, v in given.items())
-    if drafted and row.attribute == "type" and row.value != "*":
+    if shaped:
         text += ' shape="raise"'
     inside = f'<{element} id="e" {needs}{text}/>'
     if element == "face" and row.attribute == "overshoot":
@@ -171,9 +177,19 @@ def sample(row: Row) -> str:
         inside = f'<speech id="e"{text}>Hello</speech>' if row.attribute != "text" else f"<speech{text}/>"
     if element == "description":
         inside = f'<head id="e" lexeme="NOD"><description{text} {needs}/></head>'
-    speech = '<speech id="s"><text>Hello</text></speech>'
+    speech = "" if "<speech" in inside else '<speech id="s"><text>Hello</text></speech>'
     start = f'<act><bml id="b" xmlns:sbm="{SMARTBODY}" xmlns:xsi="x">'
     return f'{start}{speech}{inside}<head type="NOD"/></bml></act>'
+
+
+def published() -> list[tuple[str, str, str, str]]:
+    """Return dialect, element, attribute and a value, or "", of all attributes that are published."""
+    lines = [line for line in PUBLISHED.read_text("utf-8").splitlines() if not line.startswith("#")]
+    return [
+        (dialect, element, attribute, value)
+        for dialect, element, attributes in csv.reader(lines[1:])
+        for attribute, _, value in (name.partition("=") for name in attributes.split())
+    ]
 
 
 def cases() -> str:
