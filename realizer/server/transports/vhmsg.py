@@ -18,9 +18,9 @@ NAME = "bml-realizer"
 
 @dataclass(eq=False)
 class _Speak:
-    """A vrSpeak that has not ended, with the ids of its blocks: all that play or wait, and those accepted.
+    """A vrSpeak that has not ended, with the ids of its blocks: all that play or wait, and those planned.
 
-    `dropped` says why the first dropped behaviour was dropped.
+    `unread` are those without any feedback. `dropped` says why the first dropped behaviour was dropped.
     """
 
     agent: str
@@ -28,6 +28,7 @@ class _Speak:
     id: str
     blocks: set[str]
     planned: set[str] = field(default_factory=set)
+    unread: set[str] = field(default_factory=set)
     started: bool = False
     interrupted: bool = False
     error: str = ""
@@ -84,6 +85,7 @@ class Vhmsg:
         for document in documents:
             block, text = _named(document, self._speaks, id, agent)
             speak.blocks.add(block)
+            speak.unread.add(block)
             self._speaks[block] = speak
             actions.append(Inbound(f"<act>{text}</act>"))  # so that it is read as SmartBody's BML
         return actions
@@ -113,9 +115,17 @@ class Vhmsg:
                 if id not in speak.planned:
                     speak.error = text
                     return self._ended(speak, id)
+            case WarningFeedback(id="<no id>", text=text):
+                # Documents are read in order: this one has an id that cannot be used.
+                for block, speak in self._speaks.items():
+                    if block in speak.unread:
+                        speak.error = text
+                        return self._ended(speak, block)
             case PredictionFeedback(blocks=blocks, behaviours=behaviours):
                 for b in blocks:
-                    if b.status != "IN_PREP" and (known := self._speaks.get(b.id)) is not None:
+                    if (known := self._speaks.get(b.id)) is not None:
+                        known.unread.discard(b.id)
+                    if b.status != "IN_PREP" and known is not None:
                         known.planned.add(b.id)
                         known.plays |= bool(behaviours)
             case WarningFeedback(id=id, text=text) if speak := self._speaks.get(id.partition(":")[0]):
@@ -125,6 +135,7 @@ class Vhmsg:
     def _ended(self, speak: _Speak, block: str) -> list[Message]:
         del self._speaks[block]
         speak.blocks.discard(block)
+        speak.unread.discard(block)
         return [] if speak.blocks else self._finish(speak)
 
     def _finish(self, speak: _Speak) -> list[Message]:

@@ -7,8 +7,9 @@ from urllib.parse import quote, quote_plus, unquote
 
 import pytest
 
-from bml_schema import parse
+from bml_schema import BMLError, parse, read
 from bml_schema.feedback import BlockPrediction, BlockProgress, PredictionFeedback, WarningFeedback
+from realizer.playback.feedback_events import parse_warning
 from realizer.server.transports.message_formats import Disconnect, Inbound
 from realizer.server.transports.vhmsg import Vhmsg
 
@@ -131,6 +132,20 @@ def test_vhmsg_ends_a_refused_block_with_its_error() -> None:
         "vrAgentBML Brad ALL m1 end error not well-formed",
         "vrSpeakFailed Brad ALL m1 not well-formed",
     ]
+
+
+def test_vhmsg_ends_a_block_whose_id_cannot_be_used_with_its_error() -> None:
+    dialect = vhmsg()
+    spoken(dialect, "vrSpeak Brad ALL m1 <bml/>")
+    dialect.outgoing(planned("m1"))
+    (document,) = spoken(dialect, 'vrSpeak Brad ALL m2 <bml id="a:b"/>')
+    spoken(dialect, "vrSpeak Brad ALL m3 <bml/>")
+    (error,) = read(document)
+    assert isinstance(error, BMLError)
+    messages = said(dialect.outgoing(WarningFeedback(**parse_warning(error).to_json()).to_xml()))
+    assert messages[0].startswith("vrAgentBML Brad ALL m2 end error line 1, /bml: id: wanted a name")
+    assert messages[1].startswith("vrSpeakFailed Brad ALL m2 ")
+    assert said(dialect.outgoing(progress("m3", "start"))) == ["vrAgentBML Brad ALL m3 start"]
 
 
 def test_vhmsg_ignores_a_dropped_behaviour_or_a_late_warning() -> None:
