@@ -166,17 +166,17 @@ def advance(player: Player, played: Played, now: float, until: float, punctual: 
     """Advance the time from deadline to deadline, and collect the feedback."""
     for _ in range(MAX_DEADLINES):
         deadline = player.next_deadline()
-        if not punctual or deadline is None or deadline > until:
+        if not punctual or deadline is None or deadline >= until:
             break
         now = max(now, deadline)
-        collect(player, played, now)
+        collect(player, played, now, until)
     else:
         raise AssertionError(f"more than {MAX_DEADLINES} deadlines")
-    collect(player, played, until)
+    collect(player, played, until, until)
 
 
-def collect(player: Player, played: Played, now: float) -> None:
-    for feedback in player.due(now):
+def collect(player: Player, played: Played, now: float, starts_before: float = math.inf) -> None:
+    for feedback in player.due(now, starts_before):
         text = feedback.to_xml(len(played.feedback) + 1, EPOCH)
         played.feedback.append(parse_feedback(text, VOCABULARY))
 

@@ -36,7 +36,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--documents", type=int, help="how many random documents test_grammar plays (125)")
     parser.addoption("--mutants", type=int, default=300, help="how many broken documents test_fuzz reads")
     parser.addoption(
-        "--sessions", type=int, default=60, help="how many random sessions test_composition plays"
+        "--sessions", type=int, default=200, help="how many random sessions test_composition plays"
     )
     parser.addoption("--seed", type=int, default=0, help="of the mutants of test_fuzz")
 

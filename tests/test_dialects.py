@@ -27,13 +27,13 @@ def test_rows_become_what_their_file_says() -> None:
 @each_row("row", table().rows)
 def test_rows_play_alike_live_and_offline_and_as_bml_1_0(row: Row) -> None:
     voice, document = SilentVoice(), sample(row)
-    expected = events(offline([document], voice), ())
+    expected = events(offline([document], voice))
     assert expected
-    assert events(live([document], voice), ()) == expected
+    assert events(live([document], voice)) == expected
     (block,) = read(document)
     assert isinstance(block, Block)
     expected.subtract({("NOT_BML_1_0", "b", 0.0): 1})
-    assert events(offline([write(block)], voice), ()) == +expected
+    assert events(offline([write(block)], voice)) == +expected
 
 
 @each_row("dialect, element, attribute, value", published())

@@ -71,7 +71,7 @@ class ActiveBlock:
         context: the context of its planning.
         character: index of its character.
         number: order of arrival, from 1.
-        order: at one instant it reports before blocks of a higher order.
+        order: at one instant it reports before blocks of a higher order, as of `set_order`.
         not_before: its earliest start, seconds on the session clock.
         dependencies: blocks that it waits for; empty once it has started.
         followers: blocks that wait for it.
@@ -94,13 +94,14 @@ class ActiveBlock:
     shifts: dict[str, BaseShift] = field(default_factory=dict)
     speech: dict[str, ScheduledSpeech] = field(default_factory=dict)
     followers: list[ActiveBlock] = field(default_factory=list)
-    order: int = 0
+    order: tuple[int, int, int] = field(init=False)
     external_refs: tuple[SyncRef, ...] = field(init=False)
     first_schedule: Schedule = field(init=False)
 
     def __post_init__(self) -> None:
         self.first_schedule = self.plan.schedule
         self.external_refs = external_refs(self.block)
+        self.order = self.number, 0, self.number
         for wait in self.dependencies:
             wait.block.followers.append(self)
 
@@ -128,6 +129,11 @@ class ActiveBlock:
     @property
     def is_done(self) -> bool:
         return self.state in (State.DONE, State.INTERRUPTED, State.REVOKED)
+
+    @property
+    def is_revoked(self) -> bool:
+        """Whether it ended before it started."""
+        return self.state is State.REVOKED
 
     @property
     def is_waiting(self) -> bool:
@@ -186,9 +192,24 @@ class ActiveBlock:
         """Change to the state that follows from an event."""
         self.state = next_state(self.state, event)
 
+    def set_order(self) -> None:
+        """Set its order: blocks report as they arrived, but behind those that they wait for."""
+        behind = (
+            (first, depth + 1, self.number) for first, depth, _ in (w.block.order for w in self.dependencies)
+        )
+        self.order = max([(self.number, 0, self.number), *behind])
+
     def add_dependency(self, wait: Dependency) -> None:
         self.dependencies.append(wait)
         wait.block.followers.append(self)
+
+    def pass_on_dependencies(self) -> None:
+        """Let the blocks that are appended to it, and to what it waits for, wait for the latter directly."""
+        for other in self.followers:
+            if other.is_waiting and other.block.composition == "APPEND" and other.character == self.character:
+                for wait in self.dependencies:
+                    if wait.block.character == self.character and wait.block.number < other.number:
+                        other.add_dependency(Dependency(wait.block))
 
     def apply_plan(self, plan: Plan, start: float) -> None:
         """Place a plan on the session clock, with its channels, base states and speech."""

@@ -120,13 +120,18 @@ def _time(ref: SyncRef, schedule: Schedule) -> float | None:
 def with_stops(
     schedule_of: Callable[[str], Schedule | None], blocks: Iterable[ActiveBlock], now: float
 ) -> Callable[[str], Schedule | None]:
-    """Return `schedule_of` as if some blocks were stopped at `now`, so that nothing of them is later."""
-    gone = {p.block.id for p in blocks}
+    """Return `schedule_of` as if some blocks were stopped at `now`: nothing of them is later.
+
+    Of those that have not started nothing is known.
+    """
+    gone = {p.block.id: p for p in blocks}
 
     def of(id: str) -> Schedule | None:
         schedule = schedule_of(id)
         if schedule is None or id not in gone:
             return schedule
+        if not gone[id].has_begun:
+            return None
         local = max(0.0, now - schedule.start)
         return replace(schedule, times={b: np.minimum(t, local) for b, t in schedule.times.items()})
 

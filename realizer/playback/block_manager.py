@@ -41,6 +41,7 @@ class AnnouncedBlock:
         state: IN_PREP, or REVOKED after it was ended and reported.
         activated: it does not wait for activation.
         dependencies: blocks that were placed before it.
+        unstarted: ids of the blocks that have to wait for it and had not started when it was announced.
     """
 
     block: Block
@@ -48,6 +49,12 @@ class AnnouncedBlock:
     state: State = State.IN_PREP
     activated: bool = False
     dependencies: list[Dependency] = field(default_factory=list)
+    unstarted: frozenset[str] = frozenset()
+
+    @property
+    def is_too_late(self) -> bool:
+        """Whether it will be refused, because a block that has to wait for it had started, or is unknown."""
+        return any(name not in self.unstarted for name, _ in block_links.followers(self.block))
 
     @property
     def is_revoked(self) -> bool:
@@ -110,7 +117,9 @@ class BlockManager:
         character = self.character_index(block.character_id)
         if block.id in self._announced or self._in_use(block, character):
             return
-        self._announced[block.id] = AnnouncedBlock(block, self.blocks.new_number())
+        names = (name for name, _ in block_links.followers(block))
+        unstarted = frozenset(filter(self._has_not_started, names))
+        self._announced[block.id] = AnnouncedBlock(block, self.blocks.new_number(), unstarted=unstarted)
         start = max([now, *(w.until for w in self._dependencies(block, character))])
         self.reports.add(acknowledgement(block, start if start < now + UNKNOWN else now))
 
@@ -127,7 +136,7 @@ class BlockManager:
     def accept(self, block: Block, context: PlanningContext, now: float) -> Schedule:
         """Plan a block and accept or refuse it."""
         character = self.character_index(block.character_id)
-        self.advance(now)
+        self.advance(now, starts_before=now)
         self.announce(block, now)
         announced = self._announced.get(block.id)
         if announced is not None and announced.is_revoked:  # its end has been reported
@@ -158,7 +167,7 @@ class BlockManager:
         if not context.animates:
             return planned.schedule
         for earlier in ended:
-            self.timeline.stop(earlier, now)
+            self.timeline.stop(earlier, now, ended)
         for name in block.interrupt:
             if self._has_arrived(name, announced.number):
                 self.revoke(name, now)
@@ -167,6 +176,8 @@ class BlockManager:
         playing.apply_plan(planned, playing.earliest)  # it may have ended its own dependencies
         self.blocks.add(playing)
         self.timeline.place(playing)
+        if any(wait.block.order > playing.order for wait in waits):
+            self.timeline.reorder(playing)
         for follower, subsiding in ((p, s) for p, s in waiting if not p.is_done):
             follower.add_dependency(Dependency(playing, subsiding))
             self.timeline.reorder(follower)
@@ -183,9 +194,15 @@ class BlockManager:
 
     # time ---------------------------------------------------------------------------------------
 
-    def advance(self, now: float) -> None:
-        """Process everything that is due, in order, each event at its own time."""
-        for event in work.counted(self.timeline.events.due(now), 5):
+    def advance(self, now: float, starts_before: float = FOREVER) -> None:
+        """Process everything that is due, in order, each event at its own time.
+
+        A block that starts at an instant starts after everything that arrives at this instant.
+
+        Args:
+            starts_before: blocks that start then or later do not start yet.
+        """
+        for event in work.counted(self.timeline.events.due(now, starts_before), 5):
             self._handle_event(event, self.blocks[event.block])
 
     def next_deadline(self) -> float | None:
@@ -271,7 +288,7 @@ class BlockManager:
             The ids of the blocks that were stopped.
         """
         ids = None if block_ids is None else set(block_ids)
-        self.advance(now)
+        self.advance(now, starts_before=now)
         stopped = [p for p in self.blocks.active() if ids is None or p.block.id in ids]
         # The last first, so that no block is planned again because its dependency was stopped.
         for playing in reversed(stopped):
@@ -303,7 +320,7 @@ class BlockManager:
             syncs: sync -> seconds on the session clock; a time that is too soon becomes the earliest
                 possible. A point that has passed stays where it was.
         """
-        self.advance(now)
+        self.advance(now, starts_before=now)
         tied = [p for p in self.blocks.active() if p.start < FOREVER and id in anticipators_of(p.block)]
         soonest = {sync: max([now, *(lead_time(p, id, sync, now) for p in tied)]) for sync in syncs}
         self.blocks.anticipate(id, {sync: max(time, soonest[sync]) for sync, time in syncs.items()})
@@ -325,7 +342,7 @@ class BlockManager:
         Returns:
             False if the speech neither plays nor waits.
         """
-        self.advance(now)
+        self.advance(now, starts_before=now)
         playing = self.blocks.find(block)
         if playing is None or behaviour not in playing.plan.timings:
             return False
@@ -350,7 +367,9 @@ class BlockManager:
             playing = self.blocks.find(name)
             if playing is not None and playing.is_waiting:
                 waiting.append((playing, subsiding))
-            elif playing is not None or not self._has_arrived(name, self._announced[block.id].number):
+            elif playing is not None or not (
+                name in self._announced[block.id].unstarted and self.has_seen(name)  # not refused since then
+            ):
                 text = f"prependBefore, chunkBefore: wanted blocks that have not started, got {name!r}"
                 raise _Rejection(Warning(block.id, "TargetBlockAlreadyStartedException", text))
         if waiting and any(id(playing) in block_links.all_dependencies(waits) for playing, _ in waiting):
@@ -363,6 +382,16 @@ class BlockManager:
         placed_before = [w for w in announced.dependencies if not w.block.is_done]
         waits = block_links.dependencies(block, character, announced.number, self.blocks.active())
         return waits + placed_before
+
+    def _has_not_started(self, id: str) -> bool:
+        """Whether a block has been announced or planned, and has not started or was revoked."""
+        announced, playing = self._announced.get(id), self.blocks.find(id)
+        if announced is not None and not announced.is_too_late:
+            return True
+        if playing is not None:
+            return playing.is_waiting
+        past = self.blocks.schedule_of(id)
+        return past is not None and not past.points
 
     def _has_arrived(self, id: str, before: int) -> bool:
         """Whether a block is announced that arrived before another one, by its number."""

@@ -22,11 +22,12 @@ class BlockStore:
     """The blocks of a session while they are active or visible, and the schedules of past ones.
 
     Attributes:
+        last_number: the number of the block that arrived last.
         first_invisible: when the first ended block becomes invisible; infinite if there is none.
     """
 
     def __init__(self) -> None:
-        self._next_number = 0
+        self.last_number = 0
         self.first_invisible = FOREVER
         self._blocks: dict[int, ActiveBlock] = {}  # by number, in order of acceptance
         self._active: dict[str, ActiveBlock] = {}  # by id; those that are not done
@@ -37,8 +38,8 @@ class BlockStore:
 
     def new_number(self) -> int:
         """Return the number of a block that has just arrived."""
-        self._next_number += 1
-        return self._next_number
+        self.last_number += 1
+        return self.last_number
 
     def add(self, playing: ActiveBlock) -> None:
         """Add an accepted block."""
@@ -65,7 +66,7 @@ class BlockStore:
     def note_revoked(self, id: str, now: float) -> None:
         """Note a block that was ended before it was planned."""
         if not self.has_seen(id):
-            self._remember(Schedule(id, {}, {}, start=now))
+            self._remember(_revoked(id, now))
 
     def _remember(self, past: Schedule) -> None:
         """Store the schedule of an ended block, and drop the oldest ones if there are too many."""
@@ -103,12 +104,14 @@ class BlockStore:
         if id == ANTICIPATORS:
             return self._anticipated
         newest = next((p for p in reversed(self._blocks.values()) if p.block.id == id), None)
-        return self._past.get(id) if newest is None else newest.schedule
+        if newest is None:
+            return self._past.get(id)
+        return _revoked(id, newest.end) if newest.is_revoked else newest.schedule
 
     def first_schedule_of(self, id: str) -> Schedule | None:
         """Return the first schedule of the newest block with an id, moved to its present start."""
         newest = next((p for p in reversed(self._blocks.values()) if p.block.id == id), None)
-        return None if newest is None else _first_schedule(newest)
+        return None if newest is None or newest.is_revoked else _first_schedule(newest)
 
     def snapshot(self) -> tuple[list[Schedule], Schedule]:
         """Return the schedules of ended blocks, the oldest first, and of the anticipators."""
@@ -146,6 +149,11 @@ class BlockStore:
         return schedule if playing is None else playing.latest
 
 
+def _revoked(id: str, end: float) -> Schedule:
+    """Return the schedule of a block that ended before it started: it has no points."""
+    return Schedule(id, {}, {}, start=end)
+
+
 def _points(schedule: Schedule) -> int:
     return sum(map(len, schedule.times.values()))
 
@@ -161,6 +169,8 @@ def _first_schedule(playing: ActiveBlock) -> Schedule:
 
 def _with_lost_points(playing: ActiveBlock) -> Schedule:
     """Return the schedule of a block, with the points that it has lost, which references may still name."""
+    if playing.is_revoked:
+        return _revoked(playing.block.id, playing.end)
     schedule, first = playing.schedule, _first_schedule(playing)
     points, times = dict(schedule.points), dict(schedule.times)
     for behaviour, names in first.points.items() if playing.start < FOREVER else ():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Collection, Iterator
+from math import inf
 
 from realizer.playback.active_block import ActiveBlock
 from realizer.playback.block_states import State
@@ -28,9 +29,15 @@ class EventQueue:
         """The time of the first event, or None."""
         return None if self._first is None else self._first.time
 
-    def due(self, now: float) -> Iterator[Event]:
-        """Remove and yield events that are due, in order, with those that are added meanwhile."""
+    def due(self, now: float, starts_before: float = inf) -> Iterator[Event]:
+        """Remove and yield events that are due, in order, with those that are added meanwhile.
+
+        Args:
+            starts_before: blocks that start then or later do not start yet.
+        """
         while (first := self._first) is not None and first.time <= now:
+            if first.phase is Phase.START and first.time >= starts_before:
+                return
             events = self._events[first.block]
             events.pop()
             if events:

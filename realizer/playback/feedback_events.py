@@ -40,14 +40,14 @@ class Event(NamedTuple):
 
     Attributes:
         time: seconds on the session clock.
-        order: order of the block among those that report at one instant.
+        order: order of the block among those that report at one instant, as of `ActiveBlock`.
         behaviour, point: indices of a sync point in the block and in its behaviour.
         block: number of the block.
         name, sync: behaviour id and sync point.
     """
 
     time: float
-    order: int
+    order: tuple[int, int, int]
     phase: Phase
     behaviour: int = 0
     point: int = 0
@@ -113,7 +113,7 @@ def sync_progress(block: Block, behaviour: str, sync: str, time: float, start: f
     )
 
 
-def events(block: Block, schedule: Schedule, order: int, number: int) -> list[Event]:
+def events(block: Block, schedule: Schedule, order: tuple[int, int, int], number: int) -> list[Event]:
     """Return an event for every sync point of a block; for `order` and `number` see Event."""
     due: list[Event] = []
     phase = Phase.SYNC

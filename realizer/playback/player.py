@@ -207,14 +207,18 @@ class Player(BlockManager):
 
     # feedback -----------------------------------------------------------------------------------
 
-    def due(self, now: float) -> list[Feedback]:
-        """Return feedback that is due, in the order of report, each message once."""
+    def due(self, now: float, starts_before: float = float("inf")) -> list[Feedback]:
+        """Return feedback that is due, in the order of report, each message once.
+
+        Args:
+            starts_before: blocks that start then or later do not start yet.
+        """
         forgettable = now - self.history - RELAX - AFTERMATH
         due = self.timeline.events.next
         is_due = due is not None and due <= now
         if not (is_due or self.blocks.first_invisible < forgettable or self.reports):
             return []
-        self.advance(now)
+        self.advance(now, starts_before)
         out = self.reports.take_all()
         if forgotten := self.blocks.forget(forgettable):
             for playing in forgotten:

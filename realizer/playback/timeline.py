@@ -60,7 +60,6 @@ class BlockTimeline:
         self.blocks = BlockStore()
         self.events = EventQueue()
         self.reports = Reports()
-        self._order = 0
 
     def plan(
         self,
@@ -71,17 +70,19 @@ class BlockTimeline:
         waits: Collection[Dependency] = (),
         ended: Collection[ActiveBlock] = (),
         alone: bool = False,
+        starts: bool = False,
         may_stretch: bool = True,
     ) -> tuple[Plan, list[ActiveBlock]]:
         """Plan a block beside the active ones; return the plan, and the blocks that are solved with it.
 
         While its start is unknown, it is planned as if it started now, and does not move other blocks.
-        Conflicts with other blocks are resolved when it starts, not while it waits.
+        Conflicts with blocks that wait are resolved when it starts, because they may still move.
 
         Args:
             waits: its dependencies.
             ended: the blocks that it ends.
             alone: sync points of other blocks are fixed.
+            starts: whether its start event is due.
             may_stretch: whether the plan may require speech of other lengths.
         """
         block, character = arrival.block, arrival.character
@@ -89,21 +90,31 @@ class BlockTimeline:
         origin = start if known else now
         alive = [p for p in self.blocks.active() if p not in ended and p.block.id != block.id]
         others = affected_blocks(block, alive, now, waits) if known and not alone else []
-        schedule_of = block_links.with_stops(self.blocks.schedule_of, ended, now)
-        existing = self._existing_claims(character, arrival.number, alive, now) if start <= now else ()
+        schedule_of, first_schedule_of = (
+            block_links.with_stops(look, ended, now)
+            for look in (self.blocks.schedule_of, self.blocks.first_schedule_of)
+        )
+        existing = self._existing_claims(character, arrival.number if starts else 0, alive, now)
         planned = plan_block(
             block,
             self.kinds,
             arrival.context,
             start=origin,
-            external_times=block_links.external_times(schedule_of, origin, self.blocks.first_schedule_of),
-            existing_claims=existing,
+            external_times=block_links.external_times(schedule_of, origin, first_schedule_of),
+            existing_claims=existing if start <= now else (),
             others=[member(p, origin, now) for p in others],
             may_stretch=may_stretch,
         )
         if planned.other_schedules and self._conflict(others, planned.other_schedules):
             return self.plan(
-                arrival, start, now, waits=waits, ended=ended, alone=True, may_stretch=may_stretch
+                arrival,
+                start,
+                now,
+                waits=waits,
+                ended=ended,
+                alone=True,
+                starts=starts,
+                may_stretch=may_stretch,
             )
         return planned, others
 
@@ -133,14 +144,12 @@ class BlockTimeline:
     def place(self, playing: ActiveBlock) -> None:
         """Schedule the base states and events of a block with a new start."""
         self.characters[playing.character].add_shifts(playing.shifts.values())
-        playing.order = self._order
-        self._order += 1
         if playing.start < FOREVER:
             self.events.add(playing)
             self.mark_changed()
 
     def reorder(self, playing: ActiveBlock) -> None:
-        """Move a waiting block and its followers behind all others whose feedback is due at the same time.
+        """Let a waiting block and its followers report behind what they wait for.
 
         Raises:
             graphlib.CycleError: blocks wait for each other.
@@ -156,8 +165,7 @@ class BlockTimeline:
                         visited.add(other)
                         todo.append(other)
         for first in graph.static_order():
-            first.order = self._order
-            self._order += 1
+            first.set_order()
             if first.start < FOREVER:
                 self.events.add(first)
 
@@ -193,11 +201,18 @@ class BlockTimeline:
         )
         if not conflicts(playing.plan.claims, existing):
             return False
-        self._place_again(playing, playing.start, now, is_replanned=True, alone=True)
+        self._place_again(playing, playing.start, now, is_replanned=True, alone=True, starts=True)
         return True
 
     def _place_again(
-        self, playing: ActiveBlock, start: float, now: float, *, is_replanned: bool, alone: bool
+        self,
+        playing: ActiveBlock,
+        start: float,
+        now: float,
+        *,
+        is_replanned: bool,
+        alone: bool,
+        starts: bool = False,
     ) -> bool:
         """Place a waiting block at a start, planned again or as it is; return False if it is refused."""
         self.events.drop(playing)
@@ -205,7 +220,7 @@ class BlockTimeline:
         planned: Plan | None = playing.plan
         others: list[ActiveBlock] = []
         if is_replanned:
-            planned, others = self._replan(playing, start, now, alone=alone)
+            planned, others = self._replan(playing, start, now, alone=alone, starts=starts)
         if planned is None:
             return False
         playing.apply_plan(planned, start)
@@ -217,12 +232,12 @@ class BlockTimeline:
         return True
 
     def _replan(
-        self, playing: ActiveBlock, start: float, now: float, *, alone: bool
+        self, playing: ActiveBlock, start: float, now: float, *, alone: bool, starts: bool
     ) -> tuple[Plan | None, list[ActiveBlock]]:
         """Plan a waiting block again, and report new warnings; stop it and return None if it is refused."""
         arrival = Arrival(playing.block, playing.character, playing.number, playing.context)
         planned, others = self.plan(
-            arrival, start, now, waits=playing.dependencies, alone=alone, may_stretch=False
+            arrival, start, now, waits=playing.dependencies, alone=alone, starts=starts, may_stretch=False
         )
         if planned.schedule.failed:
             self.reports.warn(planned.schedule.warnings[0], playing.block.character_id)
@@ -307,9 +322,18 @@ class BlockTimeline:
             return None
         return schedules[0].warnings[0].text if schedules[0].failed else "it would disturb another block"
 
-    def stop(self, playing: ActiveBlock, now: float) -> None:
-        """Cut a block off at `now`: what plays relaxes, what waits is cancelled, and its end is reported."""
+    def stop(self, playing: ActiveBlock, now: float, others: Collection[ActiveBlock] = ()) -> None:
+        """Cut a block off at `now`: what plays relaxes, what waits is cancelled, and its end is reported.
+
+        Blocks that wait and refer to one that has not started are planned again, without these references.
+
+        Args:
+            others: blocks that are stopped with it.
+        """
+        bereft = [] if playing.has_begun else self._waiting_for_points_of(playing, others)
         tied = self.linked_blocks(playing, now) if playing.has_begun else []
+        if playing.is_waiting:
+            playing.pass_on_dependencies()
         self.events.drop(playing)
         self._withdraw_shifts(playing, playing.shifts.keys(), now)
         playing.cut(list(playing.schedule.times), now, ends=True)
@@ -319,7 +343,24 @@ class BlockTimeline:
         self.reports.add(progress(playing.block, "end", now, playing.state, playing.words_spoken(now)))
         self.mark_changed()
         self.reschedule([p for p in tied if not p.is_done], playing.start, now)
+        for other in bereft:
+            if other.is_waiting:
+                self._place_again(other, other.start, now, is_replanned=True, alone=True)
         self.update_followers(playing, now)
+
+    def _waiting_for_points_of(
+        self, playing: ActiveBlock, without: Collection[ActiveBlock]
+    ) -> list[ActiveBlock]:
+        """Return the planned blocks that wait and refer to one, except its followers, which move with it."""
+        id, gone = playing.block.id, [*without, *playing.followers]
+        return [
+            p
+            for p in self.blocks.active()
+            if p.is_waiting
+            and p.start < FOREVER
+            and p not in gone
+            and any(ref.block == id for ref in p.external_refs)
+        ]
 
     def cut(self, playing: ActiveBlock, behaviours: Collection[str], now: float) -> None:
         """End some behaviours of a block; the block ends with the last of the others."""

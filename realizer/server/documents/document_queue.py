@@ -145,7 +145,11 @@ class Submission:
 
     def now(self, t: float) -> float:
         """Return the present, which stands still while the documents of one message are planned."""
-        return self._instant if self._instant <= t <= self._instant + STANDSTILL else t
+        return self._instant if self.stands_still(t) else t
+
+    def stands_still(self, t: float) -> bool:
+        """Whether the present stands still at a time, because documents of one message are planned."""
+        return self._instant <= t <= self._instant + STANDSTILL
 
     def work(self, t: float) -> bool:
         """Plan a block that is ready, or else read one. Return False if nothing has changed.

@@ -31,7 +31,7 @@ from realizer.protocol.messages.replies import (
 )
 from realizer.protocol.messages.requests import Hello, Ping, StateQuery, Subscribe, Unsubscribe
 from realizer.protocol.wire import WireError, unpack_clip
-from realizer.server.documents.document_queue import Submission, block_id_of
+from realizer.server.documents.document_queue import STANDSTILL, Submission, block_id_of
 from realizer.server.documents.limits import duration_error
 from realizer.server.journal import JournalError, TakenOver
 from realizer.server.journal.checkpoint import Checkpoint
@@ -123,6 +123,8 @@ class Session:
         self._next_other: float | None = None
         self._next_feedback = 0.0
         self._client_left = False  # its open speeches end with the next tick
+        self._held = -math.inf  # when blocks did not start at that time because more might arrive
+        self._earliest = 0.0  # of what comes next: an instant is over when the blocks that start at it have
         self.subscriptions = Subscriptions(
             settings, self.player, self.faces, self.broadcast, self._connections, self.reply
         )
@@ -199,7 +201,7 @@ class Session:
         """Handle a message: bytes are a sound clip, text that starts with `{` is control, all else is BML."""
         if self.closed or connection not in self._connections:
             return
-        t = now - self.opened
+        t = self._time(now)
         self._send_due(t)
         if self.journal.needs_checkpoint and not self._compact(t):
             return
@@ -376,7 +378,7 @@ class Session:
         """Take the answer to an effect `Speak`. If the voice failed, the silent voice replaces it."""
         if self.closed:
             return
-        t = now - self.opened
+        t = self._time(now)
         self._send_due(t)
         if self.log_entry(t, "spoken", speak, "" if isinstance(result, Utterance) else str(result)):
             self._effects += self.submission.tts.answer(speak, result, t)
@@ -401,8 +403,9 @@ class Session:
 
     def tick(self, now: float, *, read_documents: bool = True) -> None:
         """Send due feedback, sound and frames; then, with `read_documents`, read or plan one document."""
-        t = now - self.opened
-        if not self.closed and self._work(t, read_documents):
+        t = self._time(now)
+        starts = not self.submission.has_work
+        if not self.closed and self._work(t, read_documents, starts=starts):
             self.log_entry(t, "tick")
 
     def frames(self, now: float) -> tuple[list[Effect], float] | None:
@@ -445,16 +448,20 @@ class Session:
         """
         while (due := self.player.next_deadline()) is not None and due < t and not self.closed:
             due = max(due, since)
-            if self.submission.now(due) < due:
+            if self.submission.stands_still(due):
                 return  # it was published when the documents of a message had been planned
             before(due)
             self._publish(due)
 
-    def _work(self, t: float, read_documents: bool = True) -> bool:
-        """Do the work of `tick`. Return whether a document or a speech changed the state."""
+    def _work(self, t: float, read_documents: bool = True, *, starts: bool = False) -> bool:
+        """Do the work of `tick`. Return whether a document or a speech changed the state.
+
+        Args:
+            starts: whether blocks that start at `t` start.
+        """
         self._client_left = False
         self._forget_deadline()
-        self._publish(t)
+        self._publish(t, starts=starts)
         if self.broadcast.active or any(c.subscriptions for c in self._connections.values()):
             self.broadcast.set_subscribers(self._connections.values())
             self.broadcast.send_due(t, self._effects, is_reading=read_documents and self.submission.has_work)
@@ -466,7 +473,7 @@ class Session:
             return False
         done = self.submission.work(t)
         if self.submission.speeches.advance(t) or done:
-            self._publish(t)
+            self._publish(t, starts=False)
             return True
         return False
 
@@ -484,6 +491,8 @@ class Session:
         other, streams = self._next_other, self.broadcast
         if other is None:
             self._next_feedback, answer_due = self.player.next_change(), self.submission.tts.deadline()
+            if self.submission.has_work and self.player.next_event <= self._held:
+                self._next_feedback = self._held + STANDSTILL  # a block starts after documents that wait
             other = streams.next_other if streams.active else math.inf
             other = other if answer_due is None else min(other, answer_due)
             # Open speeches and slow clients are checked with every frame, schedules with all feedback: then
@@ -515,13 +524,24 @@ class Session:
 
     # feedback -----------------------------------------------------------------------------------
 
-    def _publish(self, t: float) -> None:
-        """Number the feedback that is due and send it to its subscribers."""
+    def _time(self, now: float) -> float:
+        """Return the time on the session clock of something that arrives."""
+        return max(now - self.opened, self._earliest)
+
+    def _publish(self, t: float, *, starts: bool = True) -> None:
+        """Number the feedback that is due and send it to its subscribers.
+
+        Args:
+            starts: whether blocks that start at `t` start; not while more may arrive at this instant.
+        """
         t = self.submission.now(t)
+        self._held = t if not starts else -math.inf
+        if starts and t <= self.player.next_event <= t + EPSILON:
+            self._earliest = math.nextafter(self.player.next_event, math.inf)
         if self.broadcast.active and (change := self.player.next_event) <= t + EPSILON:
             self.broadcast.settle(change)
         texts: list[str] = []
-        while due := self.player.due(t + EPSILON):
+        while due := self.player.due(t + EPSILON, math.inf if starts else t):
             for event in work.counted(due, 20):
                 feedback, ending_blocks = self.submission.speeches.process_feedback(event)
                 texts.append(self.feedback_log.add(feedback, t))
@@ -536,7 +556,7 @@ class Session:
 
         A replay of the journal has no wake-ups in between and must publish the same.
         """
-        self._publish(t)
+        self._publish(t, starts=False)
         if self.broadcast.active:
             self._effects += self.broadcast.frames_due(t, is_reading=True)[0]
 

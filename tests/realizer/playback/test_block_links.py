@@ -21,6 +21,7 @@ from realizer.playback.block_links import (
     with_stops,
 )
 from realizer.playback.block_planner import plan
+from realizer.playback.block_states import BlockEvent
 from realizer.scheduling.timing import Schedule
 
 
@@ -130,7 +131,9 @@ def test_external_times_are_known_for_known_points(ref: SyncRef, time: float | N
 
 @given(st.floats(0, 20))
 def test_with_stops_nothing_of_a_stopped_block_is_later(now: float) -> None:
-    stopped = with_stops(SCHEDULES.get, [alive("a")], now)("a")
+    playing = alive("a")
+    playing.change_state(BlockEvent.START)
+    stopped = with_stops(SCHEDULES.get, [playing], now)("a")
     assert stopped is not None
     at, planned = (stopped.start + stopped.times["h"], SCHEDULES["a"].start + SCHEDULES["a"].times["h"])
     assert at == pytest.approx(np.minimum(planned, max(now, stopped.start)))
@@ -138,5 +141,6 @@ def test_with_stops_nothing_of_a_stopped_block_is_later(now: float) -> None:
 
 def test_with_stops_the_other_blocks_go_on() -> None:
     schedule_of = with_stops(SCHEDULES.get, [alive("a"), alive("nobody")], 11.0)
+    assert schedule_of("a") is None  # it has not started
     assert schedule_of("p") is SCHEDULES["p"]
     assert schedule_of("nobody") is None
