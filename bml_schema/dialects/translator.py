@@ -24,6 +24,7 @@ __all__ = ["dialect_of", "translate"]
 
 _SPACES = {"ext": EXTENSIONS, "bmla": BMLA, "bmlt": BMLT, "realizer": OWN}
 _OURS = frozenset({BMLA, BMLT, OWN})
+_JOINTS = frozenset({"eyes", "head", "neck", "chest", "back"})  # SmartBody's children of <gaze>
 
 
 def translate(root: etree._Element, wrapper: str, block_ids: Iterator[str]) -> Report:
@@ -45,6 +46,8 @@ def translate(root: etree._Element, wrapper: str, block_ids: Iterator[str]) -> R
     if not (translation.applied or wrapper or space in DRAFTS):
         return Report()
     translation.in_dialect = True
+    if wrapper == "fml-apml":
+        translation.add_composition()
     translation.run()
     made = translation.add_ids()
     if wrapper == "act":
@@ -97,6 +100,8 @@ class _Translation:
             if name == "description":
                 self._attributes(element, name)
                 continue
+            if name in _JOINTS and local(str(parent.tag)) == "gaze":
+                key = name = "sbm:joint"
             if name == "speech":
                 translate_speech(element, self._apply, words=self.in_dialect)
             own = self.table.elements.get(key) or self.table.elements.get(name)
@@ -245,6 +250,12 @@ class _Translation:
         id = next(id for n in numbers if (id := f"{kind}{n}") not in self.used)
         self.used.add(id)
         return id
+
+    def add_composition(self) -> None:
+        """Set the composition of Greta's <fml-apml>."""
+        around = self.root.getparent()
+        if around is not None and "composition" in around.attrib and "composition" not in self.root.attrib:
+            self.root.set("composition", around.get("composition"))
 
     def add_character(self) -> None:
         """Set the character that SmartBody's <participant> names."""

@@ -166,6 +166,22 @@ def test_translate_takes_the_character_of_a_participant() -> None:
     assert block.character_id == "brad"
 
 
+def test_translate_takes_the_composition_of_the_element_around_a_document() -> None:
+    around = '<fml-apml composition="replace" reaction_type="HALT">{}<fml/></fml-apml>'
+    (block,) = read(around.format('<bml><head id="h" lexeme="Nod_Big"/></bml>'))
+    (own,) = read(around.format('<bml composition="append"><head id="h" lexeme="Nod_Big"/></bml>'))
+    assert isinstance(block, Block)
+    assert isinstance(own, Block)
+    assert (block.composition, own.composition) == ("REPLACE", "APPEND")
+
+
+def test_translate_keeps_a_gaze_with_joints() -> None:
+    (block,) = read('<act><bml><gaze target="camera"><sbm:chest/><sbm:head pitch="-10"/></gaze></bml></act>')
+    assert isinstance(block, Block)
+    assert block["gaze1"] == Gaze(id="gaze1", target="camera")
+    assert [p.type for p in block.problems] == ["NOT_BML_1_0"]
+
+
 def test_translate_reads_a_dialect_in_the_namespace_of_bml() -> None:
     block = parse(f'<bml xmlns="{CORE}" id="b"><gaze id="g" target="x" angle="20" direction="LEFT"/></bml>')
     assert block["g"] == Gaze(id="g", target="x", offset_angle=20.0, offset_direction="LEFT")
