@@ -93,7 +93,8 @@ def _sounds(events: Sequence[Event], end: int) -> tuple[list[int], list[str], li
         elif kind == PHONEME and not text.startswith("("):  # "(en)": the language changes
             begins.append(min(sample, end))
             sounds.append(text)
-    return begins, sounds, words
+    # Above 400 words a minute, espeak-ng reports some sounds after those that follow them.
+    return sorted(begins), sounds, words
 
 
 def _words(

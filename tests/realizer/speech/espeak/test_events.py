@@ -57,6 +57,15 @@ def test_timeline_has_words_phonemes_and_their_stress() -> None:
     )
 
 
+def test_timeline_orders_the_starts_of_sounds() -> None:
+    starts = zip((100, 300, 250, 400), "piko", strict=True)
+    events = [word(100, 0), *(sound(at, ipa) for at, ipa in starts), END_EVENT]
+    found = times_of(document("pico"), events).phonemes
+    assert [(p.ipa, p.start, p.end) for p in found[1:]] == [
+        ("p", 0.1, 0.25), ("i", 0.25, 0.3), ("k", 0.3, 0.4), ("o", 0.4, 1.0)
+    ]  # fmt: skip
+
+
 def test_timeline_divides_words_that_were_merged() -> None:
     events = [word(0, 0), sound(0, "aɪ"), sound(200, "ɐ"), sound(400, "m"), sound(600, "h"), END_EVENT]
     found = times_of(document("I", "am", "h"), events, {"I": ["aɪ"], "am": ["æ", "m"], "h": ["h"]})
