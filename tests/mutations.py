@@ -56,6 +56,7 @@ TASTE = re.compile("realizer/(charts|facebuild/person)/")
 # Numbers so small only keep rounding errors and divisions by 0 out; those so large are limits, and one more
 # or less is the same to all who stay below them.
 TOLERANCE, LIMIT_OF_MANY = 5e-6, 1000
+WIDEST = 1e6  # metres, seconds and the like only have limits there
 # Limits of pydantic for what clients send; those beyond BOUND only keep nonsense out.
 LIMITS, BOUND = {"ge", "gt", "le", "lt", "min_length", "max_length"}, 100
 # Which random numbers are drawn: others would do.
@@ -138,7 +139,7 @@ def _end(node: ast.expr | ast.stmt) -> tuple[int, int]:
 
 
 def _is_tolerance(value: float) -> bool:
-    return 0 < value < TOLERANCE or (isinstance(value, int) and value >= LIMIT_OF_MANY)
+    return 0 < value < TOLERANCE or value >= (LIMIT_OF_MANY if isinstance(value, int) else WIDEST)
 
 
 def _nodes(tree: ast.AST) -> Iterator[ast.AST]:

@@ -51,6 +51,7 @@ def f(x: "1 + 1" = None) -> "0":
         ("a.close()", []),
         ("a(maxsize=3, b=3)", ["pass", "a(maxsize=3, b=4)"]),
         ("x = a + 1e-9, 1e-5", ["x = a - 1e-9, 1e-5", "x = a + 1e-9, 2e-05"]),
+        ("x = 1e5, 1e6", ["x = 200000.0, 1e6"]),
         ("x = F(ge=0, le=-1e4, b=1e4)", ["x = F(ge=1, le=-1e4, b=1e4)", "x = F(ge=0, le=-1e4, b=20000.0)"]),
         ("return AnError(a or b, 1)", []),
         ("x = zip(a, b[1:], strict=True)", ["x = zip(a, b[2:], strict=True)"]),

@@ -53,7 +53,7 @@ def lint(text: str, settings: Settings) -> str:
         return json.dumps({"faults": [], "skipped": words})
     source = Source(text)
     findings: list[Finding] = []
-    player = Player(replace(settings.play_options(), idle=False))
+    player = Player(settings.play_options())
     for part in check_document("document", source, text, player):
         findings += part.findings
         if part.block is not None and part.schedule is not None:

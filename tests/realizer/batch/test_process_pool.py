@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from realizer.batch import process_pool
 from realizer.batch.process_pool import TRIES, ProcessPool
 from realizer.batch.task import Options, Task
 from realizer.batch.worker import Outcome, Worker
@@ -62,10 +63,19 @@ class Deadly(Options):
 
 @pytest.mark.slow
 def test_process_pool_gives_up_a_document_whose_workers_always_die(
-    tasks: list[Task], options: Options
+    tasks: list[Task], options: Options, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    started: list[Options] = []
+
+    class Counted(process_pool._WorkerProcess):
+        def __init__(self, options: Options) -> None:
+            started.append(options)
+            super().__init__(options)
+
+    monkeypatch.setattr(process_pool, "_WorkerProcess", Counted)
     deadly = Deadly(formats=options.formats, voice=options.voice)
     outcomes = list(ProcessPool(deadly, 1).perform(tasks[:1]))
+    assert len(started) == TRIES + 1  # the last one for other documents
     for outcome in outcomes:
         assert outcome.row["status"] == "failed"
         assert outcome.row["error"] == f"its process ended {TRIES} times (exit status 3)"

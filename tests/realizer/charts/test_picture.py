@@ -79,6 +79,15 @@ def test_timeline_shows_dropped_behaviours_with_reasons(lines) -> None:
     assert any(text.startswith("g cannot be placed: g:ready = 1") for text in shown)
 
 
+def test_timeline_has_a_background_from_start_to_end_of_a_block(lines) -> None:
+    blocks = lines('<bml id="b"><wait id="w" start="1" duration="2"/></bml>')
+    picture, scale = timeline(blocks), scale_of(blocks)
+    assert any(
+        isinstance(shape, Box) and shape.x == scale.x(0) and shape.x + shape.width == scale.x(3)
+        for shape in picture.shapes
+    )
+
+
 def test_timeline_colours_gaps_at_their_time(lines) -> None:
     blocks = lines(
         '<bml id="b"><head id="n" lexeme="NOD" start="0" end="3"/>'

@@ -37,6 +37,15 @@ def test_writer_stops_and_counts_a_recording_that_fails(
     ]
 
 
+def test_writer_calls_follow_as_long_as_it_returns_true() -> None:
+    answers = iter([True, True, False])
+    writer = JournalWriter("s", Memory(), follow=lambda: next(answers))
+    writer.begin(0.0)
+    for at in range(5):
+        writer.append(float(at), "tick", 0, "")
+    assert list(answers) == []
+
+
 def test_writer_goes_on_if_a_recording_cannot_begin(tmp_path: Path) -> None:
     folder = tmp_path / "records"
     record = RecordingFolder(folder, {})
