@@ -59,8 +59,8 @@ TOLERANCE, LIMIT_OF_MANY = 5e-6, 1000
 WIDEST = 1e6  # metres, seconds and the like only have limits there
 # Limits of pydantic for what clients send; those beyond BOUND only keep nonsense out.
 LIMITS, BOUND = {"ge", "gt", "le", "lt", "min_length", "max_length"}, 100
-# Which random numbers are drawn: others would do.
-SEED = "SEED"
+# Which random numbers are drawn, how pictures are compressed: other numbers would do.
+FREE = {"SEED", "QUALITY", "METHOD"}
 NO_CODE = {"annotation", "returns", "decorator_list", "bases"}
 
 
@@ -171,8 +171,8 @@ def _is_unseen(node: ast.AST) -> bool:
             return name in TUNING or (name in LIMITS and _is_bound(value))
         case ast.FunctionDef(name=name):
             return name == "__repr__"
-        case ast.Assign(targets=[ast.Name(id=name)]):
-            return name == SEED
+        case ast.Assign(targets=[ast.Name() | ast.Tuple() as target]):
+            return {n.id for n in ast.walk(target) if isinstance(n, ast.Name)} <= FREE
     return False
 
 

@@ -57,6 +57,8 @@ def f(x: "1 + 1" = None) -> "0":
         ("x = zip(a, b[1:], strict=True)", ["x = zip(a, b[2:], strict=True)"]),
         ("x = F(strict=True)", ["x = F(strict=False)"]),
         ("SEED = 3", []),
+        ("QUALITY, METHOD = 75, 4", []),
+        ("QUALITY, x = 75, 4", ["QUALITY, x = 76, 4", "QUALITY, x = 75, 5"]),
     ],
 )
 def test_mutations_of_a_line(source: str, wanted: list[str]) -> None:
