@@ -56,6 +56,17 @@ def test_advice_is_given_on_times_in_another_unit(behaviour: str, head: str, hel
     assert finding.notes == (help,)
 
 
+def test_advice_is_given_on_a_misspelt_child_with_a_prefix() -> None:
+    changes = (
+        '<bmla:parametervaluechange id="n" target="b:s" paramId="volume" xmlns:bmla="http://www.asap-project.org/bmla">'
+        '<bmla:{0} type="linear" targetValue="1"/>{1}</bmla:parametervaluechange>'
+    )
+    findings = advised(f'<bml id="a">{changes.format("trajectory", "<bmla:trajectori/>")}</bml>')
+    (finding,) = [finding for finding in findings if "trajectori" in finding.head]
+    assert finding.head == "<bmla:trajectori>: no element of <parametervaluechange>, so it does nothing"
+    assert finding.notes == ('help: did you mean "bmla:trajectory"?',)
+
+
 @pytest.mark.parametrize("element", ["gaze", "gazeShift", "headDirectionShift"])
 def test_advice_is_given_on_a_target_without_a_scene(element: str) -> None:
     (finding,) = advised(f'<bml id="a"><{element} id="n" target="person"/></bml>')

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from realizer.core.setting_types import switch_or_file
 from realizer.core.settings import Settings, SettingsError
 from tests.rows import each_row
 
@@ -103,3 +104,16 @@ def test_numbers_accept_the_least_value_and_no_lower_one(name: str, least: int) 
     assert getattr(Settings.read(environment={variable: str(least)}), name) == least
     with pytest.raises(SettingsError, match=f"{name}: wanted"):
         Settings.read(environment={variable: str(least - 1)})
+
+
+def test_switch_or_file_is_on_off_or_an_existing_file(tmp_path: Path) -> None:
+    (tmp_path / "rules.toml").write_text("")
+    for value, wanted in (
+        ("yes", "on"),
+        (False, "off"),
+        (tmp_path / "rules.toml", str(tmp_path / "rules.toml")),
+    ):
+        assert switch_or_file(value) == wanted
+    for value in ("maybe", str(tmp_path / "none.toml"), str(tmp_path), "x" * 5000, 3):
+        with pytest.raises(ValueError, match="on, off, or an existing file"):
+            switch_or_file(value)

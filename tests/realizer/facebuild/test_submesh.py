@@ -49,6 +49,7 @@ def test_submesh_threaded_doubles_the_vertices_of_round_loops() -> None:
     patch = Submesh.of_quads(quads, 16)
     fine = patch.threaded([list(range(8)), list(range(8, 16))])
     assert len(fine) == 32
+    assert len(patch.threaded([list(range(8))]).triangles) == 24  # half of the 16 have an edge on the loop
     away = np.linalg.norm(fine.positions(base), axis=1)
     assert np.all((np.abs(away - 1) < 0.01) | (np.abs(away - 2) < 0.02))
     assert np.allclose(vertex_normals(fine.positions(base), fine.triangles), [0, 0, 1])
