@@ -205,11 +205,14 @@ class ActiveBlock:
 
     def pass_on_dependencies(self) -> None:
         """Let the blocks that are appended to it, and to what it waits for, wait for the latter directly."""
-        for other in self.followers:
+        own = [
+            w.block for w in self.dependencies if w.block.character == self.character and not w.block.is_done
+        ]
+        for other in self.followers if own else ():
             if other.is_waiting and other.block.composition == "APPEND" and other.character == self.character:
-                for wait in self.dependencies:
-                    if wait.block.character == self.character and wait.block.number < other.number:
-                        other.add_dependency(Dependency(wait.block))
+                for dependency in own:
+                    if dependency.number < other.number:
+                        other.add_dependency(Dependency(dependency))
 
     def apply_plan(self, plan: Plan, start: float) -> None:
         """Place a plan on the session clock, with its channels, base states and speech."""

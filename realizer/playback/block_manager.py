@@ -166,8 +166,9 @@ class BlockManager:
             return self._refuse(block, Warning(block.id, "CANNOT_CREATE_BEHAVIOR", words), now)
         if not context.animates:
             return planned.schedule
+        together = frozenset(ended)
         for earlier in ended:
-            self.timeline.stop(earlier, now, ended)
+            self.timeline.stop(earlier, now, together)
         for name in block.interrupt:
             if self._has_arrived(name, announced.number):
                 self.revoke(name, now)

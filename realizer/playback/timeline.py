@@ -169,13 +169,15 @@ class BlockTimeline:
             if first.start < FOREVER:
                 self.events.add(first)
 
-    def update_followers(self, playing: ActiveBlock, now: float) -> None:
-        """Move the direct and indirect followers of a block whose times have changed."""
+    def update_followers(
+        self, playing: ActiveBlock, now: float, without: Collection[ActiveBlock] = ()
+    ) -> None:
+        """Move the direct and indirect followers of a block whose times have changed, except some."""
         moved = deque([playing])
         while moved:
             first = moved.popleft()
             for other in list(first.followers):
-                if other.is_waiting and self.move(other, now, after=first.block.id):
+                if other.is_waiting and other not in without and self.move(other, now, after=first.block.id):
                     moved.append(other)
 
     def move(self, playing: ActiveBlock, now: float, *, after: str = "") -> bool:
@@ -346,21 +348,16 @@ class BlockTimeline:
         for other in bereft:
             if other.is_waiting:
                 self._place_again(other, other.start, now, is_replanned=True, alone=True)
-        self.update_followers(playing, now)
+        self.update_followers(playing, now, others)
 
     def _waiting_for_points_of(
         self, playing: ActiveBlock, without: Collection[ActiveBlock]
     ) -> list[ActiveBlock]:
         """Return the planned blocks that wait and refer to one, except its followers, which move with it."""
-        id, gone = playing.block.id, [*without, *playing.followers]
-        return [
-            p
-            for p in self.blocks.active()
-            if p.is_waiting
-            and p.start < FOREVER
-            and p not in gone
-            and any(ref.block == id for ref in p.external_refs)
-        ]
+        id = playing.block.id
+        tied = [p for p in self.blocks.active() if any(ref.block == id for ref in p.external_refs)]
+        gone = {*without, *playing.followers} if tied else set()
+        return [p for p in tied if p.is_waiting and p.start < FOREVER and p not in gone]
 
     def cut(self, playing: ActiveBlock, behaviours: Collection[str], now: float) -> None:
         """End some behaviours of a block; the block ends with the last of the others."""

@@ -196,6 +196,15 @@ def test_external_reference_keeps_its_time_when_the_start_moves(stage: Stage) ->
 # REPLACE and interrupt
 
 
+def test_accept_moves_no_block_that_it_ends() -> None:
+    stage = Stage()
+    for id in "abcde":
+        stage.send(id, wait(1), composition="APPEND")
+    seen = len(stage.log)
+    stage.send("x", wait(1), composition="REPLACE", at=0.5)
+    assert stage.log[seen:][1:6] == ["a:end INTERRUPTED 0.5", *(f"{id}:end REVOKED 0.5" for id in "bcde")]
+
+
 def test_replace_ends_playing_and_waiting_blocks_and_frees_their_ids(stage: Stage) -> None:
     stage.send("a", smile(5))
     stage.send("b", wait(1), composition="APPEND")
