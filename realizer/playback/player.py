@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from realizer.animation.idle.gaze_shifts import gaze_shifts
 from realizer.animation.idle.idle_face import Idle, idle_face
 from realizer.animation.idle.prosody import AFTERMATH, KnownMotion, SpeechSpan, phrase_ends, prosody_channels
 from realizer.animation.lips.effort import opened
-from realizer.animation.speaking_style import style_of
+from realizer.animation.speaking_style import Style, style_of
 from realizer.behaviours.kind import BehaviourKind, PlanningContext, Position
 from realizer.behaviours.registry import KINDS
 from realizer.core.array_types import Float64, Int16
@@ -288,7 +288,12 @@ class Player(BlockManager):
         blocks = self.blocks.of_character(character)
         own = self._characters[character].channels()
         moods = [channel for channel in own if channel.layer is Layer.BASE]
-        channels = [c for p in blocks for c in _with_feeling(p, moods, first, last)] + own
+
+        @cache  # the head and the mouth have the same style
+        def style(playing: ActiveBlock, start: float) -> Style:
+            return style_of((*playing.moving_channels(), *moods), start)
+
+        channels = [c for p in blocks for c in _with_feeling(p, partial(style, p), first, last)] + own
         if not self.idle:
             return channels, None
         seed = self.context.seed + SEED_STEP * character
@@ -299,7 +304,7 @@ class Player(BlockManager):
             for at, part in s.utterance.sections or [(0.0, s.utterance)]
         ]
         near = [
-            t._replace(face=(*p.moving_channels(), *moods))
+            t._replace(style=partial(style, p, t.start))
             for t, p in talks
             if t.start - NEAR <= last and t.start + t.utterance.duration + NEAR >= first
         ]
@@ -359,14 +364,13 @@ class Player(BlockManager):
 
 
 def _with_feeling(
-    playing: ActiveBlock, moods: Sequence[Channel], first: float, last: float
+    playing: ActiveBlock, style: Callable[[float], Style], first: float, last: float
 ) -> Iterator[Channel]:
     """Yield the channels of a block; the lips of speech near these times open by what the face shows."""
     for behaviour, channels in playing.channels.items():
         speech = playing.speech.get(behaviour)
         if speech is not None and channels and channels[0].span[0] <= last and channels[0].span[1] >= first:
-            style = style_of((*playing.moving_channels(), *moods), speech.start)
-            channels = opened(channels, style.opening)
+            channels = opened(channels, style(speech.start).opening)
         yield from channels
 
 

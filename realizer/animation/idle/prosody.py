@@ -5,7 +5,7 @@ It depends on the seed, the utterances and their start times, but not on the req
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from itertools import pairwise
@@ -19,7 +19,7 @@ from realizer.animation.channel import Channel, Layer
 from realizer.animation.idle.blinks import PhraseEnd
 from realizer.animation.idle.rng import uniform
 from realizer.animation.idle.speaking_head import SOURCE, head_channels, turn_channels
-from realizer.animation.speaking_style import style_of
+from realizer.animation.speaking_style import NEUTRAL, Style
 from realizer.core.array_types import Float64
 from realizer.speech.accents import Phrase, phrases, prosody_facts
 from realizer.speech.melody import RATE, Melody, melody
@@ -43,13 +43,13 @@ PARTS = {
 class SpeechSpan(NamedTuple):
     """An utterance that starts at `start` and is cut off at `until`; seconds on the session clock.
 
-    `face` has the channels of its block and the base states of the character, which show its mood.
+    `style` returns how its block and the base states of the character change it.
     """
 
     start: float
     until: float
     utterance: Utterance
-    face: tuple[Channel, ...] = ()
+    style: Callable[[], Style] = lambda: NEUTRAL
 
 
 class KnownMotion(NamedTuple):
@@ -119,7 +119,7 @@ def prosody_channels(
         if claims is None:  # computed only when needed: characters are silent most of the time
             claims = _claims(known_motions)
         head = [(known, *channel.span) for known, channel in claims.get("head", ()) if channel.values.any()]
-        style = style_of(talk.face, talk.start)
+        style = talk.style()
         shown += head_channels(talk.utterance, talk.start, talk.until, seed, style, head)
         last_sound = talk.utterance.phonemes[-1].end if talk.utterance.phonemes else talk.utterance.duration
         heard = phrases(talk.utterance), melody(talk.utterance)

@@ -33,8 +33,9 @@ def _opened(channel: Channel, factor: float) -> Channel:
     sign = _signs().get(channel.target)
     if sign is None:
         return channel
-    values = channel.values
-    return channel.changed({"values": np.where(sign * values > 0, factor * values, values)})
+    # Where it opens the mouth, the scaled value is the outer one if the factor is above 1; elsewhere not.
+    choice = np.maximum if (factor > 1.0) == (sign > 0) else np.minimum
+    return channel.changed({"values": choice(channel.values, factor * channel.values)})
 
 
 @cache
