@@ -7,7 +7,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,8 +18,10 @@ from realizer.protocol.messages.speech import SpeechMessage, TimedText
 from realizer.protocol.wire import ClipPiece
 from realizer.server.session.control_fields import FieldError
 from realizer.speech.recorded.viseme_names import sound_of
-from realizer.speech.sound_visemes.recogniser import LOWEST, VisemeRecogniser
 from realizer.speech.utterance import Phoneme, Recording, Word
+
+if TYPE_CHECKING:
+    from realizer.speech.sound_visemes.recogniser import VisemeRecogniser
 
 MAX_BYTES = 64 * 2**20  # of all clips of a session: half an hour of speech; the oldest are removed
 MAX_CLIPS = 1000  # of a session
@@ -151,6 +153,8 @@ class AudioClips:
         if size > MAX_BYTES:
             raise ClipError(where, f"wanted at most {MAX_BYTES} bytes, got {size}")
         if begins:
+            from realizer.speech.sound_visemes.recogniser import LOWEST, VisemeRecogniser
+
             self.recordings.pop(piece.id, None)
             self._clips[piece.id] = clip
             clip.rate, clip.pieces = piece.rate, pieces
