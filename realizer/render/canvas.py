@@ -6,6 +6,7 @@ import numpy as np
 
 from realizer.core.array_types import Float32, Int32, UInt8
 from realizer.face.model import Face
+from realizer.face.subdivision import subdivided
 from realizer.render.backdrop import backdrop, channels, over
 from realizer.render.cameras import Camera
 from realizer.render.eye_highlights import EyeHighlights
@@ -74,7 +75,9 @@ class Canvas(ABC):
         Raises:
             RenderError: the backend is missing here; the text says what to install.
         """
-        self._size, self._camera, self._figure = size, camera, ShadedMesh(face, camera, light)
+        self._smooth = subdivided(face)
+        self._size, self._camera = size, camera
+        self._figure = ShadedMesh(self._smooth.face, camera, light)
         self._backdrop, self._channels = backdrop(size, light, background), channels(background)
         self._open()
 
@@ -82,9 +85,9 @@ class Canvas(ABC):
         """Return (h, w, 3) uint8, (h, w, 4) where transparent, row 0 at the top; in `out` if that is given.
 
         Args:
-            vertices, normals: (n, 3) metres and unit vectors.
+            vertices, normals: (n, 3) metres and unit vectors of the face, which is subdivided here.
         """
-        self._figure.pose(vertices, normals)
+        self._figure.pose(*self._smooth(vertices, normals))
         if out is None:
             out = np.empty((*self._size[::-1], self._channels), np.uint8)
         return over(self._pixels(), self._backdrop, out)

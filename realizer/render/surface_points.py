@@ -27,10 +27,8 @@ def locate_on_skin(
     depth = face.vertices @ towards
     a, b, c = (flat[mine[:, k]] for k in range(3))
     turn = flat_cross(b - a, c - a)
-    corners = flat[mine]
-    near = (
-        (turn > 1e-12) & (corners.max(axis=1) >= low).all(axis=1) & (corners.min(axis=1) <= high).all(axis=1)
-    )
+    most, least = np.maximum(np.maximum(a, b), c), np.minimum(np.minimum(a, b), c)
+    near = (turn > 1e-12) & (most >= low).all(axis=1) & (least <= high).all(axis=1)
     mine, a, b, c, turn = mine[near], a[near], b[near], c[near], turn[near]
     if not len(mine):
         return None

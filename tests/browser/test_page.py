@@ -157,7 +157,7 @@ def quiet_page(browser, address):  # type: ignore[no-untyped-def]
     """The page with its stage as high as a still."""
     opened = browser.new_page(viewport={"width": 960, "height": 540}, bypass_csp=True)
     opened.set_default_timeout(PATIENCE)
-    opened.goto(address)
+    opened.goto(f"{address}?smooth=yes")  # as stills are; without a GPU a page is not
     style = f"#stage {{ flex: none; width: {STILL + 60}px; height: {STILL}px; min-height: 0 }}"
     opened.add_style_tag(content=style + " .choice, #time { display: none !important }")
     opened.wait_for_function("realizerPage.stage.shownFrames > 0")
@@ -225,7 +225,7 @@ def test_page_changes_the_face(page) -> None:  # type: ignore[no-untyped-def]
     other = next(name for name in names if name != mine)
     page.click(f"#faces button:has-text('{other.capitalize()}')")
     there = len(load_face(other).vertices)
-    page.wait_for_function(f"realizerPage.stage.mesh.geometry.attributes.position.count === {there}")
+    page.wait_for_function(f"realizerPage.stage.original.attributes.position.count === {there}")
     shown = page.evaluate("realizerPage.stage.shownFrames")
     page.wait_for_function(f"realizerPage.stage.shownFrames > {shown} + 5")
 

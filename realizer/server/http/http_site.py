@@ -62,9 +62,7 @@ class HttpSite:
             "/examples.json": lambda asked: _json(_examples()),
             "/vocabulary.json": lambda asked: _json(_vocabulary()),
             "/feeling.json": lambda asked: _json(preview_emotion(asked.get("of", ""))),
-            "/look.json": lambda asked: _json(
-                _look(_face(asked.get("face", "default")), self._settings.light, self._settings.background)
-            ),
+            "/look.json": self._look,
             "/pose.fap": self._pose,
         }
 
@@ -94,6 +92,12 @@ class HttpSite:
         """The names of the page's files, listed once: every request compares its path with them."""
         found = self._static.iterdir() if self._static.is_dir() else ()
         return frozenset(f.name for f in found if not f.name.startswith("."))
+
+    def _look(self, asked: dict[str, str]) -> HttpResponse:
+        face, smooth = _face(asked.get("face", "default")), asked.get("smooth", "yes")
+        if smooth not in ("yes", "no"):
+            raise ToolError(f"smooth: wanted yes or no, got {smooth[:80]!r}")
+        return _json(_look(face, self._settings.light, self._settings.background, smooth == "yes"))
 
     def _pose(self, asked: dict[str, str]) -> HttpResponse:
         face = asked.get("face")
@@ -151,9 +155,14 @@ def _examples() -> bytes:
 
 
 @functools.lru_cache(8)
-def _look(name: str, light: str | None, background: str | None) -> bytes:
-    """Return the light, the camera, and the wrinkles and highlights of a face, for viewers of its mesh."""
+def _look(name: str, light: str | None, background: str | None, smooth: bool) -> bytes:
+    """Return the light, the camera, and the wrinkles and highlights of a face, for viewers of its mesh.
+
+    Args:
+        smooth: whether the viewer subdivides the mesh (`face.subdivision`); vertices are counted after that.
+    """
     from realizer.face.load import load_face
+    from realizer.face.subdivision import subdivided
     from realizer.render.cameras import camera_for
     from realizer.render.eye_highlights import EyeHighlights
     from realizer.render.light import preset, presets
@@ -161,13 +170,15 @@ def _look(name: str, light: str | None, background: str | None) -> bytes:
 
     face, lights = load_face(name), preset(light)
     camera = camera_for(face)
+    split = subdivided(face) if smooth else None
     look = {
         "light": lights.to_json(),
         "lights": {name: lights.to_json() for name, lights in presets().items()},
         "background": background,
         "camera": camera.to_json(),
-        "furrows": Wrinkles(face).to_json(),
-        "glints": EyeHighlights(face, lights, camera.towards).to_json(),
+        "subdivided": split.ranges if split else (),
+        "furrows": Wrinkles(split.face if split else face).to_json(),
+        "glints": EyeHighlights(split.face if split else face, lights, camera.towards).to_json(),
     }
     return json.dumps(look, separators=(",", ":")).encode()
 

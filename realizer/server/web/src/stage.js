@@ -3,6 +3,7 @@ import { BufferAttribute, BufferGeometry, DoubleSide, Mesh, PerspectiveCamera, S
 import { readGlb } from "./glb.js";
 import { Furrows, Glints } from "./figure.js";
 import { ask } from "./service.js";
+import { Subdivision } from "./subdivision.js";
 import { backdrop, fragment, lightUniforms, MIDDLE, REACH, stops, vertex } from "./light.js";
 
 const KEPT = 20; // s of frames, for looking back
@@ -14,8 +15,10 @@ const STILL = 1e-4; // rad, or of the zoom: the camera does not move
 export class Stage {
   constructor(canvas) {
     this.canvas = canvas;
-    // Without a GPU, smoothing costs more than everything else.
-    this.renderer = new WebGLRenderer({ canvas, antialias: !drawnInSoftware(), alpha: true });
+    // Without a GPU, smooth edges and four times as many triangles cost more than everything else.
+    const software = drawnInSoftware();
+    this.smooth = new URLSearchParams(location.search).get("smooth") ?? (software ? "no" : "yes");
+    this.renderer = new WebGLRenderer({ canvas, antialias: !software, alpha: true });
     this.scene = new Scene();
     this.camera = new PerspectiveCamera(12, 1, 0.1, 10);
     this.material = new ShaderMaterial({ vertexShader: vertex, fragmentShader: fragment, side: DoubleSide });
@@ -33,19 +36,26 @@ export class Stage {
   async load(name, scale, offset) {
     const path = encodeURIComponent((this.awaited = name));
     const [look, glb] = await Promise.all([
-      ask(`look.json?face=${path}`).then((answer) => checked(answer).json()),
+      ask(`look.json?face=${path}&smooth=${this.smooth}`).then((answer) => checked(answer).json()),
       ask(`faces/${path}`).then((answer) => checked(answer).arrayBuffer()),
     ]);
     if (this.awaited !== name) return; // another face was requested in the meantime
     const { attributes, indices } = readGlb(glb);
+    // The stream moves the vertices of the original mesh; what is drawn is a smooth subdivision of it.
+    this.original = new BufferGeometry();
+    this.original.setAttribute("position", new BufferAttribute(new Float32Array(attributes.POSITION.array), 3));
+    this.original.setIndex(new BufferAttribute(indices, 1));
+    this.subdivision = new Subdivision(indices, attributes.POSITION.array.length / 3, look.subdivided);
     const geometry = new BufferGeometry();
-    const put = (as, { array, size, normalized }) => geometry.setAttribute(as, new BufferAttribute(array, size, normalized));
-    put("position", { array: new Float32Array(attributes.POSITION.array), size: 3 });
+    const put = (as, { array, size, normalized }) =>
+      geometry.setAttribute(as, new BufferAttribute(this.subdivision.mean(array, size, new array.constructor(size * this.subdivision.count)), size, normalized));
     put("albedo", attributes.COLOR_0);
     put("occlusion", attributes._OCCLUSION);
     put("gloss", attributes._GLOSS);
-    geometry.setIndex(new BufferAttribute(indices, 1));
-    geometry.computeVertexNormals();
+    for (const as of ["position", "normal"])
+      geometry.setAttribute(as, new BufferAttribute(new Float32Array(3 * this.subdivision.count), 3));
+    geometry.setIndex(new BufferAttribute(this.subdivision.triangles, 1));
+    this.refine(geometry);
     Object.assign(this, { name, look, preset: look.camera, scale, offset });
     for (const part of [this.mesh, this.furrows?.mesh, this.glints?.mesh]) part?.geometry.dispose();
     this.scene.clear();
@@ -126,7 +136,7 @@ export class Stage {
     const first = Math.max(0, this.frames.findLastIndex(({ time }) => time <= playhead));
     const a = this.frames[first];
     const b = this.frames[first + 1] ?? a;
-    const position = this.mesh.geometry.attributes.position;
+    const { position } = this.original.attributes;
     if (a.face !== this.name) return; // the face is still being loaded
     const t = b.time > a.time ? Math.min(1, Math.max(0, (playhead - a.time) / (b.time - a.time))) : 0;
     if (this.shown === a.values && this.shownAt === t) return;
@@ -143,9 +153,17 @@ export class Stage {
     }
     if (!moved) return;
     this.stale = true;
-    position.needsUpdate = true;
-    this.mesh.geometry.computeVertexNormals();
+    this.refine(this.mesh.geometry);
     this.furrows.pose(this.mesh.geometry);
+  }
+
+  // Move the drawn vertices and normals to the original mesh.
+  refine(geometry) {
+    this.original.computeVertexNormals();
+    const { position, normal } = this.original.attributes;
+    this.subdivision.places(position.array, geometry.attributes.position.array);
+    this.subdivision.normals(normal.array, geometry.attributes.normal.array);
+    for (const name of ["position", "normal"]) geometry.attributes[name].needsUpdate = true;
   }
 
   fit() {

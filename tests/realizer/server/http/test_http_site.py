@@ -11,7 +11,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 import realizer
-from realizer.face.load import list_faces
+from realizer.face.load import list_faces, load_face
 from realizer.server.http.http_site import NAME, NOT_BUILT, HttpSite
 
 SITE = HttpSite(lambda: {"sessions": 2})
@@ -52,6 +52,15 @@ def test_site_has_the_light_of_stills() -> None:
     assert len(look["glints"]["eyes"]) == 2
     assert look["background"] is None
     assert SITE.answer("/look.json?face=nobody").status == 404
+
+
+def test_site_counts_vertices_of_the_mesh_that_a_viewer_draws() -> None:
+    smooth, plain = (json.loads(SITE.answer(f"/look.json?smooth={way}").body) for way in ("yes", "no"))
+    assert smooth["subdivided"][0] == list(load_face().parts["skin"])
+    assert plain["subdivided"] == []
+    for look, count in ((smooth, 2e4), (plain, 7e3)):
+        assert 0.5 * count < look["glints"]["eyes"][1]["first"] < count
+    assert SITE.answer("/look.json?smooth=perhaps").status == 400
 
 
 @pytest.mark.skipif(not BUILT, reason="the page was not bundled: build the package where npm is")

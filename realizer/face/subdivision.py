@@ -1,0 +1,166 @@
+"""One smooth subdivision of a face, which is drawn instead of the mesh that is deformed.
+
+Source: Loop 1987, "Smooth subdivision surfaces based on triangles", with rims as in Hoppe et al. 1994.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from realizer.core.array_types import Float32, Float64, Int32
+from realizer.face.mesh_geometry import edges_of, half_edges
+from realizer.face.model import Face
+
+PARTS = ("skin", "tongue", "hair", "shirt")
+MOST = 20_000  # triangles of a part that is coarse enough to be seen as such
+
+
+@dataclass(frozen=True, eq=False)
+class Subdivision:
+    """A face whose coarse parts have four times as many triangles.
+
+    Attributes:
+        face: the face to draw; a part's new vertices, one an edge, follow those it had.
+        vertex: (n,) the face's vertex of each vertex of the original face, which does not move.
+        middle: (k,) the face's vertex on each of k edges.
+        smooth: sparse (k, n) float32; places of the vertices on edges = smooth @ original vertices.
+        mean: sparse (k, n) float32, the mean of the ends of each edge.
+        ranges: first and last + 1 vertex of the parts that are subdivided, in the original face.
+    """
+
+    face: Face
+    vertex: Int32
+    middle: Int32
+    smooth: Any
+    mean: Any
+    ranges: tuple[tuple[int, int], ...]
+
+    def __call__(self, vertices: Float32, normals: Float32) -> tuple[Float32, Float32]:
+        """Return vertices and normals (n + k, 3) to draw, for those of the original, (n, 3) each.
+
+        Normals are means too: they turn over triangles as evenly as the surface does.
+        """
+        ups = self.mean @ normals
+        ups /= np.maximum(np.sqrt(np.einsum("ij,ij->i", ups, ups)), 1e-20)[:, None]
+        return self._joined(vertices, self.smooth @ vertices), self._joined(normals, ups)
+
+    def _joined(self, own: Any, between: Any) -> Any:
+        out = np.empty((len(own) + len(between), *own.shape[1:]), np.float32)
+        out[self.vertex], out[self.middle] = own, between
+        return out
+
+
+@lru_cache(maxsize=16)
+def subdivided(face: Face) -> Subdivision:
+    """Return the face with its coarse parts subdivided once."""
+    n = len(face.vertices)
+    ranges = tuple(sorted(face.parts[name] for name in PARTS if _is_coarse(face, name)))
+    mine = np.zeros(n, np.int32)  # number of the range, from 1
+    for k, (first, last) in enumerate(ranges):
+        mine[first:last] = k + 1
+    inside = (mine[face.triangles] == mine[face.triangles[:, :1]]).all(axis=1) & (
+        mine[face.triangles[:, 0]] > 0
+    )
+    coarse = face.triangles[inside]
+    edges, _ = edges_of(coarse)
+    ends = np.array([0, *(last for _, last in ranges)])[mine[edges[:, 0]]] if len(edges) else np.zeros(0)
+    order = np.argsort(np.concatenate([np.arange(n), ends - 0.5]), kind="stable")
+    place = np.argsort(order).astype(np.int32)
+    parts = {
+        name: (int(place[first]), int(place[last - 1]) + 1) for name, (first, last) in face.parts.items()
+    }
+    for name, (first, last) in face.parts.items():
+        if (first, last) in ranges:
+            parts[name] = parts[name][0], parts[name][1] + int((ends == last).sum())
+    smooth, mean = _rules(n, coarse)
+    split = Subdivision(face, place[:n], place[n:], smooth, mean, ranges)
+    colours, occlusion, gloss = (
+        split._joined(values, mean @ values)
+        for values in (face.colours.astype(np.float32), face.occlusion, face.gloss)
+    )
+    drawn = replace(
+        face,
+        vertices=split._joined(face.vertices, smooth @ face.vertices),
+        triangles=place[np.concatenate([_split(coarse, edges, n), face.triangles[~inside]])],
+        colours=np.rint(colours).astype(np.uint8),
+        occlusion=occlusion,
+        gloss=gloss,
+        parts=parts,
+        feature_points={name: int(place[vertex]) for name, vertex in face.feature_points.items()},
+        basis={},
+    )
+    return replace(split, face=drawn)
+
+
+def _is_coarse(face: Face, name: str) -> bool:
+    if name not in face.parts:
+        return False
+    first, last = face.parts[name]
+    return bool(0 < ((face.triangles >= first) & (face.triangles < last)).all(axis=1).sum() <= MOST)
+
+
+def _split(triangles: Int32, edges: Int32, n: int) -> Int32:
+    """Return four triangles for each, over vertices and then the middles of edges (k, 2) from n on."""
+    ab, bc, ca = n + _numbers(triangles, edges, n).reshape(3, -1)
+    a, b, c = triangles.T
+    four = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+    return np.concatenate([np.stack(corners, axis=1) for corners in four])
+
+
+def _numbers(triangles: Int32, edges: Int32, n: int) -> Int32:
+    """Return the number (3 m,) of the edge at each side of triangles (m, 3), in the order of `half_edges`."""
+    keys, sides = (pairs[:, 0].astype(np.int64) * n + pairs[:, 1] for pairs in (
+        edges, np.sort(half_edges(triangles), axis=1)
+    ))  # fmt: skip
+    return np.asarray(np.searchsorted(keys, sides), np.int32)
+
+
+def _rules(n: int, triangles: Int32) -> tuple[Any, Any]:
+    """Return sparse matrices (k, n) of the k edges' middles: smooth places, and plain means.
+
+    Loop's rules pull a surface inwards. So the mesh is pushed out by as much first, and what is left at the
+    ends of an edge is added to its middle: vertices stay where they are.
+    """
+    import scipy.sparse as sp
+
+    edges, counts = edges_of(triangles)
+    count = len(edges)
+    rim = counts != 2
+
+    def graph(pairs: Int32) -> Any:
+        i, j = pairs.T
+        return sp.csr_matrix((np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), (n, n))
+
+    near, along = graph(edges), graph(edges[rim])
+    degree, ends = (np.asarray(each.sum(axis=1)).ravel() for each in (near, along))
+    inner = (degree > 0) & (ends == 0)
+    share = np.where(inner, np.where(degree == 3, 3 / 16, 3 / (8 * np.maximum(degree, 1))), 0.0)
+    bent = np.where(ends == 2, 1 / 8, 0.0)
+    vertex = (
+        sp.diags_array(1 - share * degree - 2 * bent)
+        + sp.diags_array(share) @ near
+        + sp.diags_array(bent) @ along
+    )
+    number = np.arange(count)
+    own = np.where(rim, 1 / 2, 3 / 8)
+    middle = _matrix(np.r_[number, number], edges.T.ravel(), np.r_[own, own], (count, n))
+    # The third corners of the two triangles at an inner edge.
+    edge = _numbers(triangles, edges, n)
+    third = triangles[:, [2, 0, 1]].T.ravel()
+    keep = ~rim[edge]
+    across = _matrix(edge[keep], third[keep], np.full(keep.sum(), 1 / 8), (count, n))
+    half = _matrix(np.r_[number, number], edges.T.ravel(), np.full(2 * count, 1 / 2), (count, n))
+    stays = sp.eye_array(n, format="csr")
+    pushed = 2 * stays - vertex
+    smooth = (middle + across) @ pushed + half @ (stays - vertex @ pushed)
+    return smooth.tocsr().astype(np.float32), half.tocsr().astype(np.float32)
+
+
+def _matrix(rows: Any, columns: Any, values: Float64, shape: tuple[int, int]) -> Any:
+    import scipy.sparse as sp
+
+    return sp.csr_matrix((values, (rows, columns)), shape)
