@@ -51,12 +51,20 @@ def soften_flips(
     out = fields.copy()
     free = np.ones(len(at), bool)
     free[list(fixed)] = False
+    watched = list(plays)
     for _ in range(ROUNDS):
-        bad = np.zeros(len(triangles), bool)
-        for amounts, along, cosine in plays:
-            bad |= flipped_triangles(at, at + np.tensordot(amounts, out, 1) + along, triangles, cosine)
+        flipped = [
+            flipped_triangles(at, at + np.tensordot(amounts, out, 1) + along, triangles, cosine)
+            for amounts, along, cosine in watched
+        ]
+        bad = np.any(flipped, axis=0)
         if not bad.any():
-            break
+            if len(watched) == len(plays):
+                break
+            watched = list(plays)
+            continue
+        # What flips nothing is looked at again when nothing else does.
+        watched = [play for play, mine in zip(watched, flipped, strict=True) if mine.any()]
         # A triangle that moves as one cannot turn over.
         corners = triangles[bad]
         count = np.bincount(corners.ravel(), minlength=len(at))

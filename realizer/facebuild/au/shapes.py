@@ -56,8 +56,10 @@ def measure_shapes(
             f"build it again with realizer faces build {folder.name} --data"
         )
     skin = skin[half]
-    lips = np.einsum("nk,nk->n", share, Lips(ground).lips[corners])
-    seen = (face.occlusion[first:last][half] > OPEN) | (lips > 0.5)
+    mouth = Lips(ground)
+    lips, lining = (np.einsum("nk,nk->n", share, part[corners]) for part in (mouth.lips, mouth.inside))
+    # The mouth's lining is painted as light as an open mouth shows it.
+    seen = (face.occlusion[first:last][half] > OPEN) & (lining < 0.5) | (lips > 0.5)
     upper = shares(face, fit_mouth(face))[first:last][half]
     out = {}
     for unit in units().values() if wanted is None else wanted:

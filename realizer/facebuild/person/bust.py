@@ -33,8 +33,8 @@ RED_RINGS = 9  # of the lips' rings, from inside to just beyond the border of th
 LOWER_ARCH = 0.0015  # m that the lower arch is narrower at each side
 # The tongue at rest: m that its tip lies behind the biting edge of the lower teeth, and below it; half its
 # width in half widths of the arch.
-TONGUE = 0.0082, 0.0055, 0.70
-TIP = 0.32  # the share of its width that the tip loses, as in the data it is as broad as the arch
+TONGUE = 0.0088, 0.0055, 0.70
+TIP = 0.55, 0.50  # from that share of its length on the tongue gets round; its tip has this share of the width
 
 
 def assemble(person: Person, lips: Lips, lids: list[Lid], recipe: Recipe) -> list[Part]:
@@ -133,7 +133,8 @@ def _tongue(person: Person, recipe: Recipe) -> Part:
     edge = np.array([0, bite[1] + BITE["lower_teeth"][1] - drop, bite[2] - BITE["lower_teeth"][0] - back])
     fit = rest + edge - ground.point("6.1")
     along = (fit[:, 2] - fit[:, 2].min()) / np.ptp(fit[:, 2])
-    narrow = 1 - TIP * smooth(along, 0.55, 1.0)
+    begin, least = TIP
+    narrow = np.sqrt(1 - (1 - least**2) * (np.maximum(along - begin, 0) / (1 - begin)) ** 2)
     fit[:, 0] = rest[:, 0] * narrow * wide * person.arch[0] / np.abs(rest[:, 0]).max()
     tongue = tongue.moved(fit - rest)
     place = tongue.positions(ground.at)

@@ -7,7 +7,7 @@ import numpy as np
 
 from realizer.core.array_types import Float64
 from realizer.face.basis import JAW_SIN
-from realizer.facebuild.fix_flipped import symmetrize, without_flips
+from realizer.facebuild.fix_flipped import JAW, LIPS, symmetrize, without_flips
 from realizer.facebuild.mpeg4.rigid import opening_rows, tongue_bends
 from realizer.facebuild.parts import smooth
 from realizer.facebuild.person.base_mesh import FORWARD, LEFT, UP, Ground, scaled
@@ -39,7 +39,11 @@ def face_fields(ground: Ground, jaw_pivot: Float64) -> tuple[dict[int, Float64],
     near = quads[(ground.at[quads, 1] > LOWEST).all(axis=1)]
     triangles = np.concatenate([near[:, [0, 1, 2]], near[:, [0, 2, 3]]]).astype(np.int32)
     fields = symmetrize(fields, twin)
-    return without_flips(fields, ground.at, triangles, ground.points, ground.fapu(), jaw_pivot, twin), lips
+    # Of the lips and the jaw only what the finished skin shows is mended: the lining of the mouth turns over,
+    # and to mend that makes lumps.
+    others = {number: field for number, field in fields.items() if number not in LIPS and number not in JAW}
+    mended = without_flips(others, ground.at, triangles, ground.points, ground.fapu(), jaw_pivot, twin)
+    return fields | mended, lips
 
 
 def _jaw(ground: Ground, lips: Lips, pivot: Float64) -> dict[int, Float64]:

@@ -22,7 +22,9 @@ RINGS = (
 MEET, BORDER = 1, 7
 RING_SIZE = 38  # vertices
 LOWER_MIDDLE = 19  # index of the middle of the lower lip in a ring
-TENSION = 0.5  # equal FAPs overshoot by less than 4 % between the knots; more tension makes steps
+TENSION = 0.45  # equal FAPs overshoot by less than 4 % between the knots; more tension makes steps
+END_TENSION = 0.55  # at the corners; less tension or roundness turns triangles over there
+ROUND = 0.25  # the share of an ellipse's angle in the splines' coordinate
 KNOTS = 5  # right corner, right half, middle, left half, left corner
 CLOSED_GAP = 0.00005  # m between closed lips
 ARC = 0.30  # metres forwards per metre of rise of the lower lip, which moves on the arc of the jaw
@@ -31,7 +33,7 @@ ARC = 0.30  # metres forwards per metre of rise of the lower lip, which moves on
 def _stretch() -> tuple[Float64, Float64]:
     # Coordinate u of a vertex -> u of the splines; the knots at 0, 0.5 and 1 do not move.
     u = np.linspace(0, 1, 201)
-    mixed = 0.5 * u + 0.5 * np.arcsin(u) / (np.pi / 2)
+    mixed = (1 - ROUND) * u + ROUND * np.arcsin(u) / (np.pi / 2)
     half = float(np.interp(0.5, u, mixed))
     return u, np.where(mixed < half, mixed / half / 2, 0.5 + (mixed - half) / (1 - half) / 2)
 
@@ -45,7 +47,7 @@ def spline_basis(u: Any) -> Float64:
     The weights sum to 1 everywhere, so equal FAPs move a lip evenly.
     """
     u = np.clip(np.asarray(u, float), -1, 1)
-    # The mean of u and the angle of an ellipse: open mouths have round corners, and smiles sharp ones.
+    # Between u and the angle of an ellipse: open mouths have round corners, and smiles sharp ones.
     u = np.sign(u) * np.interp(np.abs(u), *_STRETCH)
     piece = np.clip(np.floor((u + 1) * 2).astype(int), 0, 3)
     t = (u + 1) * 2 - piece
@@ -54,6 +56,7 @@ def spline_basis(u: Any) -> Float64:
     for knot in range(KNOTS):
         value = np.eye(KNOTS)[knot]
         slope = np.gradient(value) * (1 - TENSION)
+        slope[[0, -1]] *= (1 - END_TENSION) / (1 - TENSION)
         out[knot] = (
             basis[0] * value[piece]
             + basis[1] * slope[piece]
@@ -92,9 +95,9 @@ class Lips:
             reach = at[ring[corner], 0]
             for place, vertex in enumerate(ring):
                 self.u[vertex] = np.clip(at[vertex, 0] / reach, -1, 1)
-                self.w[vertex] = np.clip((k - MEET) / (BORDER - MEET), 0, 1)
                 self.is_upper[vertex] = min(place, RING_SIZE - place) <= corner
                 on_ring[vertex] = k
+        self._measure_across(at)
         self._align_knots(ground)
         self.fade = np.zeros(n)
         self.fade[on_ring >= 0] = 1
@@ -112,13 +115,21 @@ class Lips:
         self.around = np.where(ringed, 1.0, np.where(near, smooth(self.away / reach, 1.0, 0.06), 0.0))
         self.around[inside] = self.fade[inside]
 
+    def _measure_across(self, at: Float64) -> None:
+        """Make w the way across the lip: where rings are close together, it changes little."""
+        red = np.array(self.rings[MEET : BORDER + 1])
+        way = np.cumsum(np.linalg.norm(np.diff(at[red], axis=0), axis=2), axis=0)
+        share = way / way[-1]
+        self.w[red[1:]] = (np.roll(share, 1, axis=1) + 2 * share + np.roll(share, -1, axis=1)) / 4
+        self.w[np.array(self.rings[BORDER:])] = 1
+
     def _align_knots(self, ground: Ground) -> None:
         """Stretch u so that the feature points between middle and corner are at 0.5."""
         for is_upper, names in ((True, ("2.6", "8.5")), (False, ("2.8", "8.7"))):
             inner, outer = (float(self.u[ground.points[name]]) for name in names)
-            for ring in self.rings:
+            for k, ring in enumerate(self.rings):
                 mine = np.array([i for i in ring if self.is_upper[i] == is_upper])
-                half = inner + (outer - inner) * self.w[mine[0]]
+                half = inner + (outer - inner) * np.clip((k - MEET) / (BORDER - MEET), 0, 1)
                 u = np.abs(self.u[mine])
                 self.u[mine] = np.sign(self.u[mine]) * np.interp(u, [0, half, 1], [0, 0.5, 1])
 

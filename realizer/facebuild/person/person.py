@@ -12,7 +12,7 @@ from realizer.face.mesh_geometry import fit_ball
 from realizer.facebuild.parts import smooth
 from realizer.facebuild.person import makehuman
 from realizer.facebuild.person.base_mesh import Ground
-from realizer.facebuild.person.lips import close_lips
+from realizer.facebuild.person.lips import Lips, close_lips
 from realizer.tables import csv_rows
 from realizer.tables.arkit_names import other_side
 
@@ -28,6 +28,9 @@ NOD = np.array([0.0, -0.082, -0.012])  # the head nods about a point below and b
 JAW_AXIS = np.array([0, -0.028, -0.004])
 CORNER = (0.007, 0.006, 0.009)  # m; half axes of the region smoothed at a corner of the mouth,
 RELAXED = 5  # and how many times
+ROUNDED = 4  # times that the lower lip is smoothed along itself: shape targets bend it like a polygon;
+TAUBIN = 0.5, -0.52  # the steps of a time, which keep its size (Taubin 1995),
+ENDS = 0.95, 0.65  # between these u, less towards the corners
 ARCH = 0.74, 0.80  # half axes of the teeth's arch, in half widths and depths of the data's arches
 
 
@@ -101,8 +104,17 @@ def identity(mesh: makehuman.BaseMesh, data: Path, targets: Mapping[str, float])
 
 
 def _relaxed(ground: Ground) -> Float64:
-    """Return the base mesh (n, 3) with smooth corners of the mouth: shape targets bunch vertices there."""
-    at = ground.at
+    """Return the base mesh (n, 3) with smooth corners of the mouth, where shape targets bunch vertices.
+
+    The lower lip gets a round border.
+    """
+    at, lips = ground.at.copy(), Lips(ground)
+    rings = np.array(lips.rings)
+    share = smooth(np.abs(lips.u[rings]), *ENDS) * ~lips.is_upper[rings]
+    for step in TAUBIN * ROUNDED:
+        line = at[rings]
+        beside = (np.roll(line, 1, axis=1) + np.roll(line, -1, axis=1)) / 2
+        at[rings] += step * share[..., None] * (beside - line)
     near = np.maximum(*(ground.ellipsoid(ground.point(name), CORNER) for name in ("2.4", "2.5")))[:, None]
     for _ in range(RELAXED):
         at = at + near * (ground.smoothed(at) - at)

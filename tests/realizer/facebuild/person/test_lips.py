@@ -47,6 +47,12 @@ def test_close_lips_leaves_a_hair_between_them(ground: Ground) -> None:
     assert (np.linalg.norm(ground.at[moved] - ground.point("2.2"), axis=1) < 0.04).all()
 
 
+def test_lips_measure_the_way_across_by_its_length(ground: Ground, mask_lips: Lips) -> None:
+    spoke = [ring[0] for ring in mask_lips.rings[MEET : BORDER + 1]]
+    way = np.linalg.norm(np.diff(ground.at[spoke], axis=0), axis=1)
+    assert mask_lips.w[spoke] == pytest.approx(np.r_[0, np.cumsum(way) / way.sum()], abs=0.05)
+
+
 def test_lip_fields_move_their_feature_points_by_one(ground: Ground, mask_lips: Lips) -> None:
     made = lip_fields(ground, mask_lips)
     assert set(made) == {*range(4, 14), 16, 17, 18, *range(51, 61)}

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from realizer.facebuild.person.base_mesh import Ground
+from realizer.facebuild.person.lips import BORDER, LOWER_MIDDLE, Lips
 from realizer.facebuild.person.makehuman import BaseMesh
-from realizer.facebuild.person.person import Person, _landmarks, identity
+from realizer.facebuild.person.person import Person, _landmarks, _relaxed, identity
 
 pytestmark = pytest.mark.xdist_group("mask")
 AT = np.array([[3, 1, 0], [-3, 1, 0], [4, 1, 0], [-4, 1, 0], [0, -2, 1], [2, -2, 0], [-2, -2, 0.0]])
@@ -49,6 +50,15 @@ def test_identity_weighs_targets_of_both_sides(mesh: BaseMesh, data: Path) -> No
 def test_identity_is_even_whatever_the_targets(mesh: BaseMesh, data: Path) -> None:
     at = identity(mesh, data, {"cheek/odd": 1.0})
     assert at[mesh.mirror()] == pytest.approx(at * [-1, 1, 1])
+
+
+def test_relaxed_rounds_the_lower_lip_and_keeps_its_size(ground: Ground, mask_lips: Lips) -> None:
+    ring = mask_lips.rings[BORDER]
+    bent, middle = ground.at.copy(), ring[LOWER_MIDDLE]
+    bent[middle, 1] -= 0.002
+    made = _relaxed(Ground(ground.mesh, bent, ground.points, ground.shape))
+    assert abs(made[middle, 1] - ground.at[middle, 1]) < 0.001
+    assert np.ptp(made[ring], axis=0)[:2] == pytest.approx(np.ptp(ground.at[ring], axis=0)[:2], rel=0.1)
 
 
 def test_person_turns_whole_above_the_jaw_and_not_below_the_neck(person: Person) -> None:
