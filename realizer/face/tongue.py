@@ -18,15 +18,16 @@ STATIONS = 25  # directions around the arch, from the right over the front to th
 HALF = 0.14  # rad; a station sees the teeth up to so far beside it
 CROWN = 0.0065  # m from the biting edge; the thickness of the teeth is measured down to there
 STEEP = 4.0  # metres up (down) from a biting edge for each metre inwards: the teeth's inner sides,
-GENTLE = 0.6  # and for each metre outwards, or in front of the lips
+GENTLE = 0.8  # and for each metre outwards, or in front of the lips
 DEEP = 0.014, 0.030  # m above the upper edge that the palate, and below the lower one that the floor is
 THIN = 0.0012  # m; the tongue does not go between teeth or lips that are closer
-NARROW = 0.45  # of the mouth's half width that a tongue takes between the lips
+NARROW = 0.55  # of the mouth's half width that a tongue takes between the lips
 PASSES = 7.0  # metres beyond them for each metre that they are further apart
 APART = 0.0004  # m between tongue and teeth
 NEAR = 0.003  # m
+FAR = 0.010  # m behind the lips, which leave all the room that there is from there back
 SOFT = 0.0028  # m more between tongue and lips, which bulge between their points
-LIP, RED = 0.004, 0.010  # m behind and before the line where the lips meet: their thickness
+LIP, RED = 0.004, 0.008  # m behind and before the line where the lips meet: their thickness
 UPPER, LOWER = ("2.5", "2.7", "2.2", "2.6", "2.4"), ("2.5", "2.9", "2.3", "2.8", "2.4")
 
 
@@ -38,15 +39,19 @@ class TongueRoom:
         self._tongue = slice(*face.parts["tongue"])
         upper = np.arange(*face.parts["upper_teeth"])
         self._back = float(at[upper[np.abs(at[upper, 0]).argmax()], 2])
-        self._upper = self._row(at, upper, -1)
-        self._lower = self._row(at, np.arange(*face.parts["lower_teeth"]), 1)
-        self._lips = [np.array([face.feature_points[name] for name in names]) for names in (UPPER, LOWER)]
+        rows = self._row(at, upper, -1), self._row(at, np.arange(*face.parts["lower_teeth"]), 1)
+        self._edges, self._inner, self._outer = (np.array(each) for each in zip(*rows, strict=True))
+        self._lips = np.array([[face.feature_points[name] for name in names] for names in (UPPER, LOWER)])
         tip = np.array([face.feature_points[name] for name in ("6.1", "6.2", "6.3", "6.4")])
-        self._watched = np.concatenate([*self._lips, self._lower[0], tip])
+        self._watched = np.concatenate([self._lips.ravel(), self._edges[1], tip])
         self._rest = at[self._watched]
+        x, z = at[self._tongue, 0], at[self._tongue, 2]
+        self._half = np.array([np.abs(x[np.abs(z - here) < NEAR]).max() for here in z], np.float32)
         # Where a tongue at rest is outside by itself, it may be as far outside while it is near its rest.
-        self._out = at[self._tongue] - self._inside(at[None], at[None, self._tongue])[0]
-        self._home = at[self._tongue]
+        home = at[self._tongue]
+        out = home - self._inside(at[None], home[None])[0]
+        self._loose = np.flatnonzero(np.abs(out).max(axis=1) > 1e-7)
+        self._out, self._home = out[self._loose], home[self._loose]
 
     def __call__(self, out: Float32) -> None:
         """Move the tongue of deformed faces (n, n_vertices, 3) inside, before their heads turn, in place."""
@@ -54,10 +59,13 @@ class TongueRoom:
         frames = np.flatnonzero(moved)
         if len(frames):
             faces = out if len(frames) == len(out) else out[frames]
-            tongue = faces[:, self._tongue]
-            away = np.linalg.norm(tongue - self._home, axis=2, keepdims=True)
+            tongue = faces[:, self._tongue].copy()
+            away = np.linalg.norm(tongue[:, self._loose] - self._home, axis=2, keepdims=True)
             slack = self._out * np.maximum(1 - away / NEAR, 0)
-            out[frames, self._tongue] = self._inside(faces, tongue - slack) + slack
+            tongue[:, self._loose] -= slack
+            inside = self._inside(faces, tongue)
+            inside[:, self._loose] += slack
+            out[frames, self._tongue] = inside
 
     def _row(self, at: Float32, part: Index, up: int) -> tuple[Index, Float32, Float32]:
         """Return the vertex of the biting edge at each station, and how far teeth reach beside it."""
@@ -79,53 +87,64 @@ class TongueRoom:
     def _polar(self, x: Any, z: Any) -> tuple[Any, Any]:
         """Return distance and direction from the middle of the arch; behind it only x counts."""
         ahead = np.maximum(z - self._back, 0)
-        return np.hypot(x, ahead), np.arctan2(x, ahead)
+        return np.sqrt(x * x + ahead * ahead), np.arctan2(x, ahead)
 
     def _inside(self, faces: Float32, tongue: Float32) -> Float32:
         """Return the tongue (n, m, 3) inside the room of its face (n, n_vertices, 3)."""
-        x, y, z = tongue.transpose(2, 0, 1)
-        # It narrows where it goes between the lips.
-        corners = faces[:, self._lips[0]][:, [0, -1]]
-        wide = NARROW * np.abs(corners[..., 0]).min(axis=1)[:, None]
-        wide = wide + np.maximum(faces[:, self._lips[0][2], 2][:, None] - LIP - z, 0)
-        x = np.clip(x, -wide, wide)
-        lips = [_along(faces[:, line], x) for line in self._lips]
-        meet = np.minimum(lips[0][1], lips[1][1])
-        behind = meet - LIP
-        opening = np.maximum(lips[0][0] - lips[1][0] - THIN, 0)
-        z = np.minimum(z, behind + PASSES * opening)
+        x, y, z = (np.ascontiguousarray(column) for column in tongue.transpose(2, 0, 1))
+        lips = faces[:, self._lips]
+        # Far behind the lips only the teeth are in the way.
+        near = np.flatnonzero(z.max(axis=1) > lips[:, :, 1:-1, 2].min(axis=(1, 2)) - LIP - FAR)
+        if len(near):
+            x[near], z[near], meet, *lines = self._between_lips(lips[near], x[near], z[near])
         around, turn = self._polar(x, z)
-        rows = [self._teeth(faces, row, turn) for row in (self._upper, self._lower)]
-        gap = np.maximum(rows[0][2] - rows[1][2] - THIN, 0)
-        reach = np.minimum(rows[0][0], rows[1][0]) - APART + PASSES * gap
+        upper, lower = self._teeth(faces, turn)
+        gap = np.maximum(upper[2] - lower[2] - THIN, 0)
+        reach = np.minimum(upper[0], lower[0]) - APART + PASSES * gap
         share = np.minimum(reach / np.maximum(around, 1e-6), 1)
         x, z, around = x * share, np.minimum(z, self._back + (z - self._back) * share), around * share
-        # The lips leave more room behind them and well before them.
-        free = STEEP * np.maximum(behind - z, 0) + GENTLE * np.maximum(z - meet - RED, 0)
         bounds = []
-        for (inner, outer, edge), lip, up in zip(rows, lips, (1, -1), strict=True):
-            deep = DEEP[up < 0]
-            vault = deep * np.tanh(STEEP / deep * np.maximum(inner - around, 0))
-            teeth = up * edge + vault + GENTLE * np.maximum(around - outer, 0)
-            bounds.append(up * (np.minimum(teeth, up * lip[0] + free - SOFT) - APART))
+        for (inner, outer, edge), deep, up in zip((upper, lower), DEEP, (1, -1), strict=True):
+            vault = deep * np.tanh((STEEP / deep) * np.maximum(inner - around, 0))
+            bound = up * edge + vault + GENTLE * np.maximum(around - outer, 0)
+            if len(near):
+                # The lips leave more room behind them and well before them.
+                free = STEEP * np.maximum(meet - LIP - z[near], 0)
+                free += GENTLE * np.maximum(z[near] - meet - RED, 0)
+                bound[near] = np.minimum(bound[near], up * lines[up < 0] + free - SOFT)
+            bounds.append(up * (bound - APART))
         high, low = bounds
         middle = (high + low) / 2
         y = np.clip(y, np.minimum(low, middle), np.maximum(high, middle))
         return np.stack([x, y, z], axis=-1)
 
-    def _teeth(self, faces: Float32, row: tuple[Index, Float32, Float32], turn: Any) -> list[Any]:
-        """Return inner and outer distance and the height of the teeth's edges in directions (n, m)."""
-        edge, inner, outer = row
-        at = faces[:, edge]
+    def _between_lips(self, lips: Float32, x: Any, z: Any) -> tuple[Any, Any, Any, Any, Any]:
+        """Return x and z (n, m) narrowed to the lips (n, 2, 5, 3), where these meet, and their heights."""
+        wide = NARROW * np.abs(lips[:, 0, [0, -1], 0]).min(axis=1)[:, None]
+        wide = wide + np.maximum(lips[:, 0, 2, 2][:, None] - LIP - z, 0)
+        x = np.clip(x * np.minimum(wide / self._half, 1), -wide, wide)
+        (upper, upper_z), (lower, lower_z) = (_along(lips[:, k], x) for k in (0, 1))
+        meet = np.minimum(upper_z, lower_z)
+        z = np.minimum(z, meet - LIP + PASSES * np.maximum(upper - lower - THIN, 0))
+        return x, z, meet, upper, lower
+
+    def _teeth(self, faces: Float32, turn: Any) -> Any:
+        """Return the edges of the upper and lower teeth in directions (n, m): (2, 3, n, m).
+
+        Each is inner and outer distance and height.
+        """
+        at = faces[:, self._edges]
         around = self._polar(at[..., 0], at[..., 2])[0]
+        rows = np.stack([around - self._inner, around + self._outer, at[..., 1]])
+        steps = np.diff(rows, axis=3, append=rows[..., -1:])
         place = (turn / np.pi + 0.5) * (STATIONS - 1)
-        first = np.minimum(place.astype(np.intp), STATIONS - 2)
+        first = place.astype(np.int32)
         share = (place - first).astype(np.float32)
-        each = np.arange(len(faces))[:, None]
-        return [
-            values[each, first] * (1 - share) + values[each, first + 1] * share
-            for values in (around - inner, around + outer, at[..., 1])
-        ]
+        first += np.arange(len(faces), dtype=np.int32)[:, None] * STATIONS
+        start, step = (
+            np.take(values.transpose(2, 0, 1, 3).reshape(6, -1), first, axis=1) for values in (rows, steps)
+        )
+        return (start + share * step).reshape(2, 3, *turn.shape)
 
 
 @lru_cache(maxsize=8)
