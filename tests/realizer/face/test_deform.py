@@ -81,11 +81,7 @@ def test_deform_moves_a_feature_point_by_value_times_fapu(face: Face, row: Fap) 
         move = moved(face, mouth | {row.fap: value}) - moved(face, mouth)
         move = move[face.feature_points[row.feature_point]]
         asked = value * face.fapu.metres(row.unit)
-        went = move @ np.array(WAYS[row.direction])
-        if row.fap == 44 and face.name == "ben":  # his teeth leave the tip less room
-            assert 0.0 <= went / asked < 1.02
-            continue
-        assert went == pytest.approx(asked, rel=0.02)
+        assert move @ np.array(WAYS[row.direction]) == pytest.approx(asked, rel=0.02)
 
 
 def test_deform_lowers_the_chin_by_open_jaw_without_the_lips(face: Face) -> None:
@@ -97,7 +93,7 @@ def test_deform_lowers_the_chin_by_open_jaw_without_the_lips(face: Face) -> None
             x, y, z = move[face.feature_points[name]]
             assert np.hypot(x, y) < 0.05 * asked, name
             # Stretched cheeks draw the corners backwards.
-            assert -0.55 * asked < z < 0.05 * asked, name
+            assert -0.5 * asked < z < 0.05 * asked, name
 
 
 def test_deform_draws_the_corners_back_while_the_chin_falls(face: Face) -> None:
@@ -299,8 +295,7 @@ def test_deform_flips_no_triangle_at_usual_values(face: Face, row: Fap) -> None:
             continue
         now = ups(deform(face, rows({row.fap: v}))[0].astype(float))
         flipped = (rest * now).sum(axis=1) < -0.2 * np.linalg.norm(rest, axis=1) * np.linalg.norm(now, axis=1)
-        # At the corners of ida's mouth a few small ones do.
-        assert (flipped & ~inside).sum() <= 4 * (face.name == "ida"), np.flatnonzero(flipped & ~inside)[:10]
+        assert not (flipped & ~inside).any(), np.flatnonzero(flipped & ~inside)[:10]
     assert first == 0
 
 
