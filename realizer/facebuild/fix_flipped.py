@@ -15,7 +15,7 @@ from realizer.facebuild.mpeg4.fap_limits import OPEN_JAW, ROLLED, accompanying_f
 from realizer.tables import faps
 
 ROUNDS = 60
-PASSES = 3  # repaired neighbours change the limits of a field
+PASSES = 6  # repaired neighbours change the limits of a field
 STILL = 1e-4
 SHARE = 0.5  # of the way to the mean of the triangles that turn over, each round
 

@@ -7,6 +7,7 @@ from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.face.model import Face
 from realizer.tables import Fap, faps
+from tests.fap_measures import Measure
 from tests.rows import each_row
 from tests.shipped import FACES, FOLDERS
 
@@ -32,6 +33,7 @@ STRAIGHT = [row for row in LOW_LEVEL if row.name not in SPECIAL]
 UPPER = ("2.2", "2.6", "2.7", "8.1", "8.5", "8.6")
 LOWER = ("2.3", "2.8", "2.9", "8.2", "8.7", "8.8")
 CORNERS = ("2.4", "2.5", "8.3", "8.4")
+WIDE = {3: 1100, 5: -1350, 10: -1190, 11: -1190, 52: -1350, 57: -1180, 58: -1180}  # about as AU27
 OPEN = {3: 600, 5: -600, 10: -540, 11: -540, 52: -600, 57: -540, 58: -540}
 
 
@@ -305,6 +307,15 @@ def test_deform_moves_a_lip_evenly_by_equal_faps(face: Face) -> None:
     assert np.ptp(inner) < 0.02 * abs(inner[1])
     skin = slice(*face.parts["skin"])
     assert move[skin].min() > 1.04 * inner[1]  # nothing between the points sinks below them
+
+
+def test_deform_opens_a_lower_lip_without_lumps(face: Face) -> None:
+    measure = Measure.of(face)
+    move = measure.moves(WIDE)[measure.skin]
+    lip = face.vertices[[face.feature_points[name] for name in LOWER]]
+    away = np.linalg.norm(face.vertices[measure.skin][:, None] - lip, axis=2).min(axis=1)
+    off = np.linalg.norm(move - measure.average @ move, axis=1)[measure.seen & (away < 0.006)]
+    assert np.percentile(off, 95) < 0.0011
 
 
 def test_deform_of_batches_equals_single_frames(face: Face) -> None:
