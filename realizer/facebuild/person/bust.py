@@ -34,7 +34,7 @@ LOWER_ARCH = 0.0015  # m that the lower arch is narrower at each side
 # The tongue at rest: m that its tip lies behind the biting edge of the lower teeth, and below it; half its
 # width in half widths of the arch.
 TONGUE = 0.0088, 0.0055, 0.70
-TIP = 0.55, 0.50  # from that share of its length on the tongue gets round; its tip has this share of the width
+TIP = 0.55, 0.50  # from that share of its length on it gets round; its tip has this share of the width
 
 
 def assemble(person: Person, lips: Lips, lids: list[Lid], recipe: Recipe) -> list[Part]:

@@ -33,7 +33,8 @@ STRAIGHT = [row for row in LOW_LEVEL if row.name not in SPECIAL]
 UPPER = ("2.2", "2.6", "2.7", "8.1", "8.5", "8.6")
 LOWER = ("2.3", "2.8", "2.9", "8.2", "8.7", "8.8")
 CORNERS = ("2.4", "2.5", "8.3", "8.4")
-WIDE = {3: 1100, 5: -1350, 10: -1190, 11: -1190, 52: -1350, 57: -1180, 58: -1180}  # about as AU27
+CORNERS_DOWN = {12: -480, 13: -480, 59: -420, 60: -420}
+WIDE = {3: 1100, 5: -1350, 10: -1190, 11: -1190, 52: -1350, 57: -1180, 58: -1180} | CORNERS_DOWN  # as AU27
 OPEN = {3: 600, 5: -600, 10: -540, 11: -540, 52: -600, 57: -540, 58: -540}
 
 
@@ -315,7 +316,7 @@ def test_deform_opens_a_lower_lip_without_lumps(face: Face) -> None:
     lip = face.vertices[[face.feature_points[name] for name in LOWER]]
     away = np.linalg.norm(face.vertices[measure.skin][:, None] - lip, axis=2).min(axis=1)
     off = np.linalg.norm(move - measure.average @ move, axis=1)[measure.seen & (away < 0.006)]
-    assert np.percentile(off, 95) < 0.0011
+    assert np.percentile(off, 95) < 0.001
 
 
 def test_deform_of_batches_equals_single_frames(face: Face) -> None:
