@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float64
-from realizer.face.features import Point, write_features
+from realizer.face.features import Point, fapu_of, write_features
 from realizer.face.mesh_geometry import mirror_twins, nearest_vertex
 from realizer.facebuild.face_files import to_bytes, write_fields, write_head, write_mesh
 from realizer.facebuild.fix_flipped import without_flips
@@ -113,10 +113,12 @@ def _mend(rows: dict[int, Float64], skin: Part, points: dict[str, Point], person
     twin = mirror_twins(skin.vertices, PAIRED)
     alone = twin < 0
     twin[alone] = np.flatnonzero(alone)
+    # The units of the face that is written: the eyes' centres are known by now.
+    fapu = fapu_of({name: np.array(point.place, np.float32) for name, point in points.items()})
     mended = without_flips(
         {number: row[:n] for number, row in rows.items()}, skin.vertices, skin.triangles,
         {name: point.vertex for name, point in points.items() if point.vertex < n},
-        person.ground.fapu(), person.jaw_pivot, twin,
+        fapu, person.jaw_pivot, twin,
     )  # fmt: skip
     for number, row in mended.items():
         rows[number][:n][~alone] = row[~alone]
