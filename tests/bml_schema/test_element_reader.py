@@ -169,7 +169,7 @@ def test_attributes_may_have_blanks_around_numbers() -> None:
     # A gesture has one stroke.
     block = only("<gesture id='g' lexeme='BEAT' repetition='3'/><wait id='w' start='g:stroke:3'/>")
     slip, problem = block.problems
-    assert slip.text.startswith("repetition: no attribute of <gesture>")
+    assert slip.text.endswith("without <gesture repetition>")
     assert problem.text == 'start: wanted stroke:1..1 of "g", got stroke:3'
 
 

@@ -113,7 +113,7 @@ def test_chart_lists_behaviours_that_ended_before_they_began(lines) -> None:
         '<bml id="b" composition="REPLACE"><wait id="w" duration="1"/></bml>',
     )
     assert ended.rows == ()
-    assert [(d.id, d.element, d.type) for d in ended.dropped] == [("n", "head", "INTERRUPTED")]
+    assert [(d.id, d.element, d.type) for d in ended.dropped] == [("n", "head", "REVOKED")]
     assert new.state == "LURKING"
 
 
