@@ -96,7 +96,7 @@ def test_deform_lowers_the_chin_by_open_jaw_without_the_lips(face: Face) -> None
             x, y, z = move[face.feature_points[name]]
             assert np.hypot(x, y) < 0.05 * asked, name
             # Stretched cheeks draw the corners backwards.
-            assert -0.5 * asked < z < 0.05 * asked, name
+            assert -0.52 * asked < z < 0.05 * asked, name
 
 
 def test_deform_draws_the_corners_back_while_the_chin_falls(face: Face) -> None:

@@ -73,6 +73,7 @@ class Run:
 
     session: Session
     owed: dict[int, Speak] = field(default_factory=dict)
+    now: float = 0.0  # time never goes back
 
     def collect(self) -> None:
         self.owed |= {
@@ -81,8 +82,10 @@ class Run:
 
     def until(self, t: float) -> None:
         while (due := next_wake(self.session)) <= t:
-            self.session.tick(max(due, 0.0))
+            self.now = max(due, self.now)
+            self.session.tick(self.now)
             self.collect()
+        self.now = t
 
 
 class Pair:
@@ -168,7 +171,9 @@ class Pair:
         session = Session("s", SETTINGS, 0.0, named=True, epoch=EPOCH)
         _, owed = restore_session(session, kept, spoken)
         session.journal = JournalWriter("s", self.journal, saved=kept)
-        self.torn = Run(session, {effect.id: effect for effect in owed if isinstance(effect, Speak)})
+        self.torn = Run(
+            session, {effect.id: effect for effect in owed if isinstance(effect, Speak)}, self._now
+        )
         self.restored += bool(kept.parts)
         for run in (self.torn, self.whole):
             run.until(self._now)
