@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.array_types import Float32, Float64, Int32
-from realizer.face.mesh_geometry import edges_of, half_edges
+from realizer.core.array_types import Bool, Float32, Float64, Int32
+from realizer.face.mesh_geometry import edges_of, half_edges, part_triangles
 from realizer.face.model import Face
 
 PARTS = ("skin", "tongue", "hair", "shirt")
@@ -58,25 +58,23 @@ class Subdivision:
 def subdivided(face: Face) -> Subdivision:
     """Return the face with its coarse parts subdivided once."""
     n = len(face.vertices)
-    ranges = tuple(sorted(face.parts[name] for name in PARTS if _is_coarse(face, name)))
-    mine = np.zeros(n, np.int32)  # number of the range, from 1
-    for k, (first, last) in enumerate(ranges):
-        mine[first:last] = k + 1
-    inside = (mine[face.triangles] == mine[face.triangles[:, :1]]).all(axis=1) & (
-        mine[face.triangles[:, 0]] > 0
-    )
+    coarse_parts = {name: face.parts[name] for name in PARTS if _is_coarse(face, name)}
+    ranges = tuple(sorted(coarse_parts.values()))
+    end = np.zeros(n, np.int32)  # last + 1 vertex of the coarse part that a vertex belongs to, or 0
+    for first, last in ranges:
+        end[first:last] = last
+    ends = end[face.triangles]
+    inside = (ends[:, 0] > 0) & (ends == ends[:, :1]).all(axis=1)
     coarse = face.triangles[inside]
-    edges, _ = edges_of(coarse)
-    ends = np.array([0, *(last for _, last in ranges)])[mine[edges[:, 0]]] if len(edges) else np.zeros(0)
-    order = np.argsort(np.concatenate([np.arange(n), ends - 0.5]), kind="stable")
+    edges, counts = edges_of(coarse)
+    order = np.argsort(np.concatenate([np.arange(n), end[edges[:, 0]] - 0.5]), kind="stable")
     place = np.argsort(order).astype(np.int32)
+    added = {name: int((end[edges[:, 0]] == last).sum()) for name, (_, last) in coarse_parts.items()}
     parts = {
-        name: (int(place[first]), int(place[last - 1]) + 1) for name, (first, last) in face.parts.items()
+        name: (int(place[first]), int(place[last - 1]) + 1 + added.get(name, 0))
+        for name, (first, last) in face.parts.items()
     }
-    for name, (first, last) in face.parts.items():
-        if (first, last) in ranges:
-            parts[name] = parts[name][0], parts[name][1] + int((ends == last).sum())
-    smooth, mean = _rules(n, coarse)
+    smooth, mean = _rules(n, coarse, edges, counts != 2)
     split = Subdivision(face, place[:n], place[n:], smooth, mean, ranges)
     colours, occlusion, gloss = (
         split._joined(values, mean @ values)
@@ -97,10 +95,7 @@ def subdivided(face: Face) -> Subdivision:
 
 
 def _is_coarse(face: Face, name: str) -> bool:
-    if name not in face.parts:
-        return False
-    first, last = face.parts[name]
-    return bool(0 < ((face.triangles >= first) & (face.triangles < last)).all(axis=1).sum() <= MOST)
+    return name in face.parts and 0 < len(part_triangles(face.triangles, face.parts[name])) <= MOST
 
 
 def _split(triangles: Int32, edges: Int32, n: int) -> Int32:
@@ -113,23 +108,20 @@ def _split(triangles: Int32, edges: Int32, n: int) -> Int32:
 
 def _numbers(triangles: Int32, edges: Int32, n: int) -> Int32:
     """Return the number (3 m,) of the edge at each side of triangles (m, 3), in the order of `half_edges`."""
-    keys, sides = (pairs[:, 0].astype(np.int64) * n + pairs[:, 1] for pairs in (
-        edges, np.sort(half_edges(triangles), axis=1)
-    ))  # fmt: skip
+    sides = np.sort(half_edges(triangles), axis=1)
+    keys, sides = (pairs[:, 0].astype(np.int64) * n + pairs[:, 1] for pairs in (edges, sides))
     return np.asarray(np.searchsorted(keys, sides), np.int32)
 
 
-def _rules(n: int, triangles: Int32) -> tuple[Any, Any]:
-    """Return sparse matrices (k, n) of the k edges' middles: smooth places, and plain means.
+def _rules(n: int, triangles: Int32, edges: Int32, rim: Bool) -> tuple[Any, Any]:
+    """Return sparse matrices (k, n) for the middles of edges (k, 2): smooth places, and plain means.
 
     Loop's rules pull a surface inwards. So the mesh is pushed out by as much first, and what is left at the
     ends of an edge is added to its middle: vertices stay where they are.
     """
     import scipy.sparse as sp
 
-    edges, counts = edges_of(triangles)
     count = len(edges)
-    rim = counts != 2
 
     def graph(pairs: Int32) -> Any:
         i, j = pairs.T

@@ -204,7 +204,7 @@ class ActiveBlock:
         wait.block.followers.append(self)
 
     def pass_on_dependencies(self) -> None:
-        """Let the blocks that are appended to it, and to what it waits for, wait for the latter directly."""
+        """Let the blocks that were appended to it wait for what it waits for, because it will not start."""
         own = [
             w.block for w in self.dependencies if w.block.character == self.character and not w.block.is_done
         ]

@@ -149,7 +149,7 @@ class BlockTimeline:
             self.mark_changed()
 
     def reorder(self, playing: ActiveBlock) -> None:
-        """Let a waiting block and its followers report behind what they wait for.
+        """Order a waiting block and its followers after the blocks that they wait for.
 
         Raises:
             graphlib.CycleError: blocks wait for each other.

@@ -128,8 +128,7 @@ def prosody_channels(
                 continue
             if gesture.region == "head" and style.size != 1.0:
                 gesture = gesture.scaled(style.size)
-            leaves = min(_moving(claims, gesture.region, gesture), default=np.inf)
-            leaves = min(leaves, talk.until)
+            leaves = min((talk.until, *_moving(claims, gesture.region, gesture)))
             if gesture.region == "brows":
                 for known in _moving(claims, "frown", gesture):
                     if known <= gesture.begin:

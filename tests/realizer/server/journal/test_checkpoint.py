@@ -133,7 +133,7 @@ class Pair:
         self._both(pack_clip(ClipPiece(self.random.choice("cd"), number, rate, sound, number == 1)))
 
     def _hear(self) -> None:
-        """Let a character hear half a turn, which another call may go on with."""
+        """Send sound that a character hears; another call may continue the same turn."""
         sound = self.random.choice((bytes(RATE), self.random.randbytes(RATE)))
         id = self.random.choice(("heard:", "heard:Ben"))
         self._both(pack_clip(ClipPiece(id, 0, RATE, sound, self.random.random() < 0.1)))
