@@ -15,7 +15,9 @@ from realizer.core.errors import FaceError
 from realizer.core.registry import Registry
 from realizer.core.toml_text import parse_toml
 from realizer.face.basis import basis_from
+from realizer.face.cards import read_cards
 from realizer.face.features import fapu_of, read_features
+from realizer.face.maps import read_maps
 from realizer.face.mesh_checks import range_faults, value_faults
 from realizer.face.model import Face
 from realizer.face.reading import face_errors, read_arrays
@@ -238,4 +240,6 @@ def load_folder(folder: Path, deformer: str | None) -> Face:
         cameras=head.get("cameras", {}),
         inputs=_model_inputs(model),
         model=model,
+        maps=read_maps(folder, head, mesh),
+        cards=read_cards(folder, head, len(vertices)),
     )

@@ -13,6 +13,8 @@ from realizer.tables import faps
 
 if TYPE_CHECKING:
     from realizer.face.au.model import Model
+    from realizer.face.cards import Cards
+    from realizer.face.maps import Maps
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,8 @@ class Face:
         inputs: names of the columns of a pose, from which `face.deform` computes vertices: the 68 FAPs,
             then the inputs of the model (`au.columns`).
         model: functions by which action units displace points; None if FAPs move everything.
+        maps: pictures of the surface; None if colours of vertices are all there is.
+        cards: strips with pictures of hairs that follow the mesh, if there are any.
     """
 
     name: str
@@ -72,6 +76,8 @@ class Face:
     cameras: Mapping[str, Any] = field(default_factory=dict)
     inputs: tuple[str, ...] = field(default_factory=lambda: tuple(row.name for row in faps()))
     model: Model | None = None
+    maps: Maps | None = None
+    cards: Cards | None = None
 
     @property
     def bounds(self) -> tuple[Float32, Float32]:

@@ -30,6 +30,7 @@ class Subdivision:
         smooth: sparse (k, n) float32; places of the vertices on edges = smooth @ original vertices.
         mean: sparse (k, n) float32, the mean of the ends of each edge.
         ranges: first and last + 1 vertex of the parts that are subdivided, in the original face.
+        split: (m,) which of the original triangles have become four; those come first, in four runs.
     """
 
     face: Face
@@ -38,6 +39,14 @@ class Subdivision:
     smooth: Any
     mean: Any
     ranges: tuple[tuple[int, int], ...]
+    split: Bool
+
+    def corners(self, values: Float32) -> Float32:
+        """Return values of the drawn triangles' corners (m', 3, k), for those of the original (m, 3, k)."""
+        a, b, c = np.moveaxis(values[self.split], 1, 0)
+        ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+        four = _four(a, b, c, ab, bc, ca)
+        return np.concatenate([*(np.stack(corners, axis=1) for corners in four), values[~self.split]])
 
     def __call__(self, vertices: Float32, normals: Float32) -> tuple[Float32, Float32]:
         """Return vertices and normals (n + k, 3) to draw, for those of the original, (n, 3) each.
@@ -75,7 +84,7 @@ def subdivided(face: Face) -> Subdivision:
         for name, (first, last) in face.parts.items()
     }
     smooth, mean = _rules(n, coarse, edges, counts != 2)
-    split = Subdivision(face, place[:n], place[n:], smooth, mean, ranges)
+    split = Subdivision(face, place[:n], place[n:], smooth, mean, ranges, inside)
     colours, occlusion, gloss = (
         split._joined(values, mean @ values)
         for values in (face.colours.astype(np.float32), face.occlusion, face.gloss)
@@ -102,8 +111,12 @@ def _split(triangles: Int32, edges: Int32, n: int) -> Int32:
     """Return four triangles for each, over vertices and then the middles of edges (k, 2) from n on."""
     ab, bc, ca = n + _numbers(triangles, edges, n).reshape(3, -1)
     a, b, c = triangles.T
-    four = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
-    return np.concatenate([np.stack(corners, axis=1) for corners in four])
+    return np.concatenate([np.stack(corners, axis=1) for corners in _four(a, b, c, ab, bc, ca)])
+
+
+def _four(a: Any, b: Any, c: Any, ab: Any, bc: Any, ca: Any) -> tuple[tuple[Any, Any, Any], ...]:
+    """Return the corners of the four triangles that a triangle is split into at the middles of its edges."""
+    return (a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)
 
 
 def _numbers(triangles: Int32, edges: Int32, n: int) -> Int32:
