@@ -8,6 +8,7 @@ from urllib.parse import quote, unquote_plus
 from xml.sax.saxutils import quoteattr, unescape
 
 from bml_schema import BlockProgress, PredictionFeedback, WarningFeedback, parse_feedback
+from bml_schema.errors import NOT_BML_1_0
 from realizer.server.transports.document_framing import DocumentFramer
 from realizer.server.transports.message_formats import Action, Disconnect, Inbound, Message
 
@@ -20,7 +21,8 @@ NAME = "bml-realizer"
 class _Speak:
     """A vrSpeak that has not ended, with the ids of its blocks: all that play or wait, and those planned.
 
-    `unread` are those without any feedback. `dropped` says why the first dropped behaviour was dropped.
+    `unread` are those without any feedback. `dropped` says why the first dropped behaviour was dropped,
+    `dialect` how a document that is not BML 1.0 was read, or that it was not.
     """
 
     agent: str
@@ -34,6 +36,7 @@ class _Speak:
     error: str = ""
     plays: bool = False
     dropped: str = ""
+    dialect: str = ""
 
     def message(self, verb: str, rest: str = "") -> str:
         return f"{verb} {self.agent} {self.recipient} {self.id} {rest}".rstrip()
@@ -109,12 +112,13 @@ class Vhmsg:
                 if not speak.started:
                     speak.started = True
                     return [self._message(speak.message("vrAgentBML", "start"))]
-            case WarningFeedback(id=id, text=text) if id in self._speaks:
+            case WarningFeedback(id=id, type=type, text=text) if id in self._speaks:
                 # A warning on the block itself refuses it, unless its prediction is already out.
                 speak = self._speaks[id]
                 if id not in speak.planned:
                     speak.error = text
                     return self._ended(speak, id)
+                speak.dialect = speak.dialect or (text if type == NOT_BML_1_0 else "")
             case WarningFeedback(id="<no id>", text=text):
                 # Documents are read in order: this one has an id that cannot be used.
                 for block, speak in self._speaks.items():
@@ -141,7 +145,8 @@ class Vhmsg:
     def _finish(self, speak: _Speak) -> list[Message]:
         """Return the messages at the end of a vrSpeak; an error if nothing of it has played."""
         if not speak.plays and not speak.interrupted:
-            speak.error = speak.error or speak.dropped
+            reasons = (speak.dropped, speak.dialect) if speak.dropped else ()
+            speak.error = speak.error or "; ".join(filter(None, reasons))
         if speak.error:
             error = " ".join(speak.error.split())
             ends = [("vrAgentBML", f"end error {error}"), ("vrSpeakFailed", error)]

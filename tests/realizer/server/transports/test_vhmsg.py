@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import json
+import math
 from urllib.parse import quote, quote_plus, unquote
 
 import pytest
 
 from bml_schema import BMLError, parse, read
 from bml_schema.feedback import BlockPrediction, BlockProgress, PredictionFeedback, WarningFeedback
+from realizer.core.options import PlayOptions
+from realizer.pipeline import plan
 from realizer.playback.feedback_events import parse_warning
+from realizer.playback.player import Player
 from realizer.server.transports.message_formats import Disconnect, Inbound
 from realizer.server.transports.vhmsg import Vhmsg
+from realizer.speech.silent import SilentVoice
 
 pytestmark = pytest.mark.xdist_group("brokers")
 
@@ -165,6 +170,15 @@ def test_vhmsg_ends_with_the_reason_if_nothing_plays() -> None:
     assert said(dialect.outgoing(progress("m1", "end", "DONE")))[0].endswith(
         "end error id: wanted one, got none"
     )
+
+
+def test_vhmsg_names_the_dialect_that_strict_bml_refuses() -> None:
+    dialect, player = vhmsg(), Player(PlayOptions(idle=False, strict_bml=True))
+    (document,) = spoken(dialect, 'vrSpeak Brad ALL m1 <act><bml><head type="NOD"/></bml></act>')
+    plan([document], player, SilentVoice())
+    messages = [m for f in player.due(math.inf) for m in said(dialect.outgoing(f.to_xml()))]
+    assert messages[1].startswith("vrAgentBML Brad ALL m1 end error line 1, /bml/head[1]: id: wanted")
+    assert messages[1].endswith("this is SmartBody's BML, which is not read in strict BML")
 
 
 @pytest.mark.parametrize("xml", ["", "hello", "speech_01.xml", "<act/>", "<bml><head", "<?xml?>"])
