@@ -331,8 +331,8 @@ light = click.option(
     "--light",
     metavar="NAME",
     callback=lambda context, parameter, value: check_light(value),
-    help="portrait (soft and warm), daylight (even, shows every feature) or evening (one cheek in shade).  "
-    "[default: portrait]",
+    help="portrait (soft and warm), daylight (even, shows every feature), evening (one cheek in shade), "
+    "studio (neutral, from both sides) or outdoors (low sun).  [default: portrait]",
 )
 background = click.option(
     "--background",

@@ -173,7 +173,9 @@ def face_of(image):  # type: ignore[no-untyped-def]
 def test_page_draws_like_stills_in_every_light(quiet_page) -> None:  # type: ignore[no-untyped-def]
     import numpy as np
 
-    for light in ("portrait", "daylight", "evening"):
+    from realizer.render.light import presets
+
+    for light in presets():
         quiet_page.evaluate("name => realizerPage.stage.shine(name)", light)
         here, there = stage_of(quiet_page), still(light, {})
         assert np.abs(face_of(here) - face_of(there)).mean() < 9, light

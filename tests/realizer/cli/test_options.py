@@ -51,7 +51,10 @@ def test_verbosity_may_come_before_or_after_the_command(args: list[str], tmp_pat
             ["-o", "x.png", "--camera", "top"],
             "camera: wanted one of front, three-quarter, profile, close, got",
         ),
-        (["-o", "x.png", "--light", "noon"], "light: wanted one of portrait, daylight, evening, got 'noon'"),
+        (
+            ["-o", "x.png", "--light", "noon"],
+            "light: wanted one of portrait, daylight, evening, studio, outdoors, got 'noon'",
+        ),
         (["-o", "x.png", "--background", "#12"], "wanted transparent or a colour such as #d8dde2, got '#12'"),
         (["-o", "x.mp4", "--background", "transparent"], "a .png with --at, can be transparent"),
     ],
@@ -66,7 +69,7 @@ def test_realize_refuses_an_unknown_camera_light_or_background(args: list[str], 
     ("args", "words"),
     [
         (["--camera", "top"], "wanted one of front, three-quarter, profile, close, got 'top'"),
-        (["--light", "noon"], "wanted one of portrait, daylight, evening, got 'noon'"),
+        (["--light", "noon"], "wanted one of portrait, daylight, evening, studio, outdoors, got 'noon'"),
         (["--background", "transparent"], "these pictures are opaque"),
     ],
 )

@@ -35,7 +35,10 @@ def test_sheet_draws_archetypes_from_two_sides_with_differences(tmp_path: Path) 
     [
         (["-o", "x.jpg"], "wanted a name that ends in .png"),
         (["-o", "x.png", "--camera", "top"], "wanted one of front, three-quarter, profile, close, got 'top'"),
-        (["-o", "x.png", "--light", "noon"], "wanted one of portrait, daylight, evening, got 'noon'"),
+        (
+            ["-o", "x.png", "--light", "noon"],
+            "wanted one of portrait, daylight, evening, studio, outdoors, got 'noon'",
+        ),
         (["-o", "x.png", "--background", "blue"], "a colour such as #d8dde2, got 'blue'"),
         (["-o", "x.png", "--background", "transparent"], "these pictures are opaque"),
         (["-o", "x.png", "--value", "0"], "0"),

@@ -106,9 +106,11 @@ def test_light_to_json_has_every_coefficient():
         assert np.linalg.norm(table[lamp]["direction"]) == pytest.approx(1, abs=1e-5)
 
 
-def test_preset_lists_the_three_lights_for_another_name():
-    assert list(presets()) == ["portrait", "daylight", "evening"]
-    with pytest.raises(RenderError, match="wanted one of portrait, daylight, evening, got 'noon'"):
+def test_preset_lists_the_lights_for_another_name():
+    assert list(presets()) == ["portrait", "daylight", "evening", "studio", "outdoors"]
+    with pytest.raises(
+        RenderError, match="wanted one of portrait, daylight, evening, studio, outdoors, got 'noon'"
+    ):
         preset("noon")
 
 

@@ -162,7 +162,7 @@ def test_subscribe_names_the_known_lights(driver) -> None:
     client = driver.send({"type": "subscribe", "stream": "video", "light": "noon"})
     (error,) = client.of("error")
     assert error["where"] == "subscribe.light"
-    assert "portrait, daylight, evening" in error["message"]
+    assert "portrait, daylight, evening, studio, outdoors" in error["message"]
 
 
 def test_subscribe_to_feedback_again_begins_with_new_messages(driver) -> None:

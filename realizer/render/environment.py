@@ -1,0 +1,89 @@
+"""The light that reaches the head from all around, as small tables made of photographed panoramas.
+
+`realizer/tables/environments.md` names the panoramas; `tests/benchmarks/environments.py` makes the tables.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from itertools import product
+
+import numpy as np
+
+from realizer.core.array_types import Float32, Index
+from realizer.core.errors import RenderError
+
+LEVELS, HEIGHT, WIDTH = 5, 32, 64
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Environment:
+    """Light from all directions: +x the character's left, +y up, +z forward; linear.
+
+    Attributes:
+        sh: (9, 3) float32; the irradiance over pi is the sum of these times `polynomials` of the normal.
+        levels: (LEVELS, HEIGHT, WIDTH, 3) float32, radiance in GGX lobes of roughness 0, 1/4, ... 1 (alpha is
+            its square). Row 0 is up; a column is the azimuth atan2(x, z), from -pi to pi.
+    """
+
+    sh: Float32
+    levels: Float32
+
+    def irradiance(self, normals: Float32) -> Float32:
+        """Return the irradiance over pi, (n, 3), of surfaces with unit normals (n, 3)."""
+        light: Float32 = np.maximum(polynomials(normals) @ self.sh, 0)
+        return light
+
+    def radiance(self, directions: Float32, roughness: Float32) -> Float32:
+        """Return the light (n, 3) that surfaces of a roughness (n,) mirror from unit directions (n, 3).
+
+        Linear between texels and between levels.
+        """
+        x, y, z = np.asarray(directions, np.float32).T
+        across = (np.arctan2(x, z) / (2 * np.pi) + 0.5) * WIDTH - 0.5
+        down = np.clip(np.arccos(np.clip(y, -1, 1)) / np.pi * HEIGHT - 0.5, 0, HEIGHT - 1)
+        level = np.clip(roughness, 0, 1) * (LEVELS - 1)
+        light = np.zeros((len(x), 3), np.float32)
+        for (k, a), (i, b), (j, c) in product(_pair(level), _pair(down), _pair(across)):
+            texels = self.levels[np.minimum(k, LEVELS - 1), np.minimum(i, HEIGHT - 1), j % WIDTH]
+            light += (a * b * c)[:, None] * texels
+        return light
+
+
+@cache
+def environment_of(name: str) -> Environment:
+    """Return the environment of a preset of `realizer/tables/lights.toml`.
+
+    Raises:
+        RenderError: it has none.
+    """
+    with np.load(str(files("realizer.tables").joinpath("environments.npz"))) as table:
+        if f"{name}_sh" not in table:
+            raise RenderError(f"light {name}: wanted its environment in environments.npz, got none")
+        return Environment(table[f"{name}_sh"], table[f"{name}_levels"].astype(np.float32))
+
+
+def directions_of(height: int, width: int) -> Float32:
+    """Return the unit directions of the texels of a panorama, (height, width, 3)."""
+    down = (np.arange(height) + 0.5) / height * np.pi
+    across = ((np.arange(width) + 0.5) / width * 2 - 1) * np.pi
+    y, flat = np.cos(down)[:, None], np.sin(down)[:, None]
+    parts = np.broadcast_arrays(flat * np.sin(across), y, flat * np.cos(across))
+    return np.stack(parts, axis=-1).astype(np.float32)
+
+
+def polynomials(directions: Float32) -> Float32:
+    """Return 1, y, z, x, xy, yz, 3zz-1, xz, xx-yy of unit directions (..., 3), as (..., 9)."""
+    x, y, z = np.moveaxis(np.asarray(directions), -1, 0)
+    terms = [np.ones_like(x), y, z, x, x * y, y * z, 3 * z * z - 1, x * z, x * x - y * y]
+    return np.stack(terms, axis=-1)
+
+
+def _pair(place: Float32) -> list[tuple[Index, Float32]]:
+    """Return the texels before and after fractional places (n,), each with its share."""
+    first = np.floor(place)
+    share = (place - first).astype(np.float32)
+    before = first.astype(np.intp)
+    return [(before, 1 - share), (before + 1, share)]
