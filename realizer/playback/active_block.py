@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
 
@@ -11,6 +11,7 @@ import numpy as np
 from bml_schema import Block, SyncRef, without
 from realizer.animation.channel import Channel, Gain, Layer, later
 from realizer.animation.crossfade import crossfade
+from realizer.animation.idle.prosody import KnownMotion
 from realizer.behaviours.kind import BehaviourKind, PlanningContext
 from realizer.core import work
 from realizer.core.array_types import Float64
@@ -32,13 +33,20 @@ HEARD = 1e-4  # s
 
 @dataclass(frozen=True, eq=False)
 class ScheduledSpeech:
-    """An utterance from `start` on, cut off (with a short fade) at `until` if that is sooner."""
+    """An utterance from `start` on, cut off (with a short fade) at `until` if that is sooner.
+
+    It is not heard if it is cut off before it starts; then only its lips may have begun to move.
+    """
 
     start: float
     until: float
     utterance: Utterance
     character: int
     gains: tuple[Gain, ...] = ()
+
+    @property
+    def is_heard(self) -> bool:
+        return self.until > self.start
 
     def is_complete(self, now: float) -> bool:
         """Whether all of it has been heard."""
@@ -79,6 +87,7 @@ class ActiveBlock:
         external_refs: its references into other blocks.
         first_schedule: its schedule when it was accepted.
         channels, shifts, speech: by behaviour, on the session clock; empty while the start is unknown.
+        known_since: behaviour -> when its place on the session clock became known.
     """
 
     plan: Plan
@@ -93,6 +102,7 @@ class ActiveBlock:
     channels: dict[str, tuple[Channel, ...]] = field(default_factory=dict)
     shifts: dict[str, BaseShift] = field(default_factory=dict)
     speech: dict[str, ScheduledSpeech] = field(default_factory=dict)
+    known_since: dict[str, float] = field(default_factory=dict)
     followers: list[ActiveBlock] = field(default_factory=list)
     order: tuple[int, int, int] = field(init=False)
     external_refs: tuple[SyncRef, ...] = field(init=False)
@@ -214,15 +224,15 @@ class ActiveBlock:
                     if dependency.number < other.number:
                         other.add_dependency(Dependency(dependency))
 
-    def apply_plan(self, plan: Plan, start: float) -> None:
-        """Place a plan on the session clock, with its channels, base states and speech."""
+    def apply_plan(self, plan: Plan, start: float, now: float) -> None:
+        """Place a plan on the session clock at `now`, with its channels, base states and speech."""
         if plan.block is not self.block:
             self.external_refs = external_refs(plan.block)
         if start != plan.schedule.start:
             delay = start - plan.schedule.start
             shifted = tuple(claim.shifted(delay) for claim in plan.claims)
             plan = replace(plan, schedule=replace(plan.schedule, start=start), claims=shifted)
-        self.plan = plan
+        before, self.plan = self.schedule, plan
         self.channels, self.shifts, self.speech = {}, {}, {}
         if start == float("inf"):
             return
@@ -232,6 +242,9 @@ class ActiveBlock:
             kind = self.kinds[node.tag]
             own = self._placed(behaviour, plan.channels.get(behaviour, ()))
             begin, end = start + float(times[0]), start + float(times[-1])
+            if start != before.start or not np.array_equal(times, before.times.get(behaviour, ())):
+                self.known_since[behaviour] = now
+            self.known_since.setdefault(behaviour, now)
             if kind.region is not None:
                 self.shifts[behaviour] = BaseShift.of(begin, end, kind.region, own)
             elif own:
@@ -281,7 +294,9 @@ class ActiveBlock:
                 )
             elif new:
                 old = self.channels.get(behaviour, ())
-                self.channels[behaviour] = crossfade(old, new, now) if begun else new
+                self.channels[behaviour] = crossfade(old, new, now) if begun or _moves(old, now) else new
+            if not begun:
+                self.known_since[behaviour] = now
             if behaviour in self.speech and not begun:
                 delay = float(times[behaviour][0]) - float(before.times[behaviour][0])
                 speech = self.speech[behaviour]
@@ -344,17 +359,21 @@ class ActiveBlock:
             local = now - self.start
             if local <= at[0]:
                 not_begun.append(behaviour)
-                for table in (points, times, self.channels, self.speech):
-                    table.pop(behaviour, None)
+                del points[behaviour], times[behaviour]
             elif local < at[-1]:
                 points[behaviour], times[behaviour] = self._cut_times(behaviour, names, at, local, ends)
+            else:
+                continue
+            if behaviour in self.channels:  # what moves ahead of its start, such as lips, has been seen
                 self.channels[behaviour] = tuple(
                     c.faded(now, now + (SPEECH_FADE if c.layer is Layer.SPEECH else RELAX))
-                    for c in self.channels.get(behaviour, ())
+                    if behaviour not in not_begun or c.span[0] < now
+                    else c.changed({"until": now})
+                    for c in self.channels[behaviour]
                 )
-                if behaviour in self.speech:
-                    speech = self.speech[behaviour]
-                    self.speech[behaviour] = replace(speech, until=min(speech.until, now))
+            if behaviour in self.speech:
+                speech = self.speech[behaviour]
+                self.speech[behaviour] = replace(speech, until=min(speech.until, now))
         left = tuple(c for c in self.plan.claims if c.behaviour not in behaviours)
         timings = {b: timing for b, timing in self.plan.timings.items() if b not in behaviours}
         schedule = replace(self.schedule, points=points, times=times)
@@ -385,3 +404,15 @@ class ActiveBlock:
     def moving_channels(self) -> Iterator[Channel]:
         """Return its channels that are not base states."""
         return chain.from_iterable(self.channels.values())
+
+    def known_motions(self) -> Iterator[KnownMotion]:
+        """Yield its channels that are not base states, with the times at which they became known."""
+        for behaviour, channels in self.channels.items():
+            since = self.known_since[behaviour]
+            for channel in channels:
+                yield KnownMotion(since if channel.crossfade is None else channel.crossfade.at, channel)
+
+
+def _moves(channels: Iterable[Channel], now: float) -> bool:
+    """Return whether channels have begun to move."""
+    return any(channel.span[0] < now for channel in channels)

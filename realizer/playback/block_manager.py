@@ -174,7 +174,7 @@ class BlockManager:
                 self.revoke(name, now)
         state = next_state(announced.state, BlockEvent.PREPLAN if pending else BlockEvent.PLAN)
         playing = ActiveBlock(planned, self.kinds, context, character, announced.number, now, waits, state)
-        playing.apply_plan(planned, playing.earliest)  # it may have ended its own dependencies
+        playing.apply_plan(planned, playing.earliest, now)  # it may have ended its own dependencies
         self.blocks.add(playing)
         self.timeline.place(playing)
         if any(wait.block.order > playing.order for wait in waits):

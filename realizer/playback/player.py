@@ -301,6 +301,7 @@ class Player(BlockManager):
             (SpeechSpan(s.start + at, s.until, part), p)
             for p in (blocks if self.prosody else ())
             for s in p.speech.values()
+            if s.is_heard
             for at, part in s.utterance.sections or [(0.0, s.utterance)]
         ]
         near = [
@@ -309,7 +310,7 @@ class Player(BlockManager):
             if t.start - NEAR <= last and t.start + t.utterance.duration + NEAR >= first
         ]
         if near:
-            known = [KnownMotion(p.not_before, c) for p in blocks for c in p.moving_channels()]
+            known = [motion for p in blocks for motion in p.known_motions()]
             known += [KnownMotion(c.span[0], c) for c in own]
             channels += prosody_channels(near, first, last, seed, known)
         shifts = gaze_shifts(channels, first, last) if self.liveliness else ()
@@ -323,7 +324,8 @@ class Player(BlockManager):
 
     def speech(self) -> tuple[ScheduledSpeech, ...]:
         """Return past and future utterances, in order of their start."""
-        return tuple(sorted((s for p in self.blocks.all() for s in p.speech.values()), key=lambda s: s.start))
+        heard = (s for p in self.blocks.all() for s in p.speech.values() if s.is_heard)
+        return tuple(sorted(heard, key=lambda s: s.start))
 
     def latest(self, schedule: Schedule) -> Schedule:
         """Return the present schedule of a block, given the one that `submit` returned."""

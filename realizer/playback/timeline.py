@@ -225,7 +225,7 @@ class BlockTimeline:
             planned, others = self._replan(playing, start, now, alone=alone, starts=starts)
         if planned is None:
             return False
-        playing.apply_plan(planned, start)
+        playing.apply_plan(planned, start, now)
         self.place(playing)
         self.predict(playing, now)
         if others:

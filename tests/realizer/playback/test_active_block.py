@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import pytest
 
 from bml_schema import parse
 from realizer.animation.channel import Gain
 from realizer.behaviours.kind import PlanningContext
 from realizer.behaviours.registry import KINDS
-from realizer.playback.active_block import ActiveBlock, Dependency
+from realizer.playback.active_block import SPEECH_FADE, ActiveBlock, Dependency
 from realizer.playback.block_planner import plan
 from realizer.playback.block_states import State
+from realizer.speech.silent import SilentVoice
+from realizer.speech.utterance import SpeechRequest, Utterance
 
 FACE = '<faceLexeme id="s" lexeme="SMILE" start="0" attackPeak="0.5" relax="2" end="3"/>'
 
 
-def playing(inside: str = FACE, start: float = 10.0) -> ActiveBlock:
-    planned = plan(parse(f'<bml id="a">{inside}</bml>'), KINDS, PlanningContext(), start=start)
-    made = ActiveBlock(
-        planned, KINDS, PlanningContext(), character=0, number=0, not_before=start, state=State.IN_EXEC
-    )
-    made.apply_plan(planned, start)
+def playing(
+    inside: str = FACE, start: float = 10.0, utterances: Mapping[str, Utterance] | None = None
+) -> ActiveBlock:
+    context = PlanningContext(utterances=utterances or {})
+    planned = plan(parse(f'<bml id="a">{inside}</bml>'), KINDS, context, start=start)
+    made = ActiveBlock(planned, KINDS, context, character=0, number=0, not_before=start, state=State.IN_EXEC)
+    made.apply_plan(planned, start, start)
     return made
 
 
@@ -28,15 +33,22 @@ def test_apply_plan_at_another_start_moves_channels_claims_and_ends() -> None:
     made = playing('<gaze id="g" target="x" start="0" ready="0.5" relax="1" end="2"/>')
     (claim,) = made.plan.claims
     assert (claim.begin, claim.end, made.end) == (10.0, 11.0, 12.0)
-    made.apply_plan(made.plan, 20.0)
+    made.apply_plan(made.plan, 20.0, 12.0)
     (claim,) = made.plan.claims
     assert (claim.begin, claim.end, made.end) == (20.0, 21.0, 22.0)
     assert {c.span[0] for c in made.moving_channels()} == {20.0}
+    assert {motion.known for motion in made.known_motions()} == {12.0}
+
+
+def test_apply_plan_that_moves_nothing_keeps_since_when_it_is_known() -> None:
+    made = playing()
+    made.apply_plan(made.plan, 10.0, 5.0)
+    assert {motion.known for motion in made.known_motions()} == {10.0}
 
 
 def test_active_block_shows_nothing_before_its_start_is_known() -> None:
     made = playing()
-    made.apply_plan(made.plan, float("inf"))
+    made.apply_plan(made.plan, float("inf"), 10.0)
     assert not list(made.moving_channels())
     assert made.end == float("inf")
 
@@ -64,8 +76,21 @@ def test_cut_keeps_past_points_then_relaxes_and_ends(
 def test_cut_removes_behaviours_that_have_not_begun() -> None:
     made = playing()
     made.cut(["s"], 10.0)
-    assert not list(made.moving_channels())
+    assert not any(c.span[0] < c.span[1] for c in made.moving_channels())
     assert made.end == 10.0
+
+
+def test_cut_fades_the_lips_of_a_speech_that_has_not_begun() -> None:
+    spoken = SilentVoice().say(SpeechRequest("Five six"))
+    made = playing('<speech id="s" start="1"><text>Five six</text></speech>', utterances={"s": spoken})
+    lips = {c.target for c in made.moving_channels() if c.span[0] < 10.95}
+    assert lips
+    made.cut(["s"], 10.95)
+    fading = {c.target: c.span for c in made.moving_channels() if c.gains}
+    assert set(fading) == lips
+    assert max(last for _, last in fading.values()) == pytest.approx(10.95 + SPEECH_FADE)
+    assert "s" not in made.schedule.times
+    assert not made.speech["s"].is_heard
 
 
 def test_cut_ends_the_named_behaviours_only() -> None:

@@ -35,7 +35,7 @@ def alive(
     made = ActiveBlock(
         plan(block(id), KINDS, PlanningContext()), KINDS, PlanningContext(), character, 1, start, waits or []
     )
-    made.apply_plan(made.plan, start)
+    made.apply_plan(made.plan, start, start)
     return made
 
 

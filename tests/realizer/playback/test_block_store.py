@@ -17,7 +17,7 @@ def added(cast: BlockStore, id: str, start: float = 0.0, character: int = 0) -> 
     block = parse(f'<bml id="{id}"><wait id="w" duration="1"/></bml>')
     planned = plan(block, KINDS, PlanningContext(), start=start)
     made = ActiveBlock(planned, KINDS, PlanningContext(), character, cast.new_number(), start)
-    made.apply_plan(made.plan, start)
+    made.apply_plan(made.plan, start, start)
     cast.add(made)
     return made
 

@@ -17,7 +17,7 @@ FACE = '<faceLexeme id="s" lexeme="SMILE" start="0" attackPeak="0.5" relax="2" e
 def playing(number: int, start: float) -> ActiveBlock:
     planned = plan(parse(f'<bml id="a">{FACE}</bml>'), KINDS, PlanningContext(), start=start)
     made = ActiveBlock(planned, KINDS, PlanningContext(), character=0, number=number, not_before=start)
-    made.apply_plan(planned, start)
+    made.apply_plan(planned, start, start)
     made.order = number
     return made
 

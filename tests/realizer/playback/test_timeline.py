@@ -23,7 +23,7 @@ def taken_in(
     planned, _ = course.plan(Arrival(block, 0, 1, PlanningContext()), 0.0, 0.0)
     waits = [] if after is None else [Dependency(after)]
     made = ActiveBlock(planned, KINDS, PlanningContext(), 0, course.blocks.new_number(), 0.0, waits, state)
-    made.apply_plan(planned, made.earliest)
+    made.apply_plan(planned, made.earliest, 0.0)
     course.blocks.add(made)
     course.place(made)
     return made

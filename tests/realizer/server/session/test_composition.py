@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from bml_schema import BlockProgress, Feedback, SyncPointProgress, WarningFeedback, parse_feedback
@@ -61,6 +61,15 @@ HEADS = (
     *(f'bmla:{name}="{{other}}"' for name in ("prependBefore", "chunkBefore")),
     'bmla:preplan="true"',
 )
+
+# The second speech has begun to move the lips when an interrupt cancels it.
+CUT_BEFORE_SECOND_SPEECH = [
+    f'<bml id="a">{BODIES[-1]}</bml>',
+    '<bml xmlns:bmla="http://www.asap-project.org/bmla" id="b">'
+    '<bmla:interrupt id="i" target="a" start="0.3"/></bml>',
+]
+# A gaze moves the head sooner than it was planned, because what it waits for is interrupted.
+MOVED_BY_A_CUT = [*CUT_BEFORE_SECOND_SPEECH, f'<bml id="c" composition="APPEND">{BODIES[2]}</bml>']
 
 
 @st.composite
@@ -208,6 +217,8 @@ def test_session_shows_the_frames_of_offline(request: pytest.FixtureRequest) -> 
 
     @settings(max_examples=request.config.getoption("--sessions") // 10)
     @given(sessions(bodies=VISIBLE))
+    @example(CUT_BEFORE_SECOND_SPEECH)
+    @example(MOVED_BY_A_CUT)
     def law(documents: list[str]) -> None:
         player = Player(PlayOptions(seed=3), history=float("inf"))
         plan(documents, player, voice)
