@@ -56,7 +56,7 @@ CLIENT = {
 IMPORTERS = {
     "lxml": ("bml_schema",),
     "trimesh": ("realizer.face", "realizer.facebuild"),
-    "numba": ("realizer.render.raster",),
+    "numba": ("realizer.render.compiled",),
     "pyrender": ("realizer.render.opengl",),
     "websockets": ("realizer.server", "realizer.client"),
     "av": ("realizer.outputs", "realizer.behaviours.sound_file"),

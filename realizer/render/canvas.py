@@ -6,7 +6,6 @@ import numpy as np
 
 from realizer.core.array_types import Float32, Int32, UInt8
 from realizer.face.model import Face
-from realizer.face.subdivision import subdivided
 from realizer.render.backdrop import backdrop, channels, over
 from realizer.render.cameras import Camera
 from realizer.render.eye_highlights import EyeHighlights
@@ -75,9 +74,7 @@ class Canvas(ABC):
         Raises:
             RenderError: the backend is missing here; the text says what to install.
         """
-        self._smooth = subdivided(face)
-        self._size, self._camera = size, camera
-        self._figure = ShadedMesh(self._smooth.face, camera, light)
+        self._face, self._size, self._camera, self._light = face, size, camera, light
         self._backdrop, self._channels = backdrop(size, light, background), channels(background)
         self._open()
 
@@ -85,12 +82,11 @@ class Canvas(ABC):
         """Return (h, w, 3) uint8, (h, w, 4) where transparent, row 0 at the top; in `out` if that is given.
 
         Args:
-            vertices, normals: (n, 3) metres and unit vectors of the face, which is subdivided here.
+            vertices, normals: (n, 3) metres and unit vectors of the face.
         """
-        self._figure.pose(*self._smooth(vertices, normals))
         if out is None:
             out = np.empty((*self._size[::-1], self._channels), np.uint8)
-        return over(self._pixels(), self._backdrop, out)
+        return over(self._pixels(vertices, normals), self._backdrop, out)
 
     @abstractmethod
     def close(self) -> None:
@@ -98,8 +94,8 @@ class Canvas(ABC):
 
     @abstractmethod
     def _open(self) -> None:
-        """Prepare to draw `_figure`."""
+        """Prepare to draw."""
 
     @abstractmethod
-    def _pixels(self) -> UInt8:
-        """Return `_figure` as (h, w, 4) premultiplied."""
+    def _pixels(self, vertices: Float32, normals: Float32) -> UInt8:
+        """Return the head as (h, w, 4) premultiplied."""

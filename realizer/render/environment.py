@@ -51,6 +51,22 @@ class Environment:
             light += (a * b * c)[:, None] * texels
         return light
 
+    def octahedral(self) -> Float32:
+        """Return `levels` as octahedral maps (LEVELS, HEIGHT, HEIGHT, 3), which graphics cards read quickly.
+
+        A direction is divided by the sum of its parts' sizes and seen from the front; what lies behind is
+        folded over the corners (Cigolle et al. 2014, JCGT 3:2).
+        """
+        u, v = np.meshgrid(*2 * [(np.arange(HEIGHT) + 0.5) / HEIGHT * 2 - 1])
+        z = 1 - np.abs(u) - np.abs(v)
+        x = np.where(z < 0, (1 - np.abs(v)) * np.sign(u), u)
+        y = -np.where(z < 0, (1 - np.abs(u)) * np.sign(v), v)
+        directions = np.stack([x, y, z], axis=-1).reshape(-1, 3)
+        flat: Float32 = (directions / np.linalg.norm(directions, axis=1)[:, None]).astype(np.float32)
+        rough = np.full(len(flat), 1 / (LEVELS - 1), np.float32)
+        maps = [self.radiance(flat, rough * np.float32(k)) for k in range(LEVELS)]
+        return np.stack(maps).reshape(LEVELS, HEIGHT, HEIGHT, 3)
+
 
 @cache
 def environment_of(name: str) -> Environment:

@@ -11,6 +11,7 @@ import numpy as np
 from realizer.core.array_types import Float32, UInt8
 from realizer.core.colours import linear, srgb
 from realizer.core.errors import RenderError, TableError
+from realizer.render.environment import Environment, environment_of
 from realizer.tables import toml_table
 
 LIGHT = "REALIZER_LIGHT"
@@ -49,6 +50,7 @@ class Light:
         picture  = sRGB(shoulder(exposure * colour)); shoulder(x) = x up to the knee, then towards 1
     """
 
+    name: str
     key: Lamp
     fill: Lamp
     rim: Lamp
@@ -65,6 +67,11 @@ class Light:
     knee: float
     backdrop_middle: Triple  # sRGB 0..1, behind the head
     backdrop_edge: Triple  # sRGB 0..1, in the corners
+
+    @property
+    def environment(self) -> Environment:
+        """The light from all around."""
+        return environment_of(self.name)
 
     def to_json(self) -> dict[str, Any]:
         """Return the table as plain numbers; lamp directions have length 1."""
@@ -98,7 +105,7 @@ def _light(name: str, values: dict[str, Any]) -> Light:
         table: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in values.items()}
         for lamp in LAMPS:
             table[lamp] = Lamp(**{part: tuple(v) for part, v in table[lamp].items()})
-        return Light(**table)
+        return Light(name, **table)
     except (KeyError, TypeError) as error:
         raise TableError(f"lights.toml: {name}: {error}") from None
 

@@ -5,9 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.array_types import UInt8
+from realizer.core.array_types import Float32, UInt8
 from realizer.core.errors import RenderError
-from realizer.render.canvas import Canvas
+from realizer.face.subdivision import subdivided
+from realizer.render.canvas import Canvas, ShadedMesh
 
 NO_LIBRARY = "pictures need the render extra: pip install 'bml-realizer[render]'"
 NO_GL = "pictures need OpenGL: install Debian packages libegl1 and libgl1"
@@ -22,6 +23,8 @@ class OpenGLCanvas(Canvas):
 
     def _open(self) -> None:
         pyrender = _pyrender()
+        self._smooth = subdivided(self._face)
+        self._figure = ShadedMesh(self._smooth.face, self._camera, self._light)
         vertices = self._figure.points
         # x y z r g b a: the layout of pyrender's buffer of positions and colours.
         self._interleaved = np.ones((len(vertices), 7), np.float32)
@@ -40,9 +43,10 @@ class OpenGLCanvas(Canvas):
         self._offscreen = _open(pyrender, self._size)
         self._offscreen.render(self._scene, self._flags)  # uploads the buffers that are overwritten later
 
-    def _pixels(self) -> UInt8:
+    def _pixels(self, vertices: Float32, normals: Float32) -> UInt8:
         from OpenGL import GL
 
+        self._figure.pose(*self._smooth(vertices, normals))
         self._interleaved[:, :3] = self._figure.points
         self._interleaved[:, 3:6] = self._figure.colours
         GL.glBindBuffer(GL.GL_ARRAY_BUFFER, self._head._buffers[0])

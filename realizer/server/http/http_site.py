@@ -10,7 +10,6 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import files
-from pathlib import Path
 from urllib.parse import parse_qs
 
 from realizer.core.errors import RealizerError
@@ -64,7 +63,6 @@ class HttpSite:
             "/vocabulary.json": lambda asked: _json(_vocabulary()),
             "/feeling.json": lambda asked: _json(preview_emotion(asked.get("of", ""))),
             "/look.json": self._look,
-            "/background": self._background,
             "/pose.fap": self._pose,
         }
 
@@ -84,7 +82,7 @@ class HttpSite:
                 return HttpResponse(200, "model/gltf-binary", glb, (("Cache-Control", "no-cache"),))
         except ToolError as error:
             return HttpResponse(error.status, TEXT, f"{error}\n".encode())
-        except (RealizerError, OSError):
+        except RealizerError:
             log.exception("there is no answer to GET %s", path)
             return HttpResponse(500, TEXT, b"an error of the service: its log says which\n")
         return self._file(path[1:])
@@ -100,16 +98,6 @@ class HttpSite:
         if smooth not in ("yes", "no"):
             raise ToolError(f"smooth: wanted yes or no, got {smooth[:80]!r}")
         return _json(_look(face, self._settings.light, self._settings.background, smooth == "yes"))
-
-    def _background(self, asked: dict[str, str]) -> HttpResponse:
-        """Return the picture behind the face, as its file has it."""
-        from realizer.render.backdrop import is_picture
-
-        path = self._settings.background
-        if path is None or not is_picture(path):
-            return self._file("background")
-        media_type = mimetypes.guess_type(path)[0] or "application/octet-stream"
-        return HttpResponse(200, media_type, Path(path).read_bytes(), (("Cache-Control", "no-cache"),))
 
     def _pose(self, asked: dict[str, str]) -> HttpResponse:
         face = asked.get("face")
@@ -175,7 +163,6 @@ def _look(name: str, light: str | None, background: str | None, smooth: bool) ->
     """
     from realizer.face.load import load_face
     from realizer.face.subdivision import subdivided
-    from realizer.render.backdrop import is_picture
     from realizer.render.cameras import camera_for
     from realizer.render.eye_highlights import EyeHighlights
     from realizer.render.light import preset, presets
@@ -187,7 +174,7 @@ def _look(name: str, light: str | None, background: str | None, smooth: bool) ->
     look = {
         "light": lights.to_json(),
         "lights": {name: lights.to_json() for name, lights in presets().items()},
-        "background": "/background" if is_picture(background) else background,
+        "background": background,
         "camera": camera.to_json(),
         "subdivided": split.ranges if split else (),
         "furrows": Wrinkles(split.face if split else face).to_json(),

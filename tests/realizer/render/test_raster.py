@@ -2,25 +2,64 @@
 
 from __future__ import annotations
 
+import io
+
 import numpy as np
 import pytest
+from PIL import Image
 
+from realizer.face.drawn_mesh import CLOTH, DrawnMesh
+from realizer.face.maps import Maps
 from realizer.render.raster import Raster
+from realizer.render.shading import BRIGHTEST, STEPS, tone_curve
+from realizer.render.shadows import LampView
+from realizer.render.textures import texels_of
 
 pytestmark = [pytest.mark.gl("onboard"), pytest.mark.xdist_group("render")]
 
 SIZE = (60, 40)
 RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+SEEN = 232  # the tone curve's byte of white light
+LIGHTS = (
+    np.zeros((2, 2, 3), np.float32),
+    np.float32([[1, 1, 1]] + [[0, 0, 0]] * 8),
+    np.zeros((5, 32, 32, 3), np.float32),
+    np.float32(2),
+)
+EYE = np.float32([0, 0, 100])
 
 
-def draw(corners, colours, nearness=1.0, size=SIZE):
+def raster_of(triangles, colours, size=SIZE, uv=None, maps=None, **flags):
+    count, none = len(colours), np.zeros(len(triangles), bool)
+    mesh = DrawnMesh(
+        places=None, ups=None,
+        triangles=np.asarray(triangles, np.int32),
+        uv=np.zeros((count, 2), np.float32) if uv is None else np.float32(uv),
+        colours=np.zeros((count, 3), np.uint8),
+        occlusion=np.ones(count, np.float32),
+        gloss=np.zeros(count, np.float32),
+        kind=np.full(count, CLOTH, np.uint8),
+        parts={}, two_sided=flags.get("two_sided", none), see_through=flags.get("see_through", none),
+    )  # fmt: skip
+    lamp = LampView((0, 1, 1), (-1, -1, -1), (1, 1, 1))
+    return Raster(size, mesh, np.float32(colours), maps or texels_of(None), lamp)
+
+
+def picture_of(raster, points, near):
+    """The picture of points (n, 2) in pixels, all facing the camera and far from the shadows' box."""
+    points = np.asarray(points, float)
+    moving = np.zeros((len(points), 7), np.float32)
+    moving[:, :2], moving[:, 5] = points * (0.01, -0.01), 1
+    return raster(points, near, moving, LIGHTS, EYE).copy()
+
+
+def draw(corners, colours, nearness=1.0, size=SIZE, **flags):
     """Triangles of (n, 3, 2) pixels, each of one colour and nearness."""
     corners = np.asarray(corners, float).reshape(-1, 2)
     count = len(corners) // 3
-    tones = np.repeat(np.broadcast_to(colours, (count, 3)), 3, axis=0).astype(np.float32)
+    tones = np.repeat(np.broadcast_to(colours, (count, 3)), 3, axis=0)
     near = np.repeat(np.broadcast_to(nearness, count), 3).astype(np.float32)
-    triangles = np.arange(3 * count, dtype=np.int32).reshape(-1, 3)
-    return Raster(size)(corners, near, triangles, tones).copy()
+    return picture_of(raster_of(np.arange(3 * count).reshape(-1, 3), tones, size, **flags), corners, near)
 
 
 BIG = [(5.0, 5.0), (5.0, 35.0), (55.0, 20.0)]  # counter-clockwise, seen with y up
@@ -29,7 +68,7 @@ BIG = [(5.0, 5.0), (5.0, 35.0), (55.0, 20.0)]  # counter-clockwise, seen with y 
 def test_raster_covers_the_area_of_a_triangle():
     picture = draw([BIG], RED)
     assert picture[..., 3].sum() / 255 == pytest.approx(50 * 30 / 2, rel=0.01)
-    assert picture[20, 20].tolist() == [255, 0, 0, 255]
+    assert picture[20, 20].tolist() == [SEEN, 0, 0, 255]
     assert picture[2, 2].tolist() == [0, 0, 0, 0]
 
 
@@ -44,7 +83,7 @@ def test_raster_smooths_edges():
 def test_raster_hides_the_farther_in_either_order():
     pair = [BIG, BIG]
     for near, colours in (((1.0, 2.0), (BLUE, RED)), ((2.0, 1.0), (RED, BLUE))):
-        assert draw(pair, colours, near)[20, 20].tolist() == [255, 0, 0, 255]
+        assert draw(pair, colours, near)[20, 20].tolist() == [SEEN, 0, 0, 255]
 
 
 def test_raster_leaves_no_gap_at_a_shared_edge():
@@ -55,20 +94,38 @@ def test_raster_leaves_no_gap_at_a_shared_edge():
     picture = draw(fan, RED)
     y, x = np.mgrid[:40, :60] + 0.5
     inside = np.hypot(x - 30.3, y - 20.7) < 17
-    assert (picture[inside] == (255, 0, 0, 255)).all()
+    assert (picture[inside] == (SEEN, 0, 0, 255)).all()
 
 
 def test_raster_interpolates_colours():
-    raster = Raster((101, 50))
+    raster = raster_of([[0, 1, 2]], [[0, 0, 0], [0, 0, 0], [1, 1, 1]], (101, 50))
     points = np.array([[0.0, -60.0], [0.0, 110.0], [101.0, 25.0]])
-    tones = np.array([[0, 0, 0], [0, 0, 0], [1, 1, 1]], np.float32)
-    picture = raster(points, np.ones(3, np.float32), np.array([[0, 1, 2]], np.int32), tones)
-    assert picture[25, :95, 1].astype(int) == pytest.approx(255 * (np.arange(95) + 0.5) / 101, abs=1.5)
+    green = picture_of(raster, points, np.ones(3, np.float32))[25, :95, 1]
+    steps = (np.sqrt((np.arange(95) + 0.5) / 101 / BRIGHTEST) * (STEPS - 1)).astype(int)
+    assert green == pytest.approx(tone_curve()[steps], abs=1)
+
+
+def test_raster_shows_sheets_from_behind():
+    behind = draw([BIG[::-1]], RED, two_sided=np.ones(1, bool))
+    assert np.array_equal(behind[20, 20], draw([BIG], RED)[20, 20])
+
+
+def test_raster_cuts_holes_where_the_map_is_clear():
+    albedo = np.full((64, 64, 4), 255, np.uint8)
+    albedo[:, 32:, 3] = 0
+    stream = io.BytesIO()
+    Image.fromarray(albedo).save(stream, "webp", lossless=True)
+    maps = Maps({"albedo": stream.getvalue()}, None, 0.0, 1.0, None, None)
+    uv = [(0, 0), (0, 1), (1, 0.5)]
+    raster = raster_of([[0, 1, 2]], [RED] * 3, uv=uv, maps=texels_of(maps), see_through=np.ones(1, bool))
+    picture = picture_of(raster, BIG, np.ones(3, np.float32))
+    assert picture[20, 20].tolist() == [SEEN, 0, 0, 255]
+    assert not picture[:, 32:].any()
 
 
 def test_raster_cuts_triangles_at_the_picture_s_edges():
     huge = [(-500.0, -400.0), (-500.0, 900.0), (900.0, 20.0)]
-    assert (draw([huge], BLUE) == (0, 0, 255, 255)).all()
+    assert (draw([huge], BLUE) == (0, 0, SEEN, 255)).all()
     assert not draw([[(100.0, 5.0), (100.0, 35.0), (150.0, 20.0)]], BLUE).any()
 
 
@@ -78,14 +135,13 @@ def test_raster_leaves_out_what_is_not_a_number():
 
 
 def test_raster_forgets_the_picture_before():
-    raster = Raster(SIZE)
-    points, near = np.array(BIG), np.ones(3, np.float32)
-    triangles = np.array([[0, 1, 2]], np.int32)
-    first = raster(points, near, triangles, np.ones((3, 3), np.float32)).copy()
-    raster(points + 3, 5 * near, triangles, np.ones((3, 3), np.float32))
-    assert np.array_equal(raster(points, near, triangles, np.ones((3, 3), np.float32)), first)
+    raster = raster_of([[0, 1, 2]], [RED] * 3)
+    near = np.ones(3, np.float32)
+    first = picture_of(raster, BIG, near)
+    picture_of(raster, np.array(BIG) + 3, 5 * near)
+    assert np.array_equal(picture_of(raster, BIG, near), first)
 
 
 def test_raster_leaves_out_what_is_behind_the_lens():
     picture = draw([BIG, BIG], (RED, BLUE), (np.nan, 1.0))
-    assert picture[20, 20].tolist() == [0, 0, 255, 255]
+    assert picture[20, 20].tolist() == [0, 0, SEEN, 255]

@@ -8,7 +8,6 @@ import pytest
 from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.face.surface import normals
-from realizer.render.backdrop import backdrop
 from realizer.render.cameras import camera_for
 from realizer.render.light import preset
 from realizer.render.software import SoftwareCanvas
@@ -29,32 +28,6 @@ def pose(face, **faps):
         row[0, int(name[3:]) - 1] = value
     vertices = deform(face, row)
     return vertices[0], normals(face, vertices)[0]
-
-
-@pytest.mark.gl("gl")
-@pytest.mark.parametrize(
-    ("camera", "light"),
-    [("front", "portrait"), ("three-quarter", "evening"), ("profile", "portrait"), ("close", "evening")],
-)
-@pytest.mark.slow
-def test_software_canvas_draws_the_picture_of_opengl(face, camera, light):
-    from realizer.render.opengl import OpenGLCanvas
-
-    eye, lamp = camera_for(face, camera), preset(light)
-    behind = backdrop(SIZE, lamp)[..., :3].astype(int)
-    card, own = OpenGLCanvas(face, SIZE, eye, lamp), SoftwareCanvas(face, SIZE, eye, lamp)
-    try:
-        for shape in (pose(face), pose(face, fap3=900, fap5=-900, fap19=500, fap49=8000)):
-            a, b = card.draw(*shape).astype(int), own.draw(*shape).astype(int)
-            differs = np.abs(a - b)
-            assert differs.mean() < 0.6
-            assert (differs.max(axis=2) > 24).mean() < 0.01
-            assert np.abs(a.mean((0, 1)) - b.mean((0, 1))).max() < 0.3
-            head = [np.abs(p - behind).max(axis=2) > 24 for p in (a, b)]
-            assert 0.1 < head[0].mean() < 0.95
-            assert (head[0] ^ head[1]).mean() < 0.004
-    finally:
-        card.close()
 
 
 def test_software_canvas_draws_points_where_they_project(face):

@@ -39,7 +39,6 @@ export class Stage {
       ask(`look.json?face=${path}&smooth=${this.smooth}`).then((answer) => checked(answer).json()),
       ask(`faces/${path}`).then((answer) => checked(answer).arrayBuffer()),
     ]);
-    if (look.background === "/background") await this.fetchPicture();
     if (this.awaited !== name) return; // another face was requested in the meantime
     const { attributes, indices } = readGlb(glb);
     // The stream moves the vertices of the original mesh; what is drawn is a smooth subdivision of it.
@@ -68,13 +67,6 @@ export class Stage {
     this.shine(this.light);
   }
 
-  // Fetch the picture behind the face, once.
-  async fetchPicture() {
-    if (this.picture) return;
-    const blob = await ask("background").then((answer) => checked(answer).blob());
-    Object.assign(this, { picture: await createImageBitmap(blob), cover: `url(${URL.createObjectURL(blob)}) center / cover` });
-  }
-
   // Light the face by a preset, and draw its backdrop.
   shine(name) {
     this.light = name;
@@ -85,16 +77,14 @@ export class Stage {
       this.material.uniforms[uniform] ??= {};
       this.material.uniforms[uniform].value = value;
     }
-    const behind = this.picture ? `${this.cover}, ${backdrop(this.lit)}` : this.look.background;
-    this.canvas.parentElement.style.background = behind ?? backdrop(this.lit);
+    this.canvas.parentElement.style.background = this.look.background ?? backdrop(this.lit);
     this.stale = true;
   }
 
   // Draw the backdrop on another canvas, for a film.
   paintBackdrop(pen, width, height) {
-    const colour = this.picture ? null : this.look?.background;
-    pen.fillStyle = colour ?? "#000";
-    if (this.lit && !colour) {
+    pen.fillStyle = this.look?.background ?? "#000";
+    if (this.lit && !this.look.background) {
       const gradient = pen.createRadialGradient(0, 0, 0, 0, 0, 1);
       for (const [part, colour] of stops(this.lit)) gradient.addColorStop(part, colour);
       pen.setTransform(REACH[0] * width, 0, 0, REACH[1] * height, MIDDLE[0] * width, MIDDLE[1] * height);
@@ -102,10 +92,6 @@ export class Stage {
       pen.fillRect(-2, -2, 4, 4);
       pen.setTransform(1, 0, 0, 1, 0, 0);
     } else pen.fillRect(0, 0, width, height);
-    if (!this.picture) return;
-    const scale = Math.max(width / this.picture.width, height / this.picture.height);
-    const [w, h] = [this.picture.width * scale, this.picture.height * scale];
-    pen.drawImage(this.picture, (width - w) / 2, (height - h) / 2, w, h);
   }
 
   reset() {

@@ -11,7 +11,6 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 import realizer
-from realizer.core.settings import Settings
 from realizer.face.load import list_faces, load_face
 from realizer.server.http.http_site import NAME, NOT_BUILT, HttpSite
 
@@ -53,18 +52,6 @@ def test_site_has_the_light_of_stills() -> None:
     assert len(look["glints"]["eyes"]) == 2
     assert look["background"] is None
     assert SITE.answer("/look.json?face=nobody").status == 404
-
-
-def test_site_has_the_picture_behind_the_face(tmp_path: Path) -> None:
-    (tmp_path / "beach.png").write_bytes(b"a picture")
-    site = HttpSite(dict, Settings(background=str(tmp_path / "beach.png")))
-    assert json.loads(site.answer("/look.json").body)["background"] == "/background"
-    answer = site.answer("/background")
-    assert (answer.status, answer.media_type, answer.body) == (200, "image/png", b"a picture")
-    (tmp_path / "beach.png").unlink()
-    assert site.answer("/background").status == 500
-    assert SITE.answer("/background").status == 404
-    assert not site.is_public("/background")
 
 
 def test_site_counts_vertices_of_the_mesh_that_a_viewer_draws() -> None:

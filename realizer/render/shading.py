@@ -1,0 +1,221 @@
+"""How light leaves a surface: the formula of all pictures, for one point at a time.
+
+`surface.glsl` is the same formula for graphics cards. Vectors are tuples of three numbers; colours are linear
+light. A lamp's colour is the light that a white surface facing it sends to the eye.
+
+Sources: the microfacet model of Trowbridge and Reitz with Smith's shadowing, as in Heitz 2014, JCGT 3:2; its
+integral over an environment by Karis 2014, "Physically based shading on mobile"; light between the walls of
+cavities by Jimenez et al. 2016, "Practical realtime strategies for accurate indirect occlusion"; strands by
+Kajiya and Kay 1989; normals blended per colour for skin by d'Eon and Luebke 2007, GPU Gems 3 chapter 14.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from realizer.core.array_types import Float32
+from realizer.core.colours import srgb
+from realizer.render.compiled import compiled
+from realizer.tables import toml_table
+
+# Columns of `surfaces`.
+WRAP, SOFT, REFLECTION, SHARP, SHARP_SHARE, THROUGH = 0, 3, 6, 7, 8, 9
+KEY, RIM = 0, 1
+DIRECT = 0.55  # how far occlusion darkens light of lamps, which shadows darken already
+THIN = (0.9, 0.22, 0.10)  # colour of light that has come through thin skin
+BRIGHTEST, STEPS = 8.0, 16384  # linear light at the end of the tone curve, and its entries
+
+
+@cache
+def surfaces() -> Float32:
+    """Return a row of surfaces.toml for each kind of surface, float32."""
+    rows = toml_table("surfaces.toml").values()
+    names = ("wrap", "soft", "reflection", "sharp", "sharp_share", "through")
+    return np.array([np.hstack([row[name] for name in names]) for row in rows], np.float32)
+
+
+@cache
+def tone_curve() -> Float32:
+    """Return the sRGB byte 0..255 (STEPS,) of linear light 0..BRIGHTEST, in steps of its square root.
+
+    The curve is the fit of Narkowicz 2015 to the reference transform of the Academy (ACES).
+    """
+    x = np.linspace(0, 1, STEPS) ** 2 * BRIGHTEST
+    filmic = x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14)
+    return np.asarray(srgb(filmic.astype(np.float32)) * 255, np.float32)
+
+
+@compiled
+def dot(a: Any, b: Any) -> Any:
+    """Return the product of two vectors."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@compiled
+def unit(a: Any) -> Any:
+    """Return a vector at length 1; one without length stays as it is."""
+    scale = np.float32(1) / np.float32(math.sqrt(max(a[0] * a[0] + a[1] * a[1] + a[2] * a[2], 1e-20)))
+    return a[0] * scale, a[1] * scale, a[2] * scale
+
+
+@compiled
+def _ambient(around: Any, c: Any, n: Any) -> Any:
+    """Return the light of the environment in channel `c` on a white surface with that normal."""
+    x, y, z = n
+    light = around[0, c] + around[1, c] * y + around[2, c] * z + around[3, c] * x
+    light += (
+        around[4, c] * x * y + around[5, c] * y * z + around[6, c] * (np.float32(3) * z * z - np.float32(1))
+    )
+    light += around[7, c] * x * z + around[8, c] * (x * x - y * y)
+    return max(light, np.float32(0))
+
+
+@compiled
+def _mirrored(levels: Any, d: Any, rough: Any) -> Any:
+    """Return the light that a surface of that roughness mirrors from direction `d`.
+
+    Levels (k, n, n, 3) are octahedral maps: forwards is the middle, backwards the corners.
+    """
+    one, zero, side = np.float32(1), np.float32(0), levels.shape[1]
+    size = one / (abs(d[0]) + abs(d[1]) + abs(d[2]))
+    u, v = d[0] * size, -d[1] * size
+    if d[2] < zero:
+        u, v = (one - abs(v)) * (one if u >= zero else -one), (one - abs(u)) * (one if v >= zero else -one)
+    scale, most = np.float32(0.5 * side), np.float32(side - 1)
+    x = min(max((u + one) * scale - np.float32(0.5), zero), most)
+    y = min(max((v + one) * scale - np.float32(0.5), zero), most)
+    level = min(max(rough, zero), one) * np.float32(levels.shape[0] - 1)
+    k, x0, y0 = min(int(level), levels.shape[0] - 2), min(int(x), side - 2), min(int(y), side - 2)
+    fx, fy, fk = x - np.float32(x0), y - np.float32(y0), level - np.float32(k)
+    r = g = b = zero
+    for dk in range(2):
+        wk = fk if dk else one - fk
+        for dy in range(2):
+            wy = wk * (fy if dy else one - fy)
+            first, second = levels[k + dk, y0 + dy, x0], levels[k + dk, y0 + dy, x0 + 1]
+            r += wy * ((one - fx) * first[0] + fx * second[0])
+            g += wy * ((one - fx) * first[1] + fx * second[1])
+            b += wy * ((one - fx) * first[2] + fx * second[2])
+    return r, g, b
+
+
+@compiled
+def _gloss(rough: Any, nh: Any, nl: Any, nv: Any) -> Any:
+    """Return the microfacet term D V of a roughness."""
+    a = rough * rough
+    bend = nh * nh * (a * a - 1) + 1
+    spread = a * a / (math.pi * bend * bend)
+    shade = nl * (nv * (1 - a) + a) + nv * (nl * (1 - a) + a)
+    return spread * np.float32(0.5) / max(shade, 1e-4)
+
+
+@compiled
+def _strand_gloss(strand: Any, normal: Any, half: Any, shift: Any, power: Any) -> Any:
+    """Return the highlight of a hair whose scales tilt it by `shift` towards its root."""
+    t = unit((
+        strand[0] + shift * normal[0], strand[1] + shift * normal[1], strand[2] + shift * normal[2]
+    ))  # fmt: skip
+    th = dot(t, half)
+    return math.pow(max(1 - th * th, 1e-6), power * np.float32(0.5))
+
+
+@compiled
+def _scattered(c: Any, a: Any, row: Any, cosines: Any, occlusion: Any, lamps: Any) -> Any:
+    """Return the light of the lamps that a surface of albedo `a` scatters in channel `c`."""
+    relief, smooth, across, reached, rim, thin = cosines
+    one, zero = np.float32(1), np.float32(0)
+    wrap = row[WRAP + c]
+    facing = max(zero, (relief + (smooth - relief) * row[SOFT + c] + wrap) / (one + wrap))
+    # Strands are lit across, all around but from behind the hair.
+    facing += across * (np.float32(math.sqrt(across)) * max(zero, np.float32(0.5) + smooth) - facing)
+    behind = (max(zero, -smooth) + np.float32(0.25)) * (reached + one) * thin * THIN[c]
+    return a * (lamps[KEY, 1, c] * (facing * reached * occlusion + behind) + lamps[RIM, 1, c] * rim)
+
+
+@compiled
+def _open(a: Any, occlusion: Any) -> Any:
+    """Return the share of light from around that reaches a cavity whose walls have albedo `a`."""
+    low = (
+        (np.float32(2.0404) * a - np.float32(0.3324)) * occlusion
+        + np.float32(-4.7951) * a
+        + np.float32(0.6417)
+    )
+    return max(occlusion, (low * occlusion + np.float32(2.7552) * a + np.float32(0.6903)) * occlusion)
+
+
+@compiled
+def _mirror_share(f0: Any, rough: Any, nv: Any) -> Any:
+    """Return the share of the environment's light that is mirrored."""
+    x = np.float32(1) - rough
+    term = (
+        min(x * x, np.float32(math.exp(np.float32(-6.4324) * nv))) * x
+        - rough * np.float32(0.0275)
+        + np.float32(0.0425)
+    )
+    scale = np.float32(-1.04) * term - rough * np.float32(0.572) + np.float32(1.04)
+    return max(
+        f0 * scale + np.float32(1.04) * term + rough * np.float32(0.022) - np.float32(0.04), np.float32(0)
+    )
+
+
+@compiled
+def reflected(row: Any, hair: Any, albedo: Any, normals: Any, values: Any, view: Any, lights: Any) -> Any:
+    """Return the light (r, g, b) that a surface sends to the eye.
+
+    Args:
+        row: its row of `surfaces`; hair: whether it is made of strands.
+        albedo: (r, g, b) linear.
+        normals: of the relief, of the smooth surface, and the direction of strands; unit vectors.
+        values: occlusion, roughness, thickness 0..1, and the share of the key light that is not in shadow.
+        view: unit vector to the eye.
+        lights: lamps (2, 2, 3): direction and colour of the key and the rim lamp; the environment's `sh`
+            (9, 3) and `levels` (k, h, w, 3); and the rim lamp's power.
+    """
+    n, smooth, strand = normals
+    occlusion, rough, thickness, reached = values
+    lamps, sh, levels, rim_power = lights
+    one, zero = np.float32(1), np.float32(0)
+    key, rim = lamps[KEY, 0], lamps[RIM, 0]
+    reach = one - np.float32(DIRECT) * (one - occlusion)
+    nv, nl, nl_smooth = max(dot(n, view), np.float32(1e-3)), dot(n, key), dot(smooth, key)
+    edge = np.float32(math.pow(one - min(nv, one), rim_power)) * reach
+    along = dot(strand, key)
+    cosines = (
+        nl, nl_smooth, max(one - along * along, zero) if hair else zero, reached,
+        max(zero, (dot(n, rim) + np.float32(0.3)) / np.float32(1.3)) * edge,
+        (one - thickness) * row[THROUGH],
+    )  # fmt: skip
+    a, b, c = albedo
+    red = _scattered(0, a, row, cosines, reach, lamps) + a * _ambient(sh, 0, n) * _open(a, occlusion)
+    green = _scattered(1, b, row, cosines, reach, lamps) + b * _ambient(sh, 1, n) * _open(b, occlusion)
+    blue = _scattered(2, c, row, cosines, reach, lamps) + c * _ambient(sh, 2, n) * _open(c, occlusion)
+    half = unit((key[0] + view[0], key[1] + view[1], key[2] + view[2]))
+    if hair:
+        lit = max(zero, np.float32(0.35) + nl_smooth) * reached * reach * (one - rough * np.float32(0.6))
+        white = (
+            lit * _strand_gloss(strand, smooth, half, np.float32(-0.08), np.float32(90)) * np.float32(0.07)
+        )
+        tinted = lit * _strand_gloss(strand, smooth, half, np.float32(0.10), np.float32(22))
+        return (
+            red + (white + tinted * a) * lamps[KEY, 1, 0],
+            green + (white + tinted * b) * lamps[KEY, 1, 1],
+            blue + (white + tinted * c) * lamps[KEY, 1, 2],
+        )
+    nh, vh, share = max(dot(n, half), zero), max(dot(view, half), zero), row[SHARP_SHARE]
+    nl, f0 = max(nl, zero), row[REFLECTION]
+    miss = (one - vh) * (one - vh)
+    fresnel = f0 + (one - f0) * miss * miss * (one - vh)
+    lobes = (one - share) * _gloss(rough, nh, nl, nv) + share * _gloss(rough * row[SHARP], nh, nl, nv)
+    shine = np.float32(lobes * fresnel * nl * math.pi) * reached * reach
+    mirrored = _mirror_share(f0, rough, nv) * occlusion * occlusion
+    turn = 2 * dot(n, view)
+    sky = _mirrored(levels, (turn * n[0] - view[0], turn * n[1] - view[1], turn * n[2] - view[2]), rough)
+    return (
+        red + shine * lamps[KEY, 1, 0] + mirrored * sky[0],
+        green + shine * lamps[KEY, 1, 1] + mirrored * sky[1],
+        blue + shine * lamps[KEY, 1, 2] + mirrored * sky[2],
+    )

@@ -1,0 +1,138 @@
+"""The maps of a face as texels that the renderer reads: decoded, interleaved, and in coarser levels."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from realizer.core.array_types import Float32, Int32, UInt8
+from realizer.core.errors import FaceError
+from realizer.face.maps import Maps
+
+# Channels of a texel: sRGB, alpha; slope of the relief; occlusion, roughness, thickness; slope of the folds.
+RED, GREEN, BLUE, ALPHA, SLOPE_U, SLOPE_V, OCCLUSION, ROUGHNESS, THICKNESS, FOLD_U, FOLD_V = range(11)
+CHANNELS = 12  # a texel begins at a multiple of four bytes
+LEVEL = np.array([255, 255, 255, 255, 128, 128, 255, 255, 255, 128, 128, 0], np.uint8)
+STEEPEST = 1.0  # slope at byte 255, metres per metre; 128 is level
+BAND = 64  # rows halved at once, so that memory stays small
+FULL = 2048  # texels of a side, of the maps that `Maps.texel` is given for
+
+
+@dataclass(frozen=True, eq=False)
+class Texels:
+    """Texels of all levels, one after the other.
+
+    Attributes:
+        values: (n, CHANNELS) uint8, the rows of each level from the top.
+        levels: (k, 3) int32, first texel, width and height of each level; each is half as large as the last.
+    """
+
+    values: UInt8
+    levels: Int32
+
+    def level(self, number: int) -> UInt8:
+        """Return a level as a picture (h, w, CHANNELS)."""
+        first, width, height = (int(n) for n in self.levels[number])
+        return self.values[first : first + width * height].reshape(height, width, CHANNELS)
+
+
+def texels_of(maps: Maps | None, largest: int = FULL) -> Texels:
+    """Return the texels of maps; those of a face without maps change nothing.
+
+    Args:
+        largest: texels of a side that are enough for the picture.
+
+    Raises:
+        FaceError: a map is no picture, or not of the size of the albedo map.
+    """
+    if maps is None:
+        return _with_levels(np.broadcast_to(LEVEL, (1, 1, CHANNELS)))
+    albedo = _decoded(maps, "albedo", "RGBA")
+    height, width = albedo.shape[:2]
+    whole = np.empty((height, width, CHANNELS), np.uint8)
+    whole[:] = LEVEL
+    whole[..., : ALPHA + 1] = albedo
+    texel = maps.texel * FULL / width
+    for name, first in (("relief", SLOPE_U), ("folds", FOLD_U)):
+        if name in maps.files:
+            heights = _decoded(maps, name, "L", (width, height))
+            whole[..., first : first + 2] = _slopes(heights, maps.relief / texel)
+    if "normal" in maps.files:
+        whole[..., SLOPE_U : SLOPE_V + 1] = _tilts(_decoded(maps, "normal", "RGB", (width, height)))
+    if "surface" in maps.files:
+        whole[..., OCCLUSION : THICKNESS + 1] = _decoded(maps, "surface", "RGB", (width, height))
+    while max(whole.shape[:2]) > largest:
+        whole = _halved(whole)
+    return _with_levels(whole)
+
+
+def _decoded(maps: Maps, name: str, mode: str, size: tuple[int, int] | None = None) -> UInt8:
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(io.BytesIO(maps.files[name])) as picture:
+            pixels = picture.convert(mode)
+    except (OSError, UnidentifiedImageError, Image.DecompressionBombError) as error:
+        raise FaceError(f"{name}.webp: wanted a picture, got: {error}; build the face again") from None
+    if size is not None and pixels.size != size:
+        pixels = pixels.resize(size, Image.Resampling.BILINEAR)
+    return np.asarray(pixels)
+
+
+def _slopes(heights: UInt8, rise: float) -> UInt8:
+    """Return the slopes (h, w, 2) to the right and down of heights (h, w); `rise` is a step over a texel."""
+    scale = np.float32(rise / 2 / STEEPEST * 127)
+    out = np.full((*heights.shape, 2), 128, np.float32)
+    high = heights.astype(np.float32)
+    out[:, 1:-1, 0] += (high[:, 2:] - high[:, :-2]) * scale
+    out[1:-1, :, 1] += (high[2:] - high[:-2]) * scale
+    return _bytes(out)
+
+
+def _tilts(normals: UInt8) -> UInt8:
+    """Return slopes (h, w, 2) to the right and down, of a normal map (h, w, 3)."""
+    x, y, z = np.moveaxis(normals.astype(np.float32) / np.float32(127.5) - 1, 2, 0)
+    slopes = np.stack([-x, y], axis=2) / np.maximum(z, 0.1)[..., None]
+    return _bytes(128 + slopes / STEEPEST * 127)
+
+
+def _bytes(values: Float32) -> UInt8:
+    out: UInt8 = np.rint(values).clip(1, 255).astype(np.uint8)
+    return out
+
+
+def _halved(picture: Any) -> UInt8:
+    """Return a picture of half the size: the mean of each four texels, colours weighed by their alpha."""
+    height, width = (max(n // 2, 1) for n in picture.shape[:2])
+    out = np.empty((height, width, CHANNELS), np.uint8)
+    for top in range(0, height, BAND):
+        band = picture[2 * top : 2 * min(top + BAND, height), : 2 * width]
+        four = [band[y::2, x::2].astype(np.uint16) for y, x in np.ndindex(*np.minimum(band.shape[:2], 2))]
+        mean = out[top : top + BAND]
+        mean[:] = (sum(four) + len(four) // 2) // len(four)
+        cover = [part[..., ALPHA : ALPHA + 1].astype(np.float32) for part in four]
+        total = sum(cover)
+        if total.min() < 255 * len(four):
+            seen = (total > 0)[..., 0]
+            mixed = sum(part[..., :ALPHA] * share for part, share in zip(four, cover, strict=True))
+            mean[..., :ALPHA][seen] = np.rint(mixed[seen] / total[seen])
+    return out
+
+
+def _with_levels(picture: Any) -> Texels:
+    pictures = [np.ascontiguousarray(picture)]
+    while max(pictures[-1].shape[:2]) > 1:
+        pictures.append(_halved(pictures[-1]))
+    firsts = np.cumsum([0, *(p.shape[0] * p.shape[1] for p in pictures[:-1])])
+    levels = [[first, p.shape[1], p.shape[0]] for first, p in zip(firsts, pictures, strict=True)]
+    return Texels(np.concatenate([p.reshape(-1, CHANNELS) for p in pictures]), np.array(levels, np.int32))
+
+
+def slopes_of(texels: Texels) -> Float32:
+    """Return the slopes (h, w, 4) of relief and folds at the finest level, metres per metre."""
+    fine = texels.level(0)
+    both = np.concatenate([fine[..., SLOPE_U : SLOPE_V + 1], fine[..., FOLD_U : FOLD_V + 1]], axis=2)
+    return (both.astype(np.float32) - 128) * np.float32(STEEPEST / 127)

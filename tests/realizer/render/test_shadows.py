@@ -1,0 +1,44 @@
+"""`LampView` and `reach`: what lies behind something is in its shadow, softly."""
+
+import numpy as np
+import pytest
+
+from realizer.render.shadows import SIDE, LampView, reach
+
+pytestmark = [pytest.mark.gl("onboard"), pytest.mark.xdist_group("render")]
+UP = np.float32([0, 1, 0])
+
+
+def test_lamp_view_holds_the_whole_box():
+    view = LampView((1, 2, 3), (-1, -2, -1), (1, 1, 2))
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-2, 1) for z in (-1, 2)], np.float32)
+    seen = view.project(corners)
+    assert (seen[:, :2] >= 0).all()
+    assert (seen[:, :2] <= SIDE).all()
+    assert (seen[:, 2] >= 0).all()
+    assert (seen[:, 2] <= 1).all()
+
+
+def test_lamp_view_measures_depth_away_from_the_lamp():
+    depths = LampView((0, 1, 0), (-1, -1, -1), (1, 1, 1)).project(np.float32([[0, 1, 0], [0, -1, 0]]))[:, 2]
+    assert depths[1] - depths[0] == pytest.approx(2 / np.sqrt(12))
+
+
+def test_reach_is_dark_behind_and_light_before():
+    """A sheet over half of the box at depth 0.3: below it is shadow, above it and beside it light."""
+    view = LampView((0, 1, 0), (-1, -1, -1), (1, 1, 1))
+    depths = np.ones((SIDE, SIDE, 4), np.float32)
+    half = view.project(np.float32([[0, 0, 0]]))[0, 0]
+    depths[:, : int(half)] = 0.3
+    shadows = depths, view.matrix
+    left = -0.3 if view.matrix[0, 0] > 0 else 0.3
+
+    def at(x, y):
+        return reach(shadows, np.float32([x, y, 0]), UP)
+
+    assert at(left, -0.9) < 0.01
+    assert at(left, 0.9) == pytest.approx(1)
+    assert at(-left, -0.9) == pytest.approx(1, abs=0.01)
+    edge = [at(x, -0.9) for x in np.linspace(left / 20, -left / 20, 41)]
+    assert (np.diff(edge) >= -1e-3).all()
+    assert any(0.2 < share < 0.8 for share in edge)

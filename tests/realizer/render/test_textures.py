@@ -1,0 +1,77 @@
+"""`texels_of`: maps decoded, with slopes for heights, in levels."""
+
+import io
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from realizer.core.errors import FaceError
+from realizer.face.maps import Maps
+from realizer.render.textures import (
+    ALPHA,
+    FOLD_U,
+    LEVEL,
+    OCCLUSION,
+    SLOPE_U,
+    SLOPE_V,
+    THICKNESS,
+    slopes_of,
+    texels_of,
+)  # fmt: skip
+
+
+def encoded(pixels):
+    stream = io.BytesIO()
+    Image.fromarray(np.asarray(pixels, np.uint8)).save(stream, "webp", lossless=True, exact=True)
+    return stream.getvalue()
+
+
+def maps(**pictures):
+    return Maps({name: encoded(pixels) for name, pixels in pictures.items()}, None, 0.0, 1.0, None, None)
+
+
+WHITE = np.full((32, 32, 4), 255)
+
+
+def test_texels_of_no_maps_change_nothing():
+    assert np.array_equal(texels_of(None).level(0), LEVEL[None, None])
+
+
+def test_texels_of_heights_are_their_slopes():
+    """A plane that rises by 4 steps a texel to the right, of a map 64 times as coarse as the full one."""
+    ramp = np.tile(np.arange(32) * 4, (32, 1))
+    files = {"albedo": encoded(WHITE), "relief": encoded(ramp), "folds": encoded(ramp.T)}
+    found = texels_of(Maps(files, None, 0.001, 0.0005, None, None))
+    slopes = slopes_of(found)[1:-1, 1:-1]
+    assert slopes[..., 0] == pytest.approx(4 * 0.001 / (0.0005 * 64), abs=0.01)
+    assert slopes[..., 1] == pytest.approx(0, abs=0.01)
+    assert slopes[..., 3] == pytest.approx(4 * 0.001 / (0.0005 * 64), abs=0.01)
+
+
+def test_texels_of_a_normal_map_are_its_slopes():
+    normal = np.full((32, 32, 3), (128 + 60, 128 + 30, 230))
+    slopes = texels_of(maps(albedo=WHITE, normal=normal)).level(0)[0, 0].astype(int) - 128
+    assert slopes[SLOPE_U] == pytest.approx(-127 * 60 / 102, abs=3)
+    assert slopes[SLOPE_V] == pytest.approx(127 * 30 / 102, abs=3)
+
+
+def test_texels_of_maps_have_levels_down_to_one():
+    albedo = WHITE.copy()
+    albedo[:, 16:] = (10, 20, 30, 0)
+    surface = np.full((16, 16, 3), (200, 100, 50))
+    found = texels_of(maps(albedo=albedo, surface=surface))
+    assert [tuple(level[1:]) for level in found.levels] == [(n, n) for n in (32, 16, 8, 4, 2, 1)]
+    assert found.level(5)[0, 0, :4].tolist() == [255, 255, 255, 128]
+    assert found.level(0)[5, 5, OCCLUSION : THICKNESS + 1].tolist() == [200, 100, 50]
+    assert found.level(0)[5, 5, FOLD_U] == 128
+    assert found.level(1)[5, 12, ALPHA] == 0
+
+
+def test_texels_of_maps_are_no_larger_than_asked_for():
+    assert texels_of(maps(albedo=WHITE), 10).levels[0, 1:].tolist() == [8, 8]
+
+
+def test_texels_of_a_broken_map_names_it():
+    with pytest.raises(FaceError, match=r"albedo\.webp: wanted a picture"):
+        texels_of(Maps({"albedo": b"no"}, None, 0.0, 1.0, None, None))
