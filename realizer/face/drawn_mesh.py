@@ -56,10 +56,14 @@ class DrawnMesh:
     two_sided: Bool
     see_through: Bool
 
-    def __call__(self, vertices: Float32, normals: Float32) -> tuple[Float32, Float32]:
-        """Return vertices and unit normals (d, 3) float32, for those of the face, (n, 3) each."""
-        ups = self.ups @ normals
-        ups /= np.maximum(np.sqrt(np.einsum("ij,ij->i", ups, ups)), 1e-20)[:, None]
+    def __call__(self, vertices: Float32, normals: Float32, amounts: Float32) -> tuple[Float32, Float32]:
+        """Return vertices (d, 3), and unit normals with an amount behind each (d, 4), float32.
+
+        Args:
+            vertices, normals: (n, 3) of the face; amounts: (n,) at its vertices.
+        """
+        ups = self.ups @ np.hstack([normals, amounts[:, None]])
+        ups[:, :3] /= np.maximum(np.sqrt(np.einsum("ij,ij->i", ups[:, :3], ups[:, :3])), 1e-20)[:, None]
         return self.places @ vertices, ups
 
 

@@ -31,6 +31,7 @@ class Maps:
         texel: metres that a texel of a map of 2048 is wide.
         see_through: (m,) triangles into which the alpha of the albedo map cuts holes.
         folds: (n, r) float32 0..1, how much of each region's folds shows at each vertex.
+        regions: (r,) their names: a drive of `realizer/tables/wrinkles.toml`, and _left or _right.
     """
 
     files: Mapping[str, bytes]
@@ -39,6 +40,7 @@ class Maps:
     texel: float
     see_through: Bool
     folds: Float32
+    regions: tuple[str, ...] = ()
 
 
 def read_maps(folder: Path, head: Mapping[str, Any], mesh: Mapping[str, Any]) -> Maps | None:
@@ -61,23 +63,23 @@ def read_maps(folder: Path, head: Mapping[str, Any], mesh: Mapping[str, Any]) ->
     for key in SCALE:
         if not isinstance(table[key], int | float) or not 0 <= table[key] <= 1:
             raise FaceError(f"{folder / 'face.toml'}: [maps] {key}: wanted metres, got {table[key]!r}")
+    regions = head.get("maps", {}).get("folds", [])
+    if not isinstance(regions, list) or not all(isinstance(name, str) and "_" in name for name in regions):
+        raise FaceError(
+            f"{folder / 'face.toml'}: [maps] folds: wanted names such as frown_left, got {regions!r}"
+        )
     count, vertices = len(mesh["triangles"]), len(mesh["vertices"])
     uv = _array(folder, mesh, "uv", np.zeros(0), (count, 3, 2))
     holes = _array(folder, mesh, "see_through", np.zeros(count, bool), (count,))
-    folds = _array(folder, mesh, "fold_weights", np.zeros((vertices, 0)), (vertices, None))
+    folds = _array(folder, mesh, "fold_weights", np.zeros((vertices, 0)), (vertices, len(regions)))
     return Maps(
         files, uv.astype(np.float32) / np.float32(65535), table["relief"], table["texel"],
-        holes.astype(bool), folds.astype(np.float32) / np.float32(255),
+        holes.astype(bool), folds.astype(np.float32) / np.float32(255), tuple(regions),
     )  # fmt: skip
 
 
-def _array(
-    folder: Path, mesh: Mapping[str, Any], name: str, default: Any, shape: tuple[int | None, ...]
-) -> Any:
+def _array(folder: Path, mesh: Mapping[str, Any], name: str, default: Any, shape: tuple[int, ...]) -> Any:
     found = mesh.get(name, default)
-    if len(found.shape) != len(shape) or any(
-        want not in (None, got) for want, got in zip(shape, found.shape, strict=True)
-    ):
-        wanted = " x ".join("any" if n is None else str(n) for n in shape)
-        raise FaceError(f"{folder / 'mesh.npz'}: {name}: wanted {wanted}, got {found.shape}; build it again")
+    if found.shape != shape:
+        raise FaceError(f"{folder / 'mesh.npz'}: {name}: wanted {shape}, got {found.shape}; build it again")
     return found

@@ -6,6 +6,7 @@ from realizer.core.array_types import Float32, UInt8
 from realizer.core.colours import linear
 from realizer.face.drawn_mesh import drawn_mesh
 from realizer.render.canvas import Canvas
+from realizer.render.folds import Folds
 from realizer.render.light import Light, unit
 from realizer.render.raster import Raster
 from realizer.render.shadows import LampView
@@ -21,12 +22,13 @@ class SoftwareCanvas(Canvas):
         low, high = self._face.bounds
         lamp = LampView(self._light.key.direction, low, high)
         self._raster = Raster(self._size, self._mesh, linear(self._mesh.colours), texels, lamp)
+        self._folds = Folds(self._face)
         self._lights = lights_of(self._light)
         self._moving = np.zeros((len(self._mesh.uv), 7), np.float32)
         self._eye = self._camera.position.astype(np.float32)
 
     def _pixels(self, vertices: Float32, normals: Float32) -> UInt8:
-        places, self._moving[:, 3:6] = self._mesh(vertices, normals)
+        places, self._moving[:, 3:] = self._mesh(vertices, normals, self._folds(vertices))
         self._moving[:, :3] = places
         points, distances = self._camera.project(places, self._size)
         # Parts of a head do not come near the lens; those of a broken one are not drawn.

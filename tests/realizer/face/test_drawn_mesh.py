@@ -28,7 +28,10 @@ def test_drawn_mesh_of_a_face_without_maps_is_its_subdivision():
     assert {name: b - a for name, (a, b) in mesh.parts.items()} == {
         name: b - a for name, (a, b) in fine.parts.items()
     }
-    vertices, ups = mesh(FACE.vertices, normals(FACE, FACE.vertices[None])[0])
+    amounts = np.linspace(0, 1, len(FACE.vertices), dtype=np.float32)
+    vertices, ups = mesh(FACE.vertices, normals(FACE, FACE.vertices[None])[0], amounts)
+    ups, amounts = ups[:, :3], ups[:, 3]
+    assert (amounts.min(), amounts.max()) == pytest.approx((0, 1))
     ours, theirs = (
         np.sort(np.round(points[triangles].mean(axis=1), 6), axis=0)
         for points, triangles in ((vertices, mesh.triangles), (fine.vertices, fine.triangles))
@@ -72,6 +75,6 @@ def test_drawn_mesh_adds_cards_that_follow_their_roots():
     assert mesh.two_sided[-1]
     assert mesh.see_through[-1]
     ups = normals(FACE, FACE.vertices[None])[0]
-    vertices, drawn_ups = mesh(FACE.vertices + 1, ups)
+    vertices, drawn_ups = mesh(FACE.vertices + 1, ups, np.zeros(len(ups), np.float32))
     assert vertices[first:] == pytest.approx(np.tile(FACE.vertices[0] + 1, (3, 1)), abs=1e-6)
-    assert drawn_ups[first:] == pytest.approx(np.tile(ups[0], (3, 1)), abs=1e-6)
+    assert drawn_ups[first:, :3] == pytest.approx(np.tile(ups[0], (3, 1)), abs=1e-6)

@@ -22,11 +22,14 @@ def folder(tmp_path):
 
 
 def test_read_maps_reads_pictures_and_places(folder):
-    maps = read_maps(folder, {"maps": {"relief": 0.001, "texel": 0.0002}}, MESH)
+    maps = read_maps(
+        folder, {"maps": {"relief": 0.001, "texel": 0.0002, "folds": ["frown_left", "frown_right"]}}, MESH
+    )
     assert maps.files == {"albedo": b"albedo", "relief": b"relief"}
     assert (maps.relief, maps.texel) == (0.001, 0.0002)
     assert maps.uv == pytest.approx(1)
     assert maps.folds == pytest.approx(1)
+    assert maps.regions == ("frown_left", "frown_right")
     assert not maps.see_through.any()
 
 
@@ -39,8 +42,9 @@ def test_read_maps_of_a_face_without_any_is_none(tmp_path):
     [
         ({"maps": {"relief": "high"}}, {}, r"\[maps\] relief: wanted metres, got 'high'"),
         ({"maps": {"texel": float("nan")}}, {}, r"\[maps\] texel: wanted metres, got nan"),
-        ({}, {"uv": np.zeros((3, 3, 2))}, r"uv: wanted 2 x 3 x 2, got \(3, 3, 2\)"),
-        ({}, {"fold_weights": np.zeros(4)}, r"fold_weights: wanted 4 x any, got \(4,\)"),
+        ({}, {"uv": np.zeros((3, 3, 2))}, r"uv: wanted \(2, 3, 2\), got \(3, 3, 2\)"),
+        ({}, {}, r"fold_weights: wanted \(4, 0\), got \(4, 2\)"),
+        ({"maps": {"folds": "frown"}}, {}, r"folds: wanted names such as frown_left, got 'frown'"),
     ],
 )
 def test_read_maps_names_what_is_wrong(folder, head, change, fault):
