@@ -11,27 +11,43 @@ from realizer.core.array_types import Float64, Int32
 from realizer.face.basis import pack
 
 
-def write_head(path: Path, head: Mapping[str, str], parts: Mapping[str, Sequence[int]]) -> None:
+def write_head(
+    path: Path,
+    head: Mapping[str, str],
+    parts: Mapping[str, Sequence[int]],
+    maps: Mapping[str, Any] | None = None,
+) -> None:
     """Write face.toml.
 
     Args:
         head: name, source, licence and says.
         parts: name -> first vertex, last + 1.
+        maps: the table [maps].
     """
     lines = [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in head.items()]
     lines += ["", "[parts]  # first vertex, last + 1"]
     lines += [f"{name} = [{first}, {last}]" for name, (first, last) in parts.items()]
+    if maps:
+        lines += ["", "[maps]  # metres of 255 steps of relief and folds, and of a texel; regions of folds"]
+        lines += [f"{key} = {json.dumps(value)}" for key, value in maps.items()]
     path.write_text("\n".join(lines) + "\n", "utf-8")
 
 
 def write_mesh(
-    path: Path, vertices: Float64, triangles: Int32, colours: Float64, occlusion: Float64, gloss: Float64
+    path: Path,
+    vertices: Float64,
+    triangles: Int32,
+    colours: Float64,
+    occlusion: Float64,
+    gloss: Float64,
+    more: Mapping[str, Any] | None = None,
 ) -> None:
     """Write mesh.npz.
 
     Args:
         vertices: (n, 3) metres; triangles: (m, 3); colours: (n, 3) sRGB 0..255.
         occlusion, gloss: (n,) 0..1.
+        more: further arrays, as they are.
     """
     np.savez_compressed(
         path,
@@ -40,6 +56,7 @@ def write_mesh(
         colours=to_bytes(colours),
         occlusion=to_bytes(occlusion * 255),
         gloss=to_bytes(gloss * 255),
+        **(more or {}),
     )
 
 

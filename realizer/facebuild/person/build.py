@@ -23,6 +23,7 @@ from realizer.facebuild.person.fap_fields import face_fields
 from realizer.facebuild.person.lids import Lid
 from realizer.facebuild.person.person import Person, person_of
 from realizer.facebuild.person.recipe import read_recipe
+from realizer.facebuild.skin.maps import SkinMaps, bake
 
 SOURCE = (
     "MakeHuman base mesh hm08 with its shape targets and the face units pack 01 (CC0), from the PyPI wheel "
@@ -52,17 +53,25 @@ def build_face(name: str, data: Path, output: Path | None = None) -> Path:
     fields, lips = face_fields(person.ground, person.jaw_pivot)
     lids = [Lid(person.ground, side) for side in (1, -1)]
     made = assemble(person, lips, lids, recipe)
-    write_face(folder, name, recipe.description, person, made, fields)
+    maps = bake(name, person, lips, lids, recipe, made[0])
+    write_face(folder, name, recipe.description, person, made, fields, maps)
     return folder
 
 
 def write_face(
-    folder: Path, name: str, says: str, person: Person, made: list[Part], fields: dict[int, Float64]
+    folder: Path,
+    name: str,
+    says: str,
+    person: Person,
+    made: list[Part],
+    fields: dict[int, Float64],
+    maps: SkinMaps,
 ) -> None:
-    """Write mesh.npz, fields.npz, features.csv and face.toml.
+    """Write mesh.npz, fields.npz, features.csv, face.toml and the maps.
 
     Args:
         fields: FAP's or basis row's number -> (n, 3) on the base mesh.
+        maps: of the skin, the first part, whose vertices are written white.
     """
     count = np.cumsum([0] + [len(part.vertices) for part in made])
     total = int(count[-1])
@@ -95,16 +104,18 @@ def write_face(
         folder / "mesh.npz",
         vertices,
         np.concatenate([part.triangles + first for part, first in zip(made, count, strict=False)]),
-        np.concatenate([part.colours for part in made]),
+        np.concatenate([np.full_like(made[0].colours, 255), *(part.colours for part in made[1:])]),
         np.concatenate([np.asarray(part.occlusion) for part in made]),
         np.concatenate([part.gloss for part in made]),
+        maps.arrays([(len(part.vertices), len(part.triangles)) for part in made]),
     )
+    maps.write(folder)
     centres = [centre for centre, _ in person.balls]
     turn = to_bytes(weight * 255)
     write_fields(folder / "fields.npz", rows, turn, person.jaw_pivot, person.head_pivot, centres, lids)
     write_features(folder / "features.csv", points)
     head = {"name": name, "source": SOURCE, "licence": "CC0-1.0", "says": says}
-    write_head(folder / "face.toml", head, ranges)
+    write_head(folder / "face.toml", head, ranges, maps.head())
 
 
 def _mend(rows: dict[int, Float64], skin: Part, points: dict[str, Point], person: Person) -> None:

@@ -10,7 +10,7 @@ from realizer.facebuild.parts import Part, smooth
 from realizer.facebuild.person import clothing, skin_colours
 from realizer.facebuild.person.brows import brow, lashes
 from realizer.facebuild.person.fap_fields import SINKS
-from realizer.facebuild.person.hair import hair, shadow, style_of
+from realizer.facebuild.person.hair import hair, style_of
 from realizer.facebuild.person.lids import Lid
 from realizer.facebuild.person.lips import Lips
 from realizer.facebuild.person.person import Person
@@ -38,7 +38,10 @@ TIP = 0.55, 0.50  # from that share of its length on it gets round; its tip has 
 
 
 def assemble(person: Person, lips: Lips, lids: list[Lid], recipe: Recipe) -> list[Part]:
-    """Return the parts in the order of a face's vertices, with baked occlusion."""
+    """Return the parts in the order of a face's vertices, with baked occlusion.
+
+    The skin, which comes first, has only its broad colours: the rest is in its maps.
+    """
     ground, look = person.ground, recipe.colours
     at, n = ground.at, len(ground.at)
     points = {name: ground.point(name) for name in ground.points}
@@ -56,24 +59,9 @@ def assemble(person: Person, lips: Lips, lids: list[Lid], recipe: Recipe) -> lis
     skin = skin.threaded([place[ring].tolist() for ring in lips.rings[:RED_RINGS]])
     style = style_of(recipe.hair)
     scalp = Scalp(skin, at, points, style.line, style.rise)
-    colours, gloss = skin_colours.paint_skin(ground, lips, [lid.rings for lid in lids], look, appearance)
-    roots = shadow(scalp, style, at)[:, None]
-    colours = colours * (1 - roots) + np.array(look["hair"], float) * roots
-    tints, shine = np.asarray(skin.mix @ colours), np.asarray(skin.mix @ gloss)
-    ring = np.where(lips.inside, 0, len(lips.rings) + 2.0)
-    for k, loop in enumerate(lips.rings):
-        ring[loop] = k
-    strength = appearance.lips * (1 - 0.25 * appearance.age)
-    skin_colours.paint_lips(
-        tints,
-        shine,
-        skin.mix @ ring,
-        skin.mix @ lips.u,
-        skin.mix @ (lips.is_upper * 1.0),
-        look["lips"],
-        strength,
-    )
-    made = [Part("skin", skin, skin.positions(at), skin.triangles, tints, shine)]
+    colours = skin_colours.paint_skin(ground, lips, [lid.rings for lid in lids], look, appearance)
+    tints = np.asarray(skin.mix @ colours)
+    made = [Part("skin", skin, skin.positions(at), skin.triangles, tints, np.zeros(len(tints)))]
     made += [brow(skin, at, tints, points, side, look["brows"], appearance) for side in (1, -1)]
     for lid, (centre, _) in zip(lids, person.balls, strict=True):
         made.append(lashes(at, lid, centre, look["skin"], look["lashes"], appearance))
@@ -89,11 +77,11 @@ def assemble(person: Person, lips: Lips, lids: list[Lid], recipe: Recipe) -> lis
     stays[list(ground.points.values())] = True
     stays[lips.fade > 0.5] = True
     made = [_decimate_hidden(part, person, scalp, stays) for part in made]
-    _line_mouth(made[0], person, lips, look)
+    _line_mouth(made[0], person, lips)
     return made
 
 
-def _line_mouth(skin: Part, person: Person, lips: Lips, colours: dict[str, list[float]]) -> None:
+def _line_mouth(skin: Part, person: Person, lips: Lips) -> None:
     patch = skin.patch
     assert patch is not None
     assert skin.occlusion is not None
@@ -101,7 +89,7 @@ def _line_mouth(skin: Part, person: Person, lips: Lips, colours: dict[str, list[
     # Right behind the corners it stays dark: seen from the side, closed lips show a hair of it.
     corners = smooth(np.abs(lips.u), 0.70, 0.92) * smooth(lips.fade, 0.45, 0.75)
     share = patch.mix @ (lips.inside * (1 - corners))
-    skin_colours.paint_mouth(skin.colours, skin.gloss, skin.occlusion, share, deep, colours)
+    skin_colours.light_mouth(skin.occlusion, share, deep)
 
 
 def _decimate_hidden(part: Part, person: Person, scalp: Scalp, stays: Bool) -> Part:

@@ -25,13 +25,15 @@ class BaseMesh:
 
     Attributes:
         vertices: (n, 3) decimetres.
-        uv: (n, 2) texture coordinates of the body's vertices, 0 elsewhere.
         quads: group name -> (m, 4) vertex indices.
+        texture: (t, 2) texture coordinates, (0, 0) at the lower left.
+        corners: (m, 4) texture coordinates of each corner of the quads of the group "body".
     """
 
     vertices: Float64
-    uv: Float64
     quads: Mapping[str, Int32]
+    texture: Float64
+    corners: Int32
 
     def mirror(self) -> Int32:
         """Return each vertex's mirror image (n,), or the vertex itself."""
@@ -116,7 +118,7 @@ def read_base(data: Path) -> BaseMesh:
     vertices: list[list[float]] = []
     texture: list[list[float]] = []
     quads: dict[str, list[list[int]]] = defaultdict(list)
-    corners: list[tuple[int, int]] = []
+    corners: list[list[int]] = []
     group = ""
     for line in path.read_text("ascii").splitlines():
         word, *rest = line.split() or [""]
@@ -130,11 +132,13 @@ def read_base(data: Path) -> BaseMesh:
             pairs = [(int(a) - 1, int(b) - 1) for a, b, *_ in (corner.split("/") for corner in rest)]
             quads[group].append([a for a, _ in pairs][:4])
             if group == "body":
-                corners += pairs
-    uv = np.zeros((len(vertices), 2))
-    for vertex, place in corners:
-        uv[vertex] = texture[place]
-    return BaseMesh(np.array(vertices), uv, {name: np.array(rows, np.int32) for name, rows in quads.items()})
+                corners.append([b for _, b in pairs][:4])
+    return BaseMesh(
+        np.array(vertices),
+        {name: np.array(rows, np.int32) for name, rows in quads.items()},
+        np.array(texture),
+        np.array(corners, np.int32),
+    )
 
 
 def read_target(data: Path, name: str, n_vertices: int) -> Float64:

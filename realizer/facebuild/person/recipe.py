@@ -34,6 +34,7 @@ class Appearance:
     flush: float
     stubble: float
     freckles: float
+    moles: float
     age: float
     collar_low: float
     collar_point: float

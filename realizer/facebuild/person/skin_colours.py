@@ -14,17 +14,16 @@ from realizer.facebuild.person.recipe import Appearance
 
 def paint_skin(
     ground: Ground, lips: Lips, rings: list[list[list[int]]], colours: Mapping[str, Any], look: Appearance
-) -> tuple[Float64, Float64]:
-    """Return colours (n, 3) sRGB 0..255 and gloss (n,) of the body without the red of the lips.
+) -> Float64:
+    """Return the broad colours of the body, (n, 3) sRGB 0..255, without all that is in the maps only.
 
     Args:
         rings: left and right eye's rings around the opening, from the edge outwards.
-        colours: sRGB colours skin, blush, mouth, hair.
+        colours: sRGB colours skin, blush, mouth.
     """
     at, n = ground.at, len(ground.at)
     skin, blush, mouth = (np.array(colours[k], float) for k in ("skin", "blush", "mouth"))
     out = np.repeat(skin[None], n, 0)
-    gloss = np.full(n, 0.16)
 
     def glow(name: str, radii: Any, amount: float, colour: Any = blush, off: Any = 0.0) -> None:
         nonlocal out
@@ -48,13 +47,8 @@ def paint_skin(
         glow(name, (0.019, 0.008, 0.03), 0.32 * dark, skin * [0.84, 0.74, 0.70], [0, -0.001, 0])
     for name in ("3.11", "3.8"):
         glow(name, (0.010, 0.012, 0.03), 0.30 * dark, skin * [0.80, 0.70, 0.68], [0, 0.004, 0])
-    shade = _beard(ground, lips)[:, None] * look.stubble * 0.42
-    out = out * (1 - shade) + (np.array(colours["hair"], float) * 0.6 + [30, 36, 40]) * shade
-    out *= 1 + _mottle(ground, look)[:, None] * [0.5, 0.9, 1.0]
     inside = lips.inside
-    # Wet near the lips, dark and dull behind: a shine deep in the mouth looks like metal.
     out[inside] = mouth * np.clip(lips.fade[inside], 0.55, 1)[:, None]
-    gloss[inside] = 0.3 * np.clip(lips.fade[inside] * 2 - 1, 0, 1)
     for ring in rings:
         # The wet edge of the lids is pink, the upper one darkened by the lashes' roots.
         top = at[ring[0]][:, 1] > np.median(at[ring[0]][:, 1])
@@ -63,13 +57,10 @@ def paint_skin(
             out[ring[k]] = (
                 out[ring[k]] * (1 - share) + np.where(top[:, None], [92, 58, 48.0], [205, 120, 110.0]) * share
             )
-        gloss[ring[0]] = 0.5
-    nose = ground.ellipsoid(ground.point("9.3"), (0.014, 0.016, 0.02))
-    gloss += 0.16 * nose
-    return np.clip(out, 0, 255), np.clip(gloss, 0, 1)
+    return np.asarray(np.clip(out, 0, 255))
 
 
-def _beard(ground: Ground, lips: Lips) -> Float64:
+def beard(ground: Ground, lips: Lips) -> Float64:
     """Return where a beard grows, (n,): upper lip, chin and jaw, up to the ears."""
     at = ground.at
     under_nose, corner, lobe, chin = (ground.point(k) for k in ("9.15", "8.3", "10.7", "2.1"))
@@ -84,63 +75,31 @@ def _beard(ground: Ground, lips: Lips) -> Float64:
     return np.asarray(face * before * (1 - lips.lips) * ground.body)
 
 
-def _mottle(ground: Ground, look: Appearance) -> Float64:
-    """Return how much lighter or darker than its surroundings the skin is, (n,): freckles and age."""
-    rng = np.random.default_rng(5)
-    fine = rng.uniform(-1, 1, len(ground.at))
-    cheeks = sum(ground.ellipsoid(ground.point(k), (0.034, 0.024, 0.04)) for k in ("5.3", "5.4", "9.3"))
-    spots = np.where(fine < -0.55, -0.16, 0.02) * np.clip(cheeks, 0, 1)
-    return np.asarray(
-        spots * look.freckles + ground.smoothed(fine, 2) * 0.10 * look.age + 0.012 * fine * ground.body
-    )
-
-
-def paint_lips(
-    out: Float64, gloss: Float64, ring: Float64, u: Float64, upper: Float64, red: Any, strength: float
-) -> None:
-    """Paint the red of the lips over a skin, in place.
-
-    Args:
-        out: (n, 3) sRGB; gloss: (n,).
-        ring: (n,) place across the lip: 0 inside, 1 where the lips meet, 7 the border, 9 beyond.
-        u: (n,) -1..1 along the lip; upper: (n,) 1 on the upper lip.
-        strength: 0..1, how much red.
-    """
-    amount = smooth(ring, 8.2, 5.0) * (1 - 0.55 * smooth(np.abs(u), 0.80, 1.0))
-    # Fine furrows across the red.
-    furrow = 0.03 * np.sin(u * 61 + 0.7) + 0.02 * np.sin(u * 97)
-    # The upper lip faces down and looks darker still; the red is fullest where the lips meet.
-    tone = np.array(red, float) * ((1 - 0.06 * upper + furrow) * (1 - 0.05 * smooth(ring, 5, 1)))[:, None]
-    share = (amount * (strength + (1 - strength) * 0.75 * smooth(ring, 4.0, 1.0)))[:, None]
-    out[:] = out * (1 - share) + tone * share
-    gloss += 0.24 * smooth(ring, 7, 4.5) * amount
-    out *= (1 - 0.42 * smooth(ring, 2.3, 0.6) * (ring < 3))[:, None]
-
-
 # Metres behind the lips that the mouth's lining is darkest from; how much light reaches it there, and right
 # behind the lips.
 DEEP, LIT = 0.060, (0.24, 0.66)
 
 
-def paint_mouth(
-    out: Float64, gloss: Float64, light: Float64, share: Float64, deep: Float64, colours: Any
-) -> None:
-    """Paint the lining of the mouth, in place: wet, red and lit behind the lips, darker to the back.
-
-    The occlusion baked at rest, behind closed lips, leaves no light there; an open mouth lets it in.
+def lining(colours: Mapping[str, Any], deep: Any) -> Any:
+    """Return the colour (n, 3) of the mouth's lining: wet and red behind the lips, darker to the back.
 
     Args:
-        out: (n, 3) sRGB; gloss, light: (n,) 0..1.
-        share: (n,) 1 for pure lining, 0 for none.
-        deep: (n,) metres behind the lips.
-        colours: sRGB colours mouth, tongue.
+        colours: sRGB colours mouth, tongue; deep: (n,) metres behind the lips.
     """
-    near = 1 - smooth(deep, 0.0, DEEP)
+    near = 1 - smooth(deep, 0.0, DEEP)[:, None]
     back, front = np.array(colours["mouth"], float) * 0.75, np.array(colours["tongue"], float) * 0.9
-    out += share[:, None] * (back + (front - back) * near[:, None] - out)
-    light += share * (np.interp(near, (0, 1), LIT) - light)
-    # A shine deep in the mouth looks like metal.
-    gloss += share * (0.4 * near**2 - gloss)
+    return back + (front - back) * near
+
+
+def light_mouth(light: Float64, share: Float64, deep: Float64) -> None:
+    """Light the lining of the mouth, in place, as through open lips.
+
+    The occlusion baked at rest, behind closed lips, leaves no light there.
+
+    Args:
+        light: (n,) 0..1; share: (n,) 1 for pure lining, 0 for none; deep: (n,) metres behind the lips.
+    """
+    light += share * (np.interp(1 - smooth(deep, 0.0, DEEP), (0, 1), LIT) - light)
 
 
 DIRECTIONS, CELL, BIAS = 192, 0.0013, 0.0026  # rays a vertex; metres of a depth cell; metres a ray starts off

@@ -16,6 +16,7 @@ from realizer.facebuild.person import build
 from realizer.facebuild.person.bust import ORDER
 from realizer.facebuild.person.makehuman import OBJ
 from realizer.facebuild.person.person import Person
+from realizer.facebuild.skin.maps import SkinMaps
 
 pytestmark = pytest.mark.xdist_group("mask")
 SAYS = 'A mask, "coarse" and calm'
@@ -23,13 +24,17 @@ SAYS = 'A mask, "coarse" and calm'
 
 @pytest.fixture(scope="module")
 def written(
-    person: Person, parts: list[Part], fields: dict[int, np.ndarray], tmp_path_factory: pytest.TempPathFactory
+    person: Person,
+    parts: list[Part],
+    fields: dict[int, np.ndarray],
+    maps: SkinMaps,
+    tmp_path_factory: pytest.TempPathFactory,
 ) -> Face:
     folder = tmp_path_factory.mktemp("faces") / "mask"
     folder.mkdir()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(build, "without_flips", lambda fields, *_: dict(fields))
-        build.write_face(folder, "mask", SAYS, person, parts, fields)
+        build.write_face(folder, "mask", SAYS, person, parts, fields, maps)
     return load_face("mask", folder.parent)
 
 
@@ -38,6 +43,15 @@ def test_write_face_keeps_vertices_and_parts(written: Face, parts: list[Part]) -
     assert len(written.vertices) == sum(len(part.vertices) for part in parts)
     assert np.allclose(written.vertices[: len(parts[0].vertices)], parts[0].vertices, atol=1e-6)
     assert written.name == "mask"
+
+
+def test_write_face_writes_maps_and_a_white_skin(written: Face, parts: list[Part]) -> None:
+    n = len(parts[0].vertices)
+    assert (written.colours[:n] == 255).all()
+    assert written.maps is not None
+    assert set(written.maps.files) == {"albedo", "relief", "surface", "folds"}
+    assert written.maps.folds[:n].max() > 0.9
+    assert not written.maps.folds[n:].any()
 
 
 def test_write_face_puts_feature_points_on_their_vertices(written: Face, person: Person) -> None:

@@ -45,7 +45,7 @@ def data(tmp_path: Path) -> Path:
     """Data of one quad, and of three targets."""
     (tmp_path / OBJ).parent.mkdir(parents=True)
     places = ("-1 0 0", "1 0 0", "1 2 0", "-1 2 0", "9 9 9")
-    lines = [f"v {place}" for place in places] + ["vt 0.5 0.25", "g body", "f 1/1 2/1 3/1 4/1"]
+    lines = [f"v {place}" for place in places] + ["vt 0.5 0.25", "vt 0 1", "g body", "f 1/1 2/1 3/2 4/1"]
     (tmp_path / OBJ).write_text("\n".join(lines))
     folder = tmp_path / "mpfb2/targets/eyes"
     folder.mkdir(parents=True)
@@ -59,7 +59,8 @@ def test_read_base_reads_vertices_groups_and_textures(data: Path) -> None:
     mesh = read_base(data)
     assert mesh.vertices[:4].tolist() == [[-1, 0, 0], [1, 0, 0], [1, 2, 0], [-1, 2, 0]]
     assert mesh.quads["body"].tolist() == [[0, 1, 2, 3]]
-    assert mesh.uv[[0, 4]].tolist() == [[0.5, 0.25], [0, 0]]
+    assert mesh.texture.tolist() == [[0.5, 0.25], [0, 1]]
+    assert mesh.corners.tolist() == [[0, 0, 1, 0]]
     assert mesh.mirror().tolist() == [1, 0, 3, 2, 4]
 
 

@@ -31,7 +31,7 @@ def data(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def mesh() -> BaseMesh:
-    return BaseMesh(AT, np.zeros((len(AT), 2)), QUADS)
+    return BaseMesh(AT, QUADS, np.zeros((1, 2)), np.zeros((0, 4), np.int32))
 
 
 def test_identity_is_in_metres_from_between_the_eyes(mesh: BaseMesh, data: Path) -> None:

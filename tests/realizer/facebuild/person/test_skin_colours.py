@@ -5,20 +5,30 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.facebuild.person.skin_colours import LIT, occlusion, paint_mouth
+from realizer.facebuild.person.base_mesh import Ground
+from realizer.facebuild.person.lips import Lips
+from realizer.facebuild.person.skin_colours import LIT, beard, light_mouth, lining, occlusion
+
+COLOURS = {"mouth": [120, 48, 44], "tongue": [196, 104, 100]}
 
 
-def test_paint_mouth_darkens_to_the_back_and_leaves_the_skin() -> None:
-    deep = np.array([0.0, 0.01, 0.03, 0.08, 0.0])
-    share = np.array([1.0, 1, 1, 1, 0])
-    out, gloss, light = np.full((5, 3), 50.0), np.full(5, 0.2), np.full(5, 0.25)
-    paint_mouth(out, gloss, light, share, deep, {"mouth": [120, 48, 44], "tongue": [196, 104, 100]})
-    assert (np.diff(light[:4]) < 0).all()
-    assert (np.diff(out[:4], axis=0) < 0).all()
+def test_lining_darkens_to_the_back() -> None:
+    assert (np.diff(lining(COLOURS, np.array([0.0, 0.01, 0.03, 0.08])), axis=0)[:2] < 0).all()
+
+
+def test_light_mouth_lights_the_lining_only() -> None:
+    light = np.full(4, 0.25)
+    light_mouth(light, np.array([1.0, 1, 1, 0]), np.array([0.0, 0.03, 0.08, 0]))
     assert light[0] == pytest.approx(LIT[1])
-    assert (out[4] == 50).all()
-    assert gloss[3] == pytest.approx(0)
-    assert (gloss[4], light[4]) == (0.2, 0.25)
+    assert (np.diff(light[:3]) < 0).all()
+    assert light[3] == 0.25
+
+
+def test_beard_grows_below_the_nose_and_not_on_the_lips(ground: Ground, mask_lips: Lips) -> None:
+    where = beard(ground, mask_lips)
+    assert where[ground.points["2.10"]] > 0.9
+    assert where[ground.points["4.1"]] == 0
+    assert where[ground.points["8.1"]] < 0.1
 
 
 UP = np.array([0, 0, 1.0])

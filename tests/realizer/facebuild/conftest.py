@@ -18,6 +18,7 @@ from realizer.facebuild.person.bust import assemble
 from realizer.facebuild.person.makehuman import BaseMesh
 from realizer.facebuild.person.person import Person
 from realizer.facebuild.person.recipe import Recipe
+from realizer.facebuild.skin.maps import SkinMaps, bake
 
 STEP = 0.006  # m between the vertices of the mask
 COUNT = 13_400  # above the highest number that the rings have
@@ -99,8 +100,16 @@ def ground() -> Ground:
             off = np.linalg.norm((mask.at[skin] - face.points[name])[:, :2], axis=1)
             points[name] = int(skin[np.argmin(off)])
     quads = {name: np.array(rows, np.int32) for name, rows in mask.quads.items()}
-    mesh = BaseMesh(mask.at * 10, np.zeros((COUNT, 2)), quads)
+    mesh = BaseMesh(mask.at * 10, quads, *texture_of(mask.at, quads["body"]))
     return Ground(mesh, mask.at, points, shape_of(mask.at))
+
+
+def texture_of(at: np.ndarray, quads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return texture coordinates like the head's, which lies on its side, and those of the quads' corners."""
+    used, first, inverse = np.unique(quads, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    places = np.stack([0.8 - at[used[order], 1] / 2, 0.4835 + at[used[order], 0] / 2], 1)
+    return places, np.argsort(order)[inverse].reshape(quads.shape).astype(np.int32)
 
 
 def shape_of(at: np.ndarray) -> Callable[[str], np.ndarray]:
@@ -160,6 +169,14 @@ def parts(person: Person, mask_lips: lips.Lips, mask_lids: list[lids.Lid], recip
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(skin_colours, "occlusion", lambda vertices, *_: np.ones(len(vertices)))
         return assemble(person, mask_lips, mask_lids, recipe)
+
+
+@pytest.fixture(scope="session")
+def maps(
+    person: Person, mask_lips: lips.Lips, mask_lids: list[lids.Lid], recipe: Recipe, parts: list[Part]
+) -> SkinMaps:
+    """The maps of the mask, small."""
+    return bake("mask", person, mask_lips, mask_lids, recipe, parts[0], 256)
 
 
 @pytest.fixture(scope="session")

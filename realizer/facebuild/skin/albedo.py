@@ -1,0 +1,163 @@
+"""The albedo map of a skin: its colour, by layers."""
+
+from typing import Any
+
+import numpy as np
+
+from realizer.core.array_types import Float32
+from realizer.facebuild.parts import smooth
+from realizer.facebuild.person import skin_colours
+from realizer.facebuild.person.hair import shadow, style_of
+from realizer.facebuild.person.scalp import Scalp
+from realizer.facebuild.skin.noise import ridges
+from realizer.facebuild.skin.skin import Skin
+
+# m; noise that makes the edges of large spots uneven.
+EDGE = 0.0012
+
+
+def paint_albedo(skin: Skin, pores: Float32, lines: Float32) -> Float32:
+    """Return the colour of the skin (k, 3), sRGB 0..255.
+
+    Args:
+        pores: (k,) 0..1, how dark pores are; lines: (k,) 0..1, how deep lines are.
+    """
+    out = skin.texels.spread(skin.part.colours)
+    _mottle(skin, out)
+    out *= (1 - pores)[:, None]
+    out *= 1 - lines[:, None] * _vector([0.05, 0.09, 0.10])
+    _vessels(skin, out)
+    _spots(skin, out)
+    _lips(skin, out)
+    _beard(skin, out)
+    _scalp(skin, out)
+    _mouth(skin, out)
+    return np.clip(out, 0, 255)
+
+
+def _vector(values: Any) -> Float32:
+    return np.asarray(values, np.float32)
+
+
+def _mottle(skin: Skin, out: Float32) -> None:
+    number = 10
+    for name in ("blood", "melanin"):
+        row = skin.table[name]
+        change = sum(
+            share * skin.noise(length, number + k)
+            for k, (length, share) in enumerate(zip(row["lengths"], row["share"], strict=True))
+        )
+        number += 2
+        out *= 1 + np.clip(change, -0.08, 0.08)[:, None] * _vector(row["tint"])
+    row = skin.table["speckle"]
+    out *= (1 + row["share"] * skin.noise(row["length"], number))[:, None]
+
+
+def _vessels(skin: Skin, out: Float32) -> None:
+    """Tint veins at temples and lids, and with age capillaries of cheeks and nose."""
+    temples = skin.around("3.7", "3.12", radii=(0.028, 0.034, 0.05), off=(0.018, 0.018, -0.02))
+    lids = skin.around("3.1", "3.2", "3.3", "3.4", radii=(0.020, 0.012, 0.02))
+    flushed = skin.around("5.3", "5.4", "9.1", "9.2", radii=(0.026, 0.022, 0.03))
+    for name, where in (
+        ("veins", 0.8 * temples + 0.6 * lids),
+        ("capillaries", flushed * (0.15 + 0.6 * skin.look.age)),
+    ):
+        row = skin.table[name]
+        length, number = row["length"], skin.seed + len(name)
+        line = ridges(skin.at, length, number) if length < 0.0025 else _line(skin, length, number)
+        line = line * np.clip(0.5 + 0.6 * skin.noise(length * 2, 20 + len(name)), 0, 1)
+        out *= 1 - (line * np.clip(where, 0, 1))[:, None] * (1 - _vector(row["tint"]))
+
+
+def _line(skin: Skin, length: float, number: int) -> Any:
+    return skin.texels.broad(lambda at: ridges(at, length, number))
+
+
+def _spots(skin: Skin, out: Float32) -> None:
+    look = skin.look
+    dry = skin.dry * (1 - skin.red)
+    sunny = skin.around("5.3", "5.4", "9.3", "9.12", radii=(0.045, 0.032, 0.06))
+    upper = skin.float(smooth(skin.at[:, 1], -0.17, -0.05))
+    for name, where, number in (
+        ("freckles", (sunny * look.freckles + 0.012 * upper) * dry, 30),
+        ("spots", upper * dry * look.age, 31),
+        ("moles", dry * look.moles, 32),
+    ):
+        found, radius = skin.mark(name, where, number)
+        size = radius * (1 + 0.25 * skin.noise(EDGE, 33)[found])
+        share = skin.texels.stamp(found, skin.float(size), lambda away: smooth(away, 1.0, 0.55))
+        share *= np.clip(0.75 + 0.25 * skin.noise(EDGE, 34), 0.2, 1)
+        out *= 1 - share[:, None] * (1 - _vector(skin.table[name]["tint"]))
+
+
+def crease(skin: Skin) -> Float32:
+    """Return the creases across the lips, 0..1 (k,): they follow the lips' own coordinates."""
+    along = skin.field(skin.lips.u) * 0.025
+    place = np.stack([along, 0.0005 * skin.ring, np.zeros_like(along)], 1)
+    length = skin.table["lips"]["crease"]
+    fine = ridges(place, (length, 0.004, 1.0), skin.seed + 40)
+    wide = ridges(place, (length * 2.2, 0.006, 1.0), skin.seed + 41)
+    return skin.float(np.maximum(0.7 * fine, wide) * skin.red)
+
+
+def _lips(skin: Skin, out: Float32) -> None:
+    look, row = skin.look, skin.table["lips"]
+    u, upper = np.abs(skin.field(skin.lips.u)), skin.field(skin.lips.is_upper)
+    strength = look.lips * (1 - 0.25 * look.age)
+    full = strength + (1 - strength) * 0.75 * smooth(skin.ring, 4.0, 1.0)
+    share = skin.red * skin.float(full * (1 - 0.55 * smooth(u, 0.85, 1.0)))
+    # The upper lip faces down and looks darker still; the red is fullest where the lips meet.
+    tone = (1 - 0.06 * upper) * (1 - 0.05 * smooth(skin.ring, 5, 1)) * (1 - row["dark"] * crease(skin))
+    tone = tone * (1 + 0.03 * skin.noise(0.0016, 42))
+    colour = _vector(skin.recipe.colours["lips"]) * skin.float(tone)[:, None]
+    out += share[:, None] * (colour - out)
+    # A pale line around the red.
+    rim = np.exp(-(((skin.ring - 8.0) / 0.7) ** 2)) * skin.dry
+    out *= 1 + 0.035 * skin.float(rim * (1 - look.age))[:, None]
+    out *= skin.float(1 - 0.42 * smooth(skin.ring, 2.3, 0.6) * (skin.ring < 3) * skin.dry)[:, None]
+
+
+def _beard(skin: Skin, out: Float32) -> None:
+    amount = skin.look.stubble
+    if not amount:
+        return
+    where = skin.field(skin_colours.beard(skin.person.ground, skin.lips)) * (1 - skin.red) * skin.dry
+    where *= np.clip(1 + 0.25 * skin.noise(0.006, 43), 0, 1.2)
+    hair = _vector(skin.recipe.colours["hair"])
+    shade = (np.clip(where, 0, 1) * amount * 0.30)[:, None]
+    out += shade * (hair * 0.6 + _vector([30, 36, 40]) - out)
+    _dots(skin, out, "stubble", np.clip(where * 1.6, 0, 1) * min(1.0, amount * 2), hair)
+
+
+def _dots(skin: Skin, out: Float32, name: str, where: Any, colour: Float32) -> None:
+    """Paint the roots of hairs."""
+    row = skin.table[name]
+    found, radius = skin.mark(name, where, 44)
+    radius = np.maximum(radius, 0.8 * skin.texels.width[found])
+    share = skin.texels.stamp(found, radius, lambda away: smooth(away, 1.0, 0.1)) * row["share"]
+    out += share[:, None] * (colour * 0.8 - out)
+
+
+def _scalp(skin: Skin, out: Float32) -> None:
+    patch = skin.part.patch
+    assert patch is not None
+    ground, style = skin.person.ground, style_of(skin.recipe.hair)
+    points = {name: ground.point(name) for name in ground.points}
+    scalp = Scalp(patch, ground.at, points, style.line, style.rise)
+    ragged = 0.004 * skin.noise(0.005, 45)
+
+    def under(at: Any) -> Any:
+        return shadow(scalp, style, at)
+
+    where = np.clip(skin.texels.broad(under) * (1 + 40 * ragged), 0, 1)
+    hair = _vector(skin.recipe.colours["hair"])
+    out += (0.45 * where)[:, None] * (hair - out)
+    _dots(skin, out, "roots", where, hair)
+
+
+def _mouth(skin: Skin, out: Float32) -> None:
+    """Paint the lining of the mouth, which is red and darkens to the back."""
+    front = float(skin.person.ground.point("2.2")[2])
+    lining = skin_colours.lining(skin.recipe.colours, front - skin.at[:, 2])
+    share = skin.float(smooth(skin.ring, 1.0, 0.3) * ~skin.dry)[:, None]
+    out += share * (skin.float(lining) - out)

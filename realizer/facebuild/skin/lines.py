@@ -1,0 +1,179 @@
+"""Lines of the skin: what expressions fold, and what age leaves of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from realizer.core.array_types import Float32, Float64
+from realizer.facebuild.parts import smooth
+from realizer.facebuild.skin.skin import Skin
+from realizer.tables import toml_table
+
+SIDES = {1: "left", -1: "right"}
+STEP = 0.0003  # m between the points of a line that distances are measured to
+FACING = 0.15  # cosine at which a surface still counts as seen
+REACH = 4.0  # widths from its middle at which a line ends
+BEND = 0.0006  # m that lines wander
+PLATEAU, FADE = 0.006, 0.016  # m from a line where its fold is shown in full, and where it is not
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A line as it is seen from a direction.
+
+    Attributes:
+        row: its figures in `realizer/tables/skin_lines.toml`; side: 1 left, -1 right.
+        path: (j, 2) metres to the right and up, as seen from `towards`.
+        right, towards: (3,) directions.
+        share: (j,) how deep it is along it.
+        drives: region -> (j,) 0..1, what folds the skin along it.
+    """
+
+    row: dict[str, Any]
+    side: int
+    path: Float64
+    right: Float64
+    towards: Float64
+    share: Float64
+    drives: dict[str, Float64]
+
+    def near(self, at: Any, ups: Any, reach: float) -> tuple[Any, Float64, Any]:
+        """Return which places (j,) are within reach of the line, their distance and their nearest point."""
+        from scipy.spatial import cKDTree
+
+        flat = np.stack([at @ self.right, at[:, 1]], 1)
+        low, high = self.path.min(axis=0) - reach, self.path.max(axis=0) + reach
+        inside = ((flat > low) & (flat < high)).all(axis=1)
+        found = np.flatnonzero(inside & (ups @ self.towards > FACING))
+        hits: Any = cKDTree(self.path).query(flat[found], distance_upper_bound=reach)
+        away, point = hits
+        kept = np.isfinite(away)
+        return found[kept], away[kept], point[kept]
+
+
+def lines_of(skin: Skin) -> list[Line]:
+    """Return the lines of a person, with their own irregularities."""
+    out = []
+    size = skin.person.ground.fapu().es0
+    for number, row in enumerate(toml_table("skin_lines.toml")["lines"]):
+        for side in SIDES:
+            rng = skin.rng(1000 + 10 * number + side)
+            copies, apart = row["copies"]
+            middle = (copies - 1) / 2
+            for k in range(copies):
+                out.append(_line(skin, row, side, (k - middle) * apart * size, rng))
+    return out
+
+
+def _line(skin: Skin, row: dict[str, Any], side: int, off: float, rng: np.random.Generator) -> Line:
+    from scipy.interpolate import PchipInterpolator
+
+    size = skin.person.ground.fapu().es0
+    yaw = math.radians(row["yaw"]) * side
+    right = np.array([math.cos(yaw), 0, -math.sin(yaw)])
+    towards = np.array([math.sin(yaw), 0, math.cos(yaw)])
+    knots = []
+    for name, out, up in row["through"]:
+        place = skin.person.ground.point(name) * [side, 1, 1]
+        wander = 0.012 * rng.normal(size=2) * size
+        knots.append([place @ right + side * out * size + wander[0], place[1] + up * size + wander[1]])
+    path = np.array(knots)
+    meets = bool(row.get("meets"))
+    if meets:
+        path[-1, 0] = 0
+    along = np.r_[0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))]
+    where = np.linspace(0, along[-1], max(8, int(along[-1] / STEP)))
+    curve = np.asarray(PchipInterpolator(along, path)(where))
+    across = np.gradient(curve, axis=0)[:, ::-1] * [-1, 1]
+    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
+    t = where / along[-1]
+    # Copies are not parallel, and each begins and ends somewhere else.
+    curve = curve + across * (off * (0.8 + 0.4 * rng.random() + 0.3 * rng.normal() * (t - 0.5)))[:, None]
+    begin, end = rng.uniform(-0.05, 0.18), rng.uniform(0.85, 1.05)
+    share = smooth(t, begin, begin + 0.3) * (1 if meets else smooth(t, end, end - 0.3))
+    share = share * (rng.uniform(0.65, 1.0) if off else 1.0)
+    drives: dict[str, Float64] = {}
+    for knot, drive in enumerate(row["drives"]):
+        name = f"{drive}_{SIDES[side]}"
+        own = np.interp(where, along, np.eye(len(along))[knot])
+        drives[name] = drives.get(name, np.zeros(len(t))) + own
+    return Line(row, side, curve, right, towards, np.asarray(share), drives)
+
+
+def groove(away: Any, width: float) -> Any:
+    """Return the depth of a line, 1 in its middle; skin is pushed up beside it."""
+    x = np.asarray(away) / width
+    return np.exp(-(x**2)) - 0.30 * np.exp(-(((x - 2.2) / 0.9) ** 2))
+
+
+def engrave(skin: Skin, lines: list[Line]) -> tuple[Float32, Float32]:
+    """Return heights (k,) in metres: of the face at rest, and of its folds at full."""
+    ups = skin.normals()
+    bend = BEND * np.stack([skin.noise(0.007, 50), skin.noise(0.007, 51), 0 * skin.at[:, 0]], 1)
+    at = skin.at + bend * skin.dry[:, None]
+    varied = np.clip(0.85 + 0.25 * skin.noise(0.005, 52), 0.3, 1.2)
+    ups[~skin.dry] = 0
+    rest, folds = np.zeros((2, len(at)), np.float32)
+    for line in lines:
+        row = line.row
+        found, away, point = line.near(at, ups, REACH * row["width"])
+        deep = groove(away, row["width"]) * line.share[point] * row["depth"] * varied[found]
+        folds[found] = _deepest(folds[found], -deep)
+        rest[found] = _deepest(rest[found], -deep * row["age"] * _aged(skin, line))
+    return rest, folds
+
+
+def _aged(skin: Skin, line: Line) -> float:
+    """Return how deep age has made a line, 0..1: every person's lines age in their own order."""
+    early = skin.rng(2000 + sum(map(ord, line.row["name"]))).uniform(0.75, 1.25)
+    return float(np.clip(skin.look.age * early, 0, 1.3))
+
+
+def _deepest(one: Any, other: Any) -> Any:
+    """Return the lower of two heights, or the sum of two ridges."""
+    return np.where((one < 0) | (other < 0), np.minimum(one, other), np.maximum(one, other))
+
+
+def regions(lines: list[Line]) -> tuple[str, ...]:
+    """Return the names of the regions whose folds have an amount of their own: a drive and a side."""
+    return tuple(sorted({name for line in lines for name in line.drives} | set(_fields_drives())))
+
+
+def _fields_drives() -> list[str]:
+    table = toml_table("skin_lines.toml")
+    drives = {table["around_mouth"]["drive"], table["dimples"]["drive"]}
+    return [f"{drive}_{side}" for drive in drives for side in SIDES.values()]
+
+
+def weights(skin: Skin, lines: list[Line], ups: Float64) -> Float32:
+    """Return how much each region's folds show at the vertices of the skin, (n, regions) 0..1."""
+    at = skin.part.vertices
+    names = regions(lines)
+    out = np.zeros((len(at), len(names)), np.float32)
+    for line in lines:
+        found, away, point = line.near(at, ups, FADE)
+        cover = smooth(away, FADE, PLATEAU)
+        for name, own in line.drives.items():
+            column = names.index(name)
+            out[found, column] = np.maximum(out[found, column], cover * own[point])
+    table = toml_table("skin_lines.toml")
+    for name in ("around_mouth", "dimples"):
+        mask = vertex_mask(skin, name)
+        for side, word in SIDES.items():
+            column = names.index(f"{table[name]['drive']}_{word}")
+            half = mask * smooth(side * at[:, 0], -0.004, 0.004)
+            out[:, column] = np.maximum(out[:, column], half)
+    return np.asarray(out / np.maximum(out.sum(axis=1, keepdims=True), 1), np.float32)
+
+
+def vertex_mask(skin: Skin, name: str) -> Float64:
+    """Return where the lines around the mouth and the dimples of the chin are, 0..1 (n,) at vertices."""
+    patch, ground = skin.part.patch, skin.person.ground
+    assert patch is not None
+    if name == "dimples":
+        return np.asarray(patch.mix @ ground.ellipsoid(ground.point("2.10"), (0.026, 0.020, 0.03)))
+    return np.asarray(patch.mix @ (np.asarray(skin.lips.lips) > 0.02).astype(float))

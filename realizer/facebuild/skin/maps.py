@@ -1,0 +1,116 @@
+"""The maps of a face: baked, and written as pictures."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from realizer.core.array_types import Float32, Float64, UInt8
+from realizer.face.mesh_geometry import vertex_normals
+from realizer.facebuild.face_files import to_bytes
+from realizer.facebuild.parts import Part
+from realizer.facebuild.person.lids import Lid
+from realizer.facebuild.person.lips import Lips
+from realizer.facebuild.person.person import Person
+from realizer.facebuild.person.recipe import Recipe
+from realizer.facebuild.skin import atlas
+from realizer.facebuild.skin.albedo import paint_albedo
+from realizer.facebuild.skin.lines import lines_of, regions, weights
+from realizer.facebuild.skin.relief import relief_of
+from realizer.facebuild.skin.skin import Skin
+from realizer.facebuild.skin.surface import surface_of
+from realizer.facebuild.skin.texels import Texels
+
+RELIEF = 0.0008  # m that 255 steps of the relief are high
+TEXEL = 0.0002  # m, of a texel in the face
+QUALITY = {"albedo": 84, "relief": 90, "surface": 78, "folds": 84}  # of WebP, 0..100
+
+
+@dataclass(frozen=True, eq=False)
+class SkinMaps:
+    """The maps of a face, and where its skin is in them.
+
+    Attributes:
+        pictures: albedo (s, s, 4), relief (s, s), surface (s, s, 3) and folds (s, s), as in a face folder.
+        corners: (m, 3, 2) places in the maps, 0..1, of the corners of the skin's triangles.
+        regions: names of the regions of folds; weights: (n, regions) 0..1 of the skin's vertices.
+    """
+
+    pictures: Mapping[str, UInt8]
+    corners: Float64
+    regions: tuple[str, ...]
+    weights: Float32
+
+    def write(self, folder: Path) -> None:
+        """Write the pictures as WebP."""
+        from PIL import Image
+
+        for name, picture in self.pictures.items():
+            Image.fromarray(picture).save(folder / f"{name}.webp", quality=QUALITY[name], method=4)
+
+    def arrays(self, parts: Sequence[tuple[int, int]]) -> dict[str, Any]:
+        """Return the arrays `uv` and `fold_weights` of mesh.npz.
+
+        Args:
+            parts: how many vertices and triangles each part of the face has; the first one is the skin.
+        """
+        vertices, triangles = (sum(counts) for counts in zip(*parts, strict=True))
+        middle = [
+            (atlas.NEUTRAL.left + atlas.NEUTRAL.right) / 2,
+            (atlas.NEUTRAL.top + atlas.NEUTRAL.bottom) / 2,
+        ]
+        uv = np.tile(np.array(middle), (triangles, 3, 1))
+        uv[: len(self.corners)] = self.corners
+        folds = np.zeros((vertices, len(self.regions)))
+        folds[: len(self.weights)] = self.weights
+        return {"uv": atlas.packed(uv), "fold_weights": to_bytes(255 * folds)}
+
+    def head(self) -> dict[str, Any]:
+        """Return the table [maps] of face.toml."""
+        return {"relief": RELIEF, "texel": TEXEL, "folds": list(self.regions)}
+
+
+def bake(
+    name: str,
+    person: Person,
+    lips: Lips,
+    lids: list[Lid],
+    recipe: Recipe,
+    part: Part,
+    size: int = atlas.SIZE,
+) -> SkinMaps:
+    """Bake the maps of a person's skin.
+
+    Args:
+        name: the face's, from which its spots, pores and lines are drawn.
+        part: the skin, with its broad colours.
+        size: texels of a side.
+    """
+    patch = part.patch
+    assert patch is not None
+    corners = atlas.corners(person.ground.mesh, patch)
+    texels = Texels(part.vertices, part.triangles, corners, size)
+    skin = Skin(texels, part, person, lips, lids, recipe, zlib.crc32(name.encode()) % 2**20)
+    lines = lines_of(skin)
+    relief = relief_of(skin, lines)
+    albedo = paint_albedo(skin, relief.pores, relief.lines)
+    surface = surface_of(skin, relief)
+    # Slopes are drawn as if all texels were of one width.
+    step = 255 / RELIEF * np.clip(TEXEL / texels.width, 0.4, 1.5)
+    pictures = {
+        "albedo": _opaque(texels.picture(to_bytes(albedo), 255)),
+        "relief": texels.picture(to_bytes(128 + relief.rest * step), 128),
+        "surface": texels.picture(to_bytes(255 * surface), 255),
+        "folds": texels.picture(to_bytes(128 + relief.folds * step), 128),
+    }
+    ups = vertex_normals(part.vertices, part.triangles)
+    return SkinMaps(pictures, corners, regions(lines), weights(skin, lines, ups))
+
+
+def _opaque(colours: UInt8) -> UInt8:
+    return np.dstack([colours, np.full(colours.shape[:2], 255, np.uint8)])

@@ -1,0 +1,118 @@
+"""The relief of a skin: pores, fine lines, creases of the lips, lines of age, and folds of expressions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from realizer.core.array_types import Float32
+from realizer.facebuild.parts import smooth
+from realizer.facebuild.skin.albedo import crease
+from realizer.facebuild.skin.lines import Line, engrave
+from realizer.facebuild.skin.noise import ridges
+from realizer.facebuild.skin.skin import Skin
+from realizer.tables import toml_table
+
+
+@dataclass(frozen=True, eq=False)
+class Relief:
+    """Heights of a skin at its texels.
+
+    Attributes:
+        rest: (k,) metres at rest; folds: (k,) metres, of all expressions' folds at full.
+        pores: (k,) 0..1, how deep in a pore; lines: (k,) 0..1, how deep in a line at rest.
+    """
+
+    rest: Float32
+    folds: Float32
+    pores: Float32
+    lines: Float32
+
+
+def relief_of(skin: Skin, lines: list[Line]) -> Relief:
+    """Return the relief of a skin with these lines."""
+    rest, folds = engrave(skin, lines)
+    table = toml_table("skin_lines.toml")
+    rest += _neck(skin, table["neck"])
+    fan, fold = _around_mouth(skin, table["around_mouth"])
+    rest, folds = rest + fan, np.minimum(folds, fold)
+    dimples = table["dimples"]
+    chin = skin.around("2.10", radii=(0.022, 0.017, 0.03))
+    folds = folds + dimples["depth"] * chin * skin.noise(dimples["length"], 60) * 0.6
+    deep = np.clip(-rest / 0.0002, 0, 1)
+    slack = table["slack"]
+    for k, length in enumerate(slack["lengths"]):
+        net = ridges(skin.at, length, skin.seed + 61 + k)
+        rest = rest - slack["depth"] * skin.look.age * net * _loose(skin)
+    pores, holes = _pores(skin)
+    rest = rest - holes - _network(skin) - skin.table["lips"]["depth"] * crease(skin)
+    rest = rest + _bumps(skin)
+    return Relief(skin.float(rest), skin.float(folds), skin.float(pores), skin.float(deep))
+
+
+def _loose(skin: Skin) -> Float32:
+    """Return where age loosens the skin, 0..1 (k,): below the eyes, beside the mouth, on the neck."""
+    eyes = skin.around("3.3", "3.4", "3.7", "3.12", radii=(0.032, 0.024, 0.04), off=(0, -0.008, 0))
+    mouth = skin.around("8.3", "8.4", radii=(0.035, 0.040, 0.05), off=(0.01, -0.01, 0))
+    neck = skin.float(smooth(skin.at[:, 1], -0.10, -0.13))
+    return skin.float(np.clip(0.25 + eyes + 0.7 * mouth + neck, 0, 1)) * skin.dry * (1 - skin.red)
+
+
+def _network(skin: Skin) -> Any:
+    row = skin.table["network"]
+    fine, wide = (ridges(skin.at, length, skin.seed + 64 + k) for k, length in enumerate(row["lengths"]))
+    return row["depth"] * (fine + wide) * skin.dry * (1 - 0.7 * skin.red)
+
+
+def _pores(skin: Skin) -> tuple[Any, Any]:
+    """Return how dark pores are (k,) 0..1, and how deep, metres."""
+    row, where = skin.table["pores"], skin.pored()
+    dark, deep = np.zeros((2, len(where)), np.float32)
+    open_skin = skin.dry * (1 - skin.red)
+    for k, mask in enumerate((where, 1 - where)):
+        apart = row["apart"][k]
+        rng = skin.rng(66 + k)
+        # About as many as there is room for.
+        found = skin.texels.scatter(skin.float(mask * open_skin / apart**2), apart * 0.7, rng)
+        radius = row["radius"][k] * rng.uniform(0.75, 1.25, len(found))
+        radius = np.maximum(radius, 1.1 * skin.texels.width[found])
+        hole = skin.texels.stamp(found, skin.float(radius), lambda away: (1 - away**2) ** 2)
+        hole *= np.clip(0.7 + 0.3 * skin.noise(0.004, 68 + k), 0.2, 1.2)
+        dark, deep = np.maximum(dark, row["dark"][k] * hole), np.maximum(deep, row["depth"][k] * hole)
+    return dark, deep
+
+
+def _bumps(skin: Skin) -> Any:
+    found, radius = skin.mark("moles", skin.dry * skin.look.moles, 32)
+    bump = skin.texels.stamp(found, radius, lambda away: smooth(away, 1.0, 0.2))
+    return bump * skin.table["moles"]["height"]
+
+
+def _neck(skin: Skin, row: dict[str, Any]) -> Any:
+    """Return the lines around the neck."""
+    chin = skin.person.ground.point("2.1")
+    below = chin[1] - 0.015 - (skin.at[:, 1] + 0.35 * (skin.at[:, 2] - chin[2] + 0.05))
+    below = below + 0.0025 * skin.noise(0.030, 70) + 0.0006 * skin.noise(0.006, 71)
+    number = np.round(below / row["apart"])
+    away = np.abs(below - number * row["apart"])
+    there = smooth(below, 0.4 * row["apart"], row["apart"]) * smooth(below, 0.13, 0.08)
+    front = smooth(skin.at[:, 2] - chin[2], -0.16, -0.10)
+    uneven = np.clip(0.5 + 0.5 * skin.noise(0.022, 72), 0, 1)
+    depth = row["depth"] * (row["young"] + (1 - row["young"]) * skin.look.age)
+    groove = np.exp(-((away / row["width"]) ** 2))
+    return skin.float(-depth * groove * there * front * uneven) * skin.dry
+
+
+def _around_mouth(skin: Skin, row: dict[str, Any]) -> tuple[Float32, Float32]:
+    """Return the lines that fan out from the lips: of the face at rest, and of pursed lips, metres."""
+    lips = skin.lips
+    along, away = skin.field(lips.u) * 0.030, skin.field(lips.away)
+    place = np.stack([along, away / 3, skin.field(lips.is_upper * 0.05)], 1)
+    line = ridges(place, (row["apart"] * 0.7, 0.006, 0.02), skin.seed + 73)
+    reach = row["long"] * np.clip(0.8 + 0.3 * skin.noise(0.006, 74), 0.3, 1.3)
+    cover = smooth(skin.ring, 6.5, 8.0) * smooth(away / reach, 1.0, 0.25) * skin.dry
+    cover = cover * smooth(np.abs(skin.field(lips.u)), 1.0, 0.85)
+    fold = skin.float(-row["depth"] * line * cover)
+    return fold * row["age"] * np.float32(skin.look.age), fold

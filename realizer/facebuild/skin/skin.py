@@ -1,0 +1,156 @@
+"""The skin of a person at the texels of its maps: places, regions and figures that all maps are made of."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from realizer.core.array_types import Bool, Float32, Float64
+from realizer.face.mesh_geometry import vertex_normals
+from realizer.facebuild.parts import Part, smooth
+from realizer.facebuild.person.lids import Lid
+from realizer.facebuild.person.lips import Lips
+from realizer.facebuild.person.person import Person
+from realizer.facebuild.person.recipe import Recipe, appearance_of
+from realizer.facebuild.skin.texels import Texels
+from realizer.tables import toml_table
+
+ROUNDED = 3.0, 9.0  # texels that rings are softened by on the lips and at their border, which is uneven
+
+
+class Skin:
+    """A person's skin.
+
+    Attributes:
+        texels: of the maps; part: the skin of the mesh.
+        person, lips, lids, recipe: as they are made of it; look: figures of the recipe.
+        table: `realizer/tables/skin.toml`.
+        seed: of this person's own spots and lines.
+        ring: (k,) place across the lips: 0 inside, 1 where they meet, 7 the border of the red, 11 beyond.
+        red: (k,) 0..1, the red of the lips.
+        dry: (k,) bool, texels that are not in the mouth.
+    """
+
+    def __init__(
+        self,
+        texels: Texels,
+        part: Part,
+        person: Person,
+        lips: Lips,
+        lids: list[Lid],
+        recipe: Recipe,
+        seed: int,
+    ) -> None:
+        self.texels, self.part, self.person, self.lips, self.lids = texels, part, person, lips, lids
+        self.recipe, self.look, self.seed = recipe, appearance_of(recipe.look), seed
+        self.table: dict[str, Any] = toml_table("skin.toml")
+        ring = np.where(lips.inside, 0, len(lips.rings) + 1.0)
+        for k, loop in enumerate(lips.rings):
+            ring[loop] = k
+        ring = self.field(ring)
+        fine, wide = (texels.blurred(ring, radius) for radius in ROUNDED)
+        self.ring = fine + (wide - fine) * smooth(fine, 4.0, 6.0)
+        self.dry: Bool = self.field(lips.inside) < 0.5
+        ragged = 0.22 * self.noise(0.0022, 1)
+        self.red: Float32 = self.float(smooth(self.ring + ragged, *self.table["lips"]["border"])) * self.dry
+
+    @property
+    def at(self) -> Float32:
+        """Places of the texels, (k, 3) metres."""
+        return self.texels.at
+
+    def rng(self, number: int) -> np.random.Generator:
+        """Return this person's own random numbers for one purpose."""
+        return np.random.default_rng([self.seed, number])
+
+    def noise(self, length: float, number: int) -> Float32:
+        """Return this person's own smooth noise (k,); `length` metres, `number` says what it is for."""
+        from realizer.facebuild.skin.noise import noise
+
+        def field(at: Float32) -> Float32:
+            return noise(at, length, self.seed + number)
+
+        return field(self.at) if length < 0.0025 else self.texels.broad(field)
+
+    def field(self, values: Any) -> Float32:
+        """Return values of the base mesh's vertices (n, ...) at the texels (k, ...)."""
+        patch = self.part.patch
+        assert patch is not None
+        return self.texels.spread(patch.mix @ np.asarray(values, float))
+
+    def around(self, *names: str, radii: Any, off: Any = (0, 0, 0)) -> Float32:
+        """Return 0..1 (k,): 1 at feature points and off them, 0 outside ellipsoids around them."""
+        ground = self.person.ground
+
+        def field(at: Float32) -> Any:
+            out = np.zeros(len(at))
+            for name in names:
+                place = ground.point(name)
+                middle = place + np.asarray(off) * [np.sign(place[0]) or 1, 1, 1]
+                away = np.linalg.norm((at - middle) / np.asarray(radii), axis=1)
+                out = np.maximum(out, (1 + np.cos(np.pi * np.clip(away, 0, 1))) / 2)
+            return out
+
+        return self.texels.broad(field)
+
+    def normals(self) -> Float32:
+        """Return unit normals of the texels, (k, 3)."""
+        ups = self.texels.spread(vertex_normals(self.part.vertices, self.part.triangles))
+        return self.float(ups / np.maximum(np.linalg.norm(ups, axis=1, keepdims=True), 1e-9))
+
+    @staticmethod
+    def float(values: Any) -> Float32:
+        """Return values as float32."""
+        return np.asarray(values, np.float32)
+
+    def oily(self) -> Float32:
+        """Return where the skin is oily and its pores are large, 0..1 (k,): nose, forehead, chin."""
+        nose = self.around("9.3", radii=(0.022, 0.020, 0.03))
+        wings = self.around("9.1", "9.2", radii=(0.016, 0.018, 0.02))
+        brow = self.around("9.12", radii=(0.045, 0.050, 0.05), off=(0, 0.035, 0))
+        chin = self.around("2.10", radii=(0.020, 0.016, 0.03))
+        return self.float(np.clip(nose + wings + 0.55 * brow + 0.5 * chin, 0, 1))
+
+    def pored(self) -> Float32:
+        """Return where pores are large, 0..1 (k,): the nose and the cheeks beside it."""
+        nose = self.around("9.3", "9.1", "9.2", radii=(0.022, 0.022, 0.03))
+        cheeks = self.around("5.3", "5.4", radii=(0.034, 0.030, 0.05), off=(-0.012, 0, 0.01))
+        brow = self.around("9.12", radii=(0.045, 0.050, 0.05), off=(0, 0.035, 0))
+        chin = self.around("2.10", radii=(0.022, 0.018, 0.03))
+        return (
+            self.float(np.clip(nose + 0.75 * cheeks + 0.4 * brow + 0.5 * chin, 0, 1))
+            * self.dry
+            * (1 - self.red)
+        )
+
+    def mark(self, name: str, mask: Any, number: int) -> Any:
+        """Return texels (c,) in the middle of marks of the table, and radii (c,): small ones more often.
+
+        Args:
+            mask: (k,) 0..1, where they are.
+        """
+        row, rng = self.table[name], self.rng(number)
+        least, most = row["radius"]
+        found = self.texels.scatter(row["density"] * self.float(mask), row.get("apart", most), rng)
+        return found, self.float(least + (most - least) * rng.random(len(found)) ** 2.5)
+
+
+def distance_through(vertices: Float64, normals: Float64, among: Any, full: float) -> Float64:
+    """Return metres (n,) from each vertex to one of those `among` that lie behind it and face away.
+
+    Args:
+        among: (j,) vertices; full: metres, the most.
+    """
+    from scipy.spatial import cKDTree
+
+    out = np.full(len(vertices), full)
+    near = cKDTree(vertices[among]).query_ball_point(vertices, full)
+    for k, found in enumerate(near):
+        others = among[found]
+        way = vertices[others] - vertices[k]
+        away = np.linalg.norm(way, axis=1)
+        behind = (normals[others] @ normals[k] < -0.2) & (-way @ normals[k] > 0.6 * away)
+        if behind.any():
+            out[k] = away[behind].min()
+    return out
