@@ -7,7 +7,7 @@ import numpy as np
 from realizer.core.array_types import Float32, Float64, UInt8
 
 
-def linear(colours: UInt8 | Float64) -> Float32:
+def linear(colours: UInt8 | Float32 | Float64) -> Float32:
     """Return the linear light 0..1 of sRGB colours 0..255."""
     c = np.asarray(colours, np.float32) / np.float32(255)
     return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4).astype(np.float32)

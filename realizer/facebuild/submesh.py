@@ -11,6 +11,8 @@ import scipy.sparse as sp
 
 from realizer.core.array_types import Float64, Int32
 
+SLIVER = 1e-6  # of the height of a cut
+
 
 @dataclass(frozen=True, eq=False)
 class Submesh:
@@ -64,7 +66,7 @@ class Submesh:
     def clipped(self, height: Float64) -> tuple[Submesh, sp.csr_matrix]:
         """Return the part of the surface with `height` (n,) above zero, and its mix of vertices."""
         # A cut very close to a vertex would leave slivers, so it passes through the vertex.
-        height = np.where(np.abs(height) < 1e-6, 1e-6, height)
+        height = np.where(np.abs(height) < SLIVER, SLIVER, height)
         inside = height > 0
         rows: list[dict[int, float]] = [{i: 1.0} for i in range(len(self))]
         cuts: dict[tuple[int, int], int] = {}

@@ -19,18 +19,17 @@ from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
 from realizer.face.glb_file import BINARY_CHUNK, JSON_CHUNK
 from realizer.facebuild.arkit.gltf_schema import document_fault
+from realizer.facebuild.arkit.meshopt import EXTENSIONS, unpack
 
 KINDS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 MAX_NUMBERS = 2**26  # in all accessors together: a head of 24,000 vertices with 900 shapes
 MAX_PIXELS = 8192 * 8192  # of a texture
-# Required extensions that this reader supports; they change only how surfaces look.
-UNDERSTOOD = {"KHR_mesh_quantization", "KHR_texture_transform", "KHR_materials_unlit"}
-PACKED = {
-    "KHR_draco_mesh_compression": "Draco compression",
-    "EXT_meshopt_compression": "meshopt compression",
-    "KHR_meshopt_compression": "meshopt compression",
-}
+PICTURES = 4  # that are kept in memory
+UNPACK_KTX = "npx @gltf-transform/cli ktxdecompress HEAD.glb PLAIN.glb"
+MAX_BYTES = 2**29  # of an unpacked buffer view
+# Required extensions of others than Khronos that this reader supports; Khronos' own change how surfaces look.
+UNDERSTOOD = {"EXT_meshopt_compression", "EXT_texture_webp", "EXT_texture_avif"}
 
 
 class Gltf:
@@ -39,6 +38,7 @@ class Gltf:
     Attributes:
         path: the file that was read.
         json: the document.
+        notes: pictures that could not be read.
     """
 
     def __init__(self, path: Path) -> None:
@@ -66,11 +66,13 @@ class Gltf:
         if not version.startswith("2."):
             raise FaceError(f"{path}: wanted glTF 2.0, got version {version!r}; export the head as glTF 2.0")
         for name in self.json.get("extensionsRequired", []):
-            if name in PACKED:
-                raise FaceError(f"{path}: its geometry is packed ({PACKED[name]}); export it without")
-            if name.startswith("KHR_draco") or (name.startswith("EXT_") and name not in UNDERSTOOD):
+            if name.startswith("EXT_") and name not in UNDERSTOOD:
                 raise FaceError(f"{path}: it requires {name}, which is not understood; export it without")
+        self.notes: tuple[str, ...] = ()
         self._buffers: dict[int, bytes] = {}
+        self._unpacked: dict[int, bytes] = {}  # buffer views
+        self._values: dict[int, Any] = {}  # accessors
+        self._pictures: dict[int, Any] = {}
         self._room = MAX_NUMBERS
 
     def _chunks(self, raw: bytes) -> bytes:
@@ -116,6 +118,18 @@ class Gltf:
             raise FaceError(f"{self.path}: {name}: wanted an index 0..{len(items) - 1}, got {index!r}")
         return items[index]
 
+    def put(self, index: int, values: Any) -> None:
+        """Put values (count, width) in the place of an accessor's.
+
+        Raises:
+            FaceError: the accessor is not there, or has another shape.
+        """
+        accessor = self.item("accessors", index)
+        wanted = (accessor["count"], WIDTHS[accessor["type"]])
+        if np.shape(values) != wanted:
+            raise FaceError(f"{self.path}: accessors[{index}]: wanted {wanted}, got {np.shape(values)}")
+        self._values[index] = values
+
     def accessor(self, index: int) -> Float64:
         """Return an accessor's values, (count, width) float64; normalised ones as -1..1 or 0..1.
 
@@ -132,7 +146,9 @@ class Gltf:
                 f"{count} x {width} here; export the head with fewer vertices or shapes"
             )
         start = accessor.get("byteOffset", 0)
-        values = self._strided(accessor.get("bufferView"), start, KINDS[kind], count, width, where)
+        values = self._values.get(index)
+        if values is None:
+            values = self._strided(accessor.get("bufferView"), start, KINDS[kind], count, width, where)
         sparse = accessor.get("sparse")
         if sparse is not None:
 
@@ -157,7 +173,7 @@ class Gltf:
         if view is None:
             return np.zeros((count, width), dtype)
         layout = self.item("bufferViews", view)
-        raw = self._view(view)
+        raw = self.view(view)
         step = layout.get("byteStride") or dtype.itemsize * width
         need = start + step * (count - 1) + dtype.itemsize * width if count else 0
         if need > len(raw):
@@ -170,8 +186,31 @@ class Gltf:
         found = np.ndarray((count, width), dtype, raw, start, (step, dtype.itemsize))
         return found.copy()
 
-    def _view(self, index: Any) -> bytes:
-        view = self.item("bufferViews", index)
+    def view(self, index: Any) -> bytes:
+        """Return the bytes of a buffer view, unpacked.
+
+        Raises:
+            FaceError: it or its buffer is not there, truncated, or packed wrongly.
+        """
+        layout = self.item("bufferViews", index)
+        packed = layout.get("extensions", {})
+        if not (name := next((name for name in EXTENSIONS if packed.get(name)), None)):
+            return self._stored(layout, index)
+        if index not in self._unpacked:
+            how = packed[name]
+            count, stride, mode = how["count"], how["byteStride"], how["mode"]
+            try:
+                if not 0 < count * stride <= MAX_BYTES:
+                    raise ValueError(f"{count} x {stride} bytes")
+                self._unpacked[index] = unpack(
+                    self._stored(how, index), mode, how.get("filter", "NONE"), count, stride
+                )
+            except ValueError as error:
+                where = f"{self.path}: bufferViews[{index}]: {name}"
+                raise FaceError(f"{where}: {error}; export the head again") from None
+        return self._unpacked[index]
+
+    def _stored(self, view: dict[str, Any], index: Any) -> bytes:
         raw = self._buffer(view.get("buffer", 0))
         start, size = view.get("byteOffset", 0), view.get("byteLength", 0)
         if start + size > len(raw):
@@ -212,12 +251,26 @@ class Gltf:
                 f"{self.path.name}, or export the head as one GLB"
             ) from None
 
-    def pixels(self, image: Any) -> Any:
-        """Return (height, width, 4) uint8 sRGB of an image, or None if its format is not supported."""
+    def pixels(self, image: int) -> Any:
+        """Return (height, width, 4) uint8 sRGB of an image; None, and a note, if it cannot be decoded.
+
+        Raises:
+            FaceError: the image is missing, too large, or of a kind that has to be converted first.
+        """
+        if image not in self._pictures:
+            while len(self._pictures) >= PICTURES:
+                del self._pictures[next(iter(self._pictures))]
+            self._pictures[image] = self._decoded(image)
+        return self._pictures[image]
+
+    def _decoded(self, image: int) -> Any:
         from PIL import Image, UnidentifiedImageError
 
         found = self.item("images", image)
-        raw = self._view(found["bufferView"]) if "bufferView" in found else self._fetch(found.get("uri", ""))
+        name = f"images[{image}] {found.get('name') or found.get('uri', '')[:40]}".rstrip()
+        raw = self.view(found["bufferView"]) if "bufferView" in found else self._fetch(found.get("uri", ""))
+        if raw[1:4] == b"KTX":
+            raise FaceError(f"{self.path}: {name}: KTX2 textures are not read; undo them: {UNPACK_KTX}")
         try:
             with Image.open(io.BytesIO(raw)) as picture:
                 if picture.width * picture.height <= MAX_PIXELS:
@@ -226,5 +279,7 @@ class Gltf:
         except Image.DecompressionBombError:
             got = "more"
         except (UnidentifiedImageError, OSError, SyntaxError, ValueError):  # of the decoders
+            note = f"{name}: no picture that can be decoded; drawn without it"
+            self.notes = (*dict.fromkeys((*self.notes, note)),)
             return None
-        raise FaceError(f"{self.path}: images[{image}]: wanted at most 8192 x 8192 pixels, got {got}")
+        raise FaceError(f"{self.path}: {name}: wanted at most 8192 x 8192 pixels, got {got}")

@@ -41,11 +41,27 @@ class _Accessor(BaseModel):
     sparse: _Sparse | None = None
 
 
+class _Meshopt(BaseModel):
+    buffer: Index
+    byteOffset: Index = 0
+    byteLength: Index
+    byteStride: Annotated[int, Field(strict=True, ge=2, le=256, multiple_of=2)]
+    count: Index
+    mode: Literal["ATTRIBUTES", "TRIANGLES", "INDICES"]
+    filter: Literal["NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR"] = "NONE"
+
+
+class _ViewExtensions(BaseModel):
+    EXT_meshopt_compression: _Meshopt | None = None
+    KHR_meshopt_compression: _Meshopt | None = None
+
+
 class _BufferView(BaseModel):
     buffer: Index = 0
     byteOffset: Index = 0
     byteLength: Index = 0
     byteStride: Index | None = None
+    extensions: _ViewExtensions = _ViewExtensions()
 
 
 class _Buffer(BaseModel):
@@ -57,8 +73,25 @@ class _Image(BaseModel):
     bufferView: Index = 0
 
 
+class _TextureSource(BaseModel):
+    source: Index | None = None
+
+
+class _TextureSources(BaseModel):
+    EXT_texture_webp: _TextureSource = _TextureSource()
+    EXT_texture_avif: _TextureSource = _TextureSource()
+    KHR_texture_basisu: _TextureSource = _TextureSource()
+
+
 class _Texture(BaseModel):
     source: Index | None = None
+    sampler: Index | None = None
+    extensions: _TextureSources = _TextureSources()
+
+
+class _Sampler(BaseModel):
+    wrapS: Literal[10497, 33071, 33648] = 10497
+    wrapT: Literal[10497, 33071, 33648] = 10497
 
 
 class _TextureTransform(BaseModel):
@@ -75,16 +108,55 @@ class _TextureExtensions(BaseModel):
 class _TextureInfo(BaseModel):
     index: Index
     texCoord: Index = 0
+    scale: Finite = 1
+    strength: Finite = 1
     extensions: _TextureExtensions = _TextureExtensions()
 
 
 class _Surface(BaseModel):
     baseColorFactor: Colour = [1, 1, 1, 1]
     baseColorTexture: _TextureInfo | None = None
+    metallicRoughnessTexture: _TextureInfo | None = None
+    roughnessFactor: Finite = 1
+
+
+class _GlossySurface(BaseModel):
+    diffuseFactor: Colour = [1, 1, 1, 1]
+    diffuseTexture: _TextureInfo | None = None
+
+
+class _Strength(BaseModel):
+    emissiveStrength: Finite = 1
+
+
+class _Transmission(BaseModel):
+    transmissionFactor: Finite = 0
+
+
+class _MaterialExtensions(BaseModel):
+    KHR_materials_pbrSpecularGlossiness: _GlossySurface = _GlossySurface()
+    KHR_materials_emissive_strength: _Strength = _Strength()
+    KHR_materials_transmission: _Transmission = _Transmission()
 
 
 class _Material(BaseModel):
     pbrMetallicRoughness: _Surface = _Surface()
+    normalTexture: _TextureInfo | None = None
+    occlusionTexture: _TextureInfo | None = None
+    emissiveTexture: _TextureInfo | None = None
+    emissiveFactor: Annotated[list[Finite], Field(min_length=3, max_length=3)] = [0, 0, 0]
+    alphaMode: Literal["OPAQUE", "MASK", "BLEND"] = "OPAQUE"
+    alphaCutoff: Finite = 0.5
+    extensions: _MaterialExtensions = _MaterialExtensions()
+
+
+class _Draco(BaseModel):
+    bufferView: Index
+    attributes: dict[str, Index]
+
+
+class _PrimitiveExtensions(BaseModel):
+    KHR_draco_mesh_compression: _Draco | None = None
 
 
 class _Primitive(BaseModel):
@@ -93,6 +165,7 @@ class _Primitive(BaseModel):
     material: Index = 0
     mode: Index = 4
     targets: list[dict[str, Index]] = []
+    extensions: _PrimitiveExtensions = _PrimitiveExtensions()
 
 
 class _Mesh(BaseModel):
@@ -128,6 +201,7 @@ class _Document(BaseModel):
     skins: list[_Skin] = []
     materials: list[_Material] = []
     textures: list[_Texture] = []
+    samplers: list[_Sampler] = []
     images: list[_Image] = []
     accessors: list[_Accessor] = []
     bufferViews: list[_BufferView] = []

@@ -1,7 +1,8 @@
 """The import of a GLB head with ARKit blend shapes into a face folder, with a report."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -11,17 +12,17 @@ from realizer.core.errors import FaceError
 from realizer.face.basis import unpack
 from realizer.face.features import Point, write_features
 from realizer.face.load import load_face
+from realizer.face.maps import NAMES
 from realizer.face.mesh_geometry import fit_ball, vertex_normals
+from realizer.facebuild.arkit.atlas import SIZE, Atlas, make_atlas
 from realizer.facebuild.arkit.au_measurements import measure_units
 from realizer.facebuild.arkit.fields import ShapedSkin, shape_fields
-from realizer.facebuild.arkit.gltf import Gltf
+from realizer.facebuild.arkit.head import Head, Report, read_head
 from realizer.facebuild.arkit.jaw import drag_of, joint_of
-from realizer.facebuild.arkit.mesh_merge import Surface, cut, merge_pieces
+from realizer.facebuild.arkit.mesh_merge import Surface
 from realizer.facebuild.arkit.mouth_coordinates import mouth_of
-from realizer.facebuild.arkit.orientation import oriented, pose_of
-from realizer.facebuild.arkit.part_classifier import ASIDE, FLOOR, ball_behind, sort_parts
+from realizer.facebuild.arkit.part_classifier import ball_behind
 from realizer.facebuild.arkit.points import points_of
-from realizer.facebuild.arkit.scene import read_pieces
 from realizer.facebuild.au.measure import write_shapes
 from realizer.facebuild.face_files import write_fields, write_head, write_mesh
 from realizer.facebuild.mpeg4.build import apply_zones, with_brows
@@ -29,7 +30,6 @@ from realizer.facebuild.mpeg4.defaults import default_setup, split_sides
 from realizer.facebuild.mpeg4.rigid import opening_rows, sliding
 from realizer.facebuild.parts import smooth
 from realizer.facebuild.person.skin_colours import occlusion
-from realizer.tables.arkit_names import canonical, nearest, shapes
 
 # Gloss of surfaces: skin, hair, wet parts. A file's roughness is meant for other lights.
 GLOSS = {
@@ -38,35 +38,8 @@ GLOSS = {
 }  # fmt: skip
 DIRECTIONS, CELL = 48, 0.003  # of the baked occlusion: enough for vertices millimetres apart
 INSIDE = ("upper_teeth", "lower_teeth", "tongue")
+SHAPES = "au_shapes.npz"
 LINED = ("brows", "lashes", *INSIDE)  # cast no shadow: thin, or behind closed lips
-
-
-@dataclass(frozen=True)
-class Report:
-    """The report of an import.
-
-    Attributes:
-        found: parts and features that were recognised; missing: those that were not, with the consequences.
-        unsure: guesses to check by eye.
-    """
-
-    found: tuple[str, ...]
-    missing: tuple[str, ...]
-    unsure: tuple[str, ...]
-
-    @property
-    def lines(self) -> tuple[str, ...]:
-        kinds = (("found", self.found), ("missing", self.missing), ("unsure", self.unsure))
-        return tuple(f"{kind}: {word}" for kind, words in kinds for word in words)
-
-
-@dataclass(frozen=True, eq=False)
-class _Head:
-    surface: Surface
-    ranges: dict[str, tuple[int, int]]
-    painted: bool
-    gltf: Gltf
-    report: Report
 
 
 def inspect_head(path: Path) -> Report:
@@ -75,27 +48,49 @@ def inspect_head(path: Path) -> Report:
     Raises:
         FaceError: the file cannot be read, or has no shapes of a face.
     """
-    return _read(path).report
+    head = read_head(path)
+    for material in head.surface.materials:
+        for _, texture in material.textures:
+            head.gltf.pixels(texture.image)
+    return replace(head.report, missing=(*head.report.missing, *head.gltf.notes))
 
 
 def import_head(path: Path, folder: Path, name: str | None = None) -> Report:
     """Make a face folder of a GLB or glTF head with ARKit-named morph targets.
 
     Args:
-        path: the file; folder: the folder to write; name: the face's, the folder's if None.
+        path: the file; name: the face's, the folder's if None.
+        folder: the folder to write; an error leaves it as it was.
 
     Raises:
         FaceError: the file cannot be read, has no shapes of a face, or no skin, eyes or mouth.
     """
-    head = _read(path)
+    head = read_head(path)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    # Beside the folder, so that nothing is half written there and files move at once.
+    with TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.parent) as place:
+        draft = Path(place) / folder.name
+        draft.mkdir()
+        report = _write(head, draft, name or folder.name)
+        folder.mkdir(exist_ok=True)
+        for old in (*(f"{name}.webp" for name in NAMES), "cards.npz", SHAPES):
+            (folder / old).unlink(missing_ok=True)
+        for file in draft.iterdir():
+            file.replace(folder / file.name)
+    return report
+
+
+def _write(head: Head, folder: Path, name: str) -> Report:
     surface, ranges = head.surface, head.ranges
-    folder.mkdir(parents=True, exist_ok=True)
-    _write_head(folder / "face.toml", name or folder.name, head)
+    _write_head(folder / "face.toml", name, head)
     points, guesses = points_of(surface, ranges, head.painted)
     write_features(folder / "features.csv", points)
-    _write_mesh(folder / "mesh.npz", surface, ranges, points)
+    atlas = make_atlas(head.gltf, surface, ranges)
+    _write_mesh(folder, surface, ranges, atlas)
     made, words = _write_fields(folder, head, points)
     report = head.report
+    if atlas is not None:
+        words = (f"{len(surface.materials)} materials in maps of {SIZE} x {SIZE} texels", *words)
     found = (*report.found, f"{len(made)} FAPs move by its shapes, the others by zones", *words)
     unsure = report.unsure
     try:
@@ -103,71 +98,14 @@ def import_head(path: Path, folder: Path, name: str | None = None) -> Report:
     except FaceError as error:
         measured, unsure = {}, (*unsure, f"no shapes for the model of action units: {error}")
     if measured:
-        write_shapes(folder / "au_shapes.npz", measured)
+        write_shapes(folder / SHAPES, measured)
         found = (*found, f"{len(measured)} action units for realizer faces fit {folder.name}")
     if guesses:
         unsure = (*unsure, f"feature points that are guessed, look at them: {', '.join(guesses)}")
-    return Report(found, report.missing, unsure)
+    return Report(found, (*report.missing, *head.gltf.notes), unsure)
 
 
-def _read(path: Path) -> _Head:
-    gltf = Gltf(path)
-    pieces = read_pieces(gltf)
-    own = list(dict.fromkeys(name for piece in pieces for name in piece.moves))
-    if not pieces:
-        raise FaceError(f"{path}: wanted a head, found no triangles; export the head's meshes")
-    if not own:
-        raise FaceError(
-            f"{path}: wanted morph targets with ARKit's names (jawOpen, eyeBlinkLeft, ...), found none; "
-            "export the head with its shape keys"
-        )
-    foreign = [name for name in own if canonical(name) is None]
-    if len(foreign) == len(own):
-        guesses = [f"{name} ({' or '.join(nearest(name))}?)" if nearest(name) else name for name in own[:12]]
-        raise FaceError(
-            f"{path}: wanted morph targets with ARKit's names (jawOpen, eyeBlinkLeft, ...), got "
-            f"{', '.join(guesses)}{' ...' if len(own) > 12 else ''}; rename them"
-        )
-    try:
-        surface = merge_pieces(pieces)
-        pose = pose_of(surface)
-        surface = oriented(surface, pose)
-        surface = cut(surface, surface.vertices[:, 1] - FLOOR)
-        surface = cut(surface, ASIDE - np.abs(surface.vertices[:, 0]))
-        parts = sort_parts(surface)
-    except FaceError as error:
-        raise FaceError(f"{path}: {error}") from None
-    surface = surface.subset(np.concatenate(list(parts.parts.values())))
-    ends = np.cumsum([0] + [len(index) for index in parts.parts.values()])
-    ranges = {name: (int(ends[k]), int(ends[k + 1])) for k, name in enumerate(parts.parts)}
-    fit = ball_behind if parts.painted else fit_ball
-    balls = [fit(surface.vertices[slice(*ranges[part])])[0] for part in ("left_eye", "right_eye")]
-    surface = replace(surface, vertices=surface.vertices - (balls[0] + balls[1]) / 2)
-    found = [f"{len(surface.moves)} of ARKit's {len(shapes())} shapes", *pose.notes, *parts.words]
-    if foreign:
-        found.append(f"shapes of other names are left out: {', '.join(foreign)}")
-    missing = [
-        f"{row.name}: {row.without}"
-        for row in shapes().values()
-        if row.name not in surface.moves
-        and row.without != "nothing"
-        and (parts.painted or "eyeLook" not in row.name)
-    ]
-    missing += [
-        f"{part.replace('_', ' ')}: {without}"
-        for part, without in (
-            ("tongue", "FAPs 43 to 47 move nothing"),
-            ("lower_teeth", "nothing stands behind the open lips"),
-        )
-        if part not in ranges
-    ]
-    return _Head(
-        surface, ranges, parts.painted, gltf,
-        Report(tuple(found), tuple(missing), (*pose.unsure, *parts.unsure)),
-    )  # fmt: skip
-
-
-def _write_head(path: Path, name: str, head: _Head) -> None:
+def _write_head(path: Path, name: str, head: Head) -> None:
     asset = head.gltf.json["asset"]
     extras = asset.get("extras") if isinstance(asset.get("extras"), dict) else {}
     author = str(extras.get("author") or asset.get("generator") or "its maker")
@@ -179,8 +117,9 @@ def _write_head(path: Path, name: str, head: _Head) -> None:
 
 
 def _write_mesh(
-    path: Path, surface: Surface, ranges: dict[str, tuple[int, int]], points: dict[str, Point]
+    folder: Path, surface: Surface, ranges: dict[str, tuple[int, int]], atlas: Atlas | None
 ) -> None:
+    """Write mesh.npz and the maps. Without maps the colours of materials become those of vertices."""
     at, n = surface.vertices, len(surface.vertices)
     part = np.empty(n, object)
     for name, ends in ranges.items():
@@ -195,11 +134,19 @@ def _write_mesh(
             # Light reaches the front of an open mouth and not its back.
             z = at[slice(*ends), 2]
             light[slice(*ends)] = 0.10 + 0.85 * smooth(z.max() - z, 0.030, 0.002)
-    write_mesh(path, at, surface.triangles, surface.colours, light, gloss)
+    path, triangles = folder / "mesh.npz", surface.triangles
+    if atlas is None:
+        write_mesh(path, at, triangles, surface.painted_colours(), light, gloss)
+        return
+    gloss[triangles[atlas.matt]] = 0
+    maps = {"uv": atlas.uv, "see_through": atlas.see_through}
+    write_mesh(path, at, triangles, surface.colours, light, gloss, maps)
+    for name, picture in atlas.files.items():
+        (folder / f"{name}.webp").write_bytes(picture)
 
 
 def _write_fields(
-    folder: Path, head: _Head, points: dict[str, Point]
+    folder: Path, head: Head, points: dict[str, Point]
 ) -> tuple[tuple[int, ...], tuple[str, ...]]:
     """Write fields.npz; which FAPs the shapes serve, and what there is to say."""
     surface, ranges = head.surface, head.ranges

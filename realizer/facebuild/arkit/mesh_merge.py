@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.array_types import Bool, Float64, Int32
+from realizer.core.array_types import Float64, Int32
+from realizer.core.colours import linear, srgb
 from realizer.core.errors import FaceError
 from realizer.face.mesh_geometry import components, half_edges
+from realizer.facebuild.arkit.materials import Material
 from realizer.facebuild.arkit.scene import Piece
 from realizer.tables.arkit_names import canonical
 
@@ -24,10 +26,11 @@ class Surface:
 
     Attributes:
         vertices: (n, 3); triangles: (m, 3).
-        colours: (n, 3) sRGB 0..255.
+        colours: (n, 3) sRGB 0..255, of the vertices alone.
         piece: (n,) which piece a vertex came from; names: of each piece's material, mesh and node.
-        textured: (n,) its colour comes from a picture.
         moves: ARKit's name -> (n, 3), at weight 1.
+        uv: (m, 3, 2) places of the corners of triangles in the textures of their materials.
+        material: (m,) which of the materials a triangle has.
     """
 
     vertices: Float64
@@ -35,8 +38,10 @@ class Surface:
     colours: Float64
     piece: Int32
     names: tuple[tuple[str, str, str], ...]
-    textured: Bool
     moves: Mapping[str, Float64]
+    uv: Float64
+    material: Int32
+    materials: tuple[Material, ...]
 
     def move(self, name: str) -> Float64:
         """Return the displacement (n, 3) of a shape, or zeros if the head lacks it."""
@@ -57,22 +62,31 @@ class Surface:
         """Return the number of the connected piece of each vertex, (n,)."""
         return components(half_edges(self.triangles), len(self.vertices))
 
+    def painted_colours(self) -> Float64:
+        """Return the colours (n, 3) of vertices with those of their materials, without textures."""
+        factors = np.array([material.colour[:3] for material in self.materials], np.float32)
+        share = np.ones((len(self.vertices), 3), np.float32)
+        share[self.triangles] = factors[self.material][:, None]
+        return np.asarray(srgb(linear(self.colours) * share), np.float64) * 255
+
     def subset(self, vertices: Any) -> Surface:
         """Return the surface of the given vertices, in their order, with the triangles between them."""
         index = np.asarray(vertices)
         place = np.full(len(self.vertices), -1)
         place[index] = np.arange(len(index))
         corners = place[self.triangles]
-        return self._taken(index, corners[(corners >= 0).all(axis=1)])
+        keep = (corners >= 0).all(axis=1)
+        return self._taken(index, corners[keep], self.uv[keep], self.material[keep])
 
-    def _taken(self, index: Any, triangles: Any) -> Surface:
+    def _taken(self, index: Any, triangles: Any, uv: Any, material: Any) -> Surface:
         return replace(
             self,
             vertices=self.vertices[index],
             triangles=triangles.astype(np.int32),
             colours=self.colours[index],
             piece=self.piece[index],
-            textured=self.textured[index],
+            uv=uv,
+            material=material,
             moves={name: move[index] for name, move in self.moves.items()},
         )
 
@@ -93,13 +107,17 @@ def merge_pieces(pieces: Sequence[Piece]) -> Surface:
             if name is not None:
                 # Halves of one shape add up.
                 moves.setdefault(name, np.zeros((total, 3)))[first : first + len(move)] += move
+    materials = tuple(dict.fromkeys(piece.material for piece in pieces))
+    which = [materials.index(piece.material) for piece in pieces]
     whole = Surface(
         vertices=np.concatenate([piece.vertices for piece in pieces]),
         triangles=np.concatenate([p.triangles + f for p, f in zip(pieces, counts, strict=False)]),
         colours=np.concatenate([piece.colours for piece in pieces]),
         piece=np.repeat(np.arange(len(pieces)), np.diff(counts)).astype(np.int32),
         names=tuple(piece.names for piece in pieces),
-        textured=np.repeat([piece.textured for piece in pieces], np.diff(counts)),
+        uv=np.concatenate([piece.uv[piece.triangles] for piece in pieces]),
+        material=np.repeat(which, [len(piece.triangles) for piece in pieces]).astype(np.int32),
+        materials=materials,
         moves=moves,
     )
     return _welded(whole)
@@ -117,11 +135,13 @@ def _welded(surface: Surface) -> Surface:
     _, first, group = np.unique(key, axis=0, return_index=True, return_inverse=True)
     group = group.ravel()
     corners = group[surface.triangles]
-    corners = corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)]
+    whole = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    corners = corners[whole]
     count = np.bincount(group)[:, None]
     colours = np.stack([np.bincount(group, surface.colours[:, k]) for k in range(3)], 1) / count
     # Vertices without a triangle are invisible.
-    return replace(surface._taken(first, corners), colours=colours).subset(np.unique(corners))
+    taken = surface._taken(first, corners, surface.uv[whole], surface.material[whole])
+    return replace(taken, colours=colours).subset(np.unique(corners))
 
 
 def cut(surface: Surface, height: Float64) -> Surface:
@@ -130,11 +150,18 @@ def cut(surface: Surface, height: Float64) -> Surface:
         return surface
     import scipy.sparse as sp
 
-    from realizer.facebuild.submesh import Submesh
+    from realizer.facebuild.submesh import SLIVER, Submesh
 
     n = len(surface.vertices)
     flat = Submesh(sp.csr_matrix(sp.eye_array(n)), np.zeros((n, 3)), surface.triangles)
     piece, mix = flat.clipped(height)
-    nearest = surface._taken(np.asarray(mix.argmax(axis=1)).ravel(), piece.triangles)
+    # Triangles are cut in their order, into two where two of their corners stay.
+    inside = (height > -SLIVER)[surface.triangles].sum(axis=1)
+    of = np.repeat(np.arange(len(inside)), np.array([0, 1, 2, 1])[inside])
+    corners = np.repeat(surface.triangles[of], 3, axis=0)
+    shares = mix[np.repeat(piece.triangles.ravel(), 3), corners.ravel()]
+    uv = np.asarray(shares).reshape(-1, 3, 3) @ surface.uv[of]
+    at = np.asarray(mix.argmax(axis=1)).ravel()
+    nearest = surface._taken(at, piece.triangles, uv, surface.material[of])
     moves = {name: np.asarray(mix @ move) for name, move in surface.moves.items()}
     return replace(nearest, vertices=mix @ surface.vertices, colours=mix @ surface.colours, moves=moves)

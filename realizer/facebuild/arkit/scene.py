@@ -1,18 +1,21 @@
 """The surfaces of a glTF scene: vertices, colours and blend shapes."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from realizer.core.array_types import Float64, Int32
-from realizer.core.colours import linear, srgb
+from realizer.core.colours import srgb
 from realizer.core.errors import FaceError
+from realizer.facebuild.arkit.draco import unpack_primitive
 from realizer.facebuild.arkit.gltf import Gltf
+from realizer.facebuild.arkit.materials import CLAMP, Material, read_material
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
 MAX_GLASS_ALPHA = 0.35  # more transparent surfaces are glass, such as a cornea or a tear line
+FARTHEST = 1000.0  # copies of a repeating texture
 
 
 @dataclass(eq=False)
@@ -22,9 +25,11 @@ class Piece:
     Attributes:
         names: names of its material, mesh and node; "" for a missing name.
         vertices: (n, 3) in the unit and the axes of the file; triangles: (m, 3).
-        colours: (n, 3) sRGB 0..255.
-        textured: whether the colours come from a texture.
+        colours: (n, 3) sRGB 0..255, of the vertices alone.
+        uv: (n, 2) places in the textures of its material, (0, 0) at the top left.
+        material: what it looks like.
         glass: whether the surface is transparent.
+        notes: what of its material will not be drawn.
         moves: name of a morph target -> (n, 3) displacements.
     """
 
@@ -32,8 +37,10 @@ class Piece:
     vertices: Float64
     triangles: Int32
     colours: Float64
-    textured: bool = False
+    uv: Float64
+    material: Material
     glass: bool = False
+    notes: tuple[str, ...] = ()
     moves: dict[str, Float64] = field(default_factory=dict)
 
 
@@ -54,6 +61,7 @@ def read_pieces(gltf: Gltf) -> list[Piece]:
             if primitive.get("mode", TRIANGLES) not in (TRIANGLES, STRIP, FAN):
                 continue
             where = f"{gltf.path}: mesh {mesh.get('name', node['mesh'])!r}, primitive {k}"
+            unpack_primitive(gltf, primitive, where)
             pieces.append(_piece(gltf, node, mesh, primitive, world, worlds, where))
     return [piece for piece in pieces if len(piece.vertices) and len(piece.triangles)]
 
@@ -114,8 +122,9 @@ def _piece(
         got = f"{corners.min():g}..{corners.max():g}"
         raise FaceError(f"{where}: indices: wanted 0..{n - 1}, got {got}; export the head again")
     corners = corners.astype(np.int64)
-    material = gltf.item("materials", primitive["material"]) if "material" in primitive else {}
-    colours, textured, alpha = _colours(gltf, material, attributes, n, where)
+    material, notes = read_material(gltf, primitive.get("material"))
+    colours, alpha = _colours(gltf, attributes, n, where)
+    uv, material, lost = _places(gltf, material, attributes, n, where)
     skinning = _skinning(gltf, node, attributes, worlds, n, where)
     matrices = np.broadcast_to(world, (n, 4, 4)) if skinning is None else skinning
     triangles = _triangles(corners, primitive.get("mode", TRIANGLES))
@@ -132,12 +141,14 @@ def _piece(
                 raise FaceError(f"{where}: shape {name!r}: wanted finite x, y, z of each move; export again")
             moves[name] = np.einsum("nij,nj->ni", matrices[:, :3, :3], move)
     return Piece(
-        names=(str(material.get("name", "")), str(mesh.get("name", "")), str(node.get("name", ""))),
+        names=(material.name, str(mesh.get("name", "")), str(node.get("name", ""))),
         vertices=np.einsum("nij,nj->ni", matrices[:, :3, :3], at) + matrices[:, :3, 3],
         triangles=triangles.astype(np.int32),
         colours=colours,
-        textured=textured,
-        glass=material.get("alphaMode", "OPAQUE") == "BLEND" and alpha < MAX_GLASS_ALPHA,
+        uv=uv,
+        material=material,
+        glass=_is_glass(gltf, material, uv, alpha, triangles),
+        notes=(*notes, *lost),
         moves=moves,
     )
 
@@ -215,44 +226,43 @@ def _skinning(
     return out
 
 
-def _colours(
-    gltf: Gltf, material: dict[str, Any], attributes: dict[str, Any], n: int, where: str
-) -> tuple[Float64, bool, float]:
-    """Return the colours (n, 3) in sRGB 0..255, whether they have a texture, and the mean alpha."""
-    pbr = material.get("pbrMetallicRoughness", {})
-    factor = np.array(pbr.get("baseColorFactor", (1, 1, 1, 1)), float)
-    light, alpha, textured = np.tile(factor[:3], (n, 1)), np.full(n, factor[3]), False
+def _colours(gltf: Gltf, attributes: dict[str, Any], n: int, where: str) -> tuple[Float64, Float64]:
+    """Return the colours (n, 3) of vertices in sRGB 0..255, and their alpha (n,)."""
+    light = np.ones((n, 4))
     if "COLOR_0" in attributes:
-        vertex_colours = _attribute(gltf, attributes, "COLOR_0", n, (3, 4), where)
-        light = light * vertex_colours[:, :3]
-        alpha = alpha * (vertex_colours[:, 3] if vertex_colours.shape[1] > 3 else 1)
-    texture = pbr.get("baseColorTexture")
-    if texture:
-        transform = texture.get("extensions", {}).get("KHR_texture_transform", {})
-        name = f"TEXCOORD_{transform.get('texCoord', texture.get('texCoord', 0))}"
-        source = gltf.item("textures", texture.get("index")).get("source")
-        pixels = gltf.pixels(source) if source is not None else None
-        if pixels is not None and name in attributes:
-            uv = _transformed(_attribute(gltf, attributes, name, n, (2,), where), transform)
-            seen = sample(pixels, uv)
-            light, alpha, textured = light * linear(seen[:, :3]), alpha * seen[:, 3] / 255, True
-    return np.asarray(srgb(light.astype(np.float32)), np.float64) * 255, textured, float(alpha.mean())
+        found = _attribute(gltf, attributes, "COLOR_0", n, (3, 4), where)
+        light[:, : found.shape[1]] = found
+    return np.asarray(srgb(light[:, :3].astype(np.float32)), np.float64) * 255, light[:, 3]
 
 
-def _transformed(uv: Float64, transform: dict[str, Any]) -> Float64:
-    angle = float(transform.get("rotation", 0))
-    uv = uv * np.array(transform.get("scale", (1, 1)), float)
-    c, s = np.cos(angle), np.sin(angle)
-    return np.asarray(uv @ np.array([[c, -s], [s, c]]) + np.array(transform.get("offset", (0, 0)), float))
+def _places(
+    gltf: Gltf, material: Material, attributes: dict[str, Any], n: int, where: str
+) -> tuple[Float64, Material, tuple[str, ...]]:
+    """Return the places (n, 2) in a material's textures; without textures if the vertices have no places."""
+    chart = material.chart
+    if not material.textures or chart.name not in attributes:
+        notes = (f"no {chart.name}: textures are left out",) if material.textures else ()
+        return np.full((n, 2), 0.5), replace(material, textures=()), notes
+    uv = _attribute(gltf, attributes, chart.name, n, (2,), where) * np.array(chart.scale)
+    c, s = np.cos(chart.rotation), np.sin(chart.rotation)
+    uv = np.clip(uv @ np.array([[c, -s], [s, c]]) + np.array(chart.offset), -FARTHEST, FARTHEST)
+    for axis, wrap in enumerate(chart.wrap):
+        if wrap == CLAMP:
+            uv[:, axis] = np.clip(uv[:, axis], 0, 1)
+    return uv, material, ()
 
 
-def sample(pixels: Any, uv: Float64) -> Float64:
-    """Return the colours (n, 4) of a repeating picture at texture coordinates (n, 2), interpolated."""
-    from scipy.ndimage import map_coordinates
-
-    height, width = pixels.shape[:2]
-    at = np.stack([uv[:, 1] * height - 0.5, uv[:, 0] * width - 0.5])
-    channels = np.moveaxis(pixels, 2, 0)
-    return np.stack(
-        [map_coordinates(channel, at, np.float64, order=1, mode="grid-wrap") for channel in channels], 1
-    )
+def _is_glass(gltf: Gltf, material: Material, uv: Float64, alpha: Float64, triangles: Any) -> bool:
+    """Return whether light goes through nearly all triangles."""
+    if material.transmission > 1 - MAX_GLASS_ALPHA:
+        return True
+    if material.alpha != "BLEND" or not len(triangles):
+        return False
+    seen = alpha[triangles].mean(axis=1) * material.colour[3]
+    base = dict(material.textures).get("base")
+    pixels = gltf.pixels(base.image) if base else None
+    if pixels is not None:
+        height, width = pixels.shape[:2]
+        x, y = (uv[triangles].mean(axis=1) * (width, height)).astype(int).T
+        seen = seen * pixels[y % height, x % width, 3] / 255
+    return float(np.percentile(seen, 90)) < MAX_GLASS_ALPHA

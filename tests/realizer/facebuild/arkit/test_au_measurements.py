@@ -16,6 +16,12 @@ from realizer.facebuild.arkit.mesh_merge import Surface
 pytestmark = pytest.mark.xdist_group("fits")
 
 
+def unpainted(face: Face) -> tuple[np.ndarray, np.ndarray, tuple[()]]:
+    """Return places in textures and materials of a face without either."""
+    m = len(face.triangles)
+    return np.zeros((m, 3, 2)), np.zeros(m, np.int32), ()
+
+
 @pytest.fixture(scope="module")
 def face() -> Face:
     return load_face("ada")
@@ -25,7 +31,7 @@ def surface_of(face: Face, **moves: np.ndarray) -> Surface:
     n = len(face.vertices)
     at = face.vertices.astype(float)
     plain = np.zeros(n, np.int32)
-    return Surface(at, face.triangles, np.zeros((n, 3)), plain, (("", "", ""),), plain > 0, moves)
+    return Surface(at, face.triangles, np.zeros((n, 3)), plain, (("", "", ""),), moves, *unpainted(face))
 
 
 def test_measure_units_needs_every_shape_of_a_unit(face: Face) -> None:

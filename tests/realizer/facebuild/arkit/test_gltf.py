@@ -14,6 +14,7 @@ from click.testing import CliRunner
 
 from realizer.cli.faces import faces
 from realizer.core.errors import FaceError
+from realizer.facebuild.arkit.gltf import Gltf
 from realizer.facebuild.arkit.importer import inspect_head
 from realizer.tables.arkit_names import canonical, nearest
 
@@ -65,7 +66,9 @@ def test_gltf_refuses_a_truncated_file(ada_glb: Path, tmp_path: Path, length: in
 
 @pytest.mark.parametrize("spoil", [
     lambda d: d["asset"].update(version="1.0"),
-    lambda d: d.update(extensionsRequired=["KHR_draco_mesh_compression"]),
+    lambda d: d.update(extensionsRequired=["EXT_mesh_gpu_instancing"]),
+    lambda d: d["bufferViews"][0].update(extensions={"EXT_meshopt_compression": {
+        "buffer": 0, "byteLength": 9, "byteStride": 12, "count": 5, "mode": "ATTRIBUTES"}}),
     lambda d: d["accessors"][0].update(count=10**6),
     lambda d: d["accessors"][0].update(componentType=7),
     lambda d: d["meshes"][0]["primitives"][0]["attributes"].pop("POSITION"),
@@ -113,6 +116,44 @@ def test_gltf_refuses_places_that_are_not_finite(ada_glb: Path, tmp_path: Path, 
     spoil(document)
     with pytest.raises(FaceError, match=words):
         inspect_head(written(tmp_path / "odd.glb", document, data))
+
+
+def pictured(path: Path, raw: bytes) -> Gltf:
+    path.with_suffix(".png").write_bytes(raw)
+    document = {"asset": {"version": "2.0"}, "images": [{"uri": path.with_suffix(".png").name}]}
+    return Gltf(written(path, document, b""))
+
+
+def test_gltf_notes_a_picture_that_is_broken(tmp_path: Path) -> None:
+    gltf = pictured(tmp_path / "x.glb", b"\x89PNG\r\n and no more")
+    assert gltf.pixels(0) is None
+    assert gltf.notes == ("images[0] x.png: no picture that can be decoded; drawn without it",)
+
+
+def test_gltf_names_the_command_that_undoes_ktx2(tmp_path: Path) -> None:
+    gltf = pictured(tmp_path / "x.glb", b"\xabKTX 20\xbb\r\n\x1a\n")
+    with pytest.raises(FaceError, match=r"gltf-transform/cli ktxdecompress"):
+        gltf.pixels(0)
+
+
+def test_gltf_names_a_picture_that_is_missing(tmp_path: Path) -> None:
+    gltf = pictured(tmp_path / "x.glb", b"")
+    (tmp_path / "x.png").unlink()
+    with pytest.raises(FaceError, match=r"x\.png: No such file or directory; put it beside x\.glb"):
+        gltf.pixels(0)
+
+
+def test_gltf_reads_a_packed_buffer_view(tmp_path: Path) -> None:
+    packed = bytes([0xD1, 0, 4, 4, 0, 0, 0, 0])
+    view = {"buffer": 0, "byteLength": 8, "byteStride": 2, "count": 3, "mode": "INDICES"}
+    document = {
+        "asset": {"version": "2.0"}, "buffers": [{"byteLength": 8}, {"byteLength": 6}],
+        "bufferViews": [
+            {"buffer": 1, "byteLength": 6, "extensions": {"EXT_meshopt_compression": view}}
+        ],
+        "accessors": [{"bufferView": 0, "componentType": 5123, "count": 3, "type": "SCALAR"}],
+    }  # fmt: skip
+    assert Gltf(written(tmp_path / "x.glb", document, packed)).accessor(0).ravel().tolist() == [0, 1, 2]
 
 
 def test_gltf_takes_a_number_as_a_name(ada_glb: Path, tmp_path: Path) -> None:

@@ -6,14 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
+from realizer.core.errors import FaceError
 from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.face.model import Face
-from realizer.facebuild.arkit.importer import Report, import_head
+from realizer.facebuild.arkit.importer import Report, import_head, inspect_head
 from realizer.facebuild.au.measure import read_shapes
 from realizer.facebuild.check import check_face
 from realizer.tables import Fap, faps
+from tests.realizer.facebuild.arkit.test_gltf import split, written
 from tests.rows import each_row
 
 pytestmark = pytest.mark.xdist_group("fits")
@@ -47,6 +50,45 @@ def test_import_head_measures_action_units(brought: tuple[Face, Report], place: 
     assert {1, 2, 4, 5, 6, 9, 12, 15, 16, 17, 20, 26, 43} <= set(measured)
     assert all(one.moves.any() and (one.at[:, 0] > -1e-6).all() for one in measured.values())
     assert brought[1].found[-1].startswith(f"{len(measured)} action units")
+
+
+def with_picture(source: Path, path: Path) -> Path:
+    """Write the head with a picture beside it on all that its first material paints."""
+    document, data = split(source)
+    document["images"], document["textures"] = [{"uri": "skin.png"}], [{"source": 0}]
+    document["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = {"index": 0}
+    (primitive,) = document["meshes"][0]["primitives"]
+    count = document["accessors"][primitive["attributes"]["POSITION"]]["count"]
+    document["accessors"].append({"componentType": 5126, "count": count, "type": "VEC2"})
+    primitive["attributes"]["TEXCOORD_0"] = len(document["accessors"]) - 1
+    Image.new("RGB", (5, 7), (200, 150, 120)).save(path.parent / "skin.png")
+    return written(path, document, data)
+
+
+def test_import_head_writes_maps_or_nothing(ada_glb: Path, tmp_path: Path) -> None:
+    source = with_picture(ada_glb, tmp_path / "head.glb")
+    import_head(source, tmp_path / "mia")
+    assert check_face("mia", tmp_path) == ()
+    maps = load_face("mia", tmp_path).maps
+    assert maps is not None
+    assert maps.files.keys() == {"albedo", "surface"}
+    before = {path.name: path.read_bytes() for path in (tmp_path / "mia").iterdir()}
+    (tmp_path / "skin.png").unlink()
+    for folder in ("mia", "new"):
+        with pytest.raises(FaceError, match=r"skin\.png"):
+            import_head(source, tmp_path / folder)
+    assert {path.name: path.read_bytes() for path in (tmp_path / "mia").iterdir()} == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["head.glb", "mia"]
+    with pytest.raises(FaceError, match=r"skin\.png"):
+        inspect_head(source)
+
+
+def test_import_head_removes_the_maps_of_an_import_before(ada_glb: Path, tmp_path: Path) -> None:
+    (tmp_path / "normal.webp").write_bytes(b"old")
+    (tmp_path / "notes.txt").write_text("mine", "utf-8")
+    import_head(ada_glb, tmp_path, "again")
+    assert not (tmp_path / "normal.webp").exists()
+    assert (tmp_path / "notes.txt").is_file()
 
 
 LINEAR = [row for row in faps()[2:] if row.direction in ("up", "down", "left", "right")]

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from realizer.core.errors import FaceError
+from realizer.facebuild.arkit.materials import Material
 from realizer.facebuild.arkit.mesh_merge import Surface, cut, merge_pieces
 from realizer.facebuild.arkit.scene import Piece
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
+PLAIN = Material("", (0.5, 1, 1, 1), (0, 0, 0), None, "OPAQUE", 0.5, 0, ())
 HALVES = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
 
 
@@ -17,8 +19,9 @@ def piece(aside: float = 0, glass: bool = False, **moves: float) -> Piece:
     """A square whose vertices all move up by what a shape's name says."""
     up = {name: np.tile([0, amount, 0.0], (4, 1)) for name, amount in moves.items()}
     return Piece(
-        ("skin", "m", "n"), SQUARE + np.array([aside, 0, 0]), HALVES, np.full((4, 3), 9.0), False, glass, up
-    )
+        ("skin", "m", "n"), SQUARE + np.array([aside, 0, 0]), HALVES, np.full((4, 3), 9.0), SQUARE[:, :2],
+        PLAIN, glass, (), up,
+    )  # fmt: skip
 
 
 def test_merge_pieces_shares_the_vertices_of_a_seam() -> None:
@@ -67,6 +70,18 @@ def test_cut_ends_the_surface_along_a_straight_line() -> None:
     assert area(left) == pytest.approx(0.75)
     assert (left.move("jawOpen")[:, 1] == 1).all()
     assert cut(surface, np.ones(4)) is surface
+
+
+def test_cut_keeps_the_places_in_textures() -> None:
+    left = cut(surface := merge_pieces([piece(jawOpen=1.0)]), surface.vertices[:, 0] - 0.25)
+    assert left.uv == pytest.approx(left.vertices[left.triangles][..., :2])
+    assert len(left.material) == len(left.triangles)
+
+
+def test_painted_colours_are_those_of_vertices_and_materials() -> None:
+    colours = merge_pieces([piece()]).painted_colours()
+    assert colours[:, 1:] == pytest.approx(np.full((4, 2), 9))
+    assert 4 < colours[0, 0] < 6  # half the light
 
 
 def area(surface: Surface) -> float:

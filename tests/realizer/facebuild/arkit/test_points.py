@@ -20,6 +20,12 @@ SHAPES = {
 }  # fmt: skip
 
 
+def unpainted(face: Face) -> tuple[np.ndarray, np.ndarray, tuple[()]]:
+    """Return places in textures and materials of a face without either."""
+    m = len(face.triangles)
+    return np.zeros((m, 3, 2)), np.zeros(m, np.int32), ()
+
+
 @pytest.fixture(scope="module")
 def face() -> Face:
     return load_face("ada")
@@ -32,7 +38,7 @@ def surface_of(face: Face, *names: str) -> Surface:
     moves = {name: 0.01 * sum(rows[fap] for fap in SHAPES[name]) for name in names}
     plain = np.zeros(len(face.vertices), np.int32)
     at, colours = face.vertices.astype(float), face.colours.astype(float)
-    return Surface(at, face.triangles, colours, plain, (("", "", ""),), plain > 0, moves)
+    return Surface(at, face.triangles, colours, plain, (("", "", ""),), moves, *unpainted(face))
 
 
 def test_points_of_finds_all_points_near_the_marked_ones(face: Face) -> None:

@@ -15,6 +15,17 @@ from realizer.facebuild.arkit.gltf import Gltf
 from realizer.facebuild.arkit.scene import read_pieces
 
 
+def with_texture(glb: Any, folder: Path, alpha: int = 255) -> Any:
+    """Put a triangle with a picture beside the file into a GLB."""
+    glb.mesh("head", np.eye(3), np.array([[0, 1, 2]]), None, {}, "skin")
+    Image.fromarray(np.full((4, 4, 4), (200, 60, 20, alpha), np.uint8)).save(folder / "skin.png")
+    glb.json |= {"images": [{"uri": "skin.png"}], "textures": [{"source": 0}]}
+    glb.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = {"index": 0}
+    attributes = glb.json["meshes"][0]["primitives"][0]["attributes"]
+    attributes["TEXCOORD_0"] = glb.accessor(np.array([[0.25, 0.5], [0.75, 0.5], [0.75, 0.5]]))
+    return glb
+
+
 def test_read_pieces_decodes_quantised_places_in_a_turned_node(
     new_glb: Callable[[], Any], tmp_path: Path
 ) -> None:
@@ -66,17 +77,55 @@ def test_read_pieces_poses_vertices_by_their_skeleton(new_glb: Callable[[], Any]
     assert piece.moves["jawOpen"] == pytest.approx(np.tile([0, 0, 1.0], (3, 1)))
 
 
-def test_read_pieces_turns_a_texture_into_colours(new_glb: Callable[[], Any], tmp_path: Path) -> None:
-    glb = new_glb()
-    glb.mesh("head", np.eye(3), np.array([[0, 1, 2]]), None, {}, "skin")
-    pixels = np.zeros((4, 4, 3), np.uint8)
-    pixels[:, :2], pixels[:, 2:] = (200, 60, 20), (10, 120, 240)
-    Image.fromarray(pixels).save(tmp_path / "skin.png")
-    glb.json |= {"images": [{"uri": "skin.png"}], "textures": [{"source": 0}]}
-    glb.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = {"index": 0}
-    attributes = glb.json["meshes"][0]["primitives"][0]["attributes"]
-    attributes["TEXCOORD_0"] = glb.accessor(np.array([[0.25, 0.5], [0.75, 0.5], [0.75, 0.5]]))
+def test_read_pieces_keeps_the_places_in_a_texture(new_glb: Callable[[], Any], tmp_path: Path) -> None:
+    glb = with_texture(new_glb(), tmp_path)
     path = tmp_path / "t.glb"
     path.write_bytes(glb.bytes())
     (piece,) = read_pieces(Gltf(path))
-    assert piece.colours == pytest.approx(np.array([[200, 60, 20], [10, 120, 240], [10, 120, 240]]), abs=1.5)
+    assert piece.uv == pytest.approx(np.array([[0.25, 0.5], [0.75, 0.5], [0.75, 0.5]]))
+    assert dict(piece.material.textures)["base"].image == 0
+
+
+@pytest.mark.parametrize(("component", "most"), [(5121, 255), (5123, 65535)])
+def test_read_pieces_reads_places_of_8_and_16_bits(
+    new_glb: Callable[[], Any], tmp_path: Path, component: int, most: int
+) -> None:
+    glb = with_texture(new_glb(), tmp_path)
+    attributes = glb.json["meshes"][0]["primitives"][0]["attributes"]
+    attributes["TEXCOORD_0"] = glb.accessor(
+        np.array([[0, most], [most, 0], [0, 0]]), component, normalized=True
+    )
+    (tmp_path / "t.glb").write_bytes(glb.bytes())
+    (piece,) = read_pieces(Gltf(tmp_path / "t.glb"))
+    assert piece.uv.tolist() == [[0, 1], [1, 0], [0, 0]]
+
+
+def test_read_pieces_turns_places_as_the_extension_says(new_glb: Callable[[], Any], tmp_path: Path) -> None:
+    glb = with_texture(new_glb(), tmp_path)
+    glb.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] = {
+        "KHR_texture_transform": {"offset": [0.5, 0], "scale": [2, 1], "rotation": np.pi / 2}
+    }
+    (tmp_path / "t.glb").write_bytes(glb.bytes())
+    (piece,) = read_pieces(Gltf(tmp_path / "t.glb"))
+    assert piece.uv == pytest.approx(np.array([[1.0, -0.5], [1.0, -1.5], [1.0, -1.5]]))
+
+
+def test_read_pieces_draws_a_mesh_without_places_by_its_colour(
+    new_glb: Callable[[], Any], tmp_path: Path
+) -> None:
+    glb = with_texture(new_glb(), tmp_path)
+    del glb.json["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"]
+    (tmp_path / "t.glb").write_bytes(glb.bytes())
+    (piece,) = read_pieces(Gltf(tmp_path / "t.glb"))
+    assert piece.material.textures == ()
+    assert piece.notes == ("no TEXCOORD_0: textures are left out",)
+
+
+@pytest.mark.parametrize(("alpha", "glass"), [(0, True), (255, False)])
+def test_read_pieces_takes_a_clear_texture_for_glass(
+    new_glb: Callable[[], Any], tmp_path: Path, alpha: int, glass: bool
+) -> None:
+    glb = with_texture(new_glb(), tmp_path, alpha)
+    glb.json["materials"][0]["alphaMode"] = "BLEND"
+    (tmp_path / "t.glb").write_bytes(glb.bytes())
+    assert read_pieces(Gltf(tmp_path / "t.glb"))[0].glass == glass
