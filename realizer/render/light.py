@@ -47,7 +47,7 @@ class Light:
         reach    = 1 - shadow * (1 - occ)
         shine    = gloss * (highlight * max(0, n.h) ^ (dull * (sharp / dull) ^ gloss)) * key.colour
         colour   = albedo * ((lamp(key) + lamp(fill) + edge) * reach + ambient) + shine * reach
-        picture  = sRGB(shoulder(exposure * colour)); shoulder(x) = x up to the knee, then towards 1
+        picture  = sRGB(shoulder(colour)); shoulder(x) = x up to the knee, then towards 1
     """
 
     name: str
@@ -63,7 +63,7 @@ class Light:
     sharp: float
     glint: float  # place of the glint along key + glint x v: 1 is the mirror's place, more is lower
     glint_width: float  # radians from its middle to its edge
-    exposure: float
+    exposure: float  # of pictures that light each pixel
     knee: float
     backdrop_middle: Triple  # sRGB 0..1, behind the head
     backdrop_edge: Triple  # sRGB 0..1, in the corners
@@ -123,7 +123,7 @@ class Shader:
         """The view direction is one for the whole head: with a long lens it turns by 6 degrees at most."""
         # A channel a row: numpy is three times as fast along vertices as along colours.
         reach = (1 - light.shadow * (1 - occlusion)).astype(np.float32)
-        albedo = linear(colours).T * np.float32(light.exposure)
+        albedo = linear(colours).T
         self._lit = np.ascontiguousarray(albedo * reach)
         self._hidden = np.ascontiguousarray(albedo * occlusion)
         self._rim_power = light.rim_power
@@ -137,7 +137,7 @@ class Shader:
         self._slopes = np.ascontiguousarray(np.hstack(slopes).T, np.float32)
         self._offsets = np.hstack(offsets).astype(np.float32)[:, None]
         self._power = (light.dull * (light.sharp / light.dull) ** gloss).astype(np.float32)
-        strength = gloss * light.highlight * light.exposure * reach
+        strength = gloss * light.highlight * reach
         self._shine = np.outer(light.key.colour, strength).astype(np.float32)
         self._curve = _curve(light.knee)
 

@@ -48,9 +48,9 @@ RECIPES = {
     # Clouds over a calm sea, which reflects them; the sun behind a cloud is where the key light is.
     "daylight": Recipe("sky", 12, 4, 0.25, (0.40, 0.40, 0.405)),
     # The blue hour; the sky is brightest behind the character's left shoulder.
-    "evening": Recipe("venice", 100, 6, 0.75, (0.075, 0.085, 0.125)),
+    "evening": Recipe("venice", 100, 6, 0.75, (0.105, 0.118, 0.165)),
     # A black studio with a white floor; its umbrella is the second lamp, at the character's left.
-    "studio": Recipe("studio", 107, 12, 0.3, (0.30, 0.30, 0.305)),
+    "studio": Recipe("studio", 112, 12, 0.3, (0.22, 0.22, 0.224)),
     # A square by the sea under a clear sky; its low sun is where the key light is.
     "outdoors": Recipe("sunset", 76, 3, 0.8, (0.27, 0.285, 0.33)),
 }

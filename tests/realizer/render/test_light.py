@@ -45,9 +45,7 @@ def formula(normal, colour, occlusion, gloss):
     facing = max(0, n @ unit(unit(light.key.direction) + v))
     shine = gloss * light.highlight * facing**power * np.array(light.key.colour)
     albedo = linear(np.array(colour, np.uint8))
-    x = light.exposure * (
-        albedo * ((lamp(light.key) + lamp(light.fill) + edge) * reach + ambient) + shine * reach
-    )
+    x = albedo * ((lamp(light.key) + lamp(light.fill) + edge) * reach + ambient) + shine * reach
     knee = light.knee
     return srgb(np.where(x < knee, x, 1 - (1 - knee) * np.exp(-(x - knee) / (1 - knee))))
 

@@ -8,7 +8,7 @@ export function lightUniforms(look, shade) {
     uniforms[`${lamp}_direction`].value.normalize();
   }
   for (const name of ["sky", "ground"]) uniforms[name] = { value: new Vector3(...look[name]) };
-  for (const name of ["rim_power", "shadow", "highlight", "dull", "sharp", "exposure", "knee"]) uniforms[name] = { value: look[name] };
+  for (const name of ["rim_power", "shadow", "highlight", "dull", "sharp", "knee"]) uniforms[name] = { value: look[name] };
   return uniforms;
 }
 
@@ -51,7 +51,7 @@ void main() {
 export const fragment = `
 uniform vec3 key_direction, key_colour, key_wrap, fill_direction, fill_colour, fill_wrap, rim_direction, rim_colour, rim_wrap;
 uniform vec3 sky, ground;
-uniform float rim_power, shadow, highlight, dull, sharp, exposure, knee;
+uniform float rim_power, shadow, highlight, dull, sharp, knee;
 uniform vec3 furrow_shade;
 varying vec3 v_normal, v_place, v_albedo;
 varying float v_occlusion, v_gloss, v_tone;
@@ -72,7 +72,7 @@ void main() {
   float power = dull * pow(sharp / dull, v_gloss);
   vec3 shine = v_gloss * highlight * pow(max(dot(n, h), 1e-6), power) * key_colour;
   vec3 light = lamp(n, key_direction, key_colour, key_wrap) + lamp(n, fill_direction, fill_colour, fill_wrap) + edge;
-  vec3 colour = exposure * (v_albedo * (light * reach + ambient) + shine * reach);
+  vec3 colour = v_albedo * (light * reach + ambient) + shine * reach;
   vec3 shoulder = 1.0 - (1.0 - knee) * exp(-(colour - knee) / (1.0 - knee));
   // A furrow reduces the picture's brightness, the ridge beside it (tone below 0) increases it.
   vec3 furrow = 1.0 - max(v_tone, 0.0) * furrow_shade + max(-v_tone, 0.0);
