@@ -59,7 +59,7 @@ def texels_of(maps: Maps | None, largest: int = FULL) -> Texels:
     for name, first in (("relief", SLOPE_U), ("folds", FOLD_U)):
         if name in maps.files:
             heights = _decoded(maps, name, "L", (width, height))
-            whole[..., first : first + 2] = _slopes(heights, maps.relief / texel)
+            whole[..., first : first + 2] = _slopes(heights, maps.relief / 255 / texel)
     if "normal" in maps.files:
         whole[..., SLOPE_U : SLOPE_V + 1] = _tilts(_decoded(maps, "normal", "RGB", (width, height)))
     if "surface" in maps.files:

@@ -42,7 +42,7 @@ def test_texels_of_heights_are_their_slopes():
     """A plane that rises by 4 steps a texel to the right, of a map 64 times as coarse as the full one."""
     ramp = np.tile(np.arange(32) * 4, (32, 1))
     files = {"albedo": encoded(WHITE), "relief": encoded(ramp), "folds": encoded(ramp.T)}
-    found = texels_of(Maps(files, None, 0.001, 0.0005, None, None))
+    found = texels_of(Maps(files, None, 0.255, 0.0005, None, None))
     slopes = slopes_of(found)[1:-1, 1:-1]
     assert slopes[..., 0] == pytest.approx(4 * 0.001 / (0.0005 * 64), abs=0.01)
     assert slopes[..., 1] == pytest.approx(0, abs=0.01)
