@@ -84,12 +84,17 @@ class ClientGroup:
         self._late: list[float] = []
         self._answers: list[float] = []
         self._frames = self._missing = 0
+        self._refused = 0  # sessions
         self._ahead = ahead
         # Rows that came early by at least half of `ahead`, and after their time; rows that replace others,
         # and those of them after their time; messages with such rows.
         self._rows = Counter[str]()
         for k in range(sessions):
-            peer = open_peer(url, f"load-{k}", plays, ahead)
+            try:
+                peer = open_peer(url, f"load-{k}", plays, ahead)
+            except ConnectionRefusedError:  # the service is overloaded
+                self._refused = sessions - k
+                break
             if not plays:
                 peer.zero = 0.0
             self._peers[peer.socket.fileno()] = peer
@@ -111,6 +116,7 @@ class ClientGroup:
             "frames": self._frames,
             "expected": len(self._peers) * seconds * FPS,
             "missing": self._missing,
+            "refused": self._refused,
             **{name: 1e3 * float(np.percentile(late, part)) for name, part in PERCENTILES.items()},
             **{name: self._rows[name] for name in COUNTED},
             "timed": len(self._late),

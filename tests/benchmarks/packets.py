@@ -22,7 +22,8 @@ def handshake(client: socket.socket, session: str) -> bytearray:
     while b"\r\n\r\n" not in data:
         data += (received := client.recv(4096))
         assert received, "the service closed the connection"
-    assert data.startswith(b"HTTP/1.1 101"), bytes(data)
+    if not data.startswith(b"HTTP/1.1 101"):
+        raise ConnectionRefusedError(bytes(data))
     return data.partition(b"\r\n\r\n")[2]
 
 

@@ -133,7 +133,7 @@ def measure(
 def print_result(name: str, sessions: int, result: dict[str, float], plays: bool) -> None:
     print(
         f"{name}: {sessions} sessions, {result['frames']} frames of {result['expected']:.0f}, "
-        f"{result['missing']} missing\n"
+        f"{result['missing']} missing, {result['refused']} sessions refused\n"
         f"  lateness ms     p50 {result['p50']:6.2f}  p99 {result['p99']:6.2f}  most {result['most']:6.1f}\n"
         f"  processor       {result['cpu']:5.0%} of a core, {result['frame']:5.1f} us a frame"
         f" (the client {result['load']:.0%})\n"

@@ -139,6 +139,7 @@ GAUGES = {
     "blocks_playing": "Blocks that are planned and have not ended.",
     "unsent_bytes": "Bytes that wait for clients to read them.",
     "memory_bytes": "Bytes of the process that are in memory.",
+    "overloaded": "Processes that are overloaded: they refuse new sessions, and leave out late frames.",
 }
 COUNTERS = {
     "messages": "Messages that came in.",
@@ -148,7 +149,7 @@ COUNTERS = {
     "rate_exceeded": "How often a WebSocket began to exceed max_rate, and was read more slowly.",
     "http_errors": "HTTP requests that were answered with a status of 400 to 499.",
     "http_failures": "HTTP requests that were answered with a status of 500 or more.",
-    "frames_dropped": "Frames, pictures and sound packets that slow clients did not get.",
+    "frames_dropped": "Frames, pictures and sound packets that slow clients, or an overload, left out.",
     "taken_back": "How often frames that were sent ahead were taken back, because a plan had changed.",
     "quarantined": "Documents that sessions were restored without, after two replays that did not end.",
     "failures": "Sessions that an internal error ended.",

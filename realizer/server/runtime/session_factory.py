@@ -30,6 +30,7 @@ from realizer.server.runtime.session_registry import JoinError
 from realizer.server.session.effects import Speak
 from realizer.server.session.session import Session
 from realizer.server.session.welcome import capabilities_of
+from realizer.server.streams.overload import Overload
 from realizer.speech.utterance import Utterance
 
 log = logging.getLogger(__name__)
@@ -47,11 +48,13 @@ class SessionFactory:
     Attributes:
         journal: from which another process can resume sessions, or None.
         ending: whether new sessions take no documents.
+        overload: of the process.
     """
 
     def __init__(self, settings: Settings, metrics: Metrics) -> None:
         self.journal: Journal | None = None
         self.ending = False
+        self.overload = Overload()
         self._settings = settings
         self._metrics = metrics
         self._recorder: RecordingFolder | None = None
@@ -221,6 +224,7 @@ class SessionFactory:
         )
         session.ending = self.ending
         session.broadcast.counts = session.submission.counts = self._metrics.counts
+        session.broadcast.overload = self.overload
         return session
 
     def _journal_writer(

@@ -47,6 +47,7 @@ FRAME_SLICES = 5  # of time; frames that take longer to compute are continued wi
 MOST_WAITING = 100  # messages to a session that plans; then its clients are read more slowly
 CONGESTION = 0.02  # s; how often a client looks whether its session can take messages again
 SLOW_STEP = 0.05  # s; a step of the loop that takes so long is logged
+DEGRADED = "degraded"  # status of `/healthz` while the process is overloaded
 EXPIRY_INTERVAL = 5.0  # s; how often expired sessions and due checkpoints are looked for
 
 
@@ -73,8 +74,14 @@ class SessionHost:
 
         self.metrics = Metrics(worker)
         self._factory = SessionFactory(settings, self.metrics)
+        self._overload = self._factory.overload
         self._registry = SessionRegistry(
-            self._factory.new, settings, is_local, self._call, lambda session: self._calls.cancel(session)
+            self._factory.new,
+            settings,
+            is_local,
+            self._call,
+            lambda session: self._calls.cancel(session),
+            self._overload,
         )
         self._engines = Engines(settings.deformer)
         self._clients: dict[int, Outbound] = {}
@@ -134,7 +141,8 @@ class SessionHost:
 
     def health(self) -> dict[str, object]:
         """Return what `/healthz` reports beside the status."""
-        return {"sessions": len(self._registry.sessions), "connections": len(self._clients)}
+        status = {"status": DEGRADED} if self._overload.is_active else {}
+        return {**status, "sessions": len(self._registry.sessions), "connections": len(self._clients)}
 
     def metrics_text(self) -> str:
         """Return the metrics in the Prometheus text format."""
@@ -148,6 +156,7 @@ class SessionHost:
                 "blocks_playing": sum(len(session.player.blocks.active()) for session in sessions),
                 "unsent_bytes": sum(client.unsent_bytes for client in self._clients.values()),
                 "memory_bytes": memory(),
+                "overloaded": self._overload.is_active,
             },
             {"frames_dropped": dropped},
         )
@@ -354,6 +363,7 @@ class SessionHost:
         """Send the frames and the feedback of a session that are due, and do what else is."""
         now = self._loop.time()
         self.metrics.late.pending.append(now - when)
+        self._overload.note(now - when, now)
         if self._calls.is_busy(session):
             return  # it is woken again when its call has ended
         run = session.fast_path
@@ -494,6 +504,7 @@ class SessionHost:
         for histogram in (self.metrics.late, self.metrics.planning, self.metrics.slow_steps):
             histogram.count()
         now = self._loop.time()
+        self._overload.end_if_over(now)
         self._registry.remove_expired(now)
         self._resumed = {name: end for name, end in self._resumed.items() if end > now}
         # Spread the checkpoints over the time until the next call.

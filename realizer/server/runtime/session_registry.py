@@ -13,6 +13,7 @@ from realizer.protocol.messages.replies import ErrorMessage
 from realizer.server.documents.limits import memory_error
 from realizer.server.session.effects import Close, Effect, MoveConnection, Send
 from realizer.server.session.session import Session
+from realizer.server.streams.overload import Overload
 
 SESSION_ID = re.compile(r"[A-Za-z0-9._~-]{1,64}")
 # Sessions of other transports than the WebSocket, which are open in the first worker only.
@@ -66,6 +67,7 @@ class SessionRegistry:
         call: (session, function) -> calls a function that changes a session, now or when its other calls have
             ended; and returns whether it was now.
         cancel: ends the calls of a session that have not ended.
+        overload: whether new sessions are refused.
 
     Attributes:
         sessions: name -> session.
@@ -79,7 +81,9 @@ class SessionRegistry:
         is_local: Callable[[str], bool] = lambda name: True,
         call: Callable[[Session, Callable[[], None]], bool] = call_now,
         cancel: Callable[[Session], None] = lambda session: None,
+        overload: Overload | None = None,
     ) -> None:
+        self._overload = overload or Overload()
         self._call = call
         self._cancel = cancel
         self._is_local = is_local
@@ -99,7 +103,8 @@ class SessionRegistry:
 
         Raises:
             JoinError: 400: the name is invalid; 403: the visitor may not join that session; 429: it has
-                opened too many sessions; 503: too many sessions are open, or memory is used up.
+                opened too many sessions; 503: too many sessions are open, memory is used up, or the process
+                is overloaded.
         """
         if name is not None and not SESSION_ID.fullmatch(name):
             words = f"session: wanted 1..64 letters, digits or . _ ~ -, got {name[:80]!r}"
@@ -123,6 +128,8 @@ class SessionRegistry:
             raise JoinError(503, f"{most} sessions are open: wanted fewer {limit_hint('max_sessions')}")
         if ends is None and (full := memory_error(self._settings)) is not None:
             raise JoinError(503, full)
+        if ends is None and self._overload.is_active:
+            raise JoinError(503, "the service is overloaded, and opens no new sessions: try again later")
 
     def open(
         self,

@@ -25,12 +25,16 @@ UNAVAILABLE = (
 
 
 def _combined_health(texts: Mapping[int, str], workers: int) -> str:
-    """Return the sums of the workers' `/healthz`, and which workers are silent; "ok" if none is."""
+    """Return the sums of the workers' `/healthz`, and which workers are silent.
+
+    The status is "partly" if some are, or else that of a worker that is not "ok".
+    """
     sums: Counter[str] = Counter()
     for text in texts.values():
         sums.update({name: n for name, n in json.loads(text).items() if isinstance(n, int)})
     silent = [number for number in range(workers) if number not in texts]
-    health: dict[str, object] = {"status": "partly" if silent else "ok", **sums, "workers": workers}
+    worst = next((status for text in texts.values() if (status := json.loads(text)["status"]) != "ok"), "ok")
+    health: dict[str, object] = {"status": "partly" if silent else worst, **sums, "workers": workers}
     return json.dumps(health | ({"silent": silent} if silent else {}))
 
 

@@ -16,10 +16,10 @@ from realizer.server.streams.frame_windows import (
     FrameTimeline,
     FrameWindow,
     PackedFrames,
-    first_frame_at,
     last_frame_at,
 )
-from realizer.server.streams.frames_ahead import LATE, AheadRun, AheadSubscription
+from realizer.server.streams.frames_ahead import AheadRun, AheadSubscription
+from realizer.server.streams.overload import OUTDATED, Overload
 from realizer.server.streams.schedule_stream import ScheduleStream, schedule_message
 from realizer.server.streams.video_stream import VideoStream
 
@@ -35,8 +35,14 @@ class Fanout:
         ahead: those that get frames ahead.
     """
 
-    def __init__(self, timeline: FrameTimeline, members: list[tuple[Connection, FrameSubscription]]) -> None:
+    def __init__(
+        self,
+        timeline: FrameTimeline,
+        members: list[tuple[Connection, FrameSubscription]],
+        overload: Overload,
+    ) -> None:
         self.timeline = timeline
+        self._overload = overload
         self.members = [(c, s) for c, s in members if not isinstance(s, AheadSubscription)]
         self.ahead = [(c, s) for c, s in members if isinstance(s, AheadSubscription)]
         self._packed: PackedFrames | None = None  # the next frames of a single subscriber
@@ -63,7 +69,7 @@ class Fanout:
     def send(self, newest: int, now: float, sends: list[Send]) -> None:
         """Send all frames up to `newest` to the subscribers that have not received them."""
         timeline, first = self.timeline, self.next
-        oldest = first if first == newest else first_frame_at(now - LATE, timeline.fps)
+        oldest = first if first == newest else self._overload.oldest(newest, now, timeline.fps)
         window = timeline.window(max(first, oldest), newest)
         for connection, s in self.members:
             if s.next < oldest:
@@ -94,7 +100,8 @@ class Fanout:
                     continue
                 taken_back += s.take_back()
             is_slow = connection.is_slow
-            connection.dropped += s.drop_late(newest, now, is_slow=is_slow)
+            oldest = newest + 1 if is_slow else self._overload.oldest(newest, now, self.timeline.fps)
+            connection.dropped += s.drop_until(min(oldest, newest + 1))
             if (message := s.message(newest, now, is_slow=is_slow)) is not None:
                 sends.append(Send(connection.id, message))
         window = self.timeline.latest_window
@@ -110,10 +117,11 @@ class FrameRun:
     """A run of packed frames for one connection, which are sent without a call of the session.
 
     Args:
-        connection: id of the connection.
+        client: the connection.
         subscription: its subscription, which is advanced.
         packed: the frames.
         zero: the caller's clock when the session clock was 0.
+        overload: whether late frames are left out.
 
     Attributes:
         connection: id of the connection.
@@ -123,13 +131,16 @@ class FrameRun:
 
     def __init__(
         self,
-        connection: int,
+        client: Connection,
         subscription: FrameSubscription,
         packed: PackedFrames,
         zero: float,
         until: float,
+        overload: Overload,
     ) -> None:
-        self.connection = connection
+        self.connection = client.id
+        self._client = client
+        self._overload = overload
         self._subscription = subscription
         self._packed = packed
         self._fps = subscription.timeline.fps
@@ -142,8 +153,13 @@ class FrameRun:
     def next_message(self, now: float) -> bytes | None:
         """Return the message of the next frame; None if it is not due, far too late, or more is due."""
         number, passed = self._next, now + EPSILON
-        if not self._due <= passed < self.until or passed > self._due + LATE or number >= self._packed.end:
+        if not self._due <= passed < self.until or passed > self._due + OUTDATED:
             return None
+        if self._overload.is_active:
+            number = max(number, last_frame_at(now - self._zero, self._fps))
+        if number >= self._packed.end:
+            return None
+        self._client.dropped += number - self._next
         self._subscription.next = self._next = number + 1
         self._due = (number + 1) / self._fps + self._zero
         self.wake_at = min(self._due, self.until)
@@ -155,6 +171,7 @@ class Broadcast:
 
     Attributes:
         active: whether there is a subscription; without one nothing is ever due.
+        overload: whether late frames are left out.
         counts: counts in `taken_back` how often frames were taken back that had been sent ahead.
         schedule_subscribers: the subscriptions to the stream `schedule`, with their connections.
     """
@@ -173,6 +190,7 @@ class Broadcast:
         self._video_subscribers: list[VideoSubscription] = []
         self.active = False
         self.counts = Counter[str]()
+        self.overload = Overload()
 
     def timeline(self, index: int, fps: float) -> FrameTimeline:
         """Return the frames of one character at one rate."""
@@ -222,7 +240,7 @@ class Broadcast:
                     self.schedule_subscribers.append((connection, s))
                 else:
                     self._video_subscribers.append(s)
-        self._fanouts = [Fanout(timeline, members) for timeline, members in frames.items()]
+        self._fanouts = [Fanout(timeline, members, self.overload) for timeline, members in frames.items()]
         self.active = bool(
             frames or self.schedule_subscribers or self._audio_subscribers or self._video_subscribers
         )
@@ -282,7 +300,7 @@ class Broadcast:
         if (packed := fanout.packed) is None:
             return None
         ((connection, s),) = fanout.members
-        return FrameRun(connection.id, s, packed, zero, until)
+        return FrameRun(connection, s, packed, zero, until, self.overload)
 
     @property
     def next_frame(self) -> float:

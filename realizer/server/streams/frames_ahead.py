@@ -16,8 +16,6 @@ from realizer.server.streams.frame_windows import (
 # Rows that are together shorter than this share of `ahead` are sent in one message. So the first of them is
 # sent more than half of `ahead` before its time, also if the session is woken a little too late.
 SHARE = 0.4
-# Frames that are later than this, after the process stalled, are not sent.
-LATE = 0.5  # s
 
 
 @dataclass(eq=False)
@@ -73,11 +71,8 @@ class AheadSubscription(FrameSubscription):
         self.version = self.timeline.version
         return changed is not None
 
-    def drop_late(self, newest: int, now: float, *, is_slow: bool) -> int:
-        """Skip rows that are too late, for a slow client all up to `newest`. Return their number."""
-        if self.next > newest:
-            return 0
-        oldest = newest + 1 if is_slow else first_frame_at(now - LATE, self.timeline.fps)
+    def drop_until(self, oldest: int) -> int:
+        """Skip the rows before `oldest`. Return their number."""
         dropped = max(0, oldest - self.next)
         self.next += dropped
         return dropped

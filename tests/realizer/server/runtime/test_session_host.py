@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import re
 import selectors
 from collections.abc import Awaitable, Callable
@@ -12,8 +13,10 @@ import pytest
 
 from bml_schema.feedback import parse_feedback
 from realizer.core.settings import Settings
+from realizer.protocol.wire import unpack
 from realizer.server.runtime import sliced_calls
 from realizer.server.runtime.session_host import MOST_WAITING, SessionHost
+from realizer.server.runtime.session_registry import JoinError
 from realizer.server.streams.connection import SLOW
 from tests.worst_documents import document
 
@@ -102,6 +105,54 @@ def test_session_host_sends_frames_again_to_a_client_that_has_read(phase: float,
         client.unsent_bytes = 0
         await asyncio.sleep(2)
         assert len(client.frames) - before >= 49
+
+    hosted(test)
+
+
+@dataclass
+class Costly(Client):
+    """A client each of whose frames takes the service some time."""
+
+    selector: Selector = field(default_factory=Selector)
+    cost: float = 0.0
+
+    def send(self, data: str | bytes) -> None:
+        super().send(data)
+        self.selector.now += self.cost
+
+
+@pytest.mark.parametrize(("ahead", "cost"), [(0, 0.01), (0.2, 0.02)])
+def test_session_host_shares_the_frames_of_an_overload(ahead: float, cost: float) -> None:
+    async def test(host: SessionHost) -> None:
+        loop = asyncio.get_running_loop()
+        assert isinstance(loop, Loop)
+        clients = [Costly(selector=loop.selector) for _ in range(20)]
+        for client in clients:
+            number = host.join(client)
+            subscription = {"type": "subscribe", "stream": "fap", "fps": 25, "ahead": ahead}
+            host.receive(number, json.dumps(subscription))
+        await asyncio.sleep(2)
+        assert "status" not in host.health()
+        for client in clients:
+            client.cost = cost
+        await asyncio.sleep(10)
+        assert host.health()["status"] == "degraded"
+        assert "realizer_overloaded 1" in host.metrics_text()
+        with pytest.raises(JoinError):
+            host.check(None)
+        counts, begin = [len(client.frames) for client in clients], loop.time()
+        await asyncio.sleep(10)
+        seconds = loop.time() - begin
+        got = [len(client.frames) - count for client, count in zip(clients, counts, strict=True)]
+        assert max(got) - min(got) <= 1
+        assert sum(got) >= 0.8 * seconds / cost
+        times = [unpack(client.frames[-1]).time for client in clients]
+        assert min(times) > loop.time() - Selector.now - 1.5 * len(clients) * cost
+        for client in clients:
+            client.cost = 0.0
+        await asyncio.sleep(15)
+        assert "status" not in host.health()
+        host.check(None)
 
     hosted(test)
 

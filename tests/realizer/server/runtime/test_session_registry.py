@@ -14,6 +14,7 @@ from realizer.server.documents import limits
 from realizer.server.runtime.session_registry import JoinError, SessionRegistry, Visitor, worker_of
 from realizer.server.session.effects import Close
 from realizer.server.session.session import Session
+from realizer.server.streams.overload import Overload
 
 
 @pytest.fixture
@@ -55,6 +56,19 @@ def test_registry_refuses_a_bad_name(registry, name) -> None:
     with pytest.raises(JoinError, match=r"wanted 1\.\.64") as caught:
         registry.open(1, name, 0.0)
     assert caught.value.status == 400
+
+
+def test_registry_opens_no_session_while_overloaded_but_lets_join() -> None:
+    overload = Overload()
+    registry = SessionRegistry(
+        lambda id, now, named: Session(id, Settings(), now, named=named), Settings(), overload=overload
+    )
+    session = registry.open(1, "show", 0.0)
+    overload.is_active = True
+    with pytest.raises(JoinError, match="the service is overloaded") as caught:
+        registry.open(2, None, 0.0)
+    assert caught.value.status == 503
+    assert registry.open(3, "show", 0.0) is session
 
 
 def test_registry_refuses_too_many_sessions_but_not_joining(registry) -> None:

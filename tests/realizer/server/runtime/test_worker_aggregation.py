@@ -24,8 +24,8 @@ def of(number: int) -> bytes:
     return answer("200 OK", Metrics(worker=number).text(dict.fromkeys(GAUGES, number + 1), {}))
 
 
-def health(sessions: int) -> bytes:
-    return answer("200 OK", json.dumps({"status": "ok", "sessions": sessions, "connections": 2}))
+def health(sessions: int, status: str = "ok") -> bytes:
+    return answer("200 OK", json.dumps({"status": status, "sessions": sessions, "connections": 2}))
 
 
 def asked(*answers: bytes | None, request: bytes = REQUEST) -> tuple[bytes, list[bytes]]:
@@ -101,6 +101,8 @@ def test_aggregate_sums_health_and_names_silent_workers(monkeypatch: pytest.Monk
 
     whole = {"status": "ok", "sessions": 3, "connections": 4, "workers": 2}
     assert health_of(health(1), health(2)) == (b"200", whole)
+    degraded = {**whole, "status": "degraded"}
+    assert health_of(health(1), health(2, "degraded")) == (b"200", degraded)
     partly = {"status": "partly", "sessions": 1, "connections": 2, "workers": 3, "silent": [1, 2]}
     assert health_of(health(1), None, b"") == (b"200", partly)
     got, _ = asked(None, b"", request=request)

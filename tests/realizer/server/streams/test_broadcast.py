@@ -13,8 +13,9 @@ from realizer.protocol.streams import STREAMS
 from realizer.protocol.wire import unpack
 from realizer.server.streams.audio_stream import AudioStream
 from realizer.server.streams.broadcast import FrameRun
+from realizer.server.streams.connection import Connection
 from realizer.server.streams.frame_windows import FrameSubscription, FrameTimeline, PackedFrames
-from realizer.server.streams.frames_ahead import LATE
+from realizer.server.streams.overload import OUTDATED, Overload
 from tests.realizer.server.conftest import NOD
 
 FAP = {"type": "subscribe", "stream": "fap"}
@@ -27,13 +28,16 @@ def subscribe(stream: str, **fields):
     return {"type": "subscribe", "stream": stream, **fields}
 
 
-def run(until: float = float("inf"), following: int = 0) -> tuple[FrameRun, FrameSubscription]:
+def run(
+    until: float = float("inf"), following: int = 0, overload: Overload | None = None
+) -> tuple[FrameRun, FrameSubscription]:
     player = Player(PlayOptions(idle=False))
     timeline = FrameTimeline(player, 0, FPS, lambda: pytest.fail("no face is wanted"))
     subscription = FrameSubscription("fap", "binary", timeline, 0, None, following)
     rows = np.arange(FRAMES * 68, dtype="<i4").reshape(FRAMES, 68)
     strip = PackedFrames("fap", 0, np.arange(FRAMES) / FPS, rows, 0)
-    return FrameRun(7, subscription, strip, ZERO, until), subscription
+    client = Connection(7)
+    return FrameRun(client, subscription, strip, ZERO, until, overload or Overload()), subscription
 
 
 def at(frame: float) -> float:
@@ -53,6 +57,34 @@ def test_next_message_returns_each_frame_once_at_its_time() -> None:
         assert subscription.next == number + 1
 
 
+def test_next_message_skips_late_frames_of_an_overloaded_process() -> None:
+    overload = Overload()
+    overload.is_active = True
+    frames, subscription = run(overload=overload)
+    data = frames.next_message(at(4.5))
+    assert data is not None
+    assert (unpack(data).frame, subscription.next, frames.wake_at) == (4, 5, pytest.approx(at(5)))
+    assert frames.next_message(at(FRAMES)) is None
+
+
+@pytest.mark.parametrize(("ahead", "lost"), [(0, 9), (0.2, 5)])
+@pytest.mark.parametrize("viewers", [1, 2])
+def test_broadcast_sends_the_newest_frame_of_an_overload(
+    driver, ahead: float, lost: int, viewers: int
+) -> None:
+    for viewer in range(1, viewers + 1):
+        driver.join(viewer)
+        driver.send(subscribe("fap", ahead=ahead), viewer)
+    driver.run(1.0)
+    driver.session.broadcast.overload.is_active = True
+    before = len(driver.clients[1].frames)
+    driver.session.tick(driver.opened + 1.42)
+    driver.collect()
+    (frame,) = driver.clients[1].frames[before:]
+    assert frame.frame == 35
+    assert [driver.session.dropped_count(viewer) for viewer in range(1, viewers + 1)] == [lost] * viewers
+
+
 def test_next_message_returns_none_after_the_last_frame() -> None:
     frames, _ = run(following=FRAMES - 1)
     assert frames.next_message(at(FRAMES - 1)) is not None
@@ -69,7 +101,7 @@ def test_next_message_returns_late_frames_one_after_the_other() -> None:
 
 def test_next_message_returns_none_if_a_frame_is_far_too_late() -> None:
     frames, subscription = run()
-    assert frames.next_message(ZERO + LATE + 0.01) is None
+    assert frames.next_message(ZERO + OUTDATED + 0.01) is None
     assert subscription.next == 0
 
 

@@ -15,9 +15,9 @@ from realizer.protocol.wire import HEADER, unpack
 from realizer.server.journal import Entry, SavedSession
 from realizer.server.journal.replay import restore_session
 from realizer.server.session.session import Session
-from realizer.server.streams import frames_ahead
 from realizer.server.streams.frame_windows import FrameTimeline, FrameWindow
 from realizer.server.streams.frames_ahead import AheadRun
+from realizer.server.streams.overload import OUTDATED
 from tests.example_counts import examples
 from tests.realizer.server.conftest import NOD, TALK, Client, Driver, spoken
 
@@ -154,7 +154,7 @@ def test_ahead_skips_late_rows_after_a_stall(driver) -> None:
     driver.session.tick(driver.opened + 5.0)
     driver.collect()
     last = batches(driver.clients[1])[-1]
-    assert 0 <= last.first - (5.0 - frames_ahead.LATE) * FPS < 1
+    assert 0 <= last.first - (5.0 - OUTDATED) * FPS < 1
     assert last.first + len(last.rows) - 1 == 5.2 * FPS
 
 
