@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bml_schema import Behaviour, parse
+from realizer import tables
 from realizer.animation.axis import axis
 from realizer.animation.blend import blend
 from realizer.animation.channel import Channel
@@ -56,10 +57,13 @@ def at(channels: Sequence[Channel], name: str, *times: float) -> list[float]:
 def degrees(channels: Sequence[Channel], part: str, *times: float) -> list[tuple[float, float]]:
     """Return (yaw to the left, pitch up) of eyes or head."""
     left, right, up, down = {"eyes": ("61", "62", "63", "64"), "head": ("51", "52", "53", "54")}[part]
-    yaw, pitch = (40, 30) if part == "eyes" else (60, 40)
+    most = [tables.by_number()[int(name)].degrees for name in (left, right, up, down)]
     values = {name: at(channels, name, *times) for name in (left, right, up, down)}
     return [
-        (yaw * (values[left][k] - values[right][k]), pitch * (values[up][k] - values[down][k]))
+        (
+            most[0] * values[left][k] - most[1] * values[right][k],
+            most[2] * values[up][k] - most[3] * values[down][k],
+        )
         for k in range(len(times))
     ]
 

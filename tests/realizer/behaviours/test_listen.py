@@ -44,7 +44,7 @@ def test_listen_keeps_within_its_time() -> None:
 def test_listen_nods_by_some_degrees_and_keeps_its_eyes_on_the_other() -> None:
     channels = responses()
     down = sample([c for c in channels if c.target == NOD], TIMES).max(axis=0) * 40
-    up = sample([c for c in channels if c.target == au(63)[0]], TIMES).max(axis=0) * 30
+    up = sample([c for c in channels if c.target == au(63)[0]], TIMES).max(axis=0) * 25
     assert 5.0 < down.max() <= 9.0
     assert up == pytest.approx(down, abs=1e-9)
 

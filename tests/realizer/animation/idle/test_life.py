@@ -71,6 +71,6 @@ def test_life_keeps_the_eyes_on_their_point() -> None:
     found = units(3)
     for head, eyes in ((("51", "52"), ("61", "62")), (("53", "54"), ("63", "64"))):
         degrees = 60.0 if head[0] == "51" else 40.0
-        most = 40.0 if head[0] == "51" else 30.0
+        most = 40.0 if head[0] == "51" else 25.0
         turned = degrees * (found[head[0]] - found[head[1]]) + most * (found[eyes[0]] - found[eyes[1]])
         np.testing.assert_allclose(turned, 0.0, atol=1e-9)
