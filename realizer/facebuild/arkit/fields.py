@@ -34,6 +34,7 @@ LOWER = {
 BROWS = {1: ((31, "4.1"), (33, "4.3"), (35, "4.5")), -1: ((32, "4.2"), (34, "4.4"), (36, "4.6"))}
 CORNERS = {1: ((6, 12, "2.4", 0), (53, 59, "8.3", 1)), -1: ((7, 13, "2.5", 0), (54, 60, "8.4", 1))}
 WORDS = {1: "Left", -1: "Right"}
+MIDDLE = 0.2  # of half a lip: where the pulls of both corners meet
 BINS = 24  # places across an eye
 
 
@@ -144,7 +145,11 @@ def _line(
 
 
 def _corners(shaped: ShapedSkin, made: Mapping[int, Float64 | None]) -> dict[int, Float64 | None]:
-    """Return the fields of the corners: a smile and a stretch, mixed to move a corner straight up or out."""
+    """Return the fields of the corners: a smile and a stretch, mixed to move a corner straight up or out.
+
+    Half a lip goes aside with its corner, as no other FAP moves it so: a corner alone would fold the lip over
+    the cheek. Upwards each station has a FAP of its own.
+    """
     out: dict[int, Float64 | None] = {}
     for side, rows in CORNERS.items():
         smile, wide = (shaped.move(f"mouth{stem}{WORDS[side]}") for stem in ("Smile", "Stretch"))
@@ -160,11 +165,12 @@ def _corners(shaped: ShapedSkin, made: Mapping[int, Float64 | None]) -> dict[int
             if size.min() < 1e-4 or abs(np.linalg.det(pull / size)) < 0.2:
                 continue  # both pull the same way
             mixes = np.linalg.solve(pull, np.eye(2))
-            share = (shaped.mouth.outer if outer else 1 - shaped.mouth.outer) * shaped.mouth.knots[
-                4 if side > 0 else 0
-            ]
+            half = np.asarray(smooth(shaped.mouth.along * side, -MIDDLE, MIDDLE))
+            corner = shaped.mouth.knots[4 if side > 0 else 0]
+            contour = shaped.mouth.outer if outer else 1 - shaped.mouth.outer
+            share = np.stack([half, corner, half], axis=1) * contour[:, None]
             for fap, mix in ((across, mixes[:, 0]), (upward, mixes[:, 1])):
-                out[fap] = shaped.exact(fap, (smile * mix[0] + wide * mix[1]) * share[:, None])
+                out[fap] = shaped.exact(fap, (smile * mix[0] + wide * mix[1]) * share)
     return out
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from realizer.core.errors import FaceError
 from realizer.face.mesh_geometry import fit_ball
+from realizer.facebuild.arkit.fap_sources import FapSource, source_table
 from realizer.facebuild.arkit.gltf import Gltf
 from realizer.facebuild.arkit.mesh_merge import Surface, cut, merge_pieces
 from realizer.facebuild.arkit.orientation import oriented, pose_of
@@ -25,16 +26,19 @@ class Report:
     Attributes:
         found: parts and features that were recognised; missing: those that were not, with the consequences.
         unsure: guesses to check by eye.
+        faps: what moves each FAP; empty before that is known.
     """
 
     found: tuple[str, ...]
     missing: tuple[str, ...]
     unsure: tuple[str, ...]
+    faps: tuple[FapSource, ...] = ()
 
     @property
     def lines(self) -> tuple[str, ...]:
         kinds = (("found", self.found), ("missing", self.missing), ("unsure", self.unsure))
-        return tuple(f"{kind}: {word}" for kind, words in kinds for word in words)
+        lines = tuple(f"{kind}: {word}" for kind, words in kinds for word in words)
+        return lines + (source_table(self.faps) if self.faps else ())
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ from realizer.face.maps import NAMES
 from realizer.face.mesh_geometry import fit_ball, vertex_normals
 from realizer.facebuild.arkit.atlas import SIZE, Atlas, make_atlas
 from realizer.facebuild.arkit.au_measurements import measure_units
+from realizer.facebuild.arkit.fap_sources import fap_sources
 from realizer.facebuild.arkit.fields import ShapedSkin, shape_fields
 from realizer.facebuild.arkit.head import Head, Report, read_head
 from realizer.facebuild.arkit.jaw import drag_of, joint_of
@@ -102,7 +103,8 @@ def _write(head: Head, folder: Path, name: str) -> Report:
         found = (*found, f"{len(measured)} action units for realizer faces fit {folder.name}")
     if guesses:
         unsure = (*unsure, f"feature points that are guessed, look at them: {', '.join(guesses)}")
-    return Report(found, (*report.missing, *head.gltf.notes), unsure)
+    sources = fap_sources(made, guesses, ranges, head.painted)
+    return Report(found, (*report.missing, *head.gltf.notes), unsure, sources)
 
 
 def _write_head(path: Path, name: str, head: Head) -> None:
@@ -171,7 +173,8 @@ def _write_fields(
     centres = [centre for centre, _ in eyes]
     pivots = stored["jaw_pivot"], stored["head_pivot"]
     write_fields(folder / "fields.npz", rows, stored["head"], *pivots, centres, lids)
-    return tuple(sorted(made)), words
+    jaw = () if shaped.move("jawOpen") is None else (3,)
+    return tuple(sorted({*jaw, *made})), words
 
 
 def _shaped_skin(

@@ -91,6 +91,22 @@ def test_import_head_removes_the_maps_of_an_import_before(ada_glb: Path, tmp_pat
     assert (tmp_path / "notes.txt").is_file()
 
 
+@pytest.mark.parametrize("value", [-250, 300])
+def test_import_head_stretches_corners_without_folds(brought: tuple[Face, Report], value: float) -> None:
+    face, _ = brought
+    asked = np.zeros((2, 68), np.float32)
+    asked[1, [5, 6, 52, 53]] = value
+    first, last = face.parts["skin"]
+    rest, moved = deform(face, asked)
+    a, b, c = np.moveaxis(rest[triangles := face.triangles[(face.triangles < last).all(axis=1)]], 1, 0)
+    front = np.cross(b - a, c - a)[:, 2] / 2
+    a, b, c = np.moveaxis(moved[triangles], 1, 0)
+    away = np.abs(rest[triangles].mean(axis=1) - face.points["2.2"])
+    cheek = (away < (0.06, 0.03, 0.03)).all(axis=1) & (front > 0.4e-6)
+    assert first == 0
+    assert (np.cross(b - a, c - a)[cheek, 2] <= 0).mean() < 0.005
+
+
 LINEAR = [row for row in faps()[2:] if row.direction in ("up", "down", "left", "right")]
 
 

@@ -17,6 +17,8 @@ from realizer.facebuild.arkit.part_classifier import ball_behind, is_ball, part_
         (("Skin", "Tongue", ""), "tongue"),
         (("Skin", "", "Head"), "skin"),
         (("", "Object_1", ""), ""),
+        (("Glasses", "", ""), "other"),
+        (("Glasses_Lens", "", ""), "glass"),
     ],
 )
 def test_part_of_reads_material_mesh_and_node(names: tuple[str, str, str], part: str) -> None:
