@@ -47,4 +47,8 @@ def _thickness(skin: Skin) -> Float32:
     # No light comes from inside the mouth.
     outside = np.flatnonzero(patch.mix @ (~skin.lips.inside * 1.0) > 0.5)
     through = distance_through(part.vertices, ups, outside, full) / full
-    return skin.float(np.clip(skin.texels.spread(through), 0, 1))
+    # Behind lids and lips is no air but an eye or teeth.
+    ears = skin.around("10.1", "10.2", "10.3", "10.4", "10.7", "10.8", radii=(0.04, 0.04, 0.04))
+    wings = skin.around("9.1", "9.2", radii=(0.016, 0.014, 0.016))
+    airy = np.clip(2 * np.maximum(ears, wings), 0, 1)
+    return skin.float(1 - airy * (1 - np.clip(skin.texels.spread(through), 0, 1)))
