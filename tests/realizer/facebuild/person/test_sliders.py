@@ -17,7 +17,8 @@ def test_person_tables_have_every_colour():
 
 
 @pytest.mark.parametrize(
-    "person", [{}, {"age": 60, "sex": 0.3, "weight": 0.4, "muscle": -0.5, "people": {"asian": 2, "african": 1}}]
+    "person",
+    [{}, {"age": 60, "sex": 0.3, "weight": 0.4, "muscle": -0.5, "people": {"asian": 2, "african": 1}}],
 )
 def test_person_tables_have_shares_that_add_up(person):
     found = macros(person)
