@@ -26,7 +26,7 @@ from realizer.tables import toml_table
 WRAP, SOFT, REFLECTION, SHARP, SHARP_SHARE, THROUGH = 0, 3, 6, 7, 8, 9
 KEY, RIM = 0, 1
 DIRECT = 0.55  # how far occlusion darkens light of lamps, which shadows darken already
-THIN = (0.9, 0.22, 0.10)  # colour of light that has come through thin skin
+THIN = (0.50, 0.13, 0.07)  # colour of light that has come through thin skin
 BRIGHTEST, STEPS = 8.0, 16384  # linear light at the end of the tone curve, and its entries
 
 
@@ -132,7 +132,7 @@ def _scattered(c: Any, a: Any, row: Any, cosines: Any, occlusion: Any, lamps: An
     facing = max(zero, (relief + (smooth - relief) * row[SOFT + c] + wrap) / (one + wrap))
     # Strands are lit across, all around but from behind the hair.
     facing += across * (np.float32(math.sqrt(across)) * max(zero, np.float32(0.5) + smooth) - facing)
-    behind = (max(zero, -smooth) + np.float32(0.25)) * (reached + one) * thin * THIN[c]
+    behind = max(zero, np.float32(0.1) - smooth) * thin * THIN[c]
     return a * (lamps[KEY, 1, c] * (facing * reached * occlusion + behind) + lamps[RIM, 1, c] * rim)
 
 
@@ -187,7 +187,7 @@ def reflected(row: Any, hair: Any, albedo: Any, normals: Any, values: Any, view:
     cosines = (
         nl, nl_smooth, max(one - along * along, zero) if hair else zero, reached,
         max(zero, (dot(n, rim) + np.float32(0.3)) / np.float32(1.3)) * edge,
-        (one - thickness) * row[THROUGH],
+        (one - thickness) * row[THROUGH] * occlusion * occlusion,
     )  # fmt: skip
     a, b, c = albedo
     red = _scattered(0, a, row, cosines, reach, lamps) + a * _ambient(sh, 0, n) * _open(a, occlusion)
