@@ -58,7 +58,7 @@ def list_(as_json: bool, output: Path | None, face: str, expressions: Path | Non
     """List the expressions: name, action units, seconds of onset, apex and offset, description."""
     from realizer.expressions.library import library_of
 
-    _check_picture(output, face)
+    options.check_suffix(output, ".png")
     library = list(library_of(options.settings(expressions=expressions).expressions).values())
     _print_matches(library, [""] * len(library), as_json)
     if output is not None:
@@ -109,7 +109,7 @@ def find(
 
     if sum(query is not None for query in (text, units, like)) != 1:
         raise click.UsageError("wanted one of TEXT, --au and --like")
-    _check_picture(output, face or "default")
+    options.check_suffix(output, ".png")
     library = list(library_of(options.settings(expressions=expressions).expressions).values())
     if text is not None:
         matches = by_meaning(text, library)
@@ -134,12 +134,6 @@ def find(
     elif output is not None:
         _draw(matching, scores, output, face or "default")
     return 0 if matches else 1
-
-
-def _check_picture(output: Path | None, face: str) -> None:
-    options.check_suffix(output, ".png")
-    if output is not None:
-        options.check_camera(face, "close")
 
 
 def _print_matches(expressions: Sequence[Expression], scores: Sequence[str], as_json: bool) -> None:

@@ -26,7 +26,7 @@ def gaze_shifts(channels: Iterable[Channel], start: float, end: float) -> list[G
     for channel in channels:
         if channel.layer in (Layer.GAZE, Layer.BASE) and (most := _degrees().get(channel.target.column)):
             keys = channel.times
-            if keys[0] <= end and keys[-1] >= start - SHOWN:
+            if keys[-1] >= start - SHOWN:
                 times, turn = turns.get(id(keys)) or (keys.tolist(), [0j] * len(keys))
                 values = zip(turn, channel.values.tolist(), strict=True)
                 turns[id(keys)] = times, [before + most * value for before, value in values]

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import pytest
+from lxml import etree
 
 from bml_schema import parse
+from bml_schema.canonical import MAX_ATTRIBUTES
 from bml_schema.dialects.sync_points import SyncPoints
 from bml_schema.dialects.table import Row
 
@@ -42,3 +44,14 @@ def test_sync_points_are_translated_in_attributes_and_references() -> None:
         "ready": "f:attackPeak + 0.1",
         "end": "f:relax",
     }
+
+
+@pytest.mark.parametrize(
+    ("name", "spaces", "is_renamed"), [("head", 0, True), ("head", MAX_ATTRIBUTES, False), ("text", 0, False)]
+)
+def test_translate_leaves_elements_without_points_and_with_many_attributes(
+    name: str, spaces: int, is_renamed: bool
+) -> None:
+    element = etree.Element(name, {"stroke_end": "1"} | {f"x{k}": "" for k in range(spaces)})
+    SyncPoints(KINDS, lambda row: None, in_dialect=True).translate(element)
+    assert ("strokeEnd" in element.attrib) == is_renamed

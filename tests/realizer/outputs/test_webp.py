@@ -74,6 +74,13 @@ def test_webp_has_at_most_25_pictures_a_second(tmp_path, rendering):
     assert {shown for shown, _ in found} == {0.05}
 
 
+def test_webp_shows_a_picture_for_at_most_three_bytes_of_milliseconds(tmp_path):
+    path = tmp_path / "x.webp"
+    path.write_bytes(encode_webp(pictures(1), [0.0], 1e5))
+    ((shown, _),) = opened(path)[0]
+    assert shown == pytest.approx(16_777.215, abs=1e-4)
+
+
 def test_webp_of_one_picture(tmp_path):
     path = tmp_path / "x.webp"
     path.write_bytes(encode_webp(pictures(1), [0.0], 0.04))

@@ -9,8 +9,9 @@ from hypothesis import given
 from scipy.optimize import linprog
 
 from realizer.core.array_types import Float64
-from realizer.scheduling.conflict import Conflict, LengthBound
+from realizer.scheduling.conflict import Conflict, LengthBound, Link
 from realizer.scheduling.explain import in_words
+from realizer.scheduling.minimal_cycles import _simple
 from realizer.scheduling.problem import ORIGIN, Problem, Relation
 from realizer.scheduling.solve import Solution, solve
 from tests.example_counts import examples
@@ -142,3 +143,11 @@ def test_minimal_cycles_keep_the_given_cycle_if_the_search_is_too_long() -> None
     assert len(warning.clash) == 2 * n
     assert "571 more such things cannot all hold" in warning.text, "but nobody has to read all that"
     assert len(warning.text) < 2000
+
+
+def test_simple_cycle_leaves_out_a_walk_round_another_cycle() -> None:
+    link = Link(0, 0, 0.0)
+    there, back = (1, 1.0, link), (0, 1.0, link)
+    around = [(2, 1.0, link), (1, -1.0, link)]
+    assert _simple(0, [there, *around, (3, 0.0, link), (1, 0.0, link), back]) == [there, back]
+    assert _simple(0, [there, (2, 1.0, link), (1, 1.0, link), back]) == [(2, 1.0, link), (1, 1.0, link)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from pathlib import Path
 from typing import Any
 
 
@@ -20,7 +21,9 @@ class Fake:
         self.chatty = "chatty" in arguments
         self.drifts = "drifts" in arguments
         self.count = 0
-        self.operations = {"echo": self.echo, "sleep": self.sleep, "fail": self.fail, "die": self.die}
+        self.operations = {
+            "echo": self.echo, "sleep": self.sleep, "fail": self.fail, "die": self.die, "wait": self.wait
+        }  # fmt: skip
 
     def hello(self) -> dict[str, Any]:
         return {"rate": 8000, "chatty": self.chatty}
@@ -38,6 +41,13 @@ class Fake:
 
     def fail(self, request: dict[str, Any]) -> tuple[dict[str, Any], list[bytes]]:
         raise ValueError("it cannot")
+
+    def wait(self, request: dict[str, Any]) -> tuple[dict[str, Any], list[bytes]]:
+        """Write to a pipe after a while, during which its reader sees that the process lives."""
+        with Path(request["pipe"]).open("w") as pipe:
+            time.sleep(10)
+            pipe.write("it lives")
+        return {}, []
 
     def die(self, request: dict[str, Any]) -> tuple[dict[str, Any], list[bytes]]:
         os._exit(3)

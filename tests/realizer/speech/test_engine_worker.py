@@ -67,3 +67,17 @@ def test_worker_of_a_drifting_engine_ends_after_a_request_without_fork() -> None
 def test_worker_reports_an_engine_that_does_not_load() -> None:
     assert run(str(FAKE), "broken") == ({"error": "it has no data"}, [])
     assert "nowhere.py" in run("nowhere.py")[0]["error"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux ends children with their parent")
+def test_worker_ends_its_fork_when_it_is_killed(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    command = [sys.executable, "-P", str(RUN), str(FAKE), "drifts"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL) as worker:
+        assert worker.stdin is not None
+        worker.stdin.write(json.dumps({"op": "wait", "pipe": str(pipe)}).encode() + b"\n")
+        worker.stdin.flush()
+        with pipe.open() as alive:  # the fork has opened it
+            worker.kill()
+            assert alive.read() == ""

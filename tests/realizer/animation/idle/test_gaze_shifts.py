@@ -28,7 +28,8 @@ def test_gaze_shifts_are_the_turns_to_a_target_and_back() -> None:
     gaze = '<gaze id="a" target="left" start="1" ready="2" relax="5" end="6"/>'
     assert shifts_of(gaze) == [(1.0, 45), (5.0, 45)]
     assert shifts_of(gaze, 4.0) == [(5.0, 45)]
-    assert shifts_of(gaze, 0.0, 0.9) == []
+    assert shifts_of(gaze, 5.5) == [(5.0, 45)]
+    assert shifts_of(gaze, 0.0, 0.9) == shifts_of(gaze, 7.5) == []
 
 
 def test_gaze_shifts_include_lasting_ones_in_order_of_time() -> None:

@@ -63,6 +63,16 @@ def test_head_channels_move_faster_while_the_voice_is_loud() -> None:
     assert speed[loud].mean() > 3 * speed[inside].mean()
 
 
+def test_head_channels_begin_at_rest_after_a_pause() -> None:
+    late = tuple(replace(p, start=p.start + 2.0, end=p.end + 2.0) for p in said(4.0).phonemes)
+    spoken = replace(said(), words=(Word(2.0, 6.0, "word"),), phonemes=(Phoneme(0.0, 2.0, ""), *late))
+    times = np.array([2.0, 2.02, 3.0])
+    for seed in range(5):
+        head = turned(head_channels(spoken, 0.0, np.inf, seed), times)
+        assert np.abs([head[name][:2] for name in TURNS]).max() < 0.1
+        assert np.abs(head["yaw"][2]) > 0.1
+
+
 def test_head_channels_leave_the_eyes_on_their_target() -> None:
     head = turned(head_channels(said(), 0.0, np.inf, seed=2), TIMES)
     assert head["eyes"] == pytest.approx(-head["pitch"], abs=1e-9)

@@ -191,6 +191,11 @@ def styled(text: str, jaw: float, lips: float) -> tuple[Channel, ...]:
     return lip_channels(say(text, 0.14), 0.0, style=LipStyle(jaw, lips))
 
 
+def test_lip_style_is_usual_where_it_is_not_given() -> None:
+    assert LipStyle(jaw=0.5) == (0.5, 1.0)
+    assert LipStyle(lips=0.5) == (1.0, 0.5)
+
+
 def test_lip_channels_open_and_round_by_the_style_of_jaw_and_lips() -> None:
     text = "_ t ɑ t u t i _"
     usual = lip_channels(say(text, 0.14), 0.0)

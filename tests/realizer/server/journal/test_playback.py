@@ -64,6 +64,8 @@ def test_replay_recording_repeats_the_feedback_to_the_last_digit(tmp_path: Path)
     realization, again = replay_recording(read_recording(path))
     assert again == playback.replay_feedback(read_recording(path)) == feedback
     assert any('"b:end"' in text for text in feedback)
+    last = json.loads(path.read_text().splitlines()[-1])
+    assert realization.duration == pytest.approx(last["at"], abs=0.05)
     assert [w.text for w in realization.speeches[0].utterance.words] == ["Hello", "how", "are", "you"]
 
 

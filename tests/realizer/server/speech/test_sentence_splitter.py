@@ -41,6 +41,11 @@ def test_feed_waits_for_white_space_after_a_sentence() -> None:
     assert clauses.feed("", close=True) == [" How"]
 
 
+def test_feed_does_not_split_behind_the_semicolon_of_an_entity() -> None:
+    text = "Whatever we may have said of white salt &amp; pepper; we did not mean it like that, you know"
+    assert cut(text)[0] == "Whatever we may have said of white salt &amp; pepper;"
+
+
 def test_feed_keeps_tags_directly_behind_a_sentence() -> None:
     assert cut('One.<sync id="a"/> Two. <head id="n"/>Three.') == [
         'One.<sync id="a"/>',

@@ -27,6 +27,12 @@ def test_energies_have_a_frame_for_each_hop() -> None:
     assert f.cepstra(energy).shape == (len(energy), 26)
 
 
+def test_energies_of_a_later_sound_are_those_of_the_sound_later() -> None:
+    sound = tone(700, 0.1)
+    later = f.energies(np.concatenate([np.zeros(160, np.float32), sound]), 160)
+    assert later[1:] == pytest.approx(f.energies(sound, 160))
+
+
 def test_voice_activity_separates_sound_from_silence() -> None:
     sound = np.concatenate([tone(400, 0.5, 1e-4), tone(400, 1.0), tone(400, 0.5, 1e-4)])
     _, talks = f.voice_activity(f.loudness(f.energies(sound, 160)))
