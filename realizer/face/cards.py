@@ -24,9 +24,9 @@ class Cards:
     """Strips with pictures of hairs: hair, brows, lashes.
 
     Attributes:
-        roots: (c, 4) int32 vertices of the mesh that each vertex of a card follows.
-        weights: (c, 4) float32, place = weights @ vertices at the roots; a row sums to 1.
-        ups: (c, 4) float32, normal = ups @ normals at the roots, at length 1.
+        roots: (c, k) int32 vertices of the mesh that each vertex of a card follows.
+        weights: (c, k) float32, place = weights @ vertices at the roots; a row sums to 1.
+        ups: (c, k) float32, normal = ups @ normals at the roots, at length 1.
         triangles: (t, 3) int32 of the cards' vertices; they are seen from both sides.
         uv: (c, 2) float32 in the face's maps; v runs along the hairs.
         colours: (c, 3) uint8 sRGB.
@@ -66,7 +66,16 @@ def read_cards(folder: Path, head: Mapping[str, Any], vertices: int) -> Cards | 
             raise FaceError(
                 f"{path}: {name}: wanted indices 0..{most - 1}, got {indices.min()}..{indices.max()}"
             )
-    widths = {"roots": 4, "weights": 4, "ups": 4, "uv": 2, "colours": 3, "occlusion": None, "gloss": None}
+    each = arrays["roots"].shape[1]
+    widths = {
+        "roots": each,
+        "weights": each,
+        "ups": each,
+        "uv": 2,
+        "colours": 3,
+        "occlusion": None,
+        "gloss": None,
+    }
     for name, width in widths.items():
         shape = (count, width) if width else (count,)
         if arrays[name].shape != shape or not np.isfinite(arrays[name]).all():

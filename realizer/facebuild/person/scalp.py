@@ -5,13 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.array_types import Float64
+from realizer.core.array_types import Float64, Int32
 from realizer.face.mesh_geometry import vertex_normals
-from realizer.facebuild.submesh import Submesh
 
 CROWN, CHIN = 0.1087, -0.1002  # m; heights of the head that the hairline was drawn on
 # The hair leaves the ear free: an ellipse in the side view, drawn from the ear's top and lobe (10.1, 10.5).
-EAR_ABOVE, EAR_BEHIND, EAR_TALL, EAR_WIDE, EAR_LEAN = 0.04, 0.066, 0.70, 0.45, 0.22
+EAR_ABOVE, EAR_BEHIND, EAR_TALL, EAR_WIDE, EAR_LEAN = 0.02, 0.066, 0.62, 0.36, 0.22
 EARS_FROM = 0.03  # m from the middle
 NEAR = 8  # vertices that a place on the skull is mixed from
 FLAP = 0.006  # m; what protrudes that far from its surroundings is an ear
@@ -25,13 +24,17 @@ class Scalp:
     """
 
     def __init__(
-        self, skin: Submesh, base: Float64, points: Mapping[str, Float64], line: Any, rise: Any
+        self, at: Float64, triangles: Int32, points: Mapping[str, Float64], line: Any, rise: Any
     ) -> None:
-        """`line`: (degrees, metres above the eyes) on the head it was drawn on; `rise`: metres to add."""
+        """`line`: (degrees, metres above the eyes) on the head it was drawn on; `rise`: metres to add.
+
+        Args:
+            at: (n, 3) metres, the skin's vertices; triangles: (m, 3).
+        """
         from scipy.spatial import cKDTree
 
-        self.at = skin.positions(base)
-        self.ups = vertex_normals(self.at, skin.triangles)
+        self.at = at
+        self.ups = vertex_normals(at, triangles)
         self._line, self._rise = np.array(line, float).T, np.array(rise, float).T
         top, back = points["11.4"], points["11.6"]
         self._above, self._below = top[1] / CROWN, points["2.1"][1] / CHIN
@@ -52,7 +55,8 @@ class Scalp:
         nearest = np.array([away[mine].min() for mine in around])
         bone = (away < nearest + FLAP) | (np.abs(ways[:, 0]) < 0.6)
         self._bone, self._away = cKDTree(ways[bone]), away[bone]
-        self._skin = cKDTree(self.at)
+        self._skin, self._skull = cKDTree(self.at), cKDTree(self.at[bone])
+        self._bones = np.flatnonzero(bone)
 
     def degrees(self, at: Float64) -> Float64:
         """Return the direction of places about the head in degrees from the front, 0..180."""
@@ -93,8 +97,9 @@ class Scalp:
         return np.asarray(self.middle + ways * away[:, None])
 
     def lift(self, at: Float64) -> tuple[Float64, Float64]:
-        """Return the height of places above the skin's tangent plane, (n,) metres, and its normal (n, 3)."""
-        off, near = self._skin.query(at, 3)
+        """Return the height of places above the skin, without ears, (n,) metres, and its normal (n, 3)."""
+        off, near = self._skull.query(at, 3)
+        near = self._bones[near]
         share = 1 / (np.asarray(off) + 1e-4)
         share /= share.sum(axis=1, keepdims=True)
         ups = (self.ups[near] * share[..., None]).sum(axis=1)
@@ -102,6 +107,6 @@ class Scalp:
         each = ((at[:, None] - self.at[near]) * self.ups[near]).sum(axis=2)
         return np.asarray((each * share).sum(axis=1)), np.asarray(ups)
 
-    def nearest(self, at: Float64) -> Any:
-        """Return the skin's vertex that is nearest to each place, (n,)."""
-        return self._skin.query(at)[1]
+    def distance(self, at: Float64) -> Float64:
+        """Return the distance of each place from the nearest vertex of the skin, (n,) metres."""
+        return np.asarray(self._skin.query(at)[0])

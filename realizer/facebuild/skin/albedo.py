@@ -5,9 +5,10 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float32
+from realizer.facebuild.hair.strands import shadow
+from realizer.facebuild.hair.style import style_of
 from realizer.facebuild.parts import smooth
 from realizer.facebuild.person import skin_colours
-from realizer.facebuild.person.hair import shadow, style_of
 from realizer.facebuild.person.scalp import Scalp
 from realizer.facebuild.skin.noise import ridges
 from realizer.facebuild.skin.skin import Skin
@@ -143,7 +144,7 @@ def _scalp(skin: Skin, out: Float32) -> None:
     assert patch is not None
     ground, style = skin.person.ground, style_of(skin.recipe.hair)
     points = {name: ground.point(name) for name in ground.points}
-    scalp = Scalp(patch, ground.at, points, style.line, style.rise)
+    scalp = Scalp(patch.positions(ground.at), patch.triangles, points, style.line, style.rise)
     ragged = 0.004 * skin.noise(0.005, 45)
 
     def under(at: Any) -> Any:

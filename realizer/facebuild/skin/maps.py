@@ -13,6 +13,7 @@ import numpy as np
 from realizer.core.array_types import Float32, Float64, UInt8
 from realizer.face.mesh_geometry import vertex_normals
 from realizer.facebuild.face_files import to_bytes
+from realizer.facebuild.hair.texture import hair_texture
 from realizer.facebuild.parts import Part
 from realizer.facebuild.person.lids import Lid
 from realizer.facebuild.person.lips import Lips
@@ -102,8 +103,11 @@ def bake(
     surface = surface_of(skin, relief)
     # Slopes are drawn as if all texels were of one width.
     step = 255 / RELIEF * np.clip(TEXEL / texels.width, 0.4, 1.5)
+    whole = _opaque(texels.picture(to_bytes(albedo), 255))
+    strands = atlas.HAIR.texels(size)
+    whole[strands] = hair_texture(strands[0].stop - strands[0].start)
     pictures = {
-        "albedo": _opaque(texels.picture(to_bytes(albedo), 255)),
+        "albedo": whole,
         "relief": texels.picture(to_bytes(128 + relief.rest * step), 128),
         "surface": texels.picture(to_bytes(255 * surface), 255),
         "folds": texels.picture(to_bytes(128 + relief.folds * step), 128),

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import scipy.sparse as sp
 
 from realizer.face.load import load_face
 from realizer.face.mesh_geometry import part_triangles
 from realizer.face.model import Face
 from realizer.facebuild.person.scalp import Scalp
-from realizer.facebuild.submesh import Submesh
 
 LINE = [[0, 0.06], [60, 0.05], [90, 0.0], [130, -0.06], [180, -0.07]]
 
@@ -24,8 +22,7 @@ def face() -> Face:
 def scalp(face: Face) -> Scalp:
     base = face.vertices[slice(*face.parts["skin"])].astype(float)
     mine = part_triangles(face.triangles, face.parts["skin"])
-    skin = Submesh(sp.eye_array(len(base), format="csr"), np.zeros_like(base), mine)
-    return Scalp(skin, base, {name: np.array(at, float) for name, at in face.points.items()}, LINE, [[0, 0]])
+    return Scalp(base, mine, {name: np.array(at, float) for name, at in face.points.items()}, LINE, [[0, 0]])
 
 
 def test_scalp_degrees_run_from_the_front_to_the_back(scalp: Scalp) -> None:
@@ -69,4 +66,4 @@ def test_scalp_lift_is_the_height_above_the_skin(scalp: Scalp) -> None:
     height, ups = scalp.lift(lifted)
     assert height == pytest.approx(np.full(len(index), 0.004), abs=0.001)
     assert np.linalg.norm(ups, axis=1) == pytest.approx(np.ones(len(index)))
-    assert (scalp.nearest(scalp.at[index]) == index).all()
+    assert scalp.distance(scalp.at[index]) == pytest.approx(np.zeros(len(index)))

@@ -1,0 +1,70 @@
+"""All cards of a face: hair, brows and lashes, and the file that holds them."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from realizer.face.cards import FILE, Cards
+from realizer.face.mesh_geometry import part_triangles
+from realizer.face.model import Face
+from realizer.face.subdivision import subdivided
+from realizer.facebuild.face_files import to_bytes
+from realizer.facebuild.hair.bind import bind
+from realizer.facebuild.hair.brows import brow
+from realizer.facebuild.hair.cards import joined
+from realizer.facebuild.hair.grow import hair
+from realizer.facebuild.hair.lashes import Margin, lashes
+from realizer.facebuild.hair.style import style_of
+from realizer.facebuild.person.recipe import Recipe, appearance_of
+from realizer.facebuild.person.scalp import Scalp
+
+
+def face_cards(face: Face, recipe: Recipe, margins: Sequence[Margin]) -> Cards:
+    """Return the cards of a face that was built without them.
+
+    Args:
+        margins: the edges of the lids.
+    """
+    look, colours = appearance_of(recipe.look), recipe.colours
+    points = {name: np.array(place, float) for name, place in face.points.items()}
+    at, fine = face.vertices.astype(float), subdivided(face).face
+    skin = at, face.triangles[(face.triangles < face.parts["skin"][1]).all(axis=1)]
+    first, last = fine.parts["skin"]
+    drawn = fine.vertices[first:last].astype(float), part_triangles(fine.triangles, (first, last))
+    style = style_of(recipe.hair)
+    scalp = Scalp(*drawn, points, style.line, style.rise)
+    rng = np.random.default_rng(zlib.crc32(face.name.encode()))
+    groups = {
+        "hair": [hair(scalp, drawn[1], style, colours["hair"])],
+        "brows": [brow(skin, drawn, points, side, colours["brows"], look, rng) for side in (1, -1)],
+        "lashes": [lashes(at, margin, colours["lashes"], look.lash, rng) for margin in margins],
+    }
+    patches = {name: joined(group) for name, group in groups.items()}
+    ends = np.cumsum([0] + [len(patch.places) for patch in patches.values()]).tolist()
+    parts = dict(zip(patches, pairwise(ends), strict=True))
+    turns = face.basis["head"][:, 0]
+    return bind(joined(list(patches.values())), at, face.triangles, scalp, turns, parts)
+
+
+def write_cards(folder: Path, cards: Cards) -> None:
+    """Write cards.npz, and the parts of the cards to the end of face.toml."""
+    np.savez_compressed(
+        folder / FILE,
+        roots=cards.roots,
+        weights=cards.weights,
+        ups=cards.ups,
+        triangles=cards.triangles,
+        uv=np.rint(cards.uv * 65535).astype(np.uint16),
+        colours=cards.colours,
+        occlusion=to_bytes(cards.occlusion * 255),
+        gloss=to_bytes(cards.gloss * 255),
+    )
+    lines = ["", "[cards]  # first vertex, last + 1"]
+    lines += [f"{name} = [{first}, {last}]" for name, (first, last) in cards.parts.items()]
+    with (folder / "face.toml").open("a", encoding="utf-8") as file:
+        file.write("\n".join(lines) + "\n")

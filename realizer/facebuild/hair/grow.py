@@ -1,0 +1,142 @@
+"""The hair of a face: the cap on its scalp, the cards on that, and thin ones along the hairline."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from realizer.core.array_types import Float64, Int32
+from realizer.facebuild.hair.bun import bun
+from realizer.facebuild.hair.cards import Patch, joined, ribbons
+from realizer.facebuild.hair.strands import LEAST, edge, grow, roots, unit
+from realizer.facebuild.hair.style import Style
+from realizer.facebuild.hair.texture import LEVEL, place
+from realizer.facebuild.parts import smooth
+from realizer.facebuild.person.scalp import Scalp
+
+SEED = 11  # of the strands: the same head, the same hair
+GREY = np.array([196.0, 193.0, 190.0])
+NEAR = 0.012  # m from the skin in which cards are kept off it
+UNDER = 0.35  # layers below that show dense strands
+CAP = 0.0011  # m that the cap lies above the skin
+SOFT = 0.016  # m from the hairline in which the cap gets dense; the part of its picture for that
+FADE = 0.42
+TURN, AROUND = 0.012, 0.085  # m that the cap's picture is wide; radius of the head
+DEEP = 0.13
+
+
+def hair(scalp: Scalp, triangles: Int32, style: Style, colour: Any) -> Patch:
+    """Return all cards of the hair.
+
+    Args:
+        scalp: over the skin that is drawn; triangles: (m, 3) of that skin.
+        colour: sRGB.
+    """
+    rng = np.random.default_rng(SEED)
+    parts = [cap(scalp, triangles, style, colour)]
+    if style.cards:
+        parts.append(_locks(scalp, style, colour, rng))
+    if style.border:
+        parts.append(_border(scalp, style, colour, rng))
+    if max(style.bun) > 0:
+        parts.append(bun(scalp, style, lambda count: tints(style, colour, count, rng), rng))
+    whole = joined(parts)
+    lift, ups = scalp.lift(whole.places)
+    low = np.where(scalp.distance(whole.places) < NEAR, np.maximum(LEAST / 2 - lift, 0), 0)
+    return replace(whole, places=whole.places + ups * low[:, None])
+
+
+def tints(style: Style, colour: Any, count: int, rng: Any) -> Float64:
+    """Return colours of cards (count, 3), sRGB: those of hair, some turned grey."""
+    white = smooth(style.grey + 0.35 * rng.uniform(-1, 1, count) * (1 - abs(2 * style.grey - 1)), 0.25, 0.75)
+    white = np.where(style.grey <= 0, 0, np.where(style.grey >= 1, 1, white))[:, None]
+    out = np.array(colour, float) * (1 - white) + GREY * white
+    out = out * (1 + style.contrast * rng.uniform(-1, 1, (count, 1)))
+    return np.asarray(np.clip(out / LEVEL, 0, 255))
+
+
+def cap(scalp: Scalp, triangles: Int32, style: Style, colour: Any) -> Patch:
+    """Return the drawn skin's own triangles under the hair, a little above it, in the hair's colour."""
+    inside = edge(scalp, style, scalp.at)
+    keep = triangles[(inside[triangles] > -0.001).any(axis=1) & (inside[triangles] > -0.012).all(axis=1)]
+    used, across, corners = _wrapped(scalp, keep)
+    at, ups, inside = scalp.at[used], scalp.ups[used], inside[used]
+    soft, full = FADE * np.maximum(inside, -0.004) / SOFT, FADE + (1 - FADE) * (inside - SOFT) / DEEP
+    tint = np.array(colour, float) * (1 - style.grey) + GREY * style.grey
+    count = len(used)
+    return Patch(
+        at + ups * CAP * smooth(inside, -0.006, 0.006)[:, None],
+        ups,
+        place("cap", across, np.clip(np.where(inside < SOFT, soft, full), 0, 1)),
+        np.repeat(np.clip(tint / LEVEL, 0, 255)[None], count, 0),
+        style.depth * 0.5 + (1 - style.depth * 0.5) * smooth(inside, 0.022, 0.0),
+        np.full(count, style.gloss * 0.5),
+        corners,
+        np.full((count, 3), -1, np.int32),
+        np.zeros((count, 3)),
+    )
+
+
+def _wrapped(scalp: Scalp, triangles: Int32) -> tuple[Int32, Float64, Int32]:
+    """Return the skin's vertex of each vertex (c,), its place across the picture, 0..1, and triangles (m, 3).
+
+    The picture repeats around the head; a triangle shows a piece of it that is not cut.
+    """
+    at = scalp.at[triangles]
+    turn = np.arctan2(at[..., 0], at[..., 2] - scalp.middle[2]) / (2 * np.pi)
+    turn -= np.rint(turn - turn[:, :1])  # behind the head it jumps
+    across = turn * round(2 * np.pi * AROUND / TURN)
+    middle = across.mean(axis=1, keepdims=True)
+    off = across - middle
+    off *= np.minimum(1, 0.45 / np.abs(off).max(axis=1, keepdims=True))
+    low, high = -off.min(axis=1, keepdims=True), 1 - off.max(axis=1, keepdims=True)
+    across = np.rint((np.clip(middle % 1, low, high) + off) * 200).astype(np.int64)
+    keys, corners = np.unique(triangles * 1000 + across, return_inverse=True)
+    return keys // 1000, keys % 1000 / 200, corners.reshape(-1, 3).astype(np.int32)
+
+
+def _locks(scalp: Scalp, style: Style, colour: Any, rng: Any) -> Patch:
+    at = roots(scalp, style, style.cards, 0.003, 1.0, rng)
+    count = len(at)
+    layer = rng.permutation(np.linspace(0, 1, count) ** 0.7)
+    way = unit(at - scalp.middle)
+    sides, top = style.length
+    length = (sides + (top - sides) * smooth(way[:, 1], 0.2, 0.85)) * rng.uniform(0.75, 1.15, count)
+    lines = grow(scalp, style, at, layer, length, style.segments, rng)
+    good = lines.length > 0.006
+    s = np.linspace(0, 1, style.segments + 1)
+    shape = (0.45 + 0.75 * smooth(s, 0.0, 0.35)) * (1 - 0.55 * smooth(s, 0.5, 1.0))
+    width = style.width * rng.uniform(0.7, 1.3, (count, 1)) * shape
+    light = (0.35 + 0.65 * lines.layer[:, None]) * (0.55 + 0.45 * smooth(s, 0.0, 0.5))
+    names = np.where(layer < UNDER, "dense", rng.choice(style.strips, count))
+    inside = edge(scalp, style, at)
+    names = np.where(inside < rng.uniform(0.004, 0.016, count), rng.choice(["loose", "sparse"], count), names)
+    return ribbons(
+        lines.places[good], lines.ups[good], width[good], names[good], tints(style, colour, count, rng)[good],
+        light[good], style.gloss,
+    )  # fmt: skip
+
+
+def _border(scalp: Scalp, style: Style, colour: Any, rng: Any) -> Patch:
+    """Return cards of few hairs along the hairline, so that it has no edge."""
+    at = roots(scalp, style, style.border, -0.0025, 0.008, rng)
+    count = len(at)
+    lines = grow(
+        scalp,
+        style,
+        at,
+        rng.uniform(0.1, 0.6, count),
+        style.border_length * rng.uniform(0.5, 1.2, count),
+        5,
+        rng,
+    )
+    width = 0.0055 * rng.uniform(0.7, 1.2, (count, 1)) * np.linspace(1, 0.8, 6)
+    good = lines.length > 0.003
+    light = np.full((count, 6), 0.9)
+    names = rng.choice(["sparse", "loose"], count)
+    return ribbons(
+        lines.places[good], lines.ups[good], width[good], names[good], tints(style, colour, count, rng)[good],
+        light[good], style.gloss,
+    )  # fmt: skip

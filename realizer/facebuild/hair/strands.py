@@ -1,0 +1,200 @@
+"""Strands: lines that grow from the scalp along the flow of a style and hang down from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from realizer.core.array_types import Float64
+from realizer.facebuild.hair.style import Style
+from realizer.facebuild.parts import smooth
+from realizer.facebuild.person.scalp import Scalp
+
+STEP = 0.004  # m
+NEAR = 0.03  # m; farther away from skin, strands need not be kept off it
+EAR = 0.016  # m that hair over an ear lies above the skull
+LEAST = 0.0006  # m that a strand lies above the skin
+DOWN = np.array([0.0, -1.0, 0.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Strands:
+    """Lines of s strands with k + 1 places each, from root to tip.
+
+    Attributes:
+        places, ups: (s, k + 1, 3) metres, and unit normals of the hair's surface there.
+        layer: (s,) 0 for the undermost, 1 for the outermost.
+        length: (s,) metres.
+    """
+
+    places: Float64
+    ups: Float64
+    layer: Float64
+    length: Float64
+
+
+def unit(vectors: Any) -> Float64:
+    """Return vectors (..., 3) at length 1."""
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12))
+
+
+class Flow:
+    """The direction of hair on the scalp: away from the parting, or towards it where hair is tied back."""
+
+    def __init__(self, scalp: Scalp, style: Style) -> None:
+        self._middle, self._style = scalp.middle, style
+        ends = unit(np.array(style.parting, float))
+        shares = np.linspace(0, len(ends) - 1, 24)
+        self._parting = unit(np.stack([np.interp(shares, range(len(ends)), ends[:, k]) for k in range(3)], 1))
+
+    def distance(self, at: Float64) -> Float64:
+        """Return about how far places (n, 3) are from the parting, metres."""
+        way = unit(at - self._middle)
+        return np.asarray(0.1 * np.arccos((way @ self._parting.T).max(axis=1).clip(-1, 1)))
+
+    def __call__(self, at: Float64) -> Float64:
+        """Return unit vectors (n, 3) at places (n, 3)."""
+        way = unit(at - self._middle)
+        from_ = self._parting[(way @ self._parting.T).argmax(axis=1)]
+        out = way - from_
+        out = unit(out - way * (out * way).sum(axis=1, keepdims=True))
+        if self._style.tied:
+            out = -out
+        turn = np.radians(self._style.whorl) + self._style.stray * _wavy(at)
+        aside = np.cross(way, out)
+        return np.asarray(out * np.cos(turn)[:, None] + aside * np.sin(turn)[:, None])
+
+
+def _wavy(at: Float64) -> Float64:
+    """Return a value (n,) from -1 to 1 that varies smoothly over a few centimetres, the same each time."""
+    x, y, z = at.T * 1000
+    return np.asarray(
+        (np.sin(x / 9 + 1.3 * np.sin(z / 14)) + np.sin(y / 11 + z / 8 + 2) + np.sin(x / 6 - y / 7 + 4)) / 3
+    )
+
+
+def roots(scalp: Scalp, style: Style, count: int, low: float, high: float, rng: Any) -> Float64:
+    """Return places (count, 3) spread evenly over the scalp between two distances from the hairline, m."""
+    ways = unit(rng.normal(size=(12 * count + 3000, 3)))
+    at = scalp.skull(ways)
+    inside = edge(scalp, style, at)
+    at = at[(inside > low) & (inside < high)]
+    if not len(at):
+        return at
+    chosen = [0]
+    away = np.full(len(at), np.inf)
+    for _ in range(min(count, len(at)) - 1):
+        away = np.minimum(away, ((at - at[chosen[-1]]) ** 2).sum(axis=1))
+        chosen.append(int(away.argmax()))
+    return at[chosen]
+
+
+def edge(scalp: Scalp, style: Style, at: Float64) -> Float64:
+    """Return about how far places (n, 3) are inside of what is covered with hair, metres."""
+    ragged = style.ragged * _wavy(at)
+    return np.minimum(scalp.high(at), scalp.height(style.top, at) - at[:, 1]) + ragged
+
+
+def shadow(scalp: Scalp, style: Style, at: Float64) -> Float64:
+    """Return the share (n,) of the hair's colour in the skin: whole under the hair, none beside it."""
+    return np.asarray(style.cover * 0.8 * smooth(edge(scalp, style, at), -0.006, 0.010))
+
+
+def thickness(scalp: Scalp, style: Style, at: Float64) -> Float64:
+    """Return the height (n,) of the hair's surface above the skin at places (n, 3), metres."""
+    inside = edge(scalp, style, at)
+    way = unit(at - scalp.middle)
+    thick = np.interp(inside, *np.array(style.thick, float).T)
+    side = 1 - (1 - style.sides) * smooth(np.abs(way[:, 0]), 0.35, 0.85)
+    crown = 1 + style.crown * smooth(way[:, 1], 0.3, 0.9) * (1 - way[:, 0] ** 2)
+    return np.asarray(np.maximum(thick * side * crown, LEAST))
+
+
+def grow(
+    scalp: Scalp, style: Style, at: Float64, layer: Float64, length: Float64, segments: int, rng: Any
+) -> Strands:
+    """Return strands from roots (s, 3).
+
+    They rise to their layer's height and follow the flow; below the skull they hang. They end at their
+    length (s,), beyond the hairline, or at the height that the style has for their side of the head.
+
+    Args:
+        layer: (s,) 0..1.
+    """
+    flow = Flow(scalp, style)
+    count, steps = len(at), int(np.ceil(length.max() / STEP)) + 1
+    at = at + scalp.lift(at)[1] * LEAST / 2
+    lines, runs = [at], np.zeros((steps + 1, count))
+    go = flow(at)
+    ends = scalp.height(style.ends, at) + style.uneven * rng.uniform(-1, 1, count)
+    alive = np.ones(count, bool)
+    body = style.body * (0.4 + 0.6 * layer)
+    for k in range(steps):
+        lift, ups = scalp.lift(at)
+        near = scalp.distance(at) < NEAR
+        # On the skull hair follows the flow; where the skull turns away it falls.
+        skull = unit(at - scalp.middle)
+        heavy = style.heavy * smooth(skull[:, 1], 0.45, -0.15)[:, None]
+        want = unit(flow(at) * (1 - heavy) + DOWN * heavy)
+        below = smooth(at[:, 1], -0.03, -0.09)[:, None] * style.heavy
+        want = unit(want + skull * [1, 0, 1] * -style.tuck * below)
+        go = unit(go * (1 - style.soft) + want * style.soft)
+        run = runs[k]
+        step = np.where(alive, np.minimum(STEP, length - run), 0)[:, None]
+        nxt = at + go * step
+        lift, ups = scalp.lift(nxt)
+        near = scalp.distance(nxt) < NEAR
+        hang = style.heavy * smooth(edge(scalp, style, nxt), 0.012, -0.004)
+        rise = np.minimum((run + STEP) * style.lift, 1.0)
+        thick = thickness(scalp, style, nxt)
+        if not style.tied:
+            thick = thick * (0.25 + 0.75 * smooth(flow.distance(nxt), 0.0, 0.03))
+        height = np.minimum(rise, thick * (1 - style.depth + style.depth * layer)).clip(LEAST)
+        height = height * (1 - hang) + np.maximum(body, height) * hang
+        height += style.heavy * EAR * smooth(scalp.off_ear(nxt), 0.030, -0.004)
+        push = np.where(near, np.maximum(height - lift, (height - lift) * (1 - hang)), 0)
+        out = unit(ups + 2 * style.heavy * skull * smooth(nxt[:, 1], -0.07, -0.03)[:, None])
+        nxt = nxt + out * (push * (step[:, 0] > 0)).clip(-STEP / 2, STEP / 2)[:, None]
+        nxt = _off_face(nxt, style)
+        inside = edge(scalp, style, nxt)
+        over = (inside < -style.over * rng.uniform(0.3, 1.0, count)) & (style.heavy == 0)
+        low = nxt[:, 1] < ends
+        runs[k + 1] = run + np.linalg.norm(nxt - at, axis=1)
+        at = nxt
+        lines.append(at)
+        alive &= ~over & ~low & (runs[k + 1] < length)
+        if not alive.any():
+            break
+    path, run = np.stack(lines), runs[: len(lines)]
+    shares = np.linspace(0, 1, segments + 1)
+    places = np.empty((count, segments + 1, 3))
+    for s in range(count):
+        for axis in range(3):
+            places[s, :, axis] = np.interp(shares * run[-1, s], run[:, s], path[:, s, axis])
+    # What would hang before the face is left out, and what stands off the crown.
+    wrong = (places[..., 2] > 0.045) & (places[..., 1] < 0.04)
+    flat = places.reshape(-1, 3)
+    off = scalp.lift(flat)[0] - 1.3 * thickness(scalp, style, flat) - 0.002
+    wrong |= (off.reshape(wrong.shape) > 0) & (places[..., 1] > 0.06)
+    return Strands(places, _ups(scalp, places), layer, np.where(wrong.any(axis=1), 0, run[-1]))
+
+
+def _ups(scalp: Scalp, places: Float64) -> Float64:
+    """Return the normals of the hair's surface: the skull's, away from the neck's axis below."""
+    out = places - scalp.middle
+    out[..., 1] *= smooth(places[..., 1], -0.06, 0.02)
+    return unit(out)
+
+
+def _off_face(at: Float64, style: Style) -> Float64:
+    """Return places moved sideways where hair would hang before the face."""
+    if not style.heavy:
+        return at
+    limit = np.interp(at[:, 1], (-0.14, -0.05, 0.03, 0.075), (0.050, 0.058, 0.050, 0.0))
+    limit = limit * smooth(at[:, 2], -0.03, 0.01)
+    side = np.where(at[:, 0] < 0, -1.0, 1.0)
+    out = at.copy()
+    out[:, 0] = side * np.maximum(np.abs(at[:, 0]), limit)
+    return out

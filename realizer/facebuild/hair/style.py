@@ -1,0 +1,68 @@
+"""Ways to wear hair, as a recipe's [hair] names them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+from realizer.core.errors import FaceError
+from realizer.tables import toml_table
+
+Table = list[list[float]]
+
+
+@dataclass(frozen=True, slots=True)
+class Style:
+    """Figures of a way to wear hair, as `realizer/tables/hair.toml` explains them."""
+
+    line: Table
+    rise: Table
+    top: Table
+    parting: Table
+    tied: bool
+    whorl: float
+    stray: float
+    thick: Table
+    depth: float
+    ragged: float
+    sides: float
+    crown: float
+    length: list[float]
+    lift: float
+    soft: float
+    over: float
+    heavy: float
+    ends: Table
+    body: float
+    tuck: float
+    uneven: float
+    cards: int
+    segments: int
+    width: float
+    strips: list[str]
+    border: int
+    border_length: float
+    cover: float
+    contrast: float
+    gloss: float
+    grey: float
+    bun: list[float]
+
+
+def style_of(table: Mapping[str, Any]) -> Style:
+    """Return the style that a recipe's [hair] names, with its changes.
+
+    Raises:
+        FaceError: no such style, or no such figure.
+    """
+    known = toml_table("hair.toml")
+    name = table.get("style", "short")
+    if not isinstance(name, str) or name not in known["styles"]:
+        raise FaceError(f"hair: style: wanted one of {', '.join(known['styles'])}, got {name!r}")
+    own = {key: value for key, value in table.items() if key != "style"}
+    names = [field.name for field in fields(Style)]
+    for key in own:
+        if key not in names:
+            raise FaceError(f"hair: wanted one of style, {', '.join(names)}, got {key!r}")
+    return Style(**(known["plain"] | known["styles"][name] | own))
