@@ -399,7 +399,7 @@ class Interleaving:
         kept = self._journal.claim(session.id)
         assert kept is not None
         restore_session(other, kept, spoken)
-        while (due := next_wake(other)) <= self.now - session.opened:
+        while (due := next_wake(other)) <= self.now - session.clock.opened:
             other.tick(max(due, 0.0))
         first = max(session.feedback_log.first, other.feedback_log.first)
         first_log, again = session.feedback_log.since(first), other.feedback_log.since(first)

@@ -7,7 +7,6 @@ import re
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
-from math import inf
 
 from bml_schema import Block, BMLError, BMLSizeError, Speech, made_ids, read
 from realizer.behaviours.registry import VOCABULARY
@@ -19,16 +18,13 @@ from realizer.scheduling.timing import Warning
 from realizer.server.documents.limits import MAX_CHARACTERS
 from realizer.server.documents.pending_blocks import PendingBlock, PendingBlocks, TtsRequests
 from realizer.server.session.effects import Effect
+from realizer.server.session.session_clock import SessionClock
 from realizer.server.speech.speech_streams import SpeechStreams
 from realizer.speech.utterance import SpeechRequest
 
 log = logging.getLogger(__name__)
 
 _BLOCK_ID = re.compile(r"<(?:\w+:)?bml\b[^<>]*?\bid\s*=\s*[\"']([^\"'<>]{1,256})[\"']")
-
-
-# The present of a session stands still for at most so long, while the documents of a message are planned.
-STANDSTILL = 0.1  # s
 
 
 class DocumentQueue:
@@ -120,6 +116,7 @@ class Submission:
 
     Args:
         name: the session's name, for the log.
+        clock: the session clock; it stands still while the documents of one message are planned.
         add_effects: takes the requests to voices.
 
     Attributes:
@@ -128,7 +125,12 @@ class Submission:
     """
 
     def __init__(
-        self, name: str, settings: Settings, player: Player, add_effects: Callable[[Iterable[Effect]], None]
+        self,
+        name: str,
+        settings: Settings,
+        player: Player,
+        clock: SessionClock,
+        add_effects: Callable[[Iterable[Effect]], None],
     ) -> None:
         self.voices: dict[int, str] = {}
         self.counts = Counter[str]()
@@ -139,28 +141,20 @@ class Submission:
         self._name = name
         self._settings = settings
         self._player = player
+        self._clock = clock
         self._add_effects = add_effects
         self._message = 0
-        self._instant = -inf
-
-    def now(self, t: float) -> float:
-        """Return the present, which stands still while the documents of one message are planned."""
-        return self._instant if self.stands_still(t) else t
-
-    def stands_still(self, t: float) -> bool:
-        """Whether the present stands still at a time, because documents of one message are planned."""
-        return self._instant <= t <= self._instant + STANDSTILL
 
     def work(self, t: float) -> bool:
         """Plan a block that is ready, or else read one. Return False if nothing has changed.
 
         The end of a message is a change too: it ends the standstill, also in a replay of the journal.
         """
-        t, unread = self.now(t), len(self.queue)
+        t, unread = self._clock.present(t), len(self.queue)
         done = self._plan_next(t) or self._parse_next(t) or len(self.queue) < unread
         is_unread = bool(self.queue) and self.queue.message == self._message
         if not is_unread and not any(w.message == self._message and w.is_ready for w in self.pending.blocks):
-            self._instant = -inf
+            self._clock.go_on()
         return done
 
     @property
@@ -241,7 +235,8 @@ class Submission:
         pending = self.pending.first_ready()
         if pending is None:
             return False
-        self._message, self._instant = pending.message, t
+        self._message = pending.message
+        self._clock.stand_still(t)
         try:
             pending.block = self.speeches.with_links(pending.block)
             schedule = self._player.submit(pending.block, t, pending.utterances)

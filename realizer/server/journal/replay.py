@@ -105,6 +105,6 @@ def catch_up(session: Session, now: float, seen: int) -> float:
     while session.feedback_log.newest < seen and not session.closed:
         if (due := session.player.next_deadline()) is None:
             break
-        now = max(now, session.opened + due)
+        now = max(now, session.clock.opened + due)
         session.tick(now)
     return now

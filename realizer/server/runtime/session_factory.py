@@ -149,7 +149,7 @@ class SessionFactory:
         at = await loop.run_in_executor(None, catch_up, session, at, seen)
         unanswered += [effect for effect in session.take_effects() if isinstance(effect, Speak)]
         now = loop.time()
-        session.opened = now - max(at, time.time() - saved.epoch)
+        session.clock.opened = now - max(at, time.time() - saved.epoch)
         for connection in session.connections:  # of the other process
             session.disconnect(connection, now)
         log.info("session %s is resumed, %d entries long", name, len(saved.entries))

@@ -188,7 +188,7 @@ class SessionHost:
 
     def _catch_up(self, session: Session, seen: int) -> None:
         now = self._loop.time()
-        session.opened -= catch_up(session, now, seen) - now
+        session.clock.opened -= catch_up(session, now, seen) - now
 
     def _is_live(self, name: str) -> bool:
         """Whether the session plays here. One that another process has taken over may still be registered."""

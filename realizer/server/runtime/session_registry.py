@@ -230,7 +230,7 @@ class SessionRegistry:
 
     @staticmethod
     def _welcome(joined: Session, move: MoveConnection, now: float) -> None:
-        joined.send_welcome(move.connection, now)
+        joined.send_welcome(move.connection, joined.clock.read(now))
         if move.seen is not None and not joined.closed:
             joined.send_missed_feedback(move.connection, move.seen)
 

@@ -31,7 +31,7 @@ from realizer.protocol.messages.replies import (
 )
 from realizer.protocol.messages.requests import Hello, Ping, StateQuery, Subscribe, Unsubscribe
 from realizer.protocol.wire import WireError, unpack_clip
-from realizer.server.documents.document_queue import STANDSTILL, Submission, block_id_of
+from realizer.server.documents.document_queue import Submission, block_id_of
 from realizer.server.documents.limits import duration_error
 from realizer.server.journal import JournalError, TakenOver
 from realizer.server.journal.checkpoint import Checkpoint
@@ -42,6 +42,7 @@ from realizer.server.session.control_fields import FieldError
 from realizer.server.session.control_handlers import ControlHandlers
 from realizer.server.session.effects import Close, Effect, MoveConnection, Send
 from realizer.server.session.feedback_log import FeedbackLog
+from realizer.server.session.session_clock import SessionClock
 from realizer.server.session.subscriptions import Subscriptions
 from realizer.server.session.welcome import build_welcome
 from realizer.server.speech.audio_clips import HEARD, AudioClips
@@ -67,7 +68,7 @@ class Session:
     Args:
         id: the session's name.
         settings: limits and defaults.
-        now: the session clock starts here.
+        now: the session clock starts here. If the host's clock goes back, the session clock waits.
         named: whether a client chose the name: then the session outlives its last connection by
             `settings.keep`.
         scene: the initial positions of targets.
@@ -76,6 +77,7 @@ class Session:
         log: the feedback log of another session, to continue it.
 
     Attributes:
+        clock: the session clock.
         ending: whether documents are refused because the service is ending.
         feedback_log: the published feedback.
         fast_path: the frames of the only client, which need no call of the session; None if more is due.
@@ -95,7 +97,7 @@ class Session:
     ) -> None:
         self.id = id
         self.settings = settings
-        self.opened = now
+        self.clock = SessionClock(now)
         self.named = named
         self.closed = False
         self.ending = False
@@ -112,7 +114,7 @@ class Session:
         )
         self.capabilities = dict(capabilities or {})
         self.broadcast = Broadcast(self.player, self.faces)
-        self.submission = Submission(id, settings, self.player, self._add_effects)
+        self.submission = Submission(id, settings, self.player, self.clock, self._add_effects)
         self._connections: dict[int, Connection] = {}
         self.feedback_log = log or FeedbackLog(epoch)
         self._checkpoint = Checkpoint(self.player, self.faces, self.clips, self.submission, self.feedback_log)
@@ -123,8 +125,6 @@ class Session:
         self._next_other: float | None = None
         self._next_feedback = 0.0
         self._client_left = False  # its open speeches end with the next tick
-        self._held = -math.inf  # when blocks did not start at that time because more might arrive
-        self._earliest = 0.0  # of what comes next: an instant is over when the blocks that start at it have
         self.subscriptions = Subscriptions(
             settings, self.player, self.faces, self.broadcast, self._connections, self.reply
         )
@@ -146,7 +146,7 @@ class Session:
             return
         self._forget_deadline()
         self._connections[connection] = Connection(connection)
-        if not self.log_entry(now - self.opened, "join", connection):
+        if not self.log_entry(self.clock.read(now), "join", connection):
             return
         self.empty_since = None
         if seen is not None:
@@ -159,7 +159,7 @@ class Session:
             is_awaited: whether other clients will connect at once: then it stays open.
         """
         if self._connections.pop(connection, None) is not None:
-            self.log_entry(now - self.opened, "leave", connection)
+            self.log_entry(self.clock.read(now), "leave", connection)
         self.submission.speeches.on_disconnect(connection)
         self._client_left = True
         self._forget_deadline()
@@ -201,7 +201,7 @@ class Session:
         """Handle a message: bytes are a sound clip, text that starts with `{` is control, all else is BML."""
         if self.closed or connection not in self._connections:
             return
-        t = self._time(now)
+        t = self.clock.read(now)
         self._send_due(t)
         if self.journal.needs_checkpoint and not self._compact(t):
             return
@@ -281,7 +281,7 @@ class Session:
             assert message.session is not None
             self._effects.append(MoveConnection(connection.id, message.session, message.seen))
         else:
-            self.send_welcome(connection.id, t + self.opened)
+            self.send_welcome(connection.id, t)
             if message.seen is not None:
                 self.send_missed_feedback(connection.id, message.seen)
 
@@ -378,7 +378,7 @@ class Session:
         """Take the answer to an effect `Speak`. If the voice failed, the silent voice replaces it."""
         if self.closed:
             return
-        t = self._time(now)
+        t = self.clock.read(now)
         self._send_due(t)
         if self.log_entry(t, "spoken", speak, "" if isinstance(result, Utterance) else str(result)):
             self._effects += self.submission.tts.answer(speak, result, t)
@@ -403,7 +403,7 @@ class Session:
 
     def tick(self, now: float, *, read_documents: bool = True) -> None:
         """Send due feedback, sound and frames; then, with `read_documents`, read or plan one document."""
-        t = self._time(now)
+        t = self.clock.read(now)
         starts = not self.submission.has_work
         if not self.closed and self._work(t, read_documents, starts=starts):
             self.log_entry(t, "tick")
@@ -413,7 +413,7 @@ class Session:
 
         This is the fast way for a session in which nothing but frames and feedback is due.
         """
-        t = now - self.opened
+        t = now - self.clock.opened
         if self._next_other is None or t + EPSILON >= self._next_other:
             return None
         if t + EPSILON >= self._next_feedback:
@@ -426,16 +426,17 @@ class Session:
         effects = [*self.take_effects(), *sends]
         if self._next_other is None:
             return effects, self.next_due()
-        other = min(self._next_other, self._next_feedback) + self.opened
-        self.fast_path = self.broadcast.fast_path(self.opened, other)
-        return effects, min(other, following + self.opened)
+        opened = self.clock.opened
+        other = min(self._next_other, self._next_feedback) + opened
+        self.fast_path = self.broadcast.fast_path(opened, other)
+        return effects, min(other, following + opened)
 
     def compact_journal(self, now: float) -> None:
         """Replace the journal by a checkpoint if it has grown; due feedback is published first."""
         if self.journal.needs_checkpoint and not self.closed:
             self._forget_deadline()
-            self._publish(now - self.opened)
-            self._compact(now - self.opened)
+            self._publish(t := self.clock.read(now))
+            self._compact(t)
 
     def replay_until(
         self, t: float, before: Callable[[float], None] = lambda t: None, *, since: float = 0.0
@@ -448,7 +449,7 @@ class Session:
         """
         while (due := self.player.next_deadline()) is not None and due < t and not self.closed:
             due = max(due, since)
-            if self.submission.stands_still(due):
+            if self.clock.stands_still(due):
                 return  # it was published when the documents of a message had been planned
             before(due)
             self._publish(due)
@@ -491,8 +492,9 @@ class Session:
         other, streams = self._next_other, self.broadcast
         if other is None:
             self._next_feedback, answer_due = self.player.next_change(), self.submission.tts.deadline()
-            if self.submission.has_work and self.player.next_event <= self._held:
-                self._next_feedback = self._held + STANDSTILL  # a block starts after documents that wait
+            event = self.player.next_event
+            if self.submission.has_work and (start := self.clock.start_of(event)) > event:
+                self._next_feedback = start
             other = streams.next_other if streams.active else math.inf
             other = other if answer_due is None else min(other, answer_due)
             # Open speeches and slow clients are checked with every frame, schedules with all feedback: then
@@ -502,7 +504,7 @@ class Session:
             if not (self.has_documents or slow or self.submission.speeches.open_ids or shown):
                 self._next_other = other
         next_frame = streams.next_frame if streams.active else math.inf
-        return min(other, self._next_feedback, next_frame) + self.opened
+        return min(other, self._next_feedback, next_frame) + self.clock.opened
 
     def _forget_deadline(self) -> None:
         self._next_other = self.fast_path = None
@@ -524,20 +526,19 @@ class Session:
 
     # feedback -----------------------------------------------------------------------------------
 
-    def _time(self, now: float) -> float:
-        """Return the time on the session clock of something that arrives."""
-        return max(now - self.opened, self._earliest)
-
     def _publish(self, t: float, *, starts: bool = True) -> None:
         """Number the feedback that is due and send it to its subscribers.
 
         Args:
             starts: whether blocks that start at `t` start; not while more may arrive at this instant.
         """
-        t = self.submission.now(t)
-        self._held = t if not starts else -math.inf
-        if starts and t <= self.player.next_event <= t + EPSILON:
-            self._earliest = math.nextafter(self.player.next_event, math.inf)
+        t = self.clock.present(t)
+        if not starts:
+            self.clock.hold(t)
+        else:
+            self.clock.release()
+            if t <= self.player.next_event <= t + EPSILON:
+                self.clock.end_instant(self.player.next_event)
         if self.broadcast.active and (change := self.player.next_event) <= t + EPSILON:
             self.broadcast.settle(change)
         texts: list[str] = []
@@ -573,9 +574,9 @@ class Session:
             seen = first - 1
         self._send_feedback(self._connections[connection], self.feedback_log.since(seen + 1))
 
-    def send_welcome(self, connection: int, now: float) -> None:
+    def send_welcome(self, connection: int, t: float) -> None:
         """Send `welcome` to a connection."""
-        t, seq = now - self.opened, self.feedback_log.newest
+        seq = self.feedback_log.newest
         self.reply(connection, build_welcome(self.id, t, seq, self.settings, self.capabilities))
 
     def reply(self, connection: int, reply: Reply) -> None:

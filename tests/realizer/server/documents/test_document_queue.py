@@ -10,12 +10,12 @@ from realizer.core.settings import Settings
 from realizer.scheduling.timing import Warning
 from realizer.server.documents import document_queue
 from realizer.server.documents.document_queue import (
-    STANDSTILL,
     DocumentQueue,
     block_limit_error,
     size_error,
 )
 from realizer.server.documents.limits import MAX_CHARACTERS
+from realizer.server.session.session_clock import STANDSTILL
 from tests.realizer.server.conftest import Driver, spoken
 
 SPEECH = '<bml id="b"><speech id="s"><text>{}</text></speech></bml>'

@@ -276,8 +276,8 @@ def test_ahead_goes_on_in_a_restored_session(drive) -> None:
     rows = [("join", ""), ("text", SMILE.format("a", 0.1, 1.2)), ("tick", ""), ("tick", "")]
     entries = [Entry(0.5, kind, 1, body) for kind, body in rows]
     restore_session(session, SavedSession(0.0, entries), lambda _: spoken())
-    session.opened, driver.now = driver.opened, 1.0
-    session.disconnect(1, session.opened + 1.0)
+    session.clock.opened, driver.now = driver.opened, 1.0
+    session.disconnect(1, session.clock.opened + 1.0)
     for connection, ahead in ((2, 0.2), (3, 0.0)):
         driver.join(connection)
         driver.send(subscribe(ahead=ahead), connection)
