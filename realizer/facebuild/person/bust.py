@@ -10,6 +10,7 @@ from realizer.facebuild.mpeg4.rigid import opening_rows, tongue_bends
 from realizer.facebuild.parts import Part, smooth
 from realizer.facebuild.person import clothing, skin_colours
 from realizer.facebuild.person.fap_fields import SINKS
+from realizer.facebuild.person.glasses import glasses, glasses_of
 from realizer.facebuild.person.lids import Lid
 from realizer.facebuild.person.lips import Lips
 from realizer.facebuild.person.person import Person
@@ -18,7 +19,7 @@ from realizer.facebuild.person.scalp import Scalp
 from realizer.facebuild.submesh import Submesh
 from realizer.facebuild.teeth import teeth
 
-ORDER = ("skin", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue", "shirt")
+ORDER = ("skin", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue", "shirt", "glasses")
 MARGIN = 0.08  # m below the floor that the body is cut at by whole triangles first
 # Metres from the middle of the closed lips (2.2): how far the biting edges lie behind it and above it.
 # A resting jaw hangs a little: the rows do not touch.
@@ -61,6 +62,8 @@ def assemble(person: Person, lips: Lips, lids: list[Lid], recipe: Recipe) -> lis
     made += _teeth(person, recipe)
     made.append(_tongue(person, recipe))
     made.append(clothing.shirt(body, at, dressed, look["shirt"]))
+    if (figures := glasses_of(recipe.glasses)) is not None:
+        made.append(glasses(figures, made[0].vertices, list(person.balls), [points["10.1"], points["10.2"]]))
     made = sorted(made, key=lambda part: ORDER.index(part.name))
     _bake(made)
     stays = np.zeros(n, bool)

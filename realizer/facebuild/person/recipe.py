@@ -13,6 +13,7 @@ from realizer.core.toml_text import parse_toml
 from realizer.face.reading import face_errors
 from realizer.facebuild.hair.style import style_of
 from realizer.facebuild.person import makehuman
+from realizer.facebuild.person.glasses import glasses_of
 from realizer.facebuild.person.sliders import person_faults, person_tables
 from realizer.tables import toml_table
 
@@ -20,7 +21,7 @@ COLOURS = (
     "skin", "blush", "lips", "mouth", "brows", "lashes", "hair", "shirt", "tongue", "tooth", "root", "gum",
     "pupil", "iris_inner", "iris_middle", "iris_outer", "ring", "white", "corner",
 )  # fmt: skip
-TABLES = ("person", "targets", "colours", "hair", "look")
+TABLES = ("person", "targets", "colours", "hair", "look", "glasses")
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +56,7 @@ class Recipe:
         colours: what for -> sRGB 0..255.
         hair: the style of the hair, and the figures it changes.
         look: figures of `Appearance` that differ from the plain ones.
+        glasses: a style of `realizer/tables/glasses.toml`, and the figures it changes; empty for none.
     """
 
     description: str
@@ -62,6 +64,7 @@ class Recipe:
     colours: dict[str, list[float]]
     hair: dict[str, Any] = field(default_factory=dict)
     look: dict[str, Any] = field(default_factory=dict)
+    glasses: dict[str, Any] = field(default_factory=dict)
 
 
 def read_recipe(path: Path, data: Path) -> Recipe:
@@ -91,14 +94,15 @@ def read_recipe(path: Path, data: Path) -> Recipe:
             tables[name] = {**values, **tables[name]}
     faults += _target_faults(tables["targets"], data)
     faults += _colour_faults(tables["colours"])
-    for reader, name in ((style_of, "hair"), (appearance_of, "look")):
+    for reader, name in ((style_of, "hair"), (appearance_of, "look"), (glasses_of, "glasses")):
         try:
             reader(tables[name])
         except FaceError as error:
             faults.append(str(error))
     if faults:
         raise FaceError("\n".join(f"{path}: {fault}" for fault in faults))
-    return Recipe(raw["says"], tables["targets"], tables["colours"], tables["hair"], tables["look"])
+    del tables["person"]
+    return Recipe(raw["says"], **tables)
 
 
 def appearance_of(table: Mapping[str, Any]) -> Appearance:
