@@ -13,8 +13,8 @@ from realizer.facebuild.person.scalp import Scalp
 from realizer.facebuild.skin.noise import ridges
 from realizer.facebuild.skin.skin import Skin
 
-# m; noise that makes the edges of large spots uneven.
-EDGE = 0.0012
+
+EDGE = 0.0012  # m, of the noise in large spots
 
 
 def paint_albedo(skin: Skin, pores: Float32, lines: Float32) -> Float32:
@@ -26,7 +26,7 @@ def paint_albedo(skin: Skin, pores: Float32, lines: Float32) -> Float32:
     out = skin.texels.spread(skin.part.colours)
     _mottle(skin, out)
     out *= (1 - pores)[:, None]
-    out *= 1 - lines[:, None] * _vector([0.05, 0.09, 0.10])
+    out *= 1 - lines[:, None] * _vector([0.10, 0.17, 0.20])
     _vessels(skin, out)
     _spots(skin, out)
     _lips(skin, out)
@@ -79,14 +79,13 @@ def _spots(skin: Skin, out: Float32) -> None:
     dry = skin.dry * (1 - skin.red)
     sunny = skin.around("5.3", "5.4", "9.3", "9.12", radii=(0.045, 0.032, 0.06))
     upper = skin.float(smooth(skin.at[:, 1], -0.17, -0.05))
-    for name, where, number in (
-        ("freckles", (sunny * look.freckles + 0.012 * upper) * dry, 30),
-        ("spots", upper * dry * look.age, 31),
-        ("moles", dry * look.moles, 32),
+    for name, where, number, firm in (
+        ("freckles", (sunny * look.freckles + 0.012 * upper) * dry, 30, 0.5),
+        ("spots", upper * dry * look.age, 31, 0.2),
+        ("moles", dry * look.moles, 32, 0.6),
     ):
         found, radius = skin.mark(name, where, number)
-        size = radius * (1 + 0.25 * skin.noise(EDGE, 33)[found])
-        share = skin.texels.stamp(found, skin.float(size), lambda away: smooth(away, 1.0, 0.55))
+        share = skin.texels.stamp(found, radius, lambda away, firm=firm: smooth(away, 1.0, firm))
         share *= np.clip(0.75 + 0.25 * skin.noise(EDGE, 34), 0.2, 1)
         out *= 1 - share[:, None] * (1 - _vector(skin.table[name]["tint"]))
 

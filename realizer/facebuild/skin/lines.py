@@ -18,6 +18,7 @@ STEP = 0.0003  # m between the points of a line that distances are measured to
 FACING = 0.15  # cosine at which a surface still counts as seen
 REACH = 4.0  # widths from its middle at which a line ends
 BEND = 0.0006  # m that lines wander
+TAPER = 0.25  # of a line's length, over which it begins and ends
 PLATEAU, FADE = 0.006, 0.016  # m from a line where its fold is shown in full, and where it is not
 
 
@@ -94,7 +95,7 @@ def _line(skin: Skin, row: dict[str, Any], side: int, off: float, rng: np.random
     # Copies are not parallel, and each begins and ends somewhere else.
     curve = curve + across * (off * (0.8 + 0.4 * rng.random() + 0.3 * rng.normal() * (t - 0.5)))[:, None]
     begin, end = rng.uniform(-0.05, 0.18), rng.uniform(0.85, 1.05)
-    share = smooth(t, begin, begin + 0.3) * (1 if meets else smooth(t, end, end - 0.3))
+    share = smooth(t, begin, begin + TAPER) * (1 if meets else smooth(t, end, end - TAPER))
     share = share * (rng.uniform(0.65, 1.0) if off else 1.0)
     drives: dict[str, Float64] = {}
     for knot, drive in enumerate(row["drives"]):

@@ -16,6 +16,9 @@ from realizer.facebuild.skin.skin import Skin
 from realizer.tables import toml_table
 
 
+DEEP, AROUND = 0.00018, 6.0  # m below what is so many texels around it, of a line that is as dark as lines are
+
+
 @dataclass(frozen=True, eq=False)
 class Relief:
     """Heights of a skin at its texels.
@@ -41,7 +44,7 @@ def relief_of(skin: Skin, lines: list[Line]) -> Relief:
     dimples = table["dimples"]
     chin = skin.around("2.10", radii=(0.022, 0.017, 0.03))
     folds = folds + dimples["depth"] * chin * skin.noise(dimples["length"], 60) * 0.6
-    deep = np.clip(-rest / 0.0002, 0, 1)
+    deep = np.clip((skin.texels.blurred(rest, AROUND) - rest) / DEEP, 0, 1)
     slack = table["slack"]
     for k, length in enumerate(slack["lengths"]):
         net = ridges(skin.at, length, skin.seed + 61 + k)
@@ -112,7 +115,8 @@ def _around_mouth(skin: Skin, row: dict[str, Any]) -> tuple[Float32, Float32]:
     place = np.stack([along, away / 3, skin.field(lips.is_upper * 0.05)], 1)
     line = ridges(place, (row["apart"] * 0.7, 0.006, 0.02), skin.seed + 73)
     reach = row["long"] * np.clip(0.8 + 0.3 * skin.noise(0.006, 74), 0.3, 1.3)
-    cover = smooth(skin.ring, 6.5, 8.0) * smooth(away / reach, 1.0, 0.25) * skin.dry
+    reach = reach * (0.6 + 0.4 * skin.field(lips.is_upper * 1.0))
+    cover = smooth(skin.ring, 6.5, 8.5) * np.clip(1 - away / reach, 0, 1) * skin.dry
     cover = cover * smooth(np.abs(skin.field(lips.u)), 1.0, 0.85)
     fold = skin.float(-row["depth"] * line * cover)
     return fold * row["age"] * np.float32(skin.look.age), fold

@@ -10,13 +10,14 @@ from realizer.core.array_types import Bool, Float32, Float64
 from realizer.face.mesh_geometry import vertex_normals
 from realizer.facebuild.parts import Part, smooth
 from realizer.facebuild.person.lids import Lid
-from realizer.facebuild.person.lips import Lips
+from realizer.facebuild.person.lips import BORDER, RING_SIZE, Lips
 from realizer.facebuild.person.person import Person
 from realizer.facebuild.person.recipe import Recipe, appearance_of
 from realizer.facebuild.skin.texels import Texels
 from realizer.tables import toml_table
 
-ROUNDED = 3.0, 9.0  # texels that rings are softened by on the lips and at their border, which is uneven
+ROUNDED = 3.0  # texels that rings are softened by, which have corners at vertices
+EVEN = 1.6  # vertices along the border of the red over which it is evened
 
 
 class Skin:
@@ -48,12 +49,36 @@ class Skin:
         ring = np.where(lips.inside, 0, len(lips.rings) + 1.0)
         for k, loop in enumerate(lips.rings):
             ring[loop] = k
-        ring = self.field(ring)
-        fine, wide = (texels.blurred(ring, radius) for radius in ROUNDED)
-        self.ring = fine + (wide - fine) * smooth(fine, 4.0, 6.0)
+        self.ring = self._bordered(texels.blurred(self.field(ring), ROUNDED))
         self.dry: Bool = self.field(lips.inside) < 0.5
         ragged = 0.22 * self.noise(0.0022, 1)
         self.red: Float32 = self.float(smooth(self.ring + ragged, *self.table["lips"]["border"])) * self.dry
+
+    def _bordered(self, ring: Float32) -> Float32:
+        """Return places across the lips, with an even border of the red instead of the mesh's."""
+        from scipy.interpolate import CubicSpline
+        from scipy.ndimage import gaussian_filter1d
+        from scipy.spatial import cKDTree
+
+        at, t = self.person.ground.at, np.arange(RING_SIZE + 1)
+        inner, line, outer = (at[self.lips.rings[k]] for k in (BORDER - 1, BORDER, BORDER + 1))
+        gap = np.linalg.norm(outer - inner, axis=1, keepdims=True) / 2
+        across = gaussian_filter1d((outer - inner) / gap**2 / 2, EVEN, axis=0, mode="wrap")
+        corner = np.abs(self.lips.u[self.lips.rings[BORDER]])[:, None]
+        even = gaussian_filter1d(line, EVEN, axis=0, mode="wrap")
+        line = even + (line - even) * smooth(corner, 0.75, 0.95)
+        where = np.linspace(0, RING_SIZE, 12 * RING_SIZE, endpoint=False)
+        line, across = (
+            CubicSpline(t, np.concatenate([part, part[:1]]), bc_type="periodic")(where)
+            for part in (line, across)
+        )
+        near = np.flatnonzero((ring > 4.5) & (ring < BORDER + 3.5))
+        point = cKDTree(line).query(self.at[near])[1]
+        found = BORDER + ((self.at[near] - line[point]) * across[point]).sum(axis=1)
+        share = smooth(ring[near], 4.5, 5.5) * smooth(ring[near], BORDER + 3.5, BORDER + 1.5)
+        out = ring.copy()
+        out[near] += self.float(share * (np.clip(found, 4, 11) - ring[near]))
+        return out
 
     @property
     def at(self) -> Float32:

@@ -8,8 +8,8 @@ from realizer.facebuild.parts import smooth
 from realizer.facebuild.skin.relief import Relief
 from realizer.facebuild.skin.skin import Skin, distance_through
 
-CAVITY = 900.0  # part of the light that a metre of depth below the surroundings takes away
-AROUND = 4.0  # texels of these surroundings
+CAVITY = 1500.0  # part of the light that a metre of depth below the surroundings takes away
+AROUND = 6.0  # texels of these surroundings
 WET = 0.35  # roughness of the lining of the mouth and of the lids' edges
 
 
