@@ -1,5 +1,6 @@
 """The albedo map of a skin: its colour, by layers."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,6 @@ from realizer.facebuild.person import skin_colours
 from realizer.facebuild.person.scalp import Scalp
 from realizer.facebuild.skin.noise import ridges
 from realizer.facebuild.skin.skin import Skin
-
 
 EDGE = 0.0012  # m, of the noise in large spots
 
@@ -85,9 +85,13 @@ def _spots(skin: Skin, out: Float32) -> None:
         ("moles", dry * look.moles, 32, 0.6),
     ):
         found, radius = skin.mark(name, where, number)
-        share = skin.texels.stamp(found, radius, lambda away, firm=firm: smooth(away, 1.0, firm))
+        share = skin.texels.stamp(found, radius, partial(_disc, firm))
         share *= np.clip(0.75 + 0.25 * skin.noise(EDGE, 34), 0.2, 1)
         out *= 1 - share[:, None] * (1 - _vector(skin.table[name]["tint"]))
+
+
+def _disc(firm: float, away: Any) -> Any:
+    return smooth(away, 1.0, firm)
 
 
 def crease(skin: Skin) -> Float32:

@@ -15,8 +15,8 @@ from realizer.facebuild.skin.noise import ridges
 from realizer.facebuild.skin.skin import Skin
 from realizer.tables import toml_table
 
-
-DEEP, AROUND = 0.00018, 6.0  # m below what is so many texels around it, of a line that is as dark as lines are
+# Metres that the darkest lines lie below what is so many texels around them.
+DEEP, AROUND = 0.00018, 6.0
 
 
 @dataclass(frozen=True, eq=False)
