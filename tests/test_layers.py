@@ -57,7 +57,7 @@ IMPORTERS = {
     "lxml": ("bml_schema",),
     "trimesh": ("realizer.face", "realizer.facebuild"),
     "numba": ("realizer.render.compiled",),
-    "pyrender": ("realizer.render.opengl",),
+    "moderngl": ("realizer.render.opengl",),
     "websockets": ("realizer.server", "realizer.client"),
     "av": ("realizer.outputs", "realizer.behaviours.sound_file"),
     "distributed": ("realizer.batch.dask_cluster",),
@@ -150,7 +150,7 @@ def test_the_command_line_starts_without_the_heavy_libraries() -> None:
     loaded = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.split()
-    heavy = {"scipy", "trimesh", "pyrender", "av", "clarabel", "websockets", "asyncio", "PIL", "pydantic"}
+    heavy = {"scipy", "trimesh", "moderngl", "av", "clarabel", "websockets", "asyncio", "PIL", "pydantic"}
     assert not heavy & {name.split(".")[0] for name in loaded}
 
 
@@ -163,7 +163,7 @@ def test_a_document_is_scheduled_without_loading_what_draws() -> None:
     loaded = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.split()
-    heavy = {"scipy", "trimesh", "pyrender", "av", "PIL", "pydantic"}
+    heavy = {"scipy", "trimesh", "moderngl", "av", "PIL", "pydantic"}
     assert not heavy & {name.split(".")[0] for name in loaded}
 
 
@@ -184,5 +184,5 @@ def test_client_loads_no_engine() -> None:
         "realizer.protocol.streams",
         "realizer.protocol.wire",
     }
-    heavy = {"scipy", "trimesh", "pyrender", "av", "PIL", "websockets"}
+    heavy = {"scipy", "trimesh", "moderngl", "av", "PIL", "websockets"}
     assert not heavy & {name.split(".")[0] for name in loaded}

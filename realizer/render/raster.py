@@ -12,8 +12,10 @@ from realizer.core.array_types import Float32, UInt8
 from realizer.core.colours import linear
 from realizer.face.drawn_mesh import HAIR, DrawnMesh
 from realizer.render.compiled import compiled
-from realizer.render.shading import BRIGHTEST, STEPS, dot, reflected, surfaces, tone_curve, unit
-from realizer.render.shadows import SIDE, LampView, reach
+from realizer.render.lamp_view import SIDE, LampView
+from realizer.render.shading import BRIGHTEST, STEPS, dot, reflected, tone_curve, unit
+from realizer.render.shadows import reach
+from realizer.render.surfaces import surfaces
 from realizer.render.textures import ALPHA, CHANNELS, STEEPEST, Texels
 
 # Horizontal positions of the samples in a pixel, one in each row of a rotated grid, as in graphics cards.

@@ -20,22 +20,10 @@ import numpy as np
 from realizer.core.array_types import Float32
 from realizer.core.colours import srgb
 from realizer.render.compiled import compiled
-from realizer.tables import toml_table
+from realizer.render.surfaces import DIRECT, REFLECTION, SHARP, SHARP_SHARE, SOFT, THIN, THROUGH, WRAP
 
-# Columns of `surfaces`.
-WRAP, SOFT, REFLECTION, SHARP, SHARP_SHARE, THROUGH = 0, 3, 6, 7, 8, 9
 KEY, RIM = 0, 1
-DIRECT = 0.55  # how far occlusion darkens light of lamps, which shadows darken already
-THIN = (0.50, 0.13, 0.07)  # colour of light that has come through thin skin
 BRIGHTEST, STEPS = 8.0, 16384  # linear light at the end of the tone curve, and its entries
-
-
-@cache
-def surfaces() -> Float32:
-    """Return a row of surfaces.toml for each kind of surface, float32."""
-    rows = toml_table("surfaces.toml").values()
-    names = ("wrap", "soft", "reflection", "sharp", "sharp_share", "through")
-    return np.array([np.hstack([row[name] for name in names]) for row in rows], np.float32)
 
 
 @cache

@@ -4,33 +4,21 @@ import numpy as np
 
 from realizer.core.array_types import Float32, UInt8
 from realizer.core.colours import linear
-from realizer.face.drawn_mesh import drawn_mesh
 from realizer.render.canvas import Canvas
-from realizer.render.folds import Folds
 from realizer.render.light import Light, unit
 from realizer.render.raster import Raster
-from realizer.render.shadows import LampView
-from realizer.render.textures import texels_of
 
 
 class SoftwareCanvas(Canvas):
     """A head drawn by the processor."""
 
     def _open(self) -> None:
-        self._mesh = drawn_mesh(self._face)
-        texels = texels_of(self._face.maps, 2 * max(self._size))
-        low, high = self._face.bounds
-        lamp = LampView(self._light.key.direction, low, high)
-        self._raster = Raster(self._size, self._mesh, linear(self._mesh.colours), texels, lamp)
-        self._folds = Folds(self._face)
+        self._raster = Raster(self._size, self._mesh, linear(self._mesh.colours), self._texels, self._lamp)
         self._lights = lights_of(self._light)
-        self._moving = np.zeros((len(self._mesh.uv), 7), np.float32)
         self._eye = self._camera.position.astype(np.float32)
 
-    def _pixels(self, vertices: Float32, normals: Float32) -> UInt8:
-        places, self._moving[:, 3:] = self._mesh(vertices, normals, self._folds(vertices))
-        self._moving[:, :3] = places
-        points, distances = self._camera.project(places, self._size)
+    def _pixels(self) -> UInt8:
+        points, distances = self._camera.project(self._moving[:, :3], self._size)
         # Parts of a head do not come near the lens; those of a broken one are not drawn.
         nearness = np.where(distances > self._camera.near, 1 / distances, np.nan).astype(np.float32)
         return self._raster(points, nearness, self._moving, self._lights, self._eye)

@@ -20,14 +20,14 @@ import numpy as np
 from stopwatch import median, noise
 
 from realizer.face.deform import deform
+from realizer.face.drawn_mesh import drawn_mesh
 from realizer.face.load import load_face
 from realizer.face.surface import normals
 from realizer.outputs.film import FORMATS, RATE, encode_film
 from realizer.render import Renderer, unavailable_reason
 from realizer.render.backends import BACKENDS
 from realizer.render.cameras import camera_for
-from realizer.render.canvas import ShadedMesh
-from realizer.render.light import Shader, preset
+from realizer.render.light import preset
 from realizer.render.opengl import OpenGLCanvas
 from realizer.render.software import SoftwareCanvas
 from realizer.render.worker import encode
@@ -72,16 +72,15 @@ def main() -> None:
         print(f"{name:42} {ms:7.2f} ms")
 
     camera = camera_for(face)
-    shader = Shader(preset(), face.colours, face.occlusion, face.gloss, camera.towards)
     batch = rows[:16]
     vertices = deform(face, batch)
     ups = normals(face, vertices)
     line("deform, a frame of a batch of 16", median(lambda: deform(face, batch), 20) / 16)
     line("normals, likewise", median(lambda: normals(face, vertices), 20) / 16)
     line("deform and normals, one frame alone", median(lambda: normals(face, deform(face, rows[:1])), 40))
-    line("shade", median(lambda: shader(ups[0]), 100))
-    figure = ShadedMesh(face, camera, preset())
-    line("shade, with furrows and glints", median(lambda: figure.pose(vertices[4], ups[4]), 60))
+    mesh, level = drawn_mesh(face), np.zeros(len(face.vertices), np.float32)
+    print(f"drawn: {len(mesh.uv)} vertices, {len(mesh.triangles)} triangles")
+    line("vertices and normals of the drawn mesh", median(lambda: mesh(vertices[0], ups[0], level), 40))
     own = SoftwareCanvas(face, size, camera, preset())
     line("by the processor, four samples a pixel", median(lambda: own.draw(vertices[0], ups[0]), 60))
     picture = own.draw(vertices[0], ups[0])

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
+from PIL import Image
 
-from realizer.render.cameras import camera_for
-from realizer.render.light import preset
+from realizer.face.cards import Cards
+from realizer.face.deform import deform
+from realizer.face.load import load_face
+from realizer.face.maps import Maps
+from realizer.face.surface import normals
+from realizer.render.cameras import PRESETS, camera_for
+from realizer.render.light import preset, presets
 from realizer.render.opengl import OpenGLCanvas
+from tests.shipped import FACES
 
 pytestmark = [pytest.mark.gl("gl"), pytest.mark.xdist_group("render")]
 
@@ -19,15 +28,18 @@ SIZE = (320, 240)
 
 @pytest.fixture(scope="module")
 def canvases(balls) -> Iterator[Callable[[tuple[int, int]], OpenGLCanvas]]:
-    """Canvases by size. To open one takes seconds, and to close one ends the display of the process."""
+    """Canvases by size."""
     face, _ = balls
+    opened = []
 
     @cache
     def canvas_of(size: tuple[int, int]) -> OpenGLCanvas:
-        return OpenGLCanvas(face, size, camera_for(face), preset())
+        opened.append(OpenGLCanvas(face, size, camera_for(face), preset()))
+        return opened[-1]
 
     yield canvas_of
-    canvas_of(SIZE).close()
+    for canvas in opened:
+        canvas.close()
 
 
 @pytest.fixture
@@ -114,3 +126,90 @@ def test_opengl_canvas_does_not_shear_odd_sizes(canvases, balls):
     picture = canvases((101, 77)).draw(face.vertices, normals)
     columns = np.nonzero(skin(picture))[1]
     assert columns.mean() == pytest.approx(50, abs=1)
+
+
+def encoded(pixels):
+    stream = io.BytesIO()
+    Image.fromarray(np.rint(pixels).clip(0, 255).astype(np.uint8)).save(stream, "webp", lossless=True)
+    return stream.getvalue()
+
+
+def noise(seed, low, high):
+    """Soft random tones (256, 256)."""
+    coarse = np.random.default_rng(seed).uniform(low, high, (24, 24)).astype(np.float32)
+    return np.array(Image.fromarray(coarse).resize((256, 256), Image.Resampling.BICUBIC))
+
+
+def fringe(face):
+    """Cards of 6 x 45 mm that hang over the forehead in two layers, with strands from the maps' corner."""
+    x, layer = (n.ravel() for n in np.meshgrid(np.linspace(-0.05, 0.05, 20), [0.002, 0.006]))
+    corners = np.array([[-0.003, 0.045], [-0.003, 0], [0.003, 0], [0.003, 0.045]])
+    points = np.zeros((len(x), 4, 3))
+    points[..., :2] = np.stack([x, 0.02 + 30 * layer**2], axis=1)[:, None] + corners
+    points[..., 2] = layer[:, None] + 0.01 - 6 * points[..., 0] ** 2
+    count = 4 * len(x)
+    # Each point is an affine combination of four vertices far apart.
+    extremes = face.vertices.argmin(axis=0), face.vertices.argmax(axis=0)
+    roots = np.array([extremes[0][0], extremes[1][0], extremes[1][1], extremes[0][2]])
+    frame = np.column_stack([face.vertices[roots], np.ones(4)]).T
+    weights = np.linalg.solve(frame, np.column_stack([points.reshape(-1, 3), np.ones(count)]).T).T
+    first = 4 * np.arange(len(x), dtype=np.int32)[:, None]
+    return Cards(
+        roots=np.tile(roots, (count, 1)).astype(np.int32),
+        weights=weights.astype(np.float32),
+        ups=np.tile(np.float32([0, 0, 0, -1]), (count, 1)),  # forwards
+        triangles=(first[:, None] + np.int32([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3),
+        uv=np.tile(np.float32([[0.76, 0.01], [0.76, 0.24], [0.99, 0.24], [0.99, 0.01]]), (len(x), 1)),
+        colours=np.tile(np.uint8([120, 80, 50]), (count, 1)),
+        occlusion=np.ones(count, np.float32),
+        gloss=np.zeros(count, np.float32),
+        parts={"hair": (0, count)},
+    )
+
+
+@pytest.fixture(scope="module")
+def mapped(balls):
+    """The head of three balls with maps and cards, and its normals."""
+    face, ups = balls
+    albedo = np.stack([*(noise(k, 170, 255) for k in range(3)), np.full((256, 256), 255)], axis=2)
+    albedo[:64, 192:, 3] = np.arange(64) // 16 % 2 * np.linspace(300, 60, 64)[:, None]
+    surface = np.stack([noise(4, 200, 255), noise(5, 100, 180), noise(6, 0, 255)], axis=2)
+    files = {"albedo": encoded(albedo), "relief": encoded(noise(7, 90, 166)), "surface": encoded(surface)}
+    corners = face.vertices[face.triangles]
+    uv = np.stack([0.35 + corners[..., 0] * 4, 0.5 - corners[..., 1] * 3], axis=2).astype(np.float32)
+    none = np.zeros(len(uv), bool), np.zeros((len(face.vertices), 0), np.float32)
+    return replace(face, maps=Maps(files, uv, 0.001, 8e-5, *none), cards=fringe(face)), ups
+
+
+def differences(face, shape, camera, light, size=(512, 512)):
+    """How far apart pictures by OpenGL and by the processor are where both are opaque, (n, 3) 0..255."""
+    from realizer.render.software import SoftwareCanvas
+
+    pictures = []
+    for kind in (OpenGLCanvas, SoftwareCanvas):
+        canvas = kind(face, size, camera_for(face, camera), preset(light), "transparent")
+        pictures.append(canvas.draw(*shape).astype(int))
+        canvas.close()
+    whole = (pictures[0][..., 3] == 255) & (pictures[1][..., 3] == 255)
+    assert whole.mean() > 0.1
+    assert np.abs(pictures[0][..., 3] - pictures[1][..., 3]).mean() < 0.5
+    return np.abs(pictures[0] - pictures[1])[whole][:, :3]
+
+
+@pytest.mark.parametrize(("camera", "light"), [("front", "portrait"), ("profile", "studio")])
+def test_opengl_canvas_agrees_with_the_processor(mapped, camera, light):
+    face, ups = mapped
+    assert differences(face, (face.vertices, ups), camera, light).mean() < 3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("light", presets())
+@pytest.mark.parametrize("camera", PRESETS)
+@pytest.mark.parametrize("name", FACES)
+def test_opengl_canvas_agrees_with_the_processor_on_people(name, camera, light):
+    """The skin is most of what is opaque in these pictures."""
+    face = load_face(name)
+    row = np.zeros((1, len(face.inputs)), np.float32)
+    row[0, 2] = 300  # an open jaw
+    vertices = deform(face, row)
+    assert differences(face, (vertices[0], normals(face, vertices)[0]), camera, light).mean() < 3

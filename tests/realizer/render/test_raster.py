@@ -10,9 +10,9 @@ from PIL import Image
 
 from realizer.face.drawn_mesh import CLOTH, DrawnMesh
 from realizer.face.maps import Maps
+from realizer.render.lamp_view import LampView
 from realizer.render.raster import Raster
 from realizer.render.shading import BRIGHTEST, STEPS, tone_curve
-from realizer.render.shadows import LampView
 from realizer.render.textures import texels_of
 
 pytestmark = [pytest.mark.gl("onboard"), pytest.mark.xdist_group("render")]

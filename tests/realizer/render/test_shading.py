@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from realizer.face.drawn_mesh import CLOTH, EYE, HAIR, SKIN
-from realizer.render.shading import BRIGHTEST, STEPS, reflected, surfaces, tone_curve, unit
+from realizer.render.shading import BRIGHTEST, STEPS, reflected, tone_curve, unit
+from realizer.render.surfaces import surfaces
 
 pytestmark = [pytest.mark.gl("onboard"), pytest.mark.xdist_group("render")]
 FRONT, SIDE, BACK = (np.float32([0, 0, 1]), np.float32([1, 0, 0]), np.float32([0, 0, -1]))
