@@ -20,6 +20,7 @@ ROWS = FAPS + 5
 
 FARTHEST = 1e4  # m
 AGAIN = "build or import the face again"
+MOST_BULGE = 0.002  # m
 LOOKS = {23, 24, 25, 26}  # FAPs that turn eyeballs, or have fields where the eyes are no balls
 
 ARRAYS = {
@@ -54,7 +55,9 @@ def basis_from(
         eyes: ((first, last + 1), (3,) centre) for left and right, (0, 0) of an eye that has fields instead
             of a ball; thrust: metres per FAPU of 27 and 28.
         contours: which FAPs of the lips hold together.
-        lid, lid_eye, lid_radius: (k,) each.
+        bulges: of both eyes: angles from the optical axis, and how far the eye comes out of its ball there,
+            in radians and metres, (j,) each; and the ball's radius.
+        lid, lid_eye, lid_radius: (k,) each; the radius is the least distance to an eye without bulges.
 
     Raises:
         FaceError: a missing array, an index out of range, or a value that is not finite.
@@ -74,6 +77,16 @@ def basis_from(
         fields[row - 1, stored["vertex"][part] - first] = stored["move"][part].astype(np.float32) * scale
     balls = not LOOKS & set(stored["row"].tolist())
     chin = np.asarray(points["2.1"][1:], np.float64) - stored["jaw_pivot"][1:]
+    centres = stored["eye_centre"].astype(np.float32)
+    bulges = [
+        _bulge(vertices[slice(*parts[name])] - centre if balls else centre[None][:0])
+        for name, centre in zip(("left_eye", "right_eye"), centres, strict=True)
+    ]
+    lid, side = stored["lid"].astype(np.int32), stored["lid_eye"].astype(np.int32)
+    radius = stored["lid_radius"].astype(np.float32)
+    for k, bulge in enumerate(bulges):
+        mine = side == k
+        radius[mine] -= bulge_at(bulge, vertices[lid[mine]] - centres[k], np.array([0.0, 0.0, 1.0]))
     return {
         "moving": (first, last),
         "fields": csr_matrix(fields.reshape(ROWS, -1).T),
@@ -81,16 +94,42 @@ def basis_from(
         "head_pivot": stored["head_pivot"].astype(np.float32),
         "chin": chin,
         "eyes": tuple(
-            (parts[name] if balls else (0, 0), stored["eye_centre"][k].astype(np.float32))
-            for k, name in enumerate(("left_eye", "right_eye"))
+            (parts[name] if balls else (0, 0), centre)
+            for name, centre in zip(("left_eye", "right_eye"), centres, strict=True)
         ),
+        "bulges": tuple(bulges),
         "thrust": np.float32(fapu.metres("ES")),
         "open_jaw": np.float64(fapu.metres("MNS")),
         "contours": contours_of(points, fapu),
-        "lid": stored["lid"].astype(np.int32),
-        "lid_eye": stored["lid_eye"].astype(np.int32),
-        "lid_radius": stored["lid_radius"].astype(np.float32),
+        "lid": lid,
+        "lid_eye": side,
+        "lid_radius": radius,
     }
+
+
+def _bulge(eye: Float32) -> tuple[Float32, Float32, float]:
+    """Return the bulge of an eye's cornea, for its vertices (n, 3) from its centre, n may be 0."""
+    if not len(eye):
+        return np.zeros(1, np.float32), np.zeros(1, np.float32), 1.0
+    away = np.linalg.norm(eye, axis=1)
+    radius = float(np.percentile(away, 25))
+    angle = np.arccos(np.clip(eye[:, 2] / np.maximum(away, 1e-9), -1, 1))
+    order = np.argsort(angle, kind="stable")
+    return angle[order], np.clip(away - radius, 0, MOST_BULGE)[order], radius
+
+
+def bulge_at(bulge: tuple[Float32, Float32, float], away: Any, axis: Any) -> Float32:
+    """Return how far an eye comes out of its ball before places (..., 3) from its centre.
+
+    Args:
+        bulge: as in the basis.
+        axis: unit vector of the optical axis, that can be multiplied with the places.
+    """
+    angles, heights, radius = bulge
+    x, y = away[..., 0], away[..., 1]
+    front = np.sqrt(np.maximum(radius**2 - x * x - y * y, 0))
+    cosine = (x * axis[..., 0] + y * axis[..., 1] + front * axis[..., 2]) / radius
+    return np.asarray(np.interp(np.arccos(np.clip(cosine, -1, 1)), angles, heights), np.float32)
 
 
 def array_faults(stored: Mapping[str, Any], n: int) -> list[str]:

@@ -7,7 +7,7 @@ import numpy as np
 from realizer.core.array_types import Bool, Float32, Float64
 from realizer.core.units import ANGLE_UNIT
 from realizer.face.au.deformer import moves_of
-from realizer.face.basis import FAPS, JAW_COS, JAW_DROP, JAW_SIN, ROWS, TONGUE_COS, TONGUE_SIN
+from realizer.face.basis import FAPS, JAW_COS, JAW_DROP, JAW_SIN, ROWS, TONGUE_COS, TONGUE_SIN, bulge_at
 from realizer.face.contours import couple_lips
 from realizer.face.model import Face
 from realizer.face.tongue import tongue_room
@@ -43,7 +43,7 @@ def deform(face: Face, poses: Any) -> Float32:
         raise ValueError("poses: wanted finite values, got NaN or infinity")
     basis, units, room = face.basis, moves_of(face), tongue_room(face)
     rows, unit_values = rows[:, :FAPS], rows[:, FAPS:]
-    moved: Bool = np.logical_or(rows[:, LIDS].any(axis=1), rows[:, THRUST].any(axis=1))
+    moved: Bool = np.asarray(rows[:, LIDS.start : THRUST.stop].any(axis=1))
     if units is not None:
         shown, lips, mixing = (
             units.intensities(unit_values),
@@ -142,19 +142,27 @@ def _turn_eyes(basis: Any, rows: Float32, out: Float32) -> None:
 
 
 def _keep_lids_over_balls(basis: Any, rows: Float32, moved: Bool, out: Float32) -> None:
-    """Move vertices of lids forwards until they are as far from the eyeball's centre as at rest."""
-    if not moved.any():
-        return
-    lid, side = basis["lid"], basis["lid_eye"]
-    centres = np.stack([centre for _, centre in basis["eyes"]])[side]
+    """Move vertices of lids forwards until they are as far from ball and cornea as at rest."""
     frames = np.flatnonzero(moved)
-    at = out[np.ix_(frames, lid)]
-    away = at - centres
-    away[..., 2] -= (rows[frames][:, THRUST] * basis["thrust"])[:, side]
-    room = np.square(basis["lid_radius"]) - np.square(away[..., 0]) - np.square(away[..., 1])
-    push = np.sqrt(np.maximum(room, 0)) - away[..., 2]
-    at[..., 2] += np.where(room > 0, np.maximum(push, 0), 0)
-    out[np.ix_(frames, lid)] = at
+    pushed = rows[frames][:, THRUST] * basis["thrust"]
+    axes = _axes(rows[frames])
+    for k, (_, centre) in enumerate(basis["eyes"]):
+        mine = basis["lid_eye"] == k
+        lid = basis["lid"][mine]
+        at = out[np.ix_(frames, lid)]
+        away = at - centre
+        away[..., 2] -= pushed[:, k, None]
+        least = basis["lid_radius"][mine] + bulge_at(basis["bulges"][k], away, axes[:, k, None])
+        room = np.square(least) - np.square(away[..., 0]) - np.square(away[..., 1])
+        push = np.sqrt(np.maximum(room, 0)) - away[..., 2]
+        at[..., 2] += np.where(room > 0, np.maximum(push, 0), 0)
+        out[np.ix_(frames, lid)] = at
+
+
+def _axes(rows: Float32) -> Float32:
+    """Return the unit vectors (n, 2, 3) along which the eyes look."""
+    yaw, pitch = np.moveaxis((rows[:, EYES] * np.float32(ANGLE_UNIT)).reshape(-1, 2, 2), 1, 0)
+    return np.stack([np.sin(yaw) * np.cos(pitch), -np.sin(pitch), np.cos(yaw) * np.cos(pitch)], axis=-1)
 
 
 def _turn_head(basis: Any, rows: Float32, out: Float32) -> None:

@@ -139,7 +139,7 @@ def write_face(
         np.concatenate([np.full_like(made[0].colours, 255), *(part.colours for part in made[1:])]),
         np.concatenate([np.asarray(part.occlusion) for part in made]),
         np.concatenate([part.gloss for part in made]),
-        maps.arrays([(len(part.vertices), len(part.triangles)) for part in made]),
+        maps.arrays(made),
     )
     maps.write(folder)
     centres = [centre for centre, _ in person.balls]

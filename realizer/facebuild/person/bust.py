@@ -4,7 +4,7 @@ import numpy as np
 
 from realizer.core.array_types import Bool, Float64
 from realizer.face.mesh_geometry import vertex_normals
-from realizer.facebuild import parts
+from realizer.facebuild.eyeball import eyeball
 from realizer.facebuild.hair.style import style_of
 from realizer.facebuild.mpeg4.rigid import opening_rows, tongue_bends
 from realizer.facebuild.parts import Part, smooth
@@ -16,6 +16,7 @@ from realizer.facebuild.person.lips import Lips
 from realizer.facebuild.person.person import Person
 from realizer.facebuild.person.recipe import Recipe, appearance_of
 from realizer.facebuild.person.scalp import Scalp
+from realizer.facebuild.skin.atlas import EYES
 from realizer.facebuild.submesh import Submesh
 from realizer.facebuild.teeth import teeth
 
@@ -57,8 +58,8 @@ def assemble(person: Person, lips: Lips, lids: list[Lid], recipe: Recipe) -> lis
     colours = skin_colours.paint_skin(ground, lips, [lid.rings for lid in lids], look, appearance)
     tints = np.asarray(skin.mix @ colours)
     made = [Part("skin", skin, skin.positions(at), skin.triangles, tints, np.zeros(len(tints)))]
-    for name, side, (centre, radius) in zip(("left_eye", "right_eye"), (1, -1), person.balls, strict=True):
-        made.append(parts.eyeball(name, centre, radius, look, -side))
+    eyes = zip(("left_eye", "right_eye"), (29, 30), (1, -1), person.balls, strict=True)
+    made += [eyeball(name, *ball, EYES, dilation, side) for name, dilation, side, ball in eyes]
     made += _teeth(person, recipe)
     made.append(_tongue(person, recipe))
     made.append(clothing.shirt(body, at, dressed, look["shirt"]))

@@ -8,16 +8,15 @@ from pathlib import Path
 import numpy as np
 
 from realizer.core.array_types import Float64
-from realizer.face.mesh_geometry import fit_ball
 from realizer.facebuild.parts import smooth
 from realizer.facebuild.person import makehuman
 from realizer.facebuild.person.base_mesh import Ground
+from realizer.facebuild.person.eyes import balls, cleared
 from realizer.facebuild.person.lips import Lips, close_lips
 from realizer.tables import csv_rows
 from realizer.tables.arkit_names import other_side
 
 MIRROR = np.array([-1.0, 1.0, 1.0])
-EYE_INSET = 0.00015  # m; how much deeper the ball lies than the socket's fit
 # Lengths of the bust, in faces (from the hairline 11.1 to the chin 2.1: 15 to 18 cm).
 FLOOR = 0.61  # the bust ends that far below the collarbones
 NECK_TOP, NECK_LENGTH = 0.092, 0.433  # below the chin the head's turn fades out, over that length,
@@ -78,12 +77,13 @@ def person_of(data: Path, targets: Mapping[str, float]) -> Person:
 
     at = _relaxed(Ground(mesh, at, points, shape))
     ground = Ground(mesh, close_lips(Ground(mesh, at, points, shape)), points, shape)
+    eyes = balls(ground)
+    ground = Ground(mesh, cleared(ground, eyes), points, shape)
     face = float(ground.point("11.1")[1] - ground.point("2.1")[1])
-    balls = (fit_ball(at[np.unique(mesh.quads[f"helper-{side}-eye"])]) for side in "lr")
     arch = np.ptp(at[np.unique(mesh.quads["helper-upper-teeth"])], axis=0)
     return Person(
         ground=ground,
-        balls=tuple((centre, radius - EYE_INSET) for centre, radius in balls),
+        balls=eyes,
         face=face,
         jaw_pivot=_joint(mesh, at, "joint-mouth") + JAW_AXIS,
         head_pivot=_joint(mesh, at, "joint-head") + NOD * face,

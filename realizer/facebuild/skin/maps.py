@@ -21,6 +21,7 @@ from realizer.facebuild.person.person import Person
 from realizer.facebuild.person.recipe import Recipe
 from realizer.facebuild.skin import atlas
 from realizer.facebuild.skin.albedo import paint_albedo
+from realizer.facebuild.skin.eye_picture import eye_picture
 from realizer.facebuild.skin.lines import lines_of, regions, weights
 from realizer.facebuild.skin.relief import relief_of
 from realizer.facebuild.skin.skin import Skin
@@ -54,20 +55,16 @@ class SkinMaps:
         for name, picture in self.pictures.items():
             Image.fromarray(picture).save(folder / f"{name}.webp", quality=QUALITY[name], method=4)
 
-    def arrays(self, parts: Sequence[tuple[int, int]]) -> dict[str, Any]:
-        """Return the arrays `uv` and `fold_weights` of mesh.npz.
-
-        Args:
-            parts: how many vertices and triangles each part of the face has; the first one is the skin.
-        """
-        vertices, triangles = (sum(counts) for counts in zip(*parts, strict=True))
+    def arrays(self, parts: Sequence[Part]) -> dict[str, Any]:
+        """Return the arrays `uv` and `fold_weights` of mesh.npz, for the parts, the skin first."""
         middle = [
             (atlas.NEUTRAL.left + atlas.NEUTRAL.right) / 2,
             (atlas.NEUTRAL.top + atlas.NEUTRAL.bottom) / 2,
         ]
-        uv = np.tile(np.array(middle), (triangles, 3, 1))
-        uv[: len(self.corners)] = self.corners
-        folds = np.zeros((vertices, len(self.regions)))
+        places = [np.tile(middle, (len(part.vertices), 1)) if part.uv is None else part.uv for part in parts]
+        corners = [uv[part.triangles] for uv, part in zip(places[1:], parts[1:], strict=True)]
+        uv = np.concatenate([self.corners, *corners])
+        folds = np.zeros((sum(len(part.vertices) for part in parts), len(self.regions)))
         folds[: len(self.weights)] = self.weights
         return {"uv": atlas.packed(uv), "fold_weights": to_bytes(255 * folds)}
 
@@ -112,6 +109,9 @@ def bake(
         "surface": texels.picture(to_bytes(255 * surface), 255),
         "folds": texels.picture(to_bytes(128 + relief.folds * step), 128),
     }
+    eye = atlas.EYES.texels(size)
+    looks = eye_picture(eye[0].stop - eye[0].start, recipe.colours, skin.seed)
+    pictures["albedo"][(*eye, slice(3))], pictures["surface"][eye] = looks
     ups = vertex_normals(part.vertices, part.triangles)
     return SkinMaps(pictures, corners, regions(lines), weights(skin, lines, ups))
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from realizer.core.errors import FaceError
-from realizer.face.basis import JAW_COS, basis_from, pack, unpack
+from realizer.face.basis import JAW_COS, basis_from, bulge_at, pack, unpack
 from realizer.face.load import folder_of, load_face
 from realizer.face.model import Face
 
@@ -88,3 +88,12 @@ def test_basis_with_a_bad_array_is_refused(
 ) -> None:
     with pytest.raises(FaceError, match=rf"fields\.npz: {words}"):
         read(face, tmp_path, stored | {name: values})
+
+
+def test_bulge_at_is_how_far_the_cornea_comes_out_there() -> None:
+    bulge = np.float32([0, 0.4, 0.5, 1.6]), np.float32([0.001, 0.0005, 0, 0]), 0.012
+    ahead, up = np.array([0.0, 0, 1]), np.array([0.0, np.sin(0.4), np.cos(0.4)])
+    places = 0.012 * np.stack([ahead, up])
+    assert bulge_at(bulge, places, ahead) == pytest.approx([0.001, 0.0005])
+    assert bulge_at(bulge, places, up) == pytest.approx([0.0005, 0.001])
+    assert bulge_at(bulge, places * [1, -1, 1], up) == pytest.approx([0.0005, 0])

@@ -13,7 +13,7 @@ from realizer.facebuild.person.lids import Lid
 from realizer.facebuild.person.lips import Lips
 from realizer.facebuild.person.person import Person
 from realizer.facebuild.person.recipe import Recipe
-from realizer.facebuild.skin.atlas import NEUTRAL
+from realizer.facebuild.skin.atlas import EYES, NEUTRAL
 from realizer.facebuild.skin.maps import RELIEF, SkinMaps, bake
 
 pytestmark = pytest.mark.xdist_group("mask")
@@ -35,12 +35,19 @@ def test_bake_draws_another_skin_for_another_name(
         assert (other.pictures[name] != maps.pictures[name]).any()
 
 
-def test_arrays_point_other_parts_to_the_neutral_square(maps: SkinMaps) -> None:
-    n, m = len(maps.weights), len(maps.corners)
-    arrays = maps.arrays([(n, m), (5, 2)])
-    assert arrays["uv"].shape == (m + 2, 3, 2)
-    assert (arrays["uv"][m:] == 256).all()
-    assert arrays["fold_weights"].shape == (n + 5, len(maps.regions))
+def test_arrays_point_parts_without_a_picture_to_the_neutral_square(
+    maps: SkinMaps, parts: list[Part]
+) -> None:
+    m = len(maps.corners)
+    arrays = maps.arrays(parts)
+    assert arrays["uv"].shape == (sum(len(part.triangles) for part in parts), 3, 2)
+    names = np.repeat([part.name for part in parts], [len(part.triangles) for part in parts])
+    assert (arrays["uv"][names == "tongue"] == 256).all()
+    left, top, *_ = (round(65535 * side) for side in EYES)
+    eyes = arrays["uv"][(names == "left_eye") | (names == "right_eye")]
+    assert (eyes.min(axis=(0, 1)) >= (left, top)).all()
+    assert (names[:m] == "skin").all()
+    assert arrays["fold_weights"].shape == (sum(len(part.vertices) for part in parts), len(maps.regions))
 
 
 def test_write_makes_pictures(maps: SkinMaps, tmp_path: Path) -> None:
