@@ -52,7 +52,7 @@ RECIPES = {
     # A black studio with a white floor; its umbrella is the second lamp, at the character's left.
     "studio": Recipe("studio", 112, 12, 0.3, (0.22, 0.22, 0.224)),
     # A square by the sea under a clear sky; its low sun is where the key light is.
-    "outdoors": Recipe("sunset", 76, 3, 0.8, (0.27, 0.285, 0.33)),
+    "outdoors": Recipe("sunset", 76, 3, 0.8, (0.325, 0.34, 0.385)),
 }
 
 
