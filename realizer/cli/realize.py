@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from realizer.scheduling.timing import Schedule
 
 PICTURES = (".png", ".webp", ".mp4", ".webm")
-DRAWN = ("size", "camera", "at", "light", "background", "visemes")  # fields of RenderSettings
+DRAWN = ("size", "camera", "at", "light", "background", "morphs", "visemes")  # fields of RenderSettings
 
 
 performance_options = options.several(
@@ -48,6 +48,13 @@ output_options = options.several(
         help="File to write, in the format of its suffix; see `realizer outputs`.  [default: print JSON]",
     ),
     options.at,
+    click.option(
+        "--morphs",
+        type=click.Choice(["fap", "arkit"]),
+        default="fap",
+        show_default=True,
+        help="With .glb: morph targets that show each frame exactly, or ARKit's 52 shapes.",
+    ),
     click.option("--visemes", is_flag=True, help="With .fap: also write the visemes (FAP 1)."),
     performance_options,
 )
@@ -92,6 +99,8 @@ def play_documents(read: Callable[[], list[bytes]], flags: dict[str, Any]) -> in
         )
     if drawing.visemes and (writer is None or writer.suffix != ".fap"):
         raise click.BadParameter("wanted a .fap file to write FAP 1 into", param_hint="--visemes")
+    if drawing.morphs != "fap" and (writer is None or writer.suffix != ".glb"):
+        raise click.BadParameter("wanted a .glb file to write morph targets into", param_hint="--morphs")
     texts = read()
     if writer is not None:
         drawing = writer.begin(drawing, chosen.face, chosen.deformer)

@@ -54,6 +54,10 @@ class GlbFile:
             }
         return self._accessor(accessor, raw, bounds)
 
+    def add_bytes(self, raw: bytes) -> int:
+        """Add the bytes of a picture; return the buffer view's number."""
+        return self._view(np.frombuffer(raw, np.uint8), None)
+
     def animation(self, name: str, clock: int, keys: Iterable[tuple[int, str, Any]]) -> dict[str, Any]:
         """Return an animation of nodes, linear between its keys.
 

@@ -18,13 +18,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RenderSettings:
-    """Settings of an output: the options --size --camera --at --light --background --visemes of `realize`."""
+    """Settings of an output: options of `realize` from --size to --visemes."""
 
     size: tuple[int, int] = (512, 512)  # width, height
     camera: str = "front"
     at: float | None = None  # seconds of a single picture; None: the whole span
     light: str | None = None  # a preset; None: the default of `realizer.render.Renderer`
     background: str | None = None  # "#rrggbb", or for a single picture "transparent"
+    morphs: str = "fap"  # names of a .glb file's morph targets: "fap" or "arkit"
     visemes: bool = False  # whether a .fap file has FAP 1 in addition to the FAPs of the lips
     renderer: Renderer | None = None  # started by `Output.begin`
 

@@ -17,7 +17,7 @@ from realizer.facebuild.arkit.mesh_merge import Surface
 # Larger sources are shrunk: a head fills a picture of a thousand pixels with fewer texels than that, and a
 # face of 4096 x 4096 texels takes four times the memory of graphics cards and of the page's first picture.
 SIZE = 2048
-PAD = 4  # texels beyond the edges of each patch, for mean values of neighbours
+PAD = 8  # texels beyond the edges of each patch, for mean values of neighbours
 NEUTRAL = 16  # texels of the square at the top left that changes nothing
 LEAST = 8  # texels of a patch of one colour
 SHRINK = 0.94  # step by which patches become smaller until all have room
@@ -61,6 +61,8 @@ def make_atlas(gltf: Gltf, surface: Surface, ranges: Mapping[str, tuple[int, int
     Raises:
         FaceError: an image is missing or too large.
     """
+    from scipy.ndimage import distance_transform_edt
+
     if not any(surface.materials[k].textures for k in np.unique(surface.material)):
         return None
     patches = [_patch(gltf, surface, int(k), ranges) for k in np.unique(surface.material)]
@@ -74,6 +76,8 @@ def make_atlas(gltf: Gltf, surface: Surface, ranges: Mapping[str, tuple[int, int
         "normal": np.full((SIZE, SIZE, 3), (128, 128, 255), np.uint8),
         "surface": np.full((SIZE, SIZE, 3), 255, np.uint8),
     }
+    free = np.ones((SIZE, SIZE), bool)
+    free[: NEUTRAL + PAD, : NEUTRAL + PAD] = False
     uv = np.empty_like(surface.uv)
     holes, matt = np.zeros(len(uv), bool), np.zeros(len(uv), bool)
     for patch, size, (x, y) in zip(patches, sizes, places, strict=True):
@@ -83,8 +87,12 @@ def make_atlas(gltf: Gltf, surface: Surface, ranges: Mapping[str, tuple[int, int
         box = np.concatenate([patch.low - PAD * texel, patch.low + patch.span + PAD * texel])
         for name, picture in _painted(gltf, patch.material, box, size).items():
             maps[name][y : y + size[1], x : x + size[0]] = picture
+        free[y : y + size[1], x : x + size[0]] = False
         holes[patch.rows] = maps["albedo"][y : y + size[1], x : x + size[0], 3].min() < 250
         matt[patch.rows] = patch.material.roughness is not None
+    # From afar neighbours are mixed: what is near has the colour of a patch, not white.
+    near = distance_transform_edt(free, return_distances=False, return_indices=True)
+    maps["albedo"] = maps["albedo"][tuple(near)]
     slots = {slot for patch in patches for slot, _ in patch.material.textures}
     if "normal" not in slots:
         del maps["normal"]

@@ -1,0 +1,169 @@
+"""The drawn mesh of a face as primitives of a glTF file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from realizer.core.array_types import Bool, Float32, Int32
+from realizer.core.colours import linear
+from realizer.face.drawn_mesh import NEUTRAL, drawn_mesh
+from realizer.face.glb_file import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, GlbFile
+from realizer.face.surface import normals
+from realizer.outputs.glb_materials import Look, Materials
+
+if TYPE_CHECKING:
+    from realizer.face.model import Face
+    from realizer.outputs.morph_targets import MorphTargets
+
+MIN_NORMAL_CHANGE = 0.01  # half a degree; smaller changes of a normal are invisible
+NEGLIGIBLE = 5e-6  # m; smaller movements are omitted from a target
+LEVEL = 1e-4  # of u and v: nearer to the neutral square there is nothing of the maps
+GLOSSY = 0.8  # how much of its roughness a surface of gloss 1 loses, as in `render.raster`
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """Triangles of one material: their vertices in the drawn mesh (k,), and corners (t, 3) among these."""
+
+    vertices: Any
+    triangles: Any
+    material: int
+    mapped: bool
+
+
+class GlbMesh:
+    """What is drawn of a face, in a file."""
+
+    def __init__(self, file: GlbFile, face: Face) -> None:
+        """Prepare; nothing is added to the file."""
+        self._file, self._face, self._mesh = file, face, drawn_mesh(face)
+        self._at, self._ups = self._drawn(face.vertices)
+        cut = np.unique(self._mesh.triangles[self._mesh.see_through])
+        self.materials = Materials(file, face.maps, self._mesh.uv[cut])
+        colours = linear(self._mesh.colours) * self._mesh.occlusion[:, None]
+        self._colours = np.full((len(colours), 4), 65535, np.uint16)
+        # Colours include the baked occlusion, because viewers do not support it by vertex.
+        self._colours[:, :3] = np.rint(colours * 65535)
+        self._tangents = _tangents(self._at, self._ups, self._mesh.triangles, self._mesh.uv)
+
+    def part(self, name: str) -> Bool:
+        """Return which drawn vertices belong to a part, (d,)."""
+        mine = np.zeros(len(self._at), bool)
+        mine[slice(*self._mesh.parts[name])] = True
+        return mine
+
+    def rigid(self, part: Bool, name: str, centre: Float32 | float = 0.0) -> dict[str, Any]:
+        """Return the mesh of some vertices at rest.
+
+        Args:
+            part: (d,) the vertices; triangles with others are omitted.
+            centre: (3,) metres, the origin of the mesh.
+        """
+        groups = self._groups(part)
+        return {"name": name, "primitives": [self._primitive(group, centre) for group in groups]}
+
+    def morphing(self, part: Bool, targets: MorphTargets) -> dict[str, Any]:
+        """Return the mesh of some vertices with morph targets, and two joints: 0 is fixed, 1 is the head."""
+        groups = self._groups(part)
+        primitives = [self._primitive(group, 0.0) for group in groups]
+        turning = np.clip(self._mesh.places @ self._face.basis["head"][:, 0], 0, 1)
+        for group, primitive in zip(groups, primitives, strict=True):
+            shares = np.zeros((len(group.vertices), 4), np.float32)
+            shares[:, 1] = turning[group.vertices]
+            shares[:, 0] = 1 - shares[:, 1]
+            # glTF requires joint 0 for weights of 0.
+            joints = (shares > 0) * np.array([0, 1, 0, 0], np.uint8)
+            primitive["attributes"]["JOINTS_0"] = self._file.add(joints, target=ARRAY_BUFFER)
+            primitive["attributes"]["WEIGHTS_0"] = self._file.add(shares, target=ARRAY_BUFFER)
+        mesh = {"name": self._face.name, "primitives": primitives}
+        if not targets.names:
+            return mesh
+        for moves in targets.moves:
+            moved, ups = self._drawn(self._face.vertices + moves)
+            moved, ups = moved - self._at, ups - self._ups
+            moved[np.abs(moved).max(axis=1) < NEGLIGIBLE] = 0
+            ups[np.abs(ups).max(axis=1) < MIN_NORMAL_CHANGE] = 0
+            for group, primitive in zip(groups, primitives, strict=True):
+                found = moved[group.vertices], ups[group.vertices]
+                target = {
+                    "POSITION": self._file.add_sparse(found[0], bounds=True),
+                    "NORMAL": self._file.add_sparse(found[1]),
+                }
+                primitive.setdefault("targets", []).append(target)
+        # The usual place for names of targets, which glTF does not define.
+        return mesh | {"weights": [0.0] * len(targets.names), "extras": {"targetNames": list(targets.names)}}
+
+    def _drawn(self, vertices: Float32) -> tuple[Float32, Float32]:
+        """Return drawn vertices and normals; forward where there is no triangle: glTF requires a length."""
+        ups = self._mesh.ups @ normals(self._face, vertices[None])[0]
+        size = np.linalg.norm(ups, axis=1, keepdims=True)
+        ups = np.where(size > 0, ups / np.maximum(size, 1e-20), np.array([0, 0, 1], np.float32))
+        return np.asarray(self._mesh.places @ vertices, np.float32), ups.astype(np.float32)
+
+    def _groups(self, part: Bool) -> list[_Group]:
+        """Return the triangles of some vertices by their part, and by how they are drawn."""
+        mesh, found = self._mesh, []
+        inside = part[mesh.triangles].all(axis=1)
+        level = (np.abs(mesh.uv - NEUTRAL) < LEVEL).all(axis=1)
+        mapped = np.asarray(~level[mesh.triangles].all(axis=1) & (self._face.maps is not None))
+        for name, (first, last) in mesh.parts.items():
+            own = inside & (mesh.triangles[:, 0] >= first) & (mesh.triangles[:, 0] < last)
+            for cut, lies in product((False, True), repeat=2):
+                mine = own & (mesh.see_through == cut) & (mapped == lies)
+                if not mine.any():
+                    continue
+                vertices, corners = np.unique(mesh.triangles[mine], return_inverse=True)
+                look = Look(
+                    name + "_cut" * cut + "_mapped" * (lies and not mapped[own].all()),
+                    1 - GLOSSY * float(mesh.gloss[vertices].mean()),
+                    bool(mesh.two_sided[mine].any()), cut, lies,
+                )  # fmt: skip
+                material = self.materials.add(look)
+                found.append(_Group(vertices, corners.reshape(-1, 3), material, lies))
+        return found
+
+    def _primitive(self, group: _Group, centre: Float32 | float) -> dict[str, Any]:
+        mine, add = group.vertices, self._file.add
+        attributes = {
+            "POSITION": add(self._at[mine] - np.float32(centre), target=ARRAY_BUFFER, bounds=True),
+            "NORMAL": add(self._ups[mine], target=ARRAY_BUFFER),
+            "COLOR_0": add(self._colours[mine], target=ARRAY_BUFFER, normalised=True),
+        }
+        if group.mapped:
+            attributes["TEXCOORD_0"] = add(self._mesh.uv[mine], target=ARRAY_BUFFER)
+            if self.materials.bumpy:
+                attributes["TANGENT"] = add(self._tangents[mine], target=ARRAY_BUFFER)
+        return {
+            "attributes": attributes,
+            "indices": add(group.triangles.astype(np.uint32).ravel(), target=ELEMENT_ARRAY_BUFFER),
+            "material": group.material,
+        }
+
+
+def _tangents(at: Float32, ups: Float32, triangles: Int32, uv: Float32) -> Float32:
+    """Return glTF's tangents (d, 4): the way of rising u, and 1, or -1 where the map is mirrored."""
+    a, b, c = (at[triangles[:, k]].astype(np.float64) for k in range(3))
+    p, q, r = (uv[triangles[:, k]].astype(np.float64) for k in range(3))
+    (pu, pv), (qu, qv) = (q - p).T, (r - p).T
+    area = pu * qv - qu * pv
+    along = ((b - a) * qv[:, None] - (c - a) * pv[:, None]) * np.sign(area)[:, None]
+    sums = np.zeros((len(at), 4))
+    for k in range(3):
+        for axis in range(3):
+            sums[:, axis] += np.bincount(triangles[:, k], along[:, axis], len(at))
+        sums[:, 3] += np.bincount(triangles[:, k], area, len(at))
+    ups = ups.astype(np.float64)
+    # Any way across the normal where the map has none.
+    spare = np.cross(ups, np.where(np.abs(ups[:, :1]) < 0.9, (1.0, 0, 0), (0, 1.0, 0)))
+    out = np.empty((len(at), 4))
+    out[:, :3] = sums[:, :3] - ups * (ups * sums[:, :3]).sum(axis=1, keepdims=True)
+    size = np.linalg.norm(out[:, :3], axis=1)
+    out[size < 1e-9, :3] = spare[size < 1e-9]
+    out[:, :3] /= np.linalg.norm(out[:, :3], axis=1, keepdims=True)
+    # v goes down, counter-clockwise triangles of an upright map have a negative area in it.
+    out[:, 3] = np.where(sums[:, 3] > 0, -1, 1)
+    return out.astype(np.float32)
