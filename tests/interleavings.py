@@ -182,8 +182,8 @@ class Interleaving:
 
     def _make(self, id: str, now: float, named: bool) -> Session:
         session = Session(id, self._settings, now, named=named, epoch=EPOCH)
-        session.journal = JournalWriter(id, self._journal if named else None)
-        session.journal.begin(EPOCH)
+        session.journal.writer = JournalWriter(id, self._journal if named else None)
+        session.journal.writer.begin(EPOCH)
         return session
 
     def run(self, steps: int) -> None:

@@ -95,8 +95,8 @@ def play(
 ) -> float:
     """Play documents; return the CPU milliseconds of one."""
     session = open_session()
-    session.journal = JournalWriter("long", journal, record)
-    session.journal.begin(0.0)
+    session.journal.writer = JournalWriter("long", journal, record)
+    session.journal.writer.begin(0.0)
     session.connect(1, 0.0)
     session.receive(1, '{"type":"scene","objects":{"cup":{"x":0.2,"y":-0.1,"z":0.5}}}', 0.0)
     begin_time = time.process_time()

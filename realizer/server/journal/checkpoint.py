@@ -35,6 +35,10 @@ class Checkpoint:
     submission: Submission
     feedback_log: FeedbackLog
 
+    def is_possible(self, ended_by: float) -> bool:
+        """Return whether nothing plays or is prepared; see `Player.is_idle`."""
+        return self.submission.is_idle and self.player.is_idle(ended_by)
+
     def write(self, at: float, connections: Collection[int]) -> dict[str, str | None]:
         """Return the parts that a journal stores.
 

@@ -101,9 +101,9 @@ class SessionFactory:
         """
         epoch = time.time()
         session = self._session(id, now, named=named, epoch=epoch)
-        session.journal = self._journal_writer(id, self.journal if named else None)
+        session.journal.writer = self._journal_writer(id, self.journal if named else None)
         try:
-            session.journal.begin(epoch)
+            session.journal.writer.begin(epoch)
         except JournalError as error:
             raise JoinError(503, str(error)) from None
         return session
@@ -144,13 +144,13 @@ class SessionFactory:
             log.exception("session %s cannot be resumed", name)
             raise JournalError(f"session {name} cannot be resumed: internal error") from None
         watch.write = lambda text: self._try_note(name, text)
-        session.journal = self._journal_writer(name, self.journal, saved, watch.follow)
-        await loop.run_in_executor(None, session.journal.resume, saved)
+        session.journal.writer = self._journal_writer(name, self.journal, saved, watch.follow)
+        await loop.run_in_executor(None, session.journal.writer.resume, saved)
         at = await loop.run_in_executor(None, catch_up, session, at, seen)
         unanswered += [effect for effect in session.take_effects() if isinstance(effect, Speak)]
         now = loop.time()
         session.clock.opened = now - max(at, time.time() - saved.epoch)
-        for connection in session.connections:  # of the other process
+        for connection in list(session.connections):  # of the other process
             session.disconnect(connection, now)
         log.info("session %s is resumed, %d entries long", name, len(saved.entries))
         return session, unanswered
@@ -222,7 +222,7 @@ class SessionFactory:
             capabilities=self._capabilities,
             epoch=epoch,
         )
-        session.ending = self.ending
+        session.inbox.ending = self.ending
         session.broadcast.counts = session.submission.counts = self._metrics.counts
         session.broadcast.overload = self.overload
         return session

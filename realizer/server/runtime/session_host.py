@@ -117,7 +117,7 @@ class SessionHost:
         """Refuse documents from now on."""
         self._factory.ending = True
         for session in self._registry.sessions.values():
-            session.ending = True
+            session.inbox.ending = True
 
     @property
     def busy(self) -> bool:
@@ -147,7 +147,7 @@ class SessionHost:
     def metrics_text(self) -> str:
         """Return the metrics in the Prometheus text format."""
         sessions = self._registry.sessions.values()
-        dropped = sum(session.dropped_count(number) for session in sessions for number in session.connections)
+        dropped = sum(client.dropped for session in sessions for client in session.connections.values())
         return self.metrics.text(
             {
                 "sessions": len(sessions),
@@ -267,7 +267,7 @@ class SessionHost:
         """Remove a closed connection."""
         left = self._registry.session_of.get(number)
         if left is not None:
-            self.metrics.counts["frames_dropped"] += left.dropped_count(number)
+            self.metrics.counts["frames_dropped"] += left.connections.dropped_count(number)
         self._registry.leave(number, self._loop.time())
         self._clients.pop(number, None)
         self._gc_policy.ended_connections += 1
@@ -452,7 +452,7 @@ class SessionHost:
         for number in session.connections:
             self._apply_effect(session, Close(number, 1011, "internal error"))
         session.close()
-        session.journal.end()  # a restored session would fail again
+        session.journal.writer.end()  # a restored session would fail again
         self._registry.remove(session)
 
     def _apply_effect(self, session: Session, effect: Effect) -> None:
@@ -508,7 +508,9 @@ class SessionHost:
         self._registry.remove_expired(now)
         self._resumed = {name: end for name, end in self._resumed.items() if end > now}
         # Spread the checkpoints over the time until the next call.
-        grown = [session for session in self._registry.sessions.values() if session.journal.needs_checkpoint]
+        grown = [
+            session for session in self._registry.sessions.values() if session.journal.writer.needs_checkpoint
+        ]
         for k, session in enumerate(grown):
             self._loop.call_later(EXPIRY_INTERVAL * k / len(grown), self._compact_journal, session)
         if self._takeover_check is None or self._takeover_check.done():

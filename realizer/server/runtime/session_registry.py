@@ -186,7 +186,7 @@ class SessionRegistry:
         for left in {connection, *session.connections} - joined:
             session.disconnect(left, now, is_awaited=bool(joined))
         if session.closed and self.sessions.get(session.id) is session:
-            session.journal.end()
+            session.journal.writer.end()
             self.remove(session)
 
     def remove(self, session: Session) -> None:
@@ -230,9 +230,9 @@ class SessionRegistry:
 
     @staticmethod
     def _welcome(joined: Session, move: MoveConnection, now: float) -> None:
-        joined.send_welcome(move.connection, joined.clock.read(now))
+        joined.queries.send_welcome(move.connection, joined.clock.read(now))
         if move.seen is not None and not joined.closed:
-            joined.send_missed_feedback(move.connection, move.seen)
+            joined.connections.send_missed_feedback(move.connection, move.seen)
 
     def _refusal(self, move: MoveConnection, left: Session, visitor: Visitor) -> str | None:
         """Return why a connection cannot move from a session to another, or None."""
@@ -270,5 +270,5 @@ class SessionRegistry:
     def _end(self, session: Session) -> None:
         self._cancel(session)
         session.close()
-        session.journal.end()
+        session.journal.writer.end()
         self.remove(session)

@@ -21,7 +21,7 @@ from realizer.protocol.messages.requests import (
     Unsubscribe,
 )
 from realizer.protocol.messages.speech import SpeechMessage
-from realizer.protocol.wire import ClipPiece
+from realizer.protocol.wire import ClipPiece, WireError, unpack_clip
 from realizer.server.documents.document_queue import Submission
 from realizer.server.session.character_faces import CharacterFaces
 from realizer.server.session.control_fields import FieldError, character_index, direct_values, emotion_values
@@ -91,13 +91,21 @@ class ControlHandlers:
             case Stop():
                 self._stop(message, t)
 
-    def hear(self, piece: ClipPiece, t: float) -> None:
-        """Pass sound that a character hears to the player.
+    def handle_sound(self, connection: Connection, message: bytes, t: float) -> None:
+        """Add a piece of a sound clip, or reply with an error."""
+        try:
+            piece = unpack_clip(message)
+            if piece.id.startswith(HEARD):
+                self._hear(piece, t)
+            else:
+                self.clips.add_chunk(piece)
+        except WireError as error:
+            self.reply(connection.id, ErrorMessage(code="unsupported", message=str(error)))
+        except FieldError as error:
+            self.reply(connection.id, _error("clip", error, error.where))
 
-        Raises:
-            ClipError: the sound is not mono int16 PCM of a usual rate.
-            FieldError: the session has too many characters.
-        """
+    def _hear(self, piece: ClipPiece, t: float) -> None:
+        """Pass sound that a character hears to the player."""
         sound = heard_samples(piece)
         index = character_index(self.player, piece.id.removeprefix(HEARD) or None)
         self.player.hear_sound(sound, piece.rate, t, is_last=piece.final, character=index)

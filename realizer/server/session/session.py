@@ -5,57 +5,40 @@ It opens no sockets and reads no clock.
 
 from __future__ import annotations
 
-import json
 import logging
 import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from bml_schema import WarningFeedback
 from realizer.behaviours.kind import Position
 from realizer.behaviours.registry import KINDS
 from realizer.core import work
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
 from realizer.playback.player import Player
-from realizer.protocol.messages.common import PROTOCOL, Reply
-from realizer.protocol.messages.parse import Control, parse_control
-from realizer.protocol.messages.replies import (
-    BlockState,
-    CharacterState,
-    ErrorMessage,
-    Gap,
-    Pong,
-    StateMessage,
-    VoiceState,
-)
-from realizer.protocol.messages.requests import Hello, Ping, StateQuery, Subscribe, Unsubscribe
-from realizer.protocol.wire import WireError, unpack_clip
-from realizer.server.documents.document_queue import Submission, block_id_of
+from realizer.server.documents.document_queue import Submission
 from realizer.server.documents.limits import duration_error
-from realizer.server.journal import JournalError, TakenOver
+from realizer.server.journal import TakenOver
 from realizer.server.journal.checkpoint import Checkpoint
-from realizer.server.journal.entry import Kind
-from realizer.server.journal.journal_writer import JournalWriter
+from realizer.server.journal.session_journal import SessionJournal
 from realizer.server.session.character_faces import CharacterFaces
-from realizer.server.session.control_fields import FieldError
+from realizer.server.session.connections import Connections
 from realizer.server.session.control_handlers import ControlHandlers
-from realizer.server.session.effects import Close, Effect, MoveConnection, Send
+from realizer.server.session.deadlines import Deadlines
+from realizer.server.session.effects import Close, Effect
 from realizer.server.session.feedback_log import FeedbackLog
+from realizer.server.session.inbox import Inbox
+from realizer.server.session.query_handlers import QueryHandlers
 from realizer.server.session.session_clock import SessionClock
 from realizer.server.session.subscriptions import Subscriptions
-from realizer.server.session.welcome import build_welcome
-from realizer.server.speech.audio_clips import HEARD, AudioClips
+from realizer.server.speech.audio_clips import AudioClips
 from realizer.server.streams.broadcast import Broadcast, FrameRun
-from realizer.server.streams.connection import SLOW, STUCK, Connection
+from realizer.server.streams.connection import Connection
 from realizer.server.streams.frame_windows import EPSILON
 from realizer.server.streams.frames_ahead import AheadRun
 from realizer.speech.utterance import Utterance
 
 log = logging.getLogger(__name__)
-
-# Messages that affect only their own connection: they are not written to the journal.
-PASSING = (Hello, Ping, StateQuery, Subscribe, Unsubscribe)
 
 
 class Session:
@@ -78,7 +61,6 @@ class Session:
 
     Attributes:
         clock: the session clock.
-        ending: whether documents are refused because the service is ending.
         feedback_log: the published feedback.
         fast_path: the frames of the only client, which need no call of the session; None if more is due.
     """
@@ -100,9 +82,7 @@ class Session:
         self.clock = SessionClock(now)
         self.named = named
         self.closed = False
-        self.ending = False
         self.empty_since: float | None = now
-        self.journal = JournalWriter(id)
         self.faces = CharacterFaces(settings)
         self.clips = AudioClips()
         self.player = Player(
@@ -112,32 +92,33 @@ class Session:
             face_inputs=lambda index: self.faces.of(index).inputs,
             veto=lambda block, schedule: duration_error(block, schedule, settings),
         )
-        self.capabilities = dict(capabilities or {})
         self.broadcast = Broadcast(self.player, self.faces)
         self.submission = Submission(id, settings, self.player, self.clock, self._add_effects)
-        self._connections: dict[int, Connection] = {}
         self.feedback_log = log or FeedbackLog(epoch)
+        self.connections = Connections(self.feedback_log, self._add_effects)
         self._checkpoint = Checkpoint(self.player, self.faces, self.clips, self.submission, self.feedback_log)
+        self.journal = SessionJournal(id, self._checkpoint, self.connections, self.hand_over)
+        self._deadlines = Deadlines(
+            self.clock, self.player, self.submission, self.broadcast, self.connections
+        )
         self.fast_path: FrameRun | AheadRun | None = None
         self._effects: list[Effect] = []
-        # The cached deadlines on the session clock: of the next event that is neither a frame nor feedback
-        # (None if unknown), and of feedback.
-        self._next_other: float | None = None
-        self._next_feedback = 0.0
         self._client_left = False  # its open speeches end with the next tick
+        reply = self.connections.reply
         self.subscriptions = Subscriptions(
-            settings, self.player, self.faces, self.broadcast, self._connections, self.reply
+            settings, self.player, self.faces, self.broadcast, self.connections, reply
         )
-        self._controls = ControlHandlers(
-            self.player, self.faces, self.clips, self.submission, self.subscriptions, self.reply
+        self.queries = QueryHandlers(
+            id, settings, capabilities or {}, self.player, self.faces, self.submission, self.connections
+        )
+        controls = ControlHandlers(
+            self.player, self.faces, self.clips, self.submission, self.subscriptions, reply
+        )
+        self.inbox = Inbox(
+            self.player, self.submission, self.journal, self.connections, self.queries, controls
         )
 
     # connections --------------------------------------------------------------------------------
-
-    @property
-    def connections(self) -> tuple[int, ...]:
-        """The ids of the connections that share the session."""
-        return tuple(self._connections)
 
     def connect(self, connection: int, now: float, seen: int | None = None) -> None:
         """Add a connection. With `seen` it gets all feedback after that one, without it only new feedback."""
@@ -145,12 +126,12 @@ class Session:
             self._effects.append(Close(connection, 1012, f"session {self.id} has ended: reconnect"))
             return
         self._forget_deadline()
-        self._connections[connection] = Connection(connection)
-        if not self.log_entry(self.clock.read(now), "join", connection):
+        self.connections[connection] = Connection(connection)
+        if not self.journal.note(self.clock.read(now), "join", connection):
             return
         self.empty_since = None
         if seen is not None:
-            self.send_missed_feedback(connection, seen)
+            self.connections.send_missed_feedback(connection, seen)
 
     def disconnect(self, connection: int, now: float, *, is_awaited: bool = False) -> None:
         """Remove a connection. An unnamed session closes with its last connection.
@@ -158,19 +139,15 @@ class Session:
         Args:
             is_awaited: whether other clients will connect at once: then it stays open.
         """
-        if self._connections.pop(connection, None) is not None:
-            self.log_entry(self.clock.read(now), "leave", connection)
+        if self.connections.pop(connection, None) is not None:
+            self.journal.note(self.clock.read(now), "leave", connection)
         self.submission.speeches.on_disconnect(connection)
         self._client_left = True
         self._forget_deadline()
-        if not self._connections:
+        if not self.connections:
             self.empty_since = now
             if not self.named and not is_awaited:
                 self.close()
-
-    def dropped_count(self, connection: int) -> int:
-        """Return how many frames, pictures and packets a client missed because it was slow."""
-        return c.dropped if (c := self._connections.get(connection)) else 0
 
     def is_expired(self, now: float) -> bool:
         """Whether the session has had no connection for `settings.keep` seconds."""
@@ -180,175 +157,30 @@ class Session:
         """Close the session: it does and sends nothing any more."""
         self.closed = True
         self._forget_deadline()
-        self._connections.clear()
+        self.connections.clear()
         self.submission.queue.clear()
         self._effects.clear()
 
     def update_backlog(self, connection: int, waiting: int) -> None:
-        """Take the number of unsent bytes of a client: a slow one misses frames, a stuck one is closed."""
-        if (client := self._connections.get(connection)) is None:
-            return
-        client.is_slow = waiting > SLOW
-        if client.is_slow:
+        """Take the number of unsent bytes of a client, as `Connections.update_backlog`."""
+        if self.connections.update_backlog(connection, waiting):
             self._forget_deadline()
-        if waiting > STUCK:
-            reason = f"{waiting} bytes wait to be read; reconnect with the session's name and seen"
-            self._effects.append(Close(connection, 1013, reason))
 
     # messages in --------------------------------------------------------------------------------
 
     def receive(self, connection: int, message: str | bytes, now: float) -> None:
-        """Handle a message: bytes are a sound clip, text that starts with `{` is control, all else is BML."""
-        if self.closed or connection not in self._connections:
+        """Handle a message, as `Inbox.handle`."""
+        if self.closed or connection not in self.connections:
             return
         t = self.clock.read(now)
         self._send_due(t)
-        if self.journal.needs_checkpoint and not self._compact(t):
+        if self.journal.writer.needs_checkpoint and not self.journal.compact(t):
             return
-        in_journal = self._dispatch(self._connections[connection], message, t)
+        in_journal = self.inbox.handle(self.connections[connection], message, t)
         if not self.closed and self._work(t) and not in_journal:
-            self.log_entry(t, "tick")
-
-    def _dispatch(self, connection: Connection, message: str | bytes, t: float) -> bool:
-        """Handle a message, or reply with an error. Return whether it was written to the journal."""
-        control: Control | None = None
-        if isinstance(message, str) and (text := message.lstrip("\ufeff \t\r\n")).startswith("{"):
-            parsed = parse_control(text)
-            if isinstance(parsed, ErrorMessage):
-                self.reply(connection.id, parsed)
-                return False
-            if isinstance(parsed, PASSING):
-                self._handle_passing(connection, parsed, t)
-                return False
-            control = parsed
-        is_bml = control is None and isinstance(message, str)
-        ending = "the service is ending and takes no more documents" if self.ending and is_bml else None
-        kind: Kind = "text" if isinstance(message, str) else "sound"
-        if (refused := ending or self._write_journal(t, kind, connection, message)) is not None:
-            if is_bml:
-                # Without a number: the message is not in the journal, and a session that is restored from the
-                # journal must number all other feedback in the same way.
-                id = block_id_of(str(message))
-                warning = WarningFeedback(id=id, type="CANNOT_CREATE_BEHAVIOR", text=refused)
-                for client in self._connections.values():
-                    self._send_feedback(client, [warning.to_xml()])
-            else:
-                self.reply(connection.id, ErrorMessage(code="journal", message=refused))
-        elif isinstance(message, bytes):
-            self._add_sound(connection, message, t)
-        elif control is not None:
-            self._handle(connection, control, t)
-        else:
-            self.submission.enqueue(message)
-        return refused is None
-
-    def _add_sound(self, connection: Connection, message: bytes, t: float) -> None:
-        try:
-            piece = unpack_clip(message)
-            if piece.id.startswith(HEARD):
-                self._controls.hear(piece, t)
-            else:
-                self.clips.add_chunk(piece)
-        except WireError as error:
-            self.reply(connection.id, ErrorMessage(code="unsupported", message=str(error)))
-        except FieldError as error:
-            self.reply(connection.id, ErrorMessage(code="clip", message=str(error), where=error.where))
-
-    def _handle_passing(self, connection: Connection, control: Control, t: float) -> None:
-        """Handle a message that is not written to the journal, except for the characters that it adds."""
-        known = self.player.characters
-        self._handle(connection, control, t)
-        for name in self.player.characters:
-            if name not in known:  # their order matters: the first is the default
-                self.log_entry(t, "text", connection.id, json.dumps({"type": "character", "id": name}))
-
-    def _handle(self, connection: Connection, control: Control, t: float) -> None:
-        match control:
-            case Hello():
-                self._hello(connection, control, t)
-            case StateQuery():
-                self.reply(connection.id, self._state(connection, t))
-            case Ping():
-                self.reply(connection.id, Pong(id=control.id, time=t))
-            case _:
-                self._controls.handle(connection, control, t)
-
-    def _hello(self, connection: Connection, message: Hello, t: float) -> None:
-        if message.version != PROTOCOL:
-            text = f"wanted version {PROTOCOL} of the protocol, got {message.version}"
-            self.reply(connection.id, ErrorMessage(code="version", message=text, where="hello.version"))
-        elif message.session not in (None, self.id):
-            assert message.session is not None
-            self._effects.append(MoveConnection(connection.id, message.session, message.seen))
-        else:
-            self.send_welcome(connection.id, t)
-            if message.seen is not None:
-                self.send_missed_feedback(connection.id, message.seen)
-
-    def _state(self, connection: Connection, t: float) -> StateMessage:
-        state = self.player.state(t)
-        preparing = [
-            BlockState(id=w.block.id, character=w.block.character_id, status="IN_PREP")
-            for w in self.submission.pending.blocks
-        ]
-        characters = [
-            CharacterState(face=self.faces.name(index), voice=self.submission.voices.get(index), **face)
-            for index, face in enumerate(state["characters"])
-        ]
-        return StateMessage(
-            session=self.id,
-            time=t,
-            blocks=[*(BlockState(**block) for block in state["blocks"]), *preparing],
-            characters=characters,
-            voice=VoiceState(name=self.settings.voice, fault=self.submission.tts.fault),
-            connections=len(self._connections),
-            dropped=connection.dropped,
-        )
+            self.journal.note(t, "tick")
 
     # journal ------------------------------------------------------------------------------------
-
-    def _write_journal(
-        self, t: float, kind: Kind, connection: Connection, message: str | bytes
-    ) -> str | None:
-        """Write a message to the journal. Return why it cannot be accepted, or None."""
-        try:
-            self.journal.append(t, kind, connection.id, message)
-        except TakenOver as error:
-            self.hand_over(error)
-            return str(error)
-        except JournalError as error:
-            log.error("session %s: %s", self.id, error)
-            return f"this could not be written to the journal, so it is refused: {error}"
-        return None
-
-    def log_entry(self, t: float, kind: Kind, number: int = 0, body: str = "") -> bool:
-        """Write an event to the journal. Return False if another process has taken over the session."""
-        try:
-            self.journal.try_append(t, kind, number, body)
-        except TakenOver as error:
-            self.hand_over(error)
-            return False
-        return True
-
-    def _compact(self, t: float) -> bool:
-        """Replace the journal by a checkpoint if nothing plays. All feedback due by `t` was published.
-
-        Return False if another process has taken over the session. Normally the face must be at rest too. If
-        the journal is far too long, this is not required: then a blink or a nod of the next seconds, which
-        depends on the last speech, may differ after a takeover.
-        """
-        if not (
-            self.submission.is_idle
-            and self.player.is_idle(t if self.journal.is_far_too_long else float("-inf"))
-        ):
-            return True
-        try:
-            if self.journal.compact(self._checkpoint.write(t, self.connections)):
-                self.clips.settle()
-        except TakenOver as error:
-            self.hand_over(error)
-            return False
-        return True
 
     def restore(self, parts: Mapping[str, str]) -> float:
         """Restore the state and the connections of a checkpoint. The session must be new and opened at 0.
@@ -370,9 +202,9 @@ class Session:
     def hand_over(self, error: TakenOver) -> None:
         """Close all connections because another process has taken over; clients reconnect there."""
         log.warning("%s", error)
-        closing: list[Effect] = [Close(connection, 1012, str(error)) for connection in self._connections]
+        closing = [Close(connection, 1012, str(error)) for connection in self.connections]
         self.close()
-        self._effects = closing
+        self._effects += closing
 
     def on_speech(self, speak: int, result: Utterance | RealizerError, now: float) -> None:
         """Take the answer to an effect `Speak`. If the voice failed, the silent voice replaces it."""
@@ -380,7 +212,7 @@ class Session:
             return
         t = self.clock.read(now)
         self._send_due(t)
-        if self.log_entry(t, "spoken", speak, "" if isinstance(result, Utterance) else str(result)):
+        if self.journal.note(t, "spoken", speak, "" if isinstance(result, Utterance) else str(result)):
             self._effects += self.submission.tts.answer(speak, result, t)
             self._work(t)
 
@@ -390,13 +222,10 @@ class Session:
             return
         self._forget_deadline()
         picture = result if isinstance(result, bytes) else None
-        effects, viewers = self.broadcast.video.on_picture(draw, picture, self._connections.values())
+        effects, viewers = self.broadcast.video.on_picture(draw, picture, self.connections.values())
         self._effects += effects
         if not isinstance(result, bytes):
-            for connection in viewers:
-                for key in [k for k in connection.subscriptions if k[0] == "video"]:
-                    del connection.subscriptions[key]
-                self.reply(connection.id, ErrorMessage(code="render", message=str(result), where="video"))
+            self.subscriptions.end_pictures(viewers, str(result))
         self.tick(now)
 
     # time ---------------------------------------------------------------------------------------
@@ -406,37 +235,37 @@ class Session:
         t = self.clock.read(now)
         starts = not self.submission.has_work
         if not self.closed and self._work(t, read_documents, starts=starts):
-            self.log_entry(t, "tick")
+            self.journal.note(t, "tick")
 
     def frames(self, now: float) -> tuple[list[Effect], float] | None:
         """Return due frames and feedback, and the next deadline; None if `tick` must be called instead.
 
         This is the fast way for a session in which nothing but frames and feedback is due.
         """
-        t = now - self.clock.opened
-        if self._next_other is None or t + EPSILON >= self._next_other:
+        deadlines, opened = self._deadlines, self.clock.opened
+        t = now - opened
+        if not deadlines.has_only_frames_and_feedback(t):
             return None
-        if t + EPSILON >= self._next_feedback:
+        if deadlines.has_feedback(t):
             version = self.player.version
             self._publish(t)
-            self._next_feedback = self.player.next_change()
+            deadlines.update_feedback()
             if self.player.version != version:
                 self._forget_deadline()
         sends, following = self.broadcast.frames_due(t)
         effects = [*self.take_effects(), *sends]
-        if self._next_other is None:
+        if not deadlines.is_known:
             return effects, self.next_due()
-        opened = self.clock.opened
-        other = min(self._next_other, self._next_feedback) + opened
-        self.fast_path = self.broadcast.fast_path(opened, other)
-        return effects, min(other, following + opened)
+        event = deadlines.next_event + opened
+        self.fast_path = self.broadcast.fast_path(opened, event)
+        return effects, min(event, following + opened)
 
     def compact_journal(self, now: float) -> None:
         """Replace the journal by a checkpoint if it has grown; due feedback is published first."""
-        if self.journal.needs_checkpoint and not self.closed:
+        if self.journal.writer.needs_checkpoint and not self.closed:
             self._forget_deadline()
             self._publish(t := self.clock.read(now))
-            self._compact(t)
+            self.journal.compact(t)
 
     def replay_until(
         self, t: float, before: Callable[[float], None] = lambda t: None, *, since: float = 0.0
@@ -463,8 +292,8 @@ class Session:
         self._client_left = False
         self._forget_deadline()
         self._publish(t, starts=starts)
-        if self.broadcast.active or any(c.subscriptions for c in self._connections.values()):
-            self.broadcast.set_subscribers(self._connections.values())
+        if self.broadcast.active or self.connections.has_subscriptions:
+            self.broadcast.set_subscribers(self.connections.values())
             self.broadcast.send_due(t, self._effects, is_reading=read_documents and self.submission.has_work)
         if self.submission.pending.blocks:
             self._effects += self.submission.tts.expire(t + EPSILON)
@@ -481,7 +310,7 @@ class Session:
     @property
     def has_documents(self) -> bool:
         """Whether a document can be read or planned now."""
-        if self.closed or self._next_other is not None:
+        if self.closed or self._deadlines.is_known:
             return False
         return self._client_left or self.submission.has_work
 
@@ -489,25 +318,11 @@ class Session:
         """Return the time of the next event other than documents; infinity if there is none."""
         if self.closed:
             return math.inf
-        other, streams = self._next_other, self.broadcast
-        if other is None:
-            self._next_feedback, answer_due = self.player.next_change(), self.submission.tts.deadline()
-            event = self.player.next_event
-            if self.submission.has_work and (start := self.clock.start_of(event)) > event:
-                self._next_feedback = start
-            other = streams.next_other if streams.active else math.inf
-            other = other if answer_due is None else min(other, answer_due)
-            # Open speeches and slow clients are checked with every frame, schedules with all feedback: then
-            # the deadline cannot be cached.
-            slow = any(connection.is_slow for connection in self._connections.values())
-            shown = streams.active and bool(streams.schedule_subscribers)
-            if not (self.has_documents or slow or self.submission.speeches.open_ids or shown):
-                self._next_other = other
-        next_frame = streams.next_frame if streams.active else math.inf
-        return min(other, self._next_feedback, next_frame) + self.clock.opened
+        return self._deadlines.next(has_documents=self.has_documents) + self.clock.opened
 
     def _forget_deadline(self) -> None:
-        self._next_other = self.fast_path = None
+        self._deadlines.forget()
+        self.fast_path = None
 
     @property
     def busy(self) -> bool:
@@ -549,8 +364,7 @@ class Session:
                 if ending_blocks:
                     self.submission.end(ending_blocks, t)
         if texts:
-            for connection in self._connections.values():
-                self._send_feedback(connection, texts)
+            self.connections.send_feedback(texts)
 
     def _send_due(self, t: float) -> None:
         """Send due feedback and frames before anything changes, also if the session was woken too late.
@@ -560,26 +374,3 @@ class Session:
         self._publish(t, starts=False)
         if self.broadcast.active:
             self._effects += self.broadcast.frames_due(t, is_reading=True)[0]
-
-    def _send_feedback(self, connection: Connection, texts: list[str]) -> None:
-        if (filter := connection.feedback) is not None:
-            sends = [Send(connection.id, text) for text in work.counted(texts) if filter.accepts(text)]
-            self._effects += sends
-
-    def send_missed_feedback(self, connection: int, seen: int) -> None:
-        """Send the feedback after `seen`, and `gap` first if some of it is not stored or never existed."""
-        first = self.feedback_log.first
-        if seen + 1 < first or seen > self.feedback_log.newest:
-            self.reply(connection, Gap(seen=seen, first=first))
-            seen = first - 1
-        self._send_feedback(self._connections[connection], self.feedback_log.since(seen + 1))
-
-    def send_welcome(self, connection: int, t: float) -> None:
-        """Send `welcome` to a connection."""
-        seq = self.feedback_log.newest
-        self.reply(connection, build_welcome(self.id, t, seq, self.settings, self.capabilities))
-
-    def reply(self, connection: int, reply: Reply) -> None:
-        """Send a message to a connection."""
-        if not self.closed:
-            self._effects.append(Send(connection, reply.text()))

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from realizer.core.settings import Settings, limit_hint
 from realizer.playback.player import Player
 from realizer.protocol.messages.common import PICTURES, Reply
-from realizer.protocol.messages.replies import FaceChanged, Subscribed
+from realizer.protocol.messages.replies import ErrorMessage, FaceChanged, Subscribed
 from realizer.protocol.messages.requests import Subscribe, Unsubscribe
 from realizer.protocol.streams import STREAMS
 from realizer.server.documents.limits import MAX_CHARACTERS, pixel_rate_error
@@ -92,6 +92,13 @@ class Subscriptions:
         for connection, mesh in self.broadcast.face_changed(index):
             fields = {"stream": "mesh", "character": mesh.name, "index": index, "frame": mesh.next}
             self.reply(connection, FaceChanged(**fields, **self._mesh(index)))
+
+    def end_pictures(self, connections: Iterable[Connection], fault: str) -> None:
+        """End the subscriptions of connections to pictures, which cannot be drawn."""
+        for connection in connections:
+            for key in [k for k in connection.subscriptions if k[0] == "video"]:
+                del connection.subscriptions[key]
+            self.reply(connection.id, ErrorMessage(code="render", message=fault, where="video"))
 
     def views(self, without: Subscription | None = None) -> list[VideoView]:
         """Return the views that are drawn, each once, without that of one subscription."""

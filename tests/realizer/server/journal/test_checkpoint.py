@@ -62,8 +62,8 @@ LASTING = (
 
 def opened(journal: Memory | None) -> Session:
     session = Session("s", SETTINGS, 0.0, named=True, epoch=EPOCH)
-    session.journal = JournalWriter("s", journal)
-    session.journal.begin(EPOCH)
+    session.journal.writer = JournalWriter("s", journal)
+    session.journal.writer.begin(EPOCH)
     return session
 
 
@@ -170,7 +170,7 @@ class Pair:
         assert kept is not None
         session = Session("s", SETTINGS, 0.0, named=True, epoch=EPOCH)
         _, owed = restore_session(session, kept, spoken)
-        session.journal = JournalWriter("s", self.journal, saved=kept)
+        session.journal.writer = JournalWriter("s", self.journal, saved=kept)
         self.torn = Run(
             session, {effect.id: effect for effect in owed if isinstance(effect, Speak)}, self._now
         )

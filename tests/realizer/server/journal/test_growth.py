@@ -30,8 +30,8 @@ WAIT = '<bml id="b"><wait id="w" duration="0.5"/></bml>'
 
 def opened(journal: Journal | None) -> Session:
     session = Session("long", SETTINGS, 0.0, named=True, epoch=0.0)
-    session.journal = JournalWriter("long", journal)
-    session.journal.begin(0.0)
+    session.journal.writer = JournalWriter("long", journal)
+    session.journal.writer.begin(0.0)
     session.connect(1, 0.0)
     return session
 

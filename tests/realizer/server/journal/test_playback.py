@@ -29,8 +29,10 @@ SCENE = '{"type": "scene", "objects": {"cup": {"x": 0.2, "y": -0.1, "z": 0.5}}}'
 def recorded(folder: Path) -> tuple[Path, list[str]]:
     """A session that was played with a slow voice: its recording, and its feedback."""
     session = Session("s", SETTINGS, 100.0, named=True, epoch=1e9)
-    session.journal = JournalWriter("s", recorder=RecordingFolder(folder, recording_head(SETTINGS, None)))
-    session.journal.begin(1e9)
+    session.journal.writer = JournalWriter(
+        "s", recorder=RecordingFolder(folder, recording_head(SETTINGS, None))
+    )
+    session.journal.writer.begin(1e9)
     session.connect(1, 100.0)
     coming = [
         (100.05, SCENE),
@@ -55,7 +57,7 @@ def recorded(folder: Path) -> tuple[Path, list[str]]:
             elif isinstance(effect, Send) and str(effect.data).startswith("<"):
                 feedback.append(str(effect.data))
     session.disconnect(1, now)
-    session.journal.end()
+    session.journal.writer.end()
     return next(folder.glob("*.jsonl")), feedback
 
 
@@ -83,8 +85,8 @@ def test_replay_recording_plays_what_was_planned_to_its_end(tmp_path: Path) -> N
 def test_replay_recording_ends_with_the_words_of_an_open_speech(tmp_path: Path) -> None:
     session = Session("s", SETTINGS, 100.0, named=True, epoch=1e9)
     record = RecordingFolder(tmp_path, recording_head(SETTINGS, None))
-    session.journal = JournalWriter("s", recorder=record)
-    session.journal.begin(1e9)
+    session.journal.writer = JournalWriter("s", recorder=record)
+    session.journal.writer.begin(1e9)
     session.connect(1, 100.0)
     session.receive(1, '{"type": "speech", "id": "turn", "append": "One two three. Four"}', 100.1)
     for step in range(100):

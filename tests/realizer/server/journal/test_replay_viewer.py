@@ -58,8 +58,10 @@ def recorded(
         late: draws how late it is woken; None: never.
     """
     session = Session("s", SETTINGS, OPENED, named=True, epoch=1e9)
-    session.journal = JournalWriter("s", recorder=RecordingFolder(folder, recording_head(SETTINGS, None)))
-    session.journal.begin(1e9)
+    session.journal.writer = JournalWriter(
+        "s", recorder=RecordingFolder(folder, recording_head(SETTINGS, None))
+    )
+    session.journal.writer.begin(1e9)
     session.connect(1, OPENED)
     got: list[bytes] = []
     answers: list[tuple[float, Speak]] = []
@@ -83,7 +85,7 @@ def recorded(
             elif isinstance(effect, Send) and isinstance(effect.data, bytes):
                 got.append(effect.data)
     session.disconnect(1, now)
-    session.journal.end()
+    session.journal.writer.end()
     return read_recording(folder), got
 
 

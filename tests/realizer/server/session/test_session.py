@@ -12,12 +12,6 @@ from hypothesis import strategies as st
 from bml_schema.feedback import BlockProgress, WarningFeedback
 from realizer.core.errors import VoiceError
 from realizer.offline import realize
-from realizer.protocol.wire import unpack
-from realizer.server.journal.entry import Entry, JournalError, TakenOver
-from realizer.server.journal.journal_writer import JournalWriter
-from realizer.server.journal.sqlite_journal import SqliteJournal
-from realizer.server.session import feedback_log
-from realizer.server.session.effects import Close
 from realizer.speech.utterance import Phoneme, Utterance, Word
 from tests.realizer.server.conftest import NOD, RATE, TALK, Driver, spoken
 from tests.worst_documents import document
@@ -106,7 +100,7 @@ def test_session_reports_a_bug_in_planning_with_the_id_of_the_block(driver, monk
 
     monkeypatch.setattr(driver.session.player, "submit", bug)
     logged: list[str] = []
-    monkeypatch.setattr(driver.session, "log_entry", lambda t, kind: logged.append(kind) or True)
+    monkeypatch.setattr(driver.session.journal, "note", lambda t, kind: logged.append(kind) or True)
     client = driver.send(NOD.format("b"))
     (warning,) = warnings(client)
     assert logged == ["tick", "tick"], "one reads it, one refuses it, and so does a replay"
@@ -198,45 +192,6 @@ def test_session_refuses_too_many_characters(driver) -> None:
     assert {w.id for w in warnings(driver.clients[1])} == {f"b{k}" for k in range(16, 20)}
 
 
-def test_session_answers_an_invalid_binary_message_with_an_error(driver) -> None:
-    client = driver.send(b"\x04\x01 sound")
-    assert client.of("error")[0]["code"] == "unsupported"
-
-
-def test_session_refuses_documents_while_the_service_ends(driver) -> None:
-    driver.session.ending = True
-    (warning,) = warnings(driver.send(NOD.format("b")))
-    assert "ending" in warning.text
-    assert warning.seq is None, "another service, that goes on with the session, would not count it"
-
-
-def test_session_sends_a_warning_without_seq_if_the_journal_is_full() -> None:
-    class Full(SqliteJournal):
-        full = False
-
-        def add(self, session: str, entry: Entry) -> None:
-            if self.full:
-                raise JournalError("no room")
-            super().add(session, entry)
-
-    driver, journal = Driver(named=True), Full(":memory:")
-    driver.session.journal = JournalWriter("test", journal)
-    driver.session.journal.begin(0.0)
-    client = driver.send({"type": "speech", "id": "turn", "append": "One. "})
-    journal.full = True
-    driver.send('<bml id="turn"><wait id="w"/></bml>')
-    journal.full = False
-    driver.send({"type": "speech", "id": "turn", "append": "Two.", "close": True})
-    driver.run(10)
-    (warning,) = warnings(client)
-    assert (warning.id, warning.seq) == ("turn", None)
-    assert "no room" in warning.text
-    numbers = sorted(f.seq for f in client.feedback if f.seq is not None)
-    assert len(numbers) == len(client.feedback) - 1
-    assert numbers == list(range(1, len(numbers) + 1))
-    assert "turn.2:end" in client.ids, "the speech of that name goes on"
-
-
 # voices -----------------------------------------------------------------------------------------
 
 
@@ -291,15 +246,6 @@ def test_tick_replaces_a_voice_that_never_answers() -> None:
     driver = Driver(mute=True)
     driver.send(TALK.format("b"))
     assert "b:end" in driver.run(60).ids
-
-
-# streams ----------------------------------------------------------------------------------------
-
-
-def test_update_backlog_closes_a_client_that_never_reads(driver) -> None:
-    driver.session.update_backlog(1, 10**9)
-    driver.collect()
-    assert [c.connection for c in driver.closed] == [1]
 
 
 # sound ------------------------------------------------------------------------------------------
@@ -371,54 +317,7 @@ def test_session_reports_no_words_of_a_complete_block() -> None:
     assert driver.run(3.0).feedback[-1].said is None
 
 
-# pictures ---------------------------------------------------------------------------------------
-
-
 # sessions ---------------------------------------------------------------------------------------
-
-
-def test_connect_sends_missed_feedback() -> None:
-    driver = Driver(named=True)
-    driver.send(NOD.format("b"))
-    driver.run(0.2)
-    driver.leave(1)
-    driver.run(10)
-    whole = driver.session.feedback_log.newest
-    again = driver.join(2, seen=2)
-    assert [f.seq for f in again.feedback] == list(range(3, whole + 1))
-    assert again.ids[-1] == "b:end"
-
-
-def test_hello_sends_missed_feedback(driver) -> None:
-    driver.send(NOD.format("b"))
-    driver.run(10)
-    viewer = driver.join(2)
-    assert not viewer.feedback
-    driver.send({"type": "hello", "session": "test", "seen": 1}, 2)
-    assert viewer.of("welcome")[0]["session"] == "test"
-    assert [f.seq for f in viewer.feedback] == list(range(2, 14))
-
-
-def test_send_missed_feedback_reports_a_gap_of_lost_messages(driver, monkeypatch) -> None:
-    monkeypatch.setattr(feedback_log, "MOST", 5)
-    monkeypatch.setattr(feedback_log, "PACK", 1)  # whole packs go
-    driver.send(NOD.format("b"))
-    driver.run(10)
-    viewer = driver.join(2, seen=2)
-    assert viewer.of("gap") == [{"type": "gap", "seen": 2, "first": 9}]
-    assert [f.seq for f in viewer.feedback] == [9, 10, 11, 12, 13]
-
-
-def test_send_missed_feedback_reports_a_gap_of_unknown_numbers(driver) -> None:
-    viewer = driver.join(2, seen=500)
-    assert viewer.of("gap") == [{"type": "gap", "seen": 500, "first": 1}]
-
-
-def test_session_sends_feedback_to_all_connections(driver) -> None:
-    viewer = driver.join(2)
-    driver.send(NOD.format("b"), 1)
-    driver.run(10)
-    assert viewer.messages == driver.clients[1].messages
 
 
 def test_disconnect_closes_an_unnamed_session(driver) -> None:
@@ -432,29 +331,6 @@ def test_is_expired_keeps_a_named_session_for_a_while() -> None:
     assert not driver.session.closed
     assert not driver.session.is_expired(driver.opened + 59)
     assert driver.session.is_expired(driver.opened + 60)
-
-
-# control ----------------------------------------------------------------------------------------
-
-
-def test_hello_refuses_another_version(driver) -> None:
-    (error,) = driver.send({"type": "hello", "version": 7}).of("error")
-    assert (error["where"], "got 7" in error["message"]) == ("hello.version", True)
-
-
-def test_ping_returns_the_time_of_the_session(driver) -> None:
-    driver.run(2.5)
-    assert driver.send({"type": "ping", "id": 9}).of("pong") == [{"type": "pong", "id": 9, "time": 2.5}]
-
-
-def test_state_lists_playing_and_waiting_blocks() -> None:
-    driver = Driver(mute=True)
-    driver.send(NOD.format("nod"))
-    driver.send(TALK.format("talk"))
-    driver.run(0.2)
-    (state,) = driver.send({"type": "state"}).of("state")
-    assert {b["id"]: b["status"] for b in state["blocks"]} == {"nod": "IN_EXEC", "talk": "IN_PREP"}
-    assert state["connections"] == 1
 
 
 # laws -------------------------------------------------------------------------------------------
@@ -526,17 +402,6 @@ def test_session_numbers_frames_and_feedback_in_any_order_of_events(actions) -> 
         for id in progress:
             running = running + 1 if id.endswith("start") else max(0, running - 1)
             assert running <= 1
-
-
-def test_hand_over_closes_all_connections() -> None:
-    class Taken(SqliteJournal):
-        def add(self, session: str, entry: Entry) -> None:
-            raise TakenOver(session)
-
-    driver = Driver(named=True)
-    driver.session.journal = JournalWriter("test", Taken(":memory:"))
-    driver.join(2)
-    assert driver.closed == [Close(k, 1012, "session test is another process's now") for k in (1, 2)]
 
 
 def test_disconnect_ends_the_open_speech_of_the_client() -> None:
@@ -618,96 +483,3 @@ def test_session_stretches_a_late_speech_to_its_end() -> None:
     times = {f.id: f.global_time for f in client.feedback if hasattr(f, "global_time")}
     assert times["b:s:end"] == pytest.approx(4.0)
     assert times["b:start"] == times["b:s:start"] == pytest.approx(0.6)
-
-
-CALM = """<bml id="{id}" composition="REPLACE"><head id="n" lexeme="NOD" start="0.3"/>
-<faceLexeme id="f" lexeme="SMILE" start="n:stroke" end="1.1"/><gaze id="g" target="cup" end="0.9"/></bml>"""
-
-
-def test_next_due_wakes_a_session_at_every_event(drive) -> None:
-    def play(step: float | None) -> list[str | bytes]:
-        driver = drive()
-        for message in (
-            {"type": "scene", "objects": {"cup": {"x": 0.2, "y": -0.1, "z": 0.5}}},
-            {"type": "subscribe", "stream": "fap", "fps": 30},
-            {"type": "subscribe", "stream": "au", "fps": 12.5, "encoding": "json"},
-        ):
-            driver.send(message)
-        for k, at in enumerate((0.2, 0.9, 4.0)):
-            while step is not None and driver.now + step < at:
-                driver.run(driver.now + step)
-                driver.session.tick(driver.opened + driver.now)
-                driver.collect()
-            driver.run(at)
-            driver.send(CALM.format(id=f"b{k}"))
-        driver.run(9.0)
-        return driver.clients[1].messages
-
-    assert play(None) == play(0.007)
-
-
-def test_tick_sends_frames_while_documents_wait(driver) -> None:
-    driver.send({"type": "subscribe", "stream": "fap", "fps": 25})
-    now = driver.opened
-    for k in range(3):
-        driver.session.receive(1, CALM.format(id=f"b{k}"), now)
-    driver.collect()
-    assert driver.session.has_documents
-    for frame in range(1, 6):
-        assert driver.session.next_due() == pytest.approx(now + frame / 25)
-        driver.session.tick(now + frame / 25, read_documents=False)
-        driver.collect()
-    assert [frame.frame for frame in driver.clients[1].frames] == list(range(6))
-    assert driver.session.has_documents
-    driver.run(0.3)
-    assert not driver.session.has_documents
-    assert driver.clients[1].ids[-1] != "prediction"
-    assert {"b0:end", "b1:end", "b2:start"} <= set(driver.clients[1].ids)
-
-
-@pytest.mark.parametrize("message", ["ping", "state", "stop", "unsubscribe"])
-def test_receive_sends_what_is_due_before_it_handles_a_late_message(driver, message) -> None:
-    driver.send(FAP | {"fps": 25})
-    driver.send('<bml id="b"><wait id="w" duration="0.5"/></bml>')
-    client = driver.run(0.49)
-    before, driver.now = len(client.messages), 0.53  # nobody has woken it at 0.5 and at 0.52
-    driver.send({"type": message, "stream": "fap"} if message == "unsubscribe" else {"type": message})
-    point, end, frame = client.messages[before : before + 3]
-    assert 'id="b:w:end"' in point
-    assert 'status="DONE"' in end
-    assert unpack(frame).frame == 13
-
-
-def test_replies_round_times_to_microseconds(drive) -> None:
-    driver = drive()
-    driver.run(1 / 3)
-    driver.send('<bml id="b"><wait id="w" duration="0.12345678"/></bml>')
-    client = driver.send({"type": "ping", "id": 1})
-    driver.send({"type": "state"})
-    driver.send({"type": "hello"})
-    (pong,), (state,), (welcome,) = (client.of(kind) for kind in ("pong", "state", "welcome"))
-    assert pong["time"] == state["time"] == welcome["time"] == 0.333333
-    (block,) = state["blocks"]
-    assert (block["start"], block["end"]) == (0.333333, 0.45679)
-
-
-def test_state_lists_the_layers_of_the_face(drive) -> None:
-    driver = drive(idle=False)
-    mood = '<mood xmlns="urn:bml-realizer:1" id="s" name="joy" end="1"/>'
-    driver.send(f'<bml id="m">{mood}</bml>')
-    driver.send('<bml id="b"><faceFacs id="f" au="4" amount="0.5" attackPeak="0.2" relax="8" end="9"/></bml>')
-    gaze = '<gaze id="g" target="cup" offsetAngle="20" offsetDirection="LEFT" start="0" ready="0.5" end="9"/>'
-    driver.send(f'<bml id="g">{gaze}</bml>')
-    driver.send({"type": "set", "aus": {"2L": 0.25}, "faps": {"open_jaw": 120}})
-    driver.run(3.0)
-    state = driver.send({"type": "state"}).of("state")[-1]
-    (face,) = state["characters"]
-    layers = face["layers"]
-    assert layers["expression"] == {"aus": {"4L": 0.5, "4R": 0.5}, "faps": {}}
-    assert layers["direct"] == {"aus": {"2L": 0.25}, "faps": {"open_jaw": 120}}
-    assert layers["base"]["aus"]["12L"] == layers["base"]["aus"]["12R"] > 0.1
-    assert layers["gaze"]["aus"]
-    assert "idle" not in layers
-    assert face["aus"]["4L"] > 0
-    assert face["face"] == driver.session.faces.name(0)
-    assert {(b["id"], *b["behaviours"]) for b in state["blocks"]} >= {("b", "f"), ("g", "g")}

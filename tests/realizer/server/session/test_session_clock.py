@@ -58,7 +58,7 @@ def test_session_plans_nothing_before_what_has_happened() -> None:
 
 def test_session_whose_host_goes_back_writes_a_journal_that_rises(tmp_path) -> None:
     driver, times = Driver(), list[float]()
-    driver.session.journal.append = lambda at, *entry: times.append(at)  # type: ignore[method-assign]
+    driver.session.journal.writer.append = lambda at, *entry: times.append(at)  # type: ignore[method-assign]
     for now in (3.0, 1.0, 0.0, 4.0):
         driver.session.receive(1, NOD.format(f"b{now:g}"), driver.opened + now)
         driver.session.tick(driver.opened + now)

@@ -78,7 +78,7 @@ def test_audio_subscription_takes_back_sound_after_a_stop(driver) -> None:
 
 def test_audio_subscription_is_due_a_tenth_before_the_next_packet(driver) -> None:
     driver.send({"type": "subscribe", "stream": "audio"})
-    (subscription,) = driver.session._connections[1].subscriptions.values()
+    (subscription,) = driver.session.connections[1].subscriptions.values()
     assert subscription.next_due() == math.inf
     driver.send('<bml id="b"><speech id="s" start="2"><text>Hello</text></speech></bml>')
     assert not list(subscription.messages(driver.now))

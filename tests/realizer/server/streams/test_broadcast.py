@@ -82,7 +82,7 @@ def test_broadcast_sends_the_newest_frame_of_an_overload(
     driver.collect()
     (frame,) = driver.clients[1].frames[before:]
     assert frame.frame == 35
-    assert [driver.session.dropped_count(viewer) for viewer in range(1, viewers + 1)] == [lost] * viewers
+    assert [client.dropped for client in driver.session.connections.values()] == [lost] * viewers
 
 
 def test_next_message_returns_none_after_the_last_frame() -> None:
