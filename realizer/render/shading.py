@@ -171,6 +171,11 @@ def reflected(row: Any, hair: Any, albedo: Any, normals: Any, values: Any, view:
     reach = one - np.float32(DIRECT) * (one - occlusion)
     nv, nl, nl_smooth = max(dot(n, view), np.float32(1e-3)), dot(n, key), dot(smooth, key)
     edge = np.float32(math.pow(one - min(nv, one), rim_power)) * reach
+    # Cards are made of flat pieces; the strands that they show bend as evenly as the normals do.
+    along = dot(strand, smooth)
+    strand = unit((
+        strand[0] - along * smooth[0], strand[1] - along * smooth[1], strand[2] - along * smooth[2]
+    ))  # fmt: skip
     along = dot(strand, key)
     cosines = (
         nl, nl_smooth, max(one - along * along, zero) if hair else zero, reached,

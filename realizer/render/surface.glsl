@@ -119,6 +119,8 @@ vec3 reflectedBy(int kind, vec3 albedo, vec3 n, vec3 even, vec3 strand, vec4 val
   float thin = (1.0 - thickness) * shine.w * occlusion * occlusion;
   vec3 wrap = surfaceWrap[kind];
   vec3 facing = max((nl + (lit - nl) * surfaceSoft[kind] + wrap) / (1.0 + wrap), 0.0);
+  // Cards are made of flat pieces; the strands that they show bend as evenly as the normals do.
+  strand = unitOf(strand - dot(strand, even) * even);
   float aslant = dot(strand, keyDirection), across = hair ? max(1.0 - aslant * aslant, 0.0) : 0.0;
   facing += across * (sqrt(across) * max(0.0, 0.5 + lit) - facing);
   vec3 behind = max(0.0, 0.1 - lit) * thin * thinColour;

@@ -12,6 +12,7 @@ from realizer.facebuild.person.scalp import Scalp
 
 # Directions from the skull's middle to vertices that only the head's turns move: left, right, behind, above.
 ANCHORS = (0.85, 0.30, -0.45), (-0.85, 0.30, -0.45), (0.0, 0.25, -1.0), (0.0, 1.0, -0.3)
+HANGS = -0.08  # m; the height from the eyes below which hair hangs
 STILL = 0.02  # share of the head's turn below which a vertex belongs to the bust
 
 
@@ -27,8 +28,8 @@ def bind(
 
     Seven vertices lead each vertex of a card: three around its root in the skin, and four of the skull, by
     which the rest is a fixed way off the root in the head's frame. Hair on the skull has no root in the skin:
-    the four lead its whole place. Below the skull one vertex at the foot of the neck takes the place of the
-    uppermost of the four, so that hair there hangs between head and bust.
+    the four lead its whole place, and below the skull a vertex at the foot of the neck more and more instead
+    of the middle of the four, so that hair there hangs between head and bust.
 
     Args:
         at: (n, 3) metres, the mesh; turns: (n,) 0..1, how far each vertex turns with the head.
@@ -40,12 +41,13 @@ def bind(
     rooted = patch.skin[:, 0] >= 0
     skin = np.where(rooted[:, None], patch.skin, foot)
     shares = patch.shares.copy()
-    free = patch.places - (at[skin] * shares[..., None]).sum(axis=1)
-    wanted = np.c_[free, 1 - shares.sum(axis=1)]
-    weights, low = (wanted @ _inverse(at[four]).T for four in (skull, np.r_[skull[:3], foot]))
-    hangs = ~rooted & (low[:, 3] > 0)
-    weights[hangs] = low[hangs] * [1, 1, 1, 0]
-    shares[hangs, 0] = low[hangs, 3]
+    low = (HANGS - patch.places[:, 1]) / (HANGS - at[foot, 1])
+    shares[:, 0] = np.where(rooted, shares[:, 0], np.clip(low, 0, 1))
+    hung = np.where(rooted, 0, shares[:, 0])[:, None]
+    middle = at[skull].mean(axis=0)
+    free = patch.places - (at[skin] * shares[..., None]).sum(axis=1) + hung * middle
+    wanted = np.c_[free, 1 - shares.sum(axis=1, keepdims=True) + hung]
+    weights = wanted @ np.linalg.inv(np.c_[at[skull], np.ones(4)]) - hung / 4
     turned = patch.ups @ np.linalg.pinv(ups[skull])
     return Cards(
         roots=np.c_[skin, np.tile(skull, (len(skin), 1))].astype(np.int32),
@@ -58,11 +60,6 @@ def bind(
         gloss=patch.gloss.astype(np.float32),
         parts=parts,
     )
-
-
-def _inverse(four: Float64) -> Float64:
-    """Return the matrix (4, 4) that makes (x, y, z, sum of weights) weights of four places (4, 3)."""
-    return np.linalg.inv(np.c_[four, np.ones(4)].T)
 
 
 def _anchors(at: Float64, scalp: Scalp, turns: Float64) -> tuple[Int32, int]:

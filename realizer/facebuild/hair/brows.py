@@ -85,6 +85,6 @@ def brow(
     width = WIDE * rng.uniform(0.8, 1.2, (count, 1)) * np.array([1.0, 1.0, 0.7])
     light = np.broadcast_to(0.75 + 0.25 * ROWS, (count, 3))
     return ribbons(
-        places, ups, width, ["brow"] * count, np.clip(tint, 0, 255), light, 0.15,
+        places, ups, width, ["brow"] * count, np.clip(tint, 0, 255), light, 0.0,
         (corners, np.repeat(shares[:, None], 3, axis=1)),
     )  # fmt: skip

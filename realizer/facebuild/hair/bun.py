@@ -13,7 +13,7 @@ from realizer.facebuild.hair.strands import unit
 from realizer.facebuild.hair.style import Style
 from realizer.facebuild.person.scalp import Scalp
 
-ROWS, TURNS, ROWS_OF = 8, 26, 7
+ROWS, TURNS, RINGS = 6, 26, 7
 
 
 def bun(scalp: Scalp, style: Style, tints: Callable[[int], Float64], rng: Any) -> Patch:
@@ -26,8 +26,8 @@ def bun(scalp: Scalp, style: Style, tints: Callable[[int], Float64], rng: Any) -
     centre = crest + pole * radii[2] * 0.72
     places, ups, widths, lights = [], [], [], []
     s = np.linspace(0, 1, ROWS + 1)
-    for ring in range(ROWS_OF):
-        polar = np.pi * (0.10 + 0.78 * (ring + 0.5) / ROWS_OF)
+    for ring in range(RINGS):
+        polar = np.pi * (0.10 + 0.78 * (ring + 0.5) / RINGS)
         count = max(4, round(TURNS * np.sin(polar) / 2))
         for k in range(count):
             turn = 2 * np.pi * ((k + rng.uniform(0, 1)) / count) + s * rng.uniform(1.3, 1.9)

@@ -1,4 +1,4 @@
-"""All cards of a face: hair, brows and lashes, and the file that holds them."""
+"""All cards of a face: hair, brows, lashes and beard, and the file that holds them."""
 
 from __future__ import annotations
 
@@ -9,26 +9,29 @@ from pathlib import Path
 
 import numpy as np
 
+from realizer.core.array_types import Float64
 from realizer.face.cards import FILE, Cards
 from realizer.face.mesh_geometry import part_triangles
 from realizer.face.model import Face
 from realizer.face.subdivision import subdivided
 from realizer.facebuild.face_files import to_bytes
+from realizer.facebuild.hair.beard import COUNT, beard
 from realizer.facebuild.hair.bind import bind
 from realizer.facebuild.hair.brows import brow
 from realizer.facebuild.hair.cards import joined
-from realizer.facebuild.hair.grow import hair
+from realizer.facebuild.hair.grow import hair, tints
 from realizer.facebuild.hair.lashes import Margin, lashes
 from realizer.facebuild.hair.style import style_of
 from realizer.facebuild.person.recipe import Recipe, appearance_of
 from realizer.facebuild.person.scalp import Scalp
 
 
-def face_cards(face: Face, recipe: Recipe, margins: Sequence[Margin]) -> Cards:
+def face_cards(face: Face, recipe: Recipe, margins: Sequence[Margin], bearded: Float64) -> Cards:
     """Return the cards of a face that was built without them.
 
     Args:
         margins: the edges of the lids.
+        bearded: (n,) 0..1, where a beard grows on the skin.
     """
     look, colours = appearance_of(recipe.look), recipe.colours
     points = {name: np.array(place, float) for name, place in face.points.items()}
@@ -44,6 +47,9 @@ def face_cards(face: Face, recipe: Recipe, margins: Sequence[Margin]) -> Cards:
         "brows": [brow(skin, drawn, points, side, colours["brows"], look, rng) for side in (1, -1)],
         "lashes": [lashes(at, margin, colours["lashes"], look.lash, rng) for margin in margins],
     }
+    if look.beard:
+        tint = tints(style, colours["hair"], COUNT, rng)
+        groups["beard"] = [beard(skin, scalp, bearded, points, look.beard, tint, rng)]
     patches = {name: joined(group) for name, group in groups.items()}
     ends = np.cumsum([0] + [len(patch.places) for patch in patches.values()]).tolist()
     parts = dict(zip(patches, pairwise(ends), strict=True))

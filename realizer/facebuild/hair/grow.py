@@ -10,7 +10,7 @@ import numpy as np
 from realizer.core.array_types import Float64, Int32
 from realizer.facebuild.hair.bun import bun
 from realizer.facebuild.hair.cards import Patch, joined, ribbons
-from realizer.facebuild.hair.strands import LEAST, edge, grow, roots, unit
+from realizer.facebuild.hair.strands import LEAST, Strands, edge, grow, roots, unit
 from realizer.facebuild.hair.style import Style
 from realizer.facebuild.hair.texture import LEVEL, place
 from realizer.facebuild.parts import smooth
@@ -18,6 +18,8 @@ from realizer.facebuild.person.scalp import Scalp
 
 SEED = 11  # of the strands: the same head, the same hair
 GREY = np.array([196.0, 193.0, 190.0])
+THIN = ("loose", "sparse")  # what cards at the hairline show
+BORDER, SHORTEST = 3, 0.004  # segments of cards at the hairline; m of the shortest card
 NEAR = 0.012  # m from the skin in which cards are kept off it
 UNDER = 0.35  # layers below that show dense strands
 CAP = 0.0011  # m that the cap lies above the skin
@@ -92,8 +94,8 @@ def _wrapped(scalp: Scalp, triangles: Int32) -> tuple[Int32, Float64, Int32]:
     off = across - middle
     off *= np.minimum(1, 0.45 / np.abs(off).max(axis=1, keepdims=True))
     low, high = -off.min(axis=1, keepdims=True), 1 - off.max(axis=1, keepdims=True)
-    across = np.rint((np.clip(middle % 1, low, high) + off) * 200).astype(np.int64)
-    keys, corners = np.unique(triangles * 1000 + across, return_inverse=True)
+    steps = np.rint((np.clip(middle % 1, low, high) + off) * 200).astype(np.int64)
+    keys, corners = np.unique(triangles * 1000 + steps, return_inverse=True)
     return keys // 1000, keys % 1000 / 200, corners.reshape(-1, 3).astype(np.int32)
 
 
@@ -101,42 +103,33 @@ def _locks(scalp: Scalp, style: Style, colour: Any, rng: Any) -> Patch:
     at = roots(scalp, style, style.cards, 0.003, 1.0, rng)
     count = len(at)
     layer = rng.permutation(np.linspace(0, 1, count) ** 0.7)
-    way = unit(at - scalp.middle)
     sides, top = style.length
-    length = (sides + (top - sides) * smooth(way[:, 1], 0.2, 0.85)) * rng.uniform(0.75, 1.15, count)
-    lines = grow(scalp, style, at, layer, length, style.segments, rng)
-    good = lines.length > 0.006
+    length = sides + (top - sides) * smooth(unit(at - scalp.middle)[:, 1], 0.2, 0.85)
+    lines = grow(scalp, style, at, layer, length * rng.uniform(0.75, 1.15, count), style.segments, rng)
     s = np.linspace(0, 1, style.segments + 1)
     shape = (0.45 + 0.75 * smooth(s, 0.0, 0.35)) * (1 - 0.55 * smooth(s, 0.5, 1.0))
     width = style.width * rng.uniform(0.7, 1.3, (count, 1)) * shape
-    light = (0.35 + 0.65 * lines.layer[:, None]) * (0.55 + 0.45 * smooth(s, 0.0, 0.5))
+    light = (0.35 + 0.65 * layer[:, None]) * (0.40 + 0.60 * smooth(s, 0.0, 0.35))
     names = np.where(layer < UNDER, "dense", rng.choice(style.strips, count))
-    inside = edge(scalp, style, at)
-    names = np.where(inside < rng.uniform(0.004, 0.016, count), rng.choice(["loose", "sparse"], count), names)
-    return ribbons(
-        lines.places[good], lines.ups[good], width[good], names[good], tints(style, colour, count, rng)[good],
-        light[good], style.gloss,
-    )  # fmt: skip
+    near = edge(scalp, style, at) < rng.uniform(0.004, 0.016, count)
+    names = np.where(near, rng.choice(THIN, count), names)
+    return _shown(lines, width, light, names, tints(style, colour, count, rng), style.gloss)
 
 
 def _border(scalp: Scalp, style: Style, colour: Any, rng: Any) -> Patch:
     """Return cards of few hairs along the hairline, so that it has no edge."""
-    at = roots(scalp, style, style.border, -0.0025, 0.008, rng)
+    at = roots(scalp, style, style.border, -0.004, 0.008, rng)
     count = len(at)
-    lines = grow(
-        scalp,
-        style,
-        at,
-        rng.uniform(0.1, 0.6, count),
-        style.border_length * rng.uniform(0.5, 1.2, count),
-        5,
-        rng,
-    )
-    width = 0.0055 * rng.uniform(0.7, 1.2, (count, 1)) * np.linspace(1, 0.8, 6)
-    good = lines.length > 0.003
-    light = np.full((count, 6), 0.9)
-    names = rng.choice(["sparse", "loose"], count)
+    layer, length = rng.uniform(0.1, 0.6, count), style.border_length * rng.uniform(0.5, 1.2, count)
+    lines = grow(scalp, style, at, layer, length, BORDER, rng)
+    width = 0.0048 * rng.uniform(0.7, 1.2, (count, 1)) * np.linspace(1, 0.8, BORDER + 1)
+    light = np.full((count, BORDER + 1), 0.9)
+    return _shown(lines, width, light, rng.choice(THIN, count), tints(style, colour, count, rng), style.gloss)
+
+
+def _shown(lines: Strands, width: Float64, light: Float64, names: Any, tint: Float64, gloss: float) -> Patch:
+    """Return cards along the lines that have a length."""
+    good = lines.length > SHORTEST
     return ribbons(
-        lines.places[good], lines.ups[good], width[good], names[good], tints(style, colour, count, rng)[good],
-        light[good], style.gloss,
-    )  # fmt: skip
+        lines.places[good], lines.ups[good], width[good], names[good], tint[good], light[good], gloss
+    )

@@ -14,7 +14,8 @@ from realizer.facebuild.person.scalp import Scalp
 
 STEP = 0.004  # m
 NEAR = 0.03  # m; farther away from skin, strands need not be kept off it
-EAR = 0.016  # m that hair over an ear lies above the skull
+SHARPEST = 0.6  # cosine of the sharpest bend between segments
+EAR = 0.015  # m that hair over an ear lies above the skull
 LEAST = 0.0006  # m that a strand lies above the skin
 DOWN = np.array([0.0, -1.0, 0.0])
 
@@ -109,6 +110,9 @@ def thickness(scalp: Scalp, style: Style, at: Float64) -> Float64:
     thick = np.interp(inside, *np.array(style.thick, float).T)
     side = 1 - (1 - style.sides) * smooth(np.abs(way[:, 0]), 0.35, 0.85)
     crown = 1 + style.crown * smooth(way[:, 1], 0.3, 0.9) * (1 - way[:, 0] ** 2)
+    if not style.tied:
+        # Hair lies flat where it is parted.
+        crown = crown * (0.25 + 0.75 * smooth(Flow(scalp, style).distance(at), 0.0, 0.03))
     return np.asarray(np.maximum(thick * side * crown, LEAST))
 
 
@@ -149,8 +153,6 @@ def grow(
         hang = style.heavy * smooth(edge(scalp, style, nxt), 0.012, -0.004)
         rise = np.minimum((run + STEP) * style.lift, 1.0)
         thick = thickness(scalp, style, nxt)
-        if not style.tied:
-            thick = thick * (0.25 + 0.75 * smooth(flow.distance(nxt), 0.0, 0.03))
         height = np.minimum(rise, thick * (1 - style.depth + style.depth * layer)).clip(LEAST)
         height = height * (1 - hang) + np.maximum(body, height) * hang
         height += style.heavy * EAR * smooth(scalp.off_ear(nxt), 0.030, -0.004)
@@ -168,17 +170,21 @@ def grow(
         if not alive.any():
             break
     path, run = np.stack(lines), runs[: len(lines)]
-    shares = np.linspace(0, 1, segments + 1)
+    # Hair that hangs is bent most on the crown.
+    shares = np.linspace(0, 1, segments + 1) ** (1 + 0.6 * style.heavy)
     places = np.empty((count, segments + 1, 3))
     for s in range(count):
         for axis in range(3):
             places[s, :, axis] = np.interp(shares * run[-1, s], run[:, s], path[:, s, axis])
-    # What would hang before the face is left out, and what stands off the crown.
+    # What would hang before the face is left out, and what stands off the crown or is bent sharply.
     wrong = (places[..., 2] > 0.045) & (places[..., 1] < 0.04)
     flat = places.reshape(-1, 3)
     off = scalp.lift(flat)[0] - 1.3 * thickness(scalp, style, flat) - 0.002
     wrong |= (off.reshape(wrong.shape) > 0) & (places[..., 1] > 0.06)
-    return Strands(places, _ups(scalp, places), layer, np.where(wrong.any(axis=1), 0, run[-1]))
+    ways = unit(np.diff(places, axis=1))
+    bent = (ways[:, 1:] * ways[:, :-1]).sum(axis=2).min(axis=1) < SHARPEST
+    length = np.where(wrong.any(axis=1) | bent, 0, run[-1])
+    return Strands(places, _ups(scalp, places), layer, length)
 
 
 def _ups(scalp: Scalp, places: Float64) -> Float64:

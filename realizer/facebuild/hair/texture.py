@@ -88,8 +88,9 @@ def _strip(strip: Strip, height: int, width: int, rng: np.random.Generator, whol
         centre = centre.clip(margin + wide / 2, 1 - margin - wide / 2)
         begin = strip.begins * rng.uniform(0, 1) ** (1.0 if whole else 2.0)
         end = 1.1 if whole else strip.ends + (1 - strip.ends) * rng.uniform(0, 1)
-        taper = np.clip((end - v) / 0.30, 0, 1) ** 0.6
-        on = np.clip((v - begin) / 0.04, 0, 1) * (v < end)
+        # Thin at the root and at the tip.
+        taper = np.clip((end - v) / 0.30, 0, 1) ** 0.6 * np.clip(0.35 + (v - begin) / 0.16, 0, 1)
+        on = np.clip((v - begin) / 0.08, 0, 1) * (v < end)
         half = wide / 2 * rng.uniform(0.75, 1.25) * np.maximum(taper, 0.25)
         cover = np.clip((half - np.abs(x - centre)) * width + 0.5, 0, 1) * on * np.clip(taper * 1.6, 0, 1)
         light = LEVEL + 0.22 * rng.uniform(-1, 1)

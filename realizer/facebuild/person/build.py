@@ -23,7 +23,7 @@ from realizer.facebuild.hair.face_cards import face_cards, write_cards
 from realizer.facebuild.hair.lashes import Margin
 from realizer.facebuild.mpeg4.rigid import Parts, opening_rows, sliding
 from realizer.facebuild.parts import Part
-from realizer.facebuild.person import makehuman
+from realizer.facebuild.person import makehuman, skin_colours
 from realizer.facebuild.person.bust import assemble
 from realizer.facebuild.person.fap_fields import face_fields
 from realizer.facebuild.person.lids import Lid
@@ -71,11 +71,12 @@ def build_face(
     progress("write the files")
     (folder / CARDS).unlink(missing_ok=True)
     write_face(folder, name, recipe.description, person, made, fields, maps)
-    progress("grow hair, brows and lashes")
+    progress("grow hair, brows, lashes and beard")
     patch = made[0].patch
     assert patch is not None
     margins = lid_margins(lids, person, patch.sources())
-    write_cards(folder, face_cards(load_folder(folder, "mpeg4"), recipe, margins))
+    bearded = np.asarray(patch.mix @ skin_colours.beard(person.ground, lips))
+    write_cards(folder, face_cards(load_folder(folder, "mpeg4"), recipe, margins, bearded))
     return folder
 
 

@@ -21,6 +21,7 @@ from realizer.facebuild.submesh import Submesh
 from realizer.facebuild.teeth import teeth
 
 ORDER = ("skin", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue", "shirt", "glasses")
+UNDER_HAIR = 0.02  # m inside the hairline from which the skin needs few vertices
 MARGIN = 0.08  # m below the floor that the body is cut at by whole triangles first
 # Metres from the middle of the closed lips (2.2): how far the biting edges lie behind it and above it.
 # A resting jaw hangs a little: the rows do not touch.
@@ -93,7 +94,8 @@ def _decimate_hidden(part: Part, person: Person, scalp: Scalp, stays: Bool) -> P
     own = part.patch.sources()
     keep = (own >= 0) & stays[own]
     chin = float(person.ground.point("2.1")[1])
-    return clothing.decimate_hidden(part, keep, scalp.off_ear(part.vertices) < 0, chin, person.floor)
+    plain = (scalp.off_ear(part.vertices) < 0) | (scalp.high(part.vertices) > UNDER_HAIR)
+    return clothing.decimate_hidden(part, keep, plain, chin, person.floor)
 
 
 def _teeth(person: Person, recipe: Recipe) -> list[Part]:

@@ -47,21 +47,21 @@ def shirt(skin: Submesh, base: Float64, low: Float64, colour: list[float]) -> Pa
 
 # Baked light under which nothing is ever seen, and metres that surfaces may change by where vertices go.
 HIDDEN = 0.27
-UNSEEN, EAR, BUST, CLOTH, DEEP_CLOTH = 0.003, 0.0006, 0.0005, 0.0008, 0.003
+UNSEEN, PLAIN, BUST, CLOTH, DEEP_CLOTH = 0.003, 0.0006, 0.0005, 0.0008, 0.003
 
 
-def decimate_hidden(part: Part, keep: Any, ear: Any, chin: float, floor: float) -> Part:
+def decimate_hidden(part: Part, keep: Any, plain: Any, chin: float, floor: float) -> Part:
     """Return skin, shirt or tongue with fewer vertices where hidden, or evenly curved and far from the face.
 
     Args:
         part: with baked occlusion.
-        keep: (n,) vertices that stay; ear: (n,) those of the ears.
+        keep: (n,) vertices that stay; plain: (n,) those of ears and scalp.
         chin, floor: metres, heights of the chin and of the bust's lower end.
     """
     at, light = part.vertices, np.asarray(part.occlusion)
     if part.name == "skin":
         tolerance = np.where(light < HIDDEN, UNSEEN, 0)
-        tolerance = np.maximum(tolerance, np.where(ear, EAR, 0))
+        tolerance = np.maximum(tolerance, np.where(plain, PLAIN, 0))
         tolerance = np.maximum(tolerance, np.where(at[:, 1] < chin - 0.012, BUST, 0))
         pairs, count = edges_of(part.triangles)
         tolerance[pairs[count == 1].ravel()] = 0

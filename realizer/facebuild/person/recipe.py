@@ -35,6 +35,7 @@ class Appearance:
     brow_gap: float
     brow_arch: float
     brow_hair: float
+    beard: float
     lash: float
     lips: float
     flush: float

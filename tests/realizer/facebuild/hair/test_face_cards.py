@@ -18,7 +18,7 @@ from realizer.facebuild.person.recipe import Recipe
 def cards(head: Face, margin: Margin) -> Cards:
     raw = tomllib.loads((folder_of("ada") / "recipe.toml").read_text("utf-8"))
     recipe = Recipe("A head", {}, raw["colours"], {"style": "short", "cards": 40, "border": 20})
-    return face_cards(head, recipe, [margin])
+    return face_cards(head, recipe, [margin], np.zeros(head.parts["skin"][1]))
 
 
 def test_face_cards_have_hair_brows_and_lashes(cards: Cards, head: Face) -> None:
