@@ -7,7 +7,7 @@
 uniform sampler2D albedoMap;   // sRGB and alpha, unconverted
 uniform sampler2D slopeMap;    // slopes of the relief along u and v, and of the folds; 128 is level
 uniform sampler2D surfaceMap;  // occlusion, roughness, thickness
-uniform sampler2D shadowMap;   // depths as the key lamp sees them, 0 near the lamp to 1
+uniform highp sampler2D shadowMap;   // depths as the key lamp sees them, 0 near the lamp to 1
 uniform mediump sampler2DArray mirrorMap;  // the environment by roughness, octahedral
 
 uniform vec3 surfaceWrap[5];   // surfaces.toml, a row for each kind

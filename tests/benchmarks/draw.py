@@ -19,6 +19,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in the drawing process
 import numpy as np
 from stopwatch import median, noise
 
+from realizer.core.array_types import Float32
 from realizer.face.deform import deform
 from realizer.face.drawn_mesh import drawn_mesh
 from realizer.face.load import load_face
@@ -29,6 +30,7 @@ from realizer.render.backends import BACKENDS
 from realizer.render.cameras import camera_for
 from realizer.render.light import preset
 from realizer.render.opengl import OpenGLCanvas
+from realizer.render.raster import _fill
 from realizer.render.software import SoftwareCanvas
 from realizer.render.worker import encode
 
@@ -50,6 +52,36 @@ def film(face: str, size: str) -> tuple[float, float]:
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
     spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     return time.perf_counter() - begin, spent
+
+
+def by_processor(canvas: SoftwareCanvas, vertices: Float32, normals: Float32) -> list[tuple[str, float]]:
+    """Return the ms of the steps of a picture by the processor."""
+    raster = canvas._raster
+    whole = median(lambda: canvas.draw(vertices, normals), 30)
+    moving = canvas._moving
+    points, distances = canvas._camera.project(moving[:, :3], canvas._size)
+    near, mesh = (1 / distances).astype(np.float32), canvas._mesh
+
+    def see(rows: tuple[int, int]) -> None:
+        raster._keys[rows[0] : rows[1]] = 0
+        _fill(points, near, mesh.triangles, raster._sides, raster._fixed, raster._texels, rows, raster._keys)
+
+    moved = median(lambda: canvas._mesh(vertices, normals, canvas._folds(vertices)), 30)
+    shadow = median(lambda: raster._shadow_map(moving), 30)
+    seen = median(lambda: list(raster._pool.map(see, raster._bands)), 30)
+    rest = whole - moved - shadow - seen
+    return [("mesh", moved), ("shadow", shadow), ("visibility", seen), ("light", rest), ("all", whole)]
+
+
+def by_opengl(canvas: OpenGLCanvas, vertices: Float32, normals: Float32) -> list[tuple[str, float]]:
+    """Return the ms of the steps of a picture by OpenGL, whose passes are left out one after the other."""
+    whole = median(lambda: canvas.draw(vertices, normals), 30)
+    canvas._drawing = []
+    shadow = median(lambda: canvas.draw(vertices, normals), 30)
+    canvas._casting = []
+    rest = median(lambda: canvas.draw(vertices, normals), 30)
+    light = whole - shadow
+    return [("mesh, transfer", rest), ("shadow", shadow - rest), ("visibility, light", light), ("all", whole)]
 
 
 def main() -> None:
@@ -78,15 +110,16 @@ def main() -> None:
     line("deform, a frame of a batch of 16", median(lambda: deform(face, batch), 20) / 16)
     line("normals, likewise", median(lambda: normals(face, vertices), 20) / 16)
     line("deform and normals, one frame alone", median(lambda: normals(face, deform(face, rows[:1])), 40))
-    mesh, level = drawn_mesh(face), np.zeros(len(face.vertices), np.float32)
+    mesh = drawn_mesh(face)
     print(f"drawn: {len(mesh.uv)} vertices, {len(mesh.triangles)} triangles")
-    line("vertices and normals of the drawn mesh", median(lambda: mesh(vertices[0], ups[0], level), 40))
     own = SoftwareCanvas(face, size, camera, preset())
-    line("by the processor, four samples a pixel", median(lambda: own.draw(vertices[0], ups[0]), 60))
+    for step, ms in by_processor(own, vertices[0], ups[0]):
+        line(f"by the processor: {step}", ms)
     picture = own.draw(vertices[0], ups[0])
     if (missing := unavailable_reason("gl")) is None:
         canvas = OpenGLCanvas(face, size, camera, preset())
-        line("by OpenGL, four samples a pixel", median(lambda: canvas.draw(vertices[0], ups[0]), 60))
+        for step, ms in by_opengl(canvas, vertices[0], ups[0]):
+            line(f"by OpenGL: {step}", ms)
         canvas.close()
     else:
         print(f"by OpenGL: {missing}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from importlib.resources import files
 
 import numpy as np
@@ -34,11 +35,8 @@ def lamp():
 
 def test_uniforms_of_a_light_are_those_of_surface_glsl(lamp):
     code = files("realizer.render").joinpath("surface.glsl").read_text()
-    declared = {
-        name.split("[")[0].strip()
-        for line in code.splitlines() if line.startswith("uniform ")
-        for name in line.split(";")[0].split(maxsplit=2 + ("mediump" in line))[-1].split(",")
-    }  # fmt: skip
+    lines = re.findall(r"^uniform (?:highp |mediump )?\w+ (.*?);", code, re.MULTILINE)
+    declared = {name.split("[")[0].strip() for line in lines for name in line.split(",")}
     maps = {name for name in declared if name.endswith("Map")}
     assert declared - maps == set(uniforms_of(preset(), lamp))
 
@@ -120,3 +118,27 @@ def test_surface_glsl_is_the_formula_of_the_processor(numbers, kind, name):
         wanted.append((*seen, reach((four, lamp.matrix), tuple(place[:3]), tuple(even[:3]))))
     found = by_card(numbers, kind, light, lamp, depths)
     assert found == pytest.approx(np.array(wanted), rel=4e-3, abs=2e-3)
+
+
+@pytest.mark.gl("gl")
+@pytest.mark.parametrize(
+    "head",
+    ["#version 330 core\n", "#version 300 es\nprecision highp float;\nprecision highp sampler2DArray;\n"],
+)
+def test_surface_glsl_is_valid_on_the_desktop_and_on_the_web(head):
+    from realizer.render import opengl
+
+    vertex = "in vec3 at; out vec3 place; void main() { place = at; gl_Position = vec4(at, 1.0); }"
+    main = """
+    in vec3 place;
+    out vec4 pixel;
+    void main() {
+      pixel.a = coverOf(place.xy, 0.0);
+      pixel.rgb = surfaceColour(0, place, place, place.xy, place, place.xy, 0.5, gl_FrontFacing, place);
+    }
+    """
+    context = opengl._context()
+    with context as gl:
+        code = head + files("realizer.render").joinpath("surface.glsl").read_text() + main
+        assert "albedoMap" in gl.program(vertex_shader=head + vertex, fragment_shader=code)
+    context.release()
