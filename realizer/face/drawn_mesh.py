@@ -33,6 +33,8 @@ class DrawnMesh:
 
     Attributes:
         places: sparse (d, n) float32; drawn vertices = places @ vertices of the face.
+        strands: sparse (d, n) float32; direction of hairs = strands @ vertices of the face, of any length; 0
+            where there are no hairs.
         ups: sparse (d, n) float32; drawn normals = ups @ normals of the face, at length 1.
         triangles: (t, 3) int32, counter-clockwise seen from outside, part after part.
         uv: (d, 2) float32, place in the maps, (0, 0) at the top left.
@@ -45,6 +47,7 @@ class DrawnMesh:
     """
 
     places: Any
+    strands: Any
     ups: Any
     triangles: Int32
     uv: Float32
@@ -93,8 +96,10 @@ def drawn_mesh(face: Face) -> DrawnMesh:
     for name, ends in parts.items():
         kind[slice(*ends)] = KINDS.get(name, SKIN)
         solid[slice(*ends)] = name in SOLID
+    bald = 0 * places[source]
+    bald.eliminate_zeros()
     mesh = DrawnMesh(
-        places[source], ups[source], triangles, uv, fine.colours[source], fine.occlusion[source],
+        places[source], bald, ups[source], triangles, uv, fine.colours[source], fine.occlusion[source],
         fine.gloss[source], kind, parts,
         np.asarray(~solid[triangles].all(axis=1)), np.asarray(corners[:, 0, 2] > 0),
     )  # fmt: skip
@@ -125,8 +130,9 @@ def _with_cards(mesh: DrawnMesh, cards: Cards, n: int) -> DrawnMesh:
         for whole, own in ((mesh.places, cards.weights), (mesh.ups, cards.ups))
     )
     sides = np.ones(len(cards.triangles), bool)
+    strands = sp.vstack([mesh.strands, _along_v(cards) @ places[first:]], format="csr").astype(np.float32)
     return DrawnMesh(
-        places, ups,
+        places, strands, ups,
         np.concatenate([mesh.triangles, cards.triangles + first]).astype(np.int32),
         np.concatenate([mesh.uv, cards.uv]),
         np.concatenate([mesh.colours, cards.colours]),
@@ -137,3 +143,18 @@ def _with_cards(mesh: DrawnMesh, cards: Cards, n: int) -> DrawnMesh:
         np.concatenate([mesh.two_sided, sides]),
         np.concatenate([mesh.see_through, sides]),
     )  # fmt: skip
+
+
+def _along_v(cards: Cards) -> Any:
+    """Return a sparse matrix (c, c): times the places of cards' vertices, the direction in which v grows."""
+    import scipy.sparse as sp
+
+    a, b, c = cards.triangles.T
+    (u, v), (s, t) = ((cards.uv[end] - cards.uv[a]).T for end in (b, c))
+    # On a triangle that direction is u (c - a) - s (b - a), over u t - s v; its area weighs it.
+    way = np.sign(u * t - s * v)
+    weights = np.concatenate([(s - u) * way, -s * way, u * way])
+    corners = np.concatenate([a, b, c])
+    rows = np.concatenate([np.tile(end, 3) for end in (a, b, c)])
+    entries = np.tile(weights, 3), (rows, np.tile(corners, 3))
+    return sp.csr_matrix(entries, (len(cards.uv), len(cards.uv)))

@@ -30,8 +30,8 @@ class Canvas(ABC):
         self._mesh, self._folds = drawn_mesh(face), Folds(face)
         self._texels = texels_of(face.maps, 2 * max(size))
         self._lamp = LampView(light.key.direction, *face.bounds)
-        # Place, unit normal and share of the folds of each drawn vertex.
-        self._moving = np.zeros((len(self._mesh.uv), 7), np.float32)
+        # Place, unit normal, share of the folds and direction of hairs of each drawn vertex.
+        self._moving = np.zeros((len(self._mesh.uv), 10), np.float32)
         self._backdrop, self._channels = backdrop(size, light, background), channels(background)
         self._open()
 
@@ -43,7 +43,8 @@ class Canvas(ABC):
         """
         if out is None:
             out = np.empty((*self._size[::-1], self._channels), np.uint8)
-        self._moving[:, :3], self._moving[:, 3:] = self._mesh(vertices, normals, self._folds(vertices))
+        self._moving[:, :3], self._moving[:, 3:7] = self._mesh(vertices, normals, self._folds(vertices))
+        self._moving[:, 7:] = self._mesh.strands @ vertices
         return over(self._pixels(), self._backdrop, out)
 
     @abstractmethod

@@ -43,19 +43,20 @@ TEXTURES = {
     "slopeMap": (SLOPE_U, SLOPE_V, FOLD_U, FOLD_V),
     "surfaceMap": tuple(range(OCCLUSION, THICKNESS + 1)),
 }
-MOVING, FIXED = ("place", "normal", "fold"), ("uv", "colour", "occlusionRough", "kind")
+MOVING, FIXED = ("place", "normal", "fold", "strand"), ("uv", "colour", "occlusionRough", "kind")
 
 VERTEX = """#version 400 core
 uniform mat4 world;
-in vec3 place, normal; in float fold; in vec2 uv; in vec3 colour; in vec2 occlusionRough; in float kind;
-out vec3 at, up, tint; out vec2 map, hidden; out float folded; flat out int sort;
+in vec3 place, normal, strand; in float fold, kind; in vec2 uv, occlusionRough; in vec3 colour;
+out vec3 at, up, hair, tint; out vec2 map, hidden; out float folded; flat out int sort;
 void main() {
   gl_Position = world * vec4(place, 1.0);
-  at = place; up = normal; tint = colour; map = uv; hidden = occlusionRough; folded = fold; sort = int(kind);
+  at = place; up = normal; hair = strand; tint = colour; map = uv;
+  hidden = occlusionRough; folded = fold; sort = int(kind);
 }
 """
 HEAD = """#version 400 core
-in vec3 at, up, tint; in vec2 map, hidden; in float folded; flat in int sort;
+in vec3 at, up, hair, tint; in vec2 map, hidden; in float folded; flat in int sort;
 """
 # The samples of a pixel that a card covers: those whose threshold its alpha exceeds; layers of hair differ.
 COVER = """
@@ -72,7 +73,7 @@ DRAW = """
 uniform vec3 eye;
 out vec4 pixel;
 void main() {
-  pixel = vec4(surfaceColour(sort, at, up, map, tint, hidden, folded, gl_FrontFacing, eye), 1.0);
+  pixel = vec4(surfaceColour(sort, at, up, hair, map, tint, hidden, folded, gl_FrontFacing, eye), 1.0);
 }
 """
 DRAW_HOLES = COVER + DRAW.replace("main() {", "main() {\n  gl_SampleMask[0] = coveredBy(coverOf(map, 0.0));")
@@ -133,7 +134,7 @@ class OpenGLCanvas(Canvas):
         return arrays
 
     def _array(self, gl: Any, program: Any, which: Any) -> Any:
-        buffers = [(self._moved, MOVING, "3f 3f 1f"), (self._fixed, FIXED, "2f 3f 2f 1f")]
+        buffers = [(self._moved, MOVING, "3f 3f 1f 3f"), (self._fixed, FIXED, "2f 3f 2f 1f")]
         index = gl.buffer(self._mesh.triangles[which].tobytes())
         return gl.vertex_array(
             program, [(buffer, form, *names) for buffer, names, form in buffers], index, skip_errors=True

@@ -69,7 +69,8 @@ class Raster:
         Args:
             points: (d, 2) pixels, x to the right and y down from the top left corner.
             nearness: (d,) 1 / distance, which is linear in the picture.
-            moving: (d, 7) place and unit normal in metres, and how much of the folds shows.
+            moving: (d, 10) place and unit normal in metres, how much of the folds shows, and the direction
+                of hairs.
             lights: as `shading.reflected` takes them.
             eye: (3,) place of the camera in metres.
         """
@@ -288,9 +289,13 @@ def _light_of(t: Any, x: Any, y: Any, points: Any, moving: Any, mesh: Any, texel
     place = _mixed(moving, 0, a, b, c, (q, s, r))
     smooth = unit(_mixed(moving, 3, a, b, c, (q, s, r)))
     towards = unit((eye[0] - place[0], eye[1] - place[1], eye[2] - place[2]))
-    if dot(smooth, towards) < 0 and turn > 0:
+    kind = kinds[a]
+    # Hairs have the normals of the head that they grow on, whichever way their card is seen.
+    if dot(smooth, towards) < 0 and turn > 0 and kind != HAIR:
         smooth = (-smooth[0], -smooth[1], -smooth[2])
     along, down = _frame(fixed, moving, (a, b, c))
+    if kind == HAIR:
+        down = unit(_mixed(moving, 7, a, b, c, (q, s, r)))
     fold = q * moving[a, 6] + s * moving[b, 6] + r * moving[c, 6]
     scale = np.float32(STEEPEST / 127)
     su = (texel[4] - 128 + (texel[9] - 128) * fold) * scale
@@ -304,7 +309,6 @@ def _light_of(t: Any, x: Any, y: Any, points: Any, moving: Any, mesh: Any, texel
     occlusion = (q * fixed[a, 5] + s * fixed[b, 5] + r * fixed[c, 5]) * texel[6] * byte
     rough = max((q * fixed[a, 6] + s * fixed[b, 6] + r * fixed[c, 6]) * texel[7] * byte, np.float32(0.06))
     values = (occlusion, rough, texel[8] * byte, reach(shadows, place, smooth))
-    kind = kinds[a]
     return reflected(rows[kind], kind == HAIR, albedo, (relief, smooth, down), values, towards, lights)
 
 

@@ -175,11 +175,12 @@ float coverOf(vec2 uv, float coarser) {
 }
 
 // The picture's colour, sRGB, of a point of a surface.
-//   place, normal: in metres, the normal at any length. uv: (0, 0) at the top left of the maps.
+//   place, normal, strand: in metres; the normal and the direction of hairs at any length.
+//   uv: (0, 0) at the top left of the maps.
 //   colour: linear, multiplied with the albedo map. occlusion, rough: likewise with the surface map.
 //   fold: share of the folds that shows. front: whether it is the front of the triangle. eye: the camera's place.
-vec3 surfaceColour(int kind, vec3 place, vec3 normal, vec2 uv, vec3 colour, vec2 occlusionRough, float fold,
-                   bool front, vec3 eye) {
+vec3 surfaceColour(int kind, vec3 place, vec3 normal, vec3 strand, vec2 uv, vec3 colour, vec2 occlusionRough,
+                   float fold, bool front, vec3 eye) {
   float level = levelOf(uv, vec2(textureSize(albedoMap, 0)));
   vec3 along, down;
   frameOf(place, uv, along, down);
@@ -187,10 +188,11 @@ vec3 surfaceColour(int kind, vec3 place, vec3 normal, vec2 uv, vec3 colour, vec2
   vec4 slopes = textureLod(slopeMap, uv, level) * 255.0 - 128.0;
   vec3 values = textureLod(surfaceMap, uv, level).rgb;
   vec3 view = unitOf(eye - place), even = unitOf(normal);
-  if (!front && dot(even, view) < 0.0) even = -even;
+  // Hairs have the normals of the head that they grow on, whichever way their card is seen.
+  if (!front && dot(even, view) < 0.0 && kind != hairKind) even = -even;
   vec2 slope = (slopes.xy + slopes.zw * fold) * (steepest / 127.0);
   vec3 relief = unitOf(even - slope.x * along - slope.y * down);
   values.xy *= occlusionRough;
   values.y = max(values.y, 0.06);
-  return pictureOf(reflectedBy(kind, albedo, relief, even, down, vec4(values, reachOf(place, even)), view));
+  return pictureOf(reflectedBy(kind, albedo, relief, even, unitOf(strand), vec4(values, reachOf(place, even)), view));
 }

@@ -56,6 +56,29 @@ def test_drawn_mesh_has_a_vertex_for_each_side_of_a_seam():
     assert mesh.uv[mesh.triangles[~mesh.see_through]] == pytest.approx(0.25, abs=1e-5)
 
 
+def test_drawn_mesh_has_the_direction_of_hairs_where_v_grows():
+    roots = np.arange(4, dtype=np.int32)
+    rest = FACE.vertices[:4]
+    cards = Cards(
+        roots=np.tile(roots, (4, 1)),
+        weights=np.eye(4, dtype=np.float32),
+        ups=np.ones((4, 4), np.float32),
+        triangles=np.int32([[0, 1, 2], [2, 1, 3]]),
+        uv=np.float32([[0, 0], [0.1, 0], [0, 0.1], [0.1, 0.1]]),
+        colours=np.zeros((4, 3), np.uint8),
+        occlusion=np.ones(4, np.float32),
+        gloss=np.zeros(4, np.float32),
+        parts={"hair": (0, 4)},
+    )
+    mesh = drawn_mesh(replace(FACE, cards=cards))
+    first, _ = mesh.parts["hair_cards"]
+    strands = mesh.strands @ FACE.vertices
+    assert not strands[:first].any()
+    along = strands[first] / np.linalg.norm(strands[first])
+    wanted = (rest[2] - rest[0]) / np.linalg.norm(rest[2] - rest[0])
+    assert along == pytest.approx(wanted, abs=1e-3)
+
+
 def test_drawn_mesh_adds_cards_that_follow_their_roots():
     cards = Cards(
         roots=np.zeros((3, 4), np.int32),

@@ -32,7 +32,7 @@ EYE = np.float32([0, 0, 100])
 def raster_of(triangles, colours, size=SIZE, uv=None, maps=None, **flags):
     count, none = len(colours), np.zeros(len(triangles), bool)
     mesh = DrawnMesh(
-        places=None, ups=None,
+        places=None, strands=None, ups=None,
         triangles=np.asarray(triangles, np.int32),
         uv=np.zeros((count, 2), np.float32) if uv is None else np.float32(uv),
         colours=np.zeros((count, 3), np.uint8),
@@ -48,7 +48,7 @@ def raster_of(triangles, colours, size=SIZE, uv=None, maps=None, **flags):
 def picture_of(raster, points, near):
     """The picture of points (n, 2) in pixels, all facing the camera and far from the shadows' box."""
     points = np.asarray(points, float)
-    moving = np.zeros((len(points), 7), np.float32)
+    moving = np.zeros((len(points), 10), np.float32)
     moving[:, :2], moving[:, 5] = points * (0.01, -0.01), 1
     return raster(points, near, moving, LIGHTS, EYE).copy()
 
