@@ -115,7 +115,8 @@ class Gltf:
         """
         items = self.list(name)
         if not 0 <= index < len(items):
-            raise FaceError(f"{self.path}: {name}: wanted an index 0..{len(items) - 1}, got {index!r}")
+            wanted = f"an index 0..{len(items) - 1}" if items else "none, as there are none"
+            raise FaceError(f"{self.path}: {name}: wanted {wanted}, got {index!r}; export the head again")
         return items[index]
 
     def put(self, index: int, values: Any) -> None:
@@ -268,7 +269,11 @@ class Gltf:
 
         found = self.item("images", image)
         name = f"images[{image}] {found.get('name') or found.get('uri', '')[:40]}".rstrip()
-        raw = self.view(found["bufferView"]) if "bufferView" in found else self._fetch(found.get("uri", ""))
+        if "bufferView" not in found and not found.get("uri"):
+            raise FaceError(
+                f"{self.path}: {name}: wanted a uri or a bufferView, got neither; export it again"
+            )
+        raw = self.view(found["bufferView"]) if "bufferView" in found else self._fetch(found["uri"])
         if raw[1:4] == b"KTX":
             raise FaceError(f"{self.path}: {name}: KTX2 textures are not read; undo them: {UNPACK_KTX}")
         try:

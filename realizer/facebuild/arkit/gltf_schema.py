@@ -217,6 +217,7 @@ def document_fault(document: Any) -> str:
         steps = (f"[{step}]" if isinstance(step, int) else f".{step}" for step in first["loc"])
         place = "".join(steps).removeprefix(".") or "document"
         wanted = first["msg"].replace("Input should be", "wanted").replace("Field required", "wanted a value")
+        wanted = wanted.replace("List should have", "wanted").replace(" after validation", "")
         try:
             got = repr(first["input"])[:80]
         except ValueError:

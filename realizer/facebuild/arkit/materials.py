@@ -89,6 +89,8 @@ def read_material(gltf: Gltf, number: int | None) -> tuple[Material, tuple[str, 
     for slot, info in slots.items():
         texture = _texture(gltf, info, slot) if info else None
         if texture is None:
+            if info:
+                notes.append(f"the {slot} texture has no picture that is known")
             continue
         chart = next((one.chart for one in textures.values()), texture.chart)
         if _places(texture.chart) == _places(chart):

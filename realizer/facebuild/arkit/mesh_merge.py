@@ -95,9 +95,11 @@ def merge_pieces(pieces: Sequence[Piece]) -> Surface:
     """Return the pieces as one surface, without transparent pieces.
 
     Raises:
-        FaceError: places or moves are not finite, or far larger than the head.
+        FaceError: all is transparent, or places or moves are not finite or far larger than the head.
     """
     pieces = [piece for piece in pieces if not piece.glass]
+    if not pieces:
+        raise FaceError("wanted surfaces that can be seen, got transparent ones alone; export the head again")
     counts = np.cumsum([0] + [len(piece.vertices) for piece in pieces])
     total = int(counts[-1])
     moves: dict[str, Float64] = {}

@@ -162,9 +162,10 @@ def _attribute(
         FaceError: its shape is another, or a value is not finite.
     """
     values = gltf.accessor(attributes[name])
-    if len(values) != n or values.shape[1] not in widths or not np.isfinite(values).all():
+    is_finite = bool(np.isfinite(values).all())
+    if len(values) != n or values.shape[1] not in widths or not is_finite:
         wanted = f"{n} x {' or '.join(map(str, widths))} finite numbers"
-        got = " x ".join(map(str, values.shape))
+        got = " x ".join(map(str, values.shape)) if is_finite else "NaN or infinity"
         raise FaceError(f"{where}: {name}: wanted {wanted}, got {got}; export the head again")
     return values
 

@@ -136,6 +136,15 @@ def test_gltf_names_the_command_that_undoes_ktx2(tmp_path: Path) -> None:
         gltf.pixels(0)
 
 
+def test_gltf_refuses_a_picture_without_a_place(tmp_path: Path) -> None:
+    document = {"asset": {"version": "2.0"}, "images": [{"name": "iris"}]}
+    gltf = Gltf(written(tmp_path / "x.glb", document, b""))
+    with pytest.raises(FaceError, match=r"images\[0\] iris: wanted a uri or a bufferView, got neither"):
+        gltf.pixels(0)
+    with pytest.raises(FaceError, match="samplers: wanted none, as there are none, got 2"):
+        gltf.item("samplers", 2)
+
+
 def test_gltf_names_a_picture_that_is_missing(tmp_path: Path) -> None:
     gltf = pictured(tmp_path / "x.glb", b"")
     (tmp_path / "x.png").unlink()

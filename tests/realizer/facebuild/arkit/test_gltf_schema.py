@@ -25,7 +25,7 @@ def test_document_fault_finds_none_in_a_sound_document() -> None:
         ({"nodes": 5}, "nodes: wanted a valid list, got 5"),
         ({"nodes": [{"mesh": "0"}]}, "nodes[0].mesh: wanted a valid integer, got '0'"),
         ({"nodes": [{"mesh": True}]}, "nodes[0].mesh: wanted a valid integer, got True"),
-        ({"nodes": [{"rotation": [0, 0]}]}, "nodes[0].rotation: List should have at least 4 items"),
+        ({"nodes": [{"rotation": [0, 0]}]}, "nodes[0].rotation: wanted at least 4 items"),
         ({"accessors": [ACCESSOR | {"count": 2**31}]}, "accessors[0].count: wanted less than 2147483648"),
         ({"accessors": [ACCESSOR | {"count": 10**5000}]}, "accessors[0].count: wanted less than"),
         ({"accessors": [{"count": 1, "type": "VEC3"}]}, "accessors[0].componentType: wanted a value"),

@@ -59,6 +59,11 @@ def test_read_material_says_what_is_not_drawn(tmp_path: Path) -> None:
     )
 
 
+def test_read_material_says_that_a_texture_has_no_picture(tmp_path: Path) -> None:
+    material, notes = read(tmp_path, {"normalTexture": {"index": 0}}, textures=[{}])
+    assert (material.textures, notes) == ((), ("the normal texture has no picture that is known",))
+
+
 def test_read_material_without_a_number_is_the_usual_one(tmp_path: Path) -> None:
     (tmp_path / "m.gltf").write_text('{"asset": {"version": "2.0"}}', "utf-8")
     material, _ = read_material(Gltf(tmp_path / "m.gltf"), None)

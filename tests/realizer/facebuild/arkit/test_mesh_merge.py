@@ -44,6 +44,11 @@ def test_merge_pieces_uses_arkit_names_and_drops_glass() -> None:
     assert len(surface.vertices) == 4
 
 
+def test_merge_pieces_refuses_glass_alone() -> None:
+    with pytest.raises(FaceError, match="got transparent ones alone"):
+        merge_pieces([piece(glass=True)])
+
+
 @pytest.mark.parametrize("amount", [np.nan, np.inf, -np.inf, 1e300, -2e6])
 def test_merge_pieces_refuses_moves_far_larger_than_the_head(amount: float) -> None:
     with pytest.raises(FaceError, match="wanted finite places and moves"):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from realizer.core.errors import FaceError
 from realizer.face.load import load_face
 from realizer.facebuild.arkit.gltf import Gltf
 from realizer.facebuild.arkit.scene import read_pieces
@@ -98,6 +99,15 @@ def test_read_pieces_reads_places_of_8_and_16_bits(
     (tmp_path / "t.glb").write_bytes(glb.bytes())
     (piece,) = read_pieces(Gltf(tmp_path / "t.glb"))
     assert piece.uv.tolist() == [[0, 1], [1, 0], [0, 0]]
+
+
+def test_read_pieces_refuses_places_that_are_not_finite(new_glb: Callable[[], Any], tmp_path: Path) -> None:
+    glb = with_texture(new_glb(), tmp_path)
+    attributes = glb.json["meshes"][0]["primitives"][0]["attributes"]
+    attributes["TEXCOORD_0"] = glb.accessor(np.array([[np.nan, 0], [1, 0], [0, 0]]))
+    (tmp_path / "t.glb").write_bytes(glb.bytes())
+    with pytest.raises(FaceError, match="TEXCOORD_0: wanted 3 x 2 finite numbers, got NaN or infinity"):
+        read_pieces(Gltf(tmp_path / "t.glb"))
 
 
 def test_read_pieces_turns_places_as_the_extension_says(new_glb: Callable[[], Any], tmp_path: Path) -> None:
