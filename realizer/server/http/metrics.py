@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import logging
 import re
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+
+log = logging.getLogger(__name__)
 
 MEDIA_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 # Upper bounds of buckets in seconds. Lateness is mostly below a millisecond, but may be several frames.
@@ -69,6 +72,25 @@ class Metrics:
         self.slow_steps = Histogram(SLOW_STEPS)
         self.counts: Counter[str] = Counter(dict.fromkeys(COUNTERS, 0))
         self._labels = "" if worker is None else f'worker="{worker}"'
+
+    def report_slow_step(self, seconds: float, action: str, session: str, connections: Sequence[int]) -> None:
+        """Count and log a step of the event loop that took long.
+
+        Args:
+            action: what it did, and for which session and connections.
+        """
+        self.slow_steps.pending.append(seconds)
+        fields = {
+            "session": session,
+            "connections": connections,
+            "seconds": round(seconds, 3),
+            "action": action,
+        }
+        log.info(
+            "slow step: %.0f ms for %s (session %s, connections %s)",
+            *(1000 * seconds, action, session, ", ".join(map(str, connections)) or "none"),
+            extra=fields,
+        )
 
     def text(self, now: Mapping[str, float], more: Mapping[str, int]) -> str:
         """Return all metrics in the text format.

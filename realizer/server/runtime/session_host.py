@@ -4,8 +4,6 @@ import asyncio
 import functools
 import itertools
 import logging
-import math
-from collections import deque
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -14,7 +12,6 @@ from realizer.core.settings import Settings
 from realizer.server.documents.limits import memory
 from realizer.server.http.metrics import Metrics
 from realizer.server.journal import TakenOver
-from realizer.server.journal.replay import catch_up
 from realizer.server.runtime.engines import Engines
 from realizer.server.runtime.fair_pool import FairPool
 from realizer.server.runtime.gc_policy import GcPolicy
@@ -26,7 +23,9 @@ from realizer.server.runtime.session_registry import (
     Visitor,
     worker_of,
 )
+from realizer.server.runtime.session_restorer import SessionRestorer
 from realizer.server.runtime.sliced_calls import SlicedCalls
+from realizer.server.runtime.turns import ReadingTurns, WakeUps
 from realizer.server.session.effects import Close, Draw, Effect, MoveConnection, Send, Speak
 from realizer.server.session.session import Session
 from realizer.server.streams.connection import SLOW
@@ -34,15 +33,6 @@ from realizer.server.transports.transport import Outbound
 
 log = logging.getLogger(__name__)
 
-# Wake-up times are rounded up to whole steps of uvloop's clock, except those so little after a step. A timer
-# of uvloop costs more than many frames: the sessions of a step share one.
-STEP = 0.001  # s
-SLACK = 5e-4  # of a step
-TURN = 0.004  # s; so long sessions are woken before the loop looks for messages again
-# Of the time since documents were last read, so much goes to documents before frames come again. When more is
-# due than can be done, frames are late and documents are still read.
-READING_SHARE = 0.25
-LONGEST_READING = 0.02  # s
 FRAME_SLICES = 5  # of time; frames that take longer to compute are continued with the documents, in turn
 MOST_WAITING = 100  # messages to a session that plans; then its clients are read more slowly
 CONGESTION = 0.02  # s; how often a client looks whether its session can take messages again
@@ -68,7 +58,7 @@ class SessionHost:
         self.settings = settings
 
         def is_local(session: str) -> bool:
-            if self._factory.journal is not None and not self._is_live(session):
+            if self._factory.journal is not None and not self._restorer.is_live(session):
                 return False  # another process may have it; only `restore`, before `join`, finds out
             return worker is None or worker_of(session, settings.workers, settings) == worker
 
@@ -85,18 +75,14 @@ class SessionHost:
         )
         self._engines = Engines(settings.deformer)
         self._clients: dict[int, Outbound] = {}
-        self._wakeups: dict[Session, tuple[float, int]] = {}  # times, and the steps they are rounded up to
-        self._steps: dict[int, dict[Session, None]] = {}  # the sessions of a step, which share a timer
-        self._due: deque[tuple[int, Session]] = deque()  # those whose step has come, to be woken in turn
-        self._reading: dict[Session, None] = {}  # sessions with paused calls or documents to read, in turn
-        self._reader: asyncio.Handle | None = None  # the next call of `_read`
         self._numbers = itertools.count(1)
         self._expiry_timer: asyncio.TimerHandle | None = None
         self._gc_policy = GcPolicy()
         self._closed = False
         self._takeover_check: asyncio.Task[None] | None = None
-        self._restoring: dict[str, asyncio.Task[None]] = {}
-        self._resumed: dict[str, float] = {}  # session -> until when clients may still reconnect; loop time
+        self._restorer = SessionRestorer(
+            self._factory, self._engines, self._registry.sessions, settings.keep, self._call, self._adopt
+        )
 
     async def start(self) -> None:
         """Load what all sessions share.
@@ -108,8 +94,9 @@ class SessionHost:
             JournalError: the journal cannot be opened.
         """
         self._loop = asyncio.get_running_loop()
-        self._calls = SlicedCalls[Session](self._continue_later, self._loop.call_soon_threadsafe)
-        self._read_until = self._loop.time()  # when the last call of `_read` ended
+        self._wake_ups = WakeUps[Session](self._loop, self._wake)
+        self._reading = ReadingTurns[Session](self._loop, self._read)
+        self._calls = SlicedCalls[Session](self._reading.add, self._loop.call_soon_threadsafe)
         await self._factory.load()
         self._expiry_timer = self._loop.call_later(EXPIRY_INTERVAL, self._expire_sessions)
 
@@ -128,8 +115,8 @@ class SessionHost:
     async def close(self) -> None:
         """End every session and every engine."""
         self._closed = True
-        self._reading.clear()
-        self._wakeups.clear()
+        self._reading.close()
+        self._wake_ups.close()
         for task in (self._expiry_timer, self._takeover_check):
             if task is not None:
                 task.cancel()
@@ -168,46 +155,13 @@ class SessionHost:
         self._registry.check(name, visitor)
 
     async def restore(self, name: str | None, seen: int | None = None) -> None:
-        """Take over a session of another process, before a client joins it.
+        """Take over a session of another process; raises as `SessionRestorer.restore`."""
+        await self._restorer.restore(name, seen)
 
-        Args:
-            seen: sequence number of the last feedback the client received, to which the session is advanced.
-
-        Raises:
-            JournalError: the journal cannot be read, or the session not be restored.
-        """
-        if self._factory.journal is None or name is None:
-            return
-        if not self._is_live(name):
-            if name not in self._restoring:
-                self._restoring[name] = self._loop.create_task(self._restore(name, seen or 0))
-            await asyncio.shield(self._restoring[name])
-        session = self._registry.sessions.get(name)
-        if session is not None and name in self._resumed and session.feedback_log.newest < (seen or 0):
-            self._call(session, functools.partial(self._catch_up, session, seen or 0))
-
-    def _catch_up(self, session: Session, seen: int) -> None:
-        now = self._loop.time()
-        session.clock.opened -= catch_up(session, now, seen) - now
-
-    def _is_live(self, name: str) -> bool:
-        """Whether the session plays here. One that another process has taken over may still be registered."""
-        session = self._registry.sessions.get(name)
-        return session is not None and not session.closed
-
-    async def _restore(self, name: str, seen: int) -> None:
-        try:
-            restored = await self._factory.restore(name, seen, self._engines.speak)
-            if restored is None:
-                return
-            session, unanswered = restored
-            self._registry.sessions[name] = session
-            self._resumed[name] = self._loop.time() + self.settings.keep
-            for effect in unanswered:
-                self._apply_effect(session, effect)
-            self._apply_effects(session)
-        finally:
-            del self._restoring[name]
+    def _adopt(self, session: Session, unanswered: Iterable[Effect]) -> None:
+        for effect in unanswered:
+            self._apply_effect(session, effect)
+        self._apply_effects(session)
 
     def join(
         self, client: Outbound, name: str | None = None, seen: int | None = None, visitor: Visitor = ANYBODY
@@ -293,12 +247,6 @@ class SessionHost:
         self._calls.call(session, step)
         return not self._calls.is_busy(session)
 
-    def _continue_later(self, session: Session) -> None:
-        """Continue the call of a session, which was paused, when it is its turn."""
-        self._reading.setdefault(session)
-        if self._reader is None:
-            self._reader = self._loop.call_soon(self._read)
-
     def _apply_effects(self, session: Session) -> None:
         """Carry out the effects of a session, and schedule its next wake-up."""
         effects = session.take_effects()
@@ -314,50 +262,14 @@ class SessionHost:
         """Schedule the next wake-up of a session, and its next document, which waits for its turn."""
         if self._closed:
             return
-        self._wake_at(session, session.next_due())
+        self._wake_ups.set(session, session.next_due())
         if session.has_documents:
-            self._continue_later(session)
+            self._reading.add(session)
 
-    def _wake_at(self, session: Session, when: float) -> None:
-        """Call `_tick` at a time, instead of the one before; infinite: never.
-
-        A call that is already due stays, or a session that gets messages all the time would never be woken.
-        """
-        now = self._loop.time()
-        when = max(when, now)
-        if (known := self._wakeups.get(session)) is not None:
-            old, step = known
-            if when < math.inf and (old == when or old <= now):
-                return
-            del self._wakeups[session]
-            self._steps.get(step, {}).pop(session, None)
-        if when < math.inf and not self._closed:
-            step = math.ceil(when / STEP - SLACK)
-            self._wakeups[session] = when, step
-            if step not in self._steps:
-                self._steps[step] = {}
-                self._loop.call_at(step * STEP, self._wake, step)
-            self._steps[step][session] = None
-
-    def _wake(self, step: int) -> None:
-        """Wake the sessions of a step after those that are still to be woken."""
-        is_idle = not self._due
-        self._due.extend((step, session) for session in self._steps.pop(step))
-        if is_idle:
-            self._tick_due()
-
-    def _tick_due(self) -> None:
-        """Wake sessions for a while. Then messages and documents come before the others."""
-        end = self._loop.time() + TURN
-        while self._due and (began := self._loop.time()) <= end:
-            step, session = self._due.popleft()
-            when, own = self._wakeups.get(session, (0.0, None))
-            if own == step:
-                del self._wakeups[session]
-                self._tick(session, when)
-                self._report_slow_step(began, "frames and feedback", session)
-        if self._due:
-            self._loop.call_soon(self._tick_due)
+    def _wake(self, session: Session, when: float) -> None:
+        began = self._loop.time()
+        self._tick(session, when)
+        self._report_slow_step(began, "frames and feedback", session)
 
     def _tick(self, session: Session, when: float) -> None:
         """Send the frames and the feedback of a session that are due, and do what else is."""
@@ -374,7 +286,7 @@ class SessionHost:
                 client.send(data)
             if (waiting := client.unsent_bytes) > SLOW:
                 session.update_backlog(run.connection, waiting)
-            self._wake_at(session, run.wake_at)
+            self._wake_ups.set(session, run.wake_at)
             return
         self._calls.call(session, functools.partial(self._send_due, session, now), FRAME_SLICES)
 
@@ -394,25 +306,16 @@ class SessionHost:
             client = self._clients.get(number)
             if client is not None and (waiting := client.unsent_bytes) > SLOW:
                 session.update_backlog(number, waiting)
-        self._wake_at(session, due)
+        self._wake_ups.set(session, due)
 
-    def _read(self) -> None:
-        """Read documents and continue paused calls, for their share of the time. Then frames come again."""
+    def _read(self, session: Session) -> None:
+        """Continue a paused call of a session, or read its next document."""
         began = self._loop.time()
-        end = began + min((began - self._read_until) * READING_SHARE, LONGEST_READING)
-        while self._reading:
-            session = next(iter(self._reading))
-            del self._reading[session]
-            began = self._loop.time()
-            if self._calls.is_busy(session):
-                self._calls.resume(session)
-            elif not session.closed:
-                self._call(session, functools.partial(self._read_document, session, began))
-            self._read_until = self._loop.time()
-            self._report_slow_step(began, "a document", session)
-            if self._read_until >= end:
-                break
-        self._reader = self._loop.call_soon(self._read) if self._reading else None
+        if self._calls.is_busy(session):
+            self._calls.resume(session)
+        elif not session.closed:
+            self._call(session, functools.partial(self._read_document, session, began))
+        self._report_slow_step(began, "a document", session)
 
     def _read_document(self, session: Session, now: float) -> None:
         plans = session.player.version
@@ -427,23 +330,11 @@ class SessionHost:
     def _report_slow_step(
         self, began: float, action: str, session: Session, connections: Iterable[int] | None = None
     ) -> None:
-        """Log and count a step of the loop if it took so long that it delayed the frames of all clients."""
+        """Report a step of the loop if it took so long that it delayed the frames of all clients."""
         seconds = self._loop.time() - began
-        if seconds < SLOW_STEP:
-            return
-        self.metrics.slow_steps.pending.append(seconds)
-        clients = list(session.connections if connections is None else connections)
-        fields = {
-            "session": session.id,
-            "connections": clients,
-            "seconds": round(seconds, 3),
-            "action": action,
-        }
-        log.info(
-            "slow step: %.0f ms for %s (session %s, connections %s)",
-            *(1000 * seconds, action, session.id, ", ".join(map(str, clients)) or "none"),
-            extra=fields,
-        )
+        if seconds >= SLOW_STEP:
+            clients = list(session.connections if connections is None else connections)
+            self.metrics.report_slow_step(seconds, action, session.id, clients)
 
     def _fail(self, session: Session) -> None:
         """Log an internal error and end its session; the others play on."""
@@ -506,7 +397,7 @@ class SessionHost:
         now = self._loop.time()
         self._overload.end_if_over(now)
         self._registry.remove_expired(now)
-        self._resumed = {name: end for name, end in self._resumed.items() if end > now}
+        self._restorer.expire(now)
         # Spread the checkpoints over the time until the next call.
         grown = [
             session for session in self._registry.sessions.values() if session.journal.writer.needs_checkpoint

@@ -421,27 +421,3 @@ def test_session_host_closes_clients_of_a_taken_session(in_tiny_slices, tmp_path
 
     with asyncio.Runner(loop_factory=Loop) as runner:
         runner.run(run())
-
-
-def test_session_host_advances_a_resumed_session_to_what_a_client_has_seen(tmp_path) -> None:
-    settings = Settings(voice="silent", journal=str(tmp_path / "journal"), keep=60)
-
-    async def run() -> None:
-        first, second = SessionHost(settings), SessionHost(settings)
-        for host in (first, second):
-            await host.start()
-        number, _ = subscribed(first, "s")
-        first.receive(number, '<bml id="b"><wait id="w" duration="300"/></bml>')
-        await asyncio.sleep(1)
-        await second.restore("s")
-        log = second._registry.sessions["s"].feedback_log
-        before = log.newest
-        await asyncio.sleep(30)
-        assert log.newest == before
-        await second.restore("s", seen=before + 1)
-        assert log.newest > before
-        for host in (first, second):
-            await host.close()
-
-    with asyncio.Runner(loop_factory=Loop) as runner:
-        runner.run(run())
