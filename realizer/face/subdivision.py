@@ -29,7 +29,6 @@ class Subdivision:
         middle: (k,) the face's vertex on each of k edges.
         smooth: sparse (k, n) float32; places of the vertices on edges = smooth @ original vertices.
         mean: sparse (k, n) float32, the mean of the ends of each edge.
-        ranges: first and last + 1 vertex of the parts that are subdivided, in the original face.
         split: (m,) which of the original triangles have become four; those come first, in four runs.
     """
 
@@ -38,7 +37,6 @@ class Subdivision:
     middle: Int32
     smooth: Any
     mean: Any
-    ranges: tuple[tuple[int, int], ...]
     split: Bool
 
     def corners(self, values: Float32) -> Float32:
@@ -68,9 +66,8 @@ def subdivided(face: Face) -> Subdivision:
     """Return the face with its coarse parts subdivided once."""
     n = len(face.vertices)
     coarse_parts = {name: face.parts[name] for name in PARTS if _is_coarse(face, name)}
-    ranges = tuple(sorted(coarse_parts.values()))
     end = np.zeros(n, np.int32)  # last + 1 vertex of the coarse part that a vertex belongs to, or 0
-    for first, last in ranges:
+    for first, last in coarse_parts.values():
         end[first:last] = last
     ends = end[face.triangles]
     inside = (ends[:, 0] > 0) & (ends == ends[:, :1]).all(axis=1)
@@ -84,7 +81,7 @@ def subdivided(face: Face) -> Subdivision:
         for name, (first, last) in face.parts.items()
     }
     smooth, mean = _rules(n, coarse, edges, counts != 2)
-    split = Subdivision(face, place[:n], place[n:], smooth, mean, ranges, inside)
+    split = Subdivision(face, place[:n], place[n:], smooth, mean, inside)
     colours, occlusion, gloss = (
         split._joined(values, mean @ values)
         for values in (face.colours.astype(np.float32), face.occlusion, face.gloss)

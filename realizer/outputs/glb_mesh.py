@@ -48,7 +48,7 @@ class GlbMesh:
         self._colours = np.full((len(colours), 4), 65535, np.uint16)
         # Colours include the baked occlusion, because viewers do not support it by vertex.
         self._colours[:, :3] = np.rint(colours * 65535)
-        self._tangents = _tangents(self._at, self._ups, self._mesh.triangles, self._mesh.uv)
+        self._tangents = tangents(self._at, self._ups, self._mesh.triangles, self._mesh.uv)
 
     def part(self, name: str) -> Bool:
         """Return which drawn vertices belong to a part, (d,)."""
@@ -144,7 +144,7 @@ class GlbMesh:
         }
 
 
-def _tangents(at: Float32, ups: Float32, triangles: Int32, uv: Float32) -> Float32:
+def tangents(at: Float32, ups: Float32, triangles: Int32, uv: Float32) -> Float32:
     """Return glTF's tangents (d, 4): the way of rising u, and 1, or -1 where the map is mirrored."""
     a, b, c = (at[triangles[:, k]].astype(np.float64) for k in range(3))
     p, q, r = (uv[triangles[:, k]].astype(np.float64) for k in range(3))

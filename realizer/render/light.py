@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -72,14 +72,6 @@ class Light:
     def environment(self) -> Environment:
         """The light from all around."""
         return environment_of(self.name)
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the table as plain numbers; lamp directions have length 1."""
-        table = asdict(self)
-        for name in LAMPS:
-            table[name] = {part: list(values) for part, values in table[name].items()}
-            table[name]["direction"] = [round(float(x), 6) for x in unit(table[name]["direction"])]
-        return {k: list(v) if isinstance(v, tuple) else v for k, v in table.items()}
 
 
 @cache

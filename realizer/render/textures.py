@@ -56,18 +56,29 @@ def texels_of(maps: Maps | None, largest: int = FULL) -> Texels:
     whole = np.empty((height, width, CHANNELS), np.uint8)
     whole[:] = LEVEL
     whole[..., : ALPHA + 1] = albedo
-    texel = maps.texel * FULL / width
-    for name, first in (("relief", SLOPE_U), ("folds", FOLD_U)):
+    for name, first in (("relief", SLOPE_U), ("normal", SLOPE_U), ("folds", FOLD_U)):
         if name in maps.files:
-            heights = _decoded(maps, name, "L", (width, height))
-            whole[..., first : first + 2] = _slopes(heights, maps.relief / 255 / texel)
-    if "normal" in maps.files:
-        whole[..., SLOPE_U : SLOPE_V + 1] = _tilts(_decoded(maps, "normal", "RGB", (width, height)))
+            whole[..., first : first + 2] = slopes_in(maps, name, (width, height))
     if "surface" in maps.files:
         whole[..., OCCLUSION : THICKNESS + 1] = _decoded(maps, "surface", "RGB", (width, height))
     while max(whole.shape[:2]) > largest:
         whole = _halved(whole)
     return _with_levels(whole)
+
+
+def slopes_in(maps: Maps, name: str, size: tuple[int, int] | None = None) -> UInt8:
+    """Return the slopes (h, w, 2) to the right and down that "relief", "normal" or "folds" has.
+
+    Args:
+        size: width and height of the result; None: those of the map.
+
+    Raises:
+        FaceError: the map is no picture.
+    """
+    if name == "normal":
+        return _tilts(_decoded(maps, name, "RGB", size))
+    heights = _decoded(maps, name, "L", size)
+    return _slopes(heights, maps.relief / 255 / (maps.texel * FULL / heights.shape[1]))
 
 
 def _decoded(maps: Maps, name: str, mode: str, size: tuple[int, int] | None = None) -> UInt8:

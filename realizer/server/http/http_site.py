@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import hashlib
 import json
 import logging
 import mimetypes
@@ -12,6 +13,8 @@ from dataclasses import dataclass
 from importlib.resources import files
 from urllib.parse import parse_qs
 
+import numpy as np
+
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
 from realizer.server.http.page_tools import ToolError, UnknownName, export_pose, preview_emotion
@@ -19,6 +22,7 @@ from realizer.server.http.page_tools import ToolError, UnknownName, export_pose,
 log = logging.getLogger(__name__)
 
 JSON = "application/json; charset=utf-8"
+GLB = "model/gltf-binary"
 TEXT = "text/plain; charset=utf-8"
 NOT_BUILT = """The page was not bundled when this package was built.
 Build it where npm is on the PATH: pip install -e . in the checkout, or install a wheel.
@@ -63,6 +67,7 @@ class HttpSite:
             "/vocabulary.json": lambda asked: _json(_vocabulary()),
             "/feeling.json": lambda asked: _json(preview_emotion(asked.get("of", ""))),
             "/look.json": self._look,
+            "/mirror": lambda asked: _bytes(_mirror(asked.get("light", ""))),
             "/pose.fap": self._pose,
         }
 
@@ -70,16 +75,23 @@ class HttpSite:
         """Return whether anybody may get what is at a path: the page, its files, and the health."""
         return path in ("/", "/healthz") or path[1:] in self._names
 
-    def answer(self, target: str) -> HttpResponse:
-        """Return the response to `GET target`. May block while a face is loaded for the first time."""
+    def answer(self, target: str, known: str = "") -> HttpResponse:
+        """Return the response to `GET target`. May block while a face is loaded for the first time.
+
+        Args:
+            known: the header If-None-Match, the tags of faces that the client has.
+        """
         path, _, query = target.partition("?")
         asked = {name: values[-1] for name, values in parse_qs(query).items()}
         try:
             if path in self._routes:
                 return self._routes[path](asked)
             if path.startswith("/faces/"):
-                glb = _glb(_face(path.removeprefix("/faces/").removesuffix(".glb")))
-                return HttpResponse(200, "model/gltf-binary", glb, (("Cache-Control", "no-cache"),))
+                glb, tag = _glb(_face(path.removeprefix("/faces/").removesuffix(".glb")))
+                headers = (("Cache-Control", "no-cache"), ("ETag", tag))
+                if tag in known:
+                    return HttpResponse(304, GLB, b"", headers)
+                return HttpResponse(200, GLB, glb, headers)
         except ToolError as error:
             return HttpResponse(error.status, TEXT, f"{error}\n".encode())
         except RealizerError:
@@ -94,10 +106,8 @@ class HttpSite:
         return frozenset(f.name for f in found if not f.name.startswith("."))
 
     def _look(self, asked: dict[str, str]) -> HttpResponse:
-        face, smooth = _face(asked.get("face", "default")), asked.get("smooth", "yes")
-        if smooth not in ("yes", "no"):
-            raise ToolError(f"smooth: wanted yes or no, got {smooth[:80]!r}")
-        return _json(_look(face, self._settings.light, self._settings.background, smooth == "yes"))
+        face = _face(asked.get("face", "default"))
+        return _json(_look(face, self._settings.light, self._settings.background))
 
     def _pose(self, asked: dict[str, str]) -> HttpResponse:
         face = asked.get("face")
@@ -121,6 +131,10 @@ class HttpSite:
 
 def _json(text: str | bytes) -> HttpResponse:
     return HttpResponse(200, JSON, text.encode() if isinstance(text, str) else text)
+
+
+def _bytes(body: bytes) -> HttpResponse:
+    return HttpResponse(200, "application/octet-stream", body)
 
 
 def _face(name: str) -> str:
@@ -155,37 +169,53 @@ def _examples() -> bytes:
 
 
 @functools.lru_cache(8)
-def _look(name: str, light: str | None, background: str | None, smooth: bool) -> bytes:
-    """Return the light, the camera, and the wrinkles and highlights of a face, for viewers of its mesh.
-
-    Args:
-        smooth: whether the viewer subdivides the mesh (`face.subdivision`); vertices are counted after that.
-    """
+def _look(name: str, light: str | None, background: str | None) -> bytes:
+    """Return the lights, as uniforms of `surface.glsl`, the camera and the backdrops of a face's pictures."""
     from realizer.face.load import load_face
-    from realizer.face.subdivision import subdivided
     from realizer.render.cameras import camera_for
-    from realizer.render.eye_highlights import EyeHighlights
+    from realizer.render.environment import HEIGHT
+    from realizer.render.lamp_view import LampView
     from realizer.render.light import preset, presets
-    from realizer.render.wrinkles import Wrinkles
+    from realizer.render.uniforms import uniforms_of
 
-    face, lights = load_face(name), preset(light)
-    camera = camera_for(face)
-    split = subdivided(face) if smooth else None
+    face = load_face(name)
+    lights = {}
+    for each in presets().values():
+        values = uniforms_of(each, LampView(each.key.direction, *face.bounds))
+        lights[each.name] = {
+            "uniforms": {
+                key: np.ravel(value).tolist() if np.ndim(value) else value for key, value in values.items()
+            },
+            "backdrop_middle": each.backdrop_middle,
+            "backdrop_edge": each.backdrop_edge,
+        }
     look = {
-        "light": lights.to_json(),
-        "lights": {name: lights.to_json() for name, lights in presets().items()},
+        "light": preset(light).name,
+        "lights": lights,
+        "mirror": HEIGHT,
         "background": background,
-        "camera": camera.to_json(),
-        "subdivided": split.ranges if split else (),
-        "furrows": Wrinkles(split.face if split else face).to_json(),
-        "glints": EyeHighlights(split.face if split else face, lights, camera.towards).to_json(),
+        "camera": camera_for(face).to_json(),
     }
     return json.dumps(look, separators=(",", ":")).encode()
 
 
 @functools.lru_cache(8)
-def _glb(name: str) -> bytes:
-    from realizer.face.glb import to_glb
-    from realizer.face.load import load_face
+def _mirror(light: str) -> bytes:
+    """Return the texels of `mirrorMap` of surface.glsl: half floats, red, green, blue and 1."""
+    from realizer.render.light import preset, presets
+    from realizer.render.uniforms import mirrored_of
 
-    return to_glb(load_face(name))
+    if light not in presets():
+        raise UnknownName(f"light: wanted one of {', '.join(presets())}, got {light[:80]!r}")
+    levels = mirrored_of(preset(light))
+    return np.insert(levels, 3, 1, axis=3).astype("<f2").tobytes()
+
+
+@functools.lru_cache(8)
+def _glb(name: str) -> tuple[bytes, str]:
+    """Return what is drawn of a face as GLB, and its tag."""
+    from realizer.face.load import load_face
+    from realizer.server.http.face_glb import face_glb
+
+    glb = face_glb(load_face(name))
+    return glb, f'"{hashlib.sha256(glb).hexdigest()[:32]}"'

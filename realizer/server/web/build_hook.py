@@ -14,6 +14,7 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 WEB = Path(__file__).resolve().parent
 STATIC = WEB.parent / "static"
+SHADER = WEB.parents[1] / "render" / "surface.glsl"  # the page draws by the formula of stills
 MARK = "sources.sha256"
 SKIP = "REALIZER_NO_PAGE"
 TIMEOUT = 600  # s; npm on a slow line
@@ -86,6 +87,6 @@ def _current() -> bool:
 def _hash() -> str:
     digest = hashlib.sha256()
     own = [p for p in WEB.iterdir() if p.suffix in (".css", ".html", ".json")]
-    for path in sorted([*own, *(WEB / "src").iterdir()]):
+    for path in sorted([*own, *(WEB / "src").iterdir(), SHADER]):
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()

@@ -100,7 +100,6 @@ def test_subdivided_mixes_colours_and_leaves_other_parts():
     assert drawn.face.parts["skin"] == (count, count + len(drawn.face.vertices) - count)
     ends = drawn.mean @ face.colours.astype(float)
     assert np.array_equal(drawn.face.colours[drawn.middle], np.rint(ends))
-    assert drawn.ranges == ((count, 2 * count),)
 
 
 @pytest.mark.parametrize("rows", [2, MOST])
@@ -109,6 +108,5 @@ def test_subdivided_returns_faces_without_coarse_parts_whole(rows):
     vertices = np.random.default_rng(0).normal(size=(2 * rows, 3))
     face = face_of(vertices, grid(rows, 2), parts)
     drawn = subdivided(face)
-    assert drawn.ranges == ()
     assert np.array_equal(drawn.face.triangles, face.triangles)
     assert np.array_equal(drawn.face.vertices, face.vertices)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -95,13 +93,6 @@ def test_shader_highlights_glossy_eyes_and_no_dull_skin():
 
 def test_shader_darkens_hidden_corners():
     assert (shade(FRONT, occlusion=0.2) < shade(FRONT, occlusion=1.0) - 0.1).all()
-
-
-def test_light_to_json_has_every_coefficient():
-    table = json.loads(json.dumps(preset().to_json()))
-    assert set(table) == set(preset().__dataclass_fields__)
-    for lamp in ("key", "fill", "rim"):
-        assert np.linalg.norm(table[lamp]["direction"]) == pytest.approx(1, abs=1e-5)
 
 
 def test_preset_lists_the_lights_for_another_name():

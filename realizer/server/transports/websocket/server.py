@@ -174,7 +174,9 @@ class WebSocketTransport:
         if path == "/metrics":
             return HttpResponse(200, MEDIA_TYPE, self._sessions.metrics_text().encode())
         loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(None, self._site.answer, request.path)
+        return await loop.run_in_executor(
+            None, self._site.answer, request.path, headers.get("if-none-match", "")
+        )
 
     def _wrong_worker(self, request: Request) -> str | None:
         """Return the error if a request names another worker, or None."""

@@ -138,8 +138,7 @@ function showFaces({ face }) {
 // A button for each light; the colours of the pressed one come from its table.
 function showLights() {
   const { lights, light } = stage.look;
-  const own = Object.keys(lights).find((name) => JSON.stringify(lights[name]) === JSON.stringify(light));
-  choose(at("lights"), Object.keys(lights), stage.light ?? own, (name) => stage.shine(name));
+  choose(at("lights"), Object.keys(lights), stage.light ?? light, (name) => stage.shine(name));
 }
 
 function scrub(time) {

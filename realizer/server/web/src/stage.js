@@ -1,29 +1,38 @@
-// The face in WebGL: rest mesh from the GLB, vertices from the stream, light of the rendered stills.
-import { BufferAttribute, BufferGeometry, DoubleSide, Mesh, PerspectiveCamera, Scene, ShaderMaterial, Spherical, Vector3, WebGLRenderer } from "three";
+// The face in WebGL: what is drawn from the GLB, vertices from the stream, light of the rendered stills.
+import { Mesh, PerspectiveCamera, Scene, Spherical, Vector3, WebGLRenderer } from "three";
+import { backdrop, MIDDLE, REACH, stops } from "./backdrop.js";
 import { readGlb } from "./glb.js";
-import { Furrows, Glints } from "./figure.js";
+import { Head } from "./head.js";
+import { mapsOf, mirrorOf } from "./maps.js";
 import { ask } from "./service.js";
-import { Subdivision } from "./subdivision.js";
-import { backdrop, fragment, lightUniforms, MIDDLE, REACH, stops, vertex } from "./light.js";
+import { materialsOf, shadowTarget } from "./surface.js";
 
 const KEPT = 20; // s of frames, for looking back
 // The width of the head over the height of the front camera's picture: narrower pictures step back.
 const HEAD = 0.66;
 const RANGE = { yaw: 1.6, pitch: 0.7 }; // rad
 const STILL = 1e-4; // rad, or of the zoom: the camera does not move
+// Without a GPU: ms between pictures on average from which on fewer pixels are drawn, and how few of a side at least.
+const SLOW = 50;
+const FEWEST = 0.5;
 
 export class Stage {
   constructor(canvas) {
     this.canvas = canvas;
-    // Without a GPU, smooth edges and four times as many triangles cost more than everything else.
+    // Without a GPU, detail costs more than everything else.
     const software = drawnInSoftware();
-    this.smooth = new URLSearchParams(location.search).get("smooth") ?? (software ? "no" : "yes");
-    this.renderer = new WebGLRenderer({ canvas, antialias: !software, alpha: true });
+    this.full = (new URLSearchParams(location.search).get("detail") ?? (software ? "plain" : "full")) === "full";
+    this.renderer = new WebGLRenderer({ canvas, antialias: this.full, alpha: true });
     this.scene = new Scene();
+    this.lampScene = new Scene();
     this.camera = new PerspectiveCamera(12, 1, 0.1, 10);
-    this.material = new ShaderMaterial({ vertexShader: vertex, fragmentShader: fragment, side: DoubleSide });
+    this.uniforms = {};
+    this.mirrors = {}; // textures of environments, by light
     this.frames = [];
     this.shownFrames = 0;
+    this.drawn = 0; // ms; when the last picture was drawn, if there was one at the last call
+    this.taken = 0; // ms between pictures, on average
+    this.part = 1; // of the pixels of a side
     this.stale = true; // whether the picture differs from the one on the canvas
     canvas.addEventListener("webglcontextrestored", () => (this.stale = true));
     this.light = null; // name of a preset; null: the service's default
@@ -36,49 +45,58 @@ export class Stage {
   async load(name, scale, offset) {
     const path = encodeURIComponent((this.awaited = name));
     const [look, glb] = await Promise.all([
-      ask(`look.json?face=${path}&smooth=${this.smooth}`).then((answer) => checked(answer).json()),
-      ask(`faces/${path}`).then((answer) => checked(answer).arrayBuffer()),
+      ask(`look.json?face=${path}`).then((answer) => checked(answer).json()),
+      ask(`faces/${path}`).then((answer) => checked(answer).arrayBuffer()).then(readGlb),
     ]);
+    const maps = await mapsOf(glb.pictures, this.renderer, this.full);
     if (this.awaited !== name) return; // another face was requested in the meantime
-    const { attributes, indices } = readGlb(glb);
-    // The stream moves the vertices of the original mesh; what is drawn is a smooth subdivision of it.
-    this.original = new BufferGeometry();
-    this.original.setAttribute("position", new BufferAttribute(new Float32Array(attributes.POSITION.array), 3));
-    this.original.setIndex(new BufferAttribute(indices, 1));
-    this.subdivision = new Subdivision(indices, attributes.POSITION.array.length / 3, look.subdivided);
-    const geometry = new BufferGeometry();
-    const put = (as, { array, size, normalized }) =>
-      geometry.setAttribute(as, new BufferAttribute(this.subdivision.mean(array, size, new array.constructor(size * this.subdivision.count)), size, normalized));
-    put("albedo", attributes.COLOR_0);
-    put("occlusion", attributes._OCCLUSION);
-    put("gloss", attributes._GLOSS);
-    for (const as of ["position", "normal"])
-      geometry.setAttribute(as, new BufferAttribute(new Float32Array(3 * this.subdivision.count), 3));
-    geometry.setIndex(new BufferAttribute(this.subdivision.triangles, 1));
-    this.refine(geometry);
-    Object.assign(this, { name, look, preset: look.camera, scale, offset });
-    for (const part of [this.mesh, this.furrows?.mesh, this.glints?.mesh]) part?.geometry.dispose();
+    if (this.awaited !== name) return; // another face was requested in the meantime
+    Object.assign(this, { look, preset: look.camera });
+    await this.shine(this.light);
+    if (this.awaited !== name) return;
+    this.clear();
+    this.shadows ??= shadowTarget(this.uniforms.shadowSide.value);
+    this.set({ ...maps, shadowMap: this.shadows.depthTexture });
+    Object.assign(this, { name, scale, offset, head: new Head(glb, this.full) });
+    for (const group of this.head.groups) {
+      const geometry = this.head.geometry(group);
+      const { draw, cast } = materialsOf(group, this.uniforms, this.full);
+      this.lampScene.add(still(new Mesh(geometry, cast)));
+      draw.forEach((material, k) => this.scene.add(Object.assign(still(new Mesh(geometry, material)), { renderOrder: group.holes + k })));
+    }
+    this.head.pose();
+  }
+
+  clear() {
+    for (const map of ["albedoMap", "slopeMap", "surfaceMap"]) this.uniforms[map]?.value.dispose();
+    for (const { geometry, material } of [...this.scene.children, ...this.lampScene.children]) {
+      geometry.dispose();
+      material.dispose();
+    }
     this.scene.clear();
-    this.mesh = new Mesh(geometry, this.material);
-    this.mesh.frustumCulled = false;
-    this.furrows = new Furrows(look.furrows, geometry, this.material);
-    this.glints = new Glints(look.glints);
-    this.scene.add(this.mesh, this.furrows.mesh, this.glints.mesh);
-    this.shine(this.light);
+    this.lampScene.clear();
+  }
+
+  // Change uniforms in place: materials share them.
+  set(values) {
+    for (const [name, value] of Object.entries(values)) {
+      this.uniforms[name] ??= {};
+      this.uniforms[name].value = value;
+    }
+    this.stale = true;
   }
 
   // Light the face by a preset, and draw its backdrop.
-  shine(name) {
+  async shine(name) {
     this.light = name;
     if (!this.look) return;
-    this.lit = this.look.lights[name] ?? this.look.light;
-    // In place: three.js keeps the objects of a program's first use.
-    for (const [uniform, { value }] of Object.entries(lightUniforms(this.lit, this.look.furrows.shade))) {
-      this.material.uniforms[uniform] ??= {};
-      this.material.uniforms[uniform].value = value;
-    }
+    const lit = name ?? this.look.light;
+    this.mirrors[lit] ??= ask(`mirror?light=${lit}`).then((answer) => checked(answer).arrayBuffer()).then((levels) => mirrorOf(levels, this.look.mirror));
+    const mirrorMap = await this.mirrors[lit];
+    if (this.light !== name) return;
+    this.lit = this.look.lights[lit];
+    this.set({ ...this.lit.uniforms, mirrorMap });
     this.canvas.parentElement.style.background = this.look.background ?? backdrop(this.lit);
-    this.stale = true;
   }
 
   // Draw the backdrop on another canvas, for a film.
@@ -113,7 +131,7 @@ export class Stage {
 
   // Draw the face if something has changed, or `always`: the canvas keeps its picture on the page only.
   draw(playhead, always = false) {
-    if (!this.mesh) return;
+    if (!this.head) return;
     this.fit();
     if (playhead !== null) this.pose(playhead);
     const ease = 0.18;
@@ -123,11 +141,28 @@ export class Stage {
       this.view[axis] += away * ease;
       this.stale = true;
     }
-    if (!this.stale && !always) return;
+    if (!this.stale && !always) {
+      this.drawn = 0;
+      return;
+    }
     this.stale = false;
+    if (!this.full) this.pace(performance.now());
     this.aim();
-    this.glints.pose(this.mesh.geometry, this.lit, this.camera);
+    if (this.full) {
+      this.renderer.setRenderTarget(this.shadows);
+      this.renderer.render(this.lampScene, this.camera);
+      this.renderer.setRenderTarget(null);
+    }
     this.renderer.render(this.scene, this.camera);
+  }
+
+  // Draw fewer pixels if pictures that follow each other take too long.
+  pace(now) {
+    if (this.drawn) this.taken += 0.1 * (Math.min(now - this.drawn, 4 * SLOW) - this.taken);
+    this.drawn = now;
+    if (this.taken < SLOW || this.part === FEWEST) return;
+    this.part = Math.max(FEWEST, 0.8 * this.part);
+    this.taken = 0;
   }
 
   // Vertices at `playhead`, interpolated between two frames.
@@ -136,13 +171,12 @@ export class Stage {
     const first = Math.max(0, this.frames.findLastIndex(({ time }) => time <= playhead));
     const a = this.frames[first];
     const b = this.frames[first + 1] ?? a;
-    const { position } = this.original.attributes;
     if (a.face !== this.name) return; // the face is still being loaded
     const t = b.time > a.time ? Math.min(1, Math.max(0, (playhead - a.time) / (b.time - a.time))) : 0;
     if (this.shown === a.values && this.shownAt === t) return;
     this.shown = a.values;
     this.shownAt = t;
-    const out = position.array;
+    const out = this.head.vertices;
     const { scale, offset } = this;
     this.shownFrames += 1;
     let moved = false;
@@ -153,23 +187,13 @@ export class Stage {
     }
     if (!moved) return;
     this.stale = true;
-    this.refine(this.mesh.geometry);
-    this.furrows.pose(this.mesh.geometry);
-  }
-
-  // Move the drawn vertices and normals to the original mesh.
-  refine(geometry) {
-    this.original.computeVertexNormals();
-    const { position, normal } = this.original.attributes;
-    this.subdivision.places(position.array, geometry.attributes.position.array);
-    this.subdivision.normals(normal.array, geometry.attributes.normal.array);
-    for (const name of ["position", "normal"]) geometry.attributes[name].needsUpdate = true;
+    this.head.pose();
   }
 
   fit() {
     const width = this.canvas.clientWidth;
     const height = this.canvas.clientHeight;
-    const ratio = Math.min(devicePixelRatio, 2);
+    const ratio = this.full ? Math.min(devicePixelRatio, 2) : this.part;
     if (this.width === width && this.height === height && this.ratio === ratio) return;
     Object.assign(this, { width, height, ratio, stale: true });
     this.renderer.setPixelRatio(ratio);
@@ -224,6 +248,12 @@ export class Stage {
       limit();
     });
   }
+}
+
+function still(mesh) {
+  mesh.frustumCulled = false;
+  mesh.matrixAutoUpdate = false;
+  return mesh;
 }
 
 function drawnInSoftware() {

@@ -6,12 +6,13 @@ import json
 from pathlib import Path
 from urllib.parse import quote
 
+import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
 import realizer
-from realizer.face.load import list_faces, load_face
+from realizer.face.load import list_faces
 from realizer.server.http.http_site import NAME, NOT_BUILT, HttpSite
 
 SITE = HttpSite(lambda: {"sessions": 2})
@@ -43,24 +44,33 @@ def test_site_has_faces_as_glb_and_no_unknown_face() -> None:
     assert b"nobody" in missing.body
 
 
+def test_site_sends_a_face_once_to_who_keeps_it() -> None:
+    first = SITE.answer("/faces/default")
+    tag = dict(first.headers)["ETag"]
+    again = SITE.answer("/faces/default", f'"other", {tag}')
+    assert (again.status, again.body) == (304, b"")
+    assert SITE.answer("/faces/default", '"other"').body == first.body
+
+
 def test_site_has_the_light_of_stills() -> None:
     look = json.loads(SITE.answer("/look.json?face=default").body)
-    assert {"key", "fill", "rim"} <= set(look["light"])
+    assert look["light"] == "portrait"
+    assert look["lights"]["portrait"]["uniforms"] != look["lights"]["evening"]["uniforms"]
+    assert len(look["lights"]["portrait"]["uniforms"]["ambientLight"]) == 27
     assert look["camera"]["fovy"] > 0
-    assert look["light"] == look["lights"]["portrait"] != look["lights"]["evening"]
-    assert len(look["furrows"]["points"]) == len(look["furrows"]["tones"]) > 100
-    assert len(look["glints"]["eyes"]) == 2
     assert look["background"] is None
     assert SITE.answer("/look.json?face=nobody").status == 404
 
 
-def test_site_counts_vertices_of_the_mesh_that_a_viewer_draws() -> None:
-    smooth, plain = (json.loads(SITE.answer(f"/look.json?smooth={way}").body) for way in ("yes", "no"))
-    assert smooth["subdivided"][0] == list(load_face().parts["skin"])
-    assert plain["subdivided"] == []
-    for look, count in ((smooth, 2e4), (plain, 7e3)):
-        assert 0.5 * count < look["glints"]["eyes"][1]["first"] < count
-    assert SITE.answer("/look.json?smooth=perhaps").status == 400
+def test_site_has_the_environment_of_each_light() -> None:
+    look = json.loads(SITE.answer("/look.json").body)
+    for light in look["lights"]:
+        texels = np.frombuffer(SITE.answer(f"/mirror?light={light}").body, "<f2")
+        levels = texels.reshape(-1, look["mirror"], look["mirror"], 4)
+        assert levels.max() > 0
+        assert np.isfinite(levels).all()
+        assert (levels[..., 3] == 1).all()
+    assert SITE.answer("/mirror?light=none").status == SITE.answer("/mirror").status == 404
 
 
 @pytest.mark.skipif(not BUILT, reason="the page was not bundled: build the package where npm is")
