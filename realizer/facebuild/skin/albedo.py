@@ -65,13 +65,9 @@ def _vessels(skin: Skin, out: Float32) -> None:
     ):
         row = skin.table[name]
         length, number = row["length"], skin.seed + len(name)
-        line = ridges(skin.at, length, number) if length < 0.0025 else _line(skin, length, number)
+        line = skin.within(where > 0.01, partial(ridges, length=length, seed=number))
         line = line * np.clip(0.5 + 0.6 * skin.noise(length * 2, 20 + len(name)), 0, 1)
         out *= 1 - (line * np.clip(where, 0, 1))[:, None] * (1 - _vector(row["tint"]))
-
-
-def _line(skin: Skin, length: float, number: int) -> Any:
-    return skin.texels.broad(lambda at: ridges(at, length, number))
 
 
 def _spots(skin: Skin, out: Float32) -> None:
@@ -86,7 +82,7 @@ def _spots(skin: Skin, out: Float32) -> None:
     ):
         found, radius = skin.mark(name, where, number)
         share = skin.texels.stamp(found, radius, partial(_disc, firm))
-        share *= np.clip(0.75 + 0.25 * skin.noise(EDGE, 34), 0.2, 1)
+        share *= np.clip(0.75 + 0.25 * skin.noise(EDGE, 34, share), 0.2, 1)
         out *= 1 - share[:, None] * (1 - _vector(skin.table[name]["tint"]))
 
 
@@ -99,9 +95,12 @@ def crease(skin: Skin) -> Float32:
     along = skin.field(skin.lips.u) * 0.025
     place = np.stack([along, 0.0005 * skin.ring, np.zeros_like(along)], 1)
     length = skin.table["lips"]["crease"]
-    fine = ridges(place, (length, 0.004, 1.0), skin.seed + 40)
-    wide = ridges(place, (length * 2.2, 0.006, 1.0), skin.seed + 41)
-    return skin.float(np.maximum(0.7 * fine, wide) * skin.red)
+
+    def field(at: Any) -> Any:
+        fine = ridges(at, (length, 0.004, 1.0), skin.seed + 40)
+        return np.maximum(0.7 * fine, ridges(at, (length * 2.2, 0.006, 1.0), skin.seed + 41))
+
+    return skin.red * skin.within(skin.red, field, place)
 
 
 def _lips(skin: Skin, out: Float32) -> None:
@@ -112,7 +111,7 @@ def _lips(skin: Skin, out: Float32) -> None:
     share = skin.red * skin.float(full * (1 - 0.55 * smooth(u, 0.85, 1.0)))
     # The upper lip faces down and looks darker still; the red is fullest where the lips meet.
     tone = (1 - 0.06 * upper) * (1 - 0.05 * smooth(skin.ring, 5, 1)) * (1 - row["dark"] * crease(skin))
-    tone = tone * (1 + 0.03 * skin.noise(0.0016, 42))
+    tone = tone * (1 + 0.03 * skin.noise(0.0016, 42, skin.red))
     colour = _vector(skin.recipe.colours["lips"]) * skin.float(tone)[:, None]
     out += share[:, None] * (colour - out)
     # A pale line around the red.

@@ -123,7 +123,8 @@ def engrave(skin: Skin, lines: list[Line]) -> tuple[Float32, Float32]:
         row = line.row
         found, away, point = line.near(at, ups, REACH * row["width"])
         deep = groove(away, row["width"]) * line.share[point] * row["depth"] * varied[found]
-        folds[found] = _deepest(folds[found], -deep)
+        young = row.get("young", 1.0)
+        folds[found] = _deepest(folds[found], -deep * (young + (1 - young) * skin.look.age))
         rest[found] = _deepest(rest[found], -deep * row["age"] * _aged(skin, line))
     return rest, folds
 

@@ -28,7 +28,7 @@ from realizer.facebuild.skin.skin import Skin
 from realizer.facebuild.skin.surface import surface_of
 from realizer.facebuild.skin.texels import Texels
 
-RELIEF = 0.0010  # m that 255 steps of the relief are high
+RELIEF = 0.0012  # m that 255 steps of the relief are high
 TEXEL = 0.0002  # m, of a texel in the face
 QUALITY = {"albedo": 84, "relief": 90, "surface": 78, "folds": 84}  # of WebP, 0..100
 

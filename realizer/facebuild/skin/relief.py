@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -45,10 +46,10 @@ def relief_of(skin: Skin, lines: list[Line]) -> Relief:
     chin = skin.around("2.10", radii=(0.022, 0.017, 0.03))
     folds = folds + dimples["depth"] * chin * skin.noise(dimples["length"], 60) * 0.6
     deep = np.clip((skin.texels.blurred(rest, AROUND) - rest) / DEEP, 0, 1)
-    slack = table["slack"]
+    slack, loose = table["slack"], skin.look.age * _loose(skin)
     for k, length in enumerate(slack["lengths"]):
-        net = ridges(skin.at, length, skin.seed + 61 + k)
-        rest = rest - slack["depth"] * skin.look.age * net * _loose(skin)
+        net = skin.within(loose > 0, partial(ridges, length=length, seed=skin.seed + 61 + k))
+        rest = rest - slack["depth"] * net * loose
     pores, holes = _pores(skin)
     rest = rest - holes - _network(skin) - skin.table["lips"]["depth"] * crease(skin)
     rest = rest + _bumps(skin)
@@ -82,7 +83,7 @@ def _pores(skin: Skin) -> tuple[Any, Any]:
         radius = row["radius"][k] * rng.uniform(0.75, 1.25, len(found))
         radius = np.maximum(radius, 1.1 * skin.texels.width[found])
         hole = skin.texels.stamp(found, skin.float(radius), lambda away: (1 - away**2) ** 2)
-        hole *= np.clip(0.7 + 0.3 * skin.noise(0.004, 68 + k), 0.2, 1.2)
+        hole *= np.clip(0.8 + 0.15 * skin.noise(0.004, 68 + k), 0.3, 1.2)
         dark, deep = np.maximum(dark, row["dark"][k] * hole), np.maximum(deep, row["depth"][k] * hole)
     return dark, deep
 
@@ -113,10 +114,11 @@ def _around_mouth(skin: Skin, row: dict[str, Any]) -> tuple[Float32, Float32]:
     lips = skin.lips
     along, away = skin.field(lips.u) * 0.030, skin.field(lips.away)
     place = np.stack([along, away / 3, skin.field(lips.is_upper * 0.05)], 1)
-    line = ridges(place, (row["apart"] * 0.7, 0.006, 0.02), skin.seed + 73)
     reach = row["long"] * np.clip(0.8 + 0.3 * skin.noise(0.006, 74), 0.3, 1.3)
     reach = reach * (0.6 + 0.4 * skin.field(lips.is_upper * 1.0))
     cover = smooth(skin.ring, 6.5, 8.5) * np.clip(1 - away / reach, 0, 1) * skin.dry
     cover = cover * smooth(np.abs(skin.field(lips.u)), 1.0, 0.85)
+    fan = partial(ridges, length=(row["apart"] * 0.7, 0.006, 0.02), seed=skin.seed + 73)
+    line = skin.within(cover, fan, place)
     fold = skin.float(-row["depth"] * line * cover)
     return fold * row["age"] * np.float32(skin.look.age), fold

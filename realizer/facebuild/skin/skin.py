@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,10 +14,12 @@ from realizer.facebuild.person.lids import Lid
 from realizer.facebuild.person.lips import BORDER, RING_SIZE, Lips
 from realizer.facebuild.person.person import Person
 from realizer.facebuild.person.recipe import Recipe, appearance_of
+from realizer.facebuild.skin.noise import noise
 from realizer.facebuild.skin.texels import Texels
 from realizer.tables import toml_table
 
 ROUNDED = 3.0  # texels that rings are softened by, which have corners at vertices
+FINE = 0.0025  # m; longer noise is computed at few places
 EVEN = 1.6  # vertices along the border of the red over which it is evened
 
 
@@ -51,8 +54,9 @@ class Skin:
             ring[loop] = k
         self.ring = self._bordered(texels.blurred(self.field(ring), ROUNDED))
         self.dry: Bool = self.field(lips.inside) < 0.5
-        ragged = 0.22 * self.noise(0.0022, 1)
-        self.red: Float32 = self.float(smooth(self.ring + ragged, *self.table["lips"]["border"])) * self.dry
+        # The red of the lower lip ends in the crease below it.
+        shift = 0.22 * self.noise(0.0022, 1, self.ring < 10) - 0.7 * (1 - self.field(lips.is_upper))
+        self.red: Float32 = self.float(smooth(self.ring + shift, *self.table["lips"]["border"])) * self.dry
 
     def _bordered(self, ring: Float32) -> Float32:
         """Return places across the lips, with an even border of the red instead of the mesh's."""
@@ -89,14 +93,26 @@ class Skin:
         """Return this person's own random numbers for one purpose."""
         return np.random.default_rng([self.seed, number])
 
-    def noise(self, length: float, number: int) -> Float32:
-        """Return this person's own smooth noise (k,); `length` metres, `number` says what it is for."""
-        from realizer.facebuild.skin.noise import noise
+    def noise(self, length: float, number: int, mask: Any = None) -> Float32:
+        """Return this person's own smooth noise (k,).
+
+        Args:
+            length: metres between independent values; number: what the noise is for.
+            mask: (k,) where it is wanted, if not everywhere; it is 0 elsewhere.
+        """
 
         def field(at: Float32) -> Float32:
             return noise(at, length, self.seed + number)
 
-        return field(self.at) if length < 0.0025 else self.texels.broad(field)
+        return self.texels.broad(field) if length > FINE else self.within(mask, field)
+
+    def within(self, mask: Any, field: Callable[[Float32], Any], at: Any = None) -> Float32:
+        """Return a field of places (j, 3) at the texels where a mask (k,) is not 0, and 0 elsewhere, (k,)."""
+        at = self.at if at is None else at
+        out = np.zeros(len(at), np.float32)
+        some = slice(None) if mask is None else np.asarray(mask) != 0
+        out[some] = field(at[some])
+        return out
 
     def field(self, values: Any) -> Float32:
         """Return values of the base mesh's vertices (n, ...) at the texels (k, ...)."""

@@ -30,7 +30,7 @@ def _roughness(skin: Skin) -> Float32:
     out = out + (row["lids"] - out) * np.clip(lids, 0, 1) * 0.6
     out = out + 0.06 * skin.look.age
     out = out + row["fine"] * (skin.noise(0.0012, 80) + 0.5 * skin.noise(0.005, 81))
-    out = out + (row["lips"] + 0.03 * skin.noise(0.0010, 82) - out) * skin.red
+    out = out + (row["lips"] + 0.03 * skin.noise(0.0010, 82, skin.red) - out) * skin.red
     edge = np.zeros(len(skin.person.ground.at))
     for lid in skin.lids:
         edge[lid.rings[0]] = 1
