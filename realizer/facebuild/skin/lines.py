@@ -17,9 +17,11 @@ SIDES = {1: "left", -1: "right"}
 STEP = 0.0003  # m between the points of a line that distances are measured to
 FACING = 0.15  # cosine at which a surface still counts as seen
 REACH = 4.0  # widths from its middle at which a line ends
+WANDER = 0.0007  # m, standard deviation of a person's points from those of the table
 BEND = 0.0006  # m that lines wander
 TAPER = 0.25  # of a line's length, over which it begins and ends
-PLATEAU, FADE = 0.006, 0.016  # m from a line where its fold is shown in full, and where it is not
+PLATEAU, FADE = 0.009, 0.020  # m from a line where its fold is shown in full, and where it is not
+NEAR = 0.0025  # m further away, at which a line has a third of the say
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,51 +60,66 @@ class Line:
 
 def lines_of(skin: Skin) -> list[Line]:
     """Return the lines of a person, with their own irregularities."""
-    out = []
-    size = skin.person.ground.fapu().es0
-    for number, row in enumerate(toml_table("skin_lines.toml")["lines"]):
-        for side in SIDES:
-            rng = skin.rng(1000 + 10 * number + side)
-            copies, apart = row["copies"]
-            middle = (copies - 1) / 2
-            for k in range(copies):
-                out.append(_line(skin, row, side, (k - middle) * apart * size, rng))
-    return out
+    return [
+        _line(skin, row, side, copy, 1000 + 10 * number)
+        for number, row in enumerate(toml_table("skin_lines.toml")["lines"])
+        for side in SIDES
+        for copy in range(row["copies"][0])
+    ]
 
 
-def _line(skin: Skin, row: dict[str, Any], side: int, off: float, rng: np.random.Generator) -> Line:
-    from scipy.interpolate import PchipInterpolator
-
-    size = skin.person.ground.fapu().es0
+def _line(skin: Skin, row: dict[str, Any], side: int, copy: int, number: int) -> Line:
+    """Return a copy of a line; `number` is that of its random numbers."""
+    rng = skin.rng(number + side + 1 + 3 * copy)
     yaw = math.radians(row["yaw"]) * side
     right = np.array([math.cos(yaw), 0, -math.sin(yaw)])
-    towards = np.array([math.sin(yaw), 0, math.cos(yaw)])
-    knots = []
-    for name, out, up in row["through"]:
-        place = skin.person.ground.point(name) * [side, 1, 1]
-        wander = 0.012 * rng.normal(size=2) * size
-        knots.append([place @ right + side * out * size + wander[0], place[1] + up * size + wander[1]])
-    path = np.array(knots)
+    knots = _knots(skin, row, side, right) + rng.normal(0, WANDER, (len(row["through"]), 2))
+    copies, apart = row["copies"]
+    off = (copy - (copies - 1) / 2) * apart * skin.person.ground.fapu().es0
+    # Copies are not parallel, and each begins and ends somewhere else.
+    curve, share = _course(knots, off * rng.uniform(0.8, 1.2), off * rng.normal(0, 0.3))
+    t = np.linspace(0, 1, len(curve))
     meets = bool(row.get("meets"))
-    if meets:
-        path[-1, 0] = 0
-    along = np.r_[0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))]
+    if meets:  # its mirror image, at a height that both know
+        level = skin.rng(number).normal(0, WANDER) + curve[-1, 1] - knots[-1, 1]
+        curve += smooth(t, 0.2, 1.0)[:, None] * (
+            [0, _knots(skin, row, side, right)[-1, 1] + level] - curve[-1]
+        )
+    begin, end = rng.uniform(-0.05, 0.18), rng.uniform(0.85, 1.05)
+    deep = smooth(t, begin, begin + TAPER) * (1 if meets else smooth(t, end, end - TAPER))
+    drives: dict[str, Float64] = {}
+    for drive, own in zip(row["drives"], share.T, strict=True):
+        name = f"{drive}_{SIDES[side]}"
+        drives[name] = drives.get(name, np.zeros(len(t))) + own
+    towards = np.array([math.sin(yaw), 0, math.cos(yaw)])
+    return Line(row, side, curve, right, towards, deep * rng.uniform(0.7 if off else 0.9, 1.0), drives)
+
+
+def _knots(skin: Skin, row: dict[str, Any], side: int, right: Float64) -> Float64:
+    """Return the points that a line goes through, (j, 2) metres to the right and up."""
+    ground = skin.person.ground
+    size, knots = ground.fapu().es0, []
+    for name, out, up in row["through"]:
+        place = ground.point(name) * [side, 1, 1]
+        knots.append([place @ right + side * out * size, place[1] + up * size])
+    return np.array(knots)
+
+
+def _course(knots: Float64, off: float, slant: float) -> tuple[Float64, Float64]:
+    """Return the curve (j, 2) beside knots (i, 2), and the share of each knot in its points (j, i).
+
+    Args:
+        off: metres that it lies beside them; slant: metres that this grows by from end to end.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    along = np.r_[0, np.cumsum(np.linalg.norm(np.diff(knots, axis=0), axis=1))]
     where = np.linspace(0, along[-1], max(8, int(along[-1] / STEP)))
-    curve = np.asarray(PchipInterpolator(along, path)(where))
+    curve = np.asarray(PchipInterpolator(along, knots)(where))
     across = np.gradient(curve, axis=0)[:, ::-1] * [-1, 1]
     across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
-    t = where / along[-1]
-    # Copies are not parallel, and each begins and ends somewhere else.
-    curve = curve + across * (off * (0.8 + 0.4 * rng.random() + 0.3 * rng.normal() * (t - 0.5)))[:, None]
-    begin, end = rng.uniform(-0.05, 0.18), rng.uniform(0.85, 1.05)
-    share = smooth(t, begin, begin + TAPER) * (1 if meets else smooth(t, end, end - TAPER))
-    share = share * (rng.uniform(0.65, 1.0) if off else 1.0)
-    drives: dict[str, Float64] = {}
-    for knot, drive in enumerate(row["drives"]):
-        name = f"{drive}_{SIDES[side]}"
-        own = np.interp(where, along, np.eye(len(along))[knot])
-        drives[name] = drives.get(name, np.zeros(len(t))) + own
-    return Line(row, side, curve, right, towards, np.asarray(share), drives)
+    curve = curve + across * (off + slant * (where / along[-1] - 0.5))[:, None]
+    return curve, np.stack([np.interp(where, along, own) for own in np.eye(len(along))], 1)
 
 
 def groove(away: Any, width: float) -> Any:
@@ -152,24 +169,29 @@ def _fields_drives() -> list[str]:
 
 
 def weights(skin: Skin, lines: list[Line], ups: Float64) -> Float32:
-    """Return how much each region's folds show at the vertices of the skin, (n, regions) 0..1."""
+    """Return how much each region's folds show at the vertices of the skin, (n, regions) 0..1.
+
+    A vertex shows most of the region whose line is nearest.
+    """
     at = skin.part.vertices
     names = regions(lines)
-    out = np.zeros((len(at), len(names)), np.float32)
+    score, cover = np.zeros((len(at), len(names))), np.zeros(len(at))
     for line in lines:
         found, away, point = line.near(at, ups, FADE)
-        cover = smooth(away, FADE, PLATEAU)
+        cover[found] = np.maximum(cover[found], smooth(away, FADE, PLATEAU))
         for name, own in line.drives.items():
             column = names.index(name)
-            out[found, column] = np.maximum(out[found, column], cover * own[point])
+            score[found, column] = np.maximum(score[found, column], own[point] * np.exp(-away / NEAR))
     table = toml_table("skin_lines.toml")
     for name in ("around_mouth", "dimples"):
         mask = vertex_mask(skin, name)
+        cover = np.maximum(cover, mask)
         for side, word in SIDES.items():
             column = names.index(f"{table[name]['drive']}_{word}")
-            half = mask * smooth(side * at[:, 0], -0.004, 0.004)
-            out[:, column] = np.maximum(out[:, column], half)
-    return np.asarray(out / np.maximum(out.sum(axis=1, keepdims=True), 1), np.float32)
+            half = mask * smooth(side * at[:, 0], -0.004, 0.004) * np.exp(-1)
+            score[:, column] = np.maximum(score[:, column], half)
+    total = np.maximum(score.sum(axis=1, keepdims=True), 1e-9)
+    return np.asarray(cover[:, None] * score / total, np.float32)
 
 
 def vertex_mask(skin: Skin, name: str) -> Float64:
