@@ -23,7 +23,7 @@ NEAR = [0.5 * PUPIL / LIMBUS, PUPIL / LIMBUS, 0.50, 0.66, 0.80, 0.92, 1.0]
 BEYOND = [1.10, 1.28, 1.60]
 FAR = [0.72, 1.0, 1.5]
 SEGMENTS = 32
-WIDEST = 1.5  # rad
+WIDEST = 1.15  # rad; beyond it is the socket
 
 
 def cornea(radius: float) -> tuple[float, float]:
@@ -52,7 +52,7 @@ def eyeball(
     vertices = np.concatenate([[[0, 0, CORNEA + cornea(radius)[0]]], *rings])
     edge = np.arcsin(LIMBUS / radius)
     angle = np.arctan2(out, height)
-    place = np.where(out <= LIMBUS, out / LIMBUS, 1 + (angle - edge) / (WIDEST - edge)) / 2
+    place = np.where(out <= LIMBUS, out / LIMBUS, 1 + (angle - edge) / (WIDEST - edge)).clip(0, 2) / 2
     flat = np.concatenate([[[0, 0]], *(r * around * [outward, -1] for r in place)])
     left, top, right, bottom = square
     uv = np.array([left + right, top + bottom]) / 2 + flat * np.array([right - left, bottom - top]) / 2

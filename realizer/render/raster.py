@@ -10,13 +10,13 @@ import numpy as np
 
 from realizer.core.array_types import Float32, UInt8
 from realizer.core.colours import linear
-from realizer.face.drawn_mesh import HAIR, DrawnMesh
+from realizer.face.drawn_mesh import EYE, HAIR, DrawnMesh
 from realizer.render.compiled import compiled
 from realizer.render.lamp_view import SIDE, LampView
 from realizer.render.shading import BRIGHTEST, STEPS, dot, reflected, tone_curve, unit
 from realizer.render.shadows import reach
-from realizer.render.surfaces import surfaces
-from realizer.render.textures import ALPHA, CHANNELS, STEEPEST, Texels
+from realizer.render.surfaces import BENT, BOWL, surfaces
+from realizer.render.textures import ALPHA, CHANNELS, DEPTH, IRIS, STEEPEST, Texels
 
 # Horizontal positions of the samples in a pixel, one in each row of a rotated grid, as in graphics cards.
 SAMPLES = (0.375, 0.875, 0.125, 0.625)
@@ -280,32 +280,39 @@ def _light_of(t: Any, x: Any, y: Any, points: Any, moving: Any, mesh: Any, texel
         q * fixed[a, 0] + s * fixed[b, 0] + r * fixed[c, 0],
         q * fixed[a, 1] + s * fixed[b, 1] + r * fixed[c, 1],
     )
-    _texel(texels, _level(fixed, texels[1], (a, b, c), turn), u, v, texel)
+    level, kind, byte = _level(fixed, texels[1], (a, b, c), turn), kinds[a], np.float32(1 / 255)
+    _texel(texels, level, u, v, texel)
+    place = _mixed(moving, 0, a, b, c, (q, s, r))
+    smooth = unit(_mixed(moving, 3, a, b, c, (q, s, r)))
+    towards = unit((eye[0] - place[0], eye[1] - place[1], eye[2] - place[2]))
+    # Hairs have the normals of the head that they grow on, whichever way their card is seen.
+    if dot(smooth, towards) < 0 and turn > 0 and kind != HAIR:
+        smooth = (-smooth[0], -smooth[1], -smooth[2])
+    along, down, size = _frame(fixed, moving, (a, b, c))
+    if kind == HAIR:
+        down = unit(_mixed(moving, 7, a, b, c, (q, s, r)))
+    su = sv = np.float32(0)
+    if kind == EYE and texel[8] < 254:
+        depth = np.float32(DEPTH) * (np.float32(1) - texel[8] * byte)
+        dive = size * _dive(depth, smooth, towards)
+        u, v = u - dive * dot(towards, along), v - dive * dot(towards, down)
+        _texel(texels, level, u, v, texel)
+        bowl = np.float32(BOWL / IRIS[2]) * min(depth / np.float32(0.0004), np.float32(1))
+        su, sv = bowl * (u - np.float32(IRIS[0])), bowl * (v - np.float32(IRIS[1]))
     albedo = (
         linear[int(texel[0] + half)] * (q * fixed[a, 2] + s * fixed[b, 2] + r * fixed[c, 2]),
         linear[int(texel[1] + half)] * (q * fixed[a, 3] + s * fixed[b, 3] + r * fixed[c, 3]),
         linear[int(texel[2] + half)] * (q * fixed[a, 4] + s * fixed[b, 4] + r * fixed[c, 4]),
     )
-    place = _mixed(moving, 0, a, b, c, (q, s, r))
-    smooth = unit(_mixed(moving, 3, a, b, c, (q, s, r)))
-    towards = unit((eye[0] - place[0], eye[1] - place[1], eye[2] - place[2]))
-    kind = kinds[a]
-    # Hairs have the normals of the head that they grow on, whichever way their card is seen.
-    if dot(smooth, towards) < 0 and turn > 0 and kind != HAIR:
-        smooth = (-smooth[0], -smooth[1], -smooth[2])
-    along, down = _frame(fixed, moving, (a, b, c))
-    if kind == HAIR:
-        down = unit(_mixed(moving, 7, a, b, c, (q, s, r)))
     fold = q * moving[a, 6] + s * moving[b, 6] + r * moving[c, 6]
     scale = np.float32(STEEPEST / 127)
-    su = (texel[4] - 128 + (texel[9] - 128) * fold) * scale
-    sv = (texel[5] - 128 + (texel[10] - 128) * fold) * scale
+    su += (texel[4] - 128 + (texel[9] - 128) * fold) * scale
+    sv += (texel[5] - 128 + (texel[10] - 128) * fold) * scale
     relief = unit((
         smooth[0] - su * along[0] - sv * down[0],
         smooth[1] - su * along[1] - sv * down[1],
         smooth[2] - su * along[2] - sv * down[2],
     ))  # fmt: skip
-    byte = np.float32(1 / 255)
     occlusion = (q * fixed[a, 5] + s * fixed[b, 5] + r * fixed[c, 5]) * texel[6] * byte
     rough = max((q * fixed[a, 6] + s * fixed[b, 6] + r * fixed[c, 6]) * texel[7] * byte, np.float32(0.06))
     values = (occlusion, rough, texel[8] * byte, reach(shadows, place, smooth))
@@ -325,7 +332,7 @@ def _mixed(rows: Any, k: Any, a: Any, b: Any, c: Any, shares: Any) -> Any:
 
 @compiled
 def _frame(fixed: Any, moving: Any, corners: Any) -> Any:
-    """Return the unit vectors on a triangle along which u and v of the maps grow."""
+    """Return the unit vectors on a triangle along which u and v of the maps grow, and their scale, 1/m."""
     a, b, c = corners
     e = (moving[b, 0] - moving[a, 0], moving[b, 1] - moving[a, 1], moving[b, 2] - moving[a, 2])
     f = (moving[c, 0] - moving[a, 0], moving[c, 1] - moving[a, 1], moving[c, 2] - moving[a, 2])
@@ -334,7 +341,17 @@ def _frame(fixed: Any, moving: Any, corners: Any) -> Any:
     way = np.float32(1) if u * t - v * s > 0 else np.float32(-1)
     along = unit(((t * e[0] - v * f[0]) * way, (t * e[1] - v * f[1]) * way, (t * e[2] - v * f[2]) * way))
     down = unit(((u * f[0] - s * e[0]) * way, (u * f[1] - s * e[1]) * way, (u * f[2] - s * e[2]) * way))
-    return along, down
+    ef = (e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0])
+    size = math.sqrt(abs(u * t - v * s) / math.sqrt(max(dot(ef, ef), 1e-30)))
+    return along, down, np.float32(size)
+
+
+@compiled
+def _dive(depth: Any, n: Any, towards: Any) -> Any:
+    """Return how far a ray has gone aside at a depth below the cornea, in lengths of `towards` along it."""
+    c = dot(n, towards)
+    bent = np.float32(BENT)
+    return depth * bent / np.float32(math.sqrt(np.float32(1) - bent * bent * (np.float32(1) - c * c)))
 
 
 @compiled

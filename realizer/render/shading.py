@@ -20,7 +20,18 @@ import numpy as np
 from realizer.core.array_types import Float32
 from realizer.core.colours import srgb
 from realizer.render.compiled import compiled
-from realizer.render.surfaces import DIRECT, REFLECTION, SHARP, SHARP_SHARE, SOFT, THIN, THROUGH, WRAP
+from realizer.render.surfaces import (
+    COAT,
+    DIRECT,
+    GLINT,
+    REFLECTION,
+    SHARP,
+    SHARP_SHARE,
+    SOFT,
+    THIN,
+    THROUGH,
+    WRAP,
+)  # fmt: skip
 
 KEY, RIM = 0, 1
 BRIGHTEST, STEPS = 8.0, 16384  # linear light at the end of the tone curve, and its entries
@@ -151,6 +162,33 @@ def _mirror_share(f0: Any, rough: Any, nv: Any) -> Any:
 
 
 @compiled
+def _lobes(row: Any, n: Any, half: Any, view: Any, cosines: Any, rough: Any) -> Any:
+    """Return the share of the key lamp's light that a surface mirrors; cosines of the lamp and of the eye."""
+    nl, nv = max(cosines[0], np.float32(0)), cosines[1]
+    nh, vh = max(dot(n, half), np.float32(0)), max(dot(view, half), np.float32(0))
+    one, f0, share = np.float32(1), row[REFLECTION], row[SHARP_SHARE]
+    miss = (one - vh) * (one - vh)
+    fresnel = f0 + (one - f0) * miss * miss * (one - vh)
+    lobes = (one - share) * _gloss(rough, nh, nl, nv) + share * _gloss(rough * row[SHARP], nh, nl, nv)
+    return np.float32(lobes * fresnel * nl * math.pi)
+
+
+@compiled
+def _glint(n: Any, key: Any, view: Any, glint: Any) -> Any:
+    """Return how bright the key lamp is mirrored by a coat, which shows it as a soft disc.
+
+    Args:
+        glint: the normal there is along key + glint[0] view; glint[1] is the radius in radians of normals.
+    """
+    place, width = glint
+    g = unit((key[0] + place * view[0], key[1] + place * view[1], key[2] + place * view[2]))
+    off = (n[0] - g[0], n[1] - g[1], n[2] - g[2])
+    inside = (width - np.float32(math.sqrt(dot(off, off)))) / (width * np.float32(0.5))
+    inside = min(max(inside, np.float32(0)), np.float32(1))
+    return np.float32(GLINT) * inside * inside * (np.float32(3) - 2 * inside)
+
+
+@compiled
 def reflected(row: Any, hair: Any, albedo: Any, normals: Any, values: Any, view: Any, lights: Any) -> Any:
     """Return the light (r, g, b) that a surface sends to the eye.
 
@@ -161,11 +199,11 @@ def reflected(row: Any, hair: Any, albedo: Any, normals: Any, values: Any, view:
         values: occlusion, roughness, thickness 0..1, and the share of the key light that is not in shadow.
         view: unit vector to the eye.
         lights: lamps (2, 2, 3): direction and colour of the key and the rim lamp; the environment's `sh`
-            (9, 3) and `levels` (k, h, w, 3); and the rim lamp's power.
+            (9, 3) and `levels` (k, h, w, 3); the rim lamp's power; place and width of the glint.
     """
     n, smooth, strand = normals
     occlusion, rough, thickness, reached = values
-    lamps, sh, levels, rim_power = lights
+    lamps, sh, levels, rim_power, glint = lights
     one, zero = np.float32(1), np.float32(0)
     key, rim = lamps[KEY, 0], lamps[RIM, 0]
     reach = one - np.float32(DIRECT) * (one - occlusion)
@@ -198,12 +236,12 @@ def reflected(row: Any, hair: Any, albedo: Any, normals: Any, values: Any, view:
             green + (white + tinted * b) * lamps[KEY, 1, 1],
             blue + (white + tinted * c) * lamps[KEY, 1, 2],
         )
-    nh, vh, share = max(dot(n, half), zero), max(dot(view, half), zero), row[SHARP_SHARE]
-    nl, f0 = max(nl, zero), row[REFLECTION]
-    miss = (one - vh) * (one - vh)
-    fresnel = f0 + (one - f0) * miss * miss * (one - vh)
-    lobes = (one - share) * _gloss(rough, nh, nl, nv) + share * _gloss(rough * row[SHARP], nh, nl, nv)
-    shine = np.float32(lobes * fresnel * nl * math.pi) * reached * reach
+    f0 = row[REFLECTION]
+    if row[COAT] > 0:
+        n, nv = smooth, max(dot(smooth, view), np.float32(1e-3))
+        shine = _glint(smooth, key, view, glint)
+    else:
+        shine = _lobes(row, n, half, view, (nl, nv), rough) * reached * reach
     mirrored = _mirror_share(f0, rough, nv) * occlusion * occlusion
     turn = 2 * dot(n, view)
     sky = _mirrored(levels, (turn * n[0] - view[0], turn * n[1] - view[1], turn * n[2] - view[2]), rough)

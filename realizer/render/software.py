@@ -28,8 +28,8 @@ class SoftwareCanvas(Canvas):
         self._raster.close()
 
 
-def lights_of(light: Light) -> tuple[Float32, Float32, Float32, np.float32]:
-    """Return a light as `shading.reflected` takes it: lamps, the environment twice, the rim lamp's power."""
+def lights_of(light: Light) -> tuple[Float32, Float32, Float32, np.float32, Float32]:
+    """Return a light as `shading.reflected` takes it: lamps, environment, rim lamp's power, glint."""
     around = light.environment
     lamps = [
         [unit(lamp.direction), np.multiply(lamp.colour, light.exposure)] for lamp in (light.key, light.rim)
@@ -37,5 +37,5 @@ def lights_of(light: Light) -> tuple[Float32, Float32, Float32, np.float32]:
     exposure = np.float32(light.exposure)
     return (
         np.array(lamps, np.float32), around.sh * exposure, around.octahedral() * exposure,
-        np.float32(light.rim_power),
+        np.float32(light.rim_power), np.array([light.glint, light.glint_width], np.float32),
     )  # fmt: skip

@@ -13,9 +13,12 @@ uniform mediump sampler2DArray mirrorMap;  // the environment by roughness, octa
 uniform vec3 surfaceWrap[5];   // surfaces.toml, a row for each kind
 uniform vec3 surfaceSoft[5];
 uniform vec4 surfaceShine[5];  // reflection, sharp, sharp_share, through
-uniform int hairKind;
+uniform int hairKind, eyeKind;
 uniform vec3 thinColour;       // colour of light that has come through thin skin
 uniform float directShare;     // how far occlusion darkens light of lamps
+uniform vec3 iris;             // place of its middle in the maps, and its radius there
+uniform vec3 cornea;           // metres behind it of thickness 0; how it bends light; slope of the iris at its rim
+uniform vec3 glint;            // of the key lamp on eyes: place, radius, brightness
 uniform float steepest;        // slope at byte 255 of slopeMap
 uniform vec3 ambientLight[9];  // the environment as spherical harmonics
 uniform vec3 keyDirection, keyColour, rimDirection, rimColour;
@@ -56,6 +59,13 @@ void frameOf(vec3 place, vec2 uv, out vec3 along, out vec3 down) {
   float way = abs(turn) < 1e-15 ? 0.0 : sign(turn);
   along = unitOf((b.y * e - a.y * f) * 1e4) * way;
   down = unitOf((a.x * f - b.x * e) * 1e4) * way;
+}
+
+// The scale of the maps on the surface, 1/m.
+float scaleOf(vec3 place, vec2 uv) {
+  vec2 a = dFdx(uv), b = dFdy(uv);
+  float area = length(cross(dFdx(place) * 1e4, dFdy(place) * 1e4)) * 1e-8;
+  return sqrt(abs(a.x * b.y - a.y * b.x) / max(area, 1e-20));
 }
 
 // The light of the environment on a white surface with that normal.
@@ -104,6 +114,12 @@ float mirrorShareOf(float f0, float rough, float nv) {
   return max(f0 * scale + 1.04 * term + rough * 0.022 - 0.04, 0.0);
 }
 
+// How bright the key lamp is mirrored by an eye, as a soft disc.
+float glintOf(vec3 n, vec3 view) {
+  float off = length(n - unitOf(keyDirection + glint.x * view));
+  return glint.z * smoothstep(0.0, 1.0, (glint.y - off) / (glint.y * 0.5));
+}
+
 // The light that a surface sends to the eye.
 //   n, even, strand: normals of the relief and of the smooth surface, the direction of strands.
 //   values: occlusion, roughness, thickness 0..1, and the share of the key light that is not in shadow.
@@ -137,7 +153,12 @@ vec3 reflectedBy(int kind, vec3 albedo, vec3 n, vec3 even, vec3 strand, vec4 val
   float f0 = shine.x, fresnel = f0 + (1.0 - f0) * away * away * away * away * away;
   nl = max(nl, 0.0);
   float lobes = mix(glossOf(rough, nh, nl, nv), glossOf(rough * shine.y, nh, nl, nv), shine.z);
-  light += lobes * fresnel * nl * PI * seen * reach * keyColour;
+  bool coat = kind == eyeKind;
+  light += (coat ? glintOf(even, view) : lobes * fresnel * nl * PI * seen * reach) * keyColour;
+  if (coat) {
+    n = even;
+    nv = max(dot(n, view), 1e-3);
+  }
   float mirrored = mirrorShareOf(f0, rough, nv) * occlusion * occlusion;
   return light + mirrored * mirroredOf(2.0 * dot(n, view) * n - view, rough);
 }
@@ -174,6 +195,12 @@ float coverOf(vec2 uv, float coarser) {
   return textureLod(albedoMap, uv, levelOf(uv, vec2(textureSize(albedoMap, 0))) + coarser).a;
 }
 
+// How far a ray has gone aside at a depth below the cornea, in lengths of `view` along it.
+float diveOf(float depth, vec3 n, vec3 view) {
+  float c = dot(n, view), bent = cornea.y;
+  return depth * bent * inversesqrt(1.0 - bent * bent * (1.0 - c * c));
+}
+
 // The picture's colour, sRGB, of a point of a surface.
 //   place, normal, strand: in metres; the normal and the direction of hairs at any length.
 //   uv: (0, 0) at the top left of the maps.
@@ -184,13 +211,21 @@ vec3 surfaceColour(int kind, vec3 place, vec3 normal, vec3 strand, vec2 uv, vec3
   float level = levelOf(uv, vec2(textureSize(albedoMap, 0)));
   vec3 along, down;
   frameOf(place, uv, along, down);
-  vec3 albedo = linearOf(textureLod(albedoMap, uv, level).rgb) * colour;
-  vec4 slopes = textureLod(slopeMap, uv, level) * 255.0 - 128.0;
-  vec3 values = textureLod(surfaceMap, uv, level).rgb;
   vec3 view = unitOf(eye - place), even = unitOf(normal);
   // Hairs have the normals of the head that they grow on, whichever way their card is seen.
   if (!front && dot(even, view) < 0.0 && kind != hairKind) even = -even;
-  vec2 slope = (slopes.xy + slopes.zw * fold) * (steepest / 127.0);
+  vec3 values = textureLod(surfaceMap, uv, level).rgb;
+  vec2 slope = vec2(0.0);
+  float scale = scaleOf(place, uv);
+  if (kind == eyeKind && values.z < 254.0 / 255.0) {
+    float depth = cornea.x * (1.0 - values.z);
+    uv -= scale * diveOf(depth, even, view) * vec2(dot(view, along), dot(view, down));
+    values = textureLod(surfaceMap, uv, level).rgb;
+    slope = cornea.z / iris.z * min(depth / 0.0004, 1.0) * (uv - iris.xy);
+  }
+  vec3 albedo = linearOf(textureLod(albedoMap, uv, level).rgb) * colour;
+  vec4 slopes = textureLod(slopeMap, uv, level) * 255.0 - 128.0;
+  slope += (slopes.xy + slopes.zw * fold) * (steepest / 127.0);
   vec3 relief = unitOf(even - slope.x * along - slope.y * down);
   values.xy *= occlusionRough;
   values.y = max(values.y, 0.06);

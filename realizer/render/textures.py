@@ -18,6 +18,7 @@ CHANNELS = 12  # a texel begins at a multiple of four bytes
 LEVEL = np.array([255, 255, 255, 255, 128, 128, 255, 255, 255, 128, 128, 0], np.uint8)
 STEEPEST = 1.0  # slope at byte 255, metres per metre; 128 is level
 BAND = 64  # rows halved at once, so that memory stays small
+IRIS = (0.8125, 0.9375, 0.03125)  # place of the middle of the iris in the maps, and its radius
 DEPTH = 0.003  # metres behind the cornea of a point of an iris whose thickness is 0
 FULL = 2048  # texels of a side, of the maps that `Maps.texel` is given for
 

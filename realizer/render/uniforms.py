@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float32
-from realizer.face.drawn_mesh import HAIR
+from realizer.face.drawn_mesh import EYE, HAIR
 from realizer.render.lamp_view import ASIDE, NEAR, SIDE, SOFT, LampView
 from realizer.render.light import Light, unit
-from realizer.render.surfaces import DIRECT, REFLECTION, THIN, THROUGH, WRAP, surfaces
+from realizer.render.surfaces import BENT, BOWL, DIRECT, GLINT, REFLECTION, THIN, THROUGH, WRAP, surfaces
 from realizer.render.surfaces import SOFT as EVEN
-from realizer.render.textures import STEEPEST
+from realizer.render.textures import DEPTH, IRIS, STEEPEST
 
 
 def uniforms_of(light: Light, lamp: LampView) -> Mapping[str, Any]:
@@ -30,6 +30,10 @@ def uniforms_of(light: Light, lamp: LampView) -> Mapping[str, Any]:
         "surfaceSoft": rows[:, EVEN : EVEN + 3].tolist(),
         "surfaceShine": rows[:, REFLECTION : THROUGH + 1].tolist(),
         "hairKind": HAIR,
+        "eyeKind": EYE,
+        "iris": list(IRIS),
+        "cornea": [DEPTH, BENT, BOWL],
+        "glint": [light.glint, light.glint_width, GLINT],
         "thinColour": list(THIN),
         "directShare": DIRECT,
         "steepest": STEEPEST,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from realizer.face.drawn_mesh import CLOTH, DrawnMesh
+from realizer.face.drawn_mesh import CLOTH, EYE, DrawnMesh
 from realizer.face.maps import Maps
 from realizer.render.lamp_view import LampView
 from realizer.render.raster import Raster
@@ -25,8 +25,8 @@ LIGHTS = (
     np.float32([[1, 1, 1]] + [[0, 0, 0]] * 8),
     np.zeros((5, 32, 32, 3), np.float32),
     np.float32(2),
+    np.float32([1, 0.1]),
 )
-EYE = np.float32([0, 0, 100])
 
 
 def raster_of(triangles, colours, size=SIZE, uv=None, maps=None, **flags):
@@ -38,19 +38,19 @@ def raster_of(triangles, colours, size=SIZE, uv=None, maps=None, **flags):
         colours=np.zeros((count, 3), np.uint8),
         occlusion=np.ones(count, np.float32),
         gloss=np.zeros(count, np.float32),
-        kind=np.full(count, CLOTH, np.uint8),
+        kind=np.full(count, flags.get("kind", CLOTH), np.uint8),
         parts={}, two_sided=flags.get("two_sided", none), see_through=flags.get("see_through", none),
     )  # fmt: skip
     lamp = LampView((0, 1, 1), (-1, -1, -1), (1, 1, 1))
     return Raster(size, mesh, np.float32(colours), maps or texels_of(None), lamp)
 
 
-def picture_of(raster, points, near):
+def picture_of(raster, points, near, eye=(0, 0, 100), pixel=0.01):
     """The picture of points (n, 2) in pixels, all facing the camera and far from the shadows' box."""
     points = np.asarray(points, float)
     moving = np.zeros((len(points), 10), np.float32)
-    moving[:, :2], moving[:, 5] = points * (0.01, -0.01), 1
-    return raster(points, near, moving, LIGHTS, EYE).copy()
+    moving[:, :2], moving[:, 5] = points * (pixel, -pixel), 1
+    return raster(points, near, moving, LIGHTS, np.float32(eye)).copy()
 
 
 def draw(corners, colours, nearness=1.0, size=SIZE, **flags):
@@ -121,6 +121,27 @@ def test_raster_cuts_holes_where_the_map_is_clear():
     picture = picture_of(raster, BIG, np.ones(3, np.float32))
     assert picture[20, 20].tolist() == [SEEN, 0, 0, 255]
     assert not picture[:, 32:].any()
+
+
+def webp(picture):
+    stream = io.BytesIO()
+    Image.fromarray(picture).save(stream, "webp", lossless=True)
+    return stream.getvalue()
+
+
+def test_raster_shows_an_iris_below_the_cornea():
+    albedo = np.zeros((64, 64, 3), np.uint8)
+    albedo[:, 32:] = 255
+    files = {"albedo": webp(albedo), "surface": webp(np.full((64, 64, 3), (255, 255, 0), np.uint8))}
+    maps = texels_of(Maps(files, None, 0.0, 1.0, None, None))
+    points = np.array([(0, 0), (0, 80), (80, 0)], float)
+    edges = []
+    for kind, eye in ((CLOTH, (90, 0, 0.1)), (EYE, (0, 0, 90)), (EYE, (90, 0, 0.1))):
+        raster = raster_of([[0, 1, 2]], [(1, 1, 1)] * 3, (80, 80), points / 80, maps, kind=kind)
+        row = picture_of(raster, points, np.ones(3, np.float32), eye, pixel=0.0005)[10, :60, 1]
+        edges.append(int((row > 100).argmax()))
+    # 3 mm below, light comes from 3.4 mm aside for an eye that looks along the surface.
+    assert edges == [40, 40, 47]
 
 
 def test_raster_cuts_triangles_at_the_picture_s_edges():

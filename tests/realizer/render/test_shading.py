@@ -20,7 +20,7 @@ def light(kind=CLOTH, normal=FRONT, view=FRONT, albedo=GREY, key=FRONT, around=0
     sh[0] = around
     levels = np.full((5, 32, 32, 3), sky, np.float32)
     values = values or (1.0, 0.5, 1.0, 1.0)
-    lights = lamps, sh, levels, np.float32(2)
+    lights = lamps, sh, levels, np.float32(2), np.float32([1, 0.1])
     normals = tuple(normal), tuple(normal), (np.float32(0), np.float32(1), np.float32(0))
     numbers = tuple(np.float32(v) for v in values)
     return np.array(
@@ -67,6 +67,13 @@ def test_reflected_light_of_a_smooth_surface_mirrors_the_room():
 def test_reflected_light_of_hair_is_brightest_across_the_strand():
     shine = [light(HAIR, key=np.float32([0, np.sin(a), np.cos(a)]))[0] for a in (0.0, 0.9)]
     assert shine[0] > shine[1]
+
+
+def test_reflected_light_of_an_eye_shows_the_lamp_as_a_disc():
+    lit, aside = (light(EYE, normal=unit(np.float32([x, 0, 1]))) for x in (0, 0.15))
+    assert (lit - aside > 1).all()
+    key = unit(np.float32([1, 0, 1]))
+    assert light(EYE, normal=unit(key + FRONT), key=key)[0] > 1
 
 
 def test_tone_curve_rises_to_white():

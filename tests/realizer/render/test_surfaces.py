@@ -3,11 +3,11 @@
 import numpy as np
 
 from realizer.face.drawn_mesh import CLOTH, EYE, HAIR, SKIN, WET
-from realizer.render.surfaces import REFLECTION, SHARP_SHARE, SOFT, THROUGH, WRAP, surfaces
+from realizer.render.surfaces import COAT, REFLECTION, SHARP_SHARE, SOFT, THROUGH, WRAP, surfaces
 
 
 def test_surfaces_have_a_row_for_each_kind():
-    assert surfaces().shape == (max(SKIN, EYE, HAIR, WET, CLOTH) + 1, THROUGH + 1)
+    assert surfaces().shape == (max(SKIN, EYE, HAIR, WET, CLOTH) + 1, COAT + 1)
 
 
 def test_surfaces_keep_shares_between_0_and_1():
