@@ -19,10 +19,12 @@ export class Head {
     this.groups = groups.map((group, k) => ({ ...group, triangles: fine || !coarse[k].length ? group.triangles : coarse[k] }));
     this.wanted = Uint32Array.from(new Set(this.groups.flatMap(({ triangles }) => [...triangles])));
     if (extras.folds) this.folds = { drives: extras.folds.drives, weights: read(extras.folds.weights), amounts: new Float32Array(extras.vertices), shown: false };
+    this.hairs = hairsOf(this.groups, extras.parts, attributes.TEXCOORD_0?.array);
     const gloss = attributes._GLOSS.array;
     this.attributes = {
       position: new BufferAttribute(new Float32Array(3 * count), 3),
       normal: new BufferAttribute(new Float32Array(3 * count), 3),
+      strand: new BufferAttribute(new Float32Array(3 * count), 3),
       fold: new BufferAttribute(new Float32Array(count), 1),
       uv: new BufferAttribute(attributes.TEXCOORD_0?.array ?? new Float32Array(2 * count), 2),
       colour: new BufferAttribute(attributes.COLOR_0.array, 4, true),
@@ -43,6 +45,7 @@ export class Head {
     this.places.times(this.vertices, position.array, this.wanted);
     this.ups.times(this.normals, normal.array, this.wanted);
     position.needsUpdate = normal.needsUpdate = true;
+    this.comb();
     if (this.folds) this.fold();
   }
 
@@ -69,6 +72,20 @@ export class Head {
     }
   }
 
+  // Write the direction of hairs, the one in which v of the maps grows.
+  comb() {
+    const { position: { array: p }, strand } = this.attributes;
+    const { corners, weights } = this.hairs;
+    const out = strand.array.fill(0);
+    for (let t = 0; t < corners.length; t += 3)
+      for (let k = 0; k < 3; k++) {
+        let sum = 0;
+        for (let i = 0; i < 3; i++) sum += weights[t + i] * p[3 * corners[t + i] + k];
+        for (let i = 0; i < 3; i++) out[3 * corners[t + i] + k] += sum;
+      }
+    strand.needsUpdate = true;
+  }
+
   // How much of the folds of expressions shows: by how far skin is pushed together, as realizer/render/folds.py.
   fold() {
     const { drives, weights, amounts, shown } = this.folds;
@@ -86,6 +103,21 @@ export class Head {
     this.ups.timesNumbers(amounts, this.attributes.fold.array, this.wanted);
     this.attributes.fold.needsUpdate = true;
   }
+}
+
+// The triangles of cards, and for each corner its share in the direction in which v grows, as in face/drawn_mesh.py.
+function hairsOf(groups, parts, uv) {
+  const cards = Object.entries(parts).filter(([name]) => name.endsWith("_cards")).map(([, { vertices }]) => vertices);
+  const first = Math.min(...cards.map(([first]) => first));
+  const corners = Uint32Array.from(groups.flatMap(({ triangles, holes }) => (holes && cards.length ? [...triangles] : [])).filter((vertex) => vertex >= first));
+  const weights = new Float32Array(corners.length);
+  for (let t = 0; t < corners.length; t += 3) {
+    const [a, b, c] = [2 * corners[t], 2 * corners[t + 1], 2 * corners[t + 2]];
+    const [u, v, s, w] = [uv[b] - uv[a], uv[b + 1] - uv[a + 1], uv[c] - uv[a], uv[c + 1] - uv[a + 1]];
+    const way = Math.sign(u * w - s * v);
+    weights.set([(s - u) * way, -s * way, u * way], t);
+  }
+  return { corners, weights };
 }
 
 // The stream's triangles among those drawn, whose vertices on edges have several entries in `places`.

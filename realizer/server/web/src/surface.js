@@ -8,8 +8,8 @@ import surface from "../../../render/surface.glsl";
 const vertexShader = `
 uniform mat4 modelViewMatrix, projectionMatrix, shadowView;
 uniform bool toLamp;
-in vec3 position, normal; in float fold; in vec2 uv; in vec4 colour; in vec2 occlusionRough;
-out vec3 at, up, tint; out vec2 map, hidden; out float folded;
+in vec3 position, normal, strand; in float fold; in vec2 uv; in vec4 colour; in vec2 occlusionRough;
+out vec3 at, up, hair, tint; out vec2 map, hidden; out float folded;
 invariant gl_Position;
 void main() {
   gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
@@ -17,7 +17,7 @@ void main() {
     gl_Position = vec4((shadowView * vec4(position, 1.0)).xyz * 2.0 - 1.0, 1.0);
     gl_Position.z = clamp(gl_Position.z, -1.0, 1.0);
   }
-  at = position; up = normalize(normal); tint = colour.rgb; map = uv; hidden = occlusionRough; folded = fold;
+  at = position; up = normalize(normal); hair = strand; tint = colour.rgb; map = uv; hidden = occlusionRough; folded = fold;
 }`;
 
 const head = `precision highp float;
@@ -27,18 +27,18 @@ precision highp sampler2DArray;
 ${surface}
 uniform vec3 cameraPosition;
 uniform int kind;
-in vec3 at, up, tint; in vec2 map, hidden; in float folded;
+in vec3 at, up, hair, tint; in vec2 map, hidden; in float folded;
 out vec4 pixel;
 `;
-const COLOUR = "surfaceColour(kind, at, up, map, tint, hidden, folded, gl_FrontFacing, cameraPosition)";
+const COLOUR = "surfaceColour(kind, at, up, hair, map, tint, hidden, folded, gl_FrontFacing, cameraPosition)";
 // Without relief and shadows.
 const PLAIN = `${head}
 vec3 plainColour() {
   vec3 view = unitOf(cameraPosition - at), n = unitOf(up);
-  if (!gl_FrontFacing && dot(n, view) < 0.0) n = -n;
+  if (!gl_FrontFacing && dot(n, view) < 0.0 && kind != hairKind) n = -n;
   vec2 values = texture(surfaceMap, map).rg * hidden;
   vec3 albedo = linearOf(texture(albedoMap, map).rgb) * tint;
-  return pictureOf(reflectedBy(kind, albedo, n, n, vec3(0.0), vec4(values.x, max(values.y, 0.06), 1.0, 1.0), view));
+  return pictureOf(reflectedBy(kind, albedo, n, n, unitOf(hair), vec4(values.x, max(values.y, 0.06), 1.0, 1.0), view));
 }`;
 // Hair hides as many samples of a pixel as its alpha says; without samples, a pixel is hidden or not.
 const DRAW = {
@@ -46,15 +46,15 @@ const DRAW = {
   plain: `${PLAIN} void main() { pixel = vec4(plainColour(), 1.0); }`,
 };
 const DRAW_HOLES = {
-  full: `${head} void main() { pixel = vec4(${COLOUR}, coverOf(map)); }`,
-  plain: `${PLAIN} void main() { if (coverOf(map) < 0.5) discard; pixel = vec4(plainColour(), 1.0); }`,
+  full: `${head} void main() { pixel = vec4(${COLOUR}, coverOf(map, 0.0)); }`,
+  plain: `${PLAIN} void main() { if (coverOf(map, 0.0) < 0.5) discard; pixel = vec4(plainColour(), 1.0); }`,
 };
 const FILL = `${head} void main() { pixel = vec4(1.0); }`;
 // Neighbouring texels of the shadow map are hidden from different alphas on, as samples of a pixel are.
 const CAST_HOLES = `${head}
 void main() {
   ivec2 p = ivec2(gl_FragCoord.xy) & 1;
-  if (coverOf(map) * 255.0 <= float(((p.x + 2 * p.y) << 6) + 31)) discard;
+  if (coverOf(map, 1.0) * 255.0 <= float(((p.x + 2 * p.y) << 6) + 31)) discard;
   pixel = vec4(1.0);
 }`;
 
