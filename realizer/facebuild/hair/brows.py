@@ -78,10 +78,9 @@ def brow(
     ups = unit((vertex_normals(*drawn)[fine] * weights[..., None]).sum(axis=1)).reshape(count, 3, 3)
     places = (drawn[0][fine] * weights[..., None]).sum(axis=1).reshape(count, 3, 3)
     places = places + ups * np.array(LIFT)[:, None] * rng.uniform(0.6, 1.6, (count, 1, 1))
-    white = (rng.uniform(0, 1, count) < look.brow_grey)[:, None]
-    tint = (
-        np.where(white, GREY, np.array(colour, float)) * (1 + 0.18 * rng.uniform(-1, 1, (count, 1))) / LEVEL
-    )
+    white = look.brow_grey + 0.3 * rng.uniform(-1, 1, (count, 1)) * (1 - abs(2 * look.brow_grey - 1))
+    tint = np.array(colour, float) * (1 - white) + GREY * white
+    tint *= (1 + 0.18 * rng.uniform(-1, 1, (count, 1))) / LEVEL
     width = WIDE * rng.uniform(0.8, 1.2, (count, 1)) * np.array([1.0, 1.0, 0.7])
     light = np.broadcast_to(0.75 + 0.25 * ROWS, (count, 3))
     return ribbons(

@@ -52,8 +52,8 @@ def hair(scalp: Scalp, triangles: Int32, style: Style, colour: Any) -> Patch:
 
 def tints(style: Style, colour: Any, count: int, rng: Any) -> Float64:
     """Return colours of cards (count, 3), sRGB: those of hair, some turned grey."""
-    white = smooth(style.grey + 0.35 * rng.uniform(-1, 1, count) * (1 - abs(2 * style.grey - 1)), 0.25, 0.75)
-    white = np.where(style.grey <= 0, 0, np.where(style.grey >= 1, 1, white))[:, None]
+    # A card is a lock of hundreds of hairs: each lock has white ones among its dark ones.
+    white = style.grey + 0.22 * rng.uniform(-1, 1, (count, 1)) * (1 - abs(2 * style.grey - 1))
     out = np.array(colour, float) * (1 - white) + GREY * white
     out = out * (1 + style.contrast * rng.uniform(-1, 1, (count, 1)))
     return np.asarray(np.clip(out / LEVEL, 0, 255))
