@@ -18,9 +18,9 @@ from realizer.core.array_types import Float32, Float64, Int16
 from realizer.core.errors import RealizerError
 from realizer.core.options import PlayOptions
 from realizer.core.units import frame_count
-from realizer.playback.active_block import SPEECH_FADE, ScheduledSpeech
 from realizer.playback.audio_mix import render_utterance
 from realizer.playback.player import Player
+from realizer.playback.scheduled_speech import SPEECH_FADE, ScheduledSpeech
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.utterance import Utterance
 from realizer.tables import faps

@@ -17,9 +17,9 @@ from realizer.animation.axis import AU_NAMES
 from realizer.animation.fap.conversion import to_fap
 from realizer.behaviours.registry import VOCABULARY
 from realizer.core.options import PlayOptions
-from realizer.playback.active_block import ScheduledSpeech
 from realizer.playback.feedback_events import parse_warning
 from realizer.playback.player import Player
+from realizer.playback.scheduled_speech import ScheduledSpeech
 from realizer.playback.speaking import submit_with_speech
 from realizer.scheduling.timing import Schedule
 from realizer.speech.silent import SilentVoice

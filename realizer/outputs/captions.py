@@ -12,7 +12,7 @@ from realizer.outputs import speech_spans
 from realizer.outputs.speech_spans import Span
 
 if TYPE_CHECKING:
-    from realizer.playback.active_block import ScheduledSpeech
+    from realizer.playback.scheduled_speech import ScheduledSpeech
     from realizer.realization import Realization
 
 # As usual for subtitles: about 40 letters a line, and a new line at a pause of the voice.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from realizer.playback.active_block import ScheduledSpeech
+    from realizer.playback.scheduled_speech import ScheduledSpeech
     from realizer.realization import Realization
     from realizer.speech.utterance import Phoneme, Word
 

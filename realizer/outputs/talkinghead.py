@@ -18,7 +18,7 @@ from realizer.outputs.output import Output
 from realizer.outputs.speech_spans import Span
 
 if TYPE_CHECKING:
-    from realizer.playback.active_block import ScheduledSpeech
+    from realizer.playback.scheduled_speech import ScheduledSpeech
     from realizer.realization import Realization
 
 RATE = 22050  # Hz; TalkingHead's default for PCM

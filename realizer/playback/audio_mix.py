@@ -6,7 +6,7 @@ import numpy as np
 
 from realizer.animation.curves import gain_at
 from realizer.core.array_types import Float32, Int16
-from realizer.playback.active_block import ScheduledSpeech
+from realizer.playback.scheduled_speech import ScheduledSpeech
 
 # Duration of the fade of cut-off speech, which avoids a click; with half a packet it is over in 50 ms.
 CUT = 0.04  # s

@@ -5,43 +5,34 @@ It has no clock and no I/O: every call has the argument `now`, seconds on the se
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import cache, partial
+from functools import partial
 from typing import Any
 
-import numpy as np
-
 from bml_schema import Block, Feedback
-from realizer.animation.axis import AU_NAMES, axis
-from realizer.animation.blend import blend
-from realizer.animation.channel import Channel, Layer
+from realizer.animation.channel import Channel
 from realizer.animation.frames import AUFrames
-from realizer.animation.idle.gaze_shifts import gaze_shifts
-from realizer.animation.idle.idle_face import Idle, idle_face
-from realizer.animation.idle.prosody import AFTERMATH, KnownMotion, SpeechSpan, phrase_ends, prosody_channels
-from realizer.animation.lips.effort import opened
-from realizer.animation.speaking_style import Style, style_of
+from realizer.animation.idle.idle_face import Idle
+from realizer.animation.idle.prosody import AFTERMATH
 from realizer.behaviours.kind import BehaviourKind, PlanningContext, Position
 from realizer.behaviours.registry import KINDS
 from realizer.core.array_types import Float64, Int16
 from realizer.core.options import DEFAULTS, PlayOptions
 from realizer.expressions.library import library_of
-from realizer.playback.active_block import ActiveBlock, ScheduledSpeech
 from realizer.playback.block_manager import BlockManager
 from realizer.playback.block_states import BlockEvent, State, next_state
 from realizer.playback.character import RELAX, Character
+from realizer.playback.face_motion import SEED_STEP, FaceMotion
 from realizer.playback.listener import responses
+from realizer.playback.scheduled_speech import ScheduledSpeech
 from realizer.scheduling.timing import UNKNOWN, Schedule
 from realizer.speech.utterance import Recording, SpeechRequest, Utterance
 from realizer.speech.voice_activity import Turn, VoiceActivity
-from realizer.tables.cooccurrence import load_rules
+from realizer.tables.cooccurrence import Rules
 
 # Frames up to this long before `now` can still be computed.
 HISTORY = 1.0  # s
-SEED_STEP = 7919  # from the seed of one character to that of the next
-# Motion that accompanies speech is at most this far from it.
-NEAR = 5.0  # s
 
 
 class Player(BlockManager):
@@ -87,12 +78,9 @@ class Player(BlockManager):
             liveliness=options.liveliness if options.idle else 0.0,
             animates=animates,
         )
-        self.idle = options.idle
-        self.liveliness = options.liveliness
-        self.prosody = options.prosody
+        self._faces = FaceMotion(options, self.blocks, self._characters)
         self.strict_bml = options.strict_bml
         self.history = history
-        self.rules = load_rules(options.cooccurrence)
 
     @property
     def version(self) -> int:
@@ -266,17 +254,18 @@ class Player(BlockManager):
         """Ids of the characters; the first is the default of documents without characterId."""
         return [c.id for c in self._characters]
 
+    @property
+    def rules(self) -> Rules | None:
+        """The rules of co-occurrence, None if there are none."""
+        return self._faces.rules
+
     def frames(self, times: Float64, character: int = 0) -> AUFrames:
         """Return the frames of a face at any times; a pure function of what was submitted, live and offline.
 
         Args:
             times: (n,) float64 seconds on the session clock, rising; at most `history` before the last `due`.
         """
-        times = np.asarray(times, np.float64)
-        if not len(times):
-            return blend([], times, self.rules)
-        channels, idle = self.motion(times, character)
-        return blend(channels, times, self.rules, idle)
+        return self._faces.frames(times, character)
 
     def motion(self, times: Float64, character: int = 0) -> tuple[list[Channel], Idle | None]:
         """Return all channels that move a face at these times, and possibly more, and its idle motion.
@@ -284,38 +273,7 @@ class Player(BlockManager):
         Args:
             times: as for `frames`, at least one.
         """
-        first, last = float(times[0]), float(times[-1])
-        blocks = self.blocks.of_character(character)
-        own = self._characters[character].channels()
-        moods = [channel for channel in own if channel.layer is Layer.BASE]
-
-        @cache  # the head and the mouth have the same style
-        def style(playing: ActiveBlock, start: float) -> Style:
-            return style_of((*playing.moving_channels(), *moods), start)
-
-        channels = [c for p in blocks for c in _with_feeling(p, partial(style, p), first, last)] + own
-        if not self.idle:
-            return channels, None
-        seed = self.context.seed + SEED_STEP * character
-        talks = [
-            (SpeechSpan(s.start + at, s.until, part), p)
-            for p in (blocks if self.prosody else ())
-            for s in p.speech.values()
-            if s.is_heard
-            for at, part in s.utterance.sections or [(0.0, s.utterance)]
-        ]
-        near = [
-            t._replace(style=partial(style, p, t.start))
-            for t, p in talks
-            if t.start - NEAR <= last and t.start + t.utterance.duration + NEAR >= first
-        ]
-        if near:
-            known = [motion for p in blocks for motion in p.known_motions()]
-            known += [KnownMotion(c.span[0], c) for c in own]
-            channels += prosody_channels(near, first, last, seed, known)
-        shifts = gaze_shifts(channels, first, last) if self.liveliness else ()
-        ends = phrase_ends(talk for talk, _ in talks)
-        return channels, idle_face(first, last, seed, ends, liveliness=self.liveliness, shifts=shifts)
+        return self._faces.channels(times, character)
 
     @property
     def end(self) -> float:
@@ -345,38 +303,5 @@ class Player(BlockManager):
                 blocks[-1] |= {"start": p.start, "end": end}
                 spans = ((b, t + p.start) for b, t in p.schedule.times.items() if len(t))
                 blocks[-1]["behaviours"] = [b for b, t in spans if t[0] <= now < t[-1]]
-        faces = [self._face_state(now, index) for index in range(len(self._characters))]
+        faces = [self._faces.state(now, index) for index in range(len(self._characters))]
         return {"time": now, "blocks": blocks, "characters": faces}
-
-    def _face_state(self, now: float, character: int) -> dict[str, Any]:
-        times = np.array([now])
-        channels, idle = self.motion(times, character)
-        fap_names = list(axis())[len(AU_NAMES()) : len(AU_NAMES()) + 68]
-        layers = {}
-        for layer in Layer:
-            alone = idle if layer is Layer.IDLE else None
-            own = blend([c for c in channels if c.layer is layer], times, idle=alone)
-            # AUs below 0.005 and FAPs below half a unit are invisible.
-            values = zip(fap_names, own.faps[0].tolist(), strict=True)
-            faps = {name: round(value) for name, value in values if abs(value) >= 0.5}
-            if (aus := _up(own)) or faps:
-                layers[layer.name.lower()] = {"aus": aus, "faps": faps}
-        visible = _up(blend(channels, times, self.rules, idle))
-        return {"character": self._characters[character].id, "aus": visible, "layers": layers}
-
-
-def _with_feeling(
-    playing: ActiveBlock, style: Callable[[float], Style], first: float, last: float
-) -> Iterator[Channel]:
-    """Yield the channels of a block; the lips of speech near these times open by what the face shows."""
-    for behaviour, channels in playing.channels.items():
-        speech = playing.speech.get(behaviour)
-        if speech is not None and channels and channels[0].span[0] <= last and channels[0].span[1] >= first:
-            channels = opened(channels, style(speech.start).opening)
-        yield from channels
-
-
-def _up(frames: AUFrames) -> dict[str, float]:
-    """Return the AUs of the first frame that are not 0."""
-    values = zip(AU_NAMES(), frames.aus[0].tolist(), strict=True)
-    return {name: round(value, 3) for name, value in values if value > 0.005}

@@ -21,7 +21,7 @@ from realizer.animation.pose import poses
 from realizer.core.errors import RealizerError
 from realizer.face.load import load_face
 from realizer.offline import realize
-from realizer.playback.active_block import ScheduledSpeech
+from realizer.playback.scheduled_speech import ScheduledSpeech
 from realizer.realization import Realization
 from realizer.speech.loudness import Levels
 from realizer.speech.melody import RATE, melody

@@ -10,7 +10,7 @@ import pytest
 from realizer import realize
 from realizer.core.errors import RealizerError
 from realizer.examples import examples
-from realizer.playback.active_block import ScheduledSpeech
+from realizer.playback.scheduled_speech import ScheduledSpeech
 from realizer.realization import MAX_FRAMES, frames_until
 from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Phoneme, Utterance

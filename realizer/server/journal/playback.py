@@ -6,7 +6,7 @@ from typing import Any
 
 from bml_schema import Feedback
 from realizer.core.settings import Settings, SettingsError
-from realizer.playback.active_block import ScheduledSpeech
+from realizer.playback.scheduled_speech import ScheduledSpeech
 from realizer.realization import Realization, frames_until, merge_warnings
 from realizer.server.journal.entry import JournalError, SavedSession
 from realizer.server.journal.replay import replay

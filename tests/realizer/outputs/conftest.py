@@ -18,7 +18,7 @@ from bml_schema import BlockProgress
 from realizer.animation.axis import AU_NAMES, axis
 from realizer.animation.frames import AUFrames, FAPFrames
 from realizer.outputs.output import RenderSettings
-from realizer.playback.active_block import ScheduledSpeech
+from realizer.playback.scheduled_speech import ScheduledSpeech
 from realizer.realization import Performance, Realization
 from realizer.render import Renderer
 from realizer.scheduling.timing import Schedule, Warning

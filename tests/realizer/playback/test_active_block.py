@@ -10,9 +10,10 @@ from bml_schema import parse
 from realizer.animation.channel import Gain
 from realizer.behaviours.kind import PlanningContext
 from realizer.behaviours.registry import KINDS
-from realizer.playback.active_block import SPEECH_FADE, ActiveBlock, Dependency
+from realizer.playback.active_block import ActiveBlock, Dependency
 from realizer.playback.block_planner import plan
 from realizer.playback.block_states import State
+from realizer.playback.scheduled_speech import SPEECH_FADE
 from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import SpeechRequest, Utterance
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.playback.active_block import ScheduledSpeech
 from realizer.playback.audio_mix import CUT, render_utterance, resample
+from realizer.playback.scheduled_speech import ScheduledSpeech
 from realizer.server.streams.audio_stream import PACKET
 from realizer.speech.utterance import Utterance
 
