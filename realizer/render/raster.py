@@ -22,7 +22,9 @@ from realizer.render.textures import ALPHA, CHANNELS, DEPTH, IRIS, STEEPEST, Tex
 SAMPLES = (0.375, 0.875, 0.125, 0.625)
 MAX_THREADS = 4
 LEAST = np.float32(0)
-SAME = np.float32(8e-4)  # of the nearness: samples of one kind that are that close are lit once
+# Samples of one kind are lit once where their nearness differs by less than this share of it, and the green of
+# their triangles' colours by less than that.
+SAME, TINT = np.float32(8e-4), np.float32(0.05)
 
 
 class Raster:
@@ -360,7 +362,7 @@ def _light_band(
 ) -> None:
     """Write the pixels of a band of rows, and clear its samples."""
     keys, picture = pictures
-    kinds, curve, triangles = mesh[2], mesh[5], mesh[0]
+    triangles, fixed, kinds, curve = mesh[0], mesh[1], mesh[2], mesh[5]
     view = lights, eye, np.empty(CHANNELS, np.float32)
     per = len(SAMPLES)
     nothing, low_half, high_half = np.uint64(0), np.uint64(0xFFFFFFFF), np.uint64(32)
@@ -388,7 +390,8 @@ def _light_band(
                     elif (
                         found[j] < 0
                         or kinds[triangles[found[j], 0]] != kind
-                        or (abs(near[j] - near[k]) > SAME * near[k])
+                        or abs(near[j] - near[k]) > SAME * near[k]
+                        or abs(fixed[triangles[found[j], 0], 3] - fixed[triangles[t, 0], 3]) > TINT
                     ):
                         continue
                     weight += 1
