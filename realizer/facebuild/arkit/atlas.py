@@ -2,7 +2,7 @@
 
 import io
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ COARSEST = 0.01  # of the size of the sources
 LARGEST = 8192  # texels of a source that are read along one axis
 # How fine a part's textures are in relation to those of the skin if there is no room for all of them.
 FINENESS = {"hair": 0.7, "beard": 0.7, "upper_teeth": 0.7, "lower_teeth": 0.7, "shirt": 0.4, "other": 0.4}
+GLOSSY = 0.8  # how much of the roughness in the maps a vertex of gloss 1 takes off, as in `render.raster`
 QUALITY = {"albedo": 92, "normal": 95, "surface": 92}  # of WebP: 1 to 4 MB together
 
 
@@ -35,13 +36,13 @@ class Atlas:
     Attributes:
         files: name of a map, as in `face.maps.NAMES` -> WebP.
         uv: (m, 3, 2) uint16; see_through: (m,), as in `face.maps.Maps`.
-        matt: (m,) whether the surface map has the roughness of a triangle.
+        gloss: (m,) of the triangles' materials, as in `Face.gloss`; NaN where the file says nothing.
     """
 
     files: Mapping[str, bytes]
     uv: Any
     see_through: Bool
-    matt: Bool
+    gloss: Float64
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +66,11 @@ def make_atlas(gltf: Gltf, surface: Surface, ranges: Mapping[str, tuple[int, int
 
     if not any(surface.materials[k].textures for k in np.unique(surface.material)):
         return None
-    patches = [_patch(gltf, surface, int(k), ranges) for k in np.unique(surface.material)]
+    # Materials that differ by name and roughness alone share a patch.
+    looks: dict[Material, list[int]] = {}
+    for k in np.unique(surface.material).tolist():
+        looks.setdefault(replace(surface.materials[k], name="", roughness=None), []).append(k)
+    patches = [_patch(gltf, surface, look, of, ranges) for look, of in looks.items()]
     share = 1 / min(FINENESS.values())  # all as fine as in the file
     while (places := pack(sizes := [_size(patch, share) for patch in patches])) is None:
         share *= SHRINK
@@ -79,7 +84,7 @@ def make_atlas(gltf: Gltf, surface: Surface, ranges: Mapping[str, tuple[int, int
     free = np.ones((SIZE, SIZE), bool)
     free[: NEUTRAL + PAD, : NEUTRAL + PAD] = False
     uv = np.empty_like(surface.uv)
-    holes, matt = np.zeros(len(uv), bool), np.zeros(len(uv), bool)
+    holes = np.zeros(len(uv), bool)
     for patch, size, (x, y) in zip(patches, sizes, places, strict=True):
         inner = np.array(size) - 2 * PAD
         uv[patch.rows] = (np.array((x, y)) + PAD + (patch.uv - patch.low) / patch.span * inner) / SIZE
@@ -89,17 +94,18 @@ def make_atlas(gltf: Gltf, surface: Surface, ranges: Mapping[str, tuple[int, int
             maps[name][y : y + size[1], x : x + size[0]] = picture
         free[y : y + size[1], x : x + size[0]] = False
         holes[patch.rows] = maps["albedo"][y : y + size[1], x : x + size[0], 3].min() < 250
-        matt[patch.rows] = patch.material.roughness is not None
     # From afar neighbours are mixed: what is near has the colour of a patch, not white.
     near = distance_transform_edt(free, return_distances=False, return_indices=True)
     maps["albedo"] = maps["albedo"][tuple(near)]
     slots = {slot for patch in patches for slot, _ in patch.material.textures}
     if "normal" not in slots:
         del maps["normal"]
-    if not matt.any() and "occlusion" not in slots:
+    if not slots & {"roughness", "occlusion"}:
         del maps["surface"]
     files = {name: _webp(picture, QUALITY[name]) for name, picture in maps.items()}
-    return Atlas(files, np.rint(uv * 65535).clip(0, 65535).astype(np.uint16), holes, matt)
+    rough = [np.nan if one.roughness is None else one.roughness for one in surface.materials]
+    gloss = np.clip((1 - np.array(rough)) / GLOSSY, 0, 1)[surface.material]
+    return Atlas(files, np.rint(uv * 65535).clip(0, 65535).astype(np.uint16), holes, gloss)
 
 
 def pack(sizes: Sequence[tuple[int, int]]) -> list[tuple[int, int]] | None:
@@ -121,8 +127,11 @@ def pack(sizes: Sequence[tuple[int, int]]) -> list[tuple[int, int]] | None:
     return places
 
 
-def _patch(gltf: Gltf, surface: Surface, k: int, ranges: Mapping[str, tuple[int, int]]) -> _Patch:
-    material, rows = surface.materials[k], np.flatnonzero(surface.material == k)
+def _patch(
+    gltf: Gltf, surface: Surface, material: Material, of: list[int], ranges: Mapping[str, tuple[int, int]]
+) -> _Patch:
+    """Return the patch of the triangles of some materials, which look alike."""
+    rows = np.flatnonzero(np.isin(surface.material, of))
     uv = surface.uv[rows]
     for axis, wrap in enumerate(material.chart.wrap):
         period = {CLAMP: 0, MIRROR: 2}.get(wrap, 1)
@@ -197,9 +206,8 @@ def _painted(gltf: Gltf, material: Material, box: Float64, size: tuple[int, int]
     out["surface"] = np.full((size[1], size[0], 3), 255, np.float32)
     if (shade := seen("occlusion")) is not None:
         out["surface"][..., 0] -= (255 - shade[..., 0]) * textures["occlusion"].amount
-    if material.roughness is not None:
-        rough = seen("roughness")
-        out["surface"][..., 1] = (255 if rough is None else rough[..., 1]) * material.roughness
+    if (rough := seen("roughness")) is not None:
+        out["surface"][..., 1] = rough[..., 1]
     return {name: np.clip(np.rint(picture), 0, 255).astype(np.uint8) for name, picture in out.items()}
 
 

@@ -32,7 +32,7 @@ from realizer.facebuild.mpeg4.rigid import opening_rows, sliding
 from realizer.facebuild.parts import smooth
 from realizer.facebuild.person.skin_colours import occlusion
 
-# Gloss of surfaces: skin, hair, wet parts. A file's roughness is meant for other lights.
+# Gloss of surfaces of which the file says nothing, or that have no textures.
 GLOSS = {
     "skin": 0.16, "brows": 0.05, "lashes": 0.0, "left_eye": 1.0, "right_eye": 1.0, "upper_teeth": 0.75,
     "lower_teeth": 0.75, "tongue": 0.35, "hair": 0.10, "beard": 0.08, "shirt": 0.0, "other": 0.1,
@@ -140,7 +140,8 @@ def _write_mesh(
     if atlas is None:
         write_mesh(path, at, triangles, surface.painted_colours(), light, gloss)
         return
-    gloss[triangles[atlas.matt]] = 0
+    known = ~np.isnan(atlas.gloss)
+    gloss[triangles[known]] = atlas.gloss[known, None]
     maps = {"uv": atlas.uv, "see_through": atlas.see_through}
     write_mesh(path, at, triangles, surface.colours, light, gloss, maps)
     for name, picture in atlas.files.items():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -66,9 +67,17 @@ def test_make_atlas_keeps_colour_normal_and_roughness_of_two_materials() -> None
     assert seen(atlas, "albedo", 1)[:3] == pytest.approx([20, 90, 220], abs=4)
     assert seen(atlas, "normal", 0)[:3] == pytest.approx([200, 128, 232], abs=6)
     assert seen(atlas, "normal", 1)[:3] == pytest.approx([128, 128, 255], abs=4)
-    assert seen(atlas, "surface", 1)[:3] == pytest.approx([255, 64, 255], abs=5)
+    assert seen(atlas, "surface", 1)[:3] == pytest.approx([255, 128, 255], abs=5)
     assert atlas is not None
-    assert atlas.matt.tolist() == [False, True]
+    assert atlas.gloss == pytest.approx([np.nan, 0.625], nan_ok=True)
+
+
+def test_make_atlas_shares_a_patch_of_materials_that_look_alike() -> None:
+    rough = [replace(material(base=0), name=str(k), roughness=k / 4) for k in range(5)]
+    atlas = make_atlas(Pictures(flat(9, 9, 9)), surface(rough), {})
+    assert atlas is not None
+    assert (atlas.uv == atlas.uv[0]).all()
+    assert atlas.gloss == pytest.approx([1, 0.9375, 0.625, 0.3125, 0])
 
 
 def test_make_atlas_multiplies_factor_and_adds_emission() -> None:

@@ -71,7 +71,7 @@ def test_import_head_writes_maps_or_nothing(ada_glb: Path, tmp_path: Path) -> No
     assert check_face("mia", tmp_path) == ()
     maps = load_face("mia", tmp_path).maps
     assert maps is not None
-    assert maps.files.keys() == {"albedo", "surface"}
+    assert maps.files.keys() == {"albedo"}
     before = {path.name: path.read_bytes() for path in (tmp_path / "mia").iterdir()}
     (tmp_path / "skin.png").unlink()
     for folder in ("mia", "new"):
