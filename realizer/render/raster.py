@@ -22,7 +22,7 @@ from realizer.render.textures import ALPHA, CHANNELS, DEPTH, IRIS, STEEPEST, Tex
 SAMPLES = (0.375, 0.875, 0.125, 0.625)
 MAX_THREADS = 4
 LEAST = np.float32(0)
-# Samples of one kind are lit once where their nearness differs by less than this share of it, and the green of
+# Samples of one kind are lit once where their nearness differs by less than this share, and the green of
 # their triangles' colours by less than that.
 SAME, TINT = np.float32(8e-4), np.float32(0.05)
 
