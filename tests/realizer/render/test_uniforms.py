@@ -128,17 +128,10 @@ def test_surface_glsl_is_the_formula_of_the_processor(numbers, kind, name):
 def test_surface_glsl_is_valid_on_the_desktop_and_on_the_web(head):
     from realizer.render import opengl
 
-    vertex = "in vec3 at; out vec3 place; void main() { place = at; gl_Position = vec4(at, 1.0); }"
-    main = """
-    in vec3 place;
-    out vec4 pixel;
-    void main() {
-      pixel.a = coverOf(place.xy, 0.0);
-      pixel.rgb = surfaceColour(0, place, place, place.xy, place, place.xy, 0.5, gl_FrontFacing, place);
-    }
-    """
+    surface = files("realizer.render").joinpath("surface.glsl").read_text()
+    vertex, inputs = (head + code.split("\n", 1)[1] for code in (opengl.VERTEX, opengl.HEAD))
     context = opengl._context()
     with context as gl:
-        code = head + files("realizer.render").joinpath("surface.glsl").read_text() + main
-        assert "albedoMap" in gl.program(vertex_shader=head + vertex, fragment_shader=code)
+        program = gl.program(vertex_shader=vertex, fragment_shader=inputs + surface + opengl.DRAW)
+        assert "albedoMap" in program
     context.release()
