@@ -14,10 +14,11 @@ from realizer.facebuild.hair.strands import unit
 from realizer.facebuild.parts import smooth
 from realizer.facebuild.person.scalp import Scalp
 
-COUNT = 620  # cards of a full beard
-LONG, WIDE = 0.024, 0.0055  # m, of a card on the chin of a full beard
+COUNT = 820  # cards of a full beard
+LONG, WIDE = 0.024, 0.0046  # m, of a card on the chin of a full beard
+SHORT = 0.006  # m, of the shortest beard
 SEGMENTS = 2
-LEAN = 0.75, 0.35  # how far hairs stand off the skin at the root and at the tip
+LEAN = 0.45, 0.22  # how far hairs stand off the skin at the root and at the tip
 ROOT = 0.0002  # m that a root lies above the skin
 
 
@@ -36,12 +37,12 @@ def beard(
         skin: places (n, 3) and triangles of the skin's mesh; scalp: over the skin that is drawn.
         where: (n,) 0..1, where a beard grows.
         points: feature points, metres.
-        amount: 0..1, how long it is.
+        amount: 0..1, how long it is: from SHORT to SHORT + LONG.
         tint: (COUNT, 3) sRGB, a colour for each card.
     """
     at, triangles = skin
     area = np.linalg.norm(triangle_normals(at, triangles), axis=1)
-    weight = area * smooth(where[triangles].min(axis=1), 0.25, 0.6)
+    weight = area * smooth(where[triangles].mean(axis=1), 0.3, 0.65)
     pick = rng.choice(len(triangles), COUNT, p=weight / weight.sum())
     shares = rng.dirichlet((1.0, 1.0, 1.0), COUNT)
     corners = triangles[pick]
@@ -57,17 +58,18 @@ def beard(
     way = unit(np.where(above[:, None], combed, down) + 0.22 * rng.normal(size=(COUNT, 3)))
     way = unit(way - ups * (way * ups).sum(axis=1, keepdims=True))
     near_chin = smooth(np.linalg.norm((root - chin) * [1, 0.7, 1], axis=1), 0.060, 0.015)
-    long = LONG * amount * (0.35 + 0.65 * near_chin) * rng.uniform(0.7, 1.2, COUNT)
+    long = (SHORT + LONG * amount) * (0.35 + 0.65 * near_chin) * rng.uniform(0.7, 1.2, COUNT)
     long = np.where(above, np.minimum(long, 0.011 * rng.uniform(0.7, 1.1, COUNT)), long)
     s = np.linspace(0, 1, SEGMENTS + 1)
     lean = np.interp(s, (0, 1), LEAN)[:, None, None]
     steps = unit(way + lean * ups) * (long / SEGMENTS)[:, None]
     places = root + np.concatenate([np.zeros((1, COUNT, 3)), np.cumsum(steps[1:], axis=0)])
     places = places.transpose(1, 0, 2)
+    thin = (where[corners] * shares).sum(axis=1) < rng.uniform(0.4, 1.0, COUNT)
     width = WIDE * rng.uniform(0.7, 1.2, (COUNT, 1)) * np.array([0.8, 1.0, 0.7]) * min(1, 0.5 + amount)
     light = np.broadcast_to(0.55 + 0.45 * s, (COUNT, SEGMENTS + 1)) * rng.uniform(0.7, 1, (COUNT, 1))
     return ribbons(
         places, np.repeat(ups[:, None], SEGMENTS + 1, axis=1), width,
-        rng.choice(["locks", "loose", "loose"], COUNT), tint, light, 0.15,
+        np.where(thin, "wire", "tuft"), tint, light, 0.15,
         (corners, np.repeat(shares[:, None], SEGMENTS + 1, axis=1)),
     )  # fmt: skip

@@ -53,14 +53,14 @@ def brow(
 
     count = round(COUNT * look.brow_cover * (0.7 + 0.3 * look.brow_thick))
     a, b, c = (points[k] for k in (("4.1", "4.3", "4.5") if side > 0 else ("4.2", "4.4", "4.6")))
-    x = np.abs([a[0] - side * (0.003 - look.brow_gap), (a[0] + b[0]) / 2, b[0], c[0] + side * 0.002])
+    x = np.abs([a[0] - side * (0.003 - look.brow_gap), (a[0] + b[0]) / 2, b[0], c[0] - side * 0.001])
     arch = look.brow_arch
     y = np.array([a[1] + 0.0008, (a[1] + b[1]) / 2 + 0.0008 + arch / 2, b[1] - 0.0016 + arch, c[1] - 0.0012])
     middle = PchipInterpolator(x, y - look.brow_low)
     t = (np.arange(count) + rng.uniform(0, 1, count)) / count
     t = np.interp(t, (0, 0.08, 0.9, 1), (0, 0.11, 0.88, 1))  # thin at both ends
     v = rng.uniform(-1, 1, count)
-    half = HALF * look.brow_thick * smooth(t, -0.30, 0.22) * (1 - 0.78 * smooth(t, 0.40, 1.0))
+    half = HALF * look.brow_thick * smooth(t, -0.30, 0.22) * (1 - 0.68 * smooth(t, 0.40, 1.0))
     across = x[0] + (x[-1] - x[0]) * t
     root = np.stack([across, middle(across) + v * half], 1)
     slope = np.degrees(np.arctan(middle.derivative()(across)))

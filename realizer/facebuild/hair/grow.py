@@ -18,10 +18,9 @@ from realizer.facebuild.person.scalp import Scalp
 
 SEED = 11  # of the strands: the same head, the same hair
 GREY = np.array([196.0, 193.0, 190.0])
-THIN = ("loose", "sparse")  # what cards at the hairline show
 BORDER, SHORTEST = 3, 0.004  # segments of cards at the hairline; m of the shortest card
 NEAR = 0.012  # m from the skin in which cards are kept off it
-UNDER = 0.35  # layers below that show dense strands
+UNDER = 0.35  # layers below that are what lies under the others
 CAP = 0.0011  # m that the cap lies above the skin
 SOFT = 0.016  # m from the hairline in which the cap gets dense; the part of its picture for that
 FADE = 0.42
@@ -71,7 +70,7 @@ def cap(scalp: Scalp, triangles: Int32, style: Style, colour: Any) -> Patch:
     return Patch(
         at + ups * CAP * smooth(inside, -0.006, 0.006)[:, None],
         ups,
-        place("cap", across, np.clip(np.where(inside < SOFT, soft, full), 0, 1)),
+        place(style.cap, across, np.clip(np.where(inside < SOFT, soft, full), 0, 1)),
         np.repeat(np.clip(tint / LEVEL, 0, 255)[None], count, 0),
         style.depth * 0.5 + (1 - style.depth * 0.5) * smooth(inside, 0.022, 0.0),
         np.full(count, style.gloss * 0.5),
@@ -109,10 +108,10 @@ def _locks(scalp: Scalp, style: Style, colour: Any, rng: Any) -> Patch:
     s = np.linspace(0, 1, style.segments + 1)
     shape = (0.45 + 0.75 * smooth(s, 0.0, 0.35)) * (1 - 0.55 * smooth(s, 0.5, 1.0))
     width = style.width * rng.uniform(0.7, 1.3, (count, 1)) * shape
-    light = (0.35 + 0.65 * layer[:, None]) * (0.40 + 0.60 * smooth(s, 0.0, 0.35))
-    names = np.where(layer < UNDER, "dense", rng.choice(style.strips, count))
+    light = (1 - style.depth * 0.8 * (1 - layer[:, None])) * (0.45 + 0.55 * smooth(s, 0.0, 0.35))
+    names = np.where(layer < UNDER, style.under, rng.choice(style.strips, count))
     near = edge(scalp, style, at) < rng.uniform(0.004, 0.016, count)
-    names = np.where(near, rng.choice(THIN, count), names)
+    names = np.where(near, style.edge, names)
     return _shown(lines, width, light, names, tints(style, colour, count, rng), style.gloss)
 
 
@@ -124,7 +123,9 @@ def _border(scalp: Scalp, style: Style, colour: Any, rng: Any) -> Patch:
     lines = grow(scalp, style, at, layer, length, BORDER, rng)
     width = 0.0048 * rng.uniform(0.7, 1.2, (count, 1)) * np.linspace(1, 0.8, BORDER + 1)
     light = np.full((count, BORDER + 1), 0.9)
-    return _shown(lines, width, light, rng.choice(THIN, count), tints(style, colour, count, rng), style.gloss)
+    return _shown(
+        lines, width, light, rng.choice(style.thin, count), tints(style, colour, count, rng), style.gloss
+    )
 
 
 def _shown(lines: Strands, width: Float64, light: Float64, names: Any, tint: Float64, gloss: float) -> Patch:

@@ -41,6 +41,10 @@ class Style:
     segments: int
     width: float
     strips: list[str]
+    under: str
+    edge: str
+    thin: list[str]
+    cap: str
     border: int
     border_length: float
     cover: float

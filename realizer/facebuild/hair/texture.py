@@ -16,19 +16,25 @@ LEVEL = 0.80  # mean brightness of a strand, 0..1
 
 @dataclass(frozen=True, slots=True)
 class Strip:
-    """A column of the picture: what a card shows.
+    """A part of the picture: what a card shows.
+
+    A part is about as large as a card is in pictures: a smaller copy of a finer one is a grey square.
 
     Attributes:
-        first, last: its sides, 0..1 across the picture.
+        left, top, right, bottom: its sides, 0..1 of the picture.
         strands: how many; width: of one, as a share of the strip's.
         sway: how far a strand strays, as a share of the strip's width; waves: how often.
         ends: the part of the height after which strands end.
         begins: the part of the height before which strands begin.
         tip: how far strands meet at the end, 0..1.
+        whole: strands reach the strip's sides and its end.
+        dashes: pieces that each strand is cut into; 0 is none.
     """
 
-    first: float
-    last: float
+    left: float
+    top: float
+    right: float
+    bottom: float
     strands: int
     width: float
     sway: float = 0.06
@@ -36,29 +42,37 @@ class Strip:
     ends: float = 0.75
     begins: float = 0.03
     tip: float = 0.3
+    whole: bool = False
+    dashes: int = 0
 
 
 STRIPS: Mapping[str, Strip] = {
-    "dense": Strip(0.00, 0.16, 60, 0.050, begins=0.12),
-    "locks": Strip(0.16, 0.32, 40, 0.055, 0.10, 1.0, 0.55, 0.16, 0.5),
-    "loose": Strip(0.32, 0.45, 17, 0.050, 0.12, 1.0, 0.45, 0.12, 0.5),
-    "sparse": Strip(0.45, 0.56, 8, 0.058, 0.14, 0.8, 0.35, 0.30, 0.3),
-    "cap": Strip(0.56, 0.72, 90, 0.055, 0.03, 0.6, 1.0, 0.40, 0.0),
-    "coils": Strip(0.72, 0.86, 16, 0.065, 0.16, 5.0, 0.50, 0.08, 0.2),
-    "brow": Strip(0.86, 0.92, 3, 0.15, 0.14, 0.4, 0.50, 0.25, 0.5),
-    "lash": Strip(0.92, 0.95, 1, 0.45, 0.0, 0.0, 0.85, 0.0, 0.0),
-    "stubble": Strip(0.95, 1.00, 3, 0.14, 0.10, 0.5, 0.70, 0.20, 0.0),
+    "dense": Strip(0.00, 0.0, 0.13, 1.0, 50, 0.060, begins=0.12),
+    "locks": Strip(0.13, 0.0, 0.26, 1.0, 34, 0.065, 0.10, 1.0, 0.55, 0.16, 0.5),
+    "loose": Strip(0.26, 0.0, 0.38, 1.0, 17, 0.055, 0.12, 1.0, 0.45, 0.12, 0.5),
+    "cap": Strip(0.38, 0.0, 0.54, 1.0, 140, 0.034, 0.03, 0.6, 1.0, 0.40, 0.0, whole=True),
+    "crop": Strip(0.54, 0.0, 0.66, 1.0, 26, 0.050, 0.05, 2.0, 1.0, 0.10, 0.0, whole=True, dashes=22),
+    "coils": Strip(0.66, 0.0, 0.80, 0.5, 16, 0.070, 0.16, 5.0, 0.50, 0.08, 0.2),
+    "crew": Strip(0.66, 0.5, 0.80, 1.0, 30, 0.060, 0.10, 0.8, 0.45, 0.20, 0.5),
+    "sparse": Strip(0.80, 0.0, 0.90, 0.35, 6, 0.060, 0.14, 0.8, 0.35, 0.30, 0.3),
+    "wisps": Strip(0.90, 0.0, 1.00, 0.35, 11, 0.060, 0.14, 0.8, 0.35, 0.30, 0.4),
+    "tuft": Strip(0.80, 0.35, 0.90, 0.70, 14, 0.070, 0.12, 0.8, 0.40, 0.20, 0.6),
+    "wire": Strip(0.90, 0.35, 1.00, 0.70, 9, 0.070, 0.16, 1.5, 0.40, 0.25, 0.4),
+    "brow": Strip(0.80, 0.70, 0.85, 0.95, 3, 0.16, 0.14, 0.4, 0.50, 0.25, 0.5),
+    "lash": Strip(0.86, 0.70, 0.88, 0.95, 1, 0.45, 0.0, 0.0, 0.85, 0.0, 0.0),
 }
 MARGIN = 0.06  # share of a strip that stays empty at each side
+INSET = 0.004  # share of the picture's height that cards keep off the ends of a strip
 
 
 def place(strip: str, across: Float64, along: Float64) -> Float64:
     """Return u, v (..., 2) in the maps of places in a strip: across it and along its hairs, 0..1 each."""
-    column = STRIPS[strip]
-    left, top, right, bottom = HAIR
-    u = column.first + (column.last - column.first) * np.asarray(across, float)
-    v = 0.004 + 0.992 * np.asarray(along, float)
-    u, v = np.broadcast_arrays(left + (right - left) * u, top + (bottom - top) * v)
+    part = STRIPS[strip]
+    x = part.left + (part.right - part.left) * np.asarray(across, float)
+    y = part.top + INSET + (part.bottom - part.top - 2 * INSET) * np.asarray(along, float)
+    u, v = np.broadcast_arrays(
+        HAIR.left + (HAIR.right - HAIR.left) * x, HAIR.top + (HAIR.bottom - HAIR.top) * y
+    )
     return np.stack([u, v], axis=-1)
 
 
@@ -67,18 +81,21 @@ def hair_texture(size: int) -> UInt8:
     rng = np.random.default_rng(SEED)
     out = np.zeros((size, size, 4))
     out[..., :3] = LEVEL
-    for name, strip in STRIPS.items():
-        first, last = round(strip.first * size), round(strip.last * size)
-        out[:, first:last] = _strip(strip, size, last - first, rng, name == "cap")
+    for strip in STRIPS.values():
+        left, top, right, bottom = (
+            round(s * size) for s in (strip.left, strip.top, strip.right, strip.bottom)
+        )
+        if left < right and top < bottom:
+            out[top:bottom, left:right] = _strip(strip, bottom - top, right - left, rng)
     return np.asarray(np.rint(out.clip(0, 1) * 255), np.uint8)
 
 
-def _strip(strip: Strip, height: int, width: int, rng: np.random.Generator, whole: bool) -> Float64:
-    """Return the picture (height, width, 4) of a strip, 0..1; `whole`: strands reach its sides and end."""
+def _strip(strip: Strip, height: int, width: int, rng: np.random.Generator) -> Float64:
+    """Return the picture (height, width, 4) of a strip, 0..1."""
     v = (np.arange(height) + 0.5)[:, None] / height
     x = (np.arange(width) + 0.5) / width
     tone, seen = np.full((height, width), LEVEL), np.zeros((height, width))
-    margin = 0.0 if whole else MARGIN
+    margin = 0.0 if strip.whole else MARGIN
     wide = max(strip.width, 1.1 / width)
     for middle in rng.permutation(np.linspace(margin, 1 - margin, strip.strands + 2)[1:-1]):
         turn, size, bend = rng.uniform(0, 2 * np.pi), rng.uniform(0.4, 1), rng.uniform(-1, 1)
@@ -86,11 +103,13 @@ def _strip(strip: Strip, height: int, width: int, rng: np.random.Generator, whol
         to = 0.5 + (middle - 0.5) * (1 - strip.tip * v**2)
         centre = to + (sway + strip.sway * 0.5 * bend * v) * np.minimum(1, 4 * v + 0.3)
         centre = centre.clip(margin + wide / 2, 1 - margin - wide / 2)
-        begin = strip.begins * rng.uniform(0, 1) ** (1.0 if whole else 2.0)
-        end = 1.1 if whole else strip.ends + (1 - strip.ends) * rng.uniform(0, 1)
+        begin = strip.begins * rng.uniform(0, 1) ** (1.0 if strip.whole else 2.0)
+        end = 1.1 if strip.whole else strip.ends + (1 - strip.ends) * rng.uniform(0, 1)
         # Thin at the root and at the tip.
         taper = np.clip((end - v) / 0.30, 0, 1) ** 0.6 * np.clip(0.35 + (v - begin) / 0.16, 0, 1)
         on = np.clip((v - begin) / 0.08, 0, 1) * (v < end)
+        if strip.dashes:
+            on = on * np.clip(0.9 + 3 * np.sin(2 * np.pi * strip.dashes * (v + rng.uniform(0, 1))), 0, 1)
         half = wide / 2 * rng.uniform(0.75, 1.25) * np.maximum(taper, 0.25)
         cover = np.clip((half - np.abs(x - centre)) * width + 0.5, 0, 1) * on * np.clip(taper * 1.6, 0, 1)
         light = LEVEL + 0.22 * rng.uniform(-1, 1)

@@ -21,7 +21,7 @@ def test_brow_lies_on_the_skin_above_the_eye(skin: Skin, points: dict[str, np.nd
     assert cKDTree(skin[0]).query(at)[0].max() < 0.008
     assert at[:, 1].min() > points["3.1"][1]
     assert (at[:, 0] > 0).all()
-    assert np.ptp(at[:, 0]) > 3 * np.ptp(at[:, 1])
+    assert np.ptp(at[:, 0]) > 2 * np.ptp(at[:, 1])
 
 
 @pytest.mark.parametrize(
