@@ -40,10 +40,10 @@ def test_cap_lies_on_the_skin_under_the_hair(scalp: Scalp, skin: Skin, style: St
     assert edge(scalp, style, patch.places).max() > 0.08
 
 
-def test_tints_are_white_by_strand(style: Style) -> None:
+def test_tints_turn_white_lock_by_lock(style: Style) -> None:
     rng = np.random.default_rng(2)
     dark, mixed, white = (
         tints(replace(style, grey=grey), BROWN, 200, rng).mean(axis=1) for grey in (0.0, 0.5, 1.0)
     )
-    assert dark.max() < 90 < white.min()
-    assert 0.2 < (mixed > 120).mean() < 0.8
+    assert dark.max() < mixed.min() < mixed.max() < white.min()
+    assert np.ptp(mixed) > np.ptp(dark)
