@@ -340,7 +340,7 @@ class SessionHost:
         """Log an internal error and end its session; the others play on."""
         log.exception("session %s ends: it failed", session.id)
         self.metrics.counts["failures"] += 1
-        for number in session.connections:
+        for number in list(session.connections):
             self._apply_effect(session, Close(number, 1011, "internal error"))
         session.close()
         session.journal.writer.end()  # a restored session would fail again

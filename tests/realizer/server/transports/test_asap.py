@@ -386,7 +386,7 @@ def test_asap_replaces_a_start_tag_that_clients_cannot_read() -> None:
 
 
 def test_asap_disconnects_a_client_that_stops_reading(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("realizer.server.session.session.STUCK", 1000)
+    monkeypatch.setattr("realizer.server.session.connections.STUCK", 1000)
 
     async def test(server: Server, bml: int, port: int) -> None:
         client = Client(bml, port)
