@@ -32,6 +32,7 @@ def paint_albedo(skin: Skin, pores: Float32, lines: Float32) -> Float32:
     _lips(skin, out)
     _beard(skin, out)
     _scalp(skin, out)
+    _margins(skin, out)
     _mouth(skin, out)
     return np.clip(out, 0, 255)
 
@@ -118,6 +119,13 @@ def _lips(skin: Skin, out: Float32) -> None:
     rim = np.exp(-(((skin.ring - 8.0) / 0.7) ** 2)) * skin.dry
     out *= 1 + 0.035 * skin.float(rim * (1 - look.age))[:, None]
     out *= skin.float(1 - 0.42 * smooth(skin.ring, 2.3, 0.6) * (skin.ring < 3) * skin.dry)[:, None]
+
+
+def _margins(skin: Skin, out: Float32) -> None:
+    edge, caruncle = skin.margins()
+    # Between the wet edge of a lid and its lashes the skin is as pale as before.
+    share = np.maximum(0.45 * smooth(edge, 0.35, 0.9), 0.7 * caruncle)
+    out += skin.float(share)[:, None] * (_vector(skin.recipe.colours["corner"]) * 0.92 - out)
 
 
 def _beard(skin: Skin, out: Float32) -> None:

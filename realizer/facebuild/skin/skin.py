@@ -145,6 +145,14 @@ class Skin:
         """Return values as float32."""
         return np.asarray(values, np.float32)
 
+    def margins(self) -> tuple[Float32, Float32]:
+        """Return the wet edges of the lids, and the caruncles in the inner corners, 0..1 (k,) each."""
+        edge = np.zeros(len(self.person.ground.at))
+        for lid in self.lids:
+            edge[lid.rings[0]] = 1
+        corners = self.around("3.8", "3.11", radii=(0.0045, 0.0032, 0.0050))
+        return self.field(edge), self.float(smooth(corners, 0.15, 0.6))
+
     def oily(self) -> Float32:
         """Return where the skin is oily and its pores are large, 0..1 (k,): nose, forehead, chin."""
         nose = self.around("9.3", radii=(0.022, 0.020, 0.03))

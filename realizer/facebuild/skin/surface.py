@@ -10,7 +10,7 @@ from realizer.facebuild.skin.skin import Skin, distance_through
 
 CAVITY = 1500.0  # part of the light that a metre of depth below the surroundings takes away
 AROUND = 6.0  # texels of these surroundings
-WET = 0.35  # roughness of the lining of the mouth and of the lids' edges
+WET, TEARS = 0.35, 0.14  # roughness of the lining of the mouth, and of the lids' edges
 
 
 def surface_of(skin: Skin, relief: Relief) -> Float32:
@@ -31,11 +31,10 @@ def _roughness(skin: Skin) -> Float32:
     out = out + 0.06 * skin.look.age
     out = out + row["fine"] * (skin.noise(0.0012, 80) + 0.5 * skin.noise(0.005, 81))
     out = out + (row["lips"] + 0.03 * skin.noise(0.0010, 82, skin.red) - out) * skin.red
-    edge = np.zeros(len(skin.person.ground.at))
-    for lid in skin.lids:
-        edge[lid.rings[0]] = 1
-    wet = np.maximum(skin.field(edge), smooth(skin.ring, 2.0, 1.0))
-    return skin.float(np.clip(out + (WET - out) * wet, 0.15, 1))
+    wet = smooth(skin.ring, 2.0, 1.0)
+    tears = np.maximum(*skin.margins())
+    out = out + (WET - out) * wet
+    return skin.float(np.clip(out + (TEARS - out) * tears, 0.12, 1))
 
 
 def _thickness(skin: Skin) -> Float32:
