@@ -10,7 +10,7 @@ from realizer.render.light import Light
 
 BACKENDS = ("auto", "gl", "onboard")
 # Files that Linux shows where a graphics card may be used. Without one, OpenGL is drawn by the processor too,
-# half as fast as we do.
+# less than half as fast as we do.
 CARDS = ("dri/renderD*", "nvidia[0-9]*", "dxg")
 
 
