@@ -18,7 +18,7 @@ from realizer.tables import toml_table
 AGES = (18.0, 95.0)  # years
 PEOPLES = ("african", "asian", "caucasian")
 YOUNG, OLD = 22.0, 80.0  # years of which the data has shapes
-LINED = 30.0, 75.0  # years at which lines of age begin, and are complete
+LINED = 24.0, 82.0  # years at which lines of age begin, and are complete
 GREYING = 44.0, 80.0  # years at which hair begins to turn white, and is white
 SHARES = {"sex": (0.0, 1.0), "weight": (-1.0, 1.0), "muscle": (-1.0, 1.0), "skin": (0.0, 1.0)}
 WORDS = {"shape": "shapes", "hair": "hair_colours", "eyes": "eye_colours"}

@@ -15,6 +15,7 @@ from realizer.tables import toml_table
 
 SIDES = {1: "left", -1: "right"}
 STEP = 0.0003  # m between the points of a line that distances are measured to
+BEHIND = -0.3  # forward part of a normal below which there are no lines
 FACING = 0.15  # cosine at which a surface still counts as seen
 REACH = 4.0  # widths from its middle at which a line ends
 WANDER = 0.0007  # m, standard deviation of a person's points from those of the table
@@ -131,11 +132,14 @@ def groove(away: Any, width: float) -> Any:
 def engrave(skin: Skin, lines: list[Line]) -> tuple[Float32, Float32]:
     """Return heights (k,) in metres: of the face at rest, and of its folds at full."""
     ups = skin.normals()
-    bend = BEND * np.stack([skin.noise(0.007, 50), skin.noise(0.007, 51), 0 * skin.at[:, 0]], 1)
-    at = skin.at + bend * skin.dry[:, None]
-    varied = np.clip(0.85 + 0.25 * skin.noise(0.005, 52), 0.3, 1.2)
-    ups[~skin.dry] = 0
-    rest, folds = np.zeros((2, len(at)), np.float32)
+    heights = np.concatenate([line.path[:, 1] for line in lines])
+    there = (skin.at[:, 1] > heights.min() - FADE) & (skin.at[:, 1] < heights.max() + FADE)
+    some = np.flatnonzero(there & (ups[:, 2] > BEHIND) & skin.dry)
+    bend = BEND * np.stack([skin.noise(0.007, 50), skin.noise(0.007, 51)], 1)[some]
+    at, ups = skin.at[some], ups[some]
+    at[:, :2] += bend
+    varied = np.clip(0.85 + 0.25 * skin.noise(0.005, 52)[some], 0.3, 1.2)
+    rest, folds = np.zeros((2, len(some)), np.float32)
     for line in lines:
         row = line.row
         found, away, point = line.near(at, ups, REACH * row["width"])
@@ -143,7 +147,9 @@ def engrave(skin: Skin, lines: list[Line]) -> tuple[Float32, Float32]:
         young = row.get("young", 1.0)
         folds[found] = _deepest(folds[found], -deep * (young + (1 - young) * skin.look.age))
         rest[found] = _deepest(rest[found], -deep * row["age"] * _aged(skin, line))
-    return rest, folds
+    whole = np.zeros((2, len(skin.at)), np.float32)
+    whole[:, some] = rest, folds
+    return whole[0], whole[1]
 
 
 def _aged(skin: Skin, line: Line) -> float:

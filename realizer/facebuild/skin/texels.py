@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -75,15 +76,23 @@ class Texels:
 
     def broad(self, field: Callable[[Float32], Any]) -> Float32:
         """Return a field that changes slowly, (k,): computed at few places (j, 3) and interpolated."""
-        from scipy.ndimage import zoom
-
-        places = self.picture(self.at, np.nan)[COARSE // 2 :: COARSE, COARSE // 2 :: COARSE]
+        places, cover = self._coarse
         inside = np.isfinite(places[..., 0])
         coarse = np.zeros(places.shape[:2], np.float32)
         coarse[inside] = field(places[inside])
-        cover = zoom(inside.astype(np.float32), COARSE, order=1, grid_mode=True, mode="nearest")
+        return np.asarray(self._fine(coarse) / cover)
+
+    @cached_property
+    def _coarse(self) -> tuple[Float32, Float32]:
+        """The few places (j, j, 3), NaN outside, and how much of a texel is interpolated of those inside."""
+        places = self.picture(self.at, np.nan)[COARSE // 2 :: COARSE, COARSE // 2 :: COARSE]
+        return places, np.maximum(self._fine(np.isfinite(places[..., 0]).astype(np.float32)), 0.05)
+
+    def _fine(self, coarse: Float32) -> Float32:
+        from scipy.ndimage import zoom
+
         whole = zoom(coarse, COARSE, order=1, grid_mode=True, mode="nearest")
-        return np.asarray(whole.ravel()[self.flat] / np.maximum(cover.ravel()[self.flat], 0.05))
+        return np.asarray(whole.ravel()[self.flat], np.float32)
 
     def stamp(self, centres: Any, radius: Float32, shape: Callable[[Any], Any]) -> Float32:
         """Return the largest of marks at each texel, (k,).
