@@ -1,6 +1,7 @@
 """The check of a face folder: every fault, with its file and what to change."""
 
-from collections.abc import Callable
+import io
+from collections.abc import Callable, Mapping
 from difflib import get_close_matches
 from itertools import pairwise
 from pathlib import Path
@@ -28,7 +29,7 @@ OFF = 0.004  # m; a feature point further than this from its vertex is off the m
 PARTS = (
     *NEEDED, "upper_teeth", "lower_teeth", "tongue", "brows", "lashes", "hair", "beard", "shirt", "other",
 )  # fmt: skip
-KEYS = ("name", "source", "licence", "says", "parts", "cameras", "deformer")
+KEYS = ("name", "source", "licence", "says", "parts", "cameras", "deformer", "maps", "cards")
 TONGUE = range(43, 48)  # FAPs that may move nothing if there is no tongue
 
 Read = TypeVar("Read")
@@ -90,6 +91,7 @@ def check_face(name: str = "default", directory: Path | str | None = None) -> tu
     if not faults:
         face = tried(lambda: load_folder(folder, None))
         faults += _field_faults(folder, face) if face else []
+        faults += _picture_faults(folder, face.maps.files) if face and face.maps else []
     return tuple(dict.fromkeys(faults))
 
 
@@ -178,4 +180,19 @@ def _field_faults(folder: Path, face: Face) -> list[str]:
         for row in faps()[2:]
         if moved[row.fap] < 1e-6 and ("tongue" in face.parts or row.fap not in TONGUE)
     ]
+    return faults
+
+
+def _picture_faults(folder: Path, files: Mapping[str, bytes]) -> list[str]:
+    """Return the maps that are no pictures, or damaged."""
+    from PIL import Image
+
+    faults = []
+    for name, raw in files.items():
+        try:
+            Image.open(io.BytesIO(raw)).load()
+        except (OSError, SyntaxError, ValueError, Image.DecompressionBombError):  # of the decoders
+            faults.append(
+                f"{folder / name}.webp: wanted a picture, got another file or a part of one; build it again"
+            )
     return faults

@@ -202,6 +202,13 @@ def test_realize_refuses_visemes_except_for_fap_files(tmp_path: Path) -> None:
         assert ("wanted a .fap file" in done.stderr) == (status == 2)
 
 
+def test_realize_refuses_morphs_except_for_glb_files(tmp_path: Path) -> None:
+    arguments = ["-q", "realize", "-", "--voice", "silent", "--morphs", "arkit"]
+    done = CliRunner().invoke(cli, [*arguments, "-o", str(tmp_path / "x.fap")], input=TALK)
+    assert done.exit_code == 2
+    assert "wanted a .glb file to write morph targets into" in done.stderr
+
+
 DIALECT = '<act><bml><head type="NOD"/></bml></act>'
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from PIL import Image
 
 from realizer.cli.faces import faces
 from realizer.core.errors import FaceError
@@ -295,3 +296,13 @@ def test_check_command_without_a_name_checks_every_face(folder: Path) -> None:
     assert ran.return_value == 1
     assert "ada: sound" in ran.output
     assert "mesh.npz" in ran.output
+
+
+def test_check_names_maps_that_are_no_pictures(folder: Path) -> None:
+    with np.load(folder / "mesh.npz") as file:
+        arrays = {name: file[name] for name in file.files}
+    np.savez(folder / "mesh.npz", **arrays | {"uv": np.zeros((len(arrays["triangles"]), 3, 2), np.uint16)})
+    Image.new("RGBA", (7, 5)).save(folder / "albedo.webp")
+    (folder / "surface.webp").write_bytes(b"RIFF")
+    (found,) = faults(folder)
+    assert found.startswith(f"{folder / 'surface.webp'}: wanted a picture")
