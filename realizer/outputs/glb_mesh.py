@@ -117,8 +117,10 @@ class GlbMesh:
                 if not mine.any():
                     continue
                 vertices, corners = np.unique(mesh.triangles[mine], return_inverse=True)
+                some_cut = "_cut" * (cut and not mesh.see_through[own].all())
+                some_mapped = "_mapped" * (lies and not mapped[own].all())
                 look = Look(
-                    name + "_cut" * cut + "_mapped" * (lies and not mapped[own].all()),
+                    name + some_cut + some_mapped,
                     1 - GLOSSY * float(mesh.gloss[vertices].mean()),
                     bool(mesh.two_sided[mine].any()), cut, lies,
                 )  # fmt: skip

@@ -79,7 +79,7 @@ BROKEN: dict[str, tuple[Callable[[Path], object], tuple[str, ...]]] = {
     "an unknown part": (lambda f: edit(f / "face.toml", "tongue =", "tung ="), ("'tung'", "'tongue'")),
     "no skin": (lambda f: edit(f / "face.toml", "skin =", "shirt2 ="), ("wanted 'skin', got none",)),
     "parts that overlap": (
-        lambda f: edit(f / "face.toml", "\nbrows = [", "\nbrows = [0, 50]\nother = ["),
+        lambda f: edit(f / "face.toml", "\nshirt = [", "\nshirt = [0, 50]\nother = ["),
         ("overlap", "face.toml"),
     ),
     "colours above 255": (

@@ -9,7 +9,10 @@ const [path, ...instants] = process.argv.slice(2);
 const bytes = new Uint8Array(readFileSync(path));
 const { issues, info } = await validator.validateBytes(bytes);
 // Node decodes no pictures.
-const loader = new GLTFLoader().register(() => ({ name: "pictures", loadTexture: async () => new Texture() }));
+const loader = new GLTFLoader().register((parser) => {
+  parser.loadTextureImage = async () => new Texture();
+  return { name: "pictures" };
+});
 const head = await loader.parseAsync(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length), "");
 const [clip] = head.animations;
 const mixer = new AnimationMixer(head.scene);
