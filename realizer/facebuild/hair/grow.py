@@ -18,6 +18,7 @@ from realizer.facebuild.person.scalp import Scalp
 
 SEED = 11  # of the strands: the same head, the same hair
 GREY = np.array([196.0, 193.0, 190.0])
+FRINGE = 0.007  # m that those may reach beyond it
 BORDER, SHORTEST = 3, 0.004  # segments of cards at the hairline; m of the shortest card
 NEAR = 0.012  # m from the skin in which cards are kept off it
 UNDER = 0.35  # layers below that are what lies under the others
@@ -106,7 +107,7 @@ def _locks(scalp: Scalp, style: Style, colour: Any, rng: Any) -> Patch:
     length = sides + (top - sides) * smooth(unit(at - scalp.middle)[:, 1], 0.2, 0.85)
     lines = grow(scalp, style, at, layer, length * rng.uniform(0.75, 1.15, count), style.segments, rng)
     s = np.linspace(0, 1, style.segments + 1)
-    shape = (0.45 + 0.75 * smooth(s, 0.0, 0.35)) * (1 - 0.55 * smooth(s, 0.5, 1.0))
+    shape = (0.45 + 0.75 * smooth(s, 0.0, 0.35)) * (1 - (0.55 - 0.35 * style.heavy) * smooth(s, 0.5, 1.0))
     width = style.width * rng.uniform(0.7, 1.3, (count, 1)) * shape
     light = (1 - style.depth * 0.8 * (1 - layer[:, None])) * (0.45 + 0.55 * smooth(s, 0.0, 0.35))
     names = np.where(layer < UNDER, style.under, rng.choice(style.strips, count))
@@ -121,6 +122,8 @@ def _border(scalp: Scalp, style: Style, colour: Any, rng: Any) -> Patch:
     count = len(at)
     layer, length = rng.uniform(0.1, 0.6, count), style.border_length * rng.uniform(0.5, 1.2, count)
     lines = grow(scalp, style, at, layer, length, BORDER, rng)
+    inside = edge(scalp, style, lines.places.reshape(-1, 3)).reshape(count, -1).min(axis=1)
+    lines = replace(lines, length=np.where(inside < -FRINGE, 0, lines.length))
     width = 0.0048 * rng.uniform(0.7, 1.2, (count, 1)) * np.linspace(1, 0.8, BORDER + 1)
     light = np.full((count, BORDER + 1), 0.9)
     return _shown(

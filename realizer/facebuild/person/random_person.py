@@ -41,6 +41,10 @@ def random_person(seed: int) -> dict[str, Any]:
         person[name] = round(float(np.clip(rng.normal(0, SPREAD), -LARGEST, LARGEST)), 2)
     styles = STYLES[sex] if sex == "female" or age > 45 else STYLES[sex][:2]
     looks = {"freckles": round(float(rng.beta(1, 6)), 2) if fair else 0.0}
+    # No two people share their brows.
+    shapes = (("gap", 0.0, 0.0012), ("arch", 0.0, 0.0010), ("hair", 1.0, 0.1), ("thick", 1.0, 0.12))
+    for name, middle, spread in shapes:
+        looks[f"brow_{name}"] = round(float(middle + spread * np.clip(rng.normal(), -2, 2)), 4)
     if sex == "male":
         looks["stubble"] = round(float(rng.uniform(0, 0.6)), 2)
     word = "woman" if sex == "female" else "man"
