@@ -8,7 +8,13 @@ from typing import Any, TypeVar
 from realizer.core.errors import RenderError
 
 NO_NUMBA = "pictures without OpenGL need the render extra: pip install 'bml-realizer[render]'"
-OPTIONS: Any = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", "reassoc", "arcp", "nsz"}}
+# Without _nrt, loops count no references to arrays, which two threads would wait for; they cannot make any.
+OPTIONS: Any = {
+    "nogil": True,
+    "_nrt": False,
+    "error_model": "numpy",
+    "fastmath": {"contract", "reassoc", "arcp", "nsz"},
+}
 Loop = TypeVar("Loop", bound=Callable[..., Any])
 
 

@@ -89,9 +89,26 @@ class Raster:
         shadows = self._shadow_map(moving), self._lamp.matrix
 
         def band(rows: tuple[int, int]) -> None:
-            _fill(points, nearness, self._triangles, self._sides, self._fixed, self._texels, rows, self._keys)
+            room = _room()
+            _fill(
+                points,
+                nearness,
+                self._triangles,
+                self._sides,
+                self._fixed,
+                self._texels,
+                rows,
+                (self._keys, *room),
+            )
             _light_band(
-                points, moving, mesh, self._texels, lights, (eye, shadows), rows, (self._keys, self._picture)
+                points,
+                moving,
+                mesh,
+                self._texels,
+                lights,
+                (eye, shadows),
+                rows,
+                (self._keys, self._picture, *room),
             )
 
         list(self._pool.map(band, self._bands))
@@ -106,7 +123,14 @@ class Raster:
             part = self._samples[rows[0] : rows[1]]
             part[:] = 0
             _fill(
-                points, nearness, self._triangles, self._sides, self._fixed, self._texels, rows, self._samples
+                points,
+                nearness,
+                self._triangles,
+                self._sides,
+                self._fixed,
+                self._texels,
+                rows,
+                (self._samples, *_room()),
             )
 
         list(self._pool.map(band, self._shadow_bands))
@@ -116,6 +140,12 @@ class Raster:
     def close(self) -> None:
         """End the threads."""
         self._pool.shutdown()
+
+
+def _room() -> tuple[Any, Any]:
+    """Return arrays for a thread to work in: two of whole numbers and two of values, one a sample."""
+    values = np.empty(len(SAMPLES), np.float32), np.empty(CHANNELS, np.float32)
+    return (np.empty(len(SAMPLES), np.int64), np.empty(len(SAMPLES), np.int64)), values
 
 
 @compiled
@@ -134,7 +164,7 @@ def _level(fixed: Any, levels: Any, corners: Any, turn: Any) -> Any:
 
 @compiled
 def _fill(
-    points: Any, nearness: Any, triangles: Any, sides: Any, fixed: Any, texels: Any, rows: Any, keys: Any
+    points: Any, nearness: Any, triangles: Any, sides: Any, fixed: Any, texels: Any, rows: Any, samples: Any
 ) -> None:
     """Write the samples of all triangles that are nearer than the present samples, in a band of rows.
 
@@ -144,16 +174,16 @@ def _fill(
         fixed: (d, k), the place in the maps first.
         texels: values and levels of the maps.
         rows: first and last + 1.
-        keys: (h, w, samples) uint64, nearness and number + 1 of the triangle at each sample.
+        samples: keys (h, w, samples) uint64, nearness and number + 1 of the triangle at each sample; and
+            room to work in, of `_room`.
     """
     begin, stop = rows
     values, levels = texels
+    keys, (firsts, lasts), (beside, _) = samples
     width = keys.shape[1]
     high_half = np.uint64(32)
     per = len(SAMPLES)
     pitch = 1.0 / per
-    firsts, lasts = np.empty(per, np.int64), np.empty(per, np.int64)
-    beside = np.empty(per, np.float32)  # nearness of a sample relative to the middle of its pixel
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         ax, ay = points[a, 0], points[a, 1]
@@ -361,12 +391,11 @@ def _light_band(
     points: Any, moving: Any, mesh: Any, texels: Any, lights: Any, eye: Any, rows: Any, pictures: Any
 ) -> None:
     """Write the pixels of a band of rows, and clear its samples."""
-    keys, picture = pictures
+    keys, picture, (found, _), (near, texel) = pictures
     triangles, fixed, kinds, curve = mesh[0], mesh[1], mesh[2], mesh[5]
-    view = lights, eye, np.empty(CHANNELS, np.float32)
+    view = lights, eye, texel
     per = len(SAMPLES)
     nothing, low_half, high_half = np.uint64(0), np.uint64(0xFFFFFFFF), np.uint64(32)
-    found, near = np.empty(per, np.int64), np.empty(per, np.float32)
     to_step = np.float32(STEPS - 1)
     for y in range(rows[0], rows[1]):
         for x in range(keys.shape[1]):

@@ -57,7 +57,9 @@ def dot(a: Any, b: Any) -> Any:
 @compiled
 def unit(a: Any) -> Any:
     """Return a vector at length 1; one without length stays as it is."""
-    scale = np.float32(1) / np.float32(math.sqrt(max(a[0] * a[0] + a[1] * a[1] + a[2] * a[2], 1e-20)))
+    scale = np.float32(1) / np.float32(
+        math.sqrt(max(a[0] * a[0] + a[1] * a[1] + a[2] * a[2], np.float32(1e-20)))
+    )
     return a[0] * scale, a[1] * scale, a[2] * scale
 
 
@@ -105,11 +107,10 @@ def _mirrored(levels: Any, d: Any, rough: Any) -> Any:
 @compiled
 def _gloss(rough: Any, nh: Any, nl: Any, nv: Any) -> Any:
     """Return the microfacet term D V of a roughness."""
-    a = rough * rough
-    bend = nh * nh * (a * a - 1) + 1
-    spread = a * a / (math.pi * bend * bend)
-    shade = nl * (nv * (1 - a) + a) + nv * (nl * (1 - a) + a)
-    return spread * np.float32(0.5) / max(shade, 1e-4)
+    one, a = np.float32(1), rough * rough
+    bend = nh * nh * (a * a - one) + one
+    shade = nl * (nv * (one - a) + a) + nv * (nl * (one - a) + a)
+    return np.float32(0.5 / math.pi) * a * a / (bend * bend * max(shade, np.float32(1e-4)))
 
 
 @compiled
@@ -119,7 +120,7 @@ def _strand_gloss(strand: Any, normal: Any, half: Any, shift: Any, power: Any) -
         strand[0] + shift * normal[0], strand[1] + shift * normal[1], strand[2] + shift * normal[2]
     ))  # fmt: skip
     th = dot(t, half)
-    return math.pow(max(1 - th * th, 1e-6), power * np.float32(0.5))
+    return math.pow(max(np.float32(1) - th * th, np.float32(1e-6)), power * np.float32(0.5))
 
 
 @compiled
@@ -170,7 +171,7 @@ def _lobes(row: Any, n: Any, half: Any, view: Any, cosines: Any, rough: Any) -> 
     miss = (one - vh) * (one - vh)
     fresnel = f0 + (one - f0) * miss * miss * (one - vh)
     lobes = (one - share) * _gloss(rough, nh, nl, nv) + share * _gloss(rough * row[SHARP], nh, nl, nv)
-    return np.float32(lobes * fresnel * nl * math.pi)
+    return lobes * fresnel * nl * np.float32(math.pi)
 
 
 @compiled
@@ -231,10 +232,11 @@ def reflected(row: Any, hair: Any, albedo: Any, normals: Any, values: Any, view:
             lit * _strand_gloss(strand, smooth, half, np.float32(-0.08), np.float32(90)) * np.float32(0.07)
         )
         tinted = lit * _strand_gloss(strand, smooth, half, np.float32(0.10), np.float32(22))
+        sheen = row[REFLECTION] * occlusion
         return (
-            red + (white + tinted * a) * lamps[KEY, 1, 0],
-            green + (white + tinted * b) * lamps[KEY, 1, 1],
-            blue + (white + tinted * c) * lamps[KEY, 1, 2],
+            red + (white + tinted * a) * lamps[KEY, 1, 0] + sheen * _ambient(sh, 0, n),
+            green + (white + tinted * b) * lamps[KEY, 1, 1] + sheen * _ambient(sh, 1, n),
+            blue + (white + tinted * c) * lamps[KEY, 1, 2] + sheen * _ambient(sh, 2, n),
         )
     f0 = row[REFLECTION]
     if row[COAT] > 0:
@@ -243,7 +245,7 @@ def reflected(row: Any, hair: Any, albedo: Any, normals: Any, values: Any, view:
     else:
         shine = _lobes(row, n, half, view, (nl, nv), rough) * reached * reach
     mirrored = _mirror_share(f0, rough, nv) * occlusion * occlusion
-    turn = 2 * dot(n, view)
+    turn = np.float32(2) * dot(n, view)
     sky = _mirrored(levels, (turn * n[0] - view[0], turn * n[1] - view[1], turn * n[2] - view[2]), rough)
     return (
         red + shine * lamps[KEY, 1, 0] + mirrored * sky[0],

@@ -147,7 +147,7 @@ vec3 reflectedBy(int kind, vec3 albedo, vec3 n, vec3 even, vec3 strand, vec4 val
     float strength = max(0.0, 0.35 + lit) * seen * reach * (1.0 - rough * 0.6);
     float white = strandGlossOf(strand, even, between, -0.08, 90.0) * 0.07;
     float tinted = strandGlossOf(strand, even, between, 0.10, 22.0);
-    return light + strength * (white + tinted * albedo) * keyColour;
+    return light + strength * (white + tinted * albedo) * keyColour + shine.x * occlusion * ambientOf(n);
   }
   float nh = max(dot(n, between), 0.0), away = 1.0 - max(dot(view, between), 0.0);
   float f0 = shine.x, fresnel = f0 + (1.0 - f0) * away * away * away * away * away;
