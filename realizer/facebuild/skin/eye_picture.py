@@ -85,11 +85,11 @@ def _iris(x: Float64, y: Float64, out: Float64, tint: dict[str, Float64], seed: 
 def _white(x: Float64, y: Float64, out: Float64, tint: dict[str, Float64], seed: int) -> Any:
     far = smooth(out, 1.05, 1.7)
     cloud = _field(noise, x, y, out, (0.4, 0.3), seed + 10)
-    # Bluish grey at the limbus, ivory farther out, pink in the corners.
-    made = tint["white"] * (0.82 + 0.010 * cloud)[..., None]
-    made = made * (1 + (1 - far)[..., None] * np.array([-0.03, -0.015, -0.01]))
-    made = made * (1 + far[..., None] * np.array([0.0, -0.03, -0.085]))
-    pink = smooth(-x, 0.60, 0.95) * 0.8 + smooth(x, 0.66, 1.0) * 0.5 + smooth(np.abs(y), 0.6, 0.95) * 0.4
+    # Grey at the limbus, ivory farther out, pink in the corners.
+    made = tint["white"] * (0.79 + 0.010 * cloud)[..., None]
+    made = made * (1 + (1 - far)[..., None] * np.array([-0.02, -0.012, -0.015]))
+    made = made * (1 + far[..., None] * np.array([0.02, -0.045, -0.12]))
+    pink = smooth(-x, 0.50, 0.92) * 0.8 + smooth(x, 0.56, 0.95) * 0.55 + smooth(np.abs(y), 0.6, 0.95) * 0.4
     pink = np.clip(pink + 0.05 * cloud * far, 0, 0.8)[..., None]
     made = made + pink * (tint["corner"] - made)
     red = _vessels(x.shape[0], seed)[..., None]
@@ -108,7 +108,7 @@ def _vessels(size: int, seed: int) -> Float32:
         # Most come from the corners.
         angle = rng.choice([0, np.pi]) + rng.normal(0, 0.55)
         place, way = np.array([np.cos(angle), np.sin(angle)]) * rng.uniform(0.8, 1.0), angle + np.pi
-        end, dark, width = rng.uniform(0.56, 0.80), rng.uniform(0.4, 1.0), rng.uniform(1.2, 3.4)
+        end, dark, width = rng.uniform(0.54, 0.74), rng.uniform(0.4, 1.0), rng.uniform(1.8, 4.6)
         while np.hypot(*place) > end:
             way += rng.normal(0, 0.22) + 0.15 * np.sin(angle + np.pi - way)
             step = place + 0.02 * np.array([np.cos(way), np.sin(way)])
