@@ -21,7 +21,7 @@ PUPIL = 0.0020  # radius
 # Distances of rings of vertices from the axis, in radii of the limbus; of the last ones angles in radians.
 NEAR = [0.5 * PUPIL / LIMBUS, PUPIL / LIMBUS, 0.50, 0.66, 0.80, 0.92, 1.0]
 BEYOND = [1.10, 1.28, 1.60]
-FAR = [0.72, 1.0, 1.5]
+FAR = [0.72, 1.0, 1.45, 1.95]
 SEGMENTS = 32
 WIDEST = 1.15  # rad; beyond it is the socket
 

@@ -175,8 +175,8 @@ def _lobes(row: Any, n: Any, half: Any, view: Any, cosines: Any, rough: Any) -> 
 
 
 @compiled
-def _glint(n: Any, key: Any, view: Any, glint: Any) -> Any:
-    """Return how bright the key lamp is mirrored by a coat, which shows it as a soft disc.
+def _glint(n: Any, key: Any, view: Any, glint: Any, rough: Any) -> Any:
+    """Return how bright a coat mirrors the key lamp: as a soft disc, faint if it is rough.
 
     Args:
         glint: the normal there is along key + glint[0] view; glint[1] is the radius in radians of normals.
@@ -186,7 +186,8 @@ def _glint(n: Any, key: Any, view: Any, glint: Any) -> Any:
     off = (n[0] - g[0], n[1] - g[1], n[2] - g[2])
     inside = (width - np.float32(math.sqrt(dot(off, off)))) / (width * np.float32(0.5))
     inside = min(max(inside, np.float32(0)), np.float32(1))
-    return np.float32(GLINT) * inside * inside * (np.float32(3) - 2 * inside)
+    clear = min(max(np.float32(1.6) - np.float32(6) * rough, np.float32(0.15)), np.float32(1))
+    return np.float32(GLINT) * clear * inside * inside * (np.float32(3) - 2 * inside)
 
 
 @compiled
@@ -241,7 +242,7 @@ def reflected(row: Any, hair: Any, albedo: Any, normals: Any, values: Any, view:
     f0 = row[REFLECTION]
     if row[COAT] > 0:
         n, nv = smooth, max(dot(smooth, view), np.float32(1e-3))
-        shine = _glint(smooth, key, view, glint)
+        shine = _glint(smooth, key, view, glint, rough)
     else:
         shine = _lobes(row, n, half, view, (nl, nv), rough) * reached * reach
     mirrored = _mirror_share(f0, rough, nv) * occlusion * occlusion

@@ -114,10 +114,10 @@ float mirrorShareOf(float f0, float rough, float nv) {
   return max(f0 * scale + 1.04 * term + rough * 0.022 - 0.04, 0.0);
 }
 
-// How bright the key lamp is mirrored by an eye, as a soft disc.
-float glintOf(vec3 n, vec3 view) {
+// How bright the key lamp is mirrored by an eye, as a soft disc, faint where it is rough.
+float glintOf(vec3 n, vec3 view, float rough) {
   float off = length(n - unitOf(keyDirection + glint.x * view));
-  return glint.z * smoothstep(0.0, 1.0, (glint.y - off) / (glint.y * 0.5));
+  return glint.z * clamp(1.6 - 6.0 * rough, 0.15, 1.0) * smoothstep(0.0, 1.0, (glint.y - off) / (glint.y * 0.5));
 }
 
 // The light that a surface sends to the eye.
@@ -154,7 +154,7 @@ vec3 reflectedBy(int kind, vec3 albedo, vec3 n, vec3 even, vec3 strand, vec4 val
   nl = max(nl, 0.0);
   float lobes = mix(glossOf(rough, nh, nl, nv), glossOf(rough * shine.y, nh, nl, nv), shine.z);
   bool coat = kind == eyeKind;
-  light += (coat ? glintOf(even, view) : lobes * fresnel * nl * PI * seen * reach) * keyColour;
+  light += (coat ? glintOf(even, view, rough) : lobes * fresnel * nl * PI * seen * reach) * keyColour;
   if (coat) {
     n = even;
     nv = max(dot(n, view), 1e-3);

@@ -17,7 +17,7 @@ from realizer.render.textures import DEPTH
 FINER = 3  # times finer than the picture it is painted
 COLLARETTE = 0.56  # place of the ruff around the pupil, in radii of the limbus
 VESSELS = 64
-ROUGHNESS = 0.10, 0.17  # of cornea and white: both are wet
+ROUGHNESS = 0.10, 0.24  # of cornea and white
 
 
 def eye_picture(size: int, colours: Mapping[str, Sequence[float]], seed: int) -> tuple[UInt8, UInt8]:
@@ -89,7 +89,7 @@ def _white(x: Float64, y: Float64, out: Float64, tint: dict[str, Float64], seed:
     made = tint["white"] * (0.79 + 0.010 * cloud)[..., None]
     made = made * (1 + (1 - far)[..., None] * np.array([-0.02, -0.012, -0.015]))
     made = made * (1 + far[..., None] * np.array([0.02, -0.045, -0.12]))
-    pink = smooth(-x, 0.50, 0.92) * 0.8 + smooth(x, 0.56, 0.95) * 0.55 + smooth(np.abs(y), 0.6, 0.95) * 0.4
+    pink = smooth(-x, 0.50, 0.95) * 0.7 + smooth(x, 0.56, 0.95) * 0.55 + smooth(np.abs(y), 0.6, 0.95) * 0.4
     pink = np.clip(pink + 0.05 * cloud * far, 0, 0.8)[..., None]
     made = made + pink * (tint["corner"] - made)
     red = _vessels(x.shape[0], seed)[..., None]

@@ -70,10 +70,12 @@ def test_reflected_light_of_hair_is_brightest_across_the_strand():
 
 
 def test_reflected_light_of_an_eye_shows_the_lamp_as_a_disc():
-    lit, aside = (light(EYE, normal=unit(np.float32([x, 0, 1]))) for x in (0, 0.15))
+    clear = (1.0, 0.1, 1.0, 1.0)
+    lit, aside = (light(EYE, normal=unit(np.float32([x, 0, 1])), values=clear) for x in (0, 0.15))
     assert (lit - aside > 1).all()
     key = unit(np.float32([1, 0, 1]))
-    assert light(EYE, normal=unit(key + FRONT), key=key)[0] > 1
+    assert light(EYE, normal=unit(key + FRONT), key=key, values=clear)[0] > 1
+    assert light(EYE)[0] < lit[0] - 0.8
 
 
 def test_tone_curve_rises_to_white():
