@@ -5,15 +5,13 @@ import functools
 import itertools
 import logging
 from collections.abc import Callable, Iterable
-from typing import Any
 
-from realizer.core import work
 from realizer.core.settings import Settings
 from realizer.server.documents.limits import memory
 from realizer.server.http.metrics import Metrics
 from realizer.server.journal import TakenOver
+from realizer.server.runtime.effect_runner import EffectRunner
 from realizer.server.runtime.engines import Engines
-from realizer.server.runtime.fair_pool import FairPool
 from realizer.server.runtime.gc_policy import GcPolicy
 from realizer.server.runtime.session_factory import SessionFactory
 from realizer.server.runtime.session_registry import (
@@ -26,7 +24,7 @@ from realizer.server.runtime.session_registry import (
 from realizer.server.runtime.session_restorer import SessionRestorer
 from realizer.server.runtime.sliced_calls import SlicedCalls
 from realizer.server.runtime.turns import ReadingTurns, WakeUps
-from realizer.server.session.effects import Close, Draw, Effect, MoveConnection, Send, Speak
+from realizer.server.session.effects import Close, Effect, MoveConnection
 from realizer.server.session.session import Session
 from realizer.server.streams.connection import SLOW
 from realizer.server.transports.transport import Outbound
@@ -94,6 +92,7 @@ class SessionHost:
             JournalError: the journal cannot be opened.
         """
         self._loop = asyncio.get_running_loop()
+        self._effects = EffectRunner(self._loop, self._engines, self._clients, self._deliver)
         self._wake_ups = WakeUps[Session](self._loop, self._wake)
         self._reading = ReadingTurns[Session](self._loop, self._read)
         self._calls = SlicedCalls[Session](self._reading.add, self._loop.call_soon_threadsafe)
@@ -159,8 +158,7 @@ class SessionHost:
         await self._restorer.restore(name, seen)
 
     def _adopt(self, session: Session, unanswered: Iterable[Effect]) -> None:
-        for effect in unanswered:
-            self._apply_effect(session, effect)
+        self._effects.run(session, unanswered)
         self._apply_effects(session)
 
     def join(
@@ -252,8 +250,7 @@ class SessionHost:
         effects = session.take_effects()
         if any(isinstance(effect, MoveConnection) for effect in effects):
             effects = self._registry.move_connections(session, effects, self._loop.time())
-        for effect in work.counted(effects, 5):
-            self._apply_effect(session, effect)
+        self._effects.run(session, effects)
         if session.closed:
             self._engines.drop(session)
         self._schedule_wakeup(session)
@@ -300,8 +297,7 @@ class SessionHost:
             self._call(session, functools.partial(self._work, session, now, read_documents=False))
             return
         effects, due = frames
-        for effect in work.counted(effects, 5):
-            self._apply_effect(session, effect)
+        self._effects.run(session, effects)
         for number in session.connections:
             client = self._clients.get(number)
             if client is not None and (waiting := client.unsent_bytes) > SLOW:
@@ -340,39 +336,17 @@ class SessionHost:
         """Log an internal error and end its session; the others play on."""
         log.exception("session %s ends: it failed", session.id)
         self.metrics.counts["failures"] += 1
-        for number in list(session.connections):
-            self._apply_effect(session, Close(number, 1011, "internal error"))
+        self._effects.run(session, [Close(number, 1011, "internal error") for number in session.connections])
         session.close()
         session.journal.writer.end()  # a restored session would fail again
         self._registry.remove(session)
 
-    def _apply_effect(self, session: Session, effect: Effect) -> None:
-        match effect:
-            case Send(connection, data):
-                if (client := self._clients.get(connection)) is not None:
-                    client.send(data)
-            case Speak():
-                self._submit(self._engines.speech_pool, self._engines.speak, session, effect)
-            case Draw():
-                self._submit(self._engines.render_pool, self._engines.draw, session, effect)
-            case Close(connection, code, reason):
-                if (client := self._clients.get(connection)) is not None:
-                    client.disconnect(code, reason)
-
-    def _submit(
-        self, pool: FairPool, compute: Callable[[Any], Any], session: Session, effect: Speak | Draw
-    ) -> None:
-        """Compute the answer to an effect in a thread, and pass it to the session."""
-        answer = session.on_speech if isinstance(effect, Speak) else session.on_picture
-
-        def deliver(future: asyncio.Future[Any]) -> None:
-            if not future.cancelled() and not self._closed:
-                began, result = self._loop.time(), future.result()
-                self._call(session, lambda: answer(effect.id, result, self._loop.time()))
-                self._report_slow_step(began, "the result of a voice or a renderer", session)
-
-        computed = pool.submit(session, functools.partial(compute, effect))
-        asyncio.wrap_future(computed, loop=self._loop).add_done_callback(deliver)
+    def _deliver(self, session: Session, answer: Callable[[], None]) -> None:
+        """Pass the answer of a voice or a renderer to a session."""
+        if not self._closed:
+            began = self._loop.time()
+            self._call(session, answer)
+            self._report_slow_step(began, "the result of a voice or a renderer", session)
 
     def _compact_journal(self, session: Session) -> None:
         if self._closed:
@@ -387,8 +361,7 @@ class SessionHost:
             waiting = self._registry.joined(session).difference(session.connections)
             session.hand_over(error := TakenOver(session.id))
             self._apply_effects(session)
-            for number in waiting:
-                self._apply_effect(session, Close(number, 1012, str(error)))
+            self._effects.run(session, [Close(number, 1012, str(error)) for number in waiting])
 
     def _expire_sessions(self) -> None:
         self._gc_policy.collect_if_needed(len(self._clients))
