@@ -16,7 +16,8 @@ from realizer.face.model import Face
 from realizer.face.surface import face_scale, normals
 from realizer.outputs.glb_mesh import tangents
 from realizer.render.folds import Folds
-from realizer.render.normal_maps import normal_maps
+from realizer.render.normal_map import normal_map
+from realizer.render.textures import FULL
 
 WEBP = "EXT_texture_webp"
 MIPMAPS, LINEAR, CLAMP = 9987, 9729, 33071  # of samplers
@@ -26,12 +27,13 @@ KIND_NAMES = ("skin", "eye", "hair", "wet", "cloth")  # in the order of `DrawnMe
 def face_glb(face: Face) -> bytes:
     """Return the face at rest as GLB, with a primitive and a material for each kind of surface.
 
-    All primitives share POSITION, NORMAL, COLOR_0 (linear, as glTF asks), TEXCOORD_0, _OCCLUSION and _GLOSS,
-    and TANGENT if the face has maps. A material's `extras.kind` is its row in `surfaces.toml`. The mesh's
-    `extras` hold what a client needs for streamed vertices: scale and offset, the matrix that makes the drawn
-    vertices of them (`rows`, `columns`, `weights`: accessors of its compressed rows) and the one for normals
-    (`normal_rows` ...), `folds` if the face has some, parts (name -> first and last + 1 drawn vertex), FAPU
-    in metres, source and licence.
+    All primitives share POSITION, NORMAL, COLOR_0 (linear, as glTF asks), _OCCLUSION and _GLOSS, and, if the
+    face has maps, TEXCOORD_0 and TANGENT. A material's `extras.kind` is its row in `surfaces.toml`.
+
+    The mesh's `extras` hold what a client needs for streamed vertices: their number, scale and offset, the
+    matrix that makes the drawn vertices of them (`rows`, `columns`, `weights`: accessors of its compressed rows) and
+    the one for normals (`normal_rows` ...), `relief` and `folds` if the face has some, parts (name -> first
+    and last + 1 drawn vertex), FAPU in metres, source and licence.
 
     Raises:
         FaceError: a map is no picture.
@@ -55,8 +57,8 @@ def face_glb(face: Face) -> bytes:
     if face.maps:
         attributes["TEXCOORD_0"] = file.add(mesh.uv, target=ARRAY_BUFFER)
         attributes["TANGENT"] = file.add(tangents(places, ups, mesh.triangles, mesh.uv), target=ARRAY_BUFFER)
-        plain = {name: face.maps.files[name] for name in ("albedo", "surface") if name in face.maps.files}
-        pictures = plain | normal_maps(face.maps)
+        normal = normal_map(face.maps)
+        pictures = {**face.maps.files, **({"normal": normal} if normal else {})}
     textures = {name: number for number, name in enumerate(pictures)}
     primitives: list[dict[str, Any]] = []
     materials: list[dict[str, Any]] = []
@@ -74,7 +76,7 @@ def face_glb(face: Face) -> bytes:
         "offset": [float(x) for x in offset],
         **_matrix(file, "", mesh.places),
         **_matrix(file, "normal_", mesh.ups),
-        **_folds(file, face, textures),
+        **_heights(file, face, textures),
         "parts": {name: {"vertices": list(ends)} for name, ends in mesh.parts.items()},
         "fapu": asdict(face.fapu),
         "source": face.source,
@@ -144,10 +146,16 @@ def _matrix(file: GlbFile, prefix: str, matrix: Any) -> dict[str, int]:
     }
 
 
-def _folds(file: GlbFile, face: Face, textures: dict[str, int]) -> dict[str, Any]:
-    """Add the folds of expressions: how much of each shows at each streamed vertex, and its drive."""
-    if "folds" not in textures:
+def _heights(file: GlbFile, face: Face, textures: Mapping[str, int]) -> dict[str, Any]:
+    """Add relief and folds, and how much of each fold shows at each streamed vertex, and its drive."""
+    if face.maps is None:
         return {}
-    folds = Folds(face)
-    weights = file.add(np.rint(folds.weights * 255).astype(np.uint8).ravel(), normalised=True)
-    return {"folds": {"texture": textures["folds"], "weights": weights, "drives": folds.to_json()}}
+    slope = face.maps.relief / (face.maps.texel * FULL)
+    found: dict[str, Any] = {
+        name: {"texture": textures[name], "slope": slope} for name in ("relief", "folds") if name in textures
+    }
+    if "folds" in found:
+        folds = Folds(face)
+        weights = file.add(np.rint(folds.weights * 255).astype(np.uint8).ravel(), normalised=True)
+        found["folds"] |= {"weights": weights, "drives": folds.to_json()}
+    return found

@@ -30,7 +30,7 @@ export function readGlb(buffer) {
     return { triangles: read(indices).array, kind: extras.kind, holes: alphaMode === "MASK", doubleSided };
   });
   const { pbrMetallicRoughness: look, normalTexture } = json.materials[0];
-  const textures = { albedo: look.baseColorTexture?.index, surface: look.metallicRoughnessTexture?.index, normal: normalTexture?.index, folds: extras.folds?.texture };
+  const textures = { albedo: look.baseColorTexture?.index, surface: look.metallicRoughnessTexture?.index, normal: normalTexture?.index, relief: extras.relief?.texture, folds: extras.folds?.texture };
   const pictures = Object.fromEntries(
     Object.entries(textures).filter(([, index]) => index !== undefined).map(([name, index]) => [name, picture(index)]),
   );

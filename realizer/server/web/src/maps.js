@@ -14,42 +14,52 @@ async function textureOf(picture) {
   return Object.assign(new Texture(bitmap), filters, { generateMipmaps: true, flipY: false, needsUpdate: true });
 }
 
-// Return the textures of the pictures in a face's GLB. `relief`: whether to draw it.
-export async function mapsOf(pictures, renderer, relief) {
+// Return the textures of a face's GLB. `relief`: whether to draw it.
+export async function mapsOf({ pictures, extras }, renderer, relief) {
   const load = (name, plain) => (pictures[name] ? textureOf(pictures[name]) : plain);
   const albedoMap = await load("albedo", one(255, 255, 255, 255));
   const surfaceMap = await load("surface", one(255, 255, 255, 255));
-  if (!relief || !(pictures.normal || pictures.folds)) return { albedoMap, surfaceMap, slopeMap: one(LEVEL, LEVEL, LEVEL, LEVEL) };
-  const level = one(LEVEL, LEVEL, 255, 255);
-  const slopeMap = slopesOf(await load("normal", level), await load("folds", level), renderer);
-  return { albedoMap, surfaceMap, slopeMap };
+  const level = one(LEVEL, LEVEL, LEVEL, LEVEL);
+  if (!relief) return { albedoMap, surfaceMap, slopeMap: level };
+  const even = one(LEVEL, LEVEL, 255, 255);
+  const heights = { relief: await load("relief", level), folds: await load("folds", level), normal: pictures.relief ? even : await load("normal", even) };
+  return { albedoMap, surfaceMap, slopeMap: slopesOf(heights, [extras.relief?.slope ?? 0, extras.folds?.slope ?? 0], renderer) };
 }
 
-// Normal maps as slopes, whose means in coarser levels are right: of the relief, and of the folds.
-function slopesOf(normal, folds, renderer) {
-  const { width, height } = [normal, folds].map(({ image }) => image).find((image) => image.width > 1) ?? normal.image;
-  const target = new WebGLRenderTarget(width, height, { ...filters, generateMipmaps: true, depthBuffer: false });
+// The slopes of the relief and of the folds, whose means in coarser levels are right.
+function slopesOf(heights, steep, renderer) {
+  const sides = Object.values(heights).map(({ image }) => Math.max(image.width, image.height));
+  const side = Math.max(...sides);
+  const target = new WebGLRenderTarget(side, side, { ...filters, generateMipmaps: true, depthBuffer: false });
+  const values = { ...heights, steep, fromNormal: !steep[0] };
   const material = new RawShaderMaterial({
     glslVersion: GLSL3,
     depthTest: false,
-    uniforms: { normal: { value: normal }, folds: { value: folds } },
+    uniforms: Object.fromEntries(Object.entries(values).map(([name, value]) => [name, { value }])),
     vertexShader: "in vec3 position; out vec2 uv; void main() { uv = position.xy + 0.5; gl_Position = vec4(2.0 * position.xy, 0.0, 1.0); }",
     fragmentShader: `precision highp float;
-uniform sampler2D normal, folds;
+uniform sampler2D relief, folds, normal;
+uniform vec2 steep;
+uniform bool fromNormal;
 in vec2 uv;
 out vec4 slopes;
-vec2 slopeOf(sampler2D map) {
-  vec3 n = texture(map, uv).rgb * 2.0 - 1.0;
-  return vec2(-n.x, n.y) / max(n.z, 0.1);
+vec2 slopeOf(sampler2D map, float steep) {
+  vec2 size = vec2(textureSize(map, 0)), x = vec2(1.0 / size.x, 0.0), y = vec2(0.0, 1.0 / size.y);
+  vec2 rise = vec2(textureLod(map, uv + x, 0.0).r - textureLod(map, uv - x, 0.0).r, textureLod(map, uv + y, 0.0).r - textureLod(map, uv - y, 0.0).r);
+  return rise * 0.5 * steep * size;
 }
-void main() { slopes = (vec4(slopeOf(normal), slopeOf(folds)) * 127.0 + 128.0) / 255.0; }`,
+void main() {
+  vec3 n = textureLod(normal, uv, 0.0).rgb * 2.0 - 1.0;
+  vec2 own = fromNormal ? vec2(-n.x, n.y) / max(n.z, 0.1) : slopeOf(relief, steep.x);
+  slopes = (vec4(own, slopeOf(folds, steep.y)) * 127.0 + 128.0) / 255.0;
+}`,
   });
   const scene = new Scene();
   scene.add(new Mesh(new PlaneGeometry(), material));
   renderer.setRenderTarget(target);
   renderer.render(scene, new OrthographicCamera());
   renderer.setRenderTarget(null);
-  for (const used of [normal, folds, material]) used.dispose();
+  for (const used of [...Object.values(heights), material]) used.dispose();
   return target.texture;
 }
 

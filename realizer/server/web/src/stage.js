@@ -48,7 +48,7 @@ export class Stage {
       ask(`look.json?face=${path}`).then((answer) => checked(answer).json()),
       ask(`faces/${path}`).then((answer) => checked(answer).arrayBuffer()).then(readGlb),
     ]);
-    const maps = await mapsOf(glb.pictures, this.renderer, this.full);
+    const maps = await mapsOf(glb, this.renderer, this.full);
     if (this.awaited !== name) return; // another face was requested in the meantime
     if (this.awaited !== name) return; // another face was requested in the meantime
     Object.assign(this, { look, preset: look.camera });
@@ -61,7 +61,7 @@ export class Stage {
     for (const group of this.head.groups) {
       const geometry = this.head.geometry(group);
       const { draw, cast } = materialsOf(group, this.uniforms, this.full);
-      this.lampScene.add(still(new Mesh(geometry, cast)));
+      if (cast) this.lampScene.add(still(new Mesh(geometry, cast)));
       draw.forEach((material, k) => this.scene.add(Object.assign(still(new Mesh(geometry, material)), { renderOrder: group.holes + k })));
     }
     this.head.pose();

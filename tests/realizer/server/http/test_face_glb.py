@@ -125,7 +125,8 @@ def test_face_glb_has_maps_as_textures_and_folds() -> None:
     assert np.abs(np.linalg.norm(tangents[:, :3], axis=1) - 1).max() < 1e-4
     assert np.abs((tangents[:, :3] * glb.attribute("NORMAL")).sum(axis=1)).max() < 1e-4
     folds = glb.extras["folds"]
-    assert glb.picture(folds["texture"]).getpixel((4, 4)) == (128, 128, 255)
+    assert glb.picture(folds["texture"]).getpixel((4, 4)) == (128, 128, 128)
+    assert folds["slope"] == glb.extras["relief"]["slope"] == pytest.approx(0.001 / (0.0002 * 2048))
     assert glb.array(folds["weights"]) / 255 == pytest.approx(weights[:, 0], abs=1 / 255)
     assert len(folds["drives"]) == 1
 
