@@ -42,7 +42,9 @@ def beard(
     """
     at, triangles = skin
     area = np.linalg.norm(triangle_normals(at, triangles), axis=1)
-    weight = area * smooth(where[triangles].mean(axis=1), 0.3, 0.65)
+    # The strip between nose and lip is narrow, and hardly any triangle lies in it wholly.
+    low = np.where(at[triangles, 1].mean(axis=1) > points["2.2"][1], 0.1, 0.3)
+    weight = area * smooth(where[triangles].mean(axis=1), low, low + 0.35)
     pick = rng.choice(len(triangles), COUNT, p=weight / weight.sum())
     shares = rng.dirichlet((1.0, 1.0, 1.0), COUNT)
     corners = triangles[pick]

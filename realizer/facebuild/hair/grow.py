@@ -11,13 +11,12 @@ from realizer.core.array_types import Float64, Int32
 from realizer.facebuild.hair.bun import bun
 from realizer.facebuild.hair.cards import Patch, joined, ribbons
 from realizer.facebuild.hair.strands import LEAST, Strands, edge, grow, roots, unit
-from realizer.facebuild.hair.style import Style
+from realizer.facebuild.hair.style import GREY, Style, colour_of
 from realizer.facebuild.hair.texture import LEVEL, place
 from realizer.facebuild.parts import smooth
 from realizer.facebuild.person.scalp import Scalp
 
 SEED = 11  # of the strands: the same head, the same hair
-GREY = np.array([196.0, 193.0, 190.0])
 FRINGE = 0.007  # m that those may reach beyond it
 BORDER, SHORTEST = 3, 0.004  # segments of cards at the hairline; m of the shortest card
 NEAR = 0.012  # m from the skin in which cards are kept off it
@@ -66,13 +65,12 @@ def cap(scalp: Scalp, triangles: Int32, style: Style, colour: Any) -> Patch:
     used, across, corners = _wrapped(scalp, keep)
     at, ups, inside = scalp.at[used], scalp.ups[used], inside[used]
     soft, full = FADE * np.maximum(inside, -0.004) / SOFT, FADE + (1 - FADE) * (inside - SOFT) / DEEP
-    tint = np.array(colour, float) * (1 - style.grey) + GREY * style.grey
     count = len(used)
     return Patch(
         at + ups * CAP * smooth(inside, -0.006, 0.006)[:, None],
         ups,
         place(style.cap, across, np.clip(np.where(inside < SOFT, soft, full), 0, 1)),
-        np.repeat(np.clip(tint / LEVEL, 0, 255)[None], count, 0),
+        np.repeat(np.clip(colour_of(style, colour) / LEVEL, 0, 255)[None], count, 0),
         style.depth * 0.5 + (1 - style.depth * 0.5) * smooth(inside, 0.022, 0.0),
         np.full(count, style.gloss * 0.5),
         corners,

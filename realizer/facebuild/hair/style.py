@@ -6,9 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
+import numpy as np
+
+from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
 from realizer.tables import toml_table
 
+GREY = np.array([196.0, 193.0, 190.0])  # sRGB, of white hair
 Table = list[list[float]]
 
 
@@ -70,3 +74,8 @@ def style_of(table: Mapping[str, Any]) -> Style:
         if key not in names:
             raise FaceError(f"hair: wanted one of style, {', '.join(names)}, got {key!r}")
     return Style(**(known["plain"] | known["styles"][name] | own))
+
+
+def colour_of(style: Style, colour: Any) -> Float64:
+    """Return the mean colour (3,) of hair that has white strands among its own, sRGB."""
+    return np.asarray(np.array(colour, float) * (1 - style.grey) + GREY * style.grey)

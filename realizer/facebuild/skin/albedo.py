@@ -7,7 +7,7 @@ import numpy as np
 
 from realizer.core.array_types import Float32
 from realizer.facebuild.hair.strands import shadow
-from realizer.facebuild.hair.style import style_of
+from realizer.facebuild.hair.style import colour_of, style_of
 from realizer.facebuild.parts import smooth
 from realizer.facebuild.person import skin_colours
 from realizer.facebuild.person.scalp import Scalp
@@ -135,7 +135,7 @@ def _beard(skin: Skin, out: Float32) -> None:
         return
     where = skin.field(skin_colours.beard(skin.person.ground, skin.lips)) * (1 - skin.red) * skin.dry
     where *= np.clip(1 + 0.25 * skin.noise(0.006, 43), 0, 1.2)
-    hair = _vector(skin.recipe.colours["hair"])
+    hair = _vector(colour_of(style_of(skin.recipe.hair), skin.recipe.colours["hair"]))
     shade = (np.clip(where, 0, 1) * amount * 0.30 + smooth(where, 0.4, 0.9) * grown * 0.55)[:, None]
     out += shade * (hair * 0.6 + _vector([30, 36, 40]) - out)
     _dots(skin, out, "stubble", np.clip(where * 1.6, 0, 1) * min(1.0, amount * 2), hair)
@@ -162,7 +162,7 @@ def _scalp(skin: Skin, out: Float32) -> None:
         return shadow(scalp, style, at)
 
     where = np.clip(skin.texels.broad(under) * (1 + 40 * ragged), 0, 1)
-    hair = _vector(skin.recipe.colours["hair"])
+    hair = _vector(colour_of(style, skin.recipe.colours["hair"]))
     out += (0.45 * where)[:, None] * (hair - out)
     _dots(skin, out, "roots", where, hair)
 

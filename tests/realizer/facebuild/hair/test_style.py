@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 import pytest
 
 from realizer.core.errors import FaceError
-from realizer.facebuild.hair.style import Style, style_of
+from realizer.facebuild.hair.style import Style, colour_of, style_of
 from realizer.tables import read_toml, text_of
 
 
@@ -27,3 +27,12 @@ def test_style_of_refuses_unknown_styles_and_figures(table: dict[str, str], says
 def test_style_has_every_figure_of_the_table() -> None:
     table = read_toml(text_of("hair.toml"), "hair.toml")
     assert {field.name for field in fields(Style)} == set(table["plain"])
+
+
+def test_colour_of_lies_between_that_of_hair_and_white() -> None:
+    dark, mixed, white = (
+        colour_of(style_of({"style": "bob", "grey": grey}), [70, 50, 40]) for grey in (0.0, 0.5, 1.0)
+    )
+    assert dark.tolist() == [70, 50, 40]
+    assert white.min() > 180
+    assert mixed == pytest.approx((dark + white) / 2)
