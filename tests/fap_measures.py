@@ -20,6 +20,7 @@ from realizer.face.mesh_geometry import (
     triangle_normals,
 )
 from realizer.face.model import Face
+from realizer.facebuild.eyeball import PUPIL
 from realizer.facebuild.mpeg4.fields import WAYS
 from realizer.tables import Fap
 
@@ -136,17 +137,15 @@ def _angle(measure: Measure, row: Fap, moves: Float64) -> float:
 
 
 def _grown(face: Face, row: Fap, moves: Float64) -> float:
-    """Metres that a pupil gets wider: the ring where the black of the eye ends."""
+    """Metres that a pupil gets wider: the ring of vertices where the black of the eye ends."""
     eye = 0 if "_l_" in row.name else 1
     part, centre = face.basis["eyes"][eye]
     mine = slice(*part)
     away = face.vertices[mine].astype(float) - centre
     out = np.hypot(away[:, 0], away[:, 1])
-    dark = np.flatnonzero((face.colours[mine].max(axis=1) < 40) & (away[:, 2] > 0))
-    near = dark[out[dark] < 0.004]
-    if not len(near):
+    edge = np.flatnonzero(np.isclose(out, PUPIL, atol=1e-4) & (away[:, 2] > 0))
+    if not len(edge):
         return 0.0
-    edge = near[np.isclose(out[near], out[near].max(), atol=1e-4)]
     now = np.hypot(*(away + moves[mine])[edge, :2].T)
     return float(2 * (now - out[edge]).mean())
 

@@ -186,7 +186,7 @@ def _glint(n: Any, key: Any, view: Any, glint: Any, rough: Any) -> Any:
     off = (n[0] - g[0], n[1] - g[1], n[2] - g[2])
     inside = (width - np.float32(math.sqrt(dot(off, off)))) / (width * np.float32(0.5))
     inside = min(max(inside, np.float32(0)), np.float32(1))
-    clear = min(max(np.float32(1.6) - np.float32(6) * rough, np.float32(0.15)), np.float32(1))
+    clear = min(max(np.float32(2) - np.float32(5.5) * rough, np.float32(0.15)), np.float32(1))
     return np.float32(GLINT) * clear * inside * inside * (np.float32(3) - 2 * inside)
 
 

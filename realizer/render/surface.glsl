@@ -117,7 +117,7 @@ float mirrorShareOf(float f0, float rough, float nv) {
 // How bright the key lamp is mirrored by an eye, as a soft disc, faint where it is rough.
 float glintOf(vec3 n, vec3 view, float rough) {
   float off = length(n - unitOf(keyDirection + glint.x * view));
-  return glint.z * clamp(1.6 - 6.0 * rough, 0.15, 1.0) * smoothstep(0.0, 1.0, (glint.y - off) / (glint.y * 0.5));
+  return glint.z * clamp(2.0 - 5.5 * rough, 0.15, 1.0) * smoothstep(0.0, 1.0, (glint.y - off) / (glint.y * 0.5));
 }
 
 // The light that a surface sends to the eye.

@@ -11,8 +11,10 @@ import numpy as np
 from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
 from realizer.face.basis import ARRAYS, unpack
+from realizer.face.cards import FILE as CARDS
 from realizer.face.features import read_features, write_features
 from realizer.face.load import MESH, read_head
+from realizer.face.maps import NAMES as MAPS
 from realizer.face.mesh_geometry import half_edges, neighbour_mean, part_triangles
 from realizer.face.reading import read_arrays
 from realizer.facebuild.face_files import write_fields
@@ -25,7 +27,10 @@ from realizer.facebuild.mpeg4.parameters import FILE, read_setup, write_setup
 from realizer.facebuild.mpeg4.zones import Setup, mask_faults, synchronised
 from realizer.tables import faps
 
-FILES = ("face.toml", "mesh.npz", "features.csv", "fields.npz", "recipe.toml", "LICENSE.md", FILE)
+FILES = (
+    "face.toml", "mesh.npz", "features.csv", "fields.npz", "recipe.toml", "LICENSE.md", FILE, CARDS,
+    *(f"{name}.webp" for name in MAPS),
+)  # fmt: skip
 
 GROWN = ("brows", "lashes", "beard")  # parts that lie on the skin and follow it
 NEAR = 3  # vertices of the skin that one of theirs follows

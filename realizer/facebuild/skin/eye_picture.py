@@ -17,7 +17,7 @@ from realizer.render.textures import DEPTH
 FINER = 3  # times finer than the picture it is painted
 COLLARETTE = 0.56  # place of the ruff around the pupil, in radii of the limbus
 VESSELS = 64
-ROUGHNESS = 0.10, 0.24  # of cornea and white
+ROUGHNESS = 0.10, 0.32  # of cornea and white
 
 
 def eye_picture(size: int, colours: Mapping[str, Sequence[float]], seed: int) -> tuple[UInt8, UInt8]:

@@ -194,8 +194,7 @@ def test_deform_widens_pupils_by_value_times_fapu(face: Face, fap: int, part: st
     eye = 0 if part == "left_eye" else 1
     _, centre = face.basis["eyes"][eye]
     out = np.hypot(*(face.vertices[first:last] - centre)[:, :2].T)
-    dark = np.flatnonzero(face.colours[first:last].max(axis=1) < 40)
-    edge = dark[np.isclose(out[dark], out[dark][out[dark] < 0.004].max(), atol=1e-5)]
+    edge = np.flatnonzero(np.isclose(out, 0.002, atol=1e-4) & (face.vertices[first:last, 2] > centre[2]))
     for value in (200, -200):
         after = deform(face, rows({fap: value}))[0, first:last] - centre
         grown = 2 * (np.hypot(*after[:, :2].T) - out)[edge].mean()
