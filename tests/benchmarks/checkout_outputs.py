@@ -36,6 +36,7 @@ TARGETS = (
     "/vocabulary.json",
     "/healthz",
     "/look.json",
+    "/mirror?light=evening",
     "/look.json?face=nobody",
     "/faces/default",
     "/faces/ada",

@@ -28,10 +28,9 @@ def face_glb(face: Face) -> bytes:
     """Return the face at rest as GLB, with a primitive and a material for each kind of surface.
 
     All primitives share POSITION, NORMAL, COLOR_0 (linear, as glTF asks), _OCCLUSION and _GLOSS, and, if the
-    face has maps, TEXCOORD_0 and TANGENT. A material's `extras.kind` is its row in `surfaces.toml`.
-
-    The mesh's `extras` hold what a client needs for streamed vertices: their number, scale and offset, the
-    matrix that makes the drawn vertices of them (`rows`, `columns`, `weights`: accessors of its compressed rows) and
+    face has maps, TEXCOORD_0 and TANGENT. A material's `extras.kind` is its row in `surfaces.toml`. The
+    mesh's `extras` hold what a client needs for streamed vertices: their number, scale and offset, the matrix
+    that makes the drawn vertices of them (`rows`, `columns`, `weights`: accessors of its compressed rows) and
     the one for normals (`normal_rows` ...), `relief` and `folds` if the face has some, parts (name -> first
     and last + 1 drawn vertex), FAPU in metres, source and licence.
 

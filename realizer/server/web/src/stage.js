@@ -34,7 +34,7 @@ export class Stage {
     this.taken = 0; // ms between pictures, on average
     this.part = 1; // of the pixels of a side
     this.stale = true; // whether the picture differs from the one on the canvas
-    canvas.addEventListener("webglcontextrestored", () => (this.stale = true));
+    canvas.addEventListener("webglcontextrestored", () => this.name && this.load(this.name, this.scale, this.offset));
     this.light = null; // name of a preset; null: the service's default
     this.want = { yaw: 0, pitch: 0, zoom: 1 };
     this.view = { yaw: 0, pitch: 0, zoom: 1 };

@@ -115,7 +115,16 @@ def test_site_answers_the_tools_of_the_page_and_their_errors() -> None:
         assert SITE.answer(target).status == 400
 
 
-ROUTES = ("/", "/faces/", "/look.json?face=", "/pose.fap?face=", "/feeling.json?of=", "/pose.fap?set=", "/x/")
+ROUTES = (
+    "/",
+    "/faces/",
+    "/look.json?face=",
+    "/mirror?light=",
+    "/pose.fap?face=",
+    "/feeling.json?of=",
+    "/pose.fap?set=",
+    "/x/",
+)
 VALUES = st.recursive(
     st.none() | st.booleans() | st.floats() | st.integers(-(10**400), 10**400) | st.text(max_size=8),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=4), inner, max_size=3),
