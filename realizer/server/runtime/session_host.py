@@ -94,7 +94,9 @@ class SessionHost:
         self._loop = asyncio.get_running_loop()
         self._effects = EffectRunner(self._loop, self._engines, self._clients, self._deliver)
         self._wake_ups = WakeUps[Session](self._loop, self._wake)
-        self._reading = ReadingTurns[Session](self._loop, self._read)
+        self._reading = ReadingTurns[Session](
+            self._loop, self._read, lambda: self._overload.is_active and self._wake_ups.is_behind
+        )
         self._calls = SlicedCalls[Session](self._reading.add, self._loop.call_soon_threadsafe)
         await self._factory.load()
         self._expiry_timer = self._loop.call_later(EXPIRY_INTERVAL, self._expire_sessions)

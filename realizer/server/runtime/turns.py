@@ -16,7 +16,8 @@ STEP = 0.001  # s
 SLACK = 5e-4  # of a step
 TURN = 0.004  # s; so long sessions are woken before the loop looks for messages again
 # Of the time since documents were last read, so much goes to documents before frames come again. When more is
-# due than can be done, frames are late and documents are still read.
+# due than can be done, frames are late and documents are still read; an overloaded process reads no more than
+# this share of the time.
 READING_SHARE = 0.25
 LONGEST_READING = 0.02  # s
 
@@ -58,6 +59,11 @@ class WakeUps(Generic[T]):
                 self._loop.call_at(step * STEP, self._wake_step, step)
             self._steps[step][session] = None
 
+    @property
+    def is_behind(self) -> bool:
+        """Whether sessions are due that have not been woken."""
+        return bool(self._due)
+
     def close(self) -> None:
         """Wake no session any more."""
         self._closed = True
@@ -89,14 +95,22 @@ class ReadingTurns(Generic[T]):
     Args:
         loop: the event loop.
         read: called with the session whose turn it is.
+        must_wait: returns whether turns wait until it is time for their share.
     """
 
-    def __init__(self, loop: asyncio.AbstractEventLoop, read: Callable[[T], None]) -> None:
+    def __init__(
+        self,
+        loop: asyncio.AbstractEventLoop,
+        read: Callable[[T], None],
+        must_wait: Callable[[], bool] = lambda: False,
+    ) -> None:
         self._loop = loop
         self._read = read
+        self._must_wait = must_wait
         self._waiting: dict[T, None] = {}
         self._next: asyncio.Handle | None = None
         self._until = loop.time()  # when the last turns ended
+        self._excess = 0.0  # s that the last turns took beyond their share
 
     def add(self, session: T) -> None:
         """Give a session one turn."""
@@ -111,7 +125,13 @@ class ReadingTurns(Generic[T]):
     def _take_turns(self) -> None:
         """Give sessions their turns for a share of the time. Then frames come again."""
         began = self._loop.time()
-        end = began + min((began - self._until) * READING_SHARE, LONGEST_READING)
+        share = min((began - self._until) * READING_SHARE, LONGEST_READING)
+        if self._must_wait():
+            share -= self._excess
+            if share < 0.0:
+                self._next = self._loop.call_soon(self._take_turns)
+                return
+        end = began + share
         while self._waiting:
             session = next(iter(self._waiting))
             del self._waiting[session]
@@ -119,4 +139,5 @@ class ReadingTurns(Generic[T]):
             self._until = self._loop.time()
             if self._until >= end:
                 break
+        self._excess = min(max(0.0, self._until - end), LONGEST_READING)
         self._next = self._loop.call_soon(self._take_turns) if self._waiting else None

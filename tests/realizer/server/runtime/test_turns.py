@@ -140,3 +140,25 @@ def test_reading_turns_give_no_turn_after_they_are_closed(loop) -> None:
     turns.close()
     loop.run_soon()
     assert not loop.soon
+
+
+def test_reading_turns_that_must_wait_keep_to_their_share(loop) -> None:
+    took = 0.0
+
+    def take(session: str) -> None:
+        nonlocal took
+        loop.now += 0.004
+        took += 0.004
+
+    is_busy = True
+    turns = ReadingTurns(loop, take, lambda: is_busy)
+    for k in range(200):
+        turns.add(f"s{k}")
+    begin = loop.now
+    while loop.now < begin + 1.0:
+        loop.now += 0.0005  # a frame
+        loop.soon.pop(0)()
+    assert took == pytest.approx(READING_SHARE / (1 + READING_SHARE), abs=0.02)
+    is_busy = False
+    loop.run_soon()
+    assert took == pytest.approx(200 * 0.004)
