@@ -11,7 +11,7 @@ from realizer.tables import toml_table
 
 # Columns of `surfaces`.
 WRAP, SOFT, REFLECTION, SHARP, SHARP_SHARE, THROUGH, COAT = 0, 3, 6, 7, 8, 9, 10
-GLINT = 1.2  # brightness of the key lamp's reflection on a coat, as a share of its light on white
+GLINT = 2.0  # brightness of the key lamp's reflection on a coat, as a share of its light on white
 DIRECT = 0.55  # how far occlusion darkens light of lamps, which shadows darken already
 BENT = 1 / 1.336  # how light is bent at the cornea
 BOWL = 1.3  # slope of an iris at its rim, against the cornea: a bowl that is brightest opposite to the lamp

@@ -17,7 +17,7 @@ from realizer.render.textures import DEPTH
 FINER = 3  # times finer than the picture it is painted
 COLLARETTE = 0.56  # place of the ruff around the pupil, in radii of the limbus
 VESSELS = 64
-ROUGHNESS = 0.10, 0.32  # of cornea and white
+ROUGHNESS = 0.10, 0.34  # of cornea and white
 
 
 def eye_picture(size: int, colours: Mapping[str, Sequence[float]], seed: int) -> tuple[UInt8, UInt8]:
@@ -39,7 +39,8 @@ def eye_picture(size: int, colours: Mapping[str, Sequence[float]], seed: int) ->
     shares = smooth(out, 1.07, 0.96)[..., None]
     albedo = _white(x, y, out, tint, seed) * (1 - shares) + _iris(x, y, out, tint, seed) * shares
     depth = np.sqrt(CORNEA**2 - np.minimum(out * LIMBUS, LIMBUS) ** 2) - np.sqrt(CORNEA**2 - LIMBUS**2)
-    wet = np.where(out < 1, *ROUGHNESS)
+    clear, white = ROUGHNESS
+    wet = white + (clear - white) * smooth(out, 0.97, 0.85)
     surface = np.stack([np.ones_like(out), wet, 1 - depth / DEPTH], -1) * 255
     return _smaller(albedo, size), _smaller(surface, size)
 
