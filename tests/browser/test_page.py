@@ -120,7 +120,7 @@ FACE = "mapped"
 
 
 def mapped_face(folder: Path) -> None:
-    """Write a face that has everything in its maps: ada, with a picture across her front."""
+    """Write a face that has everything: ada, with maps across her front and a hair."""
     import numpy as np
     from PIL import Image
 
@@ -143,9 +143,19 @@ def mapped_face(folder: Path) -> None:
     for name, channels in maps.items():
         picture = np.stack(channels, axis=2).astype(np.uint8).squeeze()
         Image.fromarray(picture).save(folder / f"{name}.webp", lossless=True)
+    forehead = flat[:, 1].argsort()[len(flat) // 4]
+    shares = np.tile(np.float32([1, 0, 0, 0]), (4, 1))
+    places = np.array([[9000, 9000], [20000, 9000], [9000, 30000], [20000, 30000]], np.uint16)
+    np.savez(
+        folder / "cards.npz",
+        roots=forehead + np.arange(16, dtype=np.int32).reshape(4, 4), weights=shares, ups=shares, uv=places,
+        triangles=np.int32([[0, 1, 2], [2, 1, 3]]), colours=np.full((4, 3), 90, np.uint8),
+        occlusion=np.full(4, 255, np.uint8), gloss=np.zeros(4, np.uint8),
+    )  # fmt: skip
     table = (folder / "face.toml").read_text()
     table = re.sub(r"(?ms)^\[(maps|cards)\].*?(?=^\[|\Z)", "", table).replace('"ada"', f'"{FACE}"', 1)
     table += '\n[maps]\nrelief = 0.002\ntexel = 0.0002\nfolds = ["frown_left", "frown_right"]\n'
+    table += "[cards]\nhair = [0, 4]\n"
     (folder / "face.toml").write_text(table)
 
 
@@ -238,6 +248,26 @@ def test_page_draws_folds_like_stills(quiet_page) -> None:  # type: ignore[no-un
     assert np.abs(here - there).mean() < 3
     # The folds, which are everywhere on this face, show on a cheek that the brows do not move.
     assert np.abs(here - skin_of(calm))[80:120].mean() > 4
+
+
+def test_page_carries_the_stream_to_what_is_drawn(quiet_page) -> None:  # type: ignore[no-untyped-def]
+    import numpy as np
+
+    from realizer.face.drawn_mesh import drawn_mesh
+    from realizer.face.surface import normals
+
+    def head(name: str):  # type: ignore[no-untyped-def]
+        return np.reshape(quiet_page.evaluate(f"Array.from(realizerPage.stage.head.{name})"), (-1, 3))
+
+    face, vertices = load_face(FACE), head("vertices").astype(np.float32)
+    ups = normals(face, vertices[None])[0]
+    mesh = drawn_mesh(face)
+    assert head("attributes.position.array") == pytest.approx(mesh.places @ vertices, abs=1e-6)
+    # Corners of triangles without area may have any normal.
+    assert (np.abs(head("attributes.normal.array") - mesh.ups @ ups).max(axis=1) < 1e-3).mean() > 0.999
+    strands, wanted = head("attributes.strand.array"), mesh.strands @ vertices
+    assert np.abs(wanted).max() > 0
+    assert strands == pytest.approx(wanted, abs=1e-3 * np.abs(wanted).max())
 
 
 def test_page_without_a_gpu_draws_the_mesh_that_is_streamed(page) -> None:  # type: ignore[no-untyped-def]
