@@ -14,7 +14,7 @@ from realizer.facebuild.hair.strands import unit
 from realizer.facebuild.parts import smooth
 from realizer.facebuild.person.scalp import Scalp
 
-COUNT = 820  # cards of a full beard
+COUNT = 950  # cards of a full beard
 LONG, WIDE = 0.024, 0.0046  # m, of a card on the chin of a full beard
 SHORT = 0.006  # m, of the shortest beard
 SEGMENTS = 2
@@ -43,8 +43,10 @@ def beard(
     at, triangles = skin
     area = np.linalg.norm(triangle_normals(at, triangles), axis=1)
     # The strip between nose and lip is narrow, and hardly any triangle lies in it wholly.
-    low = np.where(at[triangles, 1].mean(axis=1) > points["2.2"][1], 0.1, 0.3)
-    weight = area * smooth(where[triangles].mean(axis=1), low, low + 0.35)
+    middle = at[triangles].mean(axis=1)
+    lip = (middle[:, 1] > points["2.2"][1]) & (np.abs(middle[:, 0]) < points["8.3"][0] + 0.008)
+    low = np.where(lip, 0.05, 0.3)
+    weight = area * np.where(lip, 3, 1) * smooth(where[triangles].mean(axis=1), low, low + 0.35)
     pick = rng.choice(len(triangles), COUNT, p=weight / weight.sum())
     shares = rng.dirichlet((1.0, 1.0, 1.0), COUNT)
     corners = triangles[pick]

@@ -43,7 +43,7 @@ def face_cards(face: Face, recipe: Recipe, margins: Sequence[Margin], bearded: F
     scalp = Scalp(*drawn, points, style.line, style.rise)
     rng = np.random.default_rng(zlib.crc32(face.name.encode()))
     groups = {
-        "hair": [hair(scalp, drawn[1], style, colours["hair"])],
+        "hair": [hair(scalp, drawn[1], style, colours["hair"], rng)],
         "brows": [brow(skin, drawn, points, side, colours["brows"], look, rng) for side in (1, -1)],
         "lashes": [lashes(at, margin, colours["lashes"], look.lash, rng) for margin in margins],
     }

@@ -16,9 +16,8 @@ from realizer.facebuild.hair.texture import LEVEL, place
 from realizer.facebuild.parts import smooth
 from realizer.facebuild.person.scalp import Scalp
 
-SEED = 11  # of the strands: the same head, the same hair
-FRINGE = 0.007  # m that those may reach beyond it
 BORDER, SHORTEST = 3, 0.004  # segments of cards at the hairline; m of the shortest card
+FRINGE = 0.007  # m that cards at the hairline may reach beyond it
 NEAR = 0.012  # m from the skin in which cards are kept off it
 UNDER = 0.35  # layers below that are what lies under the others
 CAP = 0.0011  # m that the cap lies above the skin
@@ -28,14 +27,13 @@ TURN, AROUND = 0.012, 0.085  # m that the cap's picture is wide; radius of the h
 DEEP = 0.13
 
 
-def hair(scalp: Scalp, triangles: Int32, style: Style, colour: Any) -> Patch:
+def hair(scalp: Scalp, triangles: Int32, style: Style, colour: Any, rng: Any) -> Patch:
     """Return all cards of the hair.
 
     Args:
         scalp: over the skin that is drawn; triangles: (m, 3) of that skin.
         colour: sRGB.
     """
-    rng = np.random.default_rng(SEED)
     parts = [cap(scalp, triangles, style, colour)]
     if style.cards:
         parts.append(_locks(scalp, style, colour, rng))

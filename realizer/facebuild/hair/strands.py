@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.array_types import Float64
+from realizer.core.array_types import Bool, Float64
 from realizer.facebuild.hair.style import Style
 from realizer.facebuild.parts import smooth
 from realizer.facebuild.person.scalp import Scalp
@@ -127,64 +127,74 @@ def grow(
     Args:
         layer: (s,) 0..1.
     """
-    flow = Flow(scalp, style)
-    count, steps = len(at), int(np.ceil(length.max() / STEP)) + 1
-    at = at + scalp.lift(at)[1] * LEAST / 2
-    lines, runs = [at], np.zeros((steps + 1, count))
-    go = flow(at)
-    ends = scalp.height(style.ends, at) + style.uneven * rng.uniform(-1, 1, count)
-    alive = np.ones(count, bool)
-    body = style.body * (0.4 + 0.6 * layer)
-    for k in range(steps):
-        lift, ups = scalp.lift(at)
-        near = scalp.distance(at) < NEAR
-        # On the skull hair follows the flow; where the skull turns away it falls.
-        skull = unit(at - scalp.middle)
-        heavy = style.heavy * smooth(skull[:, 1], 0.45, -0.15)[:, None]
-        want = unit(flow(at) * (1 - heavy) + DOWN * heavy)
-        below = smooth(at[:, 1], -0.03, -0.09)[:, None] * style.heavy
-        want = unit(want + skull * [1, 0, 1] * -style.tuck * below)
-        go = unit(go * (1 - style.soft) + want * style.soft)
-        run = runs[k]
-        step = np.where(alive, np.minimum(STEP, length - run), 0)[:, None]
-        nxt = at + go * step
-        lift, ups = scalp.lift(nxt)
-        near = scalp.distance(nxt) < NEAR
-        hang = style.heavy * smooth(edge(scalp, style, nxt), 0.012, -0.004)
-        rise = np.minimum((run + STEP) * style.lift, 1.0)
-        thick = thickness(scalp, style, nxt)
-        height = np.minimum(rise, thick * (1 - style.depth + style.depth * layer)).clip(LEAST)
-        height = height * (1 - hang) + np.maximum(body, height) * hang
-        height += style.heavy * EAR * smooth(scalp.off_ear(nxt), 0.030, -0.004)
-        push = np.where(near, np.maximum(height - lift, (height - lift) * (1 - hang)), 0)
-        out = unit(ups + 2 * style.heavy * skull * smooth(nxt[:, 1], -0.07, -0.03)[:, None])
-        nxt = nxt + out * (push * (step[:, 0] > 0)).clip(-STEP / 2, STEP / 2)[:, None]
-        nxt = _off_face(nxt, style)
-        inside = edge(scalp, style, nxt)
-        over = (inside < -style.over * rng.uniform(0.3, 1.0, count)) & (style.heavy == 0)
-        low = nxt[:, 1] < ends
-        runs[k + 1] = run + np.linalg.norm(nxt - at, axis=1)
-        at = nxt
-        lines.append(at)
-        alive &= ~over & ~low & (runs[k + 1] < length)
-        if not alive.any():
-            break
-    path, run = np.stack(lines), runs[: len(lines)]
+    path, run = _traced(scalp, style, at, layer, length, rng)
     # Hair that hangs is bent most on the crown.
     shares = np.linspace(0, 1, segments + 1) ** (1 + 0.6 * style.heavy)
-    places = np.empty((count, segments + 1, 3))
-    for s in range(count):
-        for axis in range(3):
-            places[s, :, axis] = np.interp(shares * run[-1, s], run[:, s], path[:, s, axis])
-    # What would hang before the face is left out, and what stands off the crown or is bent sharply.
-    wrong = (places[..., 2] > 0.045) & (places[..., 1] < 0.04)
+    places = np.stack(
+        [
+            np.stack([np.interp(shares * far[-1], far, line[:, axis]) for axis in range(3)], axis=1)
+            for far, line in zip(run.T, path.transpose(1, 0, 2), strict=True)
+        ]
+    )
+    length = np.where(_is_wrong(scalp, style, places), 0, run[-1])
+    return Strands(places, _ups(scalp, places), layer, length)
+
+
+def _traced(
+    scalp: Scalp, style: Style, at: Float64, layer: Float64, length: Float64, rng: Any
+) -> tuple[Float64, Float64]:
+    """Return the steps of strands, (k, s, 3), and how long they are by then, (k, s) metres."""
+    flow = Flow(scalp, style)
+    at = at + scalp.lift(at)[1] * LEAST / 2
+    run, go, alive = np.zeros(len(at)), flow(at), np.ones(len(at), bool)
+    lines, runs = [at], [run]
+    ends = scalp.height(style.ends, at) + style.uneven * rng.uniform(-1, 1, len(at))
+    while alive.any():
+        go = unit(go * (1 - style.soft) + _heading(scalp, style, at, flow(at)) * style.soft)
+        step = np.where(alive, np.minimum(STEP, length - run), 0)
+        last, at = at, at + go * step[:, None]
+        push = _push(scalp, style, at, layer, (run + STEP) * style.lift)
+        at = _off_face(at + np.where(step > 0, 1, 0)[:, None] * push, style)
+        run = run + np.linalg.norm(at - last, axis=1)
+        lines.append(at)
+        runs.append(run)
+        beyond = edge(scalp, style, at) < -style.over * rng.uniform(0.3, 1.0, len(at))
+        alive &= (run < length) & (at[:, 1] >= ends) & ~(beyond & (style.heavy == 0))
+        alive &= len(lines) * STEP < 2 * length
+    return np.stack(lines), np.stack(runs)
+
+
+def _heading(scalp: Scalp, style: Style, at: Float64, along: Float64) -> Float64:
+    """Return where hair wants to go, (n, 3): along the skull, down where that turns away, then inwards."""
+    skull = unit(at - scalp.middle)
+    heavy = style.heavy * smooth(skull[:, 1], 0.45, -0.15)[:, None]
+    below = style.heavy * smooth(at[:, 1], -0.03, -0.09)[:, None]
+    return unit(unit(along * (1 - heavy) + DOWN * heavy) - skull * [1, 0, 1] * style.tuck * below)
+
+
+def _push(scalp: Scalp, style: Style, at: Float64, layer: Float64, rise: Float64) -> Float64:
+    """Return the ways (n, 3) by which strands reach the height of their layer, or that to which they rise."""
+    lift, ups = scalp.lift(at)
+    hang = style.heavy * smooth(edge(scalp, style, at), 0.012, -0.004)
+    height = thickness(scalp, style, at) * (1 - style.depth + style.depth * layer)
+    height = np.minimum(rise, height).clip(LEAST)
+    height = height * (1 - hang) + np.maximum(style.body * (0.4 + 0.6 * layer), height) * hang
+    height += style.heavy * EAR * smooth(scalp.off_ear(at), 0.030, -0.004)
+    push = np.maximum(height - lift, (height - lift) * (1 - hang)).clip(-STEP / 2, STEP / 2)
+    skull = unit(at - scalp.middle) * smooth(at[:, 1], -0.07, -0.03)[:, None]
+    return unit(ups + 2 * style.heavy * skull) * np.where(scalp.distance(at) < NEAR, push, 0)[:, None]
+
+
+def _is_wrong(scalp: Scalp, style: Style, places: Float64) -> Bool:
+    """Return which strands (s,) hang before face or forehead, stand off the crown or are bent sharply."""
     flat = places.reshape(-1, 3)
     off = scalp.lift(flat)[0] - 1.3 * thickness(scalp, style, flat) - 0.002
+    wrong = (places[..., 2] > 0.045) & (places[..., 1] < 0.04)
     wrong |= (off.reshape(wrong.shape) > 0) & (places[..., 1] > 0.06)
+    wrong |= (edge(scalp, style, flat).reshape(wrong.shape) < -0.010) & (places[..., 1] > 0.045)
     ways = unit(np.diff(places, axis=1))
     bent = (ways[:, 1:] * ways[:, :-1]).sum(axis=2).min(axis=1) < SHARPEST
-    length = np.where(wrong.any(axis=1) | bent, 0, run[-1])
-    return Strands(places, _ups(scalp, places), layer, length)
+    return np.asarray(wrong.any(axis=1) | bent)
 
 
 def _ups(scalp: Scalp, places: Float64) -> Float64:

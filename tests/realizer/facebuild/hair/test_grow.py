@@ -21,7 +21,7 @@ Skin = tuple[np.ndarray, np.ndarray]
 def test_hair_of_every_style_is_sound_and_light(skin: Skin, points: dict[str, np.ndarray], name: str) -> None:
     style = style_of({"style": name})
     scalp = Scalp(*skin, points, style.line, style.rise)
-    patch = hair(scalp, skin[1], style, BROWN)
+    patch = hair(scalp, skin[1], style, BROWN, np.random.default_rng(11))
     assert len(patch.triangles) < 9000
     for values in (patch.places, patch.ups, patch.uv, patch.colours, patch.occlusion):
         assert np.isfinite(values).all()
