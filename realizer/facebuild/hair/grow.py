@@ -114,12 +114,14 @@ def _locks(scalp: Scalp, style: Style, colour: Any, rng: Any) -> Patch:
 
 def _border(scalp: Scalp, style: Style, colour: Any, rng: Any) -> Patch:
     """Return cards of few hairs along the hairline, so that it has no edge."""
-    at = roots(scalp, style, style.border, -0.004, 0.008, rng)
+    # Hair that hangs lies along the hairline: beyond it, it would float on the forehead.
+    low, least = (0.002, -0.002) if style.heavy else (-0.004, -FRINGE)
+    at = roots(scalp, style, style.border, low, 0.008, rng)
     count = len(at)
     layer, length = rng.uniform(0.1, 0.6, count), style.border_length * rng.uniform(0.5, 1.2, count)
     lines = grow(scalp, style, at, layer, length, BORDER, rng)
     inside = edge(scalp, style, lines.places.reshape(-1, 3)).reshape(count, -1).min(axis=1)
-    lines = replace(lines, length=np.where(inside < -FRINGE, 0, lines.length))
+    lines = replace(lines, length=np.where(inside < least, 0, lines.length))
     width = 0.0048 * rng.uniform(0.7, 1.2, (count, 1)) * np.linspace(1, 0.8, BORDER + 1)
     light = np.full((count, BORDER + 1), 0.9)
     return _shown(
