@@ -306,14 +306,15 @@ def check_camera(face: str, name: str) -> None:
 
 
 def _background(value: str | None) -> str | None:
-    from realizer.render.backdrop import colour_of
+    from realizer.render.backdrop import background_of, is_picture, read_picture
 
-    return _checked(colour_of, value)
+    _checked(background_of, value)
+    return _checked(read_picture, value) if is_picture(value) else value
 
 
 def _opaque(value: str | None) -> str | None:
     if value == "transparent":
-        raise click.BadParameter("wanted a colour such as #d8dde2: these pictures are opaque")
+        raise click.BadParameter("wanted a colour such as #d8dde2, or a picture: these pictures are opaque")
     return _background(value)
 
 
@@ -336,15 +337,17 @@ light = click.option(
 )
 background = click.option(
     "--background",
-    metavar="COLOUR",
+    metavar="COLOUR|FILE",
     callback=lambda context, parameter, value: _background(value),
-    help="Colour behind the head such as '#d8dde2', or transparent.  [default: the light's own]",
+    help="What is behind the head: a colour such as '#d8dde2', a picture (PNG, JPEG, WebP), or transparent.  "
+    "[default: the light's own]",
 )
 opaque_background = click.option(
     "--background",
-    metavar="COLOUR",
+    metavar="COLOUR|FILE",
     callback=lambda context, parameter, value: _opaque(value),
-    help="Colour behind the head such as '#d8dde2'.  [default: the light's own]",
+    help="What is behind the head: a colour such as '#d8dde2', or a picture (PNG, JPEG, WebP).  "
+    "[default: the light's own]",
 )
 
 

@@ -135,6 +135,7 @@ def _cells(
     from realizer.cli import sheet_poses
     from realizer.face.load import input_names
     from realizer.render import Renderer
+    from realizer.render.backdrop import backdrop
     from realizer.render.contact_sheet import Cell
     from realizer.render.difference_image import difference, faint, flatten
     from realizer.render.light import preset
@@ -142,7 +143,7 @@ def _cells(
     # A plain background, so that only the face differs.
     behind = np.rint(np.array(preset(drawing.light).backdrop_middle) * 255)
     if drawing.background:
-        behind = np.frombuffer(bytes.fromhex(drawing.background[1:]), np.uint8)
+        behind = backdrop(drawing.size, preset(drawing.light), drawing.background)[..., :3]
     all_poses = [pose for part in series for pose in part.poses]
     rows = poses_of(sheet_poses.frames(series), input_names(name, deformer=deformer), mapping)
     pictures: list[list[Any]] = [[] for _ in all_poses]

@@ -98,6 +98,14 @@ def _existing(is_kind: Callable[[Path], object], kind: str) -> Callable[[Any], P
 folder, file = _existing(os.path.isdir, "folder"), _existing(os.path.isfile, "file")
 
 
+def background(value: Any) -> str:
+    """Return "transparent", "#rrggbb", or the name of a file."""
+    named = isinstance(value, str) and re.fullmatch(r"#[0-9a-fA-F]{6}|transparent", value)
+    if not named and not (isinstance(value, str | Path) and os.path.isfile(value)):  # noqa: PTH113
+        raise ValueError("transparent, a colour such as #d8dde2, or an existing file")
+    return str(value)
+
+
 def switch_or_file(value: Any) -> str:
     """Return "on", "off", or the name of a file."""
     try:

@@ -170,8 +170,8 @@ class Settings:
     light: str | None = _row(None, kind.text, "default light of pictures; none: portrait")
     background: str | None = _row(
         None,
-        kind.matching(r"#[0-9a-fA-F]{6}|transparent", "transparent or a colour such as #d8dde2"),
-        "default background of pictures; none: the light's own",
+        kind.background,
+        "default background of pictures: a colour, a picture's file, or transparent; none: the light's own",
     )
     fps: float = _row(25.0, kind.real(0.01, 240), "default frames per second of streams")
     scene: Path | None = _row(None, kind.path, "file of targets for all sessions: NAME X Y Z, in metres")

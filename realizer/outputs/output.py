@@ -24,7 +24,7 @@ class RenderSettings:
     camera: str = "front"
     at: float | None = None  # seconds of a single picture; None: the whole span
     light: str | None = None  # a preset; None: the default of `realizer.render.Renderer`
-    background: str | None = None  # "#rrggbb", or for a single picture "transparent"
+    background: str | None = None  # "#rrggbb", a picture's path, or for a single picture "transparent"
     morphs: str = "fap"  # names of a .glb file's morph targets: "fap" or "arkit"
     visemes: bool = False  # whether a .fap file has FAP 1 in addition to the FAPs of the lips
     renderer: Renderer | None = None  # started by `Output.begin`
@@ -115,7 +115,7 @@ class Output:
         """Return the settings for `write` with a renderer that starts now, during planning.
 
         Raises:
-            RenderError: if `drawing.background` is not a colour.
+            RenderError: if `drawing.background` is neither a colour nor a file.
         """
         if self.picture_size is None:
             return drawing

@@ -1,7 +1,10 @@
 """The backdrop behind the head, and compositing over it."""
 
+from __future__ import annotations
+
 import os
 import re
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,26 +12,54 @@ from realizer.core.array_types import UInt8
 from realizer.core.errors import RenderError
 from realizer.render.light import Light
 
+if TYPE_CHECKING:
+    from PIL import Image
+
 TRANSPARENT = "transparent"
 BACKGROUND = "REALIZER_BACKGROUND"
+_COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
+_FORMATS = ("PNG", "JPEG", "WEBP")
+_WANTED = f"{TRANSPARENT}, a colour such as #d8dde2, or a picture ({', '.join(_FORMATS)})"
 
 
-def colour_of(background: str | None, *, alpha: bool = True) -> str | None:
-    """Return the background: None is the light's own gradient, else "#rrggbb" or "transparent".
+def background_of(background: str | None, *, alpha: bool = True) -> str | None:
+    """Return the background: "#rrggbb", "transparent" or the path of a picture; None is the light's gradient.
 
     Args:
         background: the caller's choice; None selects the variable REALIZER_BACKGROUND.
         alpha: without it, a variable that says "transparent" means the gradient: films are opaque.
 
     Raises:
-        RenderError: neither a colour nor "transparent".
+        RenderError: neither a colour, nor "transparent", nor an existing file.
     """
     named = background or os.environ.get(BACKGROUND) or None
     if named is None or (named == TRANSPARENT and not alpha and background is None):
         return None
-    if named != TRANSPARENT and not re.fullmatch(r"#[0-9a-fA-F]{6}", named):
-        raise RenderError(f"background: wanted {TRANSPARENT} or a colour such as #d8dde2, got {named!r}")
+    if is_picture(named) and not os.path.isfile(named):  # noqa: PTH113 (Path raises for a long name)
+        raise RenderError(f"background: wanted {_WANTED}, got {named!r}, which is no file")
     return named
+
+
+def is_picture(background: str | None) -> bool:
+    """Return whether a background is the path of a picture."""
+    return background not in (None, TRANSPARENT) and not _COLOUR.fullmatch(str(background))
+
+
+def read_picture(path: str) -> Image.Image:
+    """Return the picture of a file, RGBA.
+
+    Raises:
+        RenderError: the file is missing, broken, too large, or of another format.
+    """
+    from PIL import Image, ImageOps
+
+    try:
+        with Image.open(path, formats=_FORMATS) as picture:
+            return ImageOps.exif_transpose(picture).convert("RGBA")
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        raise RenderError(
+            f"background: wanted a picture ({', '.join(_FORMATS)}), got {path!r}: {error}"
+        ) from None
 
 
 def channels(background: str | None) -> int:
@@ -37,11 +68,25 @@ def channels(background: str | None) -> int:
 
 
 def backdrop(size: tuple[int, int], light: Light, background: str | None = None) -> UInt8:
-    """Return (h, w, 4) uint8: one colour, nothing, or a soft gradient, lighter behind the head."""
+    """Return (h, w, 4) uint8: one colour, nothing, a picture that covers the size, or the light's gradient.
+
+    Raises:
+        RenderError: see `read_picture`.
+    """
+    if background is None:
+        return _gradient(size, light)
+    if is_picture(background):
+        from PIL import Image, ImageOps
+
+        picture = ImageOps.fit(read_picture(background), size)
+        return np.array(Image.alpha_composite(Image.fromarray(_gradient(size, light)), picture))
+    plain = (0, 0, 0, 0) if background == TRANSPARENT else (*bytes.fromhex(background[1:]), 255)
+    return np.full((*size[::-1], 4), plain, np.uint8)
+
+
+def _gradient(size: tuple[int, int], light: Light) -> UInt8:
+    """Return a soft gradient (h, w, 4), lighter behind the head."""
     width, height = size
-    if background is not None:
-        plain = (0, 0, 0, 0) if background == TRANSPARENT else (*bytes.fromhex(background[1:]), 255)
-        return np.full((height, width, 4), plain, np.uint8)
     y, x = np.meshgrid(np.linspace(-1, 1, height), np.linspace(-1, 1, width), indexing="ij")
     out = np.clip(np.hypot(x, y * 0.9 + 0.1) / 1.35, 0, 1)[..., None]
     mix = out * out * (3 - 2 * out)

@@ -47,7 +47,11 @@ def difference(picture: UInt8, neutral: UInt8, below: Float32) -> UInt8:
 
 
 def flatten(pixels: UInt8, behind: Any) -> UInt8:
-    """Return pixels (h, w, 3) of a picture (h, w, 4), which is not premultiplied, over a colour 0..255."""
+    """Return pixels (h, w, 3) of a picture (h, w, 4), which is not premultiplied, over `behind`.
+
+    Args:
+        behind: a colour, or pixels (h, w, 3); 0..255.
+    """
     share = pixels[..., 3:] / np.float32(255)
     mixed = pixels[..., :3] * share + np.asarray(behind, np.float32) * (1 - share)
     out: UInt8 = np.rint(mixed).astype(np.uint8)

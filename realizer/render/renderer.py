@@ -13,7 +13,7 @@ import numpy as np
 from realizer.core.array_types import Float32, UInt8
 from realizer.core.errors import RenderError
 from realizer.face.model import Face
-from realizer.render.backdrop import channels, colour_of
+from realizer.render.backdrop import background_of, channels
 from realizer.render.drawing_process import DRAW, DrawingProcess
 from realizer.render.process_messages import Open, Pixels
 
@@ -48,7 +48,8 @@ class Renderer:
             size: width, height in pixels.
             camera: a preset, or a camera of the face.
             light: a preset; None selects REALIZER_LIGHT, then "portrait".
-            background: "#rrggbb" or "transparent"; None selects REALIZER_BACKGROUND, then the light's own.
+            background: "#rrggbb", "transparent" or the path of a picture (PNG, JPEG, WebP); None selects
+                REALIZER_BACKGROUND, then the light's own.
             alpha: the caller takes pictures of four channels, should REALIZER_BACKGROUND say "transparent".
             backend: "gl", "onboard" or "auto"; None selects REALIZER_DRAW, then "auto".
             deformer: of a face that is given by name, "mpeg4" or "au"; None is its own default.
@@ -145,9 +146,9 @@ class Renderer:
         """The background; None is the light's own gradient.
 
         Raises:
-            RenderError: neither a colour nor "transparent".
+            RenderError: neither a colour, nor "transparent", nor an existing file.
         """
-        return colour_of(self._background, alpha=self._alpha)
+        return background_of(self._background, alpha=self._alpha)
 
     @property
     def pid(self) -> int | None:

@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import files
+from pathlib import Path
 from urllib.parse import parse_qs
 
 import numpy as np
@@ -68,6 +69,7 @@ class HttpSite:
             "/feeling.json": lambda asked: _json(preview_emotion(asked.get("of", ""))),
             "/look.json": self._look,
             "/mirror": lambda asked: _bytes(_mirror(asked.get("light", ""))),
+            "/background": self._background,
             "/pose.fap": self._pose,
         }
 
@@ -94,7 +96,7 @@ class HttpSite:
                 return HttpResponse(200, GLB, glb, headers)
         except ToolError as error:
             return HttpResponse(error.status, TEXT, f"{error}\n".encode())
-        except RealizerError:
+        except (RealizerError, OSError):
             log.exception("there is no answer to GET %s", path)
             return HttpResponse(500, TEXT, b"an error of the service: its log says which\n")
         return self._file(path[1:])
@@ -108,6 +110,16 @@ class HttpSite:
     def _look(self, asked: dict[str, str]) -> HttpResponse:
         face = _face(asked.get("face", "default"))
         return _json(_look(face, self._settings.light, self._settings.background))
+
+    def _background(self, asked: dict[str, str]) -> HttpResponse:
+        """Return the picture behind the face, as its file has it."""
+        from realizer.render.backdrop import is_picture
+
+        path = self._settings.background
+        if path is None or not is_picture(path):
+            return self._file("background")
+        media_type = mimetypes.guess_type(path)[0] or "application/octet-stream"
+        return HttpResponse(200, media_type, Path(path).read_bytes(), (("Cache-Control", "no-cache"),))
 
     def _pose(self, asked: dict[str, str]) -> HttpResponse:
         face = asked.get("face")
@@ -172,6 +184,7 @@ def _examples() -> bytes:
 def _look(name: str, light: str | None, background: str | None) -> bytes:
     """Return the lights, as uniforms of `surface.glsl`, the camera and the backdrops of a face's pictures."""
     from realizer.face.load import load_face
+    from realizer.render.backdrop import is_picture
     from realizer.render.cameras import camera_for
     from realizer.render.environment import HEIGHT
     from realizer.render.lamp_view import LampView
@@ -193,7 +206,7 @@ def _look(name: str, light: str | None, background: str | None) -> bytes:
         "light": preset(light).name,
         "lights": lights,
         "mirror": HEIGHT,
-        "background": background,
+        "background": "/background" if is_picture(background) else background,
         "camera": camera_for(face).to_json(),
     }
     return json.dumps(look, separators=(",", ":")).encode()

@@ -55,7 +55,8 @@ def test_verbosity_may_come_before_or_after_the_command(args: list[str], tmp_pat
             ["-o", "x.png", "--light", "noon"],
             "light: wanted one of portrait, daylight, evening, studio, outdoors, got 'noon'",
         ),
-        (["-o", "x.png", "--background", "#12"], "wanted transparent or a colour such as #d8dde2, got '#12'"),
+        (["-o", "x.png", "--background", "#12"], "got '#12', which is no file"),
+        (["-o", "x.png", "--background", __file__], "background: wanted a picture (PNG, JPEG, WEBP), got"),
         (["-o", "x.mp4", "--background", "transparent"], "a .png with --at, can be transparent"),
     ],
 )
@@ -71,6 +72,7 @@ def test_realize_refuses_an_unknown_camera_light_or_background(args: list[str], 
         (["--camera", "top"], "wanted one of front, three-quarter, profile, close, got 'top'"),
         (["--light", "noon"], "wanted one of portrait, daylight, evening, studio, outdoors, got 'noon'"),
         (["--background", "transparent"], "these pictures are opaque"),
+        (["--background", "beach.png"], "got 'beach.png', which is no file"),
     ],
 )
 def test_serve_refuses_an_unknown_camera_light_or_background(args: list[str], words: str) -> None:

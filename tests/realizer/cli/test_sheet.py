@@ -39,7 +39,7 @@ def test_sheet_draws_archetypes_from_two_sides_with_differences(tmp_path: Path) 
             ["-o", "x.png", "--light", "noon"],
             "wanted one of portrait, daylight, evening, studio, outdoors, got 'noon'",
         ),
-        (["-o", "x.png", "--background", "blue"], "a colour such as #d8dde2, got 'blue'"),
+        (["-o", "x.png", "--background", "blue"], "got 'blue', which is no file"),
         (["-o", "x.png", "--background", "transparent"], "these pictures are opaque"),
         (["-o", "x.png", "--value", "0"], "0"),
     ],

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from realizer.core.setting_types import switch_or_file
+from realizer.core.setting_types import background, switch_or_file
 from realizer.core.settings import Settings, SettingsError
 from tests.rows import each_row
 
@@ -117,3 +117,12 @@ def test_switch_or_file_is_on_off_or_an_existing_file(tmp_path: Path) -> None:
     for value in ("maybe", str(tmp_path / "none.toml"), str(tmp_path), "x" * 5000, 3):
         with pytest.raises(ValueError, match="on, off, or an existing file"):
             switch_or_file(value)
+
+
+def test_background_is_a_colour_transparent_or_a_file(tmp_path: Path) -> None:
+    (tmp_path / "beach.jpg").write_bytes(b"")
+    for value in ("#d8dde2", "transparent", str(tmp_path / "beach.jpg")):
+        assert background(value) == value
+    for value in ("blue", "#12", str(tmp_path), "x" * 5000, 3):
+        with pytest.raises(ValueError, match="transparent, a colour such as #d8dde2, or an existing file"):
+            background(value)

@@ -48,6 +48,7 @@ export class Stage {
       ask(`look.json?face=${path}`).then((answer) => checked(answer).json()),
       ask(`faces/${path}`).then((answer) => checked(answer).arrayBuffer()).then(readGlb),
     ]);
+    if (look.background === "/background") await this.fetchPicture();
     const maps = await mapsOf(glb, this.renderer, this.full);
     if (this.awaited !== name) return; // another face was requested in the meantime
     if (this.awaited !== name) return; // another face was requested in the meantime
@@ -86,6 +87,13 @@ export class Stage {
     this.stale = true;
   }
 
+  // Fetch the picture behind the face, once.
+  async fetchPicture() {
+    if (this.picture) return;
+    const blob = await ask("background").then((answer) => checked(answer).blob());
+    Object.assign(this, { picture: await createImageBitmap(blob), cover: `url(${URL.createObjectURL(blob)}) center / cover` });
+  }
+
   // Light the face by a preset, and draw its backdrop.
   async shine(name) {
     this.light = name;
@@ -96,13 +104,15 @@ export class Stage {
     if (this.light !== name) return;
     this.lit = this.look.lights[lit];
     this.set({ ...this.lit.uniforms, mirrorMap });
-    this.canvas.parentElement.style.background = this.look.background ?? backdrop(this.lit);
+    const behind = this.picture ? `${this.cover}, ${backdrop(this.lit)}` : this.look.background;
+    this.canvas.parentElement.style.background = behind ?? backdrop(this.lit);
   }
 
   // Draw the backdrop on another canvas, for a film.
   paintBackdrop(pen, width, height) {
-    pen.fillStyle = this.look?.background ?? "#000";
-    if (this.lit && !this.look.background) {
+    const colour = this.picture ? null : this.look?.background;
+    pen.fillStyle = colour ?? "#000";
+    if (this.lit && !colour) {
       const gradient = pen.createRadialGradient(0, 0, 0, 0, 0, 1);
       for (const [part, colour] of stops(this.lit)) gradient.addColorStop(part, colour);
       pen.setTransform(REACH[0] * width, 0, 0, REACH[1] * height, MIDDLE[0] * width, MIDDLE[1] * height);
@@ -110,6 +120,10 @@ export class Stage {
       pen.fillRect(-2, -2, 4, 4);
       pen.setTransform(1, 0, 0, 1, 0, 0);
     } else pen.fillRect(0, 0, width, height);
+    if (!this.picture) return;
+    const scale = Math.max(width / this.picture.width, height / this.picture.height);
+    const [w, h] = [this.picture.width * scale, this.picture.height * scale];
+    pen.drawImage(this.picture, (width - w) / 2, (height - h) / 2, w, h);
   }
 
   reset() {

@@ -12,6 +12,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 import realizer
+from realizer.core.settings import Settings
 from realizer.face.load import list_faces
 from realizer.server.http.http_site import NAME, NOT_BUILT, HttpSite
 
@@ -71,6 +72,18 @@ def test_site_has_the_environment_of_each_light() -> None:
         assert np.isfinite(levels).all()
         assert (levels[..., 3] == 1).all()
     assert SITE.answer("/mirror?light=none").status == SITE.answer("/mirror").status == 404
+
+
+def test_site_has_the_picture_behind_the_face(tmp_path: Path) -> None:
+    (tmp_path / "beach.png").write_bytes(b"a picture")
+    site = HttpSite(dict, Settings(background=str(tmp_path / "beach.png")))
+    assert json.loads(site.answer("/look.json").body)["background"] == "/background"
+    answer = site.answer("/background")
+    assert (answer.status, answer.media_type, answer.body) == (200, "image/png", b"a picture")
+    (tmp_path / "beach.png").unlink()
+    assert site.answer("/background").status == 500
+    assert SITE.answer("/background").status == 404
+    assert not site.is_public("/background")
 
 
 @pytest.mark.skipif(not BUILT, reason="the page was not bundled: build the package where npm is")
