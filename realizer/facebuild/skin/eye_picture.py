@@ -16,6 +16,7 @@ from realizer.render.textures import DEPTH
 
 FINER = 3  # times finer than the picture it is painted
 COLLARETTE = 0.56  # place of the ruff around the pupil, in radii of the limbus
+STEPS = 100  # of a vessel, at most; most have under 30
 VESSELS = 64
 ROUGHNESS = 0.10, 0.34  # of cornea and white
 
@@ -110,7 +111,9 @@ def _vessels(size: int, seed: int) -> Float32:
         angle = rng.choice([0, np.pi]) + rng.normal(0, 0.55)
         place, way = np.array([np.cos(angle), np.sin(angle)]) * rng.uniform(0.8, 1.0), angle + np.pi
         end, dark, width = rng.uniform(0.54, 0.74), rng.uniform(0.4, 1.0), rng.uniform(1.8, 4.6)
-        while np.hypot(*place) > end:
+        for _ in range(STEPS):  # a vessel may wind away
+            if np.hypot(*place) <= end:
+                break
             way += rng.normal(0, 0.22) + 0.15 * np.sin(angle + np.pi - way)
             step = place + 0.02 * np.array([np.cos(way), np.sin(way)])
             ends = [tuple((at + 1) / 2 * size) for at in (place, step)]
