@@ -162,13 +162,12 @@ def outside(face: Face, at: np.ndarray, cover: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize("fap", [48, 49, 50])
-@pytest.mark.parametrize("cover", ["shirt", "hair"])
-def test_deform_keeps_covered_skin_covered_on_a_turned_head(face: Face, cover: str, fap: int) -> None:
-    rest = outside(face, face.vertices.astype(float), cover)
+def test_deform_keeps_covered_skin_covered_on_a_turned_head(face: Face, fap: int) -> None:
+    rest = outside(face, face.vertices.astype(float), "shirt")
     covered = np.isfinite(rest) & (rest < -0.0005)
     assert covered.any()
     for value in (52360, -52360):
-        now = outside(face, deform(face, rows({fap: value}))[0].astype(float), cover)
+        now = outside(face, deform(face, rows({fap: value}))[0].astype(float), "shirt")
         assert now[covered].max() < 0
 
 

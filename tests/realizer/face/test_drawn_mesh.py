@@ -12,7 +12,7 @@ from realizer.face.maps import Maps
 from realizer.face.subdivision import subdivided
 from realizer.face.surface import normals
 
-FACE = load_face("ada")
+FACE = replace(load_face("ada"), maps=None, cards=None)
 
 
 def with_maps(uv, **rest):
