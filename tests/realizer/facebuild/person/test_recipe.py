@@ -5,8 +5,10 @@ from pathlib import Path
 import pytest
 
 from realizer.core.errors import FaceError
+from realizer.core.toml_text import parse_toml
 from realizer.face.load import list_faces
 from realizer.facebuild.person.recipe import COLOURS, appearance_of, read_recipe
+from realizer.facebuild.person.sliders import person_tables
 
 GOOD = "\n".join(
     [
@@ -92,7 +94,8 @@ def test_read_recipe_names_a_file_that_is_no_toml(data: Path) -> None:
 def test_read_recipe_accepts_every_shipped_recipe(info: object, data: Path) -> None:
     # Its targets are in the data, which do not ship; all else is sound.
     path = info.path / "recipe.toml"  # type: ignore[attr-defined]
-    for name in (line.split('"')[1] for line in path.read_text("utf-8").splitlines() if line.startswith('"')):
+    raw = parse_toml(path.read_text("utf-8"))
+    for name in raw.get("targets") or person_tables(raw["person"])["targets"]:
         for side in ("l-", "r-") if "*" in name else ("",):
             target = data / "mpfb2/targets" / f"{name.replace('*', side)}.target"
             target.parent.mkdir(parents=True, exist_ok=True)
