@@ -112,7 +112,7 @@ def test_face_glb_has_maps_as_textures_and_folds() -> None:
     uv = np.float32([[0, 0], [1, 0], [0, 1]]) * np.linspace(0.1, 0.9, count, dtype=np.float32)[:, None, None]
     weights = np.linspace(0, 1, len(face.vertices), dtype=np.float32)[:, None]
     maps = Maps(files, uv, 0.001, 0.0002, np.arange(count) == 0, weights, ("frown_left",))
-    glb = Glb(face_glb(replace(face, maps=maps)))
+    glb = Glb(face_glb(replace(face, maps=maps, cards=None)))
     skin = next(material for material in glb.json["materials"] if material["name"] == "skin")
     look = skin["pbrMetallicRoughness"]
     assert glb.picture(look["baseColorTexture"]["index"]).convert("RGB").getpixel((4, 4)) == (9, 99, 199)

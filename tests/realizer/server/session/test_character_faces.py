@@ -18,7 +18,7 @@ from realizer.server.session.character_faces import CharacterFaces
 def test_check_names_the_known_faces_and_no_folders(name: str) -> None:
     with pytest.raises(FaceError) as error:
         CharacterFaces(Settings()).check(name)
-    assert str(error.value) == f"wanted one of ada, ben, ida, got {name!r}"
+    assert str(error.value) == f"wanted one of ada, ben, ida, leo, nia, omar, got {name!r}"
 
 
 def test_name_is_that_of_the_settings_until_one_is_assigned() -> None:
