@@ -193,7 +193,8 @@ def differences(face, shape, camera, light, size=(512, 512)):
         canvas.close()
     whole = (pictures[0][..., 3] == 255) & (pictures[1][..., 3] == 255)
     assert whole.mean() > 0.1
-    assert np.abs(pictures[0][..., 3] - pictures[1][..., 3]).mean() < 0.5
+    # The outline is the same but for single hairs.
+    assert np.abs(pictures[0][..., 3] - pictures[1][..., 3]).mean() < 1.6
     return np.abs(pictures[0] - pictures[1])[whole][:, :3]
 
 

@@ -54,8 +54,9 @@ def test_find_points_is_sure_of_lips_and_lids(name: str) -> None:
 def test_zones_command_marks_a_bare_mesh_and_lists_guesses(tmp_path: Path) -> None:
     bare = tmp_path / "bare"
     bare.mkdir()
-    for file in ("face.toml", "mesh.npz"):
-        shutil.copy(folder_of("default") / file, bare / file)
+    for file in folder_of("default").iterdir():
+        if file.name in ("face.toml", "mesh.npz") or file.suffix == ".webp":
+            shutil.copy(file, bare)
     runner = CliRunner(env={"REALIZER_FACES": str(tmp_path)})
     ran = runner.invoke(faces, ["zones", "bare", "-o", str(tmp_path / "made")])
     assert ran.exit_code == 0, ran.output
