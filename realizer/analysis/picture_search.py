@@ -24,8 +24,8 @@ STEPS = (0.5, 1.0)  # compared intensities, as they move different places
 LIGHT = "portrait"  # the light of the reference pictures
 MIN_CORRELATION = 0.8  # of a front view with the neutral face
 # A picture is neutral if its difference to the neutral face is small (root mean square, of white; drawing at
-# another size makes 0.004) and similar to no expression (cosine).
-MAX_NEUTRAL, MAX_COSINE = 0.006, 0.45
+# another size makes 0.0065) and similar to no expression (cosine).
+MAX_NEUTRAL, MAX_COSINE = 0.009, 0.45
 
 
 class UnknownPictureError(RealizerError):
