@@ -22,6 +22,7 @@ KINDS: Mapping[str, int] = {
 }  # fmt: skip
 # Parts with an inside that is never seen; all others (hair, clothes, lashes) may be sheets.
 SOLID = ("skin", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue")
+GLOSSY = 0.8  # how much of its roughness a surface of gloss 1 loses
 NEUTRAL = 4 / 1024  # u and v of the middle of the square in maps that changes nothing
 
 
@@ -59,14 +60,23 @@ class DrawnMesh:
     two_sided: Bool
     see_through: Bool
 
+    @property
+    def roughness(self) -> Float32:
+        """(d,) 0..1, which is multiplied with the map's."""
+        return 1 - np.float32(GLOSSY) * self.gloss
+
     def __call__(self, vertices: Float32, normals: Float32, amounts: Float32) -> tuple[Float32, Float32]:
         """Return vertices (d, 3), and unit normals with an amount behind each (d, 4), float32.
+
+        The normal of a vertex without a triangle points forward.
 
         Args:
             vertices, normals: (n, 3) of the face; amounts: (n,) at its vertices.
         """
         ups = self.ups @ np.hstack([normals, amounts[:, None]])
-        ups[:, :3] /= np.maximum(np.sqrt(np.einsum("ij,ij->i", ups[:, :3], ups[:, :3])), 1e-20)[:, None]
+        sizes = np.sqrt(np.einsum("ij,ij->i", ups[:, :3], ups[:, :3]))
+        ups[sizes == 0, 2] = 1
+        ups[:, :3] /= np.where(sizes > 0, sizes, 1)[:, None]
         return self.places @ vertices, ups
 
 

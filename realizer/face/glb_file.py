@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from realizer.core.array_types import Float32
+
 COMPONENTS = {"u1": 5121, "u2": 5123, "u4": 5125, "f4": 5126}
 KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
@@ -36,6 +38,12 @@ class GlbFile:
         if normalised:
             accessor["normalized"] = True
         return self._accessor(accessor, raw, bounds)
+
+    def add_colours(self, colours: Float32) -> int:
+        """Add opaque colours of vertices, (n, 3) linear light 0..1."""
+        out = np.full((len(colours), 4), 65535, np.uint16)
+        out[:, :3] = np.rint(colours * 65535)
+        return self.add(out, target=ARRAY_BUFFER, normalised=True)
 
     def add_sparse(self, array: Any, *, bounds: bool = False) -> int:
         """Add an array of mostly zero rows; only the other rows are stored."""

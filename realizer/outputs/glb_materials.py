@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from realizer.render.textures import ALPHA, OCCLUSION, ROUGHNESS, slopes_of, texels_of
+from realizer.render.normal_map import normals_of
+from realizer.render.textures import ALPHA, OCCLUSION, ROUGHNESS, SLOPE_U, SLOPE_V, texels_of
 
 if TYPE_CHECKING:
     from realizer.core.array_types import Float32, UInt8
@@ -102,10 +103,7 @@ class Materials:
             picture[box] = fine[box][..., : ALPHA + 1]
             return picture
         if name == "normal":
-            slopes = slopes_of(self._texels)[..., :2] * (-1, 1)
-            ups = np.concatenate([slopes, np.ones((*slopes.shape[:2], 1))], axis=2)
-            ups /= np.linalg.norm(ups, axis=2, keepdims=True)
-            return np.rint(127.5 + 127.5 * ups).astype(np.uint8)
+            return normals_of(fine[..., SLOPE_U : SLOPE_V + 1])
         if name == "surface":
             picture = np.zeros((*fine.shape[:2], 3), np.uint8)  # blue is metal
             picture[..., :2] = fine[..., [OCCLUSION, ROUGHNESS]]

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 MIN_NORMAL_CHANGE = 0.01  # half a degree; smaller changes of a normal are invisible
 NEGLIGIBLE = 5e-6  # m; smaller movements are omitted from a target
 LEVEL = 1e-4  # of u and v: nearer to the neutral square there is nothing of the maps
-GLOSSY = 0.8  # how much of its roughness a surface of gloss 1 loses, as in `render.raster`
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,10 +43,8 @@ class GlbMesh:
         self._at, self._ups = self._drawn(face.vertices)
         cut = np.unique(self._mesh.triangles[self._mesh.see_through])
         self.materials = Materials(file, face.maps, self._mesh.uv[cut])
-        colours = linear(self._mesh.colours) * self._mesh.occlusion[:, None]
-        self._colours = np.full((len(colours), 4), 65535, np.uint16)
         # Colours include the baked occlusion, because viewers do not support it by vertex.
-        self._colours[:, :3] = np.rint(colours * 65535)
+        self._colours = linear(self._mesh.colours) * self._mesh.occlusion[:, None]
         self._tangents = tangents(self._at, self._ups, self._mesh.triangles, self._mesh.uv)
 
     def part(self, name: str) -> Bool:
@@ -98,11 +95,10 @@ class GlbMesh:
         return mesh | {"weights": [0.0] * len(targets.names), "extras": {"targetNames": list(targets.names)}}
 
     def _drawn(self, vertices: Float32) -> tuple[Float32, Float32]:
-        """Return drawn vertices and normals; forward where there is no triangle: glTF requires a length."""
-        ups = self._mesh.ups @ normals(self._face, vertices[None])[0]
-        size = np.linalg.norm(ups, axis=1, keepdims=True)
-        ups = np.where(size > 0, ups / np.maximum(size, 1e-20), np.array([0, 0, 1], np.float32))
-        return np.asarray(self._mesh.places @ vertices, np.float32), ups.astype(np.float32)
+        """Return drawn vertices and normals, (d, 3) each."""
+        own = normals(self._face, vertices[None])[0]
+        at, ups = self._mesh(vertices, own, np.zeros(len(own), np.float32))
+        return np.asarray(at, np.float32), np.ascontiguousarray(ups[:, :3], np.float32)
 
     def _groups(self, part: Bool) -> list[_Group]:
         """Return the triangles of some vertices by their part, and by how they are drawn."""
@@ -121,7 +117,7 @@ class GlbMesh:
                 some_mapped = "_mapped" * (lies and not mapped[own].all())
                 look = Look(
                     name + some_cut + some_mapped,
-                    1 - GLOSSY * float(mesh.gloss[vertices].mean()),
+                    float(mesh.roughness[vertices].mean()),
                     bool(mesh.two_sided[mine].any()), cut, lies,
                 )  # fmt: skip
                 material = self.materials.add(look)
@@ -133,7 +129,7 @@ class GlbMesh:
         attributes = {
             "POSITION": add(self._at[mine] - np.float32(centre), target=ARRAY_BUFFER, bounds=True),
             "NORMAL": add(self._ups[mine], target=ARRAY_BUFFER),
-            "COLOR_0": add(self._colours[mine], target=ARRAY_BUFFER, normalised=True),
+            "COLOR_0": self._file.add_colours(self._colours[mine]),
         }
         if group.mapped:
             attributes["TEXCOORD_0"] = add(self._mesh.uv[mine], target=ARRAY_BUFFER)

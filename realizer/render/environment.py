@@ -81,15 +81,6 @@ def environment_of(name: str) -> Environment:
         return Environment(table[f"{name}_sh"], table[f"{name}_levels"].astype(np.float32))
 
 
-def directions_of(height: int, width: int) -> Float32:
-    """Return the unit directions of the texels of a panorama, (height, width, 3)."""
-    down = (np.arange(height) + 0.5) / height * np.pi
-    across = ((np.arange(width) + 0.5) / width * 2 - 1) * np.pi
-    y, flat = np.cos(down)[:, None], np.sin(down)[:, None]
-    parts = np.broadcast_arrays(flat * np.sin(across), y, flat * np.cos(across))
-    return np.stack(parts, axis=-1).astype(np.float32)
-
-
 def polynomials(directions: Float32) -> Float32:
     """Return 1, y, z, x, xy, yz, 3zz-1, xz, xx-yy of unit directions (..., 3), as (..., 9)."""
     x, y, z = np.moveaxis(np.asarray(directions), -1, 0)

@@ -30,9 +30,14 @@ def normal_map(maps: Maps) -> bytes | None:
         four = slopes[: 2 * height, : 2 * width].reshape(height, 2, width, 2, 2)
         slopes = ((four.sum(axis=(1, 3), dtype=np.uint16) + 2) // 4).astype(np.uint8)
     stream = io.BytesIO()
-    picture = Image.fromarray(_normals()[slopes[..., 0], slopes[..., 1]])
+    picture = Image.fromarray(normals_of(slopes))
     picture.save(stream, "webp", lossless=True, method=0, quality=20)  # twenty times as fast as with 5 % less
     return stream.getvalue()
+
+
+def normals_of(slopes: UInt8) -> UInt8:
+    """Return the normals (h, w, 3) of slopes (h, w, 2), as `slopes_in` gives them."""
+    return _normals()[slopes[..., 0], slopes[..., 1]]
 
 
 @cache

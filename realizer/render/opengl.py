@@ -169,8 +169,7 @@ class OpenGLCanvas(Canvas):
 
 def _fixed(mesh: DrawnMesh) -> Float32:
     """Return the values of vertices that do not change, (d, 8)."""
-    rough = 1 - np.float32(0.8) * mesh.gloss
-    columns = [mesh.uv, linear(mesh.colours), mesh.occlusion, rough, mesh.kind]
+    columns = mesh.uv, linear(mesh.colours), mesh.occlusion, mesh.roughness, mesh.kind
     return np.column_stack(columns).astype(np.float32)
 
 

@@ -7,6 +7,7 @@ from realizer.core.colours import linear
 from realizer.render.canvas import Canvas
 from realizer.render.light import Light, unit
 from realizer.render.raster import Raster
+from realizer.render.uniforms import mirrored_of
 
 
 class SoftwareCanvas(Canvas):
@@ -30,12 +31,11 @@ class SoftwareCanvas(Canvas):
 
 def lights_of(light: Light) -> tuple[Float32, Float32, Float32, np.float32, Float32]:
     """Return a light as `shading.reflected` takes it: lamps, environment, rim lamp's power, glint."""
-    around = light.environment
     lamps = [
         [unit(lamp.direction), np.multiply(lamp.colour, light.exposure)] for lamp in (light.key, light.rim)
     ]
     exposure = np.float32(light.exposure)
     return (
-        np.array(lamps, np.float32), around.sh * exposure, around.octahedral() * exposure,
+        np.array(lamps, np.float32), light.environment.sh * exposure, mirrored_of(light),
         np.float32(light.rim_power), np.array([light.glint, light.glint_width], np.float32),
     )  # fmt: skip

@@ -142,10 +142,3 @@ def _with_levels(picture: Any) -> Texels:
     firsts = np.cumsum([0, *(p.shape[0] * p.shape[1] for p in pictures[:-1])])
     levels = [[first, p.shape[1], p.shape[0]] for first, p in zip(firsts, pictures, strict=True)]
     return Texels(np.concatenate([p.reshape(-1, CHANNELS) for p in pictures]), np.array(levels, np.int32))
-
-
-def slopes_of(texels: Texels) -> Float32:
-    """Return the slopes (h, w, 4) of relief and folds at the finest level, metres per metre."""
-    fine = texels.level(0)
-    both = np.concatenate([fine[..., SLOPE_U : SLOPE_V + 1], fine[..., FOLD_U : FOLD_V + 1]], axis=2)
-    return (both.astype(np.float32) - 128) * np.float32(STEEPEST / 127)

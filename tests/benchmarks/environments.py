@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from realizer.render.environment import HEIGHT, LEVELS, WIDTH, directions_of, polynomials
+from realizer.render.environment import HEIGHT, LEVELS, WIDTH, polynomials
 
 TABLE = Path(__file__).parents[2] / "realizer/tables/environments.npz"
 FINE = 2  # texels of the source along each side of a texel of the table
@@ -87,6 +87,15 @@ def levels(picture: np.ndarray) -> np.ndarray:
         weights = np.maximum(facing, 0) * (alpha / (half * (alpha**2 - 1) + 1)) ** 2 * solid
         rows.append((weights @ light / weights.sum(1, keepdims=True)).reshape(HEIGHT, WIDTH, 3))
     return np.stack(rows)
+
+
+def directions_of(height: int, width: int) -> np.ndarray:
+    """Return the unit directions of the texels of a panorama, (height, width, 3)."""
+    down = (np.arange(height) + 0.5) / height * np.pi
+    across = ((np.arange(width) + 0.5) / width * 2 - 1) * np.pi
+    y, flat = np.cos(down)[:, None], np.sin(down)[:, None]
+    parts = np.broadcast_arrays(flat * np.sin(across), y, flat * np.cos(across))
+    return np.stack(parts, axis=-1).astype(np.float32)
 
 
 def _read(folder: Path, panorama: str) -> np.ndarray:

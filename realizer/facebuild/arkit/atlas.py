@@ -10,6 +10,7 @@ import numpy as np
 from realizer.core.array_types import Bool, Float64
 from realizer.core.colours import linear, srgb
 from realizer.core.errors import FaceError
+from realizer.face.drawn_mesh import GLOSSY
 from realizer.facebuild.arkit.gltf import Gltf
 from realizer.facebuild.arkit.materials import CLAMP, MIRROR, Material
 from realizer.facebuild.arkit.mesh_merge import Surface
@@ -25,7 +26,6 @@ COARSEST = 0.01  # of the size of the sources
 LARGEST = 8192  # texels of a source that are read along one axis
 # How fine a part's textures are in relation to those of the skin if there is no room for all of them.
 FINENESS = {"hair": 0.7, "beard": 0.7, "upper_teeth": 0.7, "lower_teeth": 0.7, "shirt": 0.4, "other": 0.4}
-GLOSSY = 0.8  # how much of the roughness in the maps a vertex of gloss 1 takes off, as in `render.raster`
 QUALITY = {"albedo": 92, "normal": 95, "surface": 92}  # of WebP: 1 to 4 MB together
 
 

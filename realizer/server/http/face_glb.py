@@ -27,8 +27,8 @@ KIND_NAMES = ("skin", "eye", "hair", "wet", "cloth")  # in the order of `DrawnMe
 def face_glb(face: Face) -> bytes:
     """Return the face at rest as GLB, with a primitive and a material for each kind of surface.
 
-    All primitives share POSITION, NORMAL, COLOR_0 (linear, as glTF asks), _OCCLUSION and _GLOSS, and, if the
-    face has maps, TEXCOORD_0 and TANGENT. A material's `extras.kind` is its row in `surfaces.toml`. The
+    All primitives share POSITION, NORMAL, COLOR_0 (linear, as glTF asks), _OCCLUSION and _ROUGHNESS, and, if
+    the face has maps, TEXCOORD_0 and TANGENT. A material's `extras.kind` is its row in `surfaces.toml`. The
     mesh's `extras` hold what a client needs for streamed vertices: their number, scale and offset, the matrix
     that makes the drawn vertices of them (`rows`, `columns`, `weights`: accessors of its compressed rows) and
     the one for normals (`normal_rows` ...), `relief` and `folds` if the face has some, parts (name -> first
@@ -40,17 +40,13 @@ def face_glb(face: Face) -> bytes:
     mesh, file = drawn_mesh(face), GlbFile()
     own = normals(face, face.vertices[None])[0]
     places, ups = mesh(face.vertices, own, np.zeros(len(own), np.float32))
-    ups = ups[:, :3]
-    # glTF wants unit normals; a vertex without a triangle gets one that points forward.
-    ups[np.abs(ups).sum(axis=1) == 0] = (0, 0, 1)
-    colours = np.full((len(ups), 4), 65535, np.uint16)
-    colours[:, :3] = np.rint(linear(mesh.colours) * 65535)
+    ups = np.ascontiguousarray(ups[:, :3])
     attributes = {
         "POSITION": file.add(places.astype(np.float32), target=ARRAY_BUFFER, bounds=True),
         "NORMAL": file.add(ups, target=ARRAY_BUFFER),
-        "COLOR_0": file.add(colours, target=ARRAY_BUFFER, normalised=True),
+        "COLOR_0": file.add_colours(linear(mesh.colours)),
         "_OCCLUSION": file.add(mesh.occlusion.astype(np.float32), target=ARRAY_BUFFER),
-        "_GLOSS": file.add(mesh.gloss.astype(np.float32), target=ARRAY_BUFFER),
+        "_ROUGHNESS": file.add(mesh.roughness, target=ARRAY_BUFFER),
     }
     pictures: dict[str, bytes] = {}
     if face.maps:
@@ -66,8 +62,8 @@ def face_glb(face: Face) -> bytes:
         primitives.append(
             {"attributes": attributes, "indices": indices, "material": len(materials), "mode": 4}
         )
-        gloss = float(mesh.gloss[np.unique(mesh.triangles[mine])].mean())
-        materials.append(_material(kind, holes, sheet, gloss, textures))
+        rough = float(mesh.roughness[np.unique(mesh.triangles[mine])].mean())
+        materials.append(_material(kind, holes, sheet, rough, textures))
     scale, offset = face_scale(face)
     extras = {
         "vertices": len(face.vertices),
@@ -117,9 +113,9 @@ def _groups(mesh: DrawnMesh) -> Iterator[tuple[int, bool, bool, Bool]]:
         yield int(key >> 2), bool(key & 2), bool(key & 1), sort == key
 
 
-def _material(kind: int, holes: bool, sheet: bool, gloss: float, textures: dict[str, int]) -> dict[str, Any]:
+def _material(kind: int, holes: bool, sheet: bool, rough: float, textures: dict[str, int]) -> dict[str, Any]:
     """Return a glTF material; one with holes is drawn where alpha is above a half."""
-    look: dict[str, Any] = {"metallicFactor": 0.0, "roughnessFactor": round(1 - 0.8 * gloss, 4)}
+    look: dict[str, Any] = {"metallicFactor": 0.0, "roughnessFactor": round(rough, 4)}
     found: dict[str, Any] = {"name": KIND_NAMES[kind], "pbrMetallicRoughness": look, "extras": {"kind": kind}}
     if sheet:
         found["doubleSided"] = True

@@ -9,8 +9,9 @@ import pytest
 
 from realizer import tables
 from realizer.core.errors import RenderError
-from realizer.render.environment import HEIGHT, LEVELS, WIDTH, Environment, directions_of, environment_of
+from realizer.render.environment import HEIGHT, LEVELS, WIDTH, Environment, environment_of
 from realizer.render.light import presets
+from tests.benchmarks.environments import directions_of
 
 AXES = np.vstack([np.eye(3), -np.eye(3)]).astype(np.float32)
 

@@ -20,7 +20,7 @@ export class Head {
     this.wanted = Uint32Array.from(new Set(this.groups.flatMap(({ triangles }) => [...triangles])));
     if (extras.folds) this.folds = { drives: extras.folds.drives, weights: read(extras.folds.weights), amounts: new Float32Array(extras.vertices), shown: false };
     this.hairs = hairsOf(this.groups, extras.parts, attributes.TEXCOORD_0?.array);
-    const gloss = attributes._GLOSS.array;
+    const [occlusion, rough] = [attributes._OCCLUSION.array, attributes._ROUGHNESS.array];
     this.attributes = {
       position: new BufferAttribute(new Float32Array(3 * count), 3),
       normal: new BufferAttribute(new Float32Array(3 * count), 3),
@@ -28,7 +28,7 @@ export class Head {
       fold: new BufferAttribute(new Float32Array(count), 1),
       uv: new BufferAttribute(attributes.TEXCOORD_0?.array ?? new Float32Array(2 * count), 2),
       colour: new BufferAttribute(attributes.COLOR_0.array, 4, true),
-      occlusionRough: new BufferAttribute(Float32Array.from({ length: 2 * count }, (_, i) => (i % 2 ? 1 - 0.8 * gloss[i >> 1] : attributes._OCCLUSION.array[i >> 1])), 2),
+      occlusionRough: new BufferAttribute(Float32Array.from({ length: 2 * count }, (_, i) => (i % 2 ? rough : occlusion)[i >> 1]), 2),
     };
   }
 

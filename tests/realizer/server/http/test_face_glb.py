@@ -93,7 +93,7 @@ def test_face_glb_has_a_primitive_for_each_kind_of_surface(face: Face, glb: Glb)
     joined = np.concatenate(drawn)
     assert np.array_equal(joined[np.lexsort(joined.T)], mesh.triangles[np.lexsort(mesh.triangles.T)])
     assert {name: tuple(part["vertices"]) for name, part in glb.extras["parts"].items()} == mesh.parts
-    assert np.array_equal(glb.attribute("_GLOSS"), mesh.gloss)
+    assert np.array_equal(glb.attribute("_ROUGHNESS"), mesh.roughness)
     assert np.abs(np.linalg.norm(glb.attribute("NORMAL"), axis=1) - 1).max() < 1e-4
 
 
