@@ -23,7 +23,8 @@ MILLIMETRES = {
 UNMAPPED = (29, 30, 43, 44, 46, 47, 48, 49, 50)
 RIDGE = 0.15  # mm^2: prefers solutions close to the weights of the action units
 STEPS, TOLERANCE = 400, 1e-4
-RELAXED = 1.6  # over-relaxation; values above 1 converge faster
+CHECK = 5  # steps; how often frames are taken out that have converged
+RELAXED = 1.8  # over-relaxation; values above 1 converge faster
 JAW = (3, 14, 15)
 CLOSE, OPEN = "mouthClose", "jawOpen"
 CHUNK = 4096  # frames at once
@@ -102,34 +103,42 @@ def warm_up(mapping: FapMapping | None = None) -> None:
 
 def _fit(first: Float64, rest: Float32, mapping: FapMapping | None) -> Float64:
     """Return weights (n, 52), 0..1, that best show `first` plus the FAPs `rest` (n, 68)."""
-    moves, scale, inverse, rho = _system(mapping)
-    first = np.clip(first, 0, 1)
-    aim = rest * scale @ moves.T
-    out = first.copy()
+    moves, inverse, penalised = _system(mapping)
+    out = np.clip(first, 0, 1)
+    aim = rest @ moves.T
     # Frames without a remainder keep their weights exactly.
     busy = np.flatnonzero(np.abs(aim).max(axis=1, initial=0) > 1e-9)
-    low, high, aim = -first[busy], 1 - first[busy], aim[busy]
+    low, high, aim = -out[busy], 1 - out[busy], aim[busy] @ inverse
     change, dual = np.zeros_like(aim), np.zeros_like(aim)
-    for _ in range(STEPS):
-        free = (aim + rho * (change - dual)) @ inverse
-        free = RELAXED * free + (1 - RELAXED) * change
-        before, change = change, np.clip(free + dual, low, high)
-        dual += free - change
-        if max(np.abs(change - before).max(initial=0), np.abs(free - change).max(initial=0)) < TOLERANCE:
-            break
-    out[busy] = np.clip(first[busy] + change, 0, 1)
-    return out
+    for step in range(STEPS):
+        free = RELAXED * (aim + (change - dual) @ penalised) + (1 - RELAXED) * change
+        dual += free
+        before, change = change, np.minimum(np.maximum(dual, low), high)
+        dual -= change
+        if step % CHECK == 0:
+            error = np.maximum(np.abs(change - before), np.abs(free - change)).max(axis=1, initial=0)
+            left = error >= TOLERANCE
+            out[busy[~left]] += change[~left]
+            busy, low, high, aim, change, dual = (a[left] for a in (busy, low, high, aim, change, dual))
+            if not len(busy):
+                break
+    out[busy] += change
+    return np.clip(out, 0, 1)
 
 
 @cache
-def _system(mapping: FapMapping | None) -> tuple[Float64, Float64, Float64, float]:
-    """Return the shapes' movements (52, 68) in mm, scale (68,), inverse matrix and rho for `_fit`."""
+def _system(mapping: FapMapping | None) -> tuple[Float64, Float64, Float64]:
+    """Return the matrices of `_fit`: gradients of the weights by FAPs (52, 68), and two of (52, 52).
+
+    They are the inverse of the normal equations plus the penalties, and its product with the penalties.
+    """
     scale = np.array([0.0 if row.fap in UNMAPPED else MILLIMETRES[row.unit] for row in faps()])
     moves = shape_faps(mapping) * scale
     square = moves @ moves.T + RIDGE * np.eye(len(moves))
-    sizes = np.linalg.eigvalsh(square)
-    rho = float(np.sqrt(sizes[0] * sizes[-1]))
-    return moves, scale, np.linalg.inv(square + rho * np.eye(len(square))), rho
+    sizes = np.linalg.eigvalsh(square / np.sqrt(np.outer(square.diagonal(), square.diagonal())))
+    penalties = np.diag(square.diagonal() * np.sqrt(sizes[0] * sizes[-1]))
+    inverse = np.linalg.inv(square + penalties)
+    return moves * scale, inverse, penalties @ inverse
 
 
 @cache

@@ -41,6 +41,7 @@ class Fanout:
         members: list[tuple[Connection, FrameSubscription]],
         overload: Overload,
     ) -> None:
+        timeline.limit_windows(s.stream for _, s in members)
         self.timeline = timeline
         self._overload = overload
         self.members = [(c, s) for c, s in members if not isinstance(s, AheadSubscription)]

@@ -47,10 +47,12 @@ class FrameSource:
         names: returns the names of the values of a frame.
         rows: (AUs, mapping to FAPs, whether AUs are wanted as they were before the rules of co-occurrence)
             -> (n, k) the values of n frames.
+        window: seconds that are computed in one call.
     """
 
     names: Callable[[], list[str]]
     rows: Callable[[AUFrames, FapMapping, bool], Float32 | Int32]
+    window: float = WINDOW
 
 
 def _arkit_rows(frames: AUFrames, mapping: FapMapping, raw: bool) -> Float32:
@@ -67,7 +69,8 @@ SOURCES: Mapping[str, FrameSource] = {
         lambda: list(AU_NAMES()),
         lambda frames, mapping, raw: frames.before_rules if raw else frames.aus,
     ),
-    "arkit": FrameSource(lambda: [*ARKIT_NAMES(), *TURNS], _arkit_rows),
+    # Fitting 10 s would hold up the event loop for 10 ms.
+    "arkit": FrameSource(lambda: [*ARKIT_NAMES(), *TURNS], _arkit_rows, window=2.0),
 }
 
 
@@ -239,8 +242,15 @@ class FrameTimeline:
         self._find_mapping = mapping
         self._mapping: FapMapping | None = None
         self.latest_window: FrameWindow | None = None
+        self._seconds = WINDOW
         self._version = -1
         self._face_changes = 0
+
+    def limit_windows(self, streams: Iterable[str]) -> None:
+        """Limit the windows from now on to the length that is right for all of these streams."""
+        seconds = min([WINDOW, *(SOURCES[stream].window for stream in streams if stream in SOURCES)])
+        if seconds != self._seconds:
+            self._seconds, self.latest_window = seconds, None
 
     def window(self, first: int, last: int) -> FrameWindow:
         """Return a window that contains the frames first .. last."""
@@ -248,7 +258,7 @@ class FrameTimeline:
         if window is None or not self.is_current or first < window.first or last >= window.end:
             if self._mapping is None:
                 self._mapping = self._find_mapping()
-            count = max(math.ceil(WINDOW * self.fps), last - first + 1)
+            count = max(math.ceil(self._seconds * self.fps), last - first + 1)
             window = self.latest_window = FrameWindow(self, self._mapping, first, count)
             self._version = self.version
         return window

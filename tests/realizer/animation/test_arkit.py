@@ -119,6 +119,6 @@ def test_arkit_converts_each_frame_by_itself(spoken):
         arkit(AUFrames(spoken.aus.times[k : k + 1], spoken.aus.values[k : k + 1]), spoken.mapping).weights[0]
         for k in (0, 20, 40)
     ]
-    np.testing.assert_allclose(alone, whole[[0, 20, 40]], atol=2e-3)
+    np.testing.assert_allclose(alone, whole[[0, 20, 40]], atol=1e-6)
     assert whole.min() >= 0
     assert whole.max() <= 1

@@ -62,6 +62,17 @@ def test_timeline_finds_its_mapping_again_when_the_face_has_changed() -> None:
     assert len(found) == 2
 
 
+def test_timeline_computes_short_windows_for_arkit() -> None:
+    timeline = FrameTimeline(Player(), 0, 25.0, lambda: pytest.fail("no face is wanted"))
+    long = timeline.window(0, 0)
+    timeline.limit_windows(["fap", "mesh"])
+    assert timeline.window(0, 0) is long
+    timeline.limit_windows(["fap", "arkit"])
+    short = timeline.window(0, 0)
+    assert short.end - short.first < (long.end - long.first) / 4
+    assert timeline.window(0, 99).end == 100, "one that is asked for may be longer"
+
+
 def test_message_has_the_same_values_in_json_and_binary(driver) -> None:
     driver.join(2)
     driver.send({**FAP, "encoding": "json"}, 1)
