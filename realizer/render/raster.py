@@ -70,9 +70,8 @@ class Raster:
         shadows = self._shadow_map(moving), self._lamp.matrix
 
         def band(rows: tuple[int, int]) -> None:
-            room = _room()
-            self._see(points, nearness, rows, (self._keys, *room))
-            pictures = self._keys, self._picture, *room
+            self._see(points, nearness, rows, self._keys)
+            pictures = self._keys, self._picture, *_room()
             light_band(points, moving, self._mesh, self._texels, lights, (eye, shadows), rows, pictures)
 
         list(self._pool.map(band, self._bands))
@@ -85,16 +84,16 @@ class Raster:
 
         def band(rows: tuple[int, int]) -> None:
             self._samples[slice(*rows)] = 0
-            self._see(points, nearness, rows, (self._samples, *_room()))
+            self._see(points, nearness, rows, self._samples)
 
         list(self._pool.map(band, self._shadow_bands))
         near = (self._samples >> np.uint64(32)).astype(np.uint32).view(np.float32)
         return np.where(near > 0, np.float32(1.5) - near, np.float32(2))
 
-    def _see(self, points: Any, nearness: Float32, rows: tuple[int, int], samples: Any) -> None:
+    def _see(self, points: Any, nearness: Float32, rows: tuple[int, int], keys: Any) -> None:
         """Write the nearest samples of the mesh in a band of rows, as `fill`."""
         triangles, fixed = self._mesh[:2]
-        fill(points, nearness, triangles, self._sides, fixed, self._texels, rows, samples)
+        fill(points, nearness, triangles, self._sides, fixed, self._texels, rows, (keys, *_room()))
 
     def close(self) -> None:
         """End the threads."""

@@ -30,7 +30,6 @@ from realizer.render.backends import BACKENDS
 from realizer.render.cameras import camera_for
 from realizer.render.light import preset
 from realizer.render.opengl import OpenGLCanvas
-from realizer.render.raster import _fill
 from realizer.render.software import SoftwareCanvas
 from realizer.render.worker import encode
 
@@ -60,11 +59,11 @@ def by_processor(canvas: SoftwareCanvas, vertices: Float32, normals: Float32) ->
     whole = median(lambda: canvas.draw(vertices, normals), 30)
     moving = canvas._moving
     points, distances = canvas._camera.project(moving[:, :3], canvas._size)
-    near, mesh = (1 / distances).astype(np.float32), canvas._mesh
+    near = (1 / distances).astype(np.float32)
 
     def see(rows: tuple[int, int]) -> None:
         raster._keys[rows[0] : rows[1]] = 0
-        _fill(points, near, mesh.triangles, raster._sides, raster._fixed, raster._texels, rows, raster._keys)
+        raster._see(points, near, rows, raster._keys)
 
     moved = median(lambda: canvas._mesh(vertices, normals, canvas._folds(vertices)), 30)
     shadow = median(lambda: raster._shadow_map(moving), 30)
