@@ -1,0 +1,62 @@
+"""The networks that find faces, run by ai-edge-litert."""
+
+from __future__ import annotations
+
+import importlib.util
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from realizer.core.array_types import Float32
+from realizer.core.errors import RealizerError
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+FOLDER = Path(__file__).with_name("models")
+INSTALL = "finding faces in pictures needs ai-edge-litert: pip install 'bml-realizer[track]'"
+
+
+class TrackingError(RealizerError):
+    """Pictures that cannot be tracked; the message says which file, and what to do."""
+
+
+class Network:
+    """A network of one picture.
+
+    Attributes:
+        size: width and height of the pictures it takes, in pixels.
+    """
+
+    def __init__(self, name: str) -> None:
+        """
+        Args:
+            name: the file in `models` without its suffix.
+
+        Raises:
+            TrackingError: ai-edge-litert is not installed.
+        """
+        if importlib.util.find_spec("ai_edge_litert") is None:
+            raise TrackingError(INSTALL)
+        from ai_edge_litert.interpreter import Interpreter
+
+        self._run: Any = Interpreter(str(FOLDER / f"{name}.tflite"), num_threads=1)
+        self._run.allocate_tensors()
+        self._input = self._run.get_input_details()[0]["index"]
+        self._outputs = {row["name"]: row["index"] for row in self._run.get_output_details()}
+        self.size = int(self._run.get_input_details()[0]["shape"][1])
+
+    def __call__(self, picture: Image, low: float = 0.0) -> dict[str, Float32]:
+        """Return the outputs by name; `low` is the value of black, white is 1."""
+        pixels = np.asarray(picture, np.float32) * np.float32((1 - low) / 255) + np.float32(low)
+        self._run.set_tensor(self._input, pixels[None])
+        self._run.invoke()
+        return {name: self._run.get_tensor(index) for name, index in self._outputs.items()}
+
+
+@cache
+def network(name: str) -> Network:
+    """Return the network of that name; it is loaded once."""
+    return Network(name)

@@ -1,0 +1,70 @@
+"""Turned squares in a picture, which networks see upright."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from realizer.core.array_types import Float64
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """A square in a picture.
+
+    Attributes:
+        x, y: its centre in pixels from the top left corner.
+        side: its length in pixels.
+        angle: radians by which it is turned clockwise.
+        mirrored: whether it is seen as in a mirror.
+    """
+
+    x: float
+    y: float
+    side: float
+    angle: float = 0.0
+    mirrored: bool = False
+
+    @classmethod
+    def around(cls, points: Any, left: Any, right: Any, scale: float) -> Region:
+        """Return the region around points (n, 2) whose upper edge is parallel to the line from left to right.
+
+        Args:
+            left, right: (2,) pixels, of the picture's left and right.
+            scale: its side, relative to the longer side of the turned box of the points.
+        """
+        angle = math.atan2(right[1] - left[1], right[0] - left[0])
+        upright = np.asarray(points, np.float64) @ _turn(angle)
+        low, high = upright.min(axis=0), upright.max(axis=0)
+        x, y = _turn(angle) @ ((low + high) / 2)
+        return cls(float(x), float(y), float((high - low).max()) * scale, angle)
+
+    def cut(self, picture: Image.Image, pixels: int) -> Image.Image:
+        """Return the square as an upright picture; what is outside the picture is black."""
+        factor = max(1, int(self.side / pixels / 1.5))
+        if factor > 1:  # or fine detail would make noise
+            picture = picture.reduce(factor)
+        (a, b), (c, d) = self._axes() * (self.side / pixels / factor)
+        x, y = np.array([self.x, self.y]) / factor - np.array([a + b, c + d]) * (pixels / 2)
+        numbers = tuple(map(float, (a, b, x, c, d, y)))
+        return picture.transform((pixels, pixels), Image.Transform.AFFINE, numbers, Image.Resampling.BILINEAR)
+
+    def place(self, points: Any) -> Float64:
+        """Return points (n, 2 or 3) of the square, 0..1, in pixels of the picture; depths grow with it."""
+        points = np.asarray(points, np.float64)
+        places: Float64 = points * self.side
+        places[:, :2] = (points[:, :2] - 0.5) @ (self._axes() * self.side).T + (self.x, self.y)
+        return places
+
+    def _axes(self) -> Float64:
+        """Return the directions of the square's axes as columns."""
+        return _turn(self.angle) * ((-1.0 if self.mirrored else 1.0), 1.0)
+
+
+def _turn(angle: float) -> Float64:
+    """Return the matrix that turns clockwise, where y is down."""
+    return np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])

@@ -1,0 +1,36 @@
+"""Tests of the detector of faces."""
+
+from __future__ import annotations
+
+import pytest
+from PIL import Image
+
+from realizer.tracking.detector import detect
+from tests.portraits import LITERT, pixels_of, portrait
+
+pytestmark = [LITERT, pytest.mark.gl("onboard")]
+
+
+def test_detector_finds_the_face_in_a_picture() -> None:
+    (face,) = detect(portrait())
+    nose = pixels_of("ada")["9.3"]
+    assert (face.x, face.y) == pytest.approx(tuple(nose), abs=30)
+    assert 100 < face.side < 320
+
+
+def test_detector_tells_two_people_apart() -> None:
+    both = Image.new("RGB", (640, 320))
+    both.paste(portrait("ada"), (0, 0))
+    both.paste(portrait("ben"), (320, 0))
+    assert sorted(round(face.x / 320 - 0.5) for face in detect(both)) == [0, 1]
+
+
+def test_detector_finds_a_small_face_in_a_corner() -> None:
+    scene = Image.new("RGB", (1600, 1000), (90, 100, 110))
+    scene.paste(portrait().resize((260, 260)), (1300, 700))
+    (face,) = detect(scene)
+    assert (face.x, face.y) == pytest.approx((1430, 830), abs=30)
+
+
+def test_detector_finds_no_face_where_there_is_none() -> None:
+    assert detect(Image.new("RGB", (400, 300), (120, 90, 60))) == []
