@@ -15,8 +15,8 @@ from realizer.core.errors import RealizerError
 from realizer.expressions.expression import Expression
 from realizer.face.fap_mapping import mapping_of
 from realizer.face.load import input_names, list_faces
-from realizer.render import Renderer
 from realizer.render.light import presets
+from realizer.render.renderer import Renderer
 
 HEIGHT = 96  # pixels of compared pictures; small, so that brows of different heights overlap
 FINE = 4  # pictures are drawn larger by this factor and reduced, to be smooth

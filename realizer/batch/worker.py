@@ -11,7 +11,7 @@ from realizer.core.errors import RealizerError, VoiceError
 from realizer.outputs.output import RenderSettings
 from realizer.outputs.registry import OUTPUTS
 from realizer.pipeline import play
-from realizer.render import Renderer
+from realizer.render.renderer import Renderer
 from realizer.speech.utterance import SpeechRequest, Utterance, Voice
 
 

@@ -101,7 +101,7 @@ def outputs() -> None:
 def _fix(extra: str) -> str | None:
     """Return how to install an extra, or None if it works."""
     if extra == "render":
-        from realizer.render import unavailable_reason
+        from realizer.render.drawing_process import unavailable_reason
 
         return unavailable_reason()
     return None if find_spec(MODULES[extra]) else f"pip install 'bml-realizer[{extra}]'"

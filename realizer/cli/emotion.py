@@ -170,7 +170,7 @@ def _write(profile: Profile, seed: int | None, path: Path, face: str, camera: st
         return
     from PIL import Image
 
-    from realizer.render import Renderer
+    from realizer.render.renderer import Renderer
 
     pose = profile.frame() if seed is None else profile.draw(seed)
     with Renderer(face, (512, 512), camera) as renderer:
@@ -183,8 +183,8 @@ def _draw_wheel(profiles: str, path: Path, face: str, camera: str) -> None:
     from PIL import Image
 
     from realizer.emotions.wheel import wheel
-    from realizer.render import Renderer
     from realizer.render.contact_sheet import sheet
+    from realizer.render.renderer import Renderer
     from realizer.tables.wheel_words import ring
 
     places = [(place, activation) for activation in RINGS for place in ring("paul").values()]

@@ -160,8 +160,8 @@ def _draw(expressions: Sequence[Expression], notes: Sequence[str], path: Path, f
     from realizer.cli.sheet_poses import Series, frames, of_expressions
     from realizer.face.fap_mapping import mapping_of
     from realizer.face.load import input_names
-    from realizer.render import Renderer
     from realizer.render.contact_sheet import sheet
+    from realizer.render.renderer import Renderer
 
     rows = poses(frames([Series("", of_expressions(expressions))]), input_names(face), mapping_of(face))
     with Renderer(face, (220, 220), "close") as renderer:

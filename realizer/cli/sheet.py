@@ -134,11 +134,11 @@ def _cells(
     from realizer.animation.pose import poses as poses_of
     from realizer.cli import sheet_poses
     from realizer.face.load import input_names
-    from realizer.render import Renderer
     from realizer.render.backdrop import backdrop
     from realizer.render.contact_sheet import Cell
     from realizer.render.difference_image import difference, faint, flatten
     from realizer.render.light import preset
+    from realizer.render.renderer import Renderer
 
     # A plain background, so that only the face differs.
     behind = np.rint(np.array(preset(drawing.light).backdrop_middle) * 255)

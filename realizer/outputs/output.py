@@ -13,7 +13,7 @@ from realizer.core.atomic_files import write_bytes
 
 if TYPE_CHECKING:
     from realizer.realization import Realization
-    from realizer.render import Renderer
+    from realizer.render.renderer import Renderer
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class RenderSettings:
         self, face: str, deformer: str | None, size: tuple[int, int], *, alpha: bool = False
     ) -> Renderer:
         """Return a renderer for a face and a deformer, not yet started."""
-        from realizer.render import Renderer
+        from realizer.render.renderer import Renderer
 
         return Renderer(
             face,

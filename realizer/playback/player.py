@@ -24,7 +24,6 @@ from realizer.playback.block_manager import BlockManager
 from realizer.playback.block_states import BlockEvent, State, next_state
 from realizer.playback.character import RELAX, Character
 from realizer.playback.face_motion import SEED_STEP, FaceMotion
-from realizer.playback.listener import responses
 from realizer.playback.scheduled_speech import ScheduledSpeech
 from realizer.scheduling.timing import UNKNOWN, Schedule
 from realizer.speech.utterance import Recording, SpeechRequest, Utterance
@@ -152,6 +151,8 @@ class Player(BlockManager):
             is_speaking: whether the other still speaks: then the character listens.
             text: the next piece of what the other says, if it is known.
         """
+        from realizer.playback.listener import responses  # few characters listen
+
         own = self._characters[character]
         context = replace(self.context, seed=self.context.seed + SEED_STEP * character)
         own.responses = responses(own.responses, now, context, is_speaking=is_speaking, text=text)

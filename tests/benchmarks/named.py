@@ -27,7 +27,7 @@ from realizer.animation.frames import AUFrames
 from realizer.animation.pose import poses
 from realizer.face.fap_mapping import mapping_of
 from realizer.face.load import load_face
-from realizer.render import Renderer
+from realizer.render.renderer import Renderer
 from realizer.tables.cooccurrence import rules
 from realizer.tables.lexemes import face_lexemes
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from realizer.face.model import Face, Fapu
-from realizer.render import unavailable_reason
+from realizer.render.drawing_process import unavailable_reason
 
 
 @pytest.fixture(autouse=True)

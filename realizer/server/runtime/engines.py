@@ -17,7 +17,7 @@ from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.utterance import Utterance, Voice
 
 if TYPE_CHECKING:
-    from realizer.render import Renderer
+    from realizer.render.renderer import Renderer
 
 # Each combination of face, size, camera, light and background has a renderer, which is a process.
 RENDERERS = 6
@@ -115,7 +115,7 @@ class Engines:
         Raises:
             RenderError: too many others are in use.
         """
-        from realizer.render import Renderer
+        from realizer.render.renderer import Renderer
 
         options = replace(order.options, quality=0, form="jpeg")  # these need no process of their own
         key, removed = (order.face, options), None

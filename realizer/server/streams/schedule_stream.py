@@ -1,16 +1,20 @@
 """The stream `schedule`: changes of planned blocks as JSON."""
 
+from __future__ import annotations
+
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
-from realizer.charts.chart_data import chart_of
-from realizer.charts.timeline import BlockChart
 from realizer.playback.active_block import ActiveBlock
 from realizer.playback.block_states import State
 from realizer.playback.block_store import BlockStore
 from realizer.playback.references import references
 from realizer.scheduling.timing import Schedule
+
+if TYPE_CHECKING:
+    from realizer.charts.timeline import BlockChart
 
 
 @dataclass(eq=False)
@@ -89,6 +93,8 @@ class ScheduleStream:
         return snapshot.text
 
     def _chart(self, snapshot: Snapshot) -> BlockChart:
+        from realizer.charts.chart_data import chart_of
+
         return chart_of(snapshot.block, self._store.schedule_of)
 
 

@@ -20,7 +20,7 @@ from realizer.animation.frames import AUFrames, FAPFrames
 from realizer.outputs.output import RenderSettings
 from realizer.playback.scheduled_speech import ScheduledSpeech
 from realizer.realization import Performance, Realization
-from realizer.render import Renderer
+from realizer.render.renderer import Renderer
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.utterance import Phoneme, Utterance, Word
 

@@ -9,8 +9,8 @@ import pytest
 
 from realizer.face.deform import deform
 from realizer.face.load import load_face
-from realizer.render import Renderer
 from realizer.render.cameras import camera_for
+from realizer.render.renderer import Renderer
 from tests.pictures import drawn_here
 
 pytestmark = [pytest.mark.gl, pytest.mark.xdist_group("render")]

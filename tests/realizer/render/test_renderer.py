@@ -17,7 +17,8 @@ from PIL import Image
 
 import realizer
 from realizer.core.errors import RealizerError, RenderError
-from realizer.render import Renderer, drawing_process
+from realizer.render import drawing_process
+from realizer.render.renderer import Renderer
 from tests.pictures import drawn_here
 
 pytestmark = pytest.mark.xdist_group("render")
@@ -157,7 +158,7 @@ def test_renderer_process_dies_with_its_owner():
     """The owner is killed, so it can tidy nothing; its drawing process sees the pipe close."""
     code = (
         "import sys, numpy as np\n"
-        "from realizer.render import Renderer\n"
+        "from realizer.render.renderer import Renderer\n"
         "r = Renderer('default', (32, 32)); r.draw(np.zeros((1, 68)))\n"
         "print(r.pid, flush=True); sys.stdin.read()\n"
     )

@@ -19,7 +19,7 @@ from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.face.model import Face
 from realizer.playback.player import Player
-from realizer.render import Renderer
+from realizer.render.renderer import Renderer
 from realizer.server.session.session import Session
 from realizer.server.streams.frame_windows import FrameTimeline
 
