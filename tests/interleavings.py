@@ -19,10 +19,10 @@ from realizer.core.errors import RenderError, VoiceError
 from realizer.core.settings import Settings
 from realizer.protocol.wire import ClipPiece, pack_clip, unpack
 from realizer.server.journal import JournalError
-from realizer.server.journal import journal_writer as thresholds
+from realizer.server.journal import session_journal as thresholds
 from realizer.server.journal.entry import Entry, SavedSession
-from realizer.server.journal.journal_writer import JournalWriter
 from realizer.server.journal.replay import restore_session
+from realizer.server.journal.session_journal import JournalWriter
 from realizer.server.runtime.session_registry import SessionRegistry
 from realizer.server.session.effects import Close, Draw, Effect, Send, Speak
 from realizer.server.session.session import Session

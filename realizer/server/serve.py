@@ -23,7 +23,7 @@ from realizer.server.transports.websocket.server import WebSocketTransport, star
 
 DRAIN_STEP = 0.05  # s; how often the drain checks whether everything has ended
 # s; a thread waits so long before it takes Python's lock from the event loop. While documents are planned the
-# loop pauses every 4 ms (`sliced_calls.SLICE`) and takes the lock back at once: with the usual 5 ms threads
+# loop pauses every 4 ms (`turns.SLICE`) and takes the lock back at once: with the usual 5 ms threads
 # would wait until the end.
 THREAD_WAIT = 0.001
 

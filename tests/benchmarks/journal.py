@@ -24,10 +24,10 @@ from unittest.mock import patch
 
 from realizer.core.settings import Settings
 from realizer.server.journal import Entry, Journal, SavedSession, journal_at
-from realizer.server.journal import journal_writer as thresholds
-from realizer.server.journal.journal_writer import JournalWriter
+from realizer.server.journal import session_journal as thresholds
 from realizer.server.journal.recordings import RecordingFolder
 from realizer.server.journal.replay import restore_session
+from realizer.server.journal.session_journal import JournalWriter
 from realizer.server.session.effects import Speak
 from realizer.server.session.session import Session
 from realizer.speech.duration_fit import speak_to_length

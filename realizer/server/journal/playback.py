@@ -11,7 +11,7 @@ from realizer.realization import Realization, frames_until, merge_warnings
 from realizer.server.journal.entry import JournalError, SavedSession
 from realizer.server.journal.replay import replay
 from realizer.server.journal.replay_viewer import ReplayViewer
-from realizer.server.runtime.engines import Engines
+from realizer.server.runtime.effect_runner import Engines
 from realizer.server.session.feedback_log import FeedbackLog
 from realizer.server.session.session import Session
 from realizer.server.speech.speech_streams import OPEN

@@ -1,15 +1,157 @@
-"""The journal of a session: its events, and checkpoints of its state."""
+"""The journal of a session: the writer of its entries, and checkpoints of its state."""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 
 from realizer.server.journal.checkpoint import Checkpoint
-from realizer.server.journal.entry import JournalError, Kind, TakenOver
-from realizer.server.journal.journal_writer import JournalWriter
+from realizer.server.journal.entry import Entry, Journal, JournalError, Kind, SavedSession, TakenOver
+from realizer.server.journal.recordings import RecordingFolder
 
 log = logging.getLogger(__name__)
+
+# A checkpoint is due after this many entries, whose replay takes about half a second, or bytes.
+ENTRIES = 250
+BYTES = 2**20
+LONG = 4  # times as many are far too long
+# A warning is due after each so many entries, whose replay takes a good part of a minute.
+ENDLESS = 10_000
+# A checkpoint that failed is due again after so many entries.
+AGAIN = 25
+
+
+class JournalWriter:
+    """A writer that appends a session's entries to its journal and its recording.
+
+    Args:
+        session: the session's name.
+        journal: from which another process can resume the session, or None.
+        recorder: of the session for replay, or None. The session does not depend on it.
+        on_stopped: is called when the recording has failed and stops.
+        saved: the content of the journal so far.
+        follow: is called after each entry, until it returns False.
+    """
+
+    def __init__(
+        self,
+        session: str,
+        journal: Journal | None = None,
+        recorder: RecordingFolder | None = None,
+        *,
+        on_stopped: Callable[[], None] = lambda: None,
+        saved: SavedSession | None = None,
+        follow: Callable[[], bool] = lambda: False,
+    ) -> None:
+        self._session = session
+        self._journal = journal
+        self._recorder = recorder
+        self._on_stopped = on_stopped
+        self._failing = False
+        self._follow: Callable[[], bool] | None = follow
+        entries = [] if saved is None else saved.entries
+        self._entries = len(entries)
+        self._bytes = sum(len(entry.body) for entry in entries)
+
+    @property
+    def needs_checkpoint(self) -> bool:
+        """Whether a checkpoint is due."""
+        return self._entries >= ENTRIES or self._bytes >= BYTES
+
+    @property
+    def is_far_too_long(self) -> bool:
+        """Whether a checkpoint was due long ago."""
+        return self._entries >= LONG * ENTRIES or self._bytes >= LONG * BYTES
+
+    def begin(self, epoch: float) -> None:
+        """Add a new session.
+
+        Raises:
+            JournalError: it cannot be written to the journal.
+        """
+        if self._journal is not None:
+            self._journal.begin(self._session, epoch)
+        self._record(lambda recorder: recorder.begin(self._session, epoch))
+
+    def resume(self, saved: SavedSession) -> None:
+        """Continue the recording of a session that was taken over."""
+        self._record(lambda recorder: recorder.resume(self._session, saved))
+
+    def append(self, at: float, kind: Kind, number: int = 0, body: str | bytes = "") -> None:
+        """Append an entry for an event that must not happen unless it is stored.
+
+        Raises:
+            TakenOver: another process has taken the session over.
+            JournalError: the entry cannot be written to the journal.
+        """
+        entry = Entry(at, kind, number, body)
+        if self._journal is not None:
+            self._journal.add(self._session, entry)
+            self._failing = False
+            self._entries += 1
+            self._bytes += len(entry.body)
+            if self._entries % ENDLESS == 0:
+                words = "session %s: %d entries in its journal and no checkpoint: some block always plays or"
+                log.warning(f"{words} waits", self._session, self._entries)
+            if self._follow is not None and not self._follow():
+                self._follow = None
+        self._record(lambda recorder: recorder.add(self._session, entry))
+
+    def try_append(self, at: float, kind: Kind, number: int = 0, body: str | bytes = "") -> None:
+        """Append an entry for an event that happens anyway. Only the first of several failures is logged.
+
+        Raises:
+            TakenOver: another process has taken the session over.
+        """
+        try:
+            self.append(at, kind, number, body)
+        except TakenOver:
+            raise
+        except JournalError as error:
+            self._log_failure(error)
+            self._entries = ENTRIES  # a checkpoint makes the missing entry unnecessary
+            self._record(lambda recorder: recorder.add(self._session, Entry(at, kind, number, body)))
+
+    def compact(self, parts: Mapping[str, str | None]) -> bool:
+        """Write a checkpoint. Return False if that fails; another one is due soon.
+
+        Raises:
+            TakenOver: another process has taken the session over.
+        """
+        try:
+            if self._journal is not None:
+                self._journal.compact(self._session, parts)
+        except TakenOver:
+            raise
+        except JournalError as error:
+            self._log_failure(error)
+            self._entries, self._bytes = ENTRIES - AGAIN, 0
+            return False
+        self._entries = self._bytes = 0
+        return True
+
+    def end(self) -> None:
+        """End the session in the journal and the recording."""
+        for log_ in (self._journal, self._recorder):
+            if log_ is not None:
+                log_.end(self._session)
+
+    def _record(self, write: Callable[[RecordingFolder], None]) -> None:
+        """Write to the recording. Stop at the first error: a recording with a gap cannot be replayed."""
+        if self._recorder is None:
+            return
+        try:
+            write(self._recorder)
+        except JournalError as error:
+            log.warning("the recording of session %s has stopped: %s", self._session, error)
+            self._recorder.end(self._session)
+            self._recorder = None
+            self._on_stopped()
+
+    def _log_failure(self, error: JournalError) -> None:
+        if not self._failing:
+            log.error("session %s: %s", self._session, error)
+        self._failing = True
 
 
 class SessionJournal:

@@ -1,18 +1,33 @@
-"""The runner of sessions' effects: it sends to clients, and lets engines speak and draw."""
+"""The runner of sessions' effects: it sends to clients, and lets voices and renderers work in threads."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterable, Mapping
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from realizer.core import work
-from realizer.server.runtime.engines import Engines
-from realizer.server.runtime.fair_pool import FairPool
-from realizer.server.session.effects import Close, Draw, Effect, Send, Speak
+from realizer.core.errors import RealizerError, RenderError, VoiceError
+from realizer.server.session.effects import Close, Draw, Effect, RenderOptions, Send, Speak
 from realizer.server.session.session import Session
 from realizer.server.transports.transport import Outbound
+from realizer.speech.duration_fit import speak_to_length
+from realizer.speech.utterance import Utterance, Voice
+
+if TYPE_CHECKING:
+    from realizer.render.renderer import Renderer
+
+# Each combination of face, size, camera, light and background has a renderer, which is a process.
+RENDERERS = 6
+IDLE = 5.0  # s; a renderer unused for so long makes room for another one
 
 
 class EffectRunner:
@@ -65,3 +80,198 @@ class EffectRunner:
 
         computed = pool.submit(session, partial(compute, effect))
         asyncio.wrap_future(computed, loop=self._loop).add_done_callback(answer)
+
+
+@dataclass(slots=True)
+class _RendererSlot:
+    """A renderer.
+
+    Attributes:
+        used: when it drew last, seconds on the clock of `Engines`.
+        busy: number of threads that draw with it now.
+        begun: whether its process has started.
+    """
+
+    renderer: Renderer
+    used: float
+    busy: int = 0
+    begun: bool = False
+
+
+class Engines:
+    """The voices and renderers. `speak` and `draw` may be called by the threads of their pools.
+
+    Args:
+        deformer: overrides that of the faces.
+        clock: monotonic seconds.
+    """
+
+    def __init__(self, deformer: str | None = None, clock: Callable[[], float] = time.monotonic) -> None:
+        self._deformer = deformer
+        self._clock = clock
+        # Two threads each: a long text or a starting process must not delay all other sessions.
+        self.speech_pool = FairPool(2, "voice")
+        self.render_pool = FairPool(2, "renderer")
+        self._voices: dict[str | None, Voice] = {}
+        self._slots: dict[tuple[str, RenderOptions], _RendererSlot] = {}
+        self._begun = clock()  # when a renderer last finished starting; until then the others may have waited
+        self._lock = threading.Lock()
+        self._reported: set[str] = set()
+
+    def speak(self, order: Speak) -> Utterance | RealizerError:
+        """Synthesize an utterance. Return the error if the voice fails, and print it once on stderr."""
+        try:
+            # The name has chosen the voice here; the engine would take it for one of its own voices.
+            return speak_to_length(self._voice(order.request.voice), replace(order.request, voice=None))
+        except VoiceError as error:
+            self._report(str(error))
+            return error
+        except Exception as error:
+            self._report(f"{type(error).__name__}: {error}")
+            return VoiceError(f"the voice failed: {error}")
+
+    def draw(self, order: Draw) -> bytes | RealizerError:
+        """Draw and encode a picture. Return the error if that fails."""
+        try:
+            options = order.options
+            with self._renderer(order) as renderer:
+                try:
+                    return renderer.encoded(order.pose, options.form, options.quality)
+                except RenderError:  # the next call starts the process again if it has died
+                    return renderer.encoded(order.pose, options.form, options.quality)
+        except RealizerError as error:
+            return error
+        except Exception as error:
+            return RenderError(f"the picture could not be drawn: {error}")
+
+    def drop(self, owner: Hashable) -> None:
+        """Drop the requests of an owner that wait in the pools."""
+        self.speech_pool.drop(owner)
+        self.render_pool.drop(owner)
+
+    def close(self) -> None:
+        """Close all engines, and drop the requests that wait for them."""
+        self.speech_pool.close()
+        self.render_pool.close()
+        for voice in self._voices.values():
+            voice.close()
+        for slot in self._slots.values():
+            slot.renderer.close()
+
+    def _voice(self, name: str | None) -> Voice:
+        from realizer.speech.registry import find_voice
+
+        with self._lock:
+            if name not in self._voices:
+                self._voices[name] = find_voice(name)
+            return self._voices[name]
+
+    @contextmanager
+    def _renderer(self, order: Draw) -> Iterator[Renderer]:
+        """Open the renderer of a picture, for one thread.
+
+        Raises:
+            RenderError: too many others are in use.
+        """
+        from realizer.render.renderer import Renderer
+
+        options = replace(order.options, quality=0, form="jpeg")  # these need no process of their own
+        key, removed = (order.face, options), None
+        with self._lock:
+            now = self._clock()
+            slot = self._slots.get(key)
+            if slot is None:
+                if len(self._slots) >= RENDERERS:
+                    removed = self._slots.pop(self._least_recent(now))
+                slot = self._slots[key] = _RendererSlot(
+                    Renderer(
+                        order.face,
+                        options.size,
+                        options.camera,
+                        light=options.light,
+                        background=options.background,
+                        deformer=self._deformer,
+                    ),
+                    now,
+                )
+            slot.busy += 1
+            slot.used = now
+        if removed is not None:
+            removed.renderer.close()
+        try:
+            yield slot.renderer
+        finally:
+            with self._lock:
+                slot.busy -= 1
+                slot.used = self._clock()
+                if not slot.begun:
+                    slot.begun, self._begun = True, slot.used
+
+    def _least_recent(self, now: float) -> tuple[str, RenderOptions]:
+        """Return the key of the idle renderer that was used the longest ago."""
+        idle = {
+            key: slot.used
+            for key, slot in self._slots.items()
+            if not slot.busy and now - max(slot.used, self._begun) >= IDLE
+        }
+        if not idle:
+            raise RenderError(
+                f"{RENDERERS} different pictures (face, size, camera, light, background) are "
+                "drawn already: wanted one of them, or fewer"
+            )
+        return min(idle, key=lambda key: idle[key])
+
+    def _report(self, error: str) -> None:
+        if error not in self._reported:
+            self._reported.add(error)
+            print(f"realizer: {error}; going on without sound", file=sys.stderr)
+
+
+class FairPool:
+    """A pool of threads: of the owners whose calls wait, each has one call made before another's second.
+
+    Args:
+        threads: number of calls that are made at once.
+        name: prefix of the names of the threads.
+    """
+
+    def __init__(self, threads: int, name: str) -> None:
+        self._pool = ThreadPoolExecutor(threads, name)
+        self._waiting: dict[Hashable, deque[tuple[Future[Any], Callable[[], Any]]]] = {}  # in their turns
+        self._lock = threading.Lock()
+
+    def submit(self, owner: Hashable, function: Callable[[], Any]) -> Future[Any]:
+        """Call a function in a thread when it is its owner's turn."""
+        future: Future[Any] = Future()
+        with self._lock:
+            self._waiting.setdefault(owner, deque()).append((future, function))
+        self._pool.submit(self._make_next)
+        return future
+
+    def drop(self, owner: Hashable) -> None:
+        """Cancel the calls of an owner that have not begun."""
+        with self._lock:
+            dropped = self._waiting.pop(owner, ())
+        for future, _ in dropped:
+            future.cancel()
+
+    def close(self) -> None:
+        """Cancel the calls that have not begun; those that have go on."""
+        self._pool.shutdown(wait=False, cancel_futures=True)
+
+    def _make_next(self) -> None:
+        with self._lock:
+            if not self._waiting:
+                return  # calls were dropped
+            owner = next(iter(self._waiting))
+            calls = self._waiting.pop(owner)
+            future, function = calls.popleft()
+            if calls:
+                self._waiting[owner] = calls
+        if future.set_running_or_notify_cancel():
+            try:
+                result = function()
+            except BaseException as error:
+                future.set_exception(error)
+            else:
+                future.set_result(result)

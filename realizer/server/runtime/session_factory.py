@@ -22,10 +22,10 @@ from realizer.server.documents.document_queue import block_id_of
 from realizer.server.http.metrics import Metrics
 from realizer.server.journal import Entry, Journal, JournalError, SavedSession, TakenOver, journal_at
 from realizer.server.journal.entry import NOTE
-from realizer.server.journal.journal_writer import JournalWriter
 from realizer.server.journal.recordings import RecordingFolder, recording_head
 from realizer.server.journal.replay import catch_up, restore_session
 from realizer.server.journal.replay_watch import TRIES, ReplayNote, ReplayWatch
+from realizer.server.journal.session_journal import JournalWriter
 from realizer.server.runtime.session_registry import JoinError
 from realizer.server.session.effects import Speak
 from realizer.server.session.session import Session

@@ -10,8 +10,7 @@ from realizer.core.settings import Settings
 from realizer.server.documents.limits import memory
 from realizer.server.http.metrics import Metrics
 from realizer.server.journal import TakenOver
-from realizer.server.runtime.effect_runner import EffectRunner
-from realizer.server.runtime.engines import Engines
+from realizer.server.runtime.effect_runner import EffectRunner, Engines
 from realizer.server.runtime.gc_policy import GcPolicy
 from realizer.server.runtime.session_factory import SessionFactory
 from realizer.server.runtime.session_registry import (
@@ -22,8 +21,7 @@ from realizer.server.runtime.session_registry import (
     worker_of,
 )
 from realizer.server.runtime.session_restorer import SessionRestorer
-from realizer.server.runtime.sliced_calls import SlicedCalls
-from realizer.server.runtime.turns import ReadingTurns, WakeUps
+from realizer.server.runtime.turns import ReadingTurns, SlicedCalls, WakeUps
 from realizer.server.session.effects import Close, Effect, MoveConnection
 from realizer.server.session.session import Session
 from realizer.server.streams.connection import SLOW

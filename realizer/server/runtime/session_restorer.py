@@ -7,7 +7,7 @@ from collections.abc import Callable, MutableMapping
 from functools import partial
 
 from realizer.server.journal.replay import catch_up
-from realizer.server.runtime.engines import Engines
+from realizer.server.runtime.effect_runner import Engines
 from realizer.server.runtime.session_factory import SessionFactory
 from realizer.server.session.effects import Speak
 from realizer.server.session.session import Session

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from realizer.core.settings import Settings
-from realizer.server.journal.journal_writer import JournalWriter
 from realizer.server.journal.recordings import RecordingFolder, recording_head
+from realizer.server.journal.session_journal import JournalWriter
 from realizer.server.session.session import Session
 from tests.commands import run
 

@@ -19,15 +19,15 @@ from realizer.core.settings import Settings
 from realizer.playback.character import BaseShift, Character
 from realizer.protocol.wire import ClipPiece, pack_clip
 from realizer.scheduling.timing import Schedule
-from realizer.server.journal import journal_writer as thresholds
+from realizer.server.journal import session_journal as thresholds
 from realizer.server.journal.checkpoint import (
     character_from_json,
     character_to_json,
     schedule_from_json,
     schedule_to_json,
 )
-from realizer.server.journal.journal_writer import JournalWriter
 from realizer.server.journal.replay import restore_session
+from realizer.server.journal.session_journal import JournalWriter
 from realizer.server.session.effects import Speak
 from realizer.server.session.session import Session
 from realizer.speech.voice_activity import VoiceActivity

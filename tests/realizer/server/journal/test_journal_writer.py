@@ -9,8 +9,8 @@ import pytest
 
 from realizer.server.journal import JournalError, SavedSession
 from realizer.server.journal.entry import Entry
-from realizer.server.journal.journal_writer import AGAIN, BYTES, ENTRIES, JournalWriter
 from realizer.server.journal.recordings import RecordingFolder, read_recording
+from realizer.server.journal.session_journal import AGAIN, BYTES, ENTRIES, JournalWriter
 from tests.interleavings import Memory
 
 
@@ -124,7 +124,7 @@ def test_writer_makes_up_for_lost_entries_by_a_checkpoint() -> None:
 def test_writer_warns_now_and_then_of_a_journal_that_only_grows(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr("realizer.server.journal.journal_writer.ENDLESS", 10)
+    monkeypatch.setattr("realizer.server.journal.session_journal.ENDLESS", 10)
     notes = JournalWriter("s", Memory())
     notes.begin(0.0)
     with caplog.at_level(logging.WARNING):

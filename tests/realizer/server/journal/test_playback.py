@@ -11,9 +11,9 @@ from click.testing import CliRunner
 from realizer.cli import cli
 from realizer.core.settings import Settings
 from realizer.server.journal import JournalError, playback
-from realizer.server.journal.journal_writer import JournalWriter
 from realizer.server.journal.playback import replay_recording
 from realizer.server.journal.recordings import RecordingFolder, read_recording, recording_head
+from realizer.server.journal.session_journal import JournalWriter
 from realizer.server.session.effects import Send, Speak
 from realizer.server.session.session import Session
 from realizer.speech.duration_fit import speak_to_length

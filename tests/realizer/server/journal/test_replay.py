@@ -18,7 +18,7 @@ from websockets.exceptions import ConnectionClosed
 
 from bml_schema.feedback import parse_feedback
 from realizer.core.settings import Settings
-from realizer.server.journal.journal_writer import ENTRIES
+from realizer.server.journal.session_journal import ENTRIES
 from realizer.server.runtime import session_host
 from realizer.server.serve import Server
 from realizer.server.transports.websocket import connection

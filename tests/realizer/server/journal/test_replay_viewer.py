@@ -16,9 +16,9 @@ from realizer.core.settings import Settings
 from realizer.outputs.output import RenderSettings
 from realizer.protocol.wire import ClipPiece, pack_clip, unpack
 from realizer.server.journal.entry import SavedSession
-from realizer.server.journal.journal_writer import JournalWriter
 from realizer.server.journal.playback import replay_recording
 from realizer.server.journal.recordings import RecordingFolder, read_recording, recording_head
+from realizer.server.journal.session_journal import JournalWriter
 from realizer.server.session.effects import Send, Speak
 from realizer.server.session.session import Session
 from realizer.speech.duration_fit import speak_to_length

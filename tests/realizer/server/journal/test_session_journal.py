@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bml_schema.feedback import WarningFeedback
 from realizer.server.journal.entry import Entry, JournalError, TakenOver
-from realizer.server.journal.journal_writer import JournalWriter
+from realizer.server.journal.session_journal import JournalWriter
 from realizer.server.journal.sqlite_journal import SqliteJournal
 from realizer.server.session.effects import Close
 from tests.realizer.server.conftest import Driver

@@ -8,8 +8,7 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 from realizer.core.settings import Settings
-from realizer.server.runtime.effect_runner import EffectRunner
-from realizer.server.runtime.engines import Engines
+from realizer.server.runtime.effect_runner import EffectRunner, Engines
 from realizer.server.session.effects import Close, Send, Speak
 from realizer.server.session.session import Session
 from realizer.speech.utterance import SpeechRequest

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from realizer.server.runtime.fair_pool import FairPool
+from realizer.server.runtime.effect_runner import FairPool
 
 
 class Blocked(FairPool):

@@ -14,7 +14,7 @@ import pytest
 from bml_schema.feedback import parse_feedback
 from realizer.core.settings import Settings
 from realizer.protocol.wire import unpack
-from realizer.server.runtime import sliced_calls
+from realizer.server.runtime import turns
 from realizer.server.runtime.session_host import MOST_WAITING, SessionHost
 from realizer.server.runtime.session_registry import JoinError
 from realizer.server.streams.connection import SLOW
@@ -203,7 +203,7 @@ def predicted(client: Client) -> list[str]:
 @pytest.fixture
 def in_tiny_slices(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each call is paused wherever it counts its work."""
-    monkeypatch.setattr(sliced_calls, "SLICE", 0.0)
+    monkeypatch.setattr(turns, "SLICE", 0.0)
 
 
 def test_session_host_answers_others_while_it_plans(in_tiny_slices) -> None:
@@ -312,7 +312,7 @@ def test_session_host_plans_in_slices_as_at_once(monkeypatch) -> None:
         results.append([re.sub(r'(globalTime|global|posix)\w*="[^"]*"', "", text) for text in client.texts])
 
     for seconds in (0.0, 1e9):
-        monkeypatch.setattr(sliced_calls, "SLICE", seconds)
+        monkeypatch.setattr(turns, "SLICE", seconds)
         hosted(test)
     assert results[0] == results[1]
     assert len(results[0]) > 20

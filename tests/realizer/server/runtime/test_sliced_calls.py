@@ -11,7 +11,7 @@ from queue import SimpleQueue
 import pytest
 
 from realizer.core import work
-from realizer.server.runtime.sliced_calls import SLICE, SlicedCalls
+from realizer.server.runtime.turns import SLICE, SlicedCalls
 
 
 class Calls(SlicedCalls[str]):
