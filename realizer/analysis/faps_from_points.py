@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +10,6 @@ import numpy as np
 from realizer import tables
 from realizer.core.array_types import Bool, Float32, Float64
 from realizer.core.units import ANGLE_UNIT
-from realizer.emotions.profile import Profile
 from realizer.tables.facial_features import facial_features
 
 if TYPE_CHECKING:
@@ -23,7 +21,6 @@ Points = Mapping[str, Any]  # name such as "2.1" -> (n, 3) or (3,) metres
 SKULL = ("11.1", "11.2", "11.3", "11.4", "11.5", "11.6")
 CORNERS = ("3.7", "3.8", "3.11", "3.12")
 HEAD = slice(47, 50)
-OUTER_LIPS = {4: 51, 5: 52}  # FAPs of the middle of the lips; features are measured at 8.1 and 8.2
 CHIN, JAW, DEPRESS_CHIN, OPEN_JAW = "2.10", "2.1", 17, 2
 # Direction in the standard -> axis and sign; x to the character's left, y up, z forward.
 DIRECTIONS = {"left": (0, 1), "right": (0, -1), "up": (1, 1), "down": (1, -1), "forward": (2, 1)}
@@ -91,14 +88,6 @@ def features_from_points(points: Points, neutral: Points, fapu: Fapu) -> Float64
     return np.stack(columns, axis=1)
 
 
-def features_from_faps(frames: Any) -> Float64:
-    """Return the features (n, 15) of FAPs (n, 68): f12 = -(F19 + F21), f14 = F53 + F54, ..."""
-    values = np.asarray(frames, np.float64)
-    if values.ndim != 2 or values.shape[1] != 68:
-        raise ValueError(f"frames: wanted (n, 68), got {values.shape}")
-    return values @ _sums().T
-
-
 def faps_from_features(features: Any) -> tuple[Float32, Bool]:
     """Return the FAPs (n, 68) that features (n, 15) determine, and (68,) which FAPs those are.
 
@@ -116,43 +105,6 @@ def faps_from_features(features: Any) -> tuple[Float32, Bool]:
             if not seen[fap - 1]:
                 frames[:, fap - 1], seen[fap - 1] = sign * part, True
     return frames, seen
-
-
-def measurable_profile(profile: Profile) -> Profile:
-    """Return the profile that `faps_from_features` would measure on a face that shows this one.
-
-    Features measure the outer lips, and both lids together: the ranges of the outer lips are used for the
-    inner lips and the opening of the mouth, and the FAPs of a feature have the same range.
-    """
-    known = dict(profile.ranges)
-    zero = (0.0, 0.0)
-    for inner, outer in OUTER_LIPS.items():
-        if outer in known:
-            known[inner] = known[outer]
-    if {*OUTER_LIPS.values()} & {*known}:  # the lips part by their own FAPs, not by the jaw
-        (low, high), (a, b) = (known.get(outer, zero) for outer in OUTER_LIPS.values())
-        known[3] = -high - b, -low - a
-    ranges: dict[int, tuple[float, float]] = {}
-    for row in facial_features():
-        ends = [
-            tuple(sorted((sign * a, sign * b)))
-            for fap, sign in row.signs.items()
-            for a, b in [known.get(fap, zero)]
-        ]
-        low, high = (sum(end) / len(ends) for end in zip(*ends, strict=True))
-        for fap, sign in (row.signs | dict.fromkeys(row.also, 1)).items():
-            if (low or high) and fap not in ranges:
-                ranges[fap] = (low, high) if sign > 0 else (-high, -low)
-    return Profile(profile.name, profile.source, ranges)
-
-
-@cache
-def _sums() -> Float64:
-    sums = np.zeros((15, 68))
-    for k, row in enumerate(facial_features()):
-        for fap, sign in row.signs.items():
-            sums[k, fap - 1] = sign
-    return sums
 
 
 def _checked(points: Points, neutral: Points) -> tuple[dict[str, Float64], dict[str, Float64]]:

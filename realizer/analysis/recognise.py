@@ -2,10 +2,14 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
+from itertools import groupby
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
 
+from realizer import tables
 from realizer.core.array_types import Bool, Float64
 from realizer.emotions.archetypes import archetypes
 from realizer.emotions.profile import Profile
@@ -19,9 +23,9 @@ class Recognition:
     """The result of a recognition.
 
     Attributes:
-        emotion: emotion with the greatest belief (eq. 11); None if all are 0.
+        emotion: emotion with the greatest belief (eq. 11); None if the face shows none of them.
         emotions: emotion -> belief 0..1 (eq. 9).
-        profiles: profile -> belief (eq. 8).
+        profiles: profile -> belief.
     """
 
     emotion: str | None
@@ -29,43 +33,52 @@ class Recognition:
     profiles: Mapping[str, float]
 
 
+@dataclass(frozen=True)
+class Interval:
+    """A time from `start` to `end` seconds with one emotion, or None, and the mean belief in it."""
+
+    start: float
+    end: float
+    emotion: str | None
+    certainty: float
+
+
 class Recogniser:
     """Recognises profiles and emotions in FAP frames by fuzzy classes.
 
-    The membership of a value depends on its distance from the range of the FAP (`tables/emotion_model.toml`;
-    the shape of figure 6 is not in the text). The belief in a profile is the product over its FAPs, the
-    belief in an emotion that of its best profile. Of equal beliefs, the profile with more FAPs has priority.
+    The membership of a value is 1 / (1 + d^2), where d is its distance from the range of the FAP, relative to
+    half of the range and the noise of landmarks (`tables/emotion_model.toml`; the shape of figure 6 is not in
+    the text). FAPs that only other profiles move must be near 0. Dombi's t-norm of these memberships is
+    1 / (1 + sum d^2). The belief in a profile is its tolerant form with the mean instead of the sum, so that
+    a few FAPs out of their ranges are forgiven. The belief in an emotion is that of its best profile; below
+    a least belief, a frame is of no class. Of equal beliefs, the profile with more FAPs has priority.
     """
 
-    def __init__(
-        self, profiles: Iterable[Profile], absent: bool = True, strengths: Sequence[float] = (1.0,)
-    ) -> None:
+    def __init__(self, profiles: Iterable[Profile], strengths: Sequence[float] = (1.0,)) -> None:
         """
         Args:
             profiles: at least one; the emotion is the name without the number.
-            absent: whether FAPs that only other profiles move must be near 0; without it (as published), a
-                profile with few FAPs is recognised wherever a larger one is.
             strengths: factors of the profiles to try; the best one counts.
         """
         self.profiles = tuple(profiles)
         if not self.profiles:
             raise ValueError("profiles: wanted at least one, got none")
-        model = emotion_model()
+        self._model = model = emotion_model()
         shape = (len(self.profiles), 68)
-        self._middle, self._length = np.zeros(shape), np.full(shape, 2 * model.absent)
-        self._used = np.zeros(shape, bool)
+        middle, half, moved = np.zeros(shape), np.full(shape, model.absent), np.zeros(shape, bool)
         for k, profile in enumerate(self.profiles):
             for fap, (low, high) in profile.ranges.items():
-                self._middle[k, fap - 1] = (low + high) / 2
-                self._length[k, fap - 1] = high - low
-                self._used[k, fap - 1] = True
-        self._moving = self._used.copy()
-        self._moved = self._used.sum(axis=1)
-        self._classes = [self._class(strength, model.least_length) for strength in strengths]
-        if absent:
-            self._used |= self._used.any(axis=0)
-        self._core, self._base = model.core, model.base
-        self._emotions = [_emotion(profile.name) for profile in self.profiles]
+                middle[k, fap - 1], half[k, fap - 1] = (low + high) / 2, (high - low) / 2
+                moved[k, fap - 1] = True
+        self._classes = [
+            (middle * strength, np.where(moved, np.maximum(half * strength, model.least_length / 2), half))
+            for strength in strengths
+        ]
+        self._count = moved.sum(axis=1)
+        self._judged: Bool = np.asarray(moved.any(axis=0))
+        self._judged[[fap - 1 for fap in model.unjudged]] = False
+        self._noise = np.array([model.noise.get(row.unit, np.inf) for row in tables.faps()])
+        self._emotions = [emotion_of(profile.name) for profile in self.profiles]
 
     def beliefs(self, frames: Any, seen: Bool | None = None) -> Float64:
         """Return the beliefs (n, profiles) in FAP frames (n, 68).
@@ -81,18 +94,48 @@ class Recogniser:
             raise ValueError(f"frames: wanted (n, 68), got {values.shape}")
         if not np.isfinite(values).all():
             raise ValueError("frames: wanted finite values, got NaN or infinity")
-        judged = self._used if seen is None else self._used & seen
+        judged = np.flatnonzero(self._judged if seen is None else self._judged & seen)
         best: Float64 = np.zeros((len(values), len(self.profiles)))
+        if not len(judged):
+            return best
         for middle, half in self._classes:
-            away = np.abs(values[:, None] - middle) / half
-            membership = np.clip((self._base - away) / (self._base - self._core), 0.0, 1.0)
-            np.maximum(best, np.where(judged, membership, 1.0).prod(axis=2), out=best)
-        # Profiles need at least one observed FAP.
-        return best * judged.any(axis=1)
+            length = half[:, judged]
+            beyond = np.maximum(np.abs(values[:, None, judged] - middle[:, judged]) - length, 0.0)
+            squares = np.square(beyond / (length + self._noise[judged]))
+            np.maximum(best, 1 / (1 + np.minimum(squares, self._model.most_square).mean(axis=2)), out=best)
+        return best
 
     def names(self, frames: Any, seen: Bool | None = None) -> list[str | None]:
         """Return the emotion of each frame (eq. 11), or None."""
+        return [name for name, _ in self.certainties(frames, seen)]
+
+    def certainties(self, frames: Any, seen: Bool | None = None) -> list[tuple[str | None, float]]:
+        """Return the emotion of each frame, or None, and the greatest belief."""
         return [self._best(row) for row in self.beliefs(frames, seen)]
+
+    def intervals(self, frames: Any, fps: float, seen: Bool | None = None) -> list[Interval]:
+        """Return which emotions frames show, and when.
+
+        Frames are averaged over a short window before, and what is shorter than it belongs to the interval
+        before it, so that noise does not split an expression.
+        """
+        values = np.asarray(frames, np.float64)
+        window = min(max(round(self._model.window * fps), 1), len(values))
+        before = window // 2
+        padded = np.pad(values, ((before, window - 1 - before), (0, 0)), mode="edge")
+        smooth = np.lib.stride_tricks.sliding_window_view(padded, window, axis=0).mean(axis=-1)
+        runs: list[tuple[str | None, list[float]]] = []
+        for name, run in groupby(self.certainties(smooth, seen), key=itemgetter(0)):
+            beliefs = [belief for _, belief in run]
+            if runs and (runs[-1][0] == name or len(beliefs) < window):
+                runs[-1][1].extend(beliefs)
+            else:
+                runs.append((name, beliefs))
+        ends = np.cumsum([len(beliefs) for _, beliefs in runs])
+        return [
+            Interval((end - len(beliefs)) / fps, end / fps, name, float(np.mean(beliefs)))
+            for end, (name, beliefs) in zip(ends.tolist(), runs, strict=True)
+        ]
 
     def recognise(self, frame: Any, seen: Bool | None = None) -> Recognition:
         """Recognise one FAP frame (68,)."""
@@ -101,32 +144,31 @@ class Recogniser:
         for emotion, belief in zip(self._emotions, beliefs, strict=True):
             emotions[emotion] = max(emotions.get(emotion, 0.0), float(belief))
         names = (profile.name for profile in self.profiles)
-        return Recognition(self._best(beliefs), emotions, dict(zip(names, map(float, beliefs), strict=True)))
+        profiles = dict(zip(names, map(float, beliefs), strict=True))
+        return Recognition(self._best(beliefs)[0], emotions, profiles)
 
-    def _class(self, strength: float, least: float) -> tuple[Float64, Float64]:
-        """Return the middles of the classes and half of their lengths, (profiles, 68) each."""
-        length = np.where(self._moving, np.maximum(self._length * strength, least), self._length)
-        return self._middle * strength, length / 2
-
-    def _best(self, beliefs: Float64) -> str | None:
-        best = int(np.lexsort((self._moved, beliefs))[-1])
-        return self._emotions[best] if beliefs[best] > 0 else None
+    def _best(self, beliefs: Float64) -> tuple[str | None, float]:
+        best = int(np.lexsort((self._count, beliefs))[-1])
+        belief = float(beliefs[best])
+        return (self._emotions[best] if belief >= self._model.least_belief else None), belief
 
 
-def recogniser(profiles: str = "own", absent: bool = True) -> Recogniser:
-    """Return the recogniser of all profiles of a set: "own", "published" or "raw".
+@cache
+def recogniser(profiles: str = "own") -> Recogniser:
+    """Return the recogniser of all profiles of a set, and of the neutral face.
 
-    With `absent`, the neutral face can be recognised too. Our own set has one profile per emotion, tried at
-    several strengths, and includes the advanced emotions of the wheel.
+    Our own set has one profile per emotion, tried at several strengths, and includes the advanced emotions of
+    the wheel.
     """
-    strengths = emotion_model().strengths if profiles == "own" else (1.0,)
     every = [profile for numbered in archetypes(profiles).values() for profile in numbered.values()]
     if profiles == "own":
         blends = [place for place in ring("paul").values() if place.kind == "advanced"]
         every += [replace(wheel(place.angle), name=place.name) for place in blends]
-    return Recogniser([*every, Profile("neutral", profiles, {})] if absent else every, absent, strengths)
+    strengths = emotion_model().strengths if profiles == "own" else (1.0,)
+    return Recogniser([*every, Profile("neutral", profiles, {})], strengths)
 
 
-def _emotion(name: str) -> str:
+def emotion_of(name: str) -> str:
+    """Return the emotion of a profile: its name without the number."""
     emotion, _, number = name.rpartition(" ")
     return emotion if emotion and number.isdecimal() else name

@@ -18,9 +18,13 @@ class EmotionModel:
         spread: share of an action unit by which a random face may differ.
         middle: middle of the scales of evaluation and activation.
         chosen: emotion -> number of its preferred published profile.
-        core, base: shares of a range's length where membership is 1, and where it ends.
         least_length: least length of a range, FAPU.
         absent: tolerance for a FAP that is not moved, FAPU.
+        noise: unit -> FAPU by which FAPs of tracked points are blurred.
+        most_square: greatest square of a relative distance from a range.
+        least_belief: belief below which a face belongs to no class.
+        window: seconds over which frames are averaged.
+        unjudged: FAPs that no feature point tells of alone.
         strengths: strengths at which our own profiles are recognised.
     """
 
@@ -28,10 +32,13 @@ class EmotionModel:
     spread: float
     middle: float
     chosen: Mapping[str, int]
-    core: float
-    base: float
     least_length: float
     absent: float
+    noise: Mapping[str, float]
+    most_square: float
+    least_belief: float
+    window: float
+    unjudged: tuple[int, ...]
     strengths: tuple[float, ...]
 
 
@@ -39,5 +46,6 @@ class EmotionModel:
 def emotion_model() -> EmotionModel:
     """Return the model."""
     table = tables.toml_table("emotion_model.toml")
-    recognition = table["recognition"] | {"strengths": tuple(table["recognition"]["strengths"])}
+    recognition = table["recognition"]
+    recognition |= {name: tuple(recognition[name]) for name in ("unjudged", "strengths")}
     return EmotionModel(**table["wheel"], chosen=table["chosen"], **recognition)

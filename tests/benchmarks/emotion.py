@@ -19,8 +19,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from realizer.analysis.faps_from_mesh import faps_from_mesh, points_of
-from realizer.analysis.faps_from_points import faps_from_features, features_from_points, measurable_profile
+from realizer.analysis.faps_from_mesh import faps_from_mesh, features_from_mesh, measurable_profile
 from realizer.analysis.recognise import Recogniser, recogniser
 from realizer.emotions.archetypes import archetypes
 from realizer.emotions.profile import Profile
@@ -64,15 +63,13 @@ def recognise_from_mesh(
 def recognise_from_distances(
     face: Face, known: Recogniser, profiles: Sequence[Profile], draws: int
 ) -> Counts:
-    """Return emotion -> recognised emotions by the 15 distances alone, without noise."""
+    """Return emotion -> recognised emotions by the 15 distances alone, without noise; ranges are from ada."""
     chance = np.random.default_rng(0)
-    known = Recogniser([measurable_profile(profile) for profile in known.profiles])
-    rest = {name: face.vertices[index] for name, index in face.feature_points.items()}
+    known = Recogniser([measurable_profile(profile, load_face("ada")) for profile in known.profiles])
     found: Counts = {}
     for profile in profiles:
         vertices = deform(face, np.stack([profile.draw(chance) for _ in range(draws)]))
-        features = features_from_points(points_of(face, vertices), rest, face.fapu)
-        read, seen = faps_from_features(features)
+        read, seen = features_from_mesh(face, vertices)
         name = profile.name.rpartition(" ")[0]
         found.setdefault(name, Counter()).update(str(got) for got in known.names(read, seen))
     return found

@@ -5,12 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.analysis.faps_from_mesh import faps_from_face, faps_from_mesh, points_of
+from realizer.analysis.faps_from_mesh import (
+    faps_from_face,
+    faps_from_mesh,
+    features_from_mesh,
+    measurable_profile,
+    points_of,
+)
 from realizer.analysis.recognise import recogniser
 from realizer.emotions.archetypes import archetypes
 from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.face.model import Face
+from realizer.tables.facial_features import facial_features
 
 SEEDS = (0, 1, 2)
 
@@ -47,3 +54,12 @@ def test_faps_from_face_does_not_depend_on_the_pose_of_the_head(face: Face) -> N
 def test_faps_from_mesh_refuses_vertices_of_another_face(face: Face) -> None:
     with pytest.raises(ValueError, match=r"vertices: wanted \(n, \d+, 3\), got \(3, 3\)"):
         faps_from_mesh(face, np.zeros((3, 3)))
+
+
+def test_measurable_profile_holds_what_features_see_of_its_face() -> None:
+    face, fear = load_face("ada"), archetypes("published")["fear"][8]
+    fitted = measurable_profile(fear, face)
+    assert set(fitted.ranges) <= {fap for f in facial_features() for fap in (*f.signs, *f.also)}
+    values, _ = features_from_mesh(face, deform(face, fear.frame()[None]))
+    assert all(low <= values[0, fap - 1] <= high for fap, (low, high) in fitted.ranges.items())
+    assert fitted.ranges[31][0] > 50  # inner brows up

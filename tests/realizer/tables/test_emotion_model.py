@@ -14,5 +14,6 @@ def test_emotion_model_chooses_a_profile_of_every_published_emotion() -> None:
 
 def test_emotion_model_recognises_within_lengths_above_0() -> None:
     model = emotion_model()
-    assert 0 <= model.core < model.base
+    assert 0 < model.least_belief < 1
+    assert all(3 <= fap <= 68 for fap in model.unjudged)
     assert min(model.least_length, model.absent, *model.strengths) > 0
