@@ -128,7 +128,9 @@ class Enricher:
             id = marks.get(at) or new.get(at) or names.mark(node)
             start = SyncRef(behaviour=node.id, sync=id)
             shown = [name for name in placement.rule.show if (str(start), name) not in begun]
-            placed += [self._expression(name, start, placement.rule.says, names) for name in shown]
+            beyond = placement.rule.outlasts
+            end = SyncRef(behaviour=node.id, sync="end", offset=beyond) if beyond else None
+            placed += [self._expression(name, start, placement.rule.says, names, end) for name in shown]
             if shown and at not in marks:
                 new[at] = id
         return replace(node, text=replace(node.text, parts=_marked(node.text.parts, new))), placed

@@ -36,7 +36,12 @@ def place_expressions(
         words: the emotional words; None: only punctuation counts.
     """
     rules = knowledge.placings[role]
-    placements = [placement for sentence in text for placement in _applied(sentence, rules, words)]
+    placements = [
+        placement
+        for sentence in text
+        for placement in _applied(sentence, rules, words)
+        if not placement.rule.outlasts or sentence is text[-1]
+    ]
     apart = mood.distance if mood is not None else 0.0
     if role == "listener":
         usual = knowledge.listener_distance
@@ -56,7 +61,9 @@ def _applied(
     categories = _categories(sentence, words)
     taken: set[int] = set()
     for rule in rules:
-        if set(rule.unless) & set(categories):
+        if set(rule.unless) & set(categories) or len(sentence.words) > rule.most_words:
+            continue
+        if rule.beside and not set(rule.beside) & set(categories):
             continue
         for index in _places(rule, sentence, categories):
             if index not in taken:

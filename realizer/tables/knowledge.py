@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
+from math import inf
 from typing import Any, Literal
 
 from realizer import tables
@@ -23,6 +24,9 @@ class PlacementRule:
         show: templates, in lower case, that are shown together.
         says: the rule as a sentence, with its source.
         unless: categories of words that exclude a sentence.
+        beside: categories of words of which a sentence must have one; (): any sentence.
+        most_words: most words of a sentence.
+        outlasts: seconds for which the expression outlasts the speech, whose last sentence it must be; 0: no.
         keep: whether to warn if an expression is missing.
     """
 
@@ -30,6 +34,9 @@ class PlacementRule:
     show: tuple[str, ...]
     says: str
     unless: tuple[str, ...] = ()
+    beside: tuple[str, ...] = ()
+    most_words: float = inf
+    outlasts: float = 0.0
     keep: bool = False
 
 
@@ -118,7 +125,7 @@ def knowledge() -> Knowledge:
 
 
 def _placing(row: Mapping[str, Any]) -> PlacementRule:
-    lists = {name: tuple(row[name]) for name in ("show", "unless") if name in row}
+    lists = {name: tuple(row[name]) for name in ("show", "unless", "beside") if name in row}
     return PlacementRule(**{**row, **lists})
 
 

@@ -109,6 +109,23 @@ def test_block_scales_durations_by_mood() -> None:
     assert held("confused") < held("depressed")
 
 
+@pytest.mark.parametrize(
+    ("text", "count"),
+    [("Really?", 1), ("Do you know this man?", 1), ("Do you know who this strange man was?", 0)],
+)
+def test_text_ends_only_short_questions_with_surprise(text: str, count: int) -> None:
+    names = [template_of(node) for node in Enricher().text(text).behaviours]
+    assert names.count("surprise") == count
+
+
+def test_text_shows_regret_that_outlasts_a_turn_on_something_sad() -> None:
+    block = Enricher().text("He was here. Yes, I admit it was a pity.")
+    assert str(block["regret1"].syncs["end"]) == "speech1:end + 0.6"
+    times = realizer.schedule(write(block)).times
+    assert times["regret1"][-1] == pytest.approx(times["speech1"][-1] + 0.6)
+    assert "regret1" not in {node.id for node in Enricher().text("Yes, a pity. But go on.").behaviours}
+
+
 def test_listener_shows_expressions_at_the_times_of_words() -> None:
     block = Enricher(role="listener").text("Do you know it?")
     assert [type(node) for node in block.behaviours] == [Expression]

@@ -64,7 +64,7 @@ def test_place_expressions_of_a_listener_are_fewer() -> None:
 
 
 def test_place_expressions_in_a_mood_keeps_a_distance() -> None:
-    text = "Are you here now, on this island? " * 4
+    text = "He lives on this island. Really? " * 4
     assert len(placed(text)) == 4
     assert len(placed(text, mood="confused")) > len(placed(text, mood="depressed")) > 0
 

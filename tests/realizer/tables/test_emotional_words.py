@@ -38,7 +38,26 @@ def test_categories_take_typographic_apostrophes() -> None:
 
 
 def test_word_list_of_an_unknown_language_is_none() -> None:
-    assert word_list("pl") is None
+    assert word_list("xx") is None
+
+
+def test_word_list_of_polish_knows_the_words_of_appendix_d() -> None:
+    words = word_list("pl")
+    assert words is not None
+    wanted = {
+        "praise": "geniuszem mądra pyszny szałowy świetnie utalentowana wspaniale inteligentnie",
+        "pleasure": "cichego kochanie miłego nadzieje spokojnie śmieją weselsze żartujesz",
+        "curiosity": "ciekawe dziwaczna zafascynowani tajemnicze interesują",
+        "assent": "dobrze jasne słusznie zgoda rozumiesz rozumiałam",
+        "sorrow": "bidulka bolało depresji płaczesz smutna słabo stresów umieram źle",
+        "fright": "niepokoić panicznie potworny sadyści straszne strach",
+        "irritation": "gniewa denerwować zdenerwowałam",
+        "disapproval": "bzdury kanalia obrzydły podłe podlece ułomna złośliwe",
+    }
+    for category, said in wanted.items():
+        for word in said.split():
+            assert words.categories([word]) == [category], word
+    assert words.categories(["na", "pewno", "bał", "się"]) == ["assent"] * 2 + ["fright"] * 2
 
 
 @pytest.mark.parametrize(

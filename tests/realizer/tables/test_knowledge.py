@@ -26,7 +26,7 @@ def test_knowledge_uses_only_templates() -> None:
 def test_knowledge_places_expressions_at_known_sentences_and_words() -> None:
     rules = [rule for rules in knowledge().placings.values() for rule in rules]
     known = {"question", "exclamation", *CATEGORIES}
-    assert {category for rule in rules for category in (rule.when, *rule.unless)} <= known
+    assert {category for rule in rules for category in (rule.when, *rule.unless, *rule.beside)} <= known
     assert {company.by for company in knowledge().companies} <= set(get_args(By))
 
 
@@ -39,6 +39,14 @@ def test_knowledge_has_moods_of_different_distance_and_length() -> None:
     depressed, confused = knowledge().mood("Depressed"), knowledge().mood("confused")
     assert depressed.distance > confused.distance
     assert depressed.length > 1.5 > 1.0 > confused.length
+
+
+def test_knowledge_has_the_mean_length_of_table_6_3() -> None:
+    segments = [9, 106, 6, 5, 8, 40, 66, 22, 20, 2, 2, 1]
+    frames = [165, 2712, 153, 185, 362, 1197, 1914, 480, 832, 58, 23, 15]
+    mean = sum(frames) / sum(segments)
+    assert mean == pytest.approx(28.2, abs=0.05)
+    assert knowledge().mood("sorrow").length == pytest.approx(47.6 / mean, rel=2e-3)
 
 
 def test_mood_suggests_names_for_an_unknown_one() -> None:
