@@ -1,4 +1,4 @@
-"""The generated descriptions of the protocol: asyncapi.json, docs/protocol.md and constants of realizer.js.
+"""The generated descriptions of the protocol: asyncapi.json, docs/protocol.md, constants in JavaScript.
 
 `python -m tests.protocol` writes them, from the models of messages and the table of streams.
 """
@@ -39,7 +39,7 @@ FILE = Path(realizer.__path__[0]) / "server" / "asyncapi.json"
 PAGE = Path(__file__).parent.parent / "docs" / "protocol.md"
 BEGIN = "<!-- protocol: written by python -m tests.protocol -->"
 END = "<!-- end of protocol -->"
-SCRIPT = FILE.parent / "web" / "src" / "realizer.js"
+SCRIPT = Path(__file__).parent.parent / "clients" / "javascript" / "src" / "frames.js"
 SCRIPT_MARKS = ("// protocol: written by python -m tests.protocol", "// end of protocol")
 
 REQUESTS: dict[str, type[BaseModel]] = {
@@ -244,7 +244,7 @@ def _cell(text: str) -> str:
 
 
 def constants() -> str:
-    """Return the constants of realizer.js: version, binary messages, JSON streams, types of answers."""
+    """Return the constants of frames.js: version, binary messages, JSON streams, types of answers."""
     arrays = {"<i4": "Int32Array", "<f4": "Float32Array", "<i2": "Int16Array", None: "Uint8Array"}
     kinds = [f'  {kind}: ["{row.name}", {arrays[row.dtype]}],' for kind, row in KINDS.items()]
     answers = ", ".join(f'{question}: "{answer}"' for question, answer in ANSWERS.items())
@@ -254,11 +254,13 @@ def constants() -> str:
             f"export const VERSION = {PROTOCOL};",
             f"const HEADER = {BYTES.size}; // bytes: u8 kind, u8 version, u16 flags, u32 frame, f64 time",
             f"const FORGET = {FLUSH:#x}; // flag: forget everything from this time on",
+            f"const LAST = {FINAL:#x}; // flag: the last piece of a clip",
+            f"const SOUND = {STREAMS['audio'].kind}; // kind of a clip",
             "const KINDS = {",
             *kinds,
             "};",
-            f"const JSON_STREAMS = [{', '.join(json.dumps(name) for name in JSON_STREAMS)}];",
-            f"const ANSWERS = {{ {answers} }};",
+            f"export const JSON_STREAMS = [{', '.join(json.dumps(name) for name in JSON_STREAMS)}];",
+            f"export const ANSWERS = {{ {answers} }};",
             "",
         ]
     )

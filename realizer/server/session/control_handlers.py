@@ -52,13 +52,13 @@ class ControlHandlers:
             t: seconds on the session clock.
         """
         characters = self.player.characters
+        id = message.id if isinstance(message, SpeechMessage) else None
         try:
             self._handle(connection, message, t)
             return
         except ClipError as error:
-            answer = _error("clip", error, error.where)
+            answer = _error("clip", error, error.where, id)
         except FieldError as error:
-            id = message.id if isinstance(message, SpeechMessage) else None
             answer = _error("invalid", error, f"{message.type}.{error.where}", id)
         except FaceError as error:
             answer = _error("face", error, f"{message.type}.face")

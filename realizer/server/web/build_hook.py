@@ -13,6 +13,7 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 WEB = Path(__file__).resolve().parent
+CLIENT = WEB.parents[2] / "clients" / "javascript"
 STATIC = WEB.parent / "static"
 SHADER = WEB.parents[1] / "render" / "surface.glsl"  # the page draws by the formula of stills
 MARK = "sources.sha256"
@@ -62,8 +63,6 @@ def bundle() -> None:
         if done.returncode:
             raise RuntimeError(_failed(step, (done.stderr or done.stdout).strip()[-2000:]))
     shutil.copyfile(WEB / "index.html", STATIC / "index.html")
-    # Other pages import the client, so it stays readable.
-    shutil.copyfile(WEB / "src" / "realizer.js", STATIC / "realizer.js")
     (STATIC / MARK).write_text(_hash() + "\n", "utf-8")
 
 
@@ -87,6 +86,7 @@ def _current() -> bool:
 def _hash() -> str:
     digest = hashlib.sha256()
     own = [p for p in WEB.iterdir() if p.suffix in (".css", ".html", ".json")]
-    for path in sorted([*own, *(WEB / "src").iterdir(), SHADER]):
+    client = [CLIENT / "package.json", *(CLIENT / "src").iterdir()]
+    for path in [*sorted([*own, *(WEB / "src").iterdir()]), *sorted(client), SHADER]:
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()

@@ -4,7 +4,7 @@ import { at, choose, make, tabs } from "./dom.js";
 import { Editor } from "./editor.js";
 import { Log } from "./log.js";
 import { download, Pose } from "./pose.js";
-import { Clock, Realizer, Sound } from "./realizer.js";
+import { Clock, Realizer, Sound } from "bml-realizer-client";
 import { Recorder } from "./record.js";
 import { ActionUnits, Faps } from "./sliders.js";
 import { ask, token } from "./service.js";

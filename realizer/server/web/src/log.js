@@ -1,6 +1,6 @@
 // The feedback log: one line per message, the newest at the bottom; filtered lines are hidden.
 import { make } from "./dom.js";
-import { BMLA } from "./realizer.js";
+import { BMLA } from "bml-realizer-client";
 
 const MOST = 600; // lines
 

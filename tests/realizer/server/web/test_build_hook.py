@@ -41,6 +41,15 @@ def test_build_hook_keeps_a_bundle_of_these_sources(hook, monkeypatch) -> None:
     build(hook).initialize("standard", {})
 
 
+def test_build_hook_builds_again_after_a_change_of_the_client(hook, tmp_path, monkeypatch) -> None:
+    client = tmp_path / "client"
+    shutil.copytree(hook.CLIENT, client, ignore=shutil.ignore_patterns("node_modules"))
+    monkeypatch.setattr(hook, "CLIENT", client)
+    assert hook._current()
+    (client / "src" / "voice.js").write_text("")
+    assert not hook._current()
+
+
 @pytest.mark.parametrize("name", ["index.html", "style.css", "package-lock.json", "src/app.js"])
 def test_build_hook_builds_again_after_a_change(hook, monkeypatch, name) -> None:
     source = hook.WEB / name
@@ -75,12 +84,11 @@ def test_lock_file_names_no_host() -> None:
     assert "resolved" not in (HOOK.parent / "package-lock.json").read_text("utf-8")
 
 
-def test_bundle_copies_the_page_and_the_client_as_they_are(hook, tmp_path, monkeypatch) -> None:
+def test_bundle_copies_the_page_as_it_is(hook, tmp_path, monkeypatch) -> None:
     npm = tmp_path / "npm"
     npm.write_text("#!/bin/sh\nexit 0\n")
     npm.chmod(0o755)
     monkeypatch.setattr(hook.shutil, "which", lambda name: str(npm))
     hook.bundle()
-    for copied, source in (("index.html", "index.html"), ("realizer.js", "src/realizer.js")):
-        assert (hook.STATIC / copied).read_bytes() == (hook.WEB / source).read_bytes()
+    assert (hook.STATIC / "index.html").read_bytes() == (hook.WEB / "index.html").read_bytes()
     assert build(hook).dependencies() == []

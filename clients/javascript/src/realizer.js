@@ -1,42 +1,7 @@
-/**
- * A client of the BML realizer for web pages: it sends BML and receives feedback, frames and sound.
- *
- *   import { Realizer, Clock, Sound } from "http://127.0.0.1:8765/realizer.js";
- *
- *   const realizer = new Realizer({ session: "show" });
- *   realizer.onfeedback = (element) => console.log(element.outerHTML);
- *   realizer.connect();
- *   const { names } = await realizer.arkit({ fps: 30 }, (frame) => move(head, frame.values()));
- *   await realizer.play('<bml id="hello"><speech id="s"><text>Hello there.</text></speech></bml>');
- *
- * Sound, with the face on its clock:
- *
- *   const clock = new Clock();
- *   const sound = new Sound(clock);
- *   button.onclick = () => sound.start(); // browsers require a gesture
- *   await realizer.subscribe("audio", { rate: sound.rate }, (p) => sound.packet(p.time, p.values(), p.forget));
- *   realizer.subscribe("arkit", {}, (frame) => clock.heard(frame.time, performance.now() / 1000));
- *   // the session time to show now: sound.playhead() ?? clock.playhead(performance.now() / 1000)
- *
- * What the messages are: asyncapi.json beside this file.
- */
-
-// protocol: written by python -m tests.protocol
-/** Version of the protocol; a service that speaks another one refuses `hello`. */
-export const VERSION = 1;
-const HEADER = 16; // bytes: u8 kind, u8 version, u16 flags, u32 frame, f64 time
-const FORGET = 0x100; // flag: forget everything from this time on
-const KINDS = {
-  1: ["fap", Int32Array],
-  2: ["au", Float32Array],
-  3: ["video", Uint8Array],
-  4: ["audio", Int16Array],
-  5: ["mesh", Int16Array],
-  6: ["arkit", Float32Array],
-};
-const JSON_STREAMS = ["fap", "au", "arkit", "schedule"];
-const ANSWERS = { hello: "welcome", subscribe: "subscribed", state: "state", ping: "pong" };
-// end of protocol
+import { ANSWERS, JSON_STREAMS, RealizerError, frameOf, jsonFrameOf } from "./frames.js";
+import { WebSocket, parseXml } from "#platform";
+import { Playout } from "./playout.js";
+import { Voice, rateOf, samplesOf, timed } from "./voice.js";
 
 const AHEAD = 0.2; // s; frames that are sent so long before their time survive most delays
 export const BMLA = "http://www.asap-project.org/bmla"; // namespace of the states of blocks
@@ -45,16 +10,6 @@ const BLOCK = /<(?:\w+:)?bml\b[^<>]*?\sid\s*=\s*["']([^"'<>]+)["']/g;
 const COMMENT = /<!--[^]*?-->|<\?[^]*?\?>/g;
 const nothing = () => {};
 const keyOf = ({ stream, character, view }) => JSON.stringify([stream, character ?? "", view ?? ""]);
-
-/** Why the service refused a message; `code` and `where` are those of the message `error`. */
-export class RealizerError extends Error {
-  constructor(message, code = "connection", where = null) {
-    super(message);
-    this.name = "RealizerError";
-    this.code = code;
-    this.where = where;
-  }
-}
 
 /**
  * A connection that is restored automatically, with the feedback it missed and its streams.
@@ -87,15 +42,16 @@ export class Realizer {
 
   /**
    * @param {object} [options]
-   * @param {string} [options.url] of the service's WebSocket; default: the service of this file
+   * @param {string} [options.url] of the service's WebSocket; default: the service that this file comes from
    * @param {string} [options.token] the access token, if the service requires one
    * @param {string} [options.session] name of the session to join or create; default: a new, random name
    */
   constructor({ url, session, token } = {}) {
     this.url = new URL(url ?? new URL("ws", import.meta.url));
+    if (this.url.protocol === "file:") throw new TypeError("wanted the url of a service, such as ws://127.0.0.1:8765/ws, got none");
     if (this.url.protocol.startsWith("http")) this.url.protocol = this.url.protocol.replace("http", "ws");
     if (token) this.url.searchParams.set("token", token);
-    this.session = session ?? `page-${crypto.getRandomValues(new Uint32Array(2)).join("-")}`;
+    this.session = session ?? `js-${crypto.getRandomValues(new Uint32Array(2)).join("-")}`;
   }
 
   /** Whether the connection is open. */
@@ -103,9 +59,19 @@ export class Realizer {
     return this.socket?.readyState === WebSocket.OPEN;
   }
 
-  /** Connect, and reconnect until `close`. Requests made before the connection is open are sent then. */
+  /**
+   * Connect, and reconnect until `close`. Requests made before the connection is open are sent then.
+   * @returns {Promise<void>} resolves when the connection is open; rejects if the first attempt fails, though more
+   *   follow
+   */
   connect() {
     this.#closed = false;
+    const opened = new Promise((resolve, reject) => this.#open(resolve, reject));
+    opened.catch(nothing);
+    return opened;
+  }
+
+  #open(resolve = nothing, reject = nothing) {
     const url = new URL(this.url);
     url.searchParams.set("session", this.session);
     if (this.seen !== null) url.searchParams.set("seen", this.seen);
@@ -119,13 +85,16 @@ export class Realizer {
       }
       for (const { message } of this.#asked) if (message.type !== "subscribe") this.#post(message);
       for (const text of this.#unsent.splice(0)) this.send(text);
+      resolve();
       this.onopen();
     };
     socket.onmessage = (event) => this.#receive(event.data);
-    socket.onclose = () => {
+    socket.onerror = nothing; // `onclose` follows
+    socket.onclose = ({ reason }) => {
+      reject(new RealizerError(`no connection to ${this.url}${reason ? `: ${reason}` : ""}`));
       if (this.#closed) return;
       this.onlost();
-      setTimeout(() => this.#closed || this.connect(), 1000 * RETRY[Math.min(this.#tries++, RETRY.length - 1)]);
+      setTimeout(() => this.#closed || this.#open(), 1000 * RETRY[Math.min(this.#tries++, RETRY.length - 1)]);
     };
   }
 
@@ -198,6 +167,21 @@ export class Realizer {
     return this.subscribe("arkit", { ahead: AHEAD, ...options }, take);
   }
 
+  /** Subscribe to the vertices of a face, as int16. */
+  mesh(options = {}, take = nothing) {
+    return this.subscribe("mesh", options, take);
+  }
+
+  /** Subscribe to pictures, as files. */
+  pictures(options = {}, take = nothing) {
+    return this.subscribe("video", options, take);
+  }
+
+  /** Subscribe to sound: packets of 20 ms, mono int16. */
+  sound(options = {}, take = nothing) {
+    return this.subscribe("audio", options, take);
+  }
+
   /** End a stream; `view` is the name of a video's view. */
   unsubscribe(stream, character, view) {
     const key = keyOf({ stream, character, view });
@@ -216,9 +200,58 @@ export class Realizer {
     if (!bare.trim()) return Promise.reject(new RealizerError("wanted <bml>, got nothing", "refused"));
     const ids = [...bare.matchAll(BLOCK)];
     const end = this.ended(ids.length ? ids.at(-1)[1] : "<no id>");
-    if (this.open) this.send(text);
-    else this.#unsent.push(text);
+    this.#later(text);
     return end;
+  }
+
+  /** Send a message as soon as the connection is open. */
+  #later(message) {
+    if (this.open) this.send(message);
+    else this.#unsent.push(message);
+  }
+
+  /**
+   * Play a clip of any other voice, with lips.
+   * @param {Int16Array|Float32Array|ArrayBuffer|Uint8Array} sound PCM if there is a `rate`, else a WAV, FLAC, MP3, Ogg
+   *   or WebM file
+   * @param {object} [options] rate: samples a second of PCM. text: the words as plain text. words: [[seconds, word],
+   *   ...]. phonemes, visemes: [[start, end, name], ...]. Without any, lips are read from the sound. visemeSet,
+   *   language, character, composition: as in the message `speech`
+   * @returns {Promise<Element>} the feedback of the end; rejects if the sound is refused
+   */
+  say(sound, { rate, text, words, phonemes, visemes, visemeSet, ...opening } = {}) {
+    let pcm, description;
+    try {
+      if (rate !== undefined) pcm = samplesOf(sound);
+      else if (sound instanceof ArrayBuffer) pcm = new Uint8Array(sound);
+      else if (sound instanceof Uint8Array) pcm = sound;
+      else throw new TypeError("sound: wanted the bytes of a file, or samples and their `rate`");
+      const times = Object.entries({ words, phonemes, visemes }).filter(([, items]) => items);
+      description = Object.fromEntries(times.map(([name, items]) => [name, timed(name, items)]));
+      if (rate !== undefined) rateOf(rate);
+    } catch (error) {
+      return Promise.reject(error);
+    }
+    if (text !== undefined) description.text = text;
+    if (visemeSet !== undefined) description.viseme_set = visemeSet;
+    const voice = this.#voice(rate ?? 1, opening);
+    voice.clip(pcm, rate ?? 0, description);
+    voice.close();
+    return voice.ended();
+  }
+
+  /**
+   * Open a speech of any other voice whose sound comes in parts.
+   * @param {object} options rate: samples a second. id of the speech and of its block, language, character,
+   *   composition: as in the message `speech`
+   * @returns {Voice}
+   */
+  voice({ rate, ...opening } = {}) {
+    return this.#voice(rate, opening);
+  }
+
+  #voice(rate, { id = `say-${crypto.getRandomValues(new Uint32Array(1))}`, ...opening }) {
+    return new Voice(id, rate, opening, (message) => this.#later(message), this.ended(id));
   }
 
   /** Wait for the end of a block that was sent. */
@@ -245,6 +278,7 @@ export class Realizer {
       const stream = this.#streams.get(keyOf(message));
       if (stream) stream.streamInfo = { ...stream.streamInfo, ...message };
     }
+    if (message.type === "error" && /^(speech\b|clip:)/.test(message.where)) this.#refuse(message);
     this.#answer(message);
     this.onreply(message);
   }
@@ -276,13 +310,20 @@ export class Realizer {
     error ? reject(new RealizerError(message.message, message.code, message.where)) : resolve(message);
   }
 
+  /** Reject what waits for a speech whose message or clip (named SPEECH-NUMBER) the service has refused. */
+  #refuse({ id, where, code, message }) {
+    const speech = id ?? where.replace(/^clip:|-\d+$/g, "");
+    if (this.#awaited.has(speech)) this.send(JSON.stringify({ type: "speech", id: speech, close: true }));
+    this.#settle(speech, (one) => one.reject(new RealizerError(message, code, where)));
+  }
+
   #feedback(text) {
-    const element = new DOMParser().parseFromString(text, "text/xml").documentElement;
-    const seq = Number([...element.attributes].find((a) => a.localName === "seq")?.value);
+    const element = parseXml(text);
+    const seq = Number(Array.from(element.attributes).find((a) => a.localName === "seq")?.value);
     if (seq) this.seen = seq;
     const id = element.getAttribute("id");
     if (element.localName === "predictionFeedback") {
-      for (const block of element.children) {
+      for (const block of Array.from(element.getElementsByTagName("bml"))) {
         if (block.getAttributeNS(BMLA, "status") !== "IN_PREP") for (const one of this.#awaited.get(block.getAttribute("id")) ?? []) one.planned = true;
       }
     } else if (element.localName === "blockProgress" && id.endsWith(":end")) {
@@ -297,200 +338,5 @@ export class Realizer {
   #settle(id, how) {
     for (const one of this.#awaited.get(id) ?? []) how(one);
     this.#awaited.delete(id);
-  }
-}
-
-/**
- * Decode a binary message.
- * @returns {object} stream, kind, character (its index in `subscribed`), frame (its number), time (seconds
- *   on the session clock), forget (discard everything from this time on that was sent before), values(): a typed array;
- *   for a picture the bytes of its file
- */
-export function frameOf(buffer) {
-  const view = new DataView(buffer);
-  const kind = view.getUint8(0);
-  if (!(kind in KINDS)) throw new RealizerError(`wanted a frame of kind ${Object.keys(KINDS)}, got ${kind}`);
-  const [stream, Values] = KINDS[kind];
-  return {
-    stream,
-    kind,
-    character: view.getUint16(2, true) & 0xff,
-    forget: Boolean(view.getUint16(2, true) & FORGET),
-    frame: view.getUint32(4, true),
-    time: view.getFloat64(8, true),
-    values: () => new Values(buffer, HEADER),
-  };
-}
-
-function jsonFrameOf(message) {
-  return { stream: message.type, ...message, forget: Boolean(message.flush), values: () => message.values ?? [] };
-}
-
-/** Split a frame of a stream with `ahead` into frames of one row. */
-function rowsOf(frame) {
-  const { fps, names } = frame.streamInfo;
-  const values = frame.values();
-  const rows = frame.kind === undefined ? values : Array.from({ length: values.length / names.length }, (_, k) => values.subarray(k * names.length, (k + 1) * names.length));
-  return rows.map((row, k) => ({ ...frame, frame: frame.frame + k, time: (frame.frame + k) / fps, forget: false, values: () => row }));
-}
-
-/** Delay of what is shown behind the newest data, in seconds, so that late packets are not missed. */
-export const DELAY = 0.1;
-const MEMORY = 5; // s
-
-/** An estimate of the session clock: the frame with the least delay determines the offset. */
-export class Clock {
-  constructor() {
-    this.reset();
-  }
-
-  /** Start again, as after a new connection. */
-  reset() {
-    this.offsets = [];
-    this.offset = null;
-  }
-
-  /** Note that a frame of session time `time` arrived at `here`, both in seconds, on any local clock. */
-  heard(time, here) {
-    const offset = here - time;
-    while (this.offsets.length && this.offsets[0].here < here - MEMORY) this.offsets.shift();
-    while (this.offsets.length && this.offsets.at(-1).offset >= offset) this.offsets.pop();
-    this.offsets.push({ here, offset });
-    this.offset = this.offsets[0].offset;
-  }
-
-  /** The session time to show and play at `here`; null before the first frame. */
-  playhead(here) {
-    return this.offset === null ? null : here - this.offset - DELAY;
-  }
-}
-
-/** Passes on frames that arrive up to `ahead` seconds early, each at its time, and drops those that were taken back. */
-class Playout {
-  #ahead;
-  #take;
-  #clock = new Clock();
-  #frames = [];
-  #next = 0; // number of the first frame that was not passed on
-  #timer = null;
-
-  constructor(ahead, take) {
-    this.#ahead = ahead;
-    this.#take = take;
-  }
-
-  /** Drop everything, as after a new connection. */
-  reset() {
-    clearTimeout(this.#timer);
-    this.#clock.reset();
-    this.#frames = [];
-    this.#next = 0;
-  }
-
-  /** Add the rows of a frame, instead of those from its first one on. */
-  add(frame) {
-    const rows = rowsOf(frame);
-    this.#frames = this.#frames.filter((old) => old.frame < frame.frame);
-    this.#frames.push(...rows.filter((row) => row.frame >= this.#next));
-    // The last row of a message is sent `ahead` before its time.
-    this.#clock.heard(rows.at(-1).time - this.#ahead, performance.now() / 1000);
-    this.#play();
-  }
-
-  #play() {
-    clearTimeout(this.#timer);
-    const now = performance.now() / 1000 - this.#clock.offset;
-    while (this.#frames.length && this.#frames[0].time <= now) {
-      const frame = this.#frames.shift();
-      this.#next = frame.frame + 1;
-      this.#take(frame);
-    }
-    if (this.#frames.length) this.#timer = setTimeout(() => this.#play(), 1000 * (this.#frames[0].time - now));
-  }
-}
-
-const DRIFT = 0.02; // s; the anchor moves only in silence, and only by more than this
-
-/** Plays 20 ms packets without gaps. While it runs, the audio clock determines what is shown. */
-export class Sound {
-  /** Samples a second, for `subscribe`. */
-  rate = 22050;
-  /** Whether it was started and not muted. */
-  on = false;
-
-  constructor(clock) {
-    this.clock = clock;
-    this.context = null;
-    this.anchor = null; // audio time minus session time
-    this.playing = new Map(); // source -> session time
-  }
-
-  /** Start sound. Browsers allow it only after a gesture: call it from one. */
-  start() {
-    // A context at the packets' own rate: resampling each packet separately would click at its ends.
-    this.context ??= new AudioContext({ sampleRate: this.rate, latencyHint: "interactive" });
-    this.context.resume();
-    this.on = true;
-  }
-
-  /** Be silent until `start`. */
-  mute() {
-    this.on = false;
-    this.forget(-Infinity);
-    this.context?.suspend();
-  }
-
-  /** Start again, as after a new connection. */
-  reset() {
-    this.forget(-Infinity);
-    this.anchor = null;
-  }
-
-  /** Whether sound can be heard now. */
-  get running() {
-    return this.on && this.context?.state === "running";
-  }
-
-  /** Play a packet of the stream `audio`. */
-  packet(time, samples, forget) {
-    if (forget) this.forget(time);
-    if (!this.running || !samples.length) return;
-    this.align();
-    if (this.anchor === null) return;
-    const start = this.anchor + time;
-    if (start < this.context.currentTime) return; // too late to play
-    const buffer = this.context.createBuffer(1, samples.length, this.rate);
-    const channel = buffer.getChannelData(0);
-    for (let i = 0; i < samples.length; i++) channel[i] = samples[i] / 32768;
-    const source = new AudioBufferSourceNode(this.context, { buffer });
-    source.connect(this.context.destination);
-    source.onended = () => this.playing.delete(source);
-    source.start(start);
-    this.playing.set(source, time);
-  }
-
-  /** Cancel the sound from a session time on. */
-  forget(time) {
-    for (const [source, start] of this.playing) {
-      if (start < time) continue;
-      source.stop();
-      this.playing.delete(source);
-    }
-  }
-
-  /** The session time that is audible now; null if sound is off: then use the Clock. */
-  playhead() {
-    if (!this.running) return null;
-    this.align();
-    return this.anchor === null ? null : this.context.currentTime - this.anchor - (this.context.outputLatency || 0);
-  }
-
-  align() {
-    const target = this.clock.playhead(performance.now() / 1000);
-    if (target === null || this.playing.size) return;
-    const anchor = this.context.currentTime - target;
-    if (this.anchor !== null && Math.abs(anchor - this.anchor) < DRIFT) return;
-    // On the sample grid, so that packets join without a click.
-    this.anchor = Math.round(anchor * this.rate) / this.rate;
   }
 }

@@ -1,0 +1,147 @@
+/** Version of the protocol. */
+export const VERSION: number;
+/** Namespace of the states of blocks in feedback. */
+export const BMLA: string;
+/** Delay of what is shown behind the newest data, in seconds. */
+export const DELAY: number;
+
+/** Why the service refused a message, or why there is no connection. */
+export class RealizerError extends Error {
+  /** As in the message `error`; "refused" for a block, "connection" for the connection. */
+  code: string;
+  /** Message type and field, or block. */
+  where: string | null;
+}
+
+/** What `subscribed` and `changed` say of a stream, such as `names` and `fps`. */
+export interface StreamInfo {
+  index: number;
+  names?: string[];
+  fps?: number;
+  rate?: number;
+  [field: string]: unknown;
+}
+
+/** A frame of a stream; `A` is the array of its values. */
+export interface Frame<A = ArrayLike<number>> {
+  stream: "fap" | "au" | "arkit" | "mesh" | "video" | "audio" | "schedule";
+  /** Number of the binary message; none in JSON. */
+  kind?: number;
+  /** Index of the character in binary frames, its id in JSON. */
+  character: number | string;
+  frame: number;
+  /** Seconds on the session clock. */
+  time: number;
+  /** Discard everything from this time on that was sent before. */
+  forget: boolean;
+  values(): A;
+  streamInfo: StreamInfo;
+}
+
+export interface SubscribeOptions {
+  encoding?: "binary" | "json" | "text";
+  fps?: number;
+  character?: string;
+  /** Seconds before their time that frames are sent, 0 to 2. */
+  ahead?: number;
+  [field: string]: unknown;
+}
+
+/** FAPU; 68 values. */
+export type FapFrame = Frame<Int32Array>;
+/** 0 to 1. */
+export type AuFrame = Frame<Float32Array>;
+/** Weights 0 to 1, and rotations. */
+export type ArkitFrame = Frame<Float32Array>;
+/** The place of each vertex in 65535ths of the face's scale. */
+export type MeshFrame = Frame<Int16Array>;
+/** Bytes of a JPEG, PNG or WebP file. */
+export type PictureFrame = Frame<Uint8Array>;
+/** Mono samples. */
+export type SoundFrame = Frame<Int16Array>;
+
+export type Pcm = Int16Array | Float32Array | ArrayBuffer | Uint8Array;
+/** [seconds, text], [start, end, text] or an object. */
+export type Timed = readonly [number, string] | readonly [number, number, string] | { start: number; end?: number; text: string };
+
+export interface SpeechOptions {
+  language?: string;
+  character?: string;
+  composition?: "MERGE" | "APPEND" | "REPLACE";
+  id?: string;
+}
+
+export interface SayOptions extends SpeechOptions {
+  /** Samples a second of PCM; without it the sound is a file. */
+  rate?: number;
+  text?: string;
+  words?: readonly Timed[];
+  /** In IPA. */
+  phonemes?: readonly Timed[];
+  visemes?: readonly Timed[];
+  visemeSet?: "oculus" | "mpeg4" | "sapi" | "polly";
+}
+
+/** A speech whose sound comes in parts. */
+export class Voice {
+  readonly id: string;
+  write(pcm: Pcm): void;
+  words(words: readonly Timed[]): void;
+  close(): void;
+  stop(): void;
+  ended(): Promise<Element>;
+}
+
+export class Realizer {
+  constructor(options?: { url?: string | URL; token?: string; session?: string });
+  readonly url: URL;
+  readonly session: string;
+  readonly open: boolean;
+  seen: number | null;
+  socket: WebSocket | null;
+  onopen: () => void;
+  onlost: () => void;
+  onfeedback: (element: Element, seq: number) => void;
+  onreply: (message: { type: string; [field: string]: unknown }) => void;
+  onframe: (frame: Frame) => void;
+  connect(): Promise<void>;
+  close(): void;
+  send(message: string | Uint8Array): void;
+  ask(message: { type: string; [field: string]: unknown }): Promise<Record<string, unknown> | null>;
+  play(bml: string): Promise<Element>;
+  ended(block: string): Promise<Element>;
+  say(sound: Pcm, options?: SayOptions): Promise<Element>;
+  voice(options: SpeechOptions & { rate: number }): Voice;
+  subscribe(stream: string, options?: SubscribeOptions, take?: (frame: Frame) => void): Promise<StreamInfo>;
+  unsubscribe(stream: string, character?: string, view?: string): void;
+  faps(options?: SubscribeOptions, take?: (frame: FapFrame) => void): Promise<StreamInfo>;
+  aus(options?: SubscribeOptions, take?: (frame: AuFrame) => void): Promise<StreamInfo>;
+  arkit(options?: SubscribeOptions, take?: (frame: ArkitFrame) => void): Promise<StreamInfo>;
+  mesh(options?: SubscribeOptions, take?: (frame: MeshFrame) => void): Promise<StreamInfo>;
+  pictures(options?: SubscribeOptions, take?: (frame: PictureFrame) => void): Promise<StreamInfo>;
+  sound(options?: SubscribeOptions, take?: (frame: SoundFrame) => void): Promise<StreamInfo>;
+}
+
+/** Decode a binary message. */
+export function frameOf(buffer: ArrayBuffer): Frame;
+
+/** An estimate of the session clock. */
+export class Clock {
+  reset(): void;
+  heard(time: number, here: number): void;
+  playhead(here: number): number | null;
+}
+
+/** Plays packets of the stream `audio` in a page. */
+export class Sound {
+  constructor(clock: Clock);
+  rate: number;
+  on: boolean;
+  readonly running: boolean;
+  start(): void;
+  mute(): void;
+  reset(): void;
+  packet(time: number, samples: Int16Array, forget?: boolean): void;
+  forget(time: number): void;
+  playhead(): number | null;
+}

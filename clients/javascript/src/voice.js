@@ -1,0 +1,138 @@
+// Speech of any other voice: sound that is sent in clips, with or without the times of its words.
+import { RealizerError, packClip } from "./frames.js";
+
+const PIECE = 0.2; // s; a clip without words is sent in pieces of this length, the first of which starts the speech
+const LONGEST = 1 << 20; // bytes of a message
+const nothing = () => {};
+
+/** A speech that is sent as sound comes; `Realizer.voice` opens one. */
+export class Voice {
+  #send; // sends text or bytes
+  #opening; // fields of the first message
+  #ended;
+  #rate;
+  #samples = []; // Int16Arrays that are not sent
+  #waiting = 0; // samples in them
+  #sent = 0; // samples that are
+  #words = []; // { start, text } of the speech that are not sent
+  #timed = false; // whether there were any
+  #clips = 0;
+  #closed = false;
+
+  /**
+   * @param {string} id of the speech and of its block
+   * @param {number} rate samples a second
+   * @param {object} opening composition, character, language of the message `speech`
+   * @param {Promise<Element>} ended
+   */
+  constructor(id, rate, opening, send, ended) {
+    this.id = id;
+    this.#rate = rateOf(rate);
+    this.#opening = opening;
+    this.#send = send;
+    this.#ended = ended;
+    this.#ended.catch(nothing);
+  }
+
+  /**
+   * Add mono sound, which begins to be spoken at once. Give the words of a sound before it.
+   * @param {Int16Array|Float32Array|ArrayBuffer|Uint8Array} pcm samples; bytes are little-endian int16
+   */
+  write(pcm) {
+    if (this.#closed) throw new RealizerError(`the speech ${this.id} is closed: nothing can follow`, "refused");
+    const samples = samplesOf(pcm);
+    this.#samples.push(samples);
+    this.#waiting += samples.length;
+    // A clip with words ends where a word begins, because the end of the last one is not known yet.
+    const starts = this.#words.map(({ start }) => Math.round(start * this.#rate) - this.#sent);
+    const ready = this.#timed ? (starts.findLast((start) => start <= this.#waiting) ?? 0) : this.#waiting;
+    if (ready >= PIECE * this.#rate) this.#flush(ready);
+  }
+
+  /**
+   * Add words: [[seconds from the start of the speech, word], ...], in order.
+   */
+  words(words) {
+    this.#words.push(...timed("words", words));
+    this.#timed ||= this.#words.length > 0;
+  }
+
+  /** End the speech; what was written is spoken. Closing again does nothing. */
+  close() {
+    if (this.#closed) return;
+    if (this.#waiting) this.#flush(this.#waiting);
+    this.#closed = true;
+    this.#speech({ close: true });
+  }
+
+  /** Stop speaking at once. */
+  stop() {
+    this.#closed = true;
+    this.#send(JSON.stringify({ type: "stop", blocks: [this.id] }));
+  }
+
+  /** Wait for the end: resolves with its feedback, which has `said` if it was interrupted; rejects if it is refused. */
+  ended() {
+    return this.#ended;
+  }
+
+  /** Send so many samples as a clip, with the words that begin in it. */
+  #flush(count) {
+    const joined = new Int16Array(this.#waiting);
+    let at = 0;
+    for (const part of this.#samples) {
+      joined.set(part, at);
+      at += part.length;
+    }
+    this.#samples = count < joined.length ? [joined.subarray(count)] : [];
+    this.#waiting -= count;
+    const begin = this.#sent / this.#rate;
+    this.#sent += count;
+    const inside = this.#words.filter(({ start }) => Math.round(start * this.#rate) < this.#sent);
+    this.#words = this.#words.slice(inside.length);
+    const words = inside.map(({ start, text }) => ({ start: Math.max(0, start - begin), text }));
+    this.clip(joined.subarray(0, count), this.#rate, words.length ? { words } : {});
+  }
+
+  /** Send a clip, and append it to the speech, with the fields of `speech` that describe it. */
+  clip(sound, rate, description) {
+    const id = `${this.id}-${this.#clips++}`;
+    const bytes = new Uint8Array(sound.buffer, sound.byteOffset, sound.byteLength);
+    for (let at = 0, number = 0; at < Math.max(1, bytes.length); at += LONGEST, number++) {
+      this.#send(packClip({ id, number, rate, sound: bytes.subarray(at, at + LONGEST), final: at + LONGEST >= bytes.length }));
+    }
+    this.#speech({ clip: id, ...description });
+  }
+
+  #speech(fields) {
+    this.#send(JSON.stringify({ type: "speech", id: this.id, ...this.#opening, ...fields }));
+    this.#opening = {};
+  }
+}
+
+/** Return { start, end?, text } of words, phonemes or visemes that are [seconds, text] or [start, end, text]. */
+export function timed(name, items) {
+  return Array.from(items, (item, k) => {
+    const fields = Array.isArray(item) ? item : [item?.start, item?.end, item?.text];
+    const [start, end, text] = fields.length === 2 ? [fields[0], undefined, fields[1]] : fields;
+    if (!(start >= 0) || typeof text !== "string") {
+      throw new TypeError(`${name}[${k}]: wanted [seconds, text] or [start, end, text], got ${JSON.stringify(item)}`);
+    }
+    return { start, ...(end === undefined ? {} : { end }), text };
+  });
+}
+
+/** Return mono samples as Int16Array. */
+export function samplesOf(pcm) {
+  if (pcm instanceof Int16Array) return pcm;
+  if (pcm instanceof Float32Array) return Int16Array.from(pcm, (x) => Math.round(Math.max(-1, Math.min(1, x)) * 32767));
+  const bytes = pcm instanceof ArrayBuffer ? new Uint8Array(pcm) : pcm;
+  if (!(bytes instanceof Uint8Array)) throw new TypeError("sound: wanted Int16Array, Float32Array, or bytes of int16 samples");
+  if (bytes.length % 2) throw new TypeError(`sound: wanted samples of two bytes, got ${bytes.length} bytes`);
+  return new Int16Array(bytes.slice().buffer);
+}
+
+export function rateOf(rate) {
+  if (!Number.isInteger(rate) || rate <= 0) throw new TypeError(`rate: wanted samples a second, got ${rate}`);
+  return rate;
+}

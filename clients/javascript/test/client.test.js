@@ -1,0 +1,120 @@
+// The client against a real service, whose address is REALIZER_URL; tests/clients/test_javascript.py starts one.
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { Realizer, RealizerError, frameOf } from "bml-realizer-client";
+
+const url = process.env.REALIZER_URL ?? "ws://127.0.0.1:8765/ws";
+const NOD = (id) => `<bml id="${id}"><head id="n" lexeme="NOD"/></bml>`;
+const RATE = 16000;
+const tone = (seconds) => Int16Array.from({ length: seconds * RATE }, (_, k) => 9000 * Math.sin(k * 0.06));
+let realizer;
+
+before(async () => {
+  realizer = new Realizer({ url });
+  await realizer.connect();
+});
+after(() => realizer.close());
+
+test("play resolves with the end of the block", async () => {
+  assert.equal((await realizer.play(NOD("a"))).getAttribute("id"), "a:end");
+});
+
+test("play rejects a block that is refused", async () => {
+  await assert.rejects(realizer.play("<bml id='b'><nonsense"), RealizerError);
+});
+
+test("connect rejects without a service", async () => {
+  const lost = new Realizer({ url: "ws://127.0.0.1:1/ws" });
+  await assert.rejects(lost.connect(), { code: "connection" });
+  lost.close();
+});
+
+test("Realizer needs an address outside of pages", () => {
+  assert.throws(() => new Realizer(), /wanted the url/);
+});
+
+test("faps passes on frames of 68 values one by one", async () => {
+  const info = await new Promise((resolve, reject) => {
+    const frames = [];
+    realizer.faps({ fps: 50 }, (frame) => frames.push(frame) === 10 && resolve(frames)).catch(reject);
+  });
+  assert.deepEqual(info.map((frame) => frame.values().length), Array(10).fill(68));
+  assert.deepEqual(info.map((frame) => frame.frame - info[0].frame), [...Array(10).keys()]);
+  realizer.unsubscribe("fap");
+});
+
+test("subscribe rejects an unknown stream", async () => {
+  await assert.rejects(realizer.subscribe("smell"), { code: "unsupported" });
+});
+
+test("say plays a clip with the times of its words", async () => {
+  const end = await realizer.say(tone(0.6), { rate: RATE, words: [[0.05, "Hello"], [0.3, "there"]], id: "hello" });
+  assert.equal(end.getAttribute("id"), "hello:end");
+});
+
+test("say plays a clip of which nothing else is known", async () => {
+  assert.match((await realizer.say(tone(0.4), { rate: RATE })).getAttribute("id"), /^say-\d+:end$/);
+});
+
+test("say rejects sound that is no file", async () => {
+  await assert.rejects(realizer.say(new Uint8Array([1, 2, 3])), { code: "clip" });
+});
+
+test("say rejects words whose times go back", async () => {
+  const words = [[0.3, "there"], [0.05, "Hello"]];
+  await assert.rejects(realizer.say(tone(0.6), { rate: RATE, words }), { where: "speech.words" });
+});
+
+test("say rejects what is no sound and no word", async () => {
+  await assert.rejects(realizer.say("hello"), TypeError);
+  await assert.rejects(realizer.say(tone(0.1), { rate: 0.5 }), /rate: wanted samples a second/);
+  await assert.rejects(realizer.say(tone(0.1), { rate: RATE, words: ["Hello"] }), /words\[0\]: wanted/);
+});
+
+test("voice speaks while its sound comes", async () => {
+  const voice = realizer.voice({ rate: RATE, id: "v" });
+  voice.write(tone(0.3));
+  const started = new Promise((resolve) => (realizer.onfeedback = (e) => e.getAttribute("id") === "v:start" && resolve()));
+  await started; // before the rest is there
+  voice.write(tone(0.3));
+  voice.close();
+  assert.equal((await voice.ended()).getAttribute("id"), "v:end");
+  assert.throws(() => voice.write(tone(0.1)), /closed/);
+});
+
+test("voice sends words with the sound that they begin in", async () => {
+  const starts = [];
+  realizer.onfeedback = (e) => starts.push(e.getAttribute("id"));
+  const voice = realizer.voice({ rate: RATE, id: "w" });
+  voice.words([[0.05, "one"], [0.35, "two"], [0.65, "three"]]);
+  for (let k = 0; k < 5; k++) voice.write(tone(0.2));
+  voice.close();
+  await voice.ended();
+  // Cut where "two" and "three" begin.
+  assert.deepEqual(starts.filter((id) => /^w\.\d+:start$/.test(id)), ["w.1:start", "w.2:start", "w.3:start"]);
+});
+
+test("voice is silent after stop", async () => {
+  const voice = realizer.voice({ rate: RATE, id: "x" });
+  voice.write(tone(5));
+  await new Promise((resolve) => (realizer.onfeedback = (e) => e.getAttribute("id") === "x:start" && resolve()));
+  voice.stop();
+  assert.ok((await voice.ended()).toString().includes("INTERRUPTED"));
+});
+
+test("frameOf refuses an unknown kind", () => {
+  assert.throws(() => frameOf(new Uint8Array(16).fill(99).buffer), /wanted a frame of kind/);
+});
+
+test("a connection that is lost is restored with its streams", async () => {
+  const frames = [];
+  await realizer.aus({}, (frame) => frames.push(frame));
+  const opened = new Promise((resolve) => (realizer.onopen = resolve));
+  realizer.socket.close();
+  await opened;
+  frames.length = 0;
+  await new Promise((resolve) => {
+    const timer = setInterval(() => frames.length && (clearInterval(timer), resolve()), 20);
+  });
+  assert.equal((await realizer.play(NOD("again"))).getAttribute("id"), "again:end");
+});
