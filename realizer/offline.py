@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
@@ -12,15 +14,16 @@ from realizer.behaviours.registry import VOCABULARY
 from realizer.core.options import DEFAULTS, PlayOptions
 from realizer.playback.player import Player
 from realizer.playback.speaking import open_voice, submit_with_speech
-from realizer.realization import Realization
+from realizer.result import Realization
 from realizer.scheduling.timing import Schedule
+from realizer.sources import Source, documents_of, first_error
 from realizer.speech.utterance import Voice
 
 
 def realize(
-    documents: str | bytes | Iterable[str | bytes],
+    source: Source | Iterable[Source],
     *,
-    face: str = "default",
+    face: str | Path = "default",
     deformer: str | None = None,
     fps: float = 25.0,
     voice: Voice | str | None = None,
@@ -29,34 +32,38 @@ def realize(
     idle: bool = True,
     liveliness: float = 1.0,
     language: str = "en-US",
-    media: Path | None = None,
-    expressions: Path | None = None,
+    media: Path | str | None = None,
+    expressions: Path | str | None = None,
     cooccurrence: str = "on",
     prosody: bool = True,
     jaw: float = 1.0,
     lips: float = 1.0,
-    mapping: Path | None = None,
+    mapping: Path | str | None = None,
     grace: float = 0.5,
     max_planning: int = DEFAULTS.max_planning,
     strict_bml: bool = False,
 ) -> Realization:
-    """Play BML documents from start to end, without a clock.
+    """Play documents or texts from start to end, without a clock.
 
     Args:
-        documents: BML text, or several texts; all are submitted at t = 0, in order.
+        source: BML, a text to speak, a file, or a list of these, which are submitted at 0 s, in order. A
+            string that ends in .bml, .xml or .txt or holds a path separator is the name of a file; any other
+            string, or bytes, without "<" are spoken.
         voice: a voice or its name; None for espeak-ng, or the silent voice if that is not installed.
         face, deformer, fps, scene, seed, idle, liveliness, language, media, expressions, cooccurrence,
             prosody, jaw, lips, mapping, grace, max_planning, strict_bml: as in
             `realizer.core.options.PlayOptions`.
 
     Raises:
-        FaceError: no such face.
+        BMLError: no document of the source can be read; with line and path.
+        FileNotFoundError: there is no such file or folder.
+        TypeError: the source or an option has another type.
+        ValueError: there is no such face or voice, or a number is out of its range.
         TableError: a file of rules, a mapping or an expression that cannot be used.
-        ValueError: `fps` is not a number above 0, or `liveliness` not one from 0 to 1.
         VoiceError: the named voice is not installed.
     """
     options = PlayOptions(
-        face=face,
+        face=str(face) if isinstance(face, Path) else face,
         deformer=deformer,
         fps=fps,
         scene=scene,
@@ -64,36 +71,70 @@ def realize(
         idle=idle,
         liveliness=liveliness,
         language=language,
-        media=media,
-        expressions=expressions,
-        cooccurrence=cooccurrence,
+        media=_existing(media),
+        expressions=_existing(expressions),
+        cooccurrence=cooccurrence if cooccurrence in ("on", "off") else _file(cooccurrence),
         prosody=prosody,
         jaw=jaw,
         lips=lips,
-        mapping=mapping,
+        mapping=_existing(mapping),
         grace=grace,
         max_planning=max_planning,
         strict_bml=strict_bml,
     )
-    texts = [documents] if isinstance(documents, str | bytes) else documents
-    return pipeline.play(texts, options, voice)
+    documents = documents_of(source)
+    played = pipeline.play([document.bml for document in documents], options, _checked(voice))
+    if not played.schedules:
+        raise first_error(documents, VOCABULARY, strict_bml=strict_bml)
+    return Realization.of(played)
 
 
 def schedule(
-    document: str | bytes,
+    source: Source,
     *,
     voice: Voice | str | None = None,
     scene: Mapping[str, Position] | None = None,
-    media: Path | None = None,
+    media: Path | str | None = None,
     strict_bml: bool = False,
 ) -> Schedule:
     """Return the sync times of one BML document, without animation.
 
+    Args:
+        source: BML, a text to speak, or a file, as in `realize`.
+
     Raises:
-        BMLError: the text has no valid document; with line and path.
-        VoiceError: the named voice is not installed.
+        BMLError: there is no valid document; with line and path.
+        FileNotFoundError, TypeError, ValueError, VoiceError: as `realize`.
     """
-    player = Player(PlayOptions(scene=scene, media=media), animates=False)
-    block = parse(document, VOCABULARY, strict_bml=strict_bml)
-    with open_voice(voice) as speaker:
+    options = PlayOptions(scene=scene, media=_existing(media), strict_bml=strict_bml)
+    documents = documents_of(source)
+    if len(documents) > 1:
+        raise ValueError(f"source: wanted one document, got {len(documents)}")
+    block = parse(documents[0].bml, VOCABULARY, strict_bml=strict_bml)
+    player = Player(options, animates=False)
+    with open_voice(_checked(voice)) as speaker:
         return submit_with_speech(player, block, speaker)
+
+
+def _existing(path: Path | str | None) -> Path | None:
+    """Return a path that exists.
+
+    Raises:
+        FileNotFoundError: it does not; TypeError: it is none.
+    """
+    if path is None or not isinstance(path, Path | str):
+        return path  # PlayOptions refuses what is no path
+    if not Path(path).exists():
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
+    return Path(path)
+
+
+def _file(path: str) -> str:
+    _existing(path)
+    return path
+
+
+def _checked(voice: Voice | str | None) -> Voice | str | None:
+    if not (voice is None or isinstance(voice, str) or callable(getattr(voice, "say", None))):
+        raise TypeError(f"voice: wanted the name of a voice, or a voice with a method `say`, got {voice!r}")
+    return voice

@@ -19,6 +19,7 @@ from realizer.core.errors import RealizerError
 from realizer.core.options import PlayOptions
 from realizer.core.units import frame_count
 from realizer.playback.audio_mix import render_utterance
+from realizer.playback.block_store import BlockStore
 from realizer.playback.player import Player
 from realizer.playback.scheduled_speech import SPEECH_FADE, ScheduledSpeech
 from realizer.scheduling.timing import Schedule, Warning
@@ -62,6 +63,7 @@ class Realization:
         deformer: "mpeg4" or "au", the deformer of that face; None for the face's own choice.
         mapping: the mapping of its AUs to FAPs.
         face_changes: the faces of the first character, in order, if it changes.
+        blocks: the blocks as they were played, if they are known.
         characters: character id (None: unnamed) -> its frames, the first character first.
         schedules: one per accepted or failed block, in the order of submission.
         feedback_events: BML feedback, in order.
@@ -82,6 +84,7 @@ class Realization:
     deformer: str | None = None
     mapping: FapMapping = field(default_factory=standard)
     face_changes: tuple[FaceChange, ...] = ()
+    blocks: BlockStore | None = field(default=None, repr=False)
 
     @property
     def has_content(self) -> bool:
@@ -244,6 +247,7 @@ def realization_of(
         speeches=player.speech(),
         deformer=options.deformer,
         mapping=mapping,
+        blocks=player.blocks,
     )
 
 

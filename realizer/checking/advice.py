@@ -219,4 +219,4 @@ def advise_on_behaviours(
         label = Label(source.locate(path, line=line, block=block.id))
         id = f"{block.id}:{advice.id}" if advice.id else block.id
         text, notes = f"{advice.text}; {advice.hint}", (f"help: {advice.hint}",)
-        yield Finding(file, ADVICE, id, path, text, advice.text, (label,), notes)
+        yield Finding(file, ADVICE, id, path, text, advice.text, (label,), notes, advice.is_impossible)

@@ -30,6 +30,7 @@ class Finding:
         head: shorter text for use with labels and notes.
         labels: marked places; the first primary one gives line and column of the finding.
         notes: sentences below the source, such as "help: did you mean ...?".
+        is_impossible: whether it is advice about a length that was never observed.
     """
 
     file: str
@@ -40,11 +41,39 @@ class Finding:
     head: str
     labels: tuple[Label, ...] = ()
     notes: tuple[str, ...] = ()
+    is_impossible: bool = False
 
     @property
     def spot(self) -> Spot | None:
         first = next((label for label in self.labels if label.primary), None)
         return first.spot if first else None
+
+    @property
+    def line(self) -> int | None:
+        """The line of the fault, from 1, or None if it has no place."""
+        return self.spot.line if self.spot else None
+
+    @property
+    def column(self) -> int | None:
+        """The column of the fault, from 1, or None if it has no place."""
+        return self.spot.column if self.spot else None
+
+    @property
+    def help(self) -> str:
+        """The suggestions, such as "did you mean ...?", or ""."""
+        return " ".join(note.removeprefix("help: ") for note in self.notes if note.startswith("help: "))
+
+    def __str__(self) -> str:
+        """Return `file:line:column: TYPE id: line N, path: text`, on one line."""
+        return self.one_line(self.text)
+
+    def one_line(self, text: str) -> str:
+        """Return the finding on one line, with another text."""
+        spot = self.spot
+        at = f":{spot.line}:{spot.column}" if spot else ""
+        where = ", ".join(filter(None, (f"line {spot.line}" if spot else "", self.path)))
+        words = " ".join(text.split())
+        return f"{self.file}{at}: {self.type} {self.id}: {f'{where}: ' if where else ''}{words}"
 
 
 @dataclass

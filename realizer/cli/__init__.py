@@ -11,7 +11,7 @@ import click
 
 import realizer
 from realizer.cli import options
-from realizer.core.errors import RealizerError, TableError
+from realizer.core.errors import RealizerError, TableError, UnknownNameError
 
 __all__ = ["main"]
 
@@ -79,7 +79,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     except RealizerError as error:
         click.echo(f"realizer: {error}", err=True)
         # A TableError is in a file of the user: rules, a mapping, words.
-        sys.exit(2 if isinstance(error, TableError) else 3)
+        sys.exit(2 if isinstance(error, TableError | UnknownNameError) else 3)
     except OSError as error:
         click.echo(
             f"realizer: {error.filename or ''}: {error.strerror or error}".replace(" : ", " "), err=True

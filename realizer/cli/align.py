@@ -37,7 +37,7 @@ def align(audio: Path, text: str, language: str, aligner: str | None, output: Pa
 
     options.check_suffix(output, ".json", ".vtt")
     if text.startswith("@"):
-        (content,) = options.read_documents([text[1:]])
+        content = options.read_file(text[1:])
         text = options.decode(content, text[1:], "a text")
     recording = read_sound(audio.read_bytes())
     alignment = find_words(recording.pcm, recording.rate, text, language, aligner=aligner)  # type: ignore[arg-type]

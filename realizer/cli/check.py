@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import sys
+from dataclasses import replace
 from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,13 +13,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from realizer.cli import options
-from realizer.cli.enrich import language, languages_in, mood, role, warn_unknown_languages, words, words_for
+from realizer.cli.enrich import language, mood, role, warn_unknown_languages, words, words_for
 from realizer.cli.timeline import SUFFIXES, advice_on, faults_in
 
 if TYPE_CHECKING:
     from realizer.tables.knowledge import Mood, Role
 
-MAX_ADVICE = 20  # per block: one mistake is often repeated all over a document
+
+IMPOSSIBLE = "IMPOSSIBLE_LENGTH"  # type of faults by --limit
 
 
 @click.command()
@@ -36,6 +38,11 @@ MAX_ADVICE = 20  # per block: one mistake is often repeated all over a document
     default=None,
     help="Show the source with marks and help, or one line per fault.  [default: --long on a terminal]",
 )
+@click.option(
+    "--limit",
+    is_flag=True,
+    help="Count expressions that are shorter or longer than was ever observed as faults, not as advice.",
+)
 @click.pass_context
 def check(
     context: click.Context,
@@ -49,6 +56,7 @@ def check(
     language: str | None,
     words: Path | None,
     long: bool | None,
+    limit: bool,
 ) -> int:
     """Explain every fault of documents, with line, column and path.
 
@@ -65,14 +73,16 @@ def check(
     from realizer.checking.advice import advice, advise_on_behaviours
     from realizer.checking.document import check_document
     from realizer.checking.finding import Finding
-    from realizer.cli.diagnostics import one_line, render
+    from realizer.checking.source import MAX_ADVICE
+    from realizer.cli.diagnostics import render
+    from realizer.enrichment import languages_in
 
     long = sys.stdout.isatty() if long is None else long
     width = shutil.get_terminal_size((100, 24)).columns
 
     def show(finding: Finding, source: Source, *, err: bool = False) -> None:
         stream = sys.stderr if err else sys.stdout
-        text = render(finding, source, width=width) + "\n" if long else one_line(finding)
+        text = render(finding, source, width=width) + "\n" if long else str(finding)
         click.echo(text, err=err, color=_is_coloured(stream))
 
     for stream in (sys.stdout, sys.stderr):
@@ -83,8 +93,8 @@ def check(
     faults = 0
     warned: set[str] = set()
     for name, text in zip(documents, options.read_documents(documents), strict=True):
-        if Path(name).suffix.lower() in SUFFIXES:
-            faults += _check_timeline(name, text, chosen.expressions, role, mood)
+        if Path(name).suffix.lower() in SUFFIXES and isinstance(text, bytes):
+            faults += _check_timeline(name, text, chosen.expressions, (role, mood), limit)
             continue
         # Each file has a player of its own, so that reports are independent.
         player = options.planning_player(chosen, scene)
@@ -95,14 +105,21 @@ def check(
             found += len(part.findings)
             for finding in part.findings:
                 show(finding, source)
-            if part.block is not None and part.schedule is not None and not options.is_quiet():
+            if part.block is not None and part.schedule is not None and (limit or not options.is_quiet()):
                 slips = advice(name, source, part.block, part.schedule, player)
-                unusual = advise_on_behaviours(
-                    name, source, part.block, part.schedule, part.utterances, role, mood, lists
+                unusual = list(
+                    advise_on_behaviours(
+                        name, source, part.block, part.schedule, part.utterances, role, mood, lists
+                    )
                 )
                 if context.obj["verbose"]:
                     warn_unknown_languages(lists, languages_in(part.block, lists), warned)
-                for finding in islice(chain(slips, unusual), MAX_ADVICE):
+                impossible = [finding for finding in unusual if limit and finding.is_impossible]
+                found += len(impossible)
+                for finding in impossible:
+                    show(replace(finding, type=IMPOSSIBLE), source)
+                hints = chain(slips, (finding for finding in unusual if finding not in impossible))
+                for finding in () if options.is_quiet() else islice(hints, MAX_ADVICE):
                     show(finding, source, err=True)
         if not found:
             options.note(f"{name}: no fault in {blocks} block{'s' * (blocks != 1)}")
@@ -110,16 +127,20 @@ def check(
     return 1 if faults else 0
 
 
-def _check_timeline(name: str, text: bytes, folder: Path | None, role: Role, mood: Mood | None) -> int:
+def _check_timeline(
+    name: str, text: bytes, folder: Path | None, who: tuple[Role, Mood | None], limit: bool
+) -> int:
     """Print the faults of a timeline, or advice if it has none, and return the number of faults."""
     from realizer.expressions.library import library_of
 
     library = library_of(folder)
     faults = faults_in(text, library)
+    if limit and not faults:
+        faults = [f"{IMPOSSIBLE} {fault}" for fault in advice_on(text, library, *who, impossible=True)]
     for fault in faults:
         click.echo(f"{name}: {fault}")
     if not faults and not options.is_quiet():
-        for advice in advice_on(text, library, role, mood):
+        for advice in advice_on(text, library, *who):
             options.note(f"{name}: ADVICE {advice}")
         options.note(f"{name}: no fault in this timeline")
     return len(faults)

@@ -22,7 +22,7 @@ FILM, FRAMES = Path("demo.mp4"), Path("demo.fap")
     "--port", default=8765, show_default=True, help="Port of the page; if it is in use, a free one is chosen."
 )
 @options.voice
-@click.option("--face", default="default", show_default=True, help="Face to show; see `realizer faces list`.")
+@options.face("Face to show", default="default", show_default=True)
 def demo(once: bool, port: int, voice: str | None, face: str) -> None:
     """Play the examples: write a film of them, then serve a page that shows them.
 

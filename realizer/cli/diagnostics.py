@@ -18,15 +18,6 @@ _CUT = "..."
 _LEAST = 20  # columns of source that are always shown
 
 
-def one_line(finding: Finding, text: str | None = None) -> str:
-    """Return `file:line:column: TYPE id: line N, path: text` on one line."""
-    spot = finding.spot
-    at = f":{spot.line}:{spot.column}" if spot else ""
-    where = ", ".join(filter(None, (f"line {spot.line}" if spot else "", finding.path)))
-    words = " ".join((finding.text if text is None else text).split())
-    return f"{finding.file}{at}: {finding.type} {finding.id}: {f'{where}: ' if where else ''}{words}"
-
-
 def render(finding: Finding, source: Source, *, width: int = 100) -> str:
     """Return the finding as compilers show errors, with ANSI colours.
 
@@ -34,7 +25,7 @@ def render(finding: Finding, source: Source, *, width: int = 100) -> str:
         source: the text that the finding is about.
         width: columns of the terminal.
     """
-    head = one_line(finding, finding.head)
+    head = finding.one_line(finding.head)
     colour = "yellow" if finding.type == "ADVICE" else "red"
     place, kind, rest = head.partition(f" {finding.type} ")
     lines = [click.style(place, bold=True) + click.style(kind, fg=colour, bold=True) + rest]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -47,8 +46,14 @@ RINGS = (1.0, 3.0, 5.0, 7.0)  # activations in the picture of the wheel, as in P
     metavar="FILE.png",
     help="Draw the whole wheel: 16 angles at 4 activations.",
 )
-@click.option("--face", default="default", show_default=True, help="Face to draw; see `realizer faces list`.")
-@click.option("--camera", default="close", show_default=True, help=options.CAMERAS)
+@options.face("Face to draw", default="default", show_default=True)
+@click.option(
+    "--camera",
+    default="close",
+    show_default=True,
+    shell_complete=options.completing(options.cameras),
+    help=options.CAMERAS,
+)
 def emotion(
     word: str | None,
     as_json: bool,
@@ -102,25 +107,14 @@ def _requested_profile(
 
     Also return archetype -> share at a place on the wheel.
     """
-    from realizer.emotions.wheel import affect, blend_weights, wheel
-    from realizer.emotions.words import emotion as profile_of
+    from realizer.emotions.chosen import emotion_and_shares
 
-    if (valence is None) != (arousal is None):
-        raise click.UsageError("wanted --valence and --arousal together, got one of them")
-    if activation is not None and angle is None:
-        raise click.UsageError("wanted --angle with --activation, got it alone")
-    given = sum(option is not None for option in (word, angle, valence))
-    if given > 1 or not (given or wheel_only):
-        raise click.UsageError("wanted one of WORD, --angle, or --valence with --arousal")
+    if wheel_only and all(option is None for option in (word, angle, activation, valence, arousal)):
+        return None, {}
     with options.reporting(ValueError):
-        if angle is not None:
-            return wheel(angle, activation, profiles), blend_weights(angle, profiles)
-        if valence is not None and arousal is not None:
-            degrees = math.degrees(math.atan2(arousal, valence))
-            return affect(valence, arousal, profiles), blend_weights(degrees, profiles, "affect")
-        if word is not None and word.lower().endswith(".txt"):
+        if word is not None and word.lower().endswith(".txt") and angle is None and valence is None:
             return _read_profile(Path(word)), {}
-        return None if word is None else profile_of(word, profiles), {}
+        return emotion_and_shares(word, angle, activation, (valence, arousal), profiles)
 
 
 def _read_profile(path: Path) -> Profile:

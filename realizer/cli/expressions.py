@@ -52,7 +52,7 @@ def expressions() -> None:
 @expressions.command("list")
 @options.as_json
 @sheet_output
-@click.option("--face", default="default", show_default=True, help="Face to draw.")
+@options.face("Face to draw", default="default", show_default=True)
 @options.expressions
 def list_(as_json: bool, output: Path | None, face: str, expressions: Path | None) -> None:
     """List the expressions: name, action units, seconds of onset, apex and offset, description."""

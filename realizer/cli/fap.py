@@ -152,7 +152,7 @@ def _read(file: str) -> FAPClip:
     from realizer.core.errors import RealizerError
     from realizer.outputs.fap_clip_files import read_clip
 
-    (content,) = options.read_documents([file])
+    content = options.read_file(file)
     with options.reporting(RealizerError, f"{file}: ", click.ClickException):
         return read_clip(content)
 

@@ -31,7 +31,7 @@ QUIET, VERBOSE = "Print only errors on standard error.", "Print more on standard
 DISK_FULL = (errno.ENOSPC, errno.EFBIG)
 
 documents = click.argument(
-    "documents", nargs=-1, required=True, metavar="DOC...", type=click.Path(allow_dash=True)
+    "documents", nargs=-1, required=True, metavar="DOC|TEXT...", type=click.Path(allow_dash=True)
 )
 as_json = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 media = click.option(
@@ -46,7 +46,72 @@ expressions = click.option(
 scene = click.option(
     "--scene", type=FILE, help="File of gaze and pointing targets, one a line: NAME X Y Z, in metres."
 )
-voice = click.option("--voice", metavar="NAME", help="Voice to speak with; see `realizer voices`.")
+
+
+def completing(names: Callable[[], Iterable[str]]) -> Callable[..., list[str]]:
+    """Return the completion of a shell for names that begin with what was typed."""
+    return lambda context, parameter, typed: [name for name in names() if name.startswith(typed)]
+
+
+def _faces() -> Iterable[str]:
+    from realizer.face.load import face_folders
+
+    return face_folders()
+
+
+def _voices() -> Iterable[str]:
+    from realizer.speech.registry import VOICES
+
+    return VOICES
+
+
+def cameras() -> Iterable[str]:
+    from realizer.render.cameras import PRESETS
+
+    return PRESETS
+
+
+def _lights() -> Iterable[str]:
+    from realizer.render.light import presets
+
+    return presets()
+
+
+def check_face(name: str | None) -> str | None:
+    """Return a face that is there, by name or path.
+
+    Raises:
+        click.BadParameter: it is not; the text lists those that are.
+    """
+    from realizer.core.errors import UnknownFaceError
+    from realizer.face.load import folder_of
+
+    with reporting(UnknownFaceError, wrong=bad("--face")):
+        try:
+            folder_of(name or "default")
+        except FileNotFoundError as error:
+            raise click.BadParameter(f"{error.filename}: {error.strerror}", param_hint="--face") from None
+    return name
+
+
+def face(what: str, **attributes: Any) -> Callable[[Command], Command]:
+    """Return the option --face; `what` says what the face is for."""
+    return click.option(
+        "--face",
+        metavar="NAME|PATH",
+        callback=lambda context, parameter, value: check_face(value),
+        shell_complete=completing(_faces),
+        help=f"{what}: a name of `realizer faces list`, a face folder, or a GLB head.",
+        **attributes,
+    )
+
+
+voice = click.option(
+    "--voice",
+    metavar="NAME",
+    shell_complete=completing(_voices),
+    help="Voice to speak with; see `realizer voices`.",
+)
 cooccurrence = click.option(
     "--cooccurrence",
     metavar="on|off|FILE",
@@ -121,7 +186,9 @@ size = click.option(
     callback=parse_size,
     help="Size of pictures in pixels.",
 )
-camera = click.option("--camera", default="front", show_default=True, help=CAMERAS)
+camera = click.option(
+    "--camera", default="front", show_default=True, shell_complete=completing(cameras), help=CAMERAS
+)
 at = click.option(
     "--at", type=Number(0), metavar="SECONDS", help="With .png: draw this instant instead of a contact sheet."
 )
@@ -179,19 +246,35 @@ def planning_player(chosen: Settings, scene: Path | None) -> Player:
     return Player(PlayOptions(scene=read_scene(scene), **values))
 
 
-def read_documents(names: Iterable[str]) -> list[bytes]:
-    """Return the bytes of every document; `-` is standard input.
+def read_documents(names: Iterable[str]) -> list[str | bytes]:
+    """Return every document: `-` is standard input, and a text that names no file is spoken.
 
     Raises:
         click.UsageError: a file cannot be read.
     """
-    texts = []
-    for name in names:
+    from realizer.sources import document_of
+
+    texts: list[str | bytes] = []
+    for number, name in enumerate(names, 1):
         try:
-            texts.append(sys.stdin.buffer.read() if name == "-" else Path(name).read_bytes())
+            texts.append(sys.stdin.buffer.read() if name == "-" else document_of(name, number).bml)
         except OSError as error:
             raise click.UsageError(f"{name}: {error.strerror}") from None
+        except ValueError as error:
+            raise click.UsageError(f"{name!r}: {error}") from None
     return texts
+
+
+def read_file(name: str) -> bytes:
+    """Return the content of a file; `-` is standard input.
+
+    Raises:
+        click.UsageError: it cannot be read.
+    """
+    try:
+        return sys.stdin.buffer.read() if name == "-" else Path(name).read_bytes()
+    except OSError as error:
+        raise click.UsageError(f"{name}: {error.strerror}") from None
 
 
 def decode(content: bytes, name: str, wanted: str) -> str:
@@ -331,6 +414,7 @@ def _checked(check: Callable[[str], object], value: str | None, option: str | No
 light = click.option(
     "--light",
     metavar="NAME",
+    shell_complete=completing(_lights),
     callback=lambda context, parameter, value: check_light(value),
     help="portrait (soft and warm), daylight (even, shows every feature), evening (one cheek in shade), "
     "studio (neutral, from both sides) or outdoors (low sun).  [default: portrait]",

@@ -24,7 +24,7 @@ DRAWN = ("size", "camera", "at", "light", "background", "morphs", "visemes")  # 
 
 performance_options = options.several(
     options.fps,
-    click.option("--face", metavar="NAME", help="Face to animate; see `realizer faces list`."),
+    options.face("Face to animate"),
     options.deformer,
     options.size,
     options.camera,
@@ -67,16 +67,17 @@ def realize(documents: tuple[str, ...], **flags: Any) -> int:
     """Play documents without a clock, to a film, picture, sound or animation data.
 
     \b
-    realizer realize hello.bml -o hello.mp4
+    realizer realize "Hello there" -o hello.mp4
     realizer realize hello.bml -o hello.png --at 1.5 --camera profile
     realizer realize one.bml two.bml -o talk.fap --seed 7
 
-    Several documents are submitted at 0 s, in order; their composition attributes apply.
+    Several documents are submitted at 0 s, in order; their composition attributes apply. A TEXT is spoken:
+    anything without "<" that does not end in .bml, .xml or .txt and has no path separator.
     """
     return play_documents(lambda: options.read_documents(documents), flags)
 
 
-def play_documents(read: Callable[[], list[bytes]], flags: dict[str, Any]) -> int:
+def play_documents(read: Callable[[], list[str | bytes]], flags: dict[str, Any]) -> int:
     """Play documents with the options of `output_options` and return the exit status.
 
     Args:
@@ -84,23 +85,15 @@ def play_documents(read: Callable[[], list[bytes]], flags: dict[str, Any]) -> in
         flags: the options by name.
     """
     from realizer.outputs.output import RenderSettings
+    from realizer.outputs.registry import OUTPUTS
 
     writer = writer_for(flags["output"])
     chosen = options.play_settings(flags)
     drawing = RenderSettings(**{name: flags[name] for name in DRAWN})
     if writer is not None and writer.suffix in PICTURES:
         options.check_camera(chosen.face, drawing.camera)
-    single = writer is not None and writer.suffix == ".png" and drawing.at is not None
-    if drawing.background == "transparent" and not single:
-        raise click.BadParameter(
-            "wanted a colour such as #d8dde2: only the picture of one instant, a .png with --at, "
-            "can be transparent",
-            param_hint="--background",
-        )
-    if drawing.visemes and (writer is None or writer.suffix != ".fap"):
-        raise click.BadParameter("wanted a .fap file to write FAP 1 into", param_hint="--visemes")
-    if drawing.morphs != "fap" and (writer is None or writer.suffix != ".glb"):
-        raise click.BadParameter("wanted a .glb file to write morph targets into", param_hint="--morphs")
+    with options.reporting(ValueError, "--"):
+        (writer or OUTPUTS[".json"]).check(drawing)
     texts = read()
     if writer is not None:
         drawing = writer.begin(drawing, chosen.face, chosen.deformer)
@@ -120,6 +113,8 @@ def play_documents(read: Callable[[], list[bytes]], flags: dict[str, Any]) -> in
         if not realization.has_content:
             click.echo(f"{path}: not written, as there is nothing to play", err=True)
             return 1
+        with options.reporting(ValueError, "--"):
+            writer.check(drawing, realization)
         save(realization, writer, path, drawing)
         first, *others = (name or "the unnamed character" for name in realization.characters)
         if others and not writer.all_characters:
@@ -243,7 +238,7 @@ def _table(planned: Schedule) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _as_documents(texts: Iterable[bytes], schedules: Iterable[Schedule], strict_bml: bool) -> str:
+def _as_documents(texts: Iterable[str | bytes], schedules: Iterable[Schedule], strict_bml: bool) -> str:
     """Return the documents with the times of their schedules, without refused blocks."""
     from bml_schema import Block, made_ids, read, with_absolute_times, write
     from realizer.behaviours.registry import VOCABULARY

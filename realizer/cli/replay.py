@@ -24,7 +24,7 @@ from realizer.cli.realize import PICTURES, save, writer_for
     type=options.Number(0, 240, min_open=True),
     help="Frames per second.  [default: that of the session]",
 )
-@click.option("--face", metavar="NAME", help="Replace the face.")
+@options.face("Face instead of the recorded one")
 @click.option("--voice", metavar="NAME", help="Replace the voice.")
 @options.at
 @options.size

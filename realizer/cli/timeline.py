@@ -81,8 +81,14 @@ def faults_in(content: bytes, library: Library) -> list[str]:
         return str(error).splitlines()
 
 
-def advice_on(content: bytes, library: Library, role: Role, mood: Mood | None) -> list[str]:
-    """Return advice on a timeline without faults: what is unusual for people, and what would be usual."""
+def advice_on(
+    content: bytes, library: Library, role: Role, mood: Mood | None, *, impossible: bool = False
+) -> list[str]:
+    """Return advice on a timeline without faults: what is unusual for people, and what would be usual.
+
+    Args:
+        impossible: whether to return only what was never observed.
+    """
     from realizer.expressions.timeline import remarks
     from realizer.expressions.timeline_reader import read_timeline
 
@@ -90,8 +96,9 @@ def advice_on(content: bytes, library: Library, role: Role, mood: Mood | None) -
     advice = (
         f"{item.id + ': ' if item.id else ''}{item.text}; {item.hint}"
         for item in _advice(timeline, library, role, mood)
+        if item.is_impossible or not impossible
     )
-    return list(islice(chain(remarks(timeline), advice), MAX_ADVICE))
+    return list(islice(chain(() if impossible else remarks(timeline), advice), MAX_ADVICE))
 
 
 def _advice(timeline: Timeline, library: Library, role: Role, mood: Mood | None) -> Iterator[Advice]:

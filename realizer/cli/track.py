@@ -49,7 +49,7 @@ def track(points: str, output: Path, fps: float, profiles: str | None) -> None:
     from realizer.outputs.fap_text import encode
 
     options.check_suffix(output, ".fap")
-    (content,) = options.read_documents([points])
+    content = options.read_file(points)
     text = options.decode(content, points, "a table")
     with options.reporting(ValueError):
         moving, rest = read_points(text, points)

@@ -4,10 +4,14 @@ RealizerError
 ├── ScheduleError    conflicting constraints of required behaviours
 ├── TableError       an invalid table: built in, of a face, or of the user
 ├── FaceError        an invalid or missing face
+│   └── UnknownFaceError
 ├── VoiceError       a missing or failed voice
+│   └── UnknownVoiceError
 ├── PluginError      an unusable plug-in
 └── RenderError      pictures cannot be drawn
+    └── UnknownLookError
 
+Names that are not known are also ValueError, and the command line exits with 2 for them, not 3.
 Faults of documents are `bml_schema.BMLError`.
 """
 
@@ -36,5 +40,21 @@ class PluginError(RealizerError):
     """An entry point of another package cannot be used; the message says why."""
 
 
+class UnknownNameError(RealizerError, ValueError):
+    """There is nothing of that name; the message lists what there is."""
+
+
+class UnknownFaceError(UnknownNameError, FaceError):
+    """There is no face of that name."""
+
+
+class UnknownVoiceError(UnknownNameError, VoiceError):
+    """There is no voice of that name."""
+
+
 class RenderError(RealizerError):
     """Pictures cannot be drawn; the message says what to install."""
+
+
+class UnknownLookError(UnknownNameError, RenderError):
+    """There is no such camera, light or background."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from numbers import Integral, Real
 from pathlib import Path
 
 
@@ -13,7 +14,7 @@ class PlayOptions:
     """Options for playing documents.
 
     Attributes:
-        face: name of the face.
+        face: name of the face, or the path of a face folder or of a GLB head.
         deformer: "mpeg4" moves the face by FAPs, "au" by its action unit model; None: the face's own choice.
         fps: frames per second.
         scene: target name -> (x, y, z) in metres, origin between the eyes; None: no scene declared.
@@ -34,7 +35,8 @@ class PlayOptions:
         strict_bml: whether documents are read as BML 1.0 only, without dialects.
 
     Raises:
-        ValueError: `fps` is not a number above 0, or another number is out of its range.
+        TypeError: an option has a value of another type.
+        ValueError: `fps` is not a number above 0, or another value is none of those that are possible.
     """
 
     face: str = "default"
@@ -57,11 +59,34 @@ class PlayOptions:
     strict_bml: bool = False
 
     def __post_init__(self) -> None:
+        for name, (types, wanted) in _TYPES.items():
+            value = getattr(self, name)
+            if not isinstance(value, types) or (isinstance(value, bool) and types is not bool):
+                raise TypeError(f"{name}: wanted {wanted}, got {value!r}")
         if not (math.isfinite(self.fps) and self.fps > 0):
             raise ValueError(f"fps: wanted a number above 0, got {self.fps}")
         for name, most in (("liveliness", 1), ("jaw", 2), ("lips", 2)):
             if not 0.0 <= (value := getattr(self, name)) <= most:
                 raise ValueError(f"{name}: wanted a number 0..{most}, got {value}")
+        if self.deformer not in (None, "mpeg4", "au"):
+            raise ValueError(f"deformer: wanted mpeg4 or au, got {self.deformer!r}")
+        for name, place in (self.scene or {}).items():
+            if len(place) != 3 or not all(isinstance(x, Real) and math.isfinite(x) for x in place):
+                raise ValueError(f"scene: wanted x, y, z of {name} in metres, got {place!r}")
 
 
+_NUMBER, _STEPS, _FLAG = (Real, "a number"), (Integral, "an integer"), (bool, "True or False")
+_FILE = ((str, Path, type(None)), "a path")
+# Option -> its types, and their description.
+_TYPES: Mapping[str, tuple[type | tuple[type, ...], str]] = {
+    "face": (str, "the name or the path of a face"),
+    "deformer": ((str, type(None)), "mpeg4 or au"),
+    "scene": ((Mapping, type(None)), "a mapping of names to (x, y, z)"),
+    "language": (str, "a BCP-47 tag"),
+    "cooccurrence": (str, "on, off, or the path of a file"),
+    **dict.fromkeys(("fps", "liveliness", "jaw", "lips", "grace"), _NUMBER),
+    **dict.fromkeys(("seed", "max_planning"), _STEPS),
+    **dict.fromkeys(("idle", "prosody", "strict_bml"), _FLAG),
+    **dict.fromkeys(("media", "expressions", "mapping"), _FILE),
+}
 DEFAULTS = PlayOptions()

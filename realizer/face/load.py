@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
+import hashlib
+import logging
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from importlib import import_module
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from realizer.core.errors import FaceError
+from realizer.core.errors import FaceError, UnknownFaceError
 from realizer.core.registry import Registry
 from realizer.core.toml_text import parse_toml
 from realizer.face.basis import basis_from
@@ -35,6 +41,9 @@ FACES: Registry[Path | str] = Registry(
     wanted="a folder of face folders as a Path or a string",
     accepts=lambda value: isinstance(value, (Path, str)),
 )
+HEADS = (".glb",)  # suffixes of heads that are imported on first use
+IMPORT = b"1"  # changed when heads come out of the import differently, so that they are imported again
+IMPORTER = "realizer.facebuild.arkit.importer"  # imported by name: nothing else that runs needs `facebuild`
 DEFAULT = "ada"  # the face that the name "default" stands for
 VARIABLE = "REALIZER_FACES"
 DEFORMER = "REALIZER_DEFORMER"
@@ -43,9 +52,19 @@ MODEL = "au_extended.toml"
 MESH = {"vertices": 2, "triangles": 2, "colours": 2, "occlusion": 1, "gloss": 1}  # array -> dimensions
 
 
+log = logging.getLogger(__name__)
+
+
 def face_name(name: str) -> str:
-    """Return the folder name of a face name; "default" is a valid name."""
+    """Return the folder name of a face name; "default" is a valid name. A path stays as it is."""
     return DEFAULT if name == "default" else name
+
+
+def is_path(name: str | Path) -> bool:
+    """Return whether a face is given as a path, of a face folder or of a GLB head, and not as a name."""
+    if isinstance(name, Path) or Path(name).suffix.lower() in HEADS:
+        return True
+    return os.sep in name or (os.altsep or os.sep) in name
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,19 +79,21 @@ class FaceInfo:
 
 
 def load_face(
-    name: str = "default", directory: Path | str | None = None, deformer: str | None = None
+    name: str | Path = "default", directory: Path | str | None = None, deformer: str | None = None
 ) -> Face:
-    """Load the face of that name.
+    """Load a face.
 
     Args:
-        name: a folder with faces in it, or "default".
+        name: its name, "default", or the path of a face folder or of a GLB head with ARKit's shapes.
+            A head is imported once; the result is kept below $XDG_CACHE_HOME (~/.cache).
         directory: where to look first; else what REALIZER_FACES names, `faces` beside the package, the
-            faces that came with the package, and those of plug-ins.
+            faces that came with the package, those of plug-ins, and `faces` in the current folder.
         deformer: "mpeg4" (only FAPs move it) or "au" (its model of action units; FAPs for the rest); None
             selects REALIZER_DEFORMER, then face.toml, then "mpeg4".
 
     Raises:
-        FaceError: no such face, or an unusable folder; the text says which file and what to change.
+        FaceError: an unusable folder or head; the text says which file and what to change.
+        UnknownFaceError: no face of that name. FileNotFoundError: nothing at that path.
     """
     folder, chosen = folder_of(name, directory), _deformer_override(deformer)
     try:
@@ -82,7 +103,7 @@ def load_face(
 
 
 def input_names(
-    name: str = "default", directory: Path | str | None = None, deformer: str | None = None
+    name: str | Path = "default", directory: Path | str | None = None, deformer: str | None = None
 ) -> tuple[str, ...]:
     """Return `Face.inputs` of a face without loading it. Arguments and errors as `load_face`."""
     return _model_inputs(_model(folder_of(name, directory), _deformer_override(deformer)))
@@ -110,23 +131,46 @@ def face_folders(directory: Path | str | None = None) -> dict[str, Path]:
     return dict(sorted(found.items()))
 
 
-def folder_of(name: str, directory: Path | str | None = None) -> Path:
-    """Return the folder of a face.
+def folder_of(name: str | Path, directory: Path | str | None = None) -> Path:
+    """Return the folder of a face, by name or path.
 
     Raises:
-        FaceError: none of that name.
+        UnknownFaceError: none of that name. FileNotFoundError: nothing at that path.
+        FaceError: a head that cannot be imported.
     """
-    name = face_name(name)
-    if not name or Path(name).name != name:
-        raise FaceError(
-            f"face: wanted a face's name, not a path, got {name!r}; {VARIABLE} says where else faces lie"
-        )
+    if is_path(name):
+        path = Path(name).resolve()
+        if not path.exists():
+            raise FileNotFoundError(errno.ENOENT, "no such face folder or GLB head", str(name))
+        return path if path.is_dir() else _imported(path)
+    name = face_name(str(name))
     for place in _places(directory):
-        if (place / name).is_dir():
+        if name not in ("", "..") and (place / name).is_dir():
             return place / name
-    places = list(_places(directory))
-    known = ", ".join(info.name for info in list_faces(directory)) or "none"
-    raise FaceError(f"face {name!r}: no such folder in {', '.join(map(str, places))}; there are: {known}")
+    known = ", ".join(face_folders(directory)) or "none"
+    raise UnknownFaceError(
+        f"face: wanted one of {known}, or the path of a face folder or a GLB, got {name!r}; "
+        f"{VARIABLE} says where else faces lie"
+    )
+
+
+@lru_cache(maxsize=16)
+def _imported(head: Path) -> Path:
+    """Return the face folder of a GLB head, importing it if that was not done before."""
+    if head.suffix.lower() not in HEADS:
+        raise FaceError(f"{head}: wanted a face folder, or a head as GLB")
+    digest = hashlib.sha256(IMPORT + head.read_bytes()).hexdigest()[:16]
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    folder = cache / "realizer" / "faces" / digest / head.stem
+    if not (folder / "face.toml").is_file():
+        log.warning("%s: importing the head, once", head.name)
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(dir=folder.parent) as place:
+            draft = Path(place) / head.stem
+            import_module(IMPORTER).import_head(head, draft)
+            with contextlib.suppress(OSError):  # another process has imported it meanwhile
+                draft.rename(folder)
+    return folder
 
 
 def read_head(folder: Path) -> dict[str, Any]:
@@ -160,6 +204,7 @@ def _places(directory: Path | str | None) -> Iterator[Path]:
         yield Path(os.environ[VARIABLE])
     for _, folder in FACES.working():
         yield Path(folder)
+    yield Path("faces")  # where `realizer faces import` writes
 
 
 def _deformer_override(deformer: str | None) -> str | None:

@@ -40,7 +40,7 @@ def check_face(name: str = "default", directory: Path | str | None = None) -> tu
     """Return every fault of a face folder, one sentence each; empty if the folder is sound."""
     try:
         folder = folder_of(name, directory)
-    except FaceError as error:
+    except (FaceError, FileNotFoundError) as error:
         return (str(error),)
     faults: list[str] = []
 

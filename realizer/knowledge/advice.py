@@ -36,11 +36,13 @@ class Advice:
         id: behaviour that it is about; "" for the whole block.
         text: description of what is unusual.
         hint: what would be usual, with the source.
+        is_impossible: whether it was never observed, and not only rarely.
     """
 
     id: str
     text: str
     hint: str
+    is_impossible: bool = False
 
 
 def advise(
@@ -113,7 +115,7 @@ def duration_advice(
     if possible is not None and not possible[0] - 1e-3 <= lasts <= possible[1] + 1e-3:
         how = "short" if lasts < possible[0] else "long"
         text = f"{name} is visible for {lasts:.2g} s; it was never observed so {how}"
-        yield Advice(id, text, f"it lasts {_range(possible)} ({source})")
+        yield Advice(id, text, f"it lasts {_range(possible)} ({source})", True)
     elif probable is not None and not probable[0] - 1e-3 <= lasts <= probable[1] + 1e-3:
         how = "short" if lasts < probable[0] else "long"
         text = f"{name} is visible for {lasts:.2g} s, which is unusually {how}"

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from numbers import Integral, Real
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,8 +13,18 @@ from realizer.core.array_types import UInt8
 from realizer.core.atomic_files import write_bytes
 
 if TYPE_CHECKING:
+    from realizer.face.model import Face
     from realizer.realization import Realization
     from realizer.render.renderer import Renderer
+
+
+MORPHS = ("fap", "arkit")
+# Setting -> the only suffix that it is for, and the reason.
+ONLY_FOR = {
+    "at": (".png", "for the picture of an instant"),
+    "morphs": (".glb", "to write morph targets into"),
+    "visemes": (".fap", "to write FAP 1 into"),
+}
 
 
 @dataclass(frozen=True)
@@ -28,6 +39,24 @@ class RenderSettings:
     morphs: str = "fap"  # names of a .glb file's morph targets: "fap" or "arkit"
     visemes: bool = False  # whether a .fap file has FAP 1 in addition to the FAPs of the lips
     renderer: Renderer | None = None  # started by `Output.begin`
+
+    def check_types(self) -> None:
+        """Raise TypeError for a value of another type, and ValueError for an impossible size."""
+        for name, (types, wanted) in _TYPES.items():
+            if not isinstance(value := getattr(self, name), types) or (name == "at" and value is True):
+                raise TypeError(f"{name}: wanted {wanted}, got {value!r}")
+        if len(self.size) != 2 or not all(isinstance(n, Integral) and 16 <= n <= 4096 for n in self.size):
+            raise ValueError(f"size: wanted (width, height), each 16..4096 pixels, got {self.size!r}")
+
+    def check_look(self, face: Face) -> None:
+        """Raise UnknownLookError unless there are such a camera of a face, a light and a background."""
+        from realizer.render.backdrop import background_of
+        from realizer.render.cameras import camera_for
+        from realizer.render.light import preset
+
+        camera_for(face, self.camera)
+        preset(self.light)
+        background_of(self.background)
 
     def pictures(
         self, realization: Realization, size: tuple[int, int], frames: Sequence[int]
@@ -77,6 +106,18 @@ class RenderSettings:
         )
 
 
+_WORD = ((str, type(None)), "a string")
+_TYPES: Mapping[str, tuple[type | tuple[type, ...], str]] = {
+    "size": ((tuple, list), "(width, height)"),
+    "camera": (str, "the name of a camera"),
+    "at": ((Real, type(None)), "seconds"),
+    "light": _WORD,
+    "background": _WORD,
+    "morphs": (str, " or ".join(MORPHS)),
+    "visemes": (bool, "True or False"),
+}
+
+
 @dataclass(frozen=True)
 class Output:
     """A file format into which realizations are encoded.
@@ -103,6 +144,35 @@ class Output:
     all_characters: bool = False
     save: Callable[[Realization, Path, RenderSettings], None] | None = None
     reader: str = ""
+
+    def check(self, drawing: RenderSettings, realization: Realization | None = None) -> None:
+        """Check that settings suit this format.
+
+        Args:
+            realization: what will be written; its face may have cameras, and its duration limits `at`.
+
+        Raises:
+            TypeError: a setting has a value of another type.
+            ValueError: a setting is for another format, or there is no such camera, light or instant.
+        """
+        drawing.check_types()
+        usual, single = RenderSettings(), self.suffix == ".png" and drawing.at is not None
+        for name, (suffix, reason) in ONLY_FOR.items():
+            if getattr(drawing, name) != getattr(usual, name) and self.suffix != suffix:
+                raise ValueError(f"{name}: wanted a {suffix} file {reason}, got {self.suffix}")
+        if drawing.morphs not in MORPHS:
+            raise ValueError(f"morphs: wanted {' or '.join(MORPHS)}, got {drawing.morphs!r}")
+        if drawing.background == "transparent" and not single:
+            raise ValueError(
+                "background: wanted a colour such as #d8dde2: only the picture of one instant, a .png with a "
+                "time, can be transparent"
+            )
+        if realization is None:
+            return
+        if drawing.at is not None and not 0 <= drawing.at <= realization.duration + 1e-9:
+            raise ValueError(f"at: wanted 0..{realization.duration:.2f} s, got {drawing.at:g}")
+        if self.picture_size is not None:
+            drawing.check_look(realization.face)
 
     def write(self, realization: Realization, path: Path, drawing: RenderSettings) -> None:
         """Write the file completely or not at all; `path` may be a device or a pipe."""

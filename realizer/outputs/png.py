@@ -59,6 +59,17 @@ def row_at(realization: Realization, seconds: float) -> Float32:
     return np.asarray(frames[below] * (1 - part) + frames[above] * part)
 
 
+def picture_at(realization: Realization, drawing: RenderSettings) -> UInt8:
+    """Return the picture at `drawing.at`, (h, w, 3) uint8; with alpha, if the background is transparent."""
+    seconds = drawing.at or 0.0
+    size, alpha = _picture_size(drawing)
+    first, part = next(f for f in reversed(realization.faces) if f[0] <= max(seconds * realization.fps, 0))
+    with drawing.make_renderer(realization, size, part.face_name, alpha=alpha) as renderer:
+        pictures: UInt8 = renderer.draw(row_at(part, seconds - first / realization.fps)[None])
+    picture: UInt8 = pictures[0]
+    return picture
+
+
 def encode_png(pixels: UInt8) -> bytes:
     """Encode (h, w, 3) uint8, or (h, w, 4) with alpha, as PNG."""
     from PIL import Image
@@ -72,13 +83,9 @@ def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
     """Encode the picture at `drawing.at`, or else the sheet, with pictures of half the size."""
     from realizer.render.contact_sheet import sheet
 
-    size, alpha = _picture_size(drawing)
     if drawing.at is not None:
-        now = drawing.at * realization.fps
-        first, part = next(pair for pair in reversed(realization.faces) if pair[0] <= max(now, 0))
-        with drawing.make_renderer(realization, size, part.face_name, alpha=alpha) as renderer:
-            (picture,) = renderer.draw(row_at(part, drawing.at - first / realization.fps)[None])
-        return encode_png(picture)
+        return encode_png(picture_at(realization, drawing))
+    size, _ = _picture_size(drawing)
     shown = moments(realization)
     pictures = drawing.pictures(realization, size, [moment.frame for moment in shown])
     titles = [f"{moment.time:.2f} s" for moment in shown]

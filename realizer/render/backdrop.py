@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from realizer.core.array_types import UInt8
-from realizer.core.errors import RenderError
+from realizer.core.errors import RenderError, UnknownLookError
 from realizer.render.light import Light
 
 if TYPE_CHECKING:
@@ -30,13 +30,13 @@ def background_of(background: str | None, *, alpha: bool = True) -> str | None:
         alpha: without it, a variable that says "transparent" means the gradient: films are opaque.
 
     Raises:
-        RenderError: neither a colour, nor "transparent", nor an existing file.
+        UnknownLookError: neither a colour, nor "transparent", nor an existing file.
     """
     named = background or os.environ.get(BACKGROUND) or None
     if named is None or (named == TRANSPARENT and not alpha and background is None):
         return None
     if is_picture(named) and not os.path.isfile(named):  # noqa: PTH113 (Path raises for a long name)
-        raise RenderError(f"background: wanted {_WANTED}, got {named!r}, which is no file")
+        raise UnknownLookError(f"background: wanted {_WANTED}, got {named!r}, which is no file")
     return named
 
 

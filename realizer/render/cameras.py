@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float32, Float64
-from realizer.core.errors import RenderError
+from realizer.core.errors import UnknownLookError
 from realizer.face.model import Face
 
 
@@ -101,14 +101,14 @@ def camera_for(face: Face, name: str = "front") -> Camera:
     """Return the camera of that name for this face.
 
     Raises:
-        RenderError: no such camera; the text lists the known ones.
+        UnknownLookError: no such camera; the text lists the known ones.
     """
     if name in face.cameras:
         framing = Framing(**face.cameras[name])
     elif name in PRESETS:
         framing = PRESETS[name]
     else:
-        raise RenderError(f"camera: wanted one of {', '.join(camera_names(face))}, got {name!r}")
+        raise UnknownLookError(f"camera: wanted one of {', '.join(camera_names(face))}, got {name!r}")
     yaw = math.radians(framing.yaw)
     back = np.array([math.sin(yaw), 0.0, math.cos(yaw)])
     right = np.array([math.cos(yaw), 0.0, -math.sin(yaw)])

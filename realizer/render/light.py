@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float32
-from realizer.core.errors import RenderError, TableError
+from realizer.core.errors import TableError, UnknownLookError
 from realizer.render.environment import Environment, environment_of
 from realizer.tables import toml_table
 
@@ -66,11 +66,11 @@ def preset(name: str | None = None) -> Light:
     """Return the light of that name; None selects REALIZER_LIGHT, then "portrait".
 
     Raises:
-        RenderError: no such light; the text lists the known ones.
+        UnknownLookError: no such light; the text lists the known ones.
     """
     name = name or os.environ.get(LIGHT) or "portrait"
     if name not in presets():
-        raise RenderError(f"light: wanted one of {', '.join(presets())}, got {name!r}")
+        raise UnknownLookError(f"light: wanted one of {', '.join(presets())}, got {name!r}")
     return presets()[name]
 
 

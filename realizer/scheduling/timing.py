@@ -200,12 +200,14 @@ class Schedule:
         """Return the seconds from block start of one sync point.
 
         Raises:
-            KeyError: no such behaviour (or it was dropped), or no such sync point.
+            KeyError: no such behaviour (or it was dropped), or no such sync point; the text lists them.
         """
-        try:
-            return float(self.times[behaviour][self.points[behaviour].index(sync)])
-        except ValueError:
-            raise KeyError(f"{behaviour}:{sync}") from None
+        if behaviour not in self.times:
+            raise KeyError(f"{behaviour}: wanted one of {', '.join(self.times) or 'no behaviours'}")
+        if sync not in self.points[behaviour]:
+            known = ", ".join(self.points[behaviour])
+            raise KeyError(f"{behaviour}:{sync}: wanted a sync point of {behaviour}: {known}")
+        return float(self.times[behaviour][self.points[behaviour].index(sync)])
 
     def __getitem__(self, behaviour: str) -> dict[str, float]:
         return {p: float(t) for p, t in zip(self.points[behaviour], self.times[behaviour], strict=True)}

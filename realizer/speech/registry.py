@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from functools import cache
 
-from realizer.core.errors import VoiceError
+from realizer.core.errors import UnknownVoiceError, VoiceError
 from realizer.core.registry import Registry
 from realizer.speech.base_voice import BaseVoice
 from realizer.speech.utterance import Voice
@@ -58,7 +58,8 @@ def find_voice(name: str | None = None) -> Voice:
             "silent", the name of a plug-in's voice, or None for the best that is installed.
 
     Raises:
-        VoiceError: if there is no such voice, or it is not installed; the text says what to do.
+        VoiceError: if it is not installed; the text says what to do.
+        UnknownVoiceError: if there is no such voice.
         PluginError: if the voice belongs to a plug-in that cannot be used.
     """
     if name is None:
@@ -67,7 +68,7 @@ def find_voice(name: str | None = None) -> Voice:
     engine = OTHER_NAMES.get(engine, engine)
     if engine not in VOICES:
         known = ", ".join(VOICES)
-        raise VoiceError(
+        raise UnknownVoiceError(
             f"voice: wanted one of {known}, got {name!r}; `realizer voices` says how to install them"
         )
     voice = VOICES[engine]

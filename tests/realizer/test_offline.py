@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from dataclasses import fields
+from pathlib import Path
 
 import pytest
 
@@ -22,7 +23,7 @@ NOD = '<bml id="b"><head id="n" lexeme="NOD"/></bml>'
 
 def test_realize_has_the_options_of_playing_with_their_defaults() -> None:
     parameters = inspect.signature(realize).parameters
-    options = {name: p.default for name, p in parameters.items() if name not in ("documents", "voice")}
+    options = {name: p.default for name, p in parameters.items() if name not in ("source", "voice")}
     assert options == {f.name: f.default for f in fields(PlayOptions)}
 
 
@@ -65,3 +66,67 @@ def test_schedule_reads_dialects_unless_it_is_strict() -> None:
 def test_schedule_refuses_a_document_without_a_block() -> None:
     with pytest.raises(BMLError, match="id"):
         schedule("<bml/>")
+
+
+def test_realize_speaks_a_text(tmp_path: Path) -> None:
+    (block,) = realize("Hello there", voice="silent").schedules
+    assert block.at("speech", "end") > 0.3
+    (tmp_path / "x.bml").write_text(NOD)
+    assert realize(tmp_path / "x.bml").schedules[0].block == "b"
+
+
+@pytest.mark.parametrize("source", ["<bml/>", "", ["<bml id='b'><oops", "<bml/>"], b"\xff"])
+def test_realize_refuses_a_source_without_a_document(source: str | bytes | list[str]) -> None:
+    with pytest.raises(BMLError) as error:
+        realize(source)
+    assert error.value.line == 1
+
+
+def test_realize_plays_the_rest_of_a_broken_source() -> None:
+    played = realize(["<bml/>", NOD], idle=False)
+    assert len(played.schedules) == len(played.refusals) == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"fps": "25"}, "fps: wanted a number, got '25'"),
+        ({"face": 3}, "face: wanted the name or the path of a face"),
+        ({"idle": 1}, "idle: wanted True or False"),
+        ({"seed": 1.5}, "seed: wanted an integer"),
+        ({"scene": ["ball"]}, "scene: wanted a mapping"),
+        ({"voice": 3}, "voice: wanted the name of a voice"),
+        ({"colour": "red"}, "colour"),
+    ],
+)
+def test_realize_refuses_other_types(options: dict[str, object], words: str) -> None:
+    with pytest.raises(TypeError, match=words):
+        realize(NOD, **options)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"face": "adda"}, "face: wanted one of ada, ben"),
+        ({"voice": "nobody"}, "voice: wanted one of"),
+        ({"deformer": "x"}, "deformer: wanted mpeg4 or au"),
+        ({"liveliness": 2}, "liveliness: wanted a number 0..1"),
+        ({"scene": {"ball": (1, 2)}}, "scene: wanted x, y, z of ball"),
+    ],
+)
+def test_realize_refuses_unknown_names_and_numbers(options: dict[str, object], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        realize(NOD, **options)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["face", "media", "expressions", "mapping", "cooccurrence"])
+def test_realize_reports_missing_files(name: str) -> None:
+    with pytest.raises(FileNotFoundError, match="no/such"):
+        realize(NOD, **{name: "no/such"})  # type: ignore[arg-type]
+
+
+def test_schedule_names_the_syncs_that_there_are() -> None:
+    with pytest.raises(KeyError, match="n:strok: wanted a sync point of n: start, "):
+        schedule(NOD).at("n", "strok")
+    with pytest.raises(ValueError, match="wanted one document"):
+        schedule([NOD, NOD])  # type: ignore[arg-type]

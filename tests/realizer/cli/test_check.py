@@ -384,3 +384,19 @@ def test_check_says_how_a_dialect_was_read_and_its_faults_in_strict_bml(tmp_path
     assert "NOT_BML_1_0 b: line 1, /bml: this is SmartBody's BML, which is not read in strict BML" in dialect
     assert "b:h: line 1, /bml/head[1]: lexeme: wanted a word, got none" in head
     assert "b:f: line 1, /bml/faceFacs[1]: side: wanted LEFT, RIGHT or BOTH" in face
+
+
+LONG = HEAD + '<expression xmlns="urn:bml-realizer:1" id="e" name="template:anger" start="0" end="90"/></bml>'
+
+
+def test_check_limits_lengths_to_those_that_are_possible(tmp_path: Path) -> None:
+    advised = check(tmp_path, LONG)
+    assert (advised.return_value, advised.stdout) == (0, "")
+    assert "ADVICE b1:e" in advised.stderr
+    for more in ((), ("-q",)):
+        limited = check(tmp_path, LONG, "--limit", *more)
+        assert limited.return_value == 1
+        (line,) = limited.stdout.splitlines()
+        assert "IMPOSSIBLE_LENGTH b1:e" in line
+        assert "never observed so long" in line
+        assert "ADVICE b1:e" not in limited.stderr

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from bml_schema.source import Source, Spot
 from realizer.checking.finding import Finding, Label
-from realizer.cli.diagnostics import one_line, render
+from realizer.cli.diagnostics import render
 
 ROOM = 60  # columns
 
@@ -20,21 +20,6 @@ def finding(*labels: Label, text: str = "amount: wanted 0..1", notes: tuple[str,
 
 def rows(source: str, *labels: Label, width: int = ROOM, notes: tuple[str, ...] = ()) -> list[str]:
     return click.unstyle(render(finding(*labels, notes=notes), Source(source), width=width)).split("\n")
-
-
-def test_one_line_has_file_place_type_id_and_path() -> None:
-    label = Label(Spot(2, 5, 1))
-    assert one_line(finding(label)) == (
-        "d.bml:2:5: PARSING_FAILURE b:n: line 2, /bml/head[1]: amount: wanted 0..1"
-    )
-
-
-def test_one_line_without_a_place_has_the_path_alone() -> None:
-    assert one_line(finding()) == "d.bml: PARSING_FAILURE b:n: /bml/head[1]: amount: wanted 0..1"
-
-
-def test_one_line_is_one_line_whatever_blanks_the_text_has() -> None:
-    assert one_line(finding(text="a\n\t b")).endswith(": a b")
 
 
 def test_render_underlines_the_fault_and_what_it_conflicts_with() -> None:

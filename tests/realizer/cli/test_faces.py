@@ -35,9 +35,9 @@ def test_faces_list_names_what_cannot_be_read(tmp_path: Path, monkeypatch: pytes
     assert "broken: cannot be read; run realizer faces check broken" in done.stderr
 
 
-def test_faces_zones_of_an_unknown_face_exits_with_3(tmp_path: Path) -> None:
+def test_faces_zones_of_an_unknown_face_exits_with_2(tmp_path: Path) -> None:
     done = run("faces", "zones", "nobody", "-o", str(tmp_path / "x"))
-    assert done.returncode == 3
+    assert done.returncode == 2
     assert "nobody" in done.stderr
     assert not (tmp_path / "x").exists()
 

@@ -57,7 +57,7 @@ def test_verbosity_may_come_before_or_after_the_command(args: list[str], tmp_pat
         ),
         (["-o", "x.png", "--background", "#12"], "got '#12', which is no file"),
         (["-o", "x.png", "--background", __file__], "background: wanted a picture (PNG, JPEG, WEBP), got"),
-        (["-o", "x.mp4", "--background", "transparent"], "a .png with --at, can be transparent"),
+        (["-o", "x.mp4", "--background", "transparent"], "a .png with a time, can be transparent"),
     ],
 )
 def test_realize_refuses_an_unknown_camera_light_or_background(args: list[str], words: str) -> None:

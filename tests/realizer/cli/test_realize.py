@@ -16,6 +16,7 @@ from click.testing import CliRunner, Result
 from bml_schema import Block, SyncRef, parse, read
 from realizer.behaviours.registry import VOCABULARY
 from realizer.cli import cli
+from tests.commands import run
 from tests.rows import each_row
 
 CORPUS = Path(__file__).parents[2] / "corpus"
@@ -243,3 +244,28 @@ def test_realize_checks_the_camera_of_pictures_only(tmp_path: Path, suffix: str,
     assert done.exit_code == status
     assert ("got 'top'" in done.output) is (status == 2)
     assert Path(output).exists() is (status == 0)
+
+
+def test_realize_speaks_a_text(tmp_path: Path) -> None:
+    done = run("realize", "Hello there", "--voice", "silent", "-o", str(tmp_path / "x.vtt"))
+    assert done.returncode == 0
+    assert "Hello" in (tmp_path / "x.vtt").read_text()
+
+
+@pytest.mark.parametrize("name", ["hello.bml", "no/such"])
+@pytest.mark.parametrize("command", ["realize", "schedule", "check"])
+def test_commands_refuse_a_missing_file(command: str, name: str) -> None:
+    done = run(command, name)
+    assert done.returncode == 2
+    assert f"{name}: no such file" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "flags",
+    [["--face", "adda"], ["--face", "no/face"], ["--voice", "nobody"], ["--at", "9"], ["--light", "x"]],
+)
+def test_realize_refuses_wrong_names_with_status_2(tmp_path: Path, flags: list[str]) -> None:
+    done = run("realize", "-", *flags, "-o", str(tmp_path / "x.png"), stdin=TALK)
+    assert done.returncode == 2
+    assert "wanted" in done.stderr or "no such face" in done.stderr
+    assert not list(tmp_path.iterdir())

@@ -74,6 +74,9 @@ def test_check_gives_advice_on_a_timeline_without_faults(file: Path) -> None:
     done = run("check", str(file.with_suffix(".json")))
     assert "it was never observed so long" in done.stderr
     assert "disgust stands alone" in done.stderr
+    limited = run("check", str(file.with_suffix(".json")), "--limit")
+    assert limited.return_value == 1
+    assert "IMPOSSIBLE_LENGTH" in limited.stdout
 
 
 @pytest.mark.parametrize(

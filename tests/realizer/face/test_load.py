@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from realizer.core.errors import FaceError
-from realizer.face.load import list_faces, load_face
+from realizer.face.load import _imported, list_faces, load_face
 from realizer.face.model import Face
 from realizer.facebuild.check import check_face
+from tests.realizer.facebuild.arkit.conftest import face_glb
 
 FACES = [info.name for info in list_faces()]
 
@@ -60,11 +61,48 @@ def test_load_face_reads_the_variable(copy: Path, monkeypatch: pytest.MonkeyPatc
     assert load_face("broken").name == load_face().name
 
 
-@pytest.mark.parametrize("name", ["nobody", "", "../ada", "a/b"])
+@pytest.mark.parametrize("name", ["nobody", "", ".."])
 def test_load_face_lists_the_known_faces_for_an_unknown_one(name: str) -> None:
-    with pytest.raises(FaceError):
+    with pytest.raises(ValueError, match="face: wanted one of ada, ben"):
         load_face(name)
     assert len(check_face(name)) == 1
+
+
+@pytest.mark.parametrize("path", ["../ada", "a/b", "mia.glb", Path("here")])
+def test_load_face_reports_a_path_where_nothing_is(path: str | Path) -> None:
+    with pytest.raises(FileNotFoundError, match="no such face folder or GLB head"):
+        load_face(path)
+    assert len(check_face(str(path))) == 1
+
+
+def test_load_face_takes_the_path_of_a_folder(copy: Path) -> None:
+    assert load_face(copy).name == load_face(str(copy)).name == load_face().name
+
+
+def test_load_face_finds_faces_below_the_current_folder(
+    copy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copytree(copy, tmp_path / "here" / "faces" / "mia")
+    monkeypatch.chdir(tmp_path / "here")
+    assert "mia" in [info.name for info in list_faces()]
+
+
+def test_load_face_refuses_a_file_that_is_no_head(tmp_path: Path) -> None:
+    (tmp_path / "x.txt").write_text("x")
+    with pytest.raises(FaceError, match="wanted a face folder, or a head as GLB"):
+        load_face(tmp_path / "x.txt")
+
+
+def test_load_face_imports_a_head_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    head = tmp_path / "mia.glb"
+    head.write_bytes(face_glb(load_face("ada")))
+    assert load_face(head).name == "mia"
+    (mesh,) = (tmp_path / "cache").rglob("mesh.npz")
+    written = mesh.stat().st_mtime_ns
+    _imported.cache_clear()
+    load_face(str(head))
+    assert mesh.stat().st_mtime_ns == written
 
 
 @pytest.mark.parametrize("file", ["face.toml", "mesh.npz", "features.csv", "fields.npz"])

@@ -1,0 +1,51 @@
+"""Checking of sources: `realizer.check`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from itertools import islice
+from pathlib import Path
+
+from bml_schema.source import Source as SourceText
+from realizer.behaviours.kind import Position
+from realizer.checking.advice import advice as advice_on
+from realizer.checking.document import check_document
+from realizer.checking.finding import Finding
+from realizer.core.options import PlayOptions
+from realizer.playback.player import Player
+from realizer.sources import Source, documents_of
+
+MAX_ADVICE = 20  # per block: one mistake is often repeated all over a document
+
+
+def check(
+    source: Source | Iterable[Source],
+    *,
+    scene: Mapping[str, Position] | None = None,
+    media: Path | None = None,
+    expressions: Path | None = None,
+    strict_bml: bool = False,
+    advice: bool = False,
+) -> list[Finding]:
+    """Return every fault of documents, in order; each has line, column, type, text and help.
+
+    Args:
+        source: BML, a text, a file, or a list of these, as in `realizer.realize`. Documents are checked
+            separately.
+        scene, media, expressions, strict_bml: as in `realizer.realize`.
+        advice: whether to add advice about likely mistakes, of the type "ADVICE".
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        TypeError: the source or an option has another type.
+    """
+    options = PlayOptions(scene=scene, media=media, expressions=expressions, strict_bml=strict_bml)
+    found: list[Finding] = []
+    for number, document in enumerate(documents_of(source), 1):
+        player, name = Player(options, animates=False), document.file or f"document {number}"
+        text = SourceText(document.bml)
+        for part in check_document(name, text, document.bml, player):
+            found += part.findings
+            if advice and part.block is not None and part.schedule is not None:
+                found += islice(advice_on(name, text, part.block, part.schedule, player), MAX_ADVICE)
+    return found

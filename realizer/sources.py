@@ -1,0 +1,92 @@
+"""Sources of documents: BML, a text to speak, a file, or several of these."""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from bml_schema import Block, BMLError, Speech, read, write
+from bml_schema.behaviours import SpeechText
+from bml_schema.documents import Vocabulary
+
+Source = str | bytes | Path
+# Suffixes of files that we read. A text in a .txt file is spoken; those of timelines are read by `check`.
+SUFFIXES = (".bml", ".xml", ".txt", ".toml", ".json")
+WANTED = "BML, a text, bytes, a pathlib.Path, or a list of these"
+
+
+class Document(NamedTuple):
+    """A document of a source: its content as BML, and the name of its file or ""."""
+
+    bml: str | bytes
+    file: str
+
+
+def is_file_name(text: str) -> bool:
+    """Return whether a text names a file: it ends in a suffix that we read, or holds a path separator."""
+    named = text.lower().endswith(SUFFIXES) or any(s in text for s in (os.sep, os.altsep) if s)
+    return "<" not in text and named
+
+
+def documents_of(source: Source | Iterable[Source]) -> list[Document]:
+    """Return the documents of a source, in order. Texts that are spoken are appended to each other.
+
+    Raises:
+        FileNotFoundError: there is no such file; OSError: it cannot be read.
+        TypeError: the source is of another type.
+        ValueError: there is no document.
+    """
+    if isinstance(source, Source):
+        return [document_of(source)]
+    if not isinstance(source, Iterable) or isinstance(source, (dict, set)):
+        raise TypeError(f"source: wanted {WANTED}, got {_type(source)}")
+    documents = [document_of(item, number) for number, item in enumerate(source, 1)]
+    if not documents:
+        raise ValueError(f"source: wanted {WANTED}, got no document")
+    return documents
+
+
+def first_error(documents: Sequence[Document], vocabulary: Vocabulary, *, strict_bml: bool) -> BMLError:
+    """Return the error of documents of which none can be read; its text names the file."""
+    parts = ((part, d) for d in documents for part in read(d.bml, vocabulary, strict_bml=strict_bml))
+    nothing = BMLError("wanted <bml>, or a text to speak, got nothing", line=1), documents[0]
+    error, document = next(((part, d) for part, d in parts if isinstance(part, BMLError)), nothing)
+    text = f"{error.text} (in {document.file})" if document.file else error.text
+    return type(error)(text, line=error.line, path=error.path, block=error.block)
+
+
+def spoken(text: str, number: int = 1) -> str:
+    """Return the document that speaks a text after those of smaller numbers."""
+    speech = Speech(id="speech", text=SpeechText(parts=(text,)))
+    return write(Block(id=f"text{number}", composition="APPEND", children=(speech,)))
+
+
+def document_of(item: object, number: int = 1) -> Document:
+    """Return the document of one source; `number` is its place among several. Errors as `documents_of`."""
+    if not isinstance(item, Source):
+        raise TypeError(f"source: wanted {WANTED}, got {_type(item)}")
+    if isinstance(item, str) and is_file_name(item):
+        if not Path(item).is_file():
+            words = "no such file; a text with this suffix or a path separator is spoken if given as bytes"
+            raise FileNotFoundError(errno.ENOENT, words, item)
+        item = Path(item)
+    if isinstance(item, Path):
+        content, is_text = item.read_bytes(), item.suffix.lower() == ".txt"
+        return Document(_bml(content, number) if is_text else content, str(item))
+    return Document(_bml(item, number), "")
+
+
+def _bml(content: str | bytes, number: int) -> str | bytes:
+    """Return the document that speaks a text; BML, blanks and other bytes stay as they are."""
+    try:
+        text = content if isinstance(content, str) else content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content
+    return spoken(text, number) if text.strip() and "<" not in text else content
+
+
+def _type(value: object) -> str:
+    return f"{type(value).__name__}: {value!r:.60}"

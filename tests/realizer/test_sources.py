@@ -1,0 +1,83 @@
+"""Tests of sources of documents."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from bml_schema import BMLError, Speech, parse
+from realizer.behaviours.registry import VOCABULARY
+from realizer.sources import documents_of, first_error, is_file_name
+
+NOD = '<bml id="b"><head id="n" lexeme="NOD"/></bml>'
+
+
+def text_of(bml: str | bytes) -> str:
+    (speech,) = (node for node in parse(bml).behaviours if isinstance(node, Speech))
+    return str(speech.text)
+
+
+@pytest.mark.parametrize(
+    ("text", "is_file"),
+    [("hello.bml", True), ("talk.TXT", True), ("a/b", True), ("Hello there", False), ("e.g. this.", False)],
+)
+def test_is_file_name_of_a_suffix_or_a_path(text: str, is_file: bool) -> None:
+    assert is_file_name(text) is is_file
+    assert not is_file_name(f"<bml id='{text}'/>")
+
+
+@pytest.mark.parametrize("source", ["Tom & Jerry, 1 > 0?", b"Tom & Jerry, 1 > 0?"])
+def test_documents_of_a_text_speak_it(source: str | bytes) -> None:
+    (document,) = documents_of(source)
+    assert text_of(document.bml) == "Tom & Jerry, 1 > 0?"
+
+
+def test_documents_of_a_file_are_its_content(tmp_path: Path) -> None:
+    for name, content in (("a.bml", NOD), ("b.bml", "no BML")):
+        (tmp_path / name).write_text(content)
+        for source in (tmp_path / name, str(tmp_path / name)):
+            assert documents_of(source) == [(content.encode(), str(tmp_path / name))]
+
+
+def test_documents_of_a_text_file_speak_it(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text("Hello")
+    (document,) = documents_of(tmp_path / "a.txt")
+    assert text_of(document.bml) == "Hello"
+
+
+def test_documents_of_a_list_have_ids_of_their_own() -> None:
+    first, second, third = (parse(document.bml) for document in documents_of(["One", NOD, "Two"]))
+    assert (first.id, second.id, third.id) == ("text1", "b", "text3")
+    assert third.composition == "APPEND"
+
+
+@pytest.mark.parametrize("source", ["hello.bml", "no/such/file", Path("hello.bml")])
+def test_documents_of_a_missing_file_are_an_error(source: str | Path) -> None:
+    with pytest.raises(FileNotFoundError) as error:
+        documents_of(["Hello", source])
+    assert error.value.filename == str(source) or error.value.filename == source
+
+
+@pytest.mark.parametrize("source", [None, 3, {"a": 1}, ["Hello", 3], object()])
+def test_documents_of_another_type_are_an_error(source: object) -> None:
+    with pytest.raises(TypeError, match=r"source: wanted BML, a text, bytes, a pathlib\.Path"):
+        documents_of(source)  # type: ignore[arg-type]
+
+
+def test_documents_of_an_empty_list_are_an_error() -> None:
+    with pytest.raises(ValueError, match="got no document"):
+        documents_of([])
+
+
+def test_documents_of_a_text_refuse_characters_that_xml_cannot_hold() -> None:
+    with pytest.raises(ValueError, match=r"U\+0001 at 1"):
+        documents_of("a\x01b")
+
+
+def test_first_error_has_the_line_the_path_and_the_file(tmp_path: Path) -> None:
+    (tmp_path / "a.bml").write_text("<!-- -->\n<bml/>")
+    error = first_error(documents_of([tmp_path / "a.bml"]), VOCABULARY, strict_bml=False)
+    assert isinstance(error, BMLError)
+    assert (error.line, error.path) == (2, "/bml")
+    assert str(tmp_path / "a.bml") in str(error)
