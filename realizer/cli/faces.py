@@ -77,7 +77,7 @@ def build(name: str, data: Path, output: Path | None, seed: int | None) -> None:
     from realizer.facebuild.person.build import build_face
     from realizer.facebuild.person.makehuman import data_folder
     from realizer.facebuild.person.random_person import random_person
-    from realizer.facebuild.person.recipe import recipe_text
+    from realizer.facebuild.person.recipe import read_recipe, recipe_text
 
     given = Path(name) if name.endswith(".toml") else None
     if given is not None:
@@ -90,6 +90,7 @@ def build(name: str, data: Path, output: Path | None, seed: int | None) -> None:
     if given is not None and folder / RECIPE != given:
         if not given.is_file():
             raise FaceError(f"{given}: wanted a recipe, found none; realizer faces build --help shows one")
+        read_recipe(given, data)  # before anything is written
         text = given.read_text("utf-8")
     if text is not None:
         if (folder / RECIPE).is_file() and (folder / RECIPE).read_text("utf-8") != text:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from realizer.facebuild.person.sliders import description_of
 from realizer.tables import toml_table
 
 SPREAD = 0.38  # standard deviation of a slider; faces of real people are mostly near the middle
@@ -47,9 +48,8 @@ def random_person(seed: int) -> dict[str, Any]:
         looks[f"brow_{name}"] = round(float(middle + spread * np.clip(rng.normal(), -2, 2)), 4)
     if sex == "male":
         looks["stubble"] = round(float(rng.uniform(0, 0.6)), 2)
-    word = "woman" if sex == "female" else "man"
     return {
-        "says": f"A {word} of about {age} with {person['hair']} hair, drawn with seed {seed}",
+        "says": f"{description_of(person)} with {person['hair']} hair, drawn with seed {seed}",
         "person": person,
         "hair": {"style": str(rng.choice(styles))},
         "look": looks,

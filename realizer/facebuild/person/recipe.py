@@ -14,7 +14,7 @@ from realizer.face.reading import face_errors
 from realizer.facebuild.hair.style import style_of
 from realizer.facebuild.person import makehuman
 from realizer.facebuild.person.glasses import glasses_of
-from realizer.facebuild.person.sliders import person_faults, person_tables
+from realizer.facebuild.person.sliders import description_of, person_faults, person_tables
 from realizer.tables import toml_table
 
 COLOURS = (
@@ -71,6 +71,8 @@ class Recipe:
 def read_recipe(path: Path, data: Path) -> Recipe:
     """Read a recipe from a file. What its sliders ([person]) give, its other tables may change.
 
+    Without [person], [targets] and [colours] it is the person whose sliders have their defaults.
+
     Args:
         data: the folder of shape targets that its names are looked up in.
 
@@ -81,20 +83,24 @@ def read_recipe(path: Path, data: Path) -> Recipe:
         raw = parse_toml(path.read_text("utf-8"))
     known = ("says", *TABLES)
     faults = [f"wanted one of {', '.join(known)}, got {key!r}" for key in raw if key not in known]
-    if not isinstance(raw.get("says"), str) or not raw["says"].strip():
-        faults.append(f"says: wanted a sentence about the person, got {raw.get('says')!r}")
     tables: dict[str, dict[str, Any]] = {}
     for name in TABLES:
         tables[name] = raw.get(name, {})
         if not isinstance(tables[name], dict):
             faults.append(f"{name}: wanted a table, got {tables[name]!r}")
             tables[name] = {}
-    if "person" in raw:
-        faults += (found := person_faults(tables["person"]))
-        for name, values in ({} if found else person_tables(tables["person"])).items():
+    person = tables.pop("person")
+    wrong = person_faults(person)
+    faults += wrong
+    if not wrong and ("person" in raw or not {"targets", "colours"} & raw.keys()):
+        for name, values in person_tables(person).items():
             tables[name] = {**values, **tables[name]}
-    faults += _target_faults(tables["targets"], data)
-    faults += _colour_faults(tables["colours"])
+    says = raw.get("says", description_of(person))
+    if not isinstance(says, str) or not says.strip():
+        faults.append(f"says: wanted a sentence about the person, got {says!r}")
+    if not wrong:  # else targets and colours are missing because of that
+        faults += _target_faults(tables["targets"], data)
+        faults += _colour_faults(tables["colours"])
     for reader, name in ((style_of, "hair"), (appearance_of, "look"), (glasses_of, "glasses")):
         try:
             reader(tables[name])
@@ -102,8 +108,7 @@ def read_recipe(path: Path, data: Path) -> Recipe:
             faults.append(str(error))
     if faults:
         raise FaceError("\n".join(f"{path}: {fault}" for fault in faults))
-    del tables["person"]
-    return Recipe(raw["says"], **tables)
+    return Recipe(says, **tables)
 
 
 def appearance_of(table: Mapping[str, Any]) -> Appearance:
@@ -153,9 +158,8 @@ def _target_faults(targets: Mapping[str, Any], data: Path) -> list[str]:
 
 
 def _colour_faults(colours: Mapping[str, Any]) -> list[str]:
-    faults = [
-        f"colours: {name}: wanted three numbers 0..255, got none" for name in COLOURS if name not in colours
-    ]
+    missing = [name for name in COLOURS if name not in colours]
+    faults = [f"colours: wanted also {', '.join(missing)}"] if missing else []
     for name, colour in colours.items():
         if name not in COLOURS:
             faults.append(f"colours: {name}: wanted one of {', '.join(COLOURS)}")

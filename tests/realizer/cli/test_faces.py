@@ -59,6 +59,13 @@ def test_faces_build_takes_a_recipe_or_a_seed(data: Path) -> None:
     assert "maria.toml: wanted a recipe, found none" in done.stderr
 
 
+def test_faces_build_writes_nothing_of_a_wrong_recipe(data: Path, tmp_path: Path) -> None:
+    (recipe := tmp_path / "maria.toml").write_text("[person]\nage = 200\n")
+    done = run("faces", "build", str(recipe), "--data", str(data), "-o", str(tmp_path / "maria"))
+    assert f"{recipe}: person: age: wanted a number 18..95, got 200" in done.stderr
+    assert not (tmp_path / "maria").exists()
+
+
 def test_faces_build_keeps_a_recipe_that_is_there(data: Path, tmp_path: Path) -> None:
     folder = tmp_path / "anna"
     folder.mkdir()

@@ -55,7 +55,8 @@ def test_read_recipe_keeps_what_is_written(data: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "fault"),
     [
-        ("says = 'Eve'", "", "says: wanted a sentence about the person, got None"),
+        ("says = 'Eve'", "says = ' '", "says: wanted a sentence about the person, got ' '"),
+        ("says = 'Eve'", "person = {age = 200}", "person: age: wanted a number 18..95, got 200"),
         ("says = 'Eve'", "says = 'Eve'\nsings = 1", "wanted one of says, "),
         ("*eye-scale-incr", "*eye-scale-inc", "did you mean 'eyes/*eye-scale-incr'?"),
         ("*eye-scale-incr", "l-eye-scale-incr", "targets: eyes/l-eye-scale-incr: no such shape target"),
@@ -63,7 +64,7 @@ def test_read_recipe_keeps_what_is_written(data: Path) -> None:
         ("= 0.5", "= nan", "targets: eyes/*eye-scale-incr: wanted a weight 0..1, got nan"),
         ("= 0.5", "= true", "targets: eyes/*eye-scale-incr: wanted a weight 0..1, got True"),
         ("'macrodetails/asian-female-old' = 1.0", "", "wanted at least one of macrodetails/..., got none"),
-        ("skin = [1, 2.5, 255]", "", "colours: skin: wanted three numbers 0..255, got none"),
+        ("skin = [1, 2.5, 255]", "", "colours: wanted also skin"),
         ("skin = [1, 2.5, 255]", "skin = [1, 2, 256]", "colours: skin: wanted three numbers 0..255, got [1"),
         ("skin = [1, 2.5, 255]", "skin = 'pink'", "colours: skin: wanted three numbers 0..255, got 'pink'"),
         ("[colours]", "[colours]\nnose = [1, 2, 3]", "colours: nose: wanted one of skin, "),
@@ -83,6 +84,19 @@ def test_read_recipe_names_the_key_of_a_fault(old: str, new: str, fault: str, da
 def test_read_recipe_lists_all_faults(data: Path) -> None:
     lines = faults(GOOD.replace("= 0.5", "= -1").replace("lips = [1, 2.5, 255]", ""), data)
     assert len(lines) == 2
+
+
+def test_read_recipe_of_wrong_sliders_names_these_alone(data: Path) -> None:
+    lines = faults("[person]\nsex = 'robot'\nhair = 'mohawk'\n", data)
+    assert [line.split(": wanted")[0] for line in lines] == ["person: sex", "person: hair"]
+
+
+def test_read_recipe_describes_a_person_without_a_sentence(data: Path) -> None:
+    text = GOOD.replace("says = 'Eve'\n", "") + "\n[person]\nage = 51\nsex = 1\n"
+    (data / "recipe.toml").write_text(text, "utf-8")
+    for name in person_tables({"age": 51, "sex": 1})["targets"]:
+        (data / f"mpfb2/targets/{name}.target").touch()
+    assert read_recipe(data / "recipe.toml", data).description == "A man of about 51"
 
 
 def test_read_recipe_names_a_file_that_is_no_toml(data: Path) -> None:
