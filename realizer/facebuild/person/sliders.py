@@ -68,7 +68,8 @@ def person_tables(person: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
 
 def description_of(person: Mapping[str, Any]) -> str:
     """Return a sentence about a person, for lists of faces; faulty sliders count as their defaults."""
-    age, sex = (person.get(key) if _number(person.get(key)) else DEFAULTS[key] for key in ("age", "sex"))
+    told = {key: person[key] for key in ("age", "sex") if _number(person.get(key))}
+    age, sex = ({**DEFAULTS, **told}[key] for key in ("age", "sex"))
     word = "woman" if sex < 0.4 else "man" if sex > 0.6 else "person"
     return f"A {word} of about {age:g}"
 
