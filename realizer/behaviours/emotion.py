@@ -16,8 +16,10 @@ from realizer.animation.channel import Channel
 from realizer.behaviours import pose_channels
 from realizer.behaviours.expressive_channels import express
 from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext, claiming
+from realizer.behaviours.media import MediaError, media_file
 from realizer.behaviours.table_timing import table_timing, timing_from_table
 from realizer.core.array_types import Float64
+from realizer.emotions.archetypes import archetypes, is_profile_file, split_set
 from realizer.emotions.wheel import affect, blend_weights, place_of_affect, strength_at, wheel
 from realizer.emotions.words import UnknownWordError, known_words, place_of, strength_of
 from realizer.emotions.words import emotion as profile_of
@@ -25,8 +27,9 @@ from realizer.scheduling.timing import Timing
 from realizer.tables.emotion_model import emotion_model
 from realizer.tables.emotions import emotion_faces
 
-# Our profiles play as action units, so that speech and blinks combine with them; published ones as FAPs.
+# Our profiles play as action units, so that speech and blinks combine with them; others as FAPs.
 OWN, PUBLISHED = (None, "default", "own"), ("published", "raw")
+NO_MEDIA = PlanningContext()
 PARAMETERS = {"intensity": "intensity", "amount": "intensity"}
 
 
@@ -41,15 +44,14 @@ class EmotionRequest(NamedTuple):
     arousal: float | None
 
     @classmethod
-    def of(cls, node: Emotion | Mood) -> EmotionRequest:
-        profiles = node.profile if node.profile is not None and node.profile in PUBLISHED else "own"
+    def of(cls, node: Emotion | Mood, profiles: str) -> EmotionRequest:
         name = None if node.name is None else " ".join(node.name.split()).lower()
         return cls(name, profiles, node.angle, node.activation, node.valence, node.arousal)
 
 
 def timing(node: Emotion, context: PlanningContext) -> Timing:
     """Return the timing of the archetype's face lexeme; between two archetypes their weighted mean."""
-    return _timing(EmotionRequest.of(node))
+    return _timing(EmotionRequest.of(node, _set_of(node, context)))
 
 
 @lru_cache(maxsize=1000)
@@ -69,51 +71,73 @@ def _timing(feeling: EmotionRequest) -> Timing:
 
 def expand(node: Emotion, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     """Return channels with the emotion from attackPeak to relax."""
-    channels = pose_channels.hold(values_of(node), times, node.id)
-    return channels if node.profile in PUBLISHED else express(channels, context)
+    channels = pose_channels.hold(values_of(node, context), times, node.id)
+    return express(channels, context) if _set_of(node, context) == "own" else channels
 
 
 def expand_mood(node: Mood, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     """Return channels that rise to the new base face and stay; the neutral face has none."""
-    return pose_channels.keep_base(values_of(node), times, node.id)
+    return pose_channels.keep_base(values_of(node, context), times, node.id)
 
 
 def check(node: Emotion | Mood, context: PlanningContext) -> tuple[Fault, ...]:
     """Return faults: an unknown word, or one without a face, is fatal, an unknown profile is not."""
+    try:
+        profiles = _set_of(node, context)
+        archetypes(profiles)
+    except (MediaError, ValueError) as wrong:
+        return (
+            Fault("CANNOT_CREATE_BEHAVIOR", f"profile: {wrong}".replace("profile: profiles: ", "profile: ")),
+        )
     if node.name is not None:
         try:
-            request = EmotionRequest.of(node)
-            profile_of(request.name or "", request.profiles)
+            profile_of(node.name, profiles)
         except UnknownWordError as wrong:
             if node.name[-1:].isdecimal():
                 return (Fault("CANNOT_CREATE_BEHAVIOR", str(wrong).replace("emotion: ", "name: ", 1)),)
             return (pose_channels.unknown_word("name", node.name, known_words()),)
         except ValueError as wrong:
             return (Fault("CANNOT_CREATE_BEHAVIOR", f"name: {wrong}"),)
-    if node.profile not in (*OWN, *PUBLISHED):
+    if profiles == "own" and node.profile not in OWN:
         wanted = ", ".join(name for name in (*OWN, *PUBLISHED) if name)
         text = f"profile: wanted one of {wanted}, got {node.profile!r}; shown as usual"
         return (Fault("CUSTOM_ATTRIBUTE_NOT_SUPPORTED", text, fatal=False),)
     return ()
 
 
-def values_of(node: Emotion | Mood) -> dict[Target, float]:
-    """Return column -> value: AUs 0..1, or FAPs of a published profile; random within its ranges with a seed.
+def values_of(node: Emotion | Mood, context: PlanningContext = NO_MEDIA) -> dict[Target, float]:
+    """Return column -> value: AUs 0..1, or FAPs of another set's profile; random with a seed.
 
     Raises:
         ValueError: a place off the wheel, or off the plane of valence and arousal.
+        MediaError: a profile file that is not in the media folder.
     """
-    if node.profile in PUBLISHED:
+    profiles = _set_of(node, context)
+    if profiles != "own":
         if node.angle is not None:
-            profile = wheel(node.angle, node.activation, node.profile)
+            profile = wheel(node.angle, node.activation, profiles)
         elif node.valence is not None and node.arousal is not None:
-            profile = affect(node.valence, node.arousal, node.profile)
+            profile = affect(node.valence, node.arousal, profiles)
         else:
-            profile = profile_of(node.name or "", node.profile)
+            profile = profile_of(node.name or "", profiles)
         frame = profile.frame() if node.seed is None else profile.draw(node.seed)
         return {fap(number): node.intensity * float(frame[number - 1]) for number in profile.ranges}
-    aus = _aus(EmotionRequest.of(node))
+    aus = _aus(EmotionRequest.of(node, profiles))
     return pose_channels.columns(aus if node.seed is None else _varied(aus, node.seed), node.intensity)
+
+
+def _set_of(node: Emotion | Mood, context: PlanningContext) -> str:
+    """Return the set of profiles that an element names; a profile file is one of the media folder.
+
+    Raises:
+        MediaError: no such file.
+    """
+    name, chosen = split_set(node.profile or "own")
+    if is_profile_file(name):
+        name = str(media_file(name, context))
+    elif name not in PUBLISHED:
+        return "own"
+    return ", ".join([name, *(f"{emotion} {number}" for emotion, number in chosen)])
 
 
 def _varied(aus: Mapping[tuple[int, str], float], seed: int) -> dict[tuple[int, str], float]:
@@ -149,7 +173,10 @@ def _mix(feeling: EmotionRequest) -> tuple[Mapping[str, float], float]:
         angle, away = place_of_affect(feeling.valence, feeling.arousal)
         parts = blend_weights(angle, "own", "affect")
         return {name: share for name, share in parts.items() if name in emotion_faces()}, away
-    place = place_of(feeling.name or "", feeling.profiles)
+    try:
+        place = place_of(feeling.name or "", feeling.profiles)
+    except UnknownWordError:  # an emotion of a profile file that is not on the wheel
+        place = None
     if place is None:
         return {}, 0.0
     return blend_weights(place.angle, "own", place.ring), strength_of(place)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,10 +22,11 @@ RINGS = (1.0, 3.0, 5.0, 7.0)  # activations in the picture of the wheel, as in P
 @click.option("--json", "as_json", is_flag=True, help="Print JSON: the ranges and all 68 values.")
 @click.option(
     "--profiles",
-    type=click.Choice(["own", "published", "raw"]),
+    type=options.ProfileSet(),
     default="own",
     show_default=True,
-    help="Profiles: our own, or those of Raouzaiou et al. 2002, corrected (published) or as printed (raw).",
+    help="Profiles: own, those of Raouzaiou et al. 2002, corrected (published) or as printed (raw), or of a "
+    'file. "published, fear 3" has fear 3 stand for fear.',
 )
 @click.option("--angle", type=float, metavar="DEGREES", help="Angle on the wheel of Paul 2010.")
 @click.option("--activation", type=float, help="With --angle: 0 (neutral) to 7 (full).  [default: full]")
@@ -70,7 +71,7 @@ def emotion(
 ) -> None:
     """Print which FAPs an emotion moves, and how far.
 
-    The emotion is a WORD, a place on the emotion wheel (--angle), a degree of valence and arousal, or the
+    The emotion is a WORD, a place on the emotion wheel (--angle), a degree of valence and arousal, or each
     profile in FILE.txt, as written by -o.
 
     \b
@@ -83,18 +84,19 @@ def emotion(
     options.check_suffix(chart, ".png")
     if output or chart:
         options.check_camera(face, camera)
-    profile, shares = _requested_profile(word, profiles, angle, activation, valence, arousal, bool(chart))
-    if profile is not None:
+    found, shares = _requested_profiles(word, profiles, angle, activation, valence, arousal, bool(chart))
+    if found:
         if output is not None:  # before anything is printed: the reader may close the pipe
-            _write(profile, seed, output, face, camera)
-        _print_profile(profile, shares, seed, as_json)
+            _write(found, seed, output, face, camera)
+        for profile in found:
+            _print_profile(profile, shares, seed, as_json)
     elif output is not None or as_json or seed is not None:
         raise click.UsageError("wanted a WORD or a place for --json, --seed and -o; got only --wheel")
     if chart is not None:
         _draw_wheel(profiles, chart, face, camera)
 
 
-def _requested_profile(
+def _requested_profiles(
     word: str | None,
     profiles: str,
     angle: float | None,
@@ -102,35 +104,21 @@ def _requested_profile(
     valence: float | None,
     arousal: float | None,
     wheel_only: bool,
-) -> tuple[Profile | None, Mapping[str, float]]:
-    """Return the profile of the options, or None if only the wheel was requested.
+) -> tuple[tuple[Profile, ...], Mapping[str, float]]:
+    """Return the profiles of the options; none if only the wheel was requested.
 
     Also return archetype -> share at a place on the wheel.
     """
+    from realizer.emotions.archetypes import is_profile_file, read_profile_file
     from realizer.emotions.chosen import emotion_and_shares
 
     if wheel_only and all(option is None for option in (word, angle, activation, valence, arousal)):
-        return None, {}
+        return (), {}
     with options.reporting(ValueError):
-        if word is not None and word.lower().endswith(".txt") and angle is None and valence is None:
-            return _read_profile(Path(word)), {}
-        return emotion_and_shares(word, angle, activation, (valence, arousal), profiles)
-
-
-def _read_profile(path: Path) -> Profile:
-    """Return the only profile of a file; raises ValueError otherwise."""
-    from realizer.emotions.profile_file import read_profiles
-
-    try:
-        found = read_profiles(path.read_text("utf-8-sig"), str(path))
-    except UnicodeDecodeError as error:
-        raise ValueError(f"{path}: wanted a text in UTF-8, got: {error.reason} at {error.start}") from None
-    except OSError as error:
-        raise ValueError(f"{path}: wanted a file of one profile, got: {error.strerror}") from None
-    if len(found) != 1:
-        names = ", ".join(profile.name for profile in found[:5])
-        raise ValueError(f"{path}: wanted one profile, got {len(found)}{names and ': ' + names}")
-    return found[0]
+        if word is not None and is_profile_file(word) and angle is None and valence is None:
+            return read_profile_file(Path(word)), {}
+        profile, shares = emotion_and_shares(word, angle, activation, (valence, arousal), profiles)
+        return (profile,), shares
 
 
 def _print_profile(profile: Profile, shares: Mapping[str, float], seed: int | None, as_json: bool) -> None:
@@ -156,19 +144,24 @@ def _print_profile(profile: Profile, shares: Mapping[str, float], seed: int | No
         click.echo(f"F{fap:<3} {names[fap]:<22} {low:8.1f} .. {high:7.1f}   {value:8.1f}")
 
 
-def _write(profile: Profile, seed: int | None, path: Path, face: str, camera: str) -> None:
+def _write(profiles: Sequence[Profile], seed: int | None, path: Path, face: str, camera: str) -> None:
     from realizer.emotions.profile_file import write_profiles
 
     if path.suffix.lower() == ".txt":
-        path.write_text(write_profiles([profile]), "utf-8")
+        path.write_text(write_profiles(profiles), "utf-8")
         return
+    import numpy as np
     from PIL import Image
 
+    from realizer.render.contact_sheet import sheet
     from realizer.render.renderer import Renderer
 
-    pose = profile.frame() if seed is None else profile.draw(seed)
+    poses = np.stack([profile.frame() if seed is None else profile.draw(seed) for profile in profiles])
     with Renderer(face, (512, 512), camera) as renderer:
-        Image.fromarray(renderer.draw(pose[None])[0]).save(path)
+        pictures = list(renderer.draw(poses))
+    titles, notes = [profile.name for profile in profiles], [()] * len(profiles)
+    whole = pictures[0] if len(pictures) == 1 else sheet(pictures, titles, notes, min(len(pictures), 4))
+    Image.fromarray(whole).save(path)
 
 
 def _draw_wheel(profiles: str, path: Path, face: str, camera: str) -> None:

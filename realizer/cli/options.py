@@ -150,6 +150,21 @@ mapping = click.option(
 )
 
 
+class ProfileSet(click.ParamType):  # type: ignore[type-arg]
+    """The name of a set of emotion profiles, or a profile file."""
+
+    name = "SET|FILE.txt"
+
+    def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> str:
+        from realizer.emotions.archetypes import archetypes
+
+        try:
+            archetypes(value)
+        except ValueError as error:
+            self.fail(str(error).removeprefix("profiles: "), parameter, context)
+        return str(value)
+
+
 class Number(click.FloatRange):
     """A finite number in a range; click accepts NaN."""
 

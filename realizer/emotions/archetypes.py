@@ -1,39 +1,89 @@
-"""The profiles of the archetypal emotions: our own, the published ones, and those as printed."""
+"""The profiles of the archetypal emotions: our own, published, as printed, or of a file."""
 
+import re
 from collections.abc import Mapping
 from functools import cache
-from typing import Literal
+from pathlib import Path
 
 from realizer.emotions.profile import Profile
+from realizer.emotions.profile_file import read_profiles
+from realizer.tables.emotion_model import emotion_model
 from realizer.tables.profiles import own_ranges, published_ranges
 
-ProfileSet = Literal["own", "published", "raw"]
-SETS: tuple[ProfileSet, ...] = ("own", "published", "raw")
+SETS = ("own", "published", "raw")
+CHOSEN = re.compile(r"\s*(\D*\w)\s+(\d{1,9})\s*")
 
 
 @cache
 def archetypes(profiles: str = "own") -> Mapping[str, Mapping[int, Profile]]:
-    """Return emotion -> number -> profile.
+    """Return emotion -> number -> profile; the first profile of an emotion is the one that stands for it.
 
     Args:
-        profiles: "own"; "published", those of Raouzaiou et al. 2002, table 5, corrected; or "raw", as
-            printed.
+        profiles: "own"; "published", those of Raouzaiou et al. 2002, table 5, corrected; "raw", as printed;
+            or the path of a profile file, FILE.txt, which is read once. Profiles after commas stand for
+            their emotions: "published, fear 3, joy 0".
 
     Raises:
-        ValueError: an unknown set.
+        ValueError: an unknown set or profile, or a file that cannot be read.
     """
-    if profiles not in SETS:
-        raise ValueError(f"profiles: wanted {', '.join(SETS)}, got {profiles!r}")
+    name, chosen = split_set(profiles)
+    found: dict[str, dict[int, Profile]] = {}
+    for profile in _profiles_of(name):
+        emotion, _, digits = profile.name.lower().rpartition(" ")
+        found.setdefault(emotion, {})[int(digits)] = profile
+    usual = emotion_model().chosen if name in ("published", "raw") else {}
+    for emotion, number in [*usual.items(), *chosen]:
+        numbered = found.get(emotion, {})
+        if number not in numbered:
+            known = ", ".join(profile.name for every in found.values() for profile in every.values())
+            raise ValueError(f"profiles: wanted one of {known}; got '{emotion} {number}'")
+        found[emotion] = {number: numbered[number]} | numbered
+    return found
+
+
+def split_set(profiles: str) -> tuple[str, list[tuple[str, int]]]:
+    """Return the name of a set, and the profiles chosen after it: "raw, fear 3" is "raw", [("fear", 3)]."""
+    name, *parts = re.split(r",(?=[^,]*\s\d+\s*(?:,|$))", profiles)
+    matches = [CHOSEN.fullmatch(part) for part in parts]
+    if not all(matches):
+        return profiles.strip(), []
+    return name.strip(), [(match[1].lower(), int(match[2])) for match in matches if match]
+
+
+def is_profile_file(name: str) -> bool:
+    """Return whether the name of a set is that of a profile file."""
+    return name.lower().endswith(".txt")
+
+
+def read_profile_file(path: Path) -> tuple[Profile, ...]:
+    """Return the profiles of a file.
+
+    Raises:
+        ValueError: a file that cannot be read, or has no profiles.
+    """
+    try:
+        found = read_profiles(path.read_text("utf-8-sig"), str(path))
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: wanted a text in UTF-8, got: {error.reason} at {error.start}") from None
+    except OSError as error:
+        raise ValueError(f"{path}: wanted a file of profiles, got: {error.strerror}") from None
+    if not found:
+        raise ValueError(f"{path}: wanted at least one profile, got none")
+    return found
+
+
+def _profiles_of(name: str) -> tuple[Profile, ...]:
+    if is_profile_file(name):
+        return read_profile_file(Path(name))
+    if name not in SETS:
+        raise ValueError(f"profiles: wanted {', '.join(SETS)} or a file FILE.txt, got {name!r}")
     ranges: dict[tuple[str, int], dict[int, tuple[float, float]]] = {}
-    if profiles == "own":
+    if name == "own":
         for own in own_ranges():
             ranges.setdefault((own.emotion, own.profile), {})[own.fap] = own.low, own.high
     else:
         for row in published_ranges():
-            low, high = (row.raw_low, row.raw_high) if profiles == "raw" else (row.low, row.high)
+            low, high = (row.raw_low, row.raw_high) if name == "raw" else (row.low, row.high)
             # Some ranges are printed backwards.
             ranges.setdefault((row.emotion, row.profile), {})[row.fap] = min(low, high), max(low, high)
-    found: dict[str, dict[int, Profile]] = {}
-    for (emotion, number), faps in ranges.items():
-        found.setdefault(emotion, {})[number] = Profile(f"{emotion} {number}", profiles, faps)
-    return found
+    return tuple(Profile(f"{emotion} {number}", name, faps) for (emotion, number), faps in ranges.items())

@@ -25,7 +25,8 @@ def emotion(
         word: such as "joy" or "guilty".
         angle: degrees on the wheel of Paul 2010; activation: with it, 0 (neutral) to 7 (full).
         valence, arousal: -1..1, both.
-        profiles: "own", or those of Raouzaiou et al. 2002: "published" (corrected) or "raw" (as printed).
+        profiles: "own", or those of Raouzaiou et al. 2002: "published" (corrected) or "raw" (as printed);
+            or the path of a profile file, FILE.txt. "published, fear 3" has fear 3 stand for fear.
 
     Raises:
         TypeError: a value has another type.

@@ -25,7 +25,7 @@ def wheel(
     Args:
         angle: degrees, modulo 360.
         activation: from 0 (neutral) to 7 (the rim); None: that of the archetypes.
-        profiles: "own", with archetypes at the rim, or "published" or "raw", with those of the paper.
+        profiles: a set of `archetypes`; "own" has archetypes at the rim, others those of the paper.
         ring: "paul", with trust at 0 and fear at 45; "plutchik", with the angles of Plutchik's words; or
             "affect", with the angles of (valence, arousal).
 
@@ -124,8 +124,15 @@ def _anchors(profiles: str, ring: str) -> tuple[tuple[Anchor, ...], tuple[float,
         if place.kind == "rest":
             anchors.append(Anchor(Profile(NEUTRAL, profiles, {}), model.most, place.angle))
         elif place.name in known:
-            numbered = known[place.name]
-            profile = numbered[0] if profiles == "own" else numbered[model.chosen[place.name]]
+            profile = next(iter(known[place.name].values()))
             own = model.most if profiles == "own" or place.activation is None else place.activation
             anchors.append(Anchor(profile, own, place.angle))
+    if not anchors:
+        raise ValueError(f"profiles: wanted those of emotions on the wheel, got {profiles}")
+    # A profile file may leave out half of the wheel: its middle is neutral.
+    for one, two in zip(anchors, [*anchors[1:], anchors[0]], strict=True):
+        arc = (two.angle - one.angle) % 360.0 or 360.0
+        if arc > 180.0:
+            middle = Anchor(Profile(NEUTRAL, profiles, {}), model.most, (one.angle + arc / 2) % 360.0)
+            anchors = sorted([*anchors, middle], key=lambda anchor: anchor.angle)
     return tuple(anchors), tuple(anchor.angle for anchor in anchors)

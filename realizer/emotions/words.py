@@ -2,12 +2,11 @@
 
 import difflib
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import cache
 from types import MappingProxyType
 from typing import NamedTuple
 
-from realizer.emotions.archetypes import archetypes
+from realizer.emotions.archetypes import archetypes, is_profile_file, split_set
 from realizer.emotions.intermediate import between
 from realizer.emotions.profile import Profile
 from realizer.emotions.wheel import NEUTRAL, blend_weights, neighbours, wheel
@@ -20,12 +19,14 @@ class WordPlace(NamedTuple):
     Attributes:
         activation: None for an emotion of the wheel itself, which has the activation of its archetypes.
         between: whether the word belongs to no archetype, so that published profiles are interpolated.
+        strength: factor of a word that is a milder or stronger form of another one.
     """
 
     ring: str
     angle: float
     activation: float | None = None
     between: bool = False
+    strength: float = 1.0
 
 
 class UnknownWordError(ValueError):
@@ -39,12 +40,12 @@ def emotion(word: str, profiles: str = "own") -> Profile:
     - a word rated by Whissell ("terrified", "guilty"): the archetype of its category, scaled by the ratio of
       the activations, or a blend of the two archetypes around its angle: by the published rules for
       published profiles, by `wheel` and `strength_of` for our own;
-    - a word of our own list, which stands for another word;
-    - an archetype and a number ("fear 8").
+    - a word of our own list, which stands for another word or is a degree of it ("serenity" of "joy");
+    - an archetype and a number ("fear 8"), or any emotion of a profile file.
 
     Args:
         word: in any case.
-        profiles: "own", "published" or "raw".
+        profiles: a set of `archetypes`.
 
     Raises:
         UnknownWordError: an unknown word or number.
@@ -57,6 +58,11 @@ def emotion(word: str, profiles: str = "own") -> Profile:
         if number in known.get(name, {}):
             return known[name][number]
         raise UnknownWordError(_unknown_profile(name, number, profiles))
+    if is_profile_file(split_set(profiles)[0]):
+        if word in known:
+            return next(iter(known[word].values()))
+        if word in ring("paul") and ring("paul")[word].kind == "basic":
+            raise UnknownWordError(f"emotion: wanted one of {', '.join(known)} of {profiles}, got {word!r}")
     place = place_of(word)
     if place is None:
         return Profile(word, profiles, {})
@@ -66,7 +72,7 @@ def emotion(word: str, profiles: str = "own") -> Profile:
     if profiles == "own":
         full = wheel(place.angle, None, profiles, place.ring)
         return full.scaled(strength_of(place), word)
-    return replace(wheel(place.angle, place.activation, profiles, place.ring), name=word)
+    return wheel(place.angle, place.activation, profiles, place.ring).scaled(place.strength, word)
 
 
 def strength_of(place: WordPlace) -> float:
@@ -76,10 +82,12 @@ def strength_of(place: WordPlace) -> float:
     "afraid", and "afraid" as strong as "fear".
     """
     if place.activation is None:
-        return 1.0
+        return place.strength
     parts = blend_weights(place.angle, "own", place.ring)
-    return place.activation / sum(
-        share * (ring(place.ring)[name].activation or 0.0) for name, share in parts.items()
+    return (
+        place.strength
+        * place.activation
+        / sum(share * (ring(place.ring)[name].activation or 0.0) for name, share in parts.items())
     )
 
 
@@ -97,18 +105,19 @@ def place_of(word: str, profiles: str = "own") -> WordPlace | None:
         if number not in archetypes(profiles).get(name, {}):
             raise UnknownWordError(_unknown_profile(name, number, profiles))
         word = name
-    meant = own_words()[word].like if word in own_words() else word
+    own = own_words().get(word)
+    meant, strength = (word, 1.0) if own is None else (own.like, own.strength)
     if meant == NEUTRAL:
         return None
     if meant in ring("paul"):
-        return WordPlace("paul", ring("paul")[meant].angle)
+        return WordPlace("paul", ring("paul")[meant].angle, strength=strength)
     row = whissell_words().get(meant)
     if row is None:
         raise UnknownWordError(_unknown(word))
     if row.activation is None:
         raise ValueError(f"{row.word}: its activation was never rated, so it has no face of its own")
     if row.category:
-        return WordPlace("plutchik", ring("plutchik")[row.category].angle, row.activation)
+        return WordPlace("plutchik", ring("plutchik")[row.category].angle, row.activation, strength=strength)
     return WordPlace("plutchik", row.angle, row.activation, between=True)
 
 

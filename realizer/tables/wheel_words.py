@@ -31,11 +31,16 @@ class WhissellWord:
 
 @dataclass(frozen=True, slots=True)
 class OwnWord:
-    """Another name, chosen for this project, for a word of the wheel or of Whissell."""
+    """Another name or degree, chosen for this project, of a word of the wheel or of Whissell.
+
+    Attributes:
+        strength: factor of the word that it is like.
+    """
 
     word: str
     like: str
-    source: Literal["own"]
+    strength: float
+    source: Literal["own", "plutchik"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -232,3 +233,14 @@ def test_emotion_plays_every_word_in_any_case(play, word: str) -> None:
     played = play(f'<own:emotion id="e" name="{word.upper()}" {AT}/>')
     assert played.warnings == []
     assert bool(played.aus(1.0)) == (word != "neutral")
+
+
+def test_emotion_plays_a_profile_file_of_the_media_folder(play, tmp_path: Path) -> None:
+    (tmp_path / "mine.txt").write_text("Fear 9\nF31 [100, 200]\nSmug 0\nF12 [100, 200]\n")
+    element = f'<own:emotion id="e" name="{{}}" profile="mine.txt" intensity="1" {AT}/>'
+    assert play(element.format("fear"), media=tmp_path).fap(31, 1.0) == pytest.approx(150, abs=1)
+    assert play(element.format("smug"), media=tmp_path).fap(12, 1.0) == pytest.approx(150, abs=1)
+    assert play(element.format("smug")).warnings == [("b:e", "CANNOT_CREATE_BEHAVIOR")]
+    (tmp_path / "x").mkdir()
+    outside = play(element.format("smug").replace("mine", "../mine"), media=tmp_path / "x")
+    assert outside.warnings == [("b:e", "CANNOT_CREATE_BEHAVIOR")]

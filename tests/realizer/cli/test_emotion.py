@@ -96,24 +96,17 @@ def test_emotion_reads_a_profile_file(tmp_path: Path) -> None:
     assert (said["emotion"], said["profiles"]) == ("Fear 3", str(path))
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        (None, "wanted a file of one profile, got: No such file"),
-        ("", "wanted one profile, got 0"),
-        ("Joy 0\nF3 [1, 2]\nJoy 1\nF3 [1, 3]\n", "wanted one profile, got 2: Joy 0, Joy 1"),
-        ("Joy 0\nF3 [1\n", "line 2: Joy 0, column 1: wanted F3 [low, high]"),
-    ],
-)
-def test_emotion_refuses_a_file_without_exactly_one_profile(
-    text: str | None, said: str, tmp_path: Path
-) -> None:
-    path = tmp_path / "mine.txt"
-    if text is not None:
-        path.write_text(text, "utf-8")
-    done = run(str(path))
+def test_emotion_prints_every_profile_of_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "two.txt"
+    path.write_text("Fear 9\nF3 [400, 560]\nSurprise 0\nF3 [569, 1201]\n", "utf-8")
+    assert [line for line in run(str(path)).stdout.splitlines() if "(" in line] == [
+        f"Fear 9 ({path})",
+        f"Surprise 0 ({path})",
+    ]
+    assert run("surprise", "--profiles", str(path)).stdout.startswith("Surprise 0")
+    done = run(str(tmp_path / "none.txt"))
     assert done.exit_code == 2
-    assert said in " ".join(done.stderr.split())
+    assert "wanted a file of profiles, got: No such file" in " ".join(done.stderr.split())
 
 
 def test_emotion_refuses_a_file_that_is_not_text(tmp_path: Path) -> None:
@@ -146,6 +139,7 @@ def test_emotion_draws_a_word_and_the_wheel_of_64_faces(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("args", "said"),
     [
+        (["joy", "--profiles", "ekman"], "wanted own, published, raw or a file FILE.txt, got 'ekman'"),
         (["gilty"], "got 'gilty', did you mean guilty?"),
         (["fear 33", "--profiles", "published"], "got 'fear 33', did you mean fear 9?"),
         (["feer 8", "--profiles", "published"], "got 'feer 8', did you mean fear 8"),

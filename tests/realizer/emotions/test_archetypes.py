@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from realizer.emotions.archetypes import archetypes
@@ -43,5 +45,39 @@ def test_archetypes_of_our_own_are_eight_and_symmetric() -> None:
 
 
 def test_archetypes_refuse_an_unknown_set() -> None:
-    with pytest.raises(ValueError, match="wanted own, published, raw, got 'ekman'"):
+    with pytest.raises(ValueError, match=r"wanted own, published, raw or a file FILE\.txt, got 'ekman'"):
         archetypes("ekman")
+
+
+FILE = "Fear 9\nF3 [400, 560], F5 [307, 399]\nFear 0\nF3 [10, 20]\nSmug 1\nF12 [100, 200]\n"
+
+
+def test_archetypes_of_a_file_have_all_its_profiles(tmp_path: Path) -> None:
+    path = tmp_path / "a, b.txt"
+    path.write_text(FILE)
+    found = archetypes(str(path))
+    assert {emotion: list(numbered) for emotion, numbered in found.items()} == {"fear": [9, 0], "smug": [1]}
+    assert list(archetypes(f"{path}, fear 0")["fear"]) == [0, 9]
+
+
+def test_archetypes_begin_with_the_chosen_profile() -> None:
+    assert next(iter(archetypes("published")["fear"])) == 8
+    assert next(iter(archetypes("published, fear 3, sadness 0")["fear"])) == 3
+    with pytest.raises(ValueError, match=r"wanted one of .*joy 3.*; got 'joy 7'"):
+        archetypes("published, joy 7")
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (None, "wanted a file of profiles, got: No such file"),
+        (b"", "wanted at least one profile, got none"),
+        (b"Joy 0\nF3 [1\n", r"line 2: Joy 0, column 1: wanted F3 \[low, high\]"),
+        (b"\xff\xfe", "wanted a text in UTF-8"),
+    ],
+)
+def test_archetypes_refuse_a_damaged_file(content: bytes | None, said: str, tmp_path: Path) -> None:
+    if content is not None:
+        (tmp_path / "x.txt").write_bytes(content)
+    with pytest.raises(ValueError, match=said):
+        archetypes(str(tmp_path / "x.txt"))

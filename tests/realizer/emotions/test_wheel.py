@@ -95,7 +95,7 @@ def test_affect_finds_the_words_rated_by_whissell() -> None:
         ((45, float("nan")), "activation: wanted 0..7, got nan"),
         ((float("nan"), 4), "angle: wanted a number of degrees, got nan"),
         ((float("inf"), 4), "angle: wanted a number of degrees, got inf"),
-        ((45, 4, "ekman"), "profiles: wanted own, published, raw, got 'ekman'"),
+        ((45, 4, "ekman"), "wanted own, published, raw or a file FILE.txt, got 'ekman'"),
         ((45, 4, "own", "geneva"), "ring: wanted paul, plutchik or affect, got 'geneva'"),
     ],
 )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -60,6 +62,31 @@ def test_emotion_with_a_number_is_that_profile() -> None:
     assert emotion("fear 3", "raw") is archetypes("raw")["fear"][3]
     with pytest.raises(UnknownWordError):
         emotion("fear 33", "raw")
+
+
+@pytest.mark.parametrize("profiles", ["own", "published"])
+def test_emotion_of_plutchiks_rings_is_milder_or_stronger(profiles: str) -> None:
+    joy = emotion("joy", profiles).frame()
+    assert np.allclose(emotion("serenity", profiles).frame(), joy * 0.5, atol=1e-2)
+    assert np.allclose(emotion("ecstasy", profiles).frame(), joy * 1.25, atol=1e-2)
+
+
+def test_emotion_of_a_profile_file_is_its_first_profile(tmp_path: Path) -> None:
+    path = tmp_path / "two.txt"
+    path.write_text("Fear 9\nF3 [400, 560]\nSurprise 0\nF3 [600, 1000]\nSmug 0\nF12 [100, 200]\n")
+    profiles = str(path)
+    assert emotion("fear", profiles).ranges == emotion("fear 9", profiles).ranges == {3: (400, 560)}
+    assert emotion("Smug", profiles).ranges == {12: (100, 200)}
+    assert emotion("awe", profiles).ranges == {3: (500, 780)}
+    assert wheel(247.5, None, profiles).name == "neutral"
+    with pytest.raises(UnknownWordError, match="wanted one of fear, surprise, smug"):
+        emotion("joy", profiles)
+
+
+def test_emotion_uses_the_chosen_profiles() -> None:
+    usual, chosen = (emotion("guilty", f"published{more}").ranges for more in ("", ", fear 3"))
+    assert usual != chosen
+    assert emotion("fear", "published, fear 3").ranges == emotion("fear 3", "published").ranges
 
 
 def test_place_of_a_word_between_archetypes_is_on_plutchiks_ring() -> None:
