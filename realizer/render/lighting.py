@@ -10,7 +10,7 @@ from realizer.render.compiled import compiled
 from realizer.render.shading import BRIGHTEST, STEPS, dot, reflected, unit
 from realizer.render.shadows import reach
 from realizer.render.surfaces import BENT, BOWL
-from realizer.render.textures import CHANNELS, DEPTH, IRIS, STEEPEST
+from realizer.render.textures import CHANNELS, DEPTH, FOLD_SHADE, IRIS, STEEPEST
 from realizer.render.visibility import SAMPLES, level_of
 
 # Samples of one kind are lit once where their nearness differs by less than this share, and the green of
@@ -88,6 +88,7 @@ def _light_of(t: Any, x: Any, y: Any, points: Any, moving: Any, mesh: Any, texel
         smooth[2] - su * along[2] - sv * down[2],
     ))  # fmt: skip
     occlusion = (q * fixed[a, 5] + s * fixed[b, 5] + r * fixed[c, 5]) * texel[6] * byte
+    occlusion *= np.float32(1) - np.float32(FOLD_SHADE) * fold * texel[11] * byte
     rough = max((q * fixed[a, 6] + s * fixed[b, 6] + r * fixed[c, 6]) * texel[7] * byte, np.float32(0.06))
     values = (occlusion, rough, texel[8] * byte, reach(shadows, place, smooth))
     return reflected(rows[kind], kind == HAIR, albedo, (relief, smooth, down), values, towards, lights)

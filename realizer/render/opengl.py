@@ -19,6 +19,7 @@ from realizer.render.canvas import Canvas
 from realizer.render.lamp_view import SIDE
 from realizer.render.textures import (
     ALPHA,
+    FOLD,
     FOLD_U,
     FOLD_V,
     OCCLUSION,
@@ -42,6 +43,7 @@ TEXTURES = {
     "albedoMap": tuple(range(RED, ALPHA + 1)),
     "slopeMap": (SLOPE_U, SLOPE_V, FOLD_U, FOLD_V),
     "surfaceMap": tuple(range(OCCLUSION, THICKNESS + 1)),
+    "foldMap": (FOLD,),
 }
 MOVING, FIXED = ("place", "normal", "fold", "strand"), ("uv", "colour", "occlusionRough", "kind")
 

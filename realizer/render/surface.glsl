@@ -7,6 +7,7 @@
 uniform sampler2D albedoMap;   // sRGB and alpha, unconverted
 uniform sampler2D slopeMap;    // slopes of the relief along u and v, and of the folds; 128 is level
 uniform sampler2D surfaceMap;  // occlusion, roughness, thickness
+uniform sampler2D foldMap;     // depth of the folds
 uniform highp sampler2D shadowMap;   // depths as the key lamp sees them, 0 near the lamp to 1
 uniform mediump sampler2DArray mirrorMap;  // the environment by roughness, octahedral
 
@@ -20,6 +21,7 @@ uniform vec3 iris;             // place of its middle in the maps, and its radiu
 uniform vec3 cornea;           // metres behind it of thickness 0; how it bends light; slope of the iris at its rim
 uniform vec3 glint;            // of the key lamp on eyes: place, radius, brightness
 uniform float steepest;        // slope at byte 255 of slopeMap
+uniform float foldShade;       // share of the light that folds hide at byte 255 of foldMap
 uniform vec3 ambientLight[9];  // the environment as spherical harmonics
 uniform vec3 keyDirection, keyColour, rimDirection, rimColour;
 uniform float rimPower;
@@ -228,6 +230,7 @@ vec3 surfaceColour(int kind, vec3 place, vec3 normal, vec3 strand, vec2 uv, vec3
   slope += (slopes.xy + slopes.zw * fold) * (steepest / 127.0);
   vec3 relief = unitOf(even - slope.x * along - slope.y * down);
   values.xy *= occlusionRough;
+  values.x *= 1.0 - foldShade * fold * textureLod(foldMap, uv, level).r;
   values.y = max(values.y, 0.06);
   return pictureOf(reflectedBy(kind, albedo, relief, even, unitOf(strand), vec4(values, reachOf(place, even)), view));
 }

@@ -12,11 +12,13 @@ from realizer.core.array_types import Float32, Int32, UInt8
 from realizer.core.errors import FaceError
 from realizer.face.maps import Maps
 
-# Channels of a texel: sRGB, alpha; slope of the relief; occlusion, roughness, thickness; slope of the folds.
-RED, GREEN, BLUE, ALPHA, SLOPE_U, SLOPE_V, OCCLUSION, ROUGHNESS, THICKNESS, FOLD_U, FOLD_V = range(11)
+# Channels of a texel: sRGB, alpha; slope of the relief; occlusion, roughness, thickness; slope of the folds,
+# and how deep they are: 255 is half of `Maps.relief` below the skin.
+RED, GREEN, BLUE, ALPHA, SLOPE_U, SLOPE_V, OCCLUSION, ROUGHNESS, THICKNESS, FOLD_U, FOLD_V, FOLD = range(12)
 CHANNELS = 12  # a texel begins at a multiple of four bytes
 LEVEL = np.array([255, 255, 255, 255, 128, 128, 255, 255, 255, 128, 128, 0], np.uint8)
 STEEPEST = 1.0  # slope at byte 255, metres per metre; 128 is level
+FOLD_SHADE = 0.75  # share of the light that a fold hides whose depth is 255
 BAND = 64  # rows halved at once, so that memory stays small
 IRIS = (0.8125, 0.9375, 0.03125)  # place of the middle of the iris in the maps, and its radius
 DEPTH = 0.003  # metres behind the cornea of a point of an iris whose thickness is 0
@@ -60,6 +62,9 @@ def texels_of(maps: Maps | None, largest: int = FULL) -> Texels:
     for name, first in (("relief", SLOPE_U), ("normal", SLOPE_U), ("folds", FOLD_U)):
         if name in maps.files:
             whole[..., first : first + 2] = slopes_in(maps, name, (width, height))
+    if "folds" in maps.files:
+        heights = _decoded(maps, "folds", "L", (width, height))
+        whole[..., FOLD] = np.rint((128 - np.minimum(heights, np.float32(128))) * (255 / 128))
     if "surface" in maps.files:
         whole[..., OCCLUSION : THICKNESS + 1] = _decoded(maps, "surface", "RGB", (width, height))
     while max(whole.shape[:2]) > largest:

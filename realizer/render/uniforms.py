@@ -13,7 +13,7 @@ from realizer.render.lamp_view import ASIDE, NEAR, SIDE, SOFT, LampView
 from realizer.render.light import Light, unit
 from realizer.render.surfaces import BENT, BOWL, DIRECT, GLINT, REFLECTION, THIN, THROUGH, WRAP, surfaces
 from realizer.render.surfaces import SOFT as EVEN
-from realizer.render.textures import DEPTH, IRIS, STEEPEST
+from realizer.render.textures import DEPTH, FOLD_SHADE, IRIS, STEEPEST
 
 
 def uniforms_of(light: Light, lamp: LampView) -> Mapping[str, Any]:
@@ -37,6 +37,7 @@ def uniforms_of(light: Light, lamp: LampView) -> Mapping[str, Any]:
         "thinColour": list(THIN),
         "directShare": DIRECT,
         "steepest": STEEPEST,
+        "foldShade": FOLD_SHADE,
         "ambientLight": (light.environment.sh * light.exposure).tolist(),
         "keyDirection": unit(light.key.direction).tolist(),
         "keyColour": [part * light.exposure for part in light.key.colour],

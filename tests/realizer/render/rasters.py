@@ -40,11 +40,12 @@ def raster_of(triangles, colours, size=SIZE, uv=None, maps=None, **flags):
     return Raster(size, mesh, np.float32(colours), maps or texels_of(None), lamp)
 
 
-def picture_of(raster, points, near, eye=(0, 0, 100), pixel=0.01):
+def picture_of(raster, points, near, eye=(0, 0, 100), pixel=0.01, fold=0.0):
     """The picture of points (n, 2) in pixels, all facing the camera and far from the shadows' box."""
     points = np.asarray(points, float)
     moving = np.zeros((len(points), 10), np.float32)
     moving[:, :2], moving[:, 5] = points * (pixel, -pixel), 1
+    moving[:, 6] = fold
     return raster(points, near, moving, LIGHTS, np.float32(eye)).copy()
 
 

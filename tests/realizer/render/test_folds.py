@@ -5,10 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from realizer.animation.axis import au, axis
+from realizer.animation.frames import AUFrames
+from realizer.animation.pose import poses
 from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.face.maps import Maps
 from realizer.render.folds import Folds
+from realizer.tables import by_number
+from tests.shipped import FACES
 
 REGIONS = ("frown_left", "frown_right", "inner_left", "nowhere_left")
 
@@ -45,6 +50,25 @@ def test_folds_of_one_side_show_on_that_side(face):
     raised = folds(pose(face, fap31=300))
     assert raised[2] > 0.5
     assert not folds(pose(face, fap32=300))[2]
+
+
+@pytest.mark.parametrize("name", FACES)
+@pytest.mark.parametrize(
+    ("region", "unit", "others"), [("nose", 9, (4, 10, 12, 22)), ("chin", 17, (12, 24, 26))]
+)
+def test_folds_of_a_region_show_with_their_own_unit(name, region, unit, others):
+    """The nose wrinkles with AU9 only; the chin folds with AU17, not below a mouth that opens."""
+    face = load_face(name)
+    amounts = []
+    for number in (unit, *others):
+        frame = np.zeros((1, len(axis())), np.float32)
+        for side in ("LEFT", "RIGHT") if by_number()[number].sides else ("BOTH",):
+            frame[0, [target.column for target in au(number, side)]] = 1
+        vertices = deform(face, poses(AUFrames(np.zeros(1), frame), face.inputs))[0]
+        folds = Folds(face)
+        amounts.append(folds.drives[face.maps.regions.index(f"{region}_left")](vertices))
+    assert amounts[0] > 0.6
+    assert max(amounts[1:]) < 0.35
 
 
 def test_folds_of_a_face_without_maps_are_none():

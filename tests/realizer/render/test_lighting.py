@@ -26,6 +26,19 @@ def test_light_band_interpolates_colours():
     assert green == pytest.approx(tone_curve()[steps], abs=1)
 
 
+def test_light_band_darkens_the_ground_of_folds():
+    heights = np.full((64, 64), 128, np.uint8)
+    heights[:, 32:] = 0
+    files = {"albedo": webp(np.full((64, 64, 3), 90, np.uint8)), "folds": webp(heights)}
+    points = np.array([(0, 0), (0, 80), (80, 0)], float)
+    maps = texels_of(Maps(files, None, 0.0, 1.0, None, None))
+    raster = raster_of([[0, 1, 2]], [(1, 1, 1)] * 3, (80, 80), points / 80, maps)
+    near = np.ones(3, np.float32)
+    rows = [picture_of(raster, points, near, fold=fold)[10, :, 1].astype(int) for fold in (0, 0.5, 1)]
+    assert len({int(row[20]) for row in rows}) == 1
+    assert rows[0][55] > rows[1][55] + 10 > rows[2][55] + 20
+
+
 def test_light_band_shows_an_iris_below_the_cornea():
     albedo = np.zeros((64, 64, 3), np.uint8)
     albedo[:, 32:] = 255

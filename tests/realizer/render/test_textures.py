@@ -10,6 +10,7 @@ from realizer.core.errors import FaceError
 from realizer.face.maps import Maps
 from realizer.render.textures import (
     ALPHA,
+    FOLD,
     FOLD_U,
     FOLD_V,
     LEVEL,
@@ -48,6 +49,14 @@ def test_texels_of_heights_are_their_slopes():
     assert slopes[..., SLOPE_U] == pytest.approx(4 * 0.001 / (0.0005 * 64), abs=0.01)
     assert slopes[..., SLOPE_V] == pytest.approx(0, abs=0.01)
     assert slopes[..., FOLD_V] == pytest.approx(4 * 0.001 / (0.0005 * 64), abs=0.01)
+
+
+def test_texels_of_folds_have_their_depth():
+    heights = np.full((4, 4), 128)
+    heights[1, :2], heights[2, :2] = (0, 64), (128, 255)
+    depth = texels_of(maps(albedo=WHITE[:4, :4], folds=heights)).level(0)[..., FOLD]
+    assert depth[1:3, :2].tolist() == [[255, 128], [0, 0]]
+    assert texels_of(maps(albedo=WHITE)).level(0)[..., FOLD].max() == 0
 
 
 def test_texels_of_a_normal_map_are_its_slopes():

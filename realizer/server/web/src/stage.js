@@ -69,7 +69,7 @@ export class Stage {
   }
 
   clear() {
-    for (const map of ["albedoMap", "slopeMap", "surfaceMap"]) this.uniforms[map]?.value.dispose();
+    for (const map of ["albedoMap", "slopeMap", "surfaceMap", "foldMap"]) this.uniforms[map]?.value.dispose();
     for (const { geometry, material } of [...this.scene.children, ...this.lampScene.children]) {
       geometry.dispose();
       material.dispose();
