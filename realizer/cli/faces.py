@@ -266,7 +266,7 @@ def fit(
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from realizer.face.au.file import write_model
     from realizer.face.load import folder_of, load_face
-    from realizer.facebuild.au.fit import fit_models, table, table_text
+    from realizer.facebuild.au.fit import fit_models, left_out_text, table, table_text
     from realizer.facebuild.au.fit_limits import runaways
     from realizer.facebuild.au.measure import read_measurements, read_shapes, write_shapes
 
@@ -307,6 +307,8 @@ def fit(
         write_model(files[kind], model)
         click.echo(f"{kind} form\n{table_text(table(model, measured))}")
         options.note(f"{files[kind]}: written")
+    if measurements:
+        click.echo(left_out_text(face, measured, models))
 
 
 def _files(output: Path, form: str | None) -> dict[str, Path]:

@@ -24,6 +24,17 @@ if TYPE_CHECKING:  # importing them takes longer than `--help` should
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+
+
+class MappingFile(click.Path):
+    """A file that maps action units to FAPs, or the name of a published mapping."""
+
+    def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Any:
+        from realizer.tables.mappings import published_file
+
+        return super().convert(published_file(str(value)) or value, parameter, context)
+
+
 FOLDER = click.Path(exists=True, file_okay=False, path_type=Path)
 OUTPUT = click.Path(path_type=Path)
 CAMERAS = "front, three-quarter, profile, close, or a camera of the face's own."
@@ -144,9 +155,10 @@ deformer = click.option(
 )
 mapping = click.option(
     "--mapping",
-    metavar="FILE",
-    type=FILE,
-    help="Mapping of action units to FAPs, as `realizer faces mapping` writes it; overrides the face's.",
+    metavar="FILE|zhang|raouzaiou",
+    type=MappingFile(exists=True, dir_okay=False, path_type=Path),
+    help="Mapping of action units to FAPs, as `realizer faces mapping` writes it, or a published one, that "
+    "overrides the face's.",
 )
 
 

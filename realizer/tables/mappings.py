@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from importlib.resources import files
 from itertools import groupby
 from pathlib import Path
 from typing import Literal, TypeAlias, cast
@@ -28,6 +29,7 @@ Side: TypeAlias = Literal["L", "R", ""]
 Units: TypeAlias = Mapping[tuple[int, Side], tuple[AuToFap, ...]]
 Line: TypeAlias = tuple[int, AuToFap]
 FORMS = (".txt", ".csv")
+PUBLISHED = ("zhang", "raouzaiou")
 OWN = "au_to_fap"  # the file of a face folder, .txt or .csv
 COLUMNS = ("au", "side", "fap", "au_from", "au_to", "fap_from", "fap_to")
 NUMBERS = ("AU-start", "AU-end", "FAP-start", "FAP-end")
@@ -53,6 +55,13 @@ def read_mapping(path: Path) -> Units:
         for side in _sides_of(row):
             units[row.au, side].append((number, replace(row, side=side)))
     return {key: _joined(found, path) for key, found in sorted(units.items())}
+
+
+def published_file(name: str) -> Path | None:
+    """Return the file of a published mapping, "zhang" (Paul 2010, figure 2.3) or "raouzaiou" (table 1)."""
+    if name not in PUBLISHED:
+        return None
+    return Path(str(files("realizer.tables").joinpath(f"{OWN}_{name}.txt")))
 
 
 def own_file(folder: Path) -> Path | None:

@@ -8,8 +8,8 @@ import pytest
 
 from realizer import tables
 from realizer.core.errors import TableError
-from realizer.tables import AuToFap
-from realizer.tables.mappings import FORMS, read_mapping, write_mapping
+from realizer.tables import AuToFap, au_to_fap
+from realizer.tables.mappings import FORMS, PUBLISHED, published_file, read_mapping, write_mapping
 from tests.rows import each_row
 
 # Paul 2010, figure 5.2.
@@ -142,3 +142,22 @@ def test_read_mapping_refuses_an_invalid_row(tmp_path: Path, rows: str, says: st
 def test_read_mapping_names_a_missing_file(tmp_path: Path) -> None:
     with pytest.raises(TableError, match=r"none\.txt: wanted a mapping of action units to FAPs"):
         read_mapping(tmp_path / "none.txt")
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_published_file_is_a_mapping_with_the_signs_of_our_own(name: str) -> None:
+    path = published_file(name)
+    assert path is not None
+    ours = {row.key: row.fap_to for row in au_to_fap()}
+    for rows in read_mapping(path).values():
+        for row in rows:
+            assert ours.get(row.key, row.fap_to) * row.fap_to > 0, row
+    assert published_file("mine.txt") is None
+
+
+def test_published_files_have_the_corrections() -> None:
+    zhang, raouzaiou = (read_mapping(published_file(name)) for name in ("zhang", "raouzaiou"))
+    assert {row.fap: row.fap_to for row in zhang[16, "L"]}[5] < 0
+    assert 59 not in {row.fap for row in zhang[10, "L"]}
+    assert {row.fap for row in raouzaiou[12, "L"]} == {6, 12, 53, 59}
+    assert {row.fap for row in zhang[1, "R"]} == {32}

@@ -1,5 +1,6 @@
 """Tests of the fit of a model of action units to landmarks."""
 
+import re
 import shutil
 import subprocess
 import sys
@@ -13,7 +14,7 @@ from realizer.face.au.file import read_model
 from realizer.face.au.model import Model
 from realizer.face.load import list_faces, load_face
 from realizer.face.model import Face
-from realizer.facebuild.au.fit import fit_models, table, table_text
+from realizer.facebuild.au.fit import fit_models, left_out_text, table, table_text
 from realizer.facebuild.au.measure import read_measurements, read_shapes
 
 pytestmark = pytest.mark.xdist_group("fits")
@@ -95,7 +96,17 @@ def test_fit_command_fits_landmarks_and_prints_the_table(known: Model, tmp_path:
     assert "AU2" in done.stdout
     assert "e/d_max" in done.stdout
     assert "1/1 AU2" in done.stderr
+    assert "published: e/d_max 0.0" in done.stdout.splitlines()[-1]
+    assert done.stdout.splitlines()[-1].endswith("on landmarks left out")
     assert set(read_model(tmp_path / "mine.toml").units) == {2}
+
+
+def test_left_out_text_warns_of_more_figures_than_measurements(known: Model, tmp_path: Path) -> None:
+    lines = landmarks(known, (2,), 4).splitlines(keepends=True)
+    (tmp_path / "few.csv").write_text("".join(lines[: HEAD.count("\n") + 8]))
+    measured = read_measurements(tmp_path / "few.csv")
+    said = left_out_text(load_face(), measured, {"published": known})
+    assert re.search(r"AU2 .*on landmarks left out; \d+ figures for \d+ numbers, measure more", said), said
 
 
 @pytest.fixture(scope="module")
