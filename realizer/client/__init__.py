@@ -5,5 +5,23 @@ from realizer.client.connection import connect
 from realizer.client.message_router import ClientError, Frame
 from realizer.client.speech import Speech, SyncSpeech
 from realizer.client.sync_client import SyncClient
+from realizer.client.voice import SyncVoice, Voice
+from realizer.protocol.wire import ArkitFrame, AUFrame, FapFrame, MeshFrame, PictureFrame, SoundFrame
 
-__all__ = ["Client", "ClientError", "Frame", "Speech", "SyncClient", "SyncSpeech", "connect"]
+__all__ = [
+    "AUFrame",
+    "ArkitFrame",
+    "Client",
+    "ClientError",
+    "FapFrame",
+    "Frame",
+    "MeshFrame",
+    "PictureFrame",
+    "SoundFrame",
+    "Speech",
+    "SyncClient",
+    "SyncSpeech",
+    "SyncVoice",
+    "Voice",
+    "connect",
+]

@@ -7,17 +7,27 @@ import contextlib
 import json
 import math
 import time
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
 from bml_schema.feedback import BlockProgress, Feedback
-from realizer.client.message_router import BlockWaiter, ClientError, Frame, Router, is_blank
+from realizer.client.message_router import (
+    Arrivals,
+    BlockWaiter,
+    ClientError,
+    Frame,
+    Receiver,
+    Router,
+    is_blank,
+)
 from realizer.client.playout import Playout
 from realizer.client.speech import Speech
+from realizer.client.stream_options import FrameOptions, PictureOptions, SoundOptions, SpeechOptions
+from realizer.client.voice import Pcm, Timed, Voice, samples_of, timed
 from realizer.protocol.messages.common import ANSWERS
-from realizer.protocol.wire import WireFrame
+from realizer.protocol.wire import ArkitFrame, AUFrame, FapFrame, MeshFrame, PictureFrame, SoundFrame
 
 
 class Client:
@@ -155,6 +165,59 @@ class Client:
             raise
         await speech.close()
 
+    def voice(self, *, rate: int, language: str | None = None, **opening: Unpack[SpeechOptions]) -> Voice:
+        """Return a speech whose sound is sent as it comes: write(pcm), words([...]), close(), ended().
+
+        Without words, lips follow the sound.
+
+        Args:
+            rate: samples a second.
+            language: BCP-47 tag of the words; None: the service's.
+        """
+        fields = opening if language is None else {**opening, "language": language}
+        voice = Voice(rate, fields, self._post, self.control, self.wait_for)
+        self._router.add_listener(voice.progress)
+        return voice
+
+    async def say(
+        self,
+        sound: Pcm,
+        rate: int | None = None,
+        text: str | None = None,
+        words: Iterable[Timed] | None = None,
+        phonemes: Iterable[Timed] | None = None,
+        visemes: Iterable[Timed] | None = None,
+        language: str | None = None,
+        viseme_set: str = "oculus",
+        **opening: Unpack[SpeechOptions],
+    ) -> BlockProgress:
+        """Play the sound of any other voice, and return its end; `said` are the words, if it was cut off.
+
+        Without words, phonemes and visemes, lips follow the text, or the sound alone.
+
+        Args:
+            sound: a WAV, FLAC, MP3, Ogg or WebM file; with `rate` mono PCM: int16, or floats from -1 to 1.
+            rate: samples a second of PCM.
+            text: what is said.
+            words, phonemes, visemes: (seconds, text) or (start, end, text) of each; phonemes in IPA.
+            language: BCP-47 tag of the text and the words; None: the service's.
+            viseme_set: oculus, mpeg4, sapi or polly.
+
+        Raises:
+            TypeError, ValueError: an argument has another form.
+            ClientError: the service refuses it, or the connection has ended.
+        """
+        if rate is None and not isinstance(sound, bytes | bytearray | memoryview):
+            raise TypeError(f"sound: wanted the bytes of a sound file, or PCM with a rate, got {type(sound)}")
+        voice = self.voice(rate=1 if rate is None else rate, language=language, **opening)
+        lists = {"words": words, "phonemes": phonemes, "visemes": visemes}
+        described: dict[str, Any] = {name: timed(name, v) for name, v in lists.items() if v is not None}
+        described |= {"text": text} if text is not None else {}
+        described |= {"viseme_set": viseme_set} if visemes is not None else {}
+        content = bytes(sound) if rate is None else samples_of(sound).astype("<i2").tobytes()
+        await voice.clip(content, rate or 0, close=True, **described)
+        return await voice.ended()
+
     async def feedback(self) -> AsyncIterator[Feedback]:
         """Yield feedback as it arrives, until the connection ends; each message to one iterator only."""
         with contextlib.suppress(ClientError):
@@ -183,45 +246,74 @@ class Client:
                 await self.wait_for(lambda: bool(queue))
                 yield queue.popleft()
 
-    def faps(self, *, ahead: float = 0.2, **options: Any) -> AsyncIterator[WireFrame]:
-        """Subscribe to FAPs, and yield each frame at its time: 68 int32 in FAPU.
+    def faps(self, *, ahead: float = 0.2, **options: Unpack[FrameOptions]) -> AsyncIterator[FapFrame]:
+        """Subscribe to FAPs, and yield each frame at its time.
 
         Args:
             ahead: how long before their time the service sends frames, 0 to 2 s: longer delays are noticed.
-            options: fps, character, as in `subscribe`.
 
         Raises:
             ClientError: the service refuses the subscription.
         """
         return self._play_out("fap", ahead, options)
 
-    def aus(self, *, ahead: float = 0.2, **options: Any) -> AsyncIterator[WireFrame]:
-        """Subscribe to action units, and yield each frame at its time, as `faps`: float32, 0..1."""
+    def aus(self, *, ahead: float = 0.2, **options: Unpack[FrameOptions]) -> AsyncIterator[AUFrame]:
+        """Subscribe to action units, and yield each frame at its time, as `faps`."""
         return self._play_out("au", ahead, options)
 
-    def arkit(self, *, ahead: float = 0.2, **options: Any) -> AsyncIterator[WireFrame]:
+    def arkit(self, *, ahead: float = 0.2, **options: Unpack[FrameOptions]) -> AsyncIterator[ArkitFrame]:
         """Subscribe to ARKit's weights and rotations, and yield each frame at its time, as `faps`."""
         return self._play_out("arkit", ahead, options)
 
-    async def _play_out(
-        self, stream: str, ahead: float, options: Mapping[str, Any]
-    ) -> AsyncIterator[WireFrame]:
-        character, playouts = options.get("character"), self._router.playouts
-        playout = playouts[stream, character] = Playout(ahead)
+    def mesh(self, **options: Unpack[FrameOptions]) -> AsyncIterator[MeshFrame]:
+        """Subscribe to the vertices of the face, and yield frames as they arrive. Errors as `faps`."""
+        return self._take("mesh", options)
+
+    def pictures(self, **options: Unpack[PictureOptions]) -> AsyncIterator[PictureFrame]:
+        """Subscribe to pictures, and yield them as they arrive. Errors as `faps`."""
+        return self._take("video", options)
+
+    def sound(self, **options: Unpack[SoundOptions]) -> AsyncIterator[SoundFrame]:
+        """Subscribe to sound, and yield packets as they arrive, at most 0.1 s ahead. Errors as `faps`."""
+        return self._take("audio", options)
+
+    async def _play_out(self, stream: str, ahead: float, options: Mapping[str, Any]) -> AsyncIterator[Any]:
+        playout = Playout(ahead)
+        async with self._subscribed(stream, playout, {**options, "ahead": ahead}):
+            while True:
+                while (frame := playout.take(time.monotonic())) is not None:
+                    yield frame
+                due = playout.next_due
+                pause = None if due == math.inf else due - time.monotonic()
+                with contextlib.suppress(TimeoutError):
+                    async with asyncio.timeout(pause):
+                        await self.wait_for(lambda due=due: playout.next_due != due)  # type: ignore[misc]
+
+    async def _take(self, stream: str, options: Mapping[str, Any]) -> AsyncIterator[Any]:
+        arrivals = Arrivals()
+        async with self._subscribed(stream, arrivals, options):
+            while True:
+                await self.wait_for(lambda: bool(arrivals.frames))
+                yield arrivals.frames.popleft()
+
+    @contextlib.asynccontextmanager
+    async def _subscribed(
+        self, stream: str, receiver: Receiver, options: Mapping[str, Any]
+    ) -> AsyncIterator[None]:
+        """Subscribe for a receiver, until the connection ends or the block is left."""
+        character, receivers = options.get("character"), self._router.receivers
+        receivers[stream, character] = receiver
+        subscribed = False
         try:
-            await self.subscribe(stream, ahead=ahead, **options)
-            with contextlib.suppress(ClientError):
-                while True:
-                    while (frame := playout.take(time.monotonic())) is not None:
-                        yield frame
-                    due = playout.next_due
-                    pause = None if due == math.inf else due - time.monotonic()
-                    with contextlib.suppress(TimeoutError):
-                        async with asyncio.timeout(pause):
-                            await self.wait_for(lambda due=due: playout.next_due != due)  # type: ignore[misc]
+            await self.subscribe(stream, **options)
+            subscribed = True
+            yield
+        except ClientError:
+            if not subscribed:
+                raise
         finally:
-            if playouts.get((stream, character)) is playout:
-                del playouts[stream, character]
+            if receivers.get((stream, character)) is receiver:
+                del receivers[stream, character]
                 with contextlib.suppress(ClientError):
                     await self.control("unsubscribe", stream=stream, character=character)
 
@@ -252,11 +344,11 @@ class Client:
         await self._socket.close()
         await self._reader
 
-    async def _post(self, text: str) -> None:
+    async def _post(self, message: str | bytes) -> None:
         from websockets.exceptions import ConnectionClosed
 
         try:
-            await self._socket.send(text)
+            await self._socket.send(message)
         except ConnectionClosed:
             await self.wait_for(lambda: False)  # raises once the reader knows the reason
 

@@ -12,7 +12,6 @@ from html import unescape
 from typing import Any, Protocol
 
 from bml_schema.feedback import BlockProgress, Feedback, PredictionFeedback, WarningFeedback, parse_feedback
-from realizer.client.playout import Playout
 from realizer.core.errors import RealizerError
 from realizer.protocol.messages.common import ANSWERS
 from realizer.protocol.streams import JSON_STREAMS
@@ -24,7 +23,7 @@ MAX_FEEDBACK = 10_000
 _COMMENT = re.compile(r"<!--.*?-->|<\?.*?\?>", re.DOTALL)
 _BLOCK_ID = re.compile(r"<(?:\w+:)?bml\b[^<>]*?\bid\s*=\s*[\"']([^\"'<>]+)[\"']")
 
-Frame = WireFrame | dict[str, Any]
+Frame = WireFrame[Any] | dict[str, Any]
 
 
 class ClientError(RealizerError):
@@ -62,6 +61,22 @@ class Listener(Protocol):
         ...
 
 
+class Receiver(Protocol):
+    """A receiver of the binary frames of one subscription."""
+
+    def receive(self, message: WireFrame[Any], now: float) -> None: ...
+
+
+class Arrivals:
+    """A receiver that keeps the newest frames as they arrive."""
+
+    def __init__(self) -> None:
+        self.frames: deque[WireFrame[Any]] = deque(maxlen=MAX_FRAMES)
+
+    def receive(self, message: WireFrame[Any], now: float) -> None:
+        self.frames.append(message)
+
+
 class Router:
     """The queues of messages that have arrived, and the pending request.
 
@@ -69,13 +84,13 @@ class Router:
         clock: returns seconds, and never jumps.
 
     Attributes:
-        playouts: (stream, the character in `subscribe`) -> what its binary frames go to instead of a queue.
+        receivers: (stream, the character in `subscribe`) -> what its binary frames go to instead of a queue.
         errors: errors about messages without an answer, and of video streams that ended.
         last_block: id of the last block that was sent, or None.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self.playouts: dict[tuple[str, str | None], Playout] = {}
+        self.receivers: dict[tuple[str, str | None], Receiver] = {}
         self._clock = clock
         self.feedback: deque[Feedback] = deque(maxlen=MAX_FEEDBACK)
         self.frames: dict[str, deque[Frame]] = {}
@@ -91,11 +106,11 @@ class Router:
             frame = unpack(message)
             description = self._streams.get((frame.stream, frame.character))
             frame = replace(frame, stream_info=description)
-            playout = self.playouts.get((frame.stream, (description or {}).get("character")))
-            if playout is None:
+            receiver = self.receivers.get((frame.stream, (description or {}).get("character")))
+            if receiver is None:
                 self.queue_of(frame.stream).append(frame)
             else:
-                playout.receive(frame, self._clock())
+                receiver.receive(frame, self._clock())
         elif message.startswith("{"):
             reply = json.loads(message)
             if reply["type"] in JSON_STREAMS:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from typing import Any
 
 from realizer.protocol.wire import WireFrame
 
@@ -25,12 +26,12 @@ class Playout:
 
     def __init__(self, ahead: float) -> None:
         self._ahead = ahead
-        self._frames: deque[WireFrame] = deque(maxlen=MAX_WAITING)
+        self._frames: deque[WireFrame[Any]] = deque(maxlen=MAX_WAITING)
         self._next = 0  # number of the first frame that was not taken
         # (arrival, offset) of messages, the offsets rising: the first is the least of those remembered.
         self._offsets: deque[tuple[float, float]] = deque()
 
-    def receive(self, message: WireFrame, now: float) -> None:
+    def receive(self, message: WireFrame[Any], now: float) -> None:
         """Add the frames of a message, instead of those from its first one on.
 
         Args:
@@ -52,7 +53,7 @@ class Playout:
         """When the next frame is due, on the clock of `receive`; infinity without frames."""
         return self._frames[0].time + self._offsets[0][1] if self._frames else math.inf
 
-    def take(self, now: float) -> WireFrame | None:
+    def take(self, now: float) -> WireFrame[Any] | None:
         """Return the next frame if it is due."""
         if self.next_due > now:
             return None

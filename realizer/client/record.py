@@ -2,7 +2,6 @@
 
 import asyncio
 import errno
-import io
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager
@@ -15,7 +14,7 @@ from bml_schema.feedback import BlockProgress
 from realizer.client.message_router import ClientError
 from realizer.core.array_types import Int16, UInt8
 from realizer.core.units import frame_count
-from realizer.protocol.wire import WireFrame
+from realizer.protocol.wire import PictureFrame, SoundFrame
 
 RATE = 48_000  # Hz
 # The quality of the pictures is better than that of the film's encoder.
@@ -40,8 +39,8 @@ async def record(
     async with connection as camera:
         await camera.subscribe("video", fps=fps, **{**LOOK, **look})
         await camera.subscribe("audio", rate=RATE, **{k: v for k, v in look.items() if k == "character"})
-        pictures: list[WireFrame] = []
-        packets: list[WireFrame] = []
+        pictures: list[PictureFrame] = []
+        packets: list[SoundFrame] = []
         taking = [
             asyncio.create_task(_collect(camera, "video", pictures)),
             asyncio.create_task(_collect(camera, "audio", packets)),
@@ -69,16 +68,13 @@ async def record(
     return end
 
 
-async def _collect(camera: Any, stream: str, kept: list[WireFrame]) -> None:
+async def _collect(camera: Any, stream: str, kept: list[Any]) -> None:
     async for frame in camera.frames(stream):
-        assert isinstance(frame, WireFrame)
         kept.append(frame)
 
 
-def _film_frames(pictures: Sequence[WireFrame], start: float, fps: float, count: int) -> Iterator[UInt8]:
+def _film_frames(pictures: Sequence[PictureFrame], start: float, fps: float, count: int) -> Iterator[UInt8]:
     """Yield the newest picture at each frame of the film."""
-    from PIL import Image
-
     at, decoded, known = 0, -1, np.empty(0, np.uint8)
     for k in range(count):
         # The frame grids of the service and the film differ: take the nearest picture.
@@ -86,18 +82,18 @@ def _film_frames(pictures: Sequence[WireFrame], start: float, fps: float, count:
         while at + 1 < len(pictures) and pictures[at + 1].time <= time:
             at += 1
         if decoded != at:
-            known, decoded = np.asarray(Image.open(io.BytesIO(pictures[at].payload)).convert("RGB")), at
+            known, decoded = pictures[at].pixels[..., :3], at
         yield known
 
 
-def _sound(packets: Sequence[WireFrame], start: float, seconds: float) -> Int16:
+def _sound(packets: Sequence[SoundFrame], start: float, seconds: float) -> Int16:
     """Return (n,) int16: each packet at its time; one with the flag `flush` cancels what was to follow."""
     pcm = np.zeros(round(seconds * RATE), np.int16)
     for packet in packets:
         first = round((packet.time - start) * RATE)
         if packet.flush:
             pcm[max(0, first) :] = 0
-        samples = np.frombuffer(packet.payload, "<i2")[max(0, -first) :]
+        samples = packet.values[max(0, -first) :]
         target = pcm[max(0, first) :][: len(samples)]
         target[:] = samples[: len(target)]
     return pcm

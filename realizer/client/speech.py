@@ -32,7 +32,10 @@ class SpeechProgress:
         self.fault: dict[str, Any] | None = None
 
     def on_error(self, error: dict[str, Any]) -> None:
-        if (error.get("where"), error.get("id")) == ("speech.id", self._id):
+        where = str(error.get("where"))
+        # An error about a part of a clip has only the clip, and one about a message that is too long has no id.
+        is_clip = where.startswith(f"clip:{self._id}-") or error.get("code") == "too-large"
+        if self.fault is None and (is_clip or (error.get("id") == self._id and where != "speech.append")):
             self.fault = error
 
     def check(self) -> None:

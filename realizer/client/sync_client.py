@@ -2,16 +2,18 @@
 
 import asyncio
 import threading
-from collections.abc import AsyncGenerator, AsyncIterator, Coroutine, Iterator, Mapping
+from collections.abc import AsyncGenerator, AsyncIterator, Coroutine, Iterable, Iterator, Mapping
 from contextlib import AbstractAsyncContextManager, contextmanager
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, Unpack
 
 from bml_schema.feedback import BlockProgress, Feedback
 from realizer.client.async_client import Client
 from realizer.client.message_router import ClientError, Frame
 from realizer.client.speech import SyncSpeech
-from realizer.protocol.wire import WireFrame
+from realizer.client.stream_options import FrameOptions, PictureOptions, SoundOptions, SpeechOptions
+from realizer.client.voice import Pcm, SyncVoice, Timed
+from realizer.protocol.wire import ArkitFrame, AUFrame, FapFrame, MeshFrame, PictureFrame, SoundFrame
 
 T = TypeVar("T")
 
@@ -89,6 +91,27 @@ class SyncClient:
             raise
         self._do(_exit(manager, None))
 
+    def voice(self, *, rate: int, language: str | None = None, **opening: Unpack[SpeechOptions]) -> SyncVoice:
+        """Return a speech whose sound is sent as it comes, as `Client.voice`."""
+        return SyncVoice(self._client.voice(rate=rate, language=language, **opening), self._do)
+
+    def say(
+        self,
+        sound: Pcm,
+        rate: int | None = None,
+        text: str | None = None,
+        words: Iterable[Timed] | None = None,
+        phonemes: Iterable[Timed] | None = None,
+        visemes: Iterable[Timed] | None = None,
+        language: str | None = None,
+        viseme_set: str = "oculus",
+        **opening: Unpack[SpeechOptions],
+    ) -> BlockProgress:
+        """Play the sound of any other voice, and return its end, as `Client.say`."""
+        return self._do(
+            self._client.say(sound, rate, text, words, phonemes, visemes, language, viseme_set, **opening)
+        )
+
     def feedback(self) -> Iterator[Feedback]:
         """Yield feedback as it arrives, until the connection ends."""
         return self._each(self._client.feedback())
@@ -101,17 +124,29 @@ class SyncClient:
         """Yield frames of a stream as they arrive, until the connection ends."""
         return self._each(self._client.frames(stream))
 
-    def faps(self, *, ahead: float = 0.2, **options: Any) -> Iterator[WireFrame]:
+    def faps(self, *, ahead: float = 0.2, **options: Unpack[FrameOptions]) -> Iterator[FapFrame]:
         """Subscribe to FAPs, and yield each frame at its time, as `Client.faps`."""
         return self._each(self._client.faps(ahead=ahead, **options))
 
-    def aus(self, *, ahead: float = 0.2, **options: Any) -> Iterator[WireFrame]:
+    def aus(self, *, ahead: float = 0.2, **options: Unpack[FrameOptions]) -> Iterator[AUFrame]:
         """Subscribe to action units, and yield each frame at its time, as `Client.aus`."""
         return self._each(self._client.aus(ahead=ahead, **options))
 
-    def arkit(self, *, ahead: float = 0.2, **options: Any) -> Iterator[WireFrame]:
+    def arkit(self, *, ahead: float = 0.2, **options: Unpack[FrameOptions]) -> Iterator[ArkitFrame]:
         """Subscribe to ARKit's weights and rotations, and yield each frame at its time."""
         return self._each(self._client.arkit(ahead=ahead, **options))
+
+    def mesh(self, **options: Unpack[FrameOptions]) -> Iterator[MeshFrame]:
+        """Subscribe to the vertices of the face, and yield frames as they arrive."""
+        return self._each(self._client.mesh(**options))
+
+    def pictures(self, **options: Unpack[PictureOptions]) -> Iterator[PictureFrame]:
+        """Subscribe to pictures, and yield them as they arrive."""
+        return self._each(self._client.pictures(**options))
+
+    def sound(self, **options: Unpack[SoundOptions]) -> Iterator[SoundFrame]:
+        """Subscribe to sound, and yield packets as they arrive."""
+        return self._each(self._client.sound(**options))
 
     def film(self, path: str | Path, bml: str, *, fps: float = 25, **look: Any) -> BlockProgress:
         """Play BML and save its last block as a film with sound."""

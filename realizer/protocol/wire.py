@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from io import BytesIO
+from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 
-from realizer.core.array_types import Float32, Float64, Int16, Int32
+from realizer.core.array_types import Float32, Float64, Int16, Int32, UInt8
 from realizer.core.errors import RealizerError
 from realizer.protocol.streams import KINDS, STREAMS
 
+A = TypeVar("A")
 VERSION = 1
 # u8 kind, u8 version, u16 flags, u32 frame, f64 time; little-endian. 16 bytes, so the payload stays aligned
 # for a Float32Array or an Int32Array over the message.
@@ -32,8 +34,8 @@ class WireError(RealizerError):
 
 
 @dataclass(frozen=True, slots=True)
-class WireFrame:
-    """A decoded binary message.
+class WireFrame(Generic[A]):
+    """A decoded binary message; a class of its own for each stream.
 
     Attributes:
         character: index of the character, as in `subscribed`.
@@ -55,8 +57,8 @@ class WireFrame:
         return KINDS[self.kind].name
 
     @property
-    def values(self) -> Int32 | Float32 | Int16:
-        """The payload as numbers: (68,) int32, (n,) or (59,) float32, (samples,) int16 or (n, 3) int16.
+    def values(self) -> A:
+        """The payload as numbers.
 
         Raises:
             WireError: the payload is a picture.
@@ -64,33 +66,86 @@ class WireFrame:
         row = KINDS[self.kind]
         if row.dtype is None:
             raise WireError("a picture has no values: wanted a frame of numbers")
-        values: Int32 | Float32 | Int16 = np.frombuffer(self.payload, row.dtype)
-        return values if row.width == 1 else values.reshape(-1, row.width)
+        values: Any = np.frombuffer(self.payload, row.dtype)
+        return values if row.width == 1 else values.reshape(-1, row.width)  # type: ignore[no-any-return]
 
-    def rows(self) -> list[WireFrame]:
+    @property
+    def named(self) -> dict[str, float]:
+        """Name -> value, such as that of an action unit; {} for a mesh, a picture or sound."""
+        names: Sequence[str] = (self.stream_info or {}).get("names", ())
+        return dict(zip(names, np.asarray(self.values).tolist(), strict=False)) if names else {}
+
+    def rows(self) -> list[Self]:
         """Split a message of a subscription with `ahead` into frames of one row; others are one frame."""
         info = self.stream_info
         if not info or not info.get("ahead"):
             return [self]
         size = len(info["names"]) * np.dtype(KINDS[self.kind].dtype).itemsize
         return [
-            WireFrame(
-                self.kind, k, k / info["fps"], self.payload[at : at + size], self.character, stream_info=info
-            )
+            replace(self, frame=k, time=k / info["fps"], payload=self.payload[at : at + size], flush=False)
             for k, at in enumerate(range(0, len(self.payload), size), self.frame)
         ]
 
+
+class FapFrame(WireFrame[Int32]):
+    """MPEG-4's parameters: `values` are (68,) int32 in FAPU, column = FAP - 1."""
+
+
+class AUFrame(WireFrame[Float32]):
+    """Action units: `values` are (n,) float32, 0..1; `named` has their names."""
+
+
+class ArkitFrame(WireFrame[Float32]):
+    """ARKit's 52 weights, 0..1, then rotations of head and eyes: `values` are (59,) float32."""
+
+
+class MeshFrame(WireFrame[Int16]):
+    """The vertices of a face: `values` are (n, 3) int16 as sent, `vertices` are metres."""
+
     @property
     def vertices(self) -> Float32:
-        """The vertices of a mesh, (n, 3) float32 in metres.
+        """The vertices, (n, 3) float32 in metres.
 
         Raises:
-            WireError: it is no mesh, or its scale is unknown.
+            WireError: their scale is unknown.
         """
-        if self.stream != "mesh" or self.stream_info is None:
-            raise WireError(f"wanted a mesh whose scale is known, got {self.stream}")
+        if self.stream_info is None:
+            raise WireError("wanted a mesh whose scale is known, got none of a subscription")
         scale, offset = self.stream_info["scale"], self.stream_info["offset"]
         return (self.values * np.float32(scale) + np.array(offset, np.float32)).astype(np.float32)
+
+
+class PictureFrame(WireFrame[Any]):
+    """A picture: `payload` is a JPEG, PNG or WebP file."""
+
+    @property
+    def pixels(self) -> UInt8:
+        """The decoded picture, (h, w, 3) uint8, or (h, w, 4) if it is transparent."""
+        from PIL import Image
+
+        with Image.open(BytesIO(self.payload)) as picture:
+            return np.asarray(picture.convert("RGBA" if picture.mode in ("RGBA", "LA", "P") else "RGB"))
+
+
+class SoundFrame(WireFrame[Int16]):
+    """20 ms of sound: `values` are mono samples, (n,) int16; `time` is that of the first one."""
+
+    @property
+    def rate(self) -> int:
+        """Samples a second.
+
+        Raises:
+            WireError: the frame is none of a subscription.
+        """
+        if self.stream_info is None:
+            raise WireError("wanted sound whose rate is known, got none of a subscription")
+        return int(self.stream_info["rate"])
+
+
+_FRAMES: Mapping[str, type[WireFrame[Any]]] = {
+    "fap": FapFrame, "au": AUFrame, "arkit": ArkitFrame,
+    "mesh": MeshFrame, "video": PictureFrame, "audio": SoundFrame,
+}  # fmt: skip
 
 
 def pack(
@@ -120,7 +175,7 @@ def pack_frames(
     return messages.tobytes(), messages.dtype.itemsize
 
 
-def unpack(message: bytes) -> WireFrame:
+def unpack(message: bytes) -> WireFrame[Any]:
     """Decode a binary message.
 
     Raises:
@@ -133,7 +188,8 @@ def unpack(message: bytes) -> WireFrame:
         raise WireError(f"wanted version {VERSION} of the frame header, got {version}")
     if kind not in KINDS:
         raise WireError(f"wanted a kind in {list(KINDS)}, got {kind}")
-    return WireFrame(kind, frame, time, message[HEADER.size :], flags & 0xFF, bool(flags & FLUSH))
+    make = _FRAMES[KINDS[kind].name]
+    return make(kind, frame, time, message[HEADER.size :], flags & 0xFF, bool(flags & FLUSH))
 
 
 @dataclass(frozen=True, slots=True)

@@ -114,7 +114,8 @@ def parse_control(text: str) -> Control | ErrorMessage:
         errors = error.errors(include_url=False)
         where = _where(errors[0], message)
         same = [other for other in errors if _where(other, message) == where]
-        return ErrorMessage(code="invalid", message=_explain(same), where=where)
+        id = message.get("id") if kind == "speech" and isinstance(message.get("id"), str) else None
+        return ErrorMessage(code="invalid", message=_explain(same), where=where, id=id)
 
 
 def _where(error: ErrorDetails, message: object) -> str:

@@ -12,7 +12,15 @@ from bml_schema.feedback import WarningFeedback
 from realizer.client import ClientError, connect
 from realizer.core.settings import Settings
 from realizer.face.load import load_face
-from realizer.protocol.wire import WireFrame
+from realizer.protocol.wire import (
+    ArkitFrame,
+    AUFrame,
+    FapFrame,
+    MeshFrame,
+    PictureFrame,
+    SoundFrame,
+    WireFrame,
+)
 from realizer.server.serve import Server
 from tests.realizer.client.service import LIMIT, WAIT, serving
 
@@ -222,7 +230,7 @@ def test_client_reads_a_mesh_by_the_present_face() -> None:
             assert subscribed["face"] == "ada"
             numbers, shown = [], []
             async for frame in client.frames("mesh"):
-                assert isinstance(frame, WireFrame)
+                assert isinstance(frame, MeshFrame)
                 assert frame.stream_info is not None
                 numbers.append(frame.frame)
                 shown.append(frame.stream_info["face"])
@@ -236,5 +244,74 @@ def test_client_reads_a_mesh_by_the_present_face() -> None:
             assert frame.stream_info["frame"] == frame.frame - 2
             assert numbers == list(range(subscribed["frame"], subscribed["frame"] + len(numbers)))
             assert not client.errors
+
+    serving(test)
+
+
+@pytest.mark.parametrize(
+    ("method", "kind", "shape", "dtype"),
+    [
+        ("faps", FapFrame, (68,), np.int32),
+        ("aus", AUFrame, None, np.float32),
+        ("arkit", ArkitFrame, (59,), np.float32),
+        ("mesh", MeshFrame, None, np.int16),
+        ("sound", SoundFrame, (441,), np.int16),
+    ],
+)
+def test_client_has_a_method_for_each_stream_with_frames_of_its_type(
+    method: str, kind: type[WireFrame[Any]], shape: tuple[int, ...] | None, dtype: type
+) -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            frames = getattr(client, method)()
+            first = asyncio.create_task(anext(frames))
+            await client.ask("ping")
+            if method == "sound":
+                await client.say(np.full(8000, 500, np.int16), 8000)
+            frame = await first
+            assert type(frame) is kind
+            assert frame.values.dtype == dtype
+            assert shape in (None, frame.values.shape)
+            if method in ("faps", "aus", "arkit"):
+                assert len(frame.named) == len(frame.values)
+            await frames.aclose()
+            assert (await client.ask("ping"))["type"] == "pong"
+            assert not client.errors
+
+    serving(test)
+
+
+@pytest.mark.gl
+def test_client_yields_pictures() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            async for picture in client.pictures(fps=5, size=(64, 48), format="png"):
+                assert type(picture) is PictureFrame
+                assert picture.pixels.shape[:2] == (48, 64)
+                break
+
+    serving(test, limit=60)
+
+
+def test_client_raises_when_a_stream_is_refused() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            for frames in (client.mesh(fps=-1), client.sound(rate=7), client.faps(ahead=9)):
+                with pytest.raises(ClientError, match="wanted"):
+                    await anext(frames)
+
+    serving(test)
+
+
+def test_client_has_streams_of_two_characters_side_by_side() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            for name in ("ada", "ben"):
+                await client.control("character", id=name, face=name)
+            meshes = [client.mesh(character=name) for name in ("ada", "ben")]
+            frames = [await anext(mesh) for mesh in meshes for _ in range(2)]
+            assert [frame.stream_info["face"] for frame in frames if frame.stream_info] == ["ada"] * 2 + [
+                "ben"
+            ] * 2
 
     serving(test)

@@ -66,7 +66,7 @@ def test_router_adds_the_description_of_its_stream_to_a_frame(mail) -> None:
     assert second.vertices.tolist() == [[1.0, 2.0, 4.0]]
     assert second.stream_info["fps"] == 25.0
     assert first == second
-    with pytest.raises(WireError, match="wanted a mesh whose scale is known, got mesh"):
+    with pytest.raises(WireError, match="wanted a mesh whose scale is known, got none of a subscription"):
         _ = other.vertices
     assert mail.answer()["scale"] == 2.0
     assert not mail.errors

@@ -100,6 +100,12 @@ def test_parse_control_says_what_was_wanted(text, code, where, says) -> None:
     assert says in error.message
 
 
+def test_parse_control_names_the_speech_of_a_refused_message() -> None:
+    refused = parse_control('{"type": "speech", "id": "s1", "append": 3}')
+    assert isinstance(refused, ErrorMessage)
+    assert (refused.where, refused.id) == ("speech.append", "s1")
+
+
 def test_parse_control_joins_surrogate_pairs() -> None:
     message = parse_control(r'{"type":"ping","id":"\ud83d\ude00"}')
     assert isinstance(message, Ping)

@@ -1,0 +1,273 @@
+"""Speech of any other voice: sound that is sent in clips, with or without the times of its words."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import secrets
+from collections.abc import Awaitable, Callable, Coroutine, Iterable, Mapping, Sequence
+from typing import Any, Self
+
+import numpy as np
+
+from bml_schema.feedback import BlockProgress
+from realizer.client.message_router import ClientError
+from realizer.client.speech import SpeechProgress
+from realizer.core.array_types import Float32, Float64, Int16
+from realizer.protocol.wire import ClipPiece, pack_clip
+
+# Sound without words is sent in pieces of this length; the first one starts the speech.
+PIECE = 0.2  # s
+LONGEST = 1 << 20  # bytes of one message
+# The sound of a last word, whose end is not known, waits at most so long for the next word.
+HOLD = 1.0  # s
+
+Pcm = bytes | bytearray | memoryview | Int16 | Float32 | Float64
+Timed = tuple[float, str] | tuple[float, float, str]
+
+
+class Voice:
+    """A speech whose sound is sent as it comes, which `Client.voice` returns.
+
+    `async with` closes it at its end, and stops it after an exception.
+
+    Args:
+        rate: samples a second.
+        opening: composition, character and language, as in the message `speech`.
+        send: sends bytes.
+        control: sends a control message.
+        wait: waits until a condition holds.
+
+    Attributes:
+        id: of the speech, and of its block.
+    """
+
+    def __init__(
+        self,
+        rate: int,
+        opening: Mapping[str, Any],
+        send: Callable[[bytes], Awaitable[None]],
+        control: Callable[..., Awaitable[None]],
+        wait: Callable[[Callable[[], bool]], Awaitable[None]],
+    ) -> None:
+        self.id = f"say-{secrets.token_hex(4)}"
+        self.progress = SpeechProgress(self.id)
+        self._rate = checked_rate(rate)
+        self._opening = dict(opening)
+        self._send, self._control, self._wait = send, control, wait
+        self._sound = np.zeros(0, np.int16)  # that is not sent
+        self._sent = 0  # samples
+        self._words: list[dict[str, Any]] = []  # those that are not sent; times from the start of the speech
+        self._clips = 0
+        self._closed = False
+        self._sending = asyncio.Lock()
+
+    async def write(self, pcm: Pcm) -> None:
+        """Add mono sound, which is spoken at once: int16, or floats from -1 to 1.
+
+        Give words before their sound: a clip is cut where a word begins, so that no word is torn.
+
+        Raises:
+            TypeError, ValueError: this is no mono sound.
+            ClientError: the speech was refused or closed, or the connection has ended.
+        """
+        samples = samples_of(pcm)
+        self._check_open()
+        async with self._sending:
+            self._sound = np.concatenate((self._sound, samples))
+            ready = self._ready()
+            if ready >= PIECE * self._rate:
+                await self._flush(ready)
+
+    async def words(self, words: Iterable[Timed]) -> None:
+        """Add words, (seconds, word) or (start, end, word), in seconds from the start of the speech.
+
+        Raises:
+            TypeError, ValueError: they have another form, or times that go back, or their sound was sent.
+            ClientError: as `write`.
+        """
+        added = timed("words", words)
+        self._check_open()
+        last = max(self._sent / self._rate, self._words[-1]["start"] if self._words else 0.0)
+        for word in added:
+            if word["start"] < last - 1 / self._rate:
+                raise ValueError(f"words: wanted times from {last:.3f} s on, got {word['start']:.3f} s")
+            last = word["start"]
+        self._words += added
+
+    async def close(self) -> None:
+        """End the speech: what was written is spoken. Closing again does nothing.
+
+        Raises:
+            ClientError: the connection has ended.
+        """
+        if self._closed:
+            return
+        self._closed = True
+        async with self._sending:
+            if len(self._sound) and self.progress.fault is None:
+                await self._flush(len(self._sound))
+            await self._speech(close=True)
+
+    async def stop(self) -> None:
+        """Stop speaking at once."""
+        self._sound = self._sound[:0]
+        await self._control("stop", blocks=[self.id])
+
+    async def ended(self) -> BlockProgress:
+        """Wait for the end; if the speech was cut off, `said` are the words that were heard.
+
+        Raises:
+            ClientError: the speech was refused, or the connection has ended.
+        """
+        await self._wait(lambda: self.progress.is_finished)
+        return self.progress.result()
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None:
+            await self.close()
+            return
+        with contextlib.suppress(Exception):  # keep the first exception
+            await self.stop()
+            await self.close()
+
+    async def clip(self, sound: bytes, rate: int, **description: Any) -> None:
+        """Send a clip and append it to the speech.
+
+        Args:
+            rate: of PCM; 0 for a sound file.
+            description: fields of the message `speech` that describe it.
+        """
+        id = f"{self.id}-{self._clips}"
+        self._clips += 1
+        for number, at in enumerate(range(0, max(1, len(sound)), LONGEST)):
+            final = at + LONGEST >= len(sound)
+            await self._send(pack_clip(ClipPiece(id, number, rate, sound[at : at + LONGEST], final)))
+        await self._speech(clip=id, **description)
+
+    def _ready(self) -> int:
+        """Return how many samples can be sent: all, or up to the start of a word that may go on."""
+        if not self._words:
+            return len(self._sound)
+        starts = [round(word["start"] * self._rate) - self._sent for word in self._words]
+        last, end = starts[-1], self._words[-1].get("end")
+        ends = last + HOLD * self._rate if end is None else end * self._rate - self._sent
+        if len(self._sound) >= ends:
+            return len(self._sound)
+        return max((start for start in starts if start <= len(self._sound)), default=len(self._sound))
+
+    async def _flush(self, count: int) -> None:
+        """Send so many samples as a clip, with the words that begin in it."""
+        sound, self._sound = self._sound[:count], self._sound[count:]
+        begin = self._sent / self._rate
+        self._sent += count
+        inside = [word for word in self._words if round(word["start"] * self._rate) < self._sent]
+        del self._words[: len(inside)]
+        words = [
+            word | {name: max(0.0, word[name] - begin) for name in ("start", "end") if name in word}
+            for word in inside
+        ]
+        await self.clip(sound.astype("<i2").tobytes(), self._rate, **({"words": words} if words else {}))
+
+    async def _speech(self, **fields: Any) -> None:
+        opening, self._opening = self._opening, {}
+        await self._control("speech", id=self.id, **opening, **fields)
+
+    def _check_open(self) -> None:
+        self.progress.check()
+        if self._closed:
+            raise ClientError(f"the speech {self.id} was closed: nothing can follow", "refused")
+
+
+class SyncVoice:
+    """A `Voice` for programs without an event loop, which `SyncClient.voice` returns.
+
+    Args:
+        do: runs a coroutine.
+    """
+
+    def __init__(self, voice: Voice, do: Callable[[Coroutine[Any, Any, Any]], Any]) -> None:
+        self._voice = voice
+        self._do = do
+
+    @property
+    def id(self) -> str:
+        return self._voice.id
+
+    def write(self, pcm: Pcm) -> None:
+        """Add sound, as `Voice.write`."""
+        self._do(self._voice.write(pcm))
+
+    def words(self, words: Iterable[Timed]) -> None:
+        """Add words, as `Voice.words`."""
+        self._do(self._voice.words(words))
+
+    def close(self) -> None:
+        """End the speech: what was written is spoken."""
+        self._do(self._voice.close())
+
+    def stop(self) -> None:
+        """Stop speaking at once."""
+        self._do(self._voice.stop())
+
+    def ended(self) -> BlockProgress:
+        """Wait for the end, as `Voice.ended`."""
+        end: BlockProgress = self._do(self._voice.ended())
+        return end
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self._do(self._voice.__aexit__(kind))
+
+
+def timed(name: str, items: Iterable[Timed]) -> list[dict[str, Any]]:
+    """Return words, phonemes or visemes as fields of the message `speech`.
+
+    Raises:
+        TypeError: an item has another form.
+    """
+    found = []
+    for item in items:
+        numbers, text = (item[:-1], item[-1]) if isinstance(item, Sequence) and item else ((), None)
+        if not (isinstance(text, str) and 1 <= len(numbers) <= 2 and all(map(_is_time, numbers))):
+            raise TypeError(f"{name}: wanted (seconds, text) or (start, end, text), got {item!r}")
+        found.append(dict(zip(("start", "end"), map(float, numbers), strict=False)) | {"text": text})
+    return found
+
+
+def samples_of(pcm: Pcm) -> Int16:
+    """Return mono sound as int16 samples.
+
+    Raises:
+        TypeError: it is of another type; ValueError: it is not mono, or has half a sample.
+    """
+    if isinstance(pcm, bytes | bytearray | memoryview):
+        if len(bytes(pcm)) % 2:
+            raise ValueError(f"sound: wanted samples of two bytes, got {len(bytes(pcm))} bytes")
+        return np.frombuffer(bytes(pcm), "<i2").astype(np.int16)
+    samples = np.asarray(pcm)
+    if samples.dtype != np.int16 and samples.dtype.kind != "f":
+        raise TypeError(f"sound: wanted bytes, int16 or floats from -1 to 1, got {samples.dtype}")
+    if samples.ndim != 1:
+        raise ValueError(f"sound: wanted mono sound, (n,), got {samples.shape}")
+    if samples.dtype.kind == "f":
+        samples = np.rint(np.nan_to_num(samples).clip(-1, 1) * 32767)
+    return samples.astype(np.int16)
+
+
+def checked_rate(rate: int) -> int:
+    """Return a number of samples a second; raises TypeError or ValueError for another."""
+    if isinstance(rate, bool) or not isinstance(rate, int):
+        raise TypeError(f"rate: wanted samples a second, got {rate!r}")
+    if rate <= 0:
+        raise ValueError(f"rate: wanted samples a second, got {rate}")
+    return rate
+
+
+def _is_time(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and value >= 0
