@@ -78,3 +78,11 @@ def test_morph_targets_of_a_face_at_rest_are_empty():
     assert made.names == ()
     assert made.moves.shape == (0, len(face.vertices), 3)
     assert made.weights.shape == (2, 0)
+
+
+def test_morph_targets_of_a_single_frame_are_exact(played):
+    face, poses = played.face, played.poses[-1:]
+    made = make_morph_targets(face, poses)
+    wanted = deform(face, still(face, poses))
+    got = face.vertices + np.einsum("nk,kvc->nvc", made.weights, made.moves)
+    assert np.linalg.norm(got - wanted, axis=2).max() < 1.2 * TOLERANCE

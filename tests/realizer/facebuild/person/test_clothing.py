@@ -66,3 +66,17 @@ def test_decimate_hidden_keeps_chosen_and_lit_vertices(sheet: Sheet) -> None:
     assert len(left) < 121
     assert tuple(at[24]) in left
     assert all(tuple(place) in left for place in at[dark == 1].tolist())
+
+
+def test_decimate_hidden_leaves_the_creases_of_a_shirt_above_its_lower_end(sheet: Sheet) -> None:
+    skin, base = sheet
+    at = skin.positions(base)
+    at[::2, 2] += 0.002
+    part = Part("shirt", skin, at, skin.triangles, np.zeros((121, 3)), np.zeros(121), np.ones(121))
+
+    def left(floor: float) -> int:
+        nothing = np.zeros(121, bool)
+        return len(decimate_hidden(part, nothing, nothing, chin=0.0, floor=floor).vertices)
+
+    assert left(floor=at[:, 1].min() - 0.1) == 121
+    assert left(floor=at[:, 1].max()) < 80

@@ -114,6 +114,18 @@ def test_add_part_estimates_the_end_and_missing_marks(voice) -> None:
         assert sorted(u.marks, key=lambda m: u.marks[m]) == list(MARKS)
 
 
+def test_add_part_estimates_marks_by_the_characters_before_them() -> None:
+    text = 'They sat down. <mark name="m"/>When <mark name="n"/>' + "all of them had come, they waited. " * 8
+    growing = LongText(SpeechRequest(text, ("m", "n")))
+    first = growing.next()
+    assert first is not None
+    assert first.ssml == "They sat down."
+    marks = growing.add_part(SilentVoice().say(first)).marks
+    blank = marks["m"] - growing.ready_until
+    assert blank > 0
+    assert marks["n"] - marks["m"] == pytest.approx(len("When ") * blank)
+
+
 def test_add_part_leaves_silence_before_a_late_part(voice) -> None:
     growing = LongText(SpeechRequest(TEXT, MARKS))
     first = growing.add_part(voice.say(growing.next()))
