@@ -37,7 +37,7 @@ LAYERS = (
     "realizer.pipeline",
     "realizer.outputs realizer.charts realizer.checking",
     "realizer.result realizer.enrichment",
-    "realizer.offline",
+    "realizer.offline realizer.explained",
     "realizer.protocol",
     "realizer.server",
     "realizer.facebuild",

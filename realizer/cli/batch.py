@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,6 +34,12 @@ def _formats(context: click.Context, parameter: click.Parameter, value: tuple[st
     return tuple(suffixes)
 
 
+def _suffixes() -> Iterable[str]:
+    from realizer.outputs.registry import OUTPUTS
+
+    return (suffix.removeprefix(".") for suffix in OUTPUTS)
+
+
 @click.command()
 @click.argument("places", nargs=-1, required=True, metavar="IN...")
 @click.option(
@@ -51,6 +58,7 @@ def _formats(context: click.Context, parameter: click.Parameter, value: tuple[st
     required=True,
     metavar="NAME",
     callback=_formats,
+    shell_complete=options.completing(_suffixes),
     help="Format to write, a suffix of `realizer outputs`; repeat it for several.",
 )
 @click.option("--workers", type=click.IntRange(1, 1024), help="Number of processes.  [default: one per core]")

@@ -14,6 +14,12 @@ if TYPE_CHECKING:
     from bml_schema import Feedback
 
 FILM, FRAMES = Path("demo.mp4"), Path("demo.fap")
+NEXT = """now try:
+  realizer realize "Hello there" -o hello.mp4      speak a text
+  realizer enrich "Are you sure?" -o sure.bml      turn a text into BML with expressions
+  realizer realize sure.bml -o sure.png --face ben draw it with another face
+  realizer explain sure.bml                        see how it goes through the eight steps
+  realizer serve                                   play BML from a WebSocket"""
 
 
 @click.command()
@@ -56,6 +62,13 @@ def _film(documents: list[str], voice: str | None, face: str) -> None:
             click.echo(f"realizer: {path} was left out: {error}", err=True)
 
 
+def _next_steps(page: str | None) -> str:
+    """Return what the demo has made, and what to try next."""
+    made = [f"{path}: {text}" for path, text in ((FILM, "the film"), (FRAMES, "its FAPs")) if path.is_file()]
+    live = [f"{page}: the page, until Ctrl-C"] if page else []
+    return "\n".join([*(f"made {line}" for line in made), *(f"open {line}" for line in live), NEXT])
+
+
 def _line(feedback: Feedback) -> str:
     """Return a line that describes feedback, or "" for predictions."""
     from bml_schema import BlockProgress, SyncPointProgress, WarningFeedback
@@ -79,8 +92,10 @@ async def _serve(documents: dict[str, str], once: bool, port: int, voice: str | 
         server = await Server(settings).start()
     except OSError:
         server = await Server(replace(settings, port=0)).start()
+    page = f"http://{settings.host}:{server.port}/?session=demo"
     try:
-        click.echo(f"page: http://{settings.host}:{server.port}/?session=demo")
+        if not once:
+            click.echo(f"page: {page}")
         async with connect(f"ws://{settings.host}:{server.port}/ws?session=demo") as client:
             for name, text in documents.items():
                 click.echo(f"\n{name}")
@@ -88,8 +103,8 @@ async def _serve(documents: dict[str, str], once: bool, port: int, voice: str | 
                 async for feedback in client.until_end():
                     if line := _line(feedback):
                         click.echo(line)
+        click.echo("\n" + _next_steps(None if once else page))
         if not once:
-            click.echo("\nthe page stays available until Ctrl-C")
             await server.wait_closed()
     finally:
         await server.close()

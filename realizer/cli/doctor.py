@@ -2,27 +2,54 @@
 
 from __future__ import annotations
 
+import json
+import platform
 import shutil
 from collections.abc import Iterator
 from functools import cache
+from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 
 import click
 
+import realizer
+from realizer.cli import options
+
 Finding = tuple[bool, str, str]  # whether it works, its name, a description or the fix
+PACKAGES = ("numpy", "scipy", "numba", "moderngl", "av", "espeakng-loader", "hibari-tts", "pocketsphinx")
 MODULES = {"film": "av"}  # extra -> a module that it installs
 
 
 @click.command()
-def doctor() -> None:
-    """Check the installation: pictures, voices, films, faces and the page.
+@options.as_json
+def doctor(as_json: bool) -> None:
+    """Check the installation: pictures, voices, films, faces and the page, and print versions.
 
     Prints one line per part: ok, or missing and how to fix it.
     """
-    for part in (_pictures, _voices, _film, _node, _faces, _page):
+    parts = (_pictures, _voices, _film, _node, _faces, _page)
+    versions = _versions()
+    if as_json:
+        found = [{"part": n, "works": works, "text": text} for part in parts for works, n, text in part()]
+        click.echo(json.dumps({"versions": versions, "parts": found}, indent=1))
+        return
+    words = ", ".join(f"{name} {version or 'missing'}" for name, version in versions.items())
+    click.echo(f"{click.style('ok     ', fg='green')}  {'versions':<10} {words}")
+    for part in parts:
         for works, name, text in part():
             mark = click.style("ok     ", fg="green") if works else click.style("missing", fg="yellow")
             click.echo(f"{mark}  {name:<10} {text}")
+
+
+def _versions() -> dict[str, str | None]:
+    """Return the versions of Python, of this program, and of what affects its outputs; None if missing."""
+    found: dict[str, str | None] = {"Python": platform.python_version(), "bml-realizer": realizer.__version__}
+    for package in PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = None
+    return found
 
 
 def _pictures() -> Iterator[Finding]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,8 +17,16 @@ if TYPE_CHECKING:
 RINGS = (1.0, 3.0, 5.0, 7.0)  # activations in the picture of the wheel, as in Paul 2010, 6.4
 
 
+def _known_words() -> Iterable[str]:
+    from realizer.emotions.words import known_words
+
+    return known_words()
+
+
 @click.command()
-@click.argument("word", metavar="[WORD|FILE.txt]", required=False)
+@click.argument(
+    "word", metavar="[WORD|FILE.txt]", required=False, shell_complete=options.completing(_known_words)
+)
 @click.option("--json", "as_json", is_flag=True, help="Print JSON: the ranges and all 68 values.")
 @click.option(
     "--profiles",

@@ -31,6 +31,12 @@ class MoodWord(click.ParamType):  # type: ignore[type-arg]
             self.fail(error.args[0].removeprefix("mood: "), parameter, context)
 
 
+def _moods() -> Iterable[str]:
+    from realizer.tables.knowledge import knowledge
+
+    return knowledge().moods
+
+
 role = click.option(
     "--role",
     type=click.Choice(["speaker", "listener"]),
@@ -42,6 +48,7 @@ mood = click.option(
     "--mood",
     type=MoodWord(),
     metavar="WORD",
+    shell_complete=options.completing(_moods),
     help="Mood, such as happy or sad: how often expressions come and how long they last.",
 )
 language = click.option(

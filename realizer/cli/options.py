@@ -99,7 +99,7 @@ def check_face(name: str | None) -> str | None:
 
     with reporting(UnknownFaceError, wrong=bad("--face")):
         try:
-            folder_of(name or "default")
+            folder_of("default" if name is None else name)
         except FileNotFoundError as error:
             raise click.BadParameter(f"{error.filename}: {error.strerror}", param_hint="--face") from None
     return name

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
@@ -30,6 +31,18 @@ def setting_option(
 def setting_options(*rows: tuple[str, str]) -> Callable[[options.Command], options.Command]:
     """Return a decorator that adds the options for several settings: (name, metavar) of each."""
     return options.several(*(setting_option(name, metavar) for name, metavar in rows))
+
+
+def _served_face(value: str | None) -> str | None:
+    """Return the name of a face; one that is given as a path can be found by its name from now on."""
+    from realizer.face.load import VARIABLE, folder_of, is_path
+
+    options.check_face(value)
+    if value is None or not is_path(value):
+        return value
+    folder = folder_of(value)
+    os.environ[VARIABLE] = str(folder.parent)  # processes of this service inherit it
+    return folder.name
 
 
 @click.command()
@@ -63,7 +76,7 @@ def setting_options(*rows: tuple[str, str]) -> Callable[[options.Command], optio
     ("xface_port", "PORT"), ("xface_player", "HOST:PORT"), ("stomp", "HOST:PORT"), ("journal", "FILE|URL")
 )
 @setting_option("record", "DIR", type=click.Path(file_okay=False, path_type=Path))
-@setting_option("face", "NAME")
+@setting_option("face", "NAME|PATH", callback=lambda context, parameter, value: _served_face(value))
 @options.deformer
 @setting_option("camera", "NAME")
 @options.light

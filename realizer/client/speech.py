@@ -33,7 +33,7 @@ class SpeechProgress:
 
     def on_error(self, error: dict[str, Any]) -> None:
         where = str(error.get("where"))
-        # An error about a part of a clip has only the clip, and one about a message that is too long has no id.
+        # An error about a part of a clip has only the clip; that about a message that is too long, no id.
         is_clip = where.startswith(f"clip:{self._id}-") or error.get("code") == "too-large"
         if self.fault is None and (is_clip or (error.get("id") == self._id and where != "speech.append")):
             self.fault = error

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
@@ -23,6 +24,24 @@ LONGEST = 60
 log = logging.getLogger(__name__)
 
 _installed = cache(entry_points)  # reading those of all packages takes 10 ms
+
+
+@dataclass(frozen=True, slots=True)
+class Plugin:
+    """An entry point of another package.
+
+    Attributes:
+        group: such as "realizer.voices"; name: in that group.
+        package: the distribution that it came with, or "".
+        value: "module:attribute".
+        fault: why it cannot be used, or "".
+    """
+
+    group: str
+    name: str
+    package: str
+    value: str
+    fault: str
 
 
 class Registry(Mapping[str, T], Generic[T]):
@@ -68,6 +87,20 @@ class Registry(Mapping[str, T], Generic[T]):
                 yield name, self[name]
             except PluginError as error:
                 self._warn(str(error))
+
+    def plugins(self) -> list[Plugin]:
+        """Return the plug-ins of this group, imported to see whether they can be used."""
+        found = []
+        for point in sorted(_installed().select(group=self.group), key=lambda point: point.name):
+            fault = "" if self._plugins.get(point.name) is point else "its name is taken"
+            try:
+                if not fault:
+                    self[point.name]
+            except PluginError as error:
+                fault = str(error)
+            package = point.dist.name if point.dist else ""
+            found.append(Plugin(self.group, point.name, package, point.value, fault))
+        return found
 
     @cached_property
     def _plugins(self) -> dict[str, EntryPoint]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import sys
 
+import numpy as np
 import pytest
 
 from realizer.cli.doctor import _fix
@@ -74,3 +76,13 @@ def test_outputs_that_draw_need_the_extra_render(suffix: str) -> None:
 def test_voices_has_a_line_for_each_voice() -> None:
     rows = [line.split(maxsplit=1) for line in run("voices").stdout.splitlines()]
     assert rows == [[voice.name, voice.description] for voice in voices()]
+
+
+def test_doctor_prints_json_with_versions(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("realizer.facebuild.check.check_face", lambda name: ())
+    monkeypatch.setattr("realizer.render.drawing_process.available_backend", lambda: ("gl", None))
+    found = json.loads(run("doctor", "--json").stdout)
+    assert found["versions"]["numpy"] == np.__version__
+    parts = {part["part"]: part for part in found["parts"]}
+    assert {"pictures", "FFmpeg", "silent", "node", "face", "page"} <= set(parts)
+    assert parts["pictures"] == {"part": "pictures", "works": True, "text": "drawn by OpenGL"}

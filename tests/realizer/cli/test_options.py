@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 import pytest
+from click.shell_completion import ShellComplete
 from click.testing import CliRunner, Result
 
 from realizer.cli import cli
@@ -135,3 +136,21 @@ def test_parse_size_accepts_16_to_4096_pixels(text: str) -> None:
 def test_parse_size_refuses_others(text: str) -> None:
     with pytest.raises(click.BadParameter, match="between 16x16 and 4096x4096"):
         parse_size(CONTEXT, OPTION, text)
+
+
+@pytest.mark.parametrize(
+    ("words", "found"),
+    [
+        ("realize --face a", "ada"),
+        ("realize --voice si", "silent"),
+        ("realize --camera pro", "profile"),
+        ("serve --light eve", "evening"),
+        ("batch --format arkit", "arkit.csv"),
+        ("enrich --mood hopef", "hopeful"),
+        ("emotion gui", "guilty"),
+    ],
+)
+def test_options_complete_their_values(words: str, found: str) -> None:
+    *before, typed = words.split()
+    completion = ShellComplete(cli, {}, "realizer", "_REALIZER_COMPLETE")
+    assert found in [item.value for item in completion.get_completions(before, typed)]

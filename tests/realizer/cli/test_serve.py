@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import fields
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -10,6 +12,7 @@ from click.testing import CliRunner
 
 from realizer.cli import cli
 from realizer.core.settings import Settings
+from realizer.face.load import folder_of
 from realizer.server import serve
 
 
@@ -64,3 +67,13 @@ def test_serve_listens_beyond_this_machine_with_its_options(monkeypatch: pytest.
         monkeypatch, "--host", "::", "--token", "x", "--asap-ports", "0", "1", "--allow", "192.0.2.1"
     )
     assert allowed.allow == ("192.0.2.1/32",)
+
+
+def test_serve_takes_the_path_of_a_face(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("REALIZER_FACES", "")
+    shutil.copytree(folder_of("ada"), tmp_path / "mia")
+    assert settings_of(monkeypatch, "--face", str(tmp_path / "mia")).face == "mia"
+    assert folder_of("mia") == tmp_path / "mia"
+    done = CliRunner().invoke(cli, ["serve", "--face", str(tmp_path / "no")])
+    assert done.exit_code == 2
+    assert "no such face folder" in done.stderr

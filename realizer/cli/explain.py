@@ -1,0 +1,56 @@
+"""`explain`: shows how a document goes through the eight steps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import click
+
+from realizer.cli import options
+
+
+@click.command()
+@options.documents
+@click.option(
+    "-o",
+    "--output",
+    metavar="FILE.html",
+    type=options.OUTPUT,
+    help="Write a page with the timeline and a picture.  [default: print text]",
+)
+@options.face("Face that is moved")
+@click.option("--no-idle", is_flag=True, help="No blinks or small head motion of an idle face.")
+@options.playback_options
+def explain(
+    documents: tuple[str, ...], output: Path | None, no_idle: bool, strict: bool, **flags: Any
+) -> int:
+    """Explain how a document goes through the eight steps, from text to picture.
+
+    \b
+    realizer explain hello.bml
+    realizer explain "Hello there" -o hello.html
+
+    Prints the nodes, the gaps that behaviours prefer, the scheduling problem and its solution, the channels,
+    the strongest action units and FAPs, and how far the face moves.
+    """
+    options.check_suffix(output, ".html")
+    chosen = options.settings(**flags)
+    texts = options.read_documents(documents)
+    from realizer import pipeline
+    from realizer.explained import as_html, as_text, steps_of
+    from realizer.result import Realization
+
+    play = chosen.play_options(options.read_scene(chosen.scene))
+    played = Realization.of(pipeline.play(texts, replace(play, idle=play.idle and not no_idle), chosen.voice))
+    options.print_warnings(played.warnings)
+    if not played.has_content:
+        return 1
+    steps = steps_of(played)
+    if output is None:
+        click.echo(as_text(steps), nl=False)
+    else:
+        with options.writing(output):
+            output.write_text(as_html(steps, played), "utf-8")
+    return 1 if played.refusals or (strict and any(s.dropped for s in played.schedules)) else 0
