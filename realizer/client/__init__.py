@@ -3,9 +3,9 @@
 from realizer.client.async_client import Client
 from realizer.client.connection import connect
 from realizer.client.message_router import ClientError, Frame
-from realizer.client.speech import Speech, SyncSpeech
-from realizer.client.sync_client import SyncClient
-from realizer.client.voice import SyncVoice, Voice
+from realizer.client.speech import Speech
+from realizer.client.sync_client import SyncClient, SyncSpeech, SyncVoice
+from realizer.client.voice import Voice
 from realizer.protocol.wire import ArkitFrame, AUFrame, FapFrame, MeshFrame, PictureFrame, SoundFrame
 
 __all__ = [

@@ -74,7 +74,7 @@ class Client:
         self._router.on_sent(bml)
         await self._post(bml)
 
-    async def control(self, type: str, **fields: Any) -> None:
+    async def control(self, /, type: str, **fields: Any) -> None:
         """Send a control message that has no answer, such as `stop` or `scene`; see `errors`.
 
         Raises:
@@ -82,7 +82,7 @@ class Client:
         """
         await self._post(json.dumps({"type": type, **fields}))
 
-    async def ask(self, type: str, **fields: Any) -> dict[str, Any]:
+    async def ask(self, /, type: str, **fields: Any) -> dict[str, Any]:
         """Send a control message and wait for its answer: hello, subscribe, state, ping.
 
         Raises:
@@ -97,7 +97,7 @@ class Client:
             await self.wait_for(lambda: self._router.has_answer)
             return self._router.answer()
 
-    async def subscribe(self, stream: str, **fields: Any) -> dict[str, Any]:
+    async def subscribe(self, /, stream: str, **fields: Any) -> dict[str, Any]:
         """Subscribe to a stream (fap, au, arkit, mesh, audio, video, schedule) and return its description.
 
         Raises:
@@ -317,7 +317,7 @@ class Client:
                 with contextlib.suppress(ClientError):
                     await self.control("unsubscribe", stream=stream, character=character)
 
-    async def film(self, path: str | Path, bml: str, *, fps: float = 25, **look: Any) -> BlockProgress:
+    async def film(self, /, path: str | Path, bml: str, *, fps: float = 25, **look: Any) -> BlockProgress:
         """Play BML and save its last block as a film with sound (.mp4, .webm).
 
         The service draws live, so the film repeats a picture if the next one was not drawn in time. `realizer

@@ -2,7 +2,7 @@
 
 import asyncio
 import contextlib
-from collections.abc import Awaitable, Callable, Coroutine
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 from bml_schema.feedback import BlockProgress, Feedback, SyncPointProgress, WarningFeedback
@@ -183,40 +183,3 @@ class Speech:
     async def _send(self, **fields: Any) -> None:
         opening, self._opening = self._opening, {}
         await self._control("speech", id=self.id, **fields, **opening)
-
-
-class SyncSpeech:
-    """A `Speech` for programs without an event loop, which `SyncClient.speech` returns.
-
-    Args:
-        do: runs a coroutine.
-    """
-
-    def __init__(self, speech: Speech, do: Callable[[Coroutine[Any, Any, Any]], Any]) -> None:
-        self._speech = speech
-        self._do = do
-
-    @property
-    def id(self) -> str:
-        return self._speech.id
-
-    def append(self, text: str) -> None:
-        """Append text, as `Speech.append`."""
-        self._do(self._speech.append(text))
-
-    def close(self) -> None:
-        """Close the speech: the rest of the text is spoken."""
-        self._do(self._speech.close())
-
-    def stop(self) -> None:
-        """Stop speaking at once."""
-        self._do(self._speech.stop())
-
-    def until(self, sync: str) -> float:
-        """Wait until a sync of the text is spoken, as `Speech.until`."""
-        return float(self._do(self._speech.until(sync)))
-
-    def ended(self) -> BlockProgress:
-        """Wait for the end of the speech, as `Speech.ended`."""
-        end: BlockProgress = self._do(self._speech.ended())
-        return end

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import secrets
-from collections.abc import Awaitable, Callable, Coroutine, Iterable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -180,49 +180,6 @@ class Voice:
         self.progress.check()
         if self._closed:
             raise ClientError(f"the speech {self.id} was closed: nothing can follow", "refused")
-
-
-class SyncVoice:
-    """A `Voice` for programs without an event loop, which `SyncClient.voice` returns.
-
-    Args:
-        do: runs a coroutine.
-    """
-
-    def __init__(self, voice: Voice, do: Callable[[Coroutine[Any, Any, Any]], Any]) -> None:
-        self._voice = voice
-        self._do = do
-
-    @property
-    def id(self) -> str:
-        return self._voice.id
-
-    def write(self, pcm: Pcm) -> None:
-        """Add sound, as `Voice.write`."""
-        self._do(self._voice.write(pcm))
-
-    def words(self, words: Iterable[Timed]) -> None:
-        """Add words, as `Voice.words`."""
-        self._do(self._voice.words(words))
-
-    def close(self) -> None:
-        """End the speech: what was written is spoken."""
-        self._do(self._voice.close())
-
-    def stop(self) -> None:
-        """Stop speaking at once."""
-        self._do(self._voice.stop())
-
-    def ended(self) -> BlockProgress:
-        """Wait for the end, as `Voice.ended`."""
-        end: BlockProgress = self._do(self._voice.ended())
-        return end
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        self._do(self._voice.__aexit__(kind))
 
 
 def timed(name: str, items: Iterable[Timed]) -> list[dict[str, Any]]:
