@@ -1,5 +1,7 @@
 """Loops compiled to machine code; the only importer of numba."""
 
+import hashlib
+import re
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -30,8 +32,8 @@ def compiled(loop: Loop) -> Loop:
         raise RenderError(f"{NO_NUMBA} ({error})") from None
     try:
         fast: Any = numba.njit(cache=True, **OPTIONS)(loop)
-        # Numba compiles again when the loop's own file changes; loops also call loops of other files.
-        fast._cache._cache_file._source_stamp = _state_of_sources()
+        # Numba compiles again when the loop's own file is newer; loops also use those of other files.
+        fast._cache._cache_file._source_stamp = state_of_sources()
     except RuntimeError:  # neither our folder nor the user's can be written
         fast = numba.njit(**OPTIONS)(loop)
     typed: Loop = fast
@@ -39,7 +41,11 @@ def compiled(loop: Loop) -> Loop:
 
 
 @cache
-def _state_of_sources() -> tuple[tuple[float, int], ...]:
-    """Return time and size of each file beside this one."""
-    states = (path.stat() for path in sorted(Path(__file__).parent.glob("*.py")))
-    return tuple((state.st_mtime, state.st_size) for state in states)
+def state_of_sources(folder: Path = Path(__file__).parent) -> str:
+    """Return a digest of the files of a folder of ours that hold loops, and of those that they import."""
+    texts = [path.read_text("utf-8") for path in sorted(folder.glob("*.py"))]
+    loops = [text for text in texts if "\n@compiled\n" in text]
+    names = {name for text in loops for name in re.findall(r"^from realizer\.(\S+)", text, re.MULTILINE)}
+    files = (folder.parent / f"{name.replace('.', '/')}.py" for name in sorted(names))
+    read = [path.read_text("utf-8") for path in files if path.is_file()]
+    return hashlib.sha256("\0".join([*loops, *read]).encode()).hexdigest()
