@@ -168,6 +168,10 @@ class ActiveBlock:
             return float("inf")
         return max([self.not_before, *(wait.until for wait in self.dependencies)])
 
+    def refers_to(self, other: ActiveBlock) -> bool:
+        """Return whether it refers to sync points of another block."""
+        return any(ref.block == other.block.id for ref in self.external_refs)
+
     def change_state(self, event: BlockEvent) -> None:
         """Change to the state that follows from an event."""
         self.state = next_state(self.state, event)

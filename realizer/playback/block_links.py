@@ -25,28 +25,21 @@ def dependencies(
     named = [
         p
         for p in alive
-        if p.block.id in block.append_after
-        or (
-            block.composition == "APPEND"
-            and p.character == character
-            and p.number < number
-            and p.start < FOREVER
+        if p.number < number
+        and (
+            p.block.id in block.append_after
+            or (block.composition == "APPEND" and p.character == character and p.start < FOREVER)
         )
     ]
     before = {id(wait.block) for p in named for wait in p.dependencies if not wait.subsiding}
     waits = [Dependency(p) for p in named if id(p) not in before]
-    return waits + [Dependency(p, subsiding=True) for p in alive if p.block.id in block.chunk_after]
+    chunks = (p for p in alive if p.number < number and p.block.id in block.chunk_after)
+    return waits + [Dependency(p, subsiding=True) for p in chunks]
 
 
 def followers(block: Block) -> list[tuple[str, bool]]:
     """Return (id, subsiding) of the blocks that have to wait for this one, or only for its subsiding."""
     return [(id, False) for id in block.prepend_before] + [(id, True) for id in block.chunk_before]
-
-
-def blocks_to_end(block: Block, character: int, alive: Iterable[ActiveBlock]) -> list[ActiveBlock]:
-    """Return the blocks that this one interrupts or replaces when it is accepted."""
-    replaces = block.composition == "REPLACE"
-    return [p for p in alive if p.block.id in block.interrupt or (replaces and p.character == character)]
 
 
 def existing_claims(

@@ -52,11 +52,6 @@ class AnnouncedBlock:
     unstarted: frozenset[str] = frozenset()
 
     @property
-    def is_too_late(self) -> bool:
-        """Whether it will be refused, because a block that has to wait for it had started, or is unknown."""
-        return any(name not in self.unstarted for name, _ in block_links.followers(self.block))
-
-    @property
     def is_revoked(self) -> bool:
         return self.state is State.REVOKED
 
@@ -151,7 +146,7 @@ class BlockManager:
             self._announced.pop(block.id, None)
             return self._refuse(block, refused.warning, now)
         announced = self._announced[block.id]
-        ended = block_links.blocks_to_end(block, character, self.blocks.active())
+        ended = self._blocks_to_end(announced)
         pending = block.preplan and not announced.activated
         start = FOREVER if pending else max([now, *(w.until for w in waits)])
         arrival = Arrival(block, character, announced.number, context)
@@ -166,12 +161,7 @@ class BlockManager:
             return self._refuse(block, Warning(block.id, "CANNOT_CREATE_BEHAVIOR", words), now)
         if not context.animates:
             return planned.schedule
-        together = frozenset(ended)
-        for earlier in ended:
-            self.timeline.stop(earlier, now, together)
-        for name in block.interrupt:
-            if self._has_arrived(name, announced.number):
-                self.revoke(name, now)
+        self._end(ended, announced, now)
         state = next_state(announced.state, BlockEvent.PREPLAN if pending else BlockEvent.PLAN)
         playing = ActiveBlock(planned, self.kinds, context, character, announced.number, now, waits, state)
         playing.apply_plan(planned, playing.earliest, now)  # it may have ended its own dependencies
@@ -267,16 +257,39 @@ class BlockManager:
         return id in self._announced or self.blocks.has_seen(id)
 
     def revoke(self, id: str, now: float) -> bool:
-        """End a block that was announced and has not arrived; return False if there is none."""
+        """End a block that was announced and has not arrived; return False if there is none.
+
+        What it interrupts or replaces ends too, because that must not depend on how long its voice takes.
+        """
         announced = self._announced.get(id)
         if announced is None or announced.is_revoked:
             return False
+        self._end(self._blocks_to_end(announced), announced, now)
         self._revoke(announced, now)
         return True
 
+    def _blocks_to_end(self, announced: AnnouncedBlock) -> list[ActiveBlock]:
+        """Return the accepted blocks that one interrupts or replaces."""
+        earlier = (p for p in self.blocks.active() if p.number < announced.number)
+        return [p for p in earlier if self._ends(announced.block, p.block)]
+
+    def _end(self, ended: Sequence[ActiveBlock], announced: AnnouncedBlock, now: float) -> None:
+        """End accepted blocks, and those in preparation that a block interrupts or replaces."""
+        together = frozenset(ended)
+        for playing in ended:
+            self.timeline.stop(playing, now, together)
+        for other in list(self._announced.values()):
+            if other.number < announced.number and self._ends(announced.block, other.block):
+                self.revoke(other.block.id, now)
+
+    def _ends(self, block: Block, other: Block) -> bool:
+        characters = (self.character_index(b.character_id) for b in (block, other))
+        replaces = block.composition == "REPLACE" and len(set(characters)) == 1
+        return replaces or other.id in block.interrupt
+
     def _revoke(self, announced: AnnouncedBlock, now: float) -> None:
         announced.change_state(BlockEvent.STOP)
-        self.blocks.note_revoked(announced.block.id, now)
+        self.blocks.note_revoked(announced.block.id)
         self.reports.add(progress(announced.block, "end", now, announced.state))
 
     def stop(self, now: float, block_ids: Iterable[str] | None = None) -> list[str]:
@@ -368,9 +381,7 @@ class BlockManager:
             playing = self.blocks.find(name)
             if playing is not None and playing.is_waiting:
                 waiting.append((playing, subsiding))
-            elif playing is not None or not (
-                name in self._announced[block.id].unstarted and self.has_seen(name)  # not refused since then
-            ):
+            elif playing is not None or name not in self._announced[block.id].unstarted:
                 text = f"prependBefore, chunkBefore: wanted blocks that have not started, got {name!r}"
                 raise _Rejection(Warning(block.id, "TargetBlockAlreadyStartedException", text))
         if waiting and any(id(playing) in block_links.all_dependencies(waits) for playing, _ in waiting):
@@ -385,14 +396,14 @@ class BlockManager:
         return waits + placed_before
 
     def _has_not_started(self, id: str) -> bool:
-        """Whether a block has been announced or planned, and has not started or was revoked."""
+        """Whether a block has been announced or planned, and has not started, was revoked or refused."""
         announced, playing = self._announced.get(id), self.blocks.find(id)
-        if announced is not None and not announced.is_too_late:
+        if announced is not None:
             return True
         if playing is not None:
             return playing.is_waiting
         past = self.blocks.schedule_of(id)
-        return past is not None and not past.points
+        return past is not None and past.start == FOREVER
 
     def _has_arrived(self, id: str, before: int) -> bool:
         """Whether a block is announced that arrived before another one, by its number."""
@@ -402,10 +413,11 @@ class BlockManager:
     def _in_use(self, block: Block, character: int) -> bool:
         """Whether its id belongs to a playing or waiting block that it does not end."""
         other = self.blocks.find(block.id)
-        return other is not None and other not in block_links.blocks_to_end(block, character, [other])
+        return other is not None and not self._ends(block, other.block)
 
     def _refuse(self, block: Block, warning: Warning, now: float) -> Schedule:
         self.reports.warn(warning, block.character_id)
+        self.blocks.note_revoked(block.id)
         return Schedule(block.id, {}, {}, start=now, warnings=(warning,), failed=True)
 
 

@@ -63,10 +63,10 @@ class BlockStore:
             del self._blocks[playing.number]
         return gone
 
-    def note_revoked(self, id: str, now: float) -> None:
+    def note_revoked(self, id: str) -> None:
         """Note a block that was ended before it was planned."""
         if not self.has_seen(id):
-            self._remember(_revoked(id, now))
+            self._remember(_revoked(id))
 
     def _remember(self, past: Schedule) -> None:
         """Store the schedule of an ended block, and drop the oldest ones if there are too many."""
@@ -106,7 +106,7 @@ class BlockStore:
         newest = next((p for p in reversed(self._blocks.values()) if p.block.id == id), None)
         if newest is None:
             return self._past.get(id)
-        return _revoked(id, newest.end) if newest.is_revoked else newest.schedule
+        return _revoked(id) if newest.is_revoked else newest.schedule
 
     def first_schedule_of(self, id: str) -> Schedule | None:
         """Return the first schedule of the newest block with an id, moved to its present start."""
@@ -149,9 +149,9 @@ class BlockStore:
         return schedule if playing is None else playing.latest
 
 
-def _revoked(id: str, end: float) -> Schedule:
-    """Return the schedule of a block that ended before it started: it has no points."""
-    return Schedule(id, {}, {}, start=end)
+def _revoked(id: str) -> Schedule:
+    """Return the schedule of a block that ended before it started: it has no points, and never starts."""
+    return Schedule(id, {}, {}, start=FOREVER)
 
 
 def _points(schedule: Schedule) -> int:
@@ -170,7 +170,7 @@ def _first_schedule(playing: ActiveBlock) -> Schedule:
 def _with_lost_points(playing: ActiveBlock) -> Schedule:
     """Return the schedule of a block, with the points that it has lost, which references may still name."""
     if playing.is_revoked:
-        return _revoked(playing.block.id, playing.end)
+        return _revoked(playing.block.id)
     schedule, first = playing.schedule, _first_schedule(playing)
     points, times = dict(schedule.points), dict(schedule.times)
     for behaviour, names in first.points.items() if playing.start < FOREVER else ():

@@ -66,20 +66,20 @@ def affected_blocks(
 
 
 def _has_passed(ref: SyncRef, playing: ActiveBlock, now: float) -> bool:
-    """Return whether a point has passed or does not exist."""
+    """Return whether a point has passed or does not exist; no point of a waiting block has passed."""
     sync = ref.sync if ref.index is None else f"{ref.sync}:{ref.index}"
     try:
         time = playing.schedule.at(ref.behaviour or "", sync or "")
     except KeyError:
         return True
-    return playing.start + time <= now
+    return playing.has_begun and playing.start + time <= now
 
 
 def member(playing: ActiveBlock, origin: float, now: float) -> Member:
     """Return a playing block on the clock of a block that starts at `origin`, with fixed past points."""
     delay = playing.start - origin
     passed_times: dict[str, dict[str, float]] = {}
-    for behaviour in playing.plan.timings:
+    for behaviour in playing.plan.timings if playing.has_begun else ():
         points, times = playing.schedule.points[behaviour], playing.schedule.times[behaviour]
         passed = {
             point: float(time) + delay

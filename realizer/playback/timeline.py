@@ -60,6 +60,7 @@ class BlockTimeline:
         self.blocks = BlockStore()
         self.events = EventQueue()
         self.reports = Reports()
+        self._moving: set[ActiveBlock] = set()
 
     def plan(
         self,
@@ -231,7 +232,24 @@ class BlockTimeline:
         if others:
             self.retime(others, planned.other_schedules, now)
         self.trim(planned.trims, now)
+        self._update_referring(playing, now)
         return True
+
+    def _update_referring(self, playing: ActiveBlock, now: float) -> None:
+        """Move the sync points of other blocks that refer to points of a waiting block that has moved.
+
+        Blocks that it waits for stay as they are, because both would move later for ever.
+        """
+        tied = [p for p in self.blocks.active() if p.refers_to(playing)]
+        if not tied or playing.start == FOREVER or playing in self._moving:
+            return
+        dependencies = block_links.all_dependencies(playing.dependencies)
+        self._moving.add(playing)
+        for other in tied:
+            if other.start < FOREVER and not other.is_done and id(other) not in dependencies:
+                linked = [p for p in self.linked_blocks(other, now) if p is not playing]
+                self.reschedule([other, *linked], other.start, now)
+        self._moving.remove(playing)
 
     def _replan(
         self, playing: ActiveBlock, start: float, now: float, *, alone: bool, starts: bool
@@ -333,7 +351,9 @@ class BlockTimeline:
             others: blocks that are stopped with it.
         """
         bereft = [] if playing.has_begun else self._waiting_for_points_of(playing, others)
-        tied = self.linked_blocks(playing, now) if playing.has_begun else []
+        tied = self.linked_blocks(playing, now) if playing.start < FOREVER else []
+        if not playing.has_begun:  # blocks that refer to it stay, or are planned again
+            tied = [p for p in tied if not p.refers_to(playing)]
         if playing.is_waiting:
             playing.pass_on_dependencies()
         self.events.drop(playing)
@@ -354,10 +374,10 @@ class BlockTimeline:
         self, playing: ActiveBlock, without: Collection[ActiveBlock]
     ) -> list[ActiveBlock]:
         """Return the planned blocks that wait and refer to one, except its followers, which move with it."""
-        id = playing.block.id
-        tied = [p for p in self.blocks.active() if any(ref.block == id for ref in p.external_refs)]
-        gone = {*without, *playing.followers} if tied else set()
-        return [p for p in tied if p.is_waiting and p.start < FOREVER and p not in gone]
+        tied = [p for p in self.blocks.active() if p.refers_to(playing)]
+        moved = [p for p in playing.followers if p.start < FOREVER]
+        gone = {*without, *moved} if tied else set()
+        return [p for p in tied if p.is_waiting and p not in gone]
 
     def cut(self, playing: ActiveBlock, behaviours: Collection[str], now: float) -> None:
         """End some behaviours of a block; the block ends with the last of the others."""

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from bml_schema import Block
+from bml_schema import Block, ParameterValueChange
 from realizer.core.errors import RealizerError, VoiceError
 from realizer.playback.player import Player
 from realizer.playback.references import references
@@ -61,9 +61,10 @@ class PendingBlock:
 
     @cached_property
     def named(self) -> frozenset[str | None]:
-        """The ids of the blocks whose sync points or ends it names."""
+        """The ids of the blocks whose sync points, ends or parameters it names."""
         refs = (ref.block for ref in references(self.block))
-        return frozenset(refs).union(self.block.append_after, self.block.chunk_after)
+        changes = (n.target[0] for n in self.block.behaviours if isinstance(n, ParameterValueChange))
+        return frozenset(refs).union(self.block.append_after, self.block.chunk_after, changes)
 
     def precedes(self, id: str) -> bool:
         """Return whether it names a block in any way, which must not be there when this one is planned."""
@@ -106,8 +107,8 @@ class PendingBlocks:
         It depends on blocks whose sync points it names, on those it follows, on one with its own id, on those
         that name it and must not find it yet, on a replacing block of its character, on blocks of its
         character that need the voice or the gaze as it does, and, if it is appended, on all blocks of its
-        character. A replacing block depends on none: it ends those that `replaced_by` returns. Blocks that
-        must follow this one depend on it.
+        character. A replacing block depends on none of its character: it ends those that `replaced_by`
+        returns. Blocks that must follow this one depend on it.
         """
         block = pending.block
 
@@ -126,7 +127,8 @@ class PendingBlocks:
                 return False
             return not pending.resources.isdisjoint(other.resources)
 
-        earlier = self.blocks if block.composition != "REPLACE" else []
+        replaces = block.composition == "REPLACE"
+        earlier = [o for o in self.blocks if not (replaces and o.character == pending.character)]
         pending.predecessors.update(filter(is_predecessor, earlier))
         for other in self.blocks:
             is_successor = other.block.id in (*block.prepend_before, *block.chunk_before)

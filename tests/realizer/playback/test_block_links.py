@@ -13,7 +13,6 @@ from realizer.behaviours.registry import KINDS
 from realizer.playback.active_block import ActiveBlock, Dependency, State
 from realizer.playback.block_links import (
     all_dependencies,
-    blocks_to_end,
     dependencies,
     existing_claims,
     external_times,
@@ -81,12 +80,6 @@ def test_dependencies_by_list_are_of_any_character_and_known() -> None:
 def test_followers_are_named_with_their_kind_of_dependency() -> None:
     said = 'bmla:prependBefore="a" bmla:chunkBefore="b"'
     assert followers(block("x", said)) == [("a", False), ("b", True)]
-
-
-def test_blocks_to_end_are_replaced_or_interrupted() -> None:
-    everyone = [alive("a"), alive("b", character=1), alive("c", character=1)]
-    assert [p.block.id for p in blocks_to_end(block("x", 'composition="REPLACE"'), 0, everyone)] == ["a"]
-    assert [p.block.id for p in blocks_to_end(block("x", 'bmla:interrupt="c"'), 0, everyone)] == ["c"]
 
 
 def test_existing_claims_are_those_of_the_others_of_a_character() -> None:

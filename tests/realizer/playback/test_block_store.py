@@ -87,11 +87,11 @@ def test_forget_keeps_fewer_long_schedules_but_always_the_last(
 
 def test_note_revoked_remembers_an_id_but_no_points() -> None:
     cast = BlockStore()
-    cast.note_revoked("a", 3.0)
+    cast.note_revoked("a")
     assert cast.has_seen("a")
     ended(cast, "b")
     cast.forget(9.0)
-    cast.note_revoked("b", 9.0)
+    cast.note_revoked("b")
     schedule = cast.schedule_of("b")
     assert schedule is not None
     assert schedule.at("w", "end") == 1.0, "that of the block that played"

@@ -50,6 +50,16 @@ def pending(speaking: PendingBlock) -> PendingBlocks:
         ('<bml id="b" composition="APPEND"><wait id="w"/></bml>', 0, True),
         ('<bml id="b" composition="APPEND"><wait id="w"/></bml>', 1, False),
         ('<bml id="b" composition="REPLACE"><wait id="w"/></bml>', 0, False),
+        ('<bml id="b" composition="REPLACE"><wait id="w"/></bml>', 1, False),
+        ('<bml id="b" composition="REPLACE"><wait id="w" start="a:s:end"/></bml>', 0, False),
+        ('<bml id="b" composition="REPLACE"><wait id="w" start="a:s:end"/></bml>', 1, True),
+        (
+            '<bml id="b"><bmla:parametervaluechange xmlns:bmla="http://www.asap-project.org/bmla" id="p" '
+            'target="a:s" paramId="volume"><bmla:trajectory type="instant" targetValue="50"/>'
+            "</bmla:parametervaluechange></bml>",
+            0,
+            True,
+        ),
         ('<bml id="b"><wait id="w" start="a:s:end"/></bml>', 1, True),
         (
             '<bml id="b"><wait id="w"/><constraint><after ref="a:s:end"><sync ref="w:start"/></after>'
