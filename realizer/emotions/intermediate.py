@@ -14,20 +14,6 @@ class Anchor(NamedTuple):
     angle: float
 
 
-def same_category(archetype: Profile, own: float, activation: float, name: str = "") -> Profile:
-    """Return the archetype's profile, scaled by the ratio of the activations (4.1, rules 1 to 3).
-
-    Args:
-        own: activation of the archetype's word, above 0.
-        activation: activation of the intermediate emotion.
-
-    Raises:
-        ValueError: an activation below 0, or not a number.
-    """
-    _check(own, activation)
-    return archetype.scaled(activation / own, name)
-
-
 def between(one: Anchor, two: Anchor, angle: float, activation: float, name: str = "") -> Profile:
     """Return the profile of an emotion between two archetypes, by the published rules (4.2, rules 1 to 6).
 

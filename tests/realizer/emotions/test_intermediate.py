@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from realizer.emotions.archetypes import archetypes
-from realizer.emotions.intermediate import Anchor, between, same_category
+from realizer.emotions.intermediate import Anchor, between
 from realizer.emotions.profile import Profile
 from realizer.tables.wheel_words import whissell_words
 
@@ -31,14 +31,19 @@ def agree(got: Profile, printed: str, within: float) -> None:
 
 
 @pytest.mark.parametrize(("activation", "within"), [(1.3 * 4.9, 5), (6.3, 10)])
-def test_same_category_gives_terrified_of_table_7(activation: float, within: float) -> None:
+def test_scaled_fear_is_terrified_of_table_7(activation: float, within: float) -> None:
     # The print has used the ratio rounded to 1.3.
-    agree(same_category(FEAR, 4.9, activation), TERRIFIED, within)
+    agree(FEAR.scaled(activation / 4.9), TERRIFIED, within)
 
 
-def test_same_category_gives_worried_of_table_7() -> None:
+def test_scaled_fear_is_worried_of_table_7() -> None:
     words = whissell_words()
-    agree(same_category(FEAR, words["afraid"].activation, words["worried"].activation), WORRIED, 5)
+    agree(FEAR.scaled(words["worried"].activation / words["afraid"].activation), WORRIED, 5)
+
+
+def test_scaled_surprise_is_the_smaller_one_of_paul() -> None:
+    surprise = archetypes("raw")["surprise"][0]
+    assert surprise.scaled(4.0 / 6.5).ranges[3] == pytest.approx((350, 739), abs=0.5)  # eq. 6.1
 
 
 def test_between_gives_guilty_of_table_8() -> None:
@@ -67,11 +72,6 @@ def test_between_gives_the_example_of_paul() -> None:
     assert made.ranges[20] == pytest.approx((-301.8, -196.3), abs=0.1)
 
 
-def test_same_category_gives_the_smaller_surprise_of_paul() -> None:
-    surprise = archetypes("raw")["surprise"][0]
-    assert same_category(surprise, 6.5, 4.0).ranges[3] == pytest.approx((350, 739), abs=0.5)  # eq. 6.1
-
-
 def test_between_intersects_contradicting_ranges() -> None:
     one = Profile.parse("F4 [-100, 20], F31 [10, 50]")
     two = Profile.parse("F4 [-10, 100], F31 [-50, -10]")
@@ -89,9 +89,3 @@ def test_between_crosses_angle_0() -> None:
 def test_between_refuses_an_angle_outside(angle: float) -> None:
     with pytest.raises(ValueError, match=r"wanted one from 70\.3 to 108\.5 degrees"):
         between(Anchor(FEAR, 4.9, 70.3), Anchor(SAD, 3.9, 108.5), angle, 4)
-
-
-@pytest.mark.parametrize(("own", "activation"), [(0, 4), (4, -1), (4, float("nan"))])
-def test_same_category_refuses_an_invalid_activation(own: float, activation: float) -> None:
-    with pytest.raises(ValueError, match="activation: wanted 0 or more"):
-        same_category(FEAR, own, activation)

@@ -7,12 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bml_schema import Block, parse
 from realizer.animation.axis import AU_NAMES
-from realizer.behaviours.registry import VOCABULARY
 from realizer.core.options import PlayOptions
 from realizer.playback.player import Player
-from realizer.speech.silent import SilentVoice
+from tests.realizer.playback.players import SMILE, au, submit
 
 # The parts that idle motion and prosody move: brows, lids, head, eyes.
 OWN = ("1L", "1R", "2L", "2R", "45L", "45R", *map(str, range(51, 57)), *map(str, range(61, 65)))
@@ -22,24 +20,6 @@ MOODS = [
     f'<faceShift id="m" end="0.4"><faceLexeme id="l" lexeme="{name}" amount="{amount}"/></faceShift>'
     for name, amount in (("JOY", 1.0), ("SADNESS", 0.1))
 ]
-
-
-def block(content: str, id: str = "b", attributes: str = "") -> Block:
-    return parse(f'<bml id="{id}" {attributes}>{content}</bml>', VOCABULARY)
-
-
-def submit(player: Player, *args: str, now: float = 0.0) -> None:
-    made = block(*args)
-    voice = SilentVoice()
-    player.submit(made, now, {b: voice.say(say) for b, say in player.speech_requests(made).items()})
-
-
-def au(player: Player, name: str, *times: float, character: int = 0) -> list[float]:
-    values = player.frames(np.array(times), character).aus[:, AU_NAMES().index(name)]
-    return [float(v) for v in values]
-
-
-SMILE = '<faceLexeme id="s" lexeme="SMILE" amount="1" start="0" attackPeak="0.4" relax="2" end="2.6"/>'
 
 
 @given(st.integers(0, 2**31), st.floats(0, 200))

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bml_schema import Block, parse
+from bml_schema import parse
 from bml_schema.feedback import (
     BlockProgress,
     Feedback,
@@ -15,33 +15,15 @@ from bml_schema.feedback import (
     SyncPointProgress,
     WarningFeedback,
 )
-from realizer.animation.axis import AU_NAMES
 from realizer.behaviours.registry import VOCABULARY
 from realizer.core.options import PlayOptions
 from realizer.playback.player import Player
 from realizer.speech.silent import SilentVoice
-
-
-def block(content: str, id: str = "b", attributes: str = "") -> Block:
-    return parse(f'<bml id="{id}" {attributes}>{content}</bml>', VOCABULARY)
-
-
-def submit(player: Player, *args: str, now: float = 0.0) -> None:
-    made = block(*args)
-    voice = SilentVoice()
-    player.submit(made, now, {b: voice.say(say) for b, say in player.speech_requests(made).items()})
+from tests.realizer.playback.players import SMILE, au, block, submit
 
 
 def progress(feedback: list[Feedback]) -> list[tuple[str, float]]:
     return [(f.id, f.global_time) for f in feedback if isinstance(f, BlockProgress | SyncPointProgress)]
-
-
-def au(player: Player, name: str, *times: float, character: int = 0) -> list[float]:
-    values = player.frames(np.array(times), character).aus[:, AU_NAMES().index(name)]
-    return [float(v) for v in values]
-
-
-SMILE = '<faceLexeme id="s" lexeme="SMILE" amount="1" start="0" attackPeak="0.4" relax="2" end="2.6"/>'
 
 
 def test_player_acknowledges_predicts_starts_and_ends_a_block() -> None:
