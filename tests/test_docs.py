@@ -93,3 +93,17 @@ def test_architecture_names_every_folder() -> None:
     ]
     missing = {f"{relative(package)}/" for package in packages} - named - {"realizer/"}
     assert not missing
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_python_page_has_examples_that_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = ROOT / "docs" / "python.md"
+    if not page.is_file():
+        pytest.skip("no docs beside the tests")
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    for block in re.findall(r"```python\n(.*?)```", page.read_text("utf-8"), re.DOTALL):
+        if "async" not in block:  # those need a service
+            exec(block, names)
+    assert (tmp_path / "hello.mp4").stat().st_size > 10_000
