@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
-from fnmatch import translate
 from functools import cache, lru_cache
 
 from lxml import etree
 
 from bml_schema.behaviours import Face, FaceShift
-from bml_schema.dialects.table import table
+from bml_schema.dialects.table import Row, table
 from bml_schema.node_schema import local, schema_of
 from bml_schema.nodes import DRAFTS, Behaviour, Block
 from bml_schema.steps import next_element
@@ -28,24 +26,21 @@ def is_draft(root: etree._Element) -> bool:
 
 
 @cache
-def _words() -> Mapping[type[Behaviour], tuple[str, re.Pattern[str]]]:
-    """Return class -> (its field with values of dialects, their pattern)."""
+def _words() -> Mapping[type[Behaviour], tuple[str, tuple[Row, ...]]]:
+    """Return class -> (its field with values of dialects, their rows)."""
     classes = {local(tag): cls for tag, cls in VOCABULARY.items()}
-    patterns: dict[tuple[str, str], list[str]] = {}
+    words: dict[type[Behaviour], tuple[str, tuple[Row, ...]]] = {}
     for row in table().rows:
         cls = classes.get(row.element)
         spec = schema_of(cls).attributes.get(row.attribute) if cls else None
-        if spec is not None and row.value and row.dialect != "any" and spec.value.type == "string":
-            patterns.setdefault((row.element, spec.field), []).append(translate(row.value))
-    return {
-        classes[name]: (field, re.compile("|".join(found), re.IGNORECASE))
-        for (name, field), found in patterns.items()
-    }
+        if cls and spec and row.value and row.dialect != "any" and spec.value.type == "string":
+            words[cls] = spec.field, (*words.get(cls, ("", ()))[1], row)
+    return words
 
 
 @lru_cache(maxsize=1000)
-def _is_word(pattern: re.Pattern[str], value: str) -> bool:
-    return pattern.fullmatch(value) is not None
+def _is_word(rows: tuple[Row, ...], value: str) -> bool:
+    return any(row.fits(value) for row in rows)
 
 
 def has_words_of_dialects(block: Block) -> bool:

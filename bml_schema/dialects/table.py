@@ -16,9 +16,8 @@ Columns:
 from __future__ import annotations
 
 import csv
-import re
 from collections.abc import Mapping, Sequence
-from fnmatch import translate
+from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -45,6 +44,12 @@ class Row(NamedTuple):
         inside = " ".join(filter(None, (self.element, self.attribute)))
         return f'<{inside}="{self.value}">' if self.value not in ("", MISSING) else f"<{inside}>"
 
+    def fits(self, value: str) -> bool:
+        """Return whether the row is for this value of its attribute."""
+        pattern, value = self.value.casefold(), value.casefold()
+        # Most patterns are words; others are compiled when they are first needed.
+        return pattern in ("", value) or (any(c in pattern for c in "*?[") and fnmatchcase(value, pattern))
+
 
 class Table(NamedTuple):
     """The rows of the table.
@@ -52,14 +57,14 @@ class Table(NamedTuple):
     Attributes:
         rows: all rows, in order.
         elements: name of an element -> its row.
-        attributes: element -> attribute without prefix -> (pattern of the value or None, row), in order.
+        attributes: element -> attribute without prefix -> its rows, in order.
         missing: element -> the rows for missing attributes.
         points: name of a sync point, as written or `squeezed` -> its row.
     """
 
     rows: Sequence[Row]
     elements: Mapping[str, Row]
-    attributes: Mapping[str, Mapping[str, Sequence[tuple[re.Pattern[str] | None, Row]]]]
+    attributes: Mapping[str, Mapping[str, Sequence[Row]]]
     missing: Mapping[str, Sequence[Row]]
     points: Mapping[str, Row]
 
@@ -81,7 +86,7 @@ def table() -> Table:
     lines = [line for line in FILE.read_text("utf-8").splitlines() if not line.startswith("#")]
     rows = [Row(*cells) for cells in csv.reader(lines[1:])]
     elements: dict[str, Row] = {}
-    attributes: dict[str, dict[str, list[tuple[re.Pattern[str] | None, Row]]]] = {}
+    attributes: dict[str, dict[str, list[Row]]] = {}
     missing: dict[str, list[Row]] = {}
     points: dict[str, Row] = {}
     for row in rows:
@@ -93,7 +98,6 @@ def table() -> Table:
         elif row.value == MISSING:
             missing.setdefault(row.element, []).append(row)
         else:
-            pattern = re.compile(translate(row.value), re.IGNORECASE) if row.value else None
             of_element = attributes.setdefault(row.element, {})
-            of_element.setdefault(row.attribute.rpartition(":")[2], []).append((pattern, row))
+            of_element.setdefault(row.attribute.rpartition(":")[2], []).append(row)
     return Table(rows, elements, attributes, missing, points)

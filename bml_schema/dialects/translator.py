@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator
 from copy import deepcopy
 from itertools import count, repeat
@@ -148,16 +147,10 @@ class _Translation:
                 return False
         return True
 
-    def _row(self, rows: Iterable[tuple[re.Pattern[str] | None, Row]], value: str) -> Row | None:
+    def _row(self, rows: Iterable[Row], value: str) -> Row | None:
         """Return the first row for a value."""
-        return next(
-            (
-                row
-                for pattern, row in rows
-                if (self.in_dialect or row.dialect != "any") and (not pattern or pattern.match(value))
-            ),
-            None,
-        )
+        fitting = (row for row in rows if (self.in_dialect or row.dialect != "any") and row.fits(value))
+        return next(fitting, None)
 
     def _attribute(self, element: Any, attribute: str, value: str, row: Row) -> bool:
         """Apply a row to an attribute; return whether the element stays."""

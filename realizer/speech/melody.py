@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from realizer.core.array_types import Float32, Float64
 from realizer.speech.accents import phrases
+from realizer.speech.loudness import quantile
 from realizer.speech.utterance import Utterance
 
 RATE = 25.0  # values a second
@@ -78,7 +79,7 @@ def _heard(utterance: Utterance) -> Melody:
     blocks = (begins[k : k + BLOCK] for k in range(0, count, BLOCK))
     found = [_analysed(padded[at[:, None] + np.arange(WINDOW)], rate) for at in blocks]
     power, period, likeness = (np.concatenate(column) for column in zip(*found, strict=True))
-    loud = float(np.quantile(power, 0.9)) or 1.0
+    loud = quantile(power, 0.9) or 1.0
     is_voiced = (likeness > VOICED) & (power > QUIET * loud)
     return Melody(_smoothed(np.minimum(power / loud, 1.0)), _pitch(rate / period, is_voiced))
 

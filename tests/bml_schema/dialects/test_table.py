@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from bml_schema.dialects.table import MISSING, squeezed, table
+from bml_schema.dialects.table import MISSING, Row, squeezed, table
 from bml_schema.dialects.values import FUNCTIONS
 from bml_schema.node_schema import local, schema_of
 from bml_schema.vocabulary import VOCABULARY
@@ -65,10 +65,17 @@ def test_table_leaves_bml_1_0_as_it_is() -> None:
             "RAISE_BROWS",
             "SURPRISE",
         )
-        patterns = table().attributes[row.element][row.attribute]
-        pattern = next(pattern for pattern, other in patterns if other is row)
-        if pattern is not None and row.value != "*:*":
-            assert not [word for word in words if pattern.fullmatch(word)]
+        if row.value not in ("", "*:*"):
+            assert not [word for word in words if row.fits(word)]
+
+
+@pytest.mark.parametrize(("value", "is_one"), [("TOSS", True), ("toss_up", True), ("stoss", False)])
+def test_row_fits_values_by_its_pattern_in_any_case(value: str, is_one: bool) -> None:
+    assert Row("Greta", "head", "lexeme", "Toss*", "", "").fits(value) is is_one
+
+
+def test_row_without_a_value_fits_any() -> None:
+    assert Row("Greta", "head", "side", "", "", "").fits("left")
 
 
 @pytest.mark.parametrize("point", ["stroke_start", "stroke-start", "strokestart", "strokeStart"])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from realizer.speech.accents import prosody_facts
-from realizer.speech.loudness import with_loudness
+from realizer.speech.loudness import quantile, with_loudness
 from realizer.speech.utterance import Phoneme, Utterance
 
 RATE = 8000
@@ -73,3 +73,11 @@ def test_with_loudness_extends_pauses_by_the_silence_beside_them() -> None:
     assert np.array([times for _, *times in found]) == pytest.approx(
         np.array([(0, 0.3), (0.3, 0.6), (0.6, 0.7), (0.7, 0.8), (0.8, 1.0)]), abs=0.011
     )
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64])
+@pytest.mark.parametrize("part", [0.0, 0.1, 0.5, 0.9, 1.0])
+def test_quantile_is_that_of_numpy(kind: type[np.floating], part: float) -> None:
+    for count in range(1, 40):
+        values = np.random.default_rng(count).uniform(size=count).astype(kind)
+        assert quantile(values, part) == pytest.approx(float(np.quantile(values, part)), rel=1e-6)
