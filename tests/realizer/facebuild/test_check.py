@@ -284,7 +284,7 @@ def test_check_command_takes_the_path_of_an_import(folder: Path) -> None:
     checked = CliRunner().invoke(faces, ["check", str(folder)], standalone_mode=False)
     assert checked.return_value == 1
     assert "mesh.npz: wanted this file, found none" in checked.output
-    with pytest.raises(FaceError, match="mesh.npz: wanted this file, found none"):
+    with pytest.raises(FaceError, match=r"mesh\.npz: wanted this file, found none"):
         load_face(str(folder))
 
 
