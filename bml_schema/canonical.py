@@ -8,8 +8,7 @@ from lxml import etree
 
 from bml_schema.errors import Fault
 from bml_schema.escape import escape, escape_value
-
-_XML = "http://www.w3.org/XML/1998/namespace"
+from bml_schema.nodes import XML
 
 
 def xml_parser(**options: Any) -> etree.XMLParser:
@@ -50,7 +49,7 @@ def _append(element: etree._Element, default: str, out: list[str]) -> None:
     prefixes: dict[str, str] = {}
     for key, value in attributes(element):
         namespace, label = _split(key)
-        if namespace == _XML:
+        if namespace == XML:
             label = f"xml:{label}"
         elif namespace:
             prefix = prefixes.get(namespace)

@@ -21,9 +21,10 @@ from bml_schema.document_splitter import (
     document_spans,
     without_doctype,
 )
+from bml_schema.element_reader import Vocabulary
 from bml_schema.errors import BMLError, BMLSizeError, BMLSyntaxError, quoted
 from bml_schema.node_schema import local
-from bml_schema.nodes import Behaviour, Block
+from bml_schema.nodes import Block
 from bml_schema.parser import MAX_BEHAVIOURS, read_block
 from bml_schema.undeclared_prefixes import read_undeclared
 from bml_schema.vocabulary import VOCABULARY
@@ -33,7 +34,6 @@ _MAX_RETRIES = 20  # searches for a valid document inside a broken one
 _MAX_SEARCHED = 100_000  # characters of one text that are searched again; more would take seconds
 MAX_DOCUMENTS = 1000  # in one text, so that a text full of "<bml>" does not cause a flood of warnings
 
-Vocabulary = Mapping[str, type[Behaviour]]
 
 _LONG_TAG = re.compile(rb"<([^\s<>/!?]++)[^<>\n]*+\n[^<>]*+>")
 _ID = re.compile(r"""\sid\s*=\s*(?:"([^"<]*)"|'([^'<]*)')""")

@@ -23,6 +23,7 @@ from bml_schema.nodes import (
     DRAFTS,
     EXTENSIONS,
     OWN,
+    SSML,
     After,
     Before,
     Behaviour,
@@ -40,7 +41,6 @@ from bml_schema.values import NUMBER, describe_mismatch
 
 Vocabulary = Mapping[str, type[Behaviour]]
 
-_SSML = "application/ssml+xml"
 _OURS = (f"{{{CORE}}}", f"{{{EXTENSIONS}}}")
 _OWN = (*_OURS, f"{{{OWN}}}")  # without BMLA and BMLT, which have more attributes than the schema
 _KNOWN = (*_OWN, f"{{{BMLA}}}", f"{{{BMLT}}}")
@@ -261,10 +261,10 @@ class ElementReader:
         if self.lenient and {"priority", "level"}.isdisjoint(element.keys()):
             element.set("priority", "1")
         values = self.attributes(schema_of(Description), element, False)
-        if values["type"] == _SSML:
+        if values["type"] == SSML:
             speak = [c for c in element if local(str(c.tag)) == "speak"]
             if len(speak) != 1:
-                raise Fault(f"wanted one <speak> for {_SSML}, got {len(speak) or 'none'}", element)
+                raise Fault(f"wanted one <speak> for {SSML}, got {len(speak) or 'none'}", element)
             return Description(**values, content=canonical(speak[0]))
         inside = [escape(element.text or "")]
         for child in element:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 # The characters that XML 1.0 cannot hold (production 2, Char).
-_ILLEGAL = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+ILLEGAL = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _DATA = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", "\r": "&#13;"})
 # Most values are ASCII without special characters; this check is cheaper than a translation.
 _plain = re.compile(r"[ !#-%'-;=?-~]*").fullmatch
@@ -16,7 +16,7 @@ _ATTRIBUTE = str.maketrans(
 
 
 def _checked(text: str) -> str:
-    bad = _ILLEGAL.search(text)
+    bad = ILLEGAL.search(text)
     if bad:
         raise ValueError(f"wanted characters XML can hold, got U+{ord(bad[0]):04X} at {bad.start()}")
     return text
@@ -39,4 +39,4 @@ def sanitized_value(text: str) -> str:
 
 def sanitized(text: str) -> str:
     """Replace every character XML cannot hold by U+FFFD."""
-    return _ILLEGAL.sub("\ufffd", text)
+    return ILLEGAL.sub("\ufffd", text)

@@ -18,6 +18,9 @@ EXTENSIONS = "http://www.bml-initiative.org/bml/coreextensions-1.0"
 BMLA = "http://www.asap-project.org/bmla"
 BMLT = "http://hmi.ewi.utwente.nl/bmlt"
 OWN = "urn:bml-realizer:1"  # the extensions of this project
+XML = "http://www.w3.org/XML/1998/namespace"
+LANGUAGE = f"{{{XML}}}lang"
+SSML = "application/ssml+xml"  # type of descriptions
 COMPOSITIONS = ("MERGE", "APPEND", "REPLACE")
 
 

@@ -15,6 +15,7 @@ from bml_schema.nodes import (
     CORE,
     EXTENSIONS,
     OWN,
+    XML,
     Behaviour,
     Block,
     Constraint,
@@ -26,7 +27,6 @@ from bml_schema.sync_refs import SyncRef
 from bml_schema.values import decimal
 
 _IN_CORE = f"{{{CORE}}}"
-_XML = "http://www.w3.org/XML/1998/namespace"
 # Well-known prefixes; any other namespace becomes ns1, ns2, ...
 _PREFIXES: Mapping[str, str] = {
     CORE: "bml",
@@ -142,7 +142,7 @@ class Writer:
         space, _, local = clark[1:].rpartition("}")
         if not space:
             return local
-        if space == _XML:
+        if space == XML:
             return f"xml:{local}"
         if space not in self.prefixes:
             self.prefixes[space] = _PREFIXES.get(space, f"ns{len(self.prefixes) + 1}")

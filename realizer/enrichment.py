@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from bml_schema import Block, BMLError, Speech, read, write
+from bml_schema.escape import ILLEGAL
 from realizer.behaviours.registry import VOCABULARY
 from realizer.core.options import PlayOptions
 from realizer.knowledge.enrich import Enricher, SpokenText
@@ -25,7 +26,6 @@ ROLES = ("speaker", "listener")
 MARKUP = re.compile(r"\s*<(?!\d)[\w:?!/]")  # but not "<3"
 MARKED = re.compile(rb"(?:\xef\xbb\xbf)?\s*<(?![\d\s])|\xff\xfe|\xfe\xff")
 # Characters that XML 1.0 cannot contain (production 2, Char).
-UNWRITABLE = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 log = logging.getLogger(__name__)
 
@@ -117,7 +117,7 @@ class Enrichment:
         if isinstance(source, bytes) or MARKUP.match(source):
             found._add_documents(source, enricher, report)
             return found
-        clean, count = UNWRITABLE.subn(" ", source)
+        clean, count = ILLEGAL.subn(" ", source)
         if count:
             report(f"{count} character{'s' * (count > 1)} that XML cannot hold became blanks")
         if not clean.strip():

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from bml_schema import Block, BMLError, Speech, read, write
 from bml_schema.behaviours import SpeechText
-from bml_schema.documents import Vocabulary
+from bml_schema.element_reader import Vocabulary
 
 Source = str | bytes | Path
 # Suffixes of files that we read. A text in a .txt file is spoken; those of timelines are read by `check`.

@@ -10,8 +10,8 @@ from lxml import etree
 from bml_schema.dialects.table import Row, table
 from bml_schema.dialects.values import language_tag
 from bml_schema.node_schema import local
+from bml_schema.nodes import LANGUAGE
 
-_LANGUAGE = "{http://www.w3.org/XML/1998/namespace}lang"
 _MARKS = {"sync": "id", "tm": "id", "mark": "name"}
 
 
@@ -40,7 +40,7 @@ def translate_speech(speech: Any, apply: Callable[[Row], None], *, words: bool) 
     kept = [child for child in speech if local(str(child.tag)) == "description"]
     _rewrite(text, speech, apply)
     if tag := language_tag(speech.get("language") or speech.get("lang") or ""):
-        text.set(_LANGUAGE, tag)
+        text.set(LANGUAGE, tag)
     del speech[:]
     speech.text = None
     for child in (text, *kept):

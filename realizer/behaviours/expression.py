@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bml_schema import Expression
+from bml_schema.behaviours import PEAK
 from realizer.animation.channel import Channel
 from realizer.behaviours import pose_channels
 from realizer.behaviours.expressive_channels import express
@@ -11,12 +12,10 @@ from realizer.behaviours.table_timing import from_gaps
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
-POINTS = ("start", "attackPeak", "relax", "end")
-
 
 def timing(node: Expression, context: PlanningContext) -> Timing:
     """Return the onset, apex and offset of the library; those of templates were measured."""
-    return from_gaps(POINTS, context.library[node.name].gaps)
+    return from_gaps(PEAK, context.library[node.name].gaps)
 
 
 def expand(node: Expression, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:

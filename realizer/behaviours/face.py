@@ -8,6 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from bml_schema import Face, FaceFacs, FaceLexeme, FaceShift
+from bml_schema.behaviours import PEAK
 from realizer import tables
 from realizer.animation.axis import Target, au
 from realizer.animation.channel import Channel
@@ -20,13 +21,12 @@ from realizer.scheduling.timing import Timing
 
 Part: TypeAlias = FaceLexeme | FaceFacs
 
-POINTS = ("start", "attackPeak", "relax", "end")
 # s; duration from an overshoot to the sustained value, at most half of the hold.
 SETTLE = 0.25
 
 
 def timing_of_lexeme(node: FaceLexeme, context: PlanningContext) -> Timing:
-    return from_gaps(POINTS, context.library[node.lexeme].gaps)
+    return from_gaps(PEAK, context.library[node.lexeme].gaps)
 
 
 def expand_part(node: Part, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:

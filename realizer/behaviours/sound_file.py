@@ -11,7 +11,7 @@ import numpy as np
 from realizer.behaviours.wav_file import read_wav
 from realizer.core.array_types import Int16
 from realizer.core.errors import RealizerError
-from realizer.speech.utterance import Recording
+from realizer.speech.utterance import RATES, Recording
 
 # First bytes of a file -> FFmpeg's name of its format. The format is always given, because FFmpeg would
 # also read playlists, which lead to other files.
@@ -26,7 +26,6 @@ KINDS = (
     (b"\x1aE\xdf\xa3", "matroska"),
 )
 LONGEST = 1800.0  # s; a small file can contain days of silence
-RATES = (1000, 384_000)  # Hz
 INSTALL = "wanted a WAV file, or pip install 'bml-realizer[film]' for {}"
 
 

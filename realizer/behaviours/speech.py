@@ -10,6 +10,7 @@ from xml.sax.saxutils import escape, quoteattr
 import numpy as np
 
 from bml_schema import AudioFile, Speech, Sync
+from bml_schema.nodes import LANGUAGE, SSML
 from realizer.animation.channel import Channel
 from realizer.behaviours import recordings
 from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext, claiming
@@ -18,13 +19,11 @@ from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 from realizer.speech.utterance import MAX_TEXT, Recording, SpeechRequest, Utterance
 
-SSML = "application/ssml+xml"
 # Stiffness of a second of speech, which is that of a stiff gap of the face; shorter gaps are stiffer.
 STIFFNESS = 1000.0
 MIN_GAP = 0.01  # s; limits the stiffness of very short gaps
 MIN_DURATION = 0.1  # s, for text without words such as a full stop
 Style = tuple[float, float]  # of jaw and lips
-LANG = "{http://www.w3.org/XML/1998/namespace}lang"
 
 
 @dataclass(frozen=True)
@@ -200,7 +199,7 @@ def _inside(content: str) -> SpokenContent | None:
     inner = escape(speak.text or "") + "".join(
         ElementTree.tostring(child, encoding="unicode") for child in speak
     )
-    return SpokenContent(inner, marks, speak.get(LANG))
+    return SpokenContent(inner, marks, speak.get(LANGUAGE))
 
 
 def _places(node: Speech) -> dict[str, float]:

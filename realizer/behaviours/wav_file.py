@@ -9,9 +9,9 @@ import numpy as np
 
 from realizer.core.array_types import Float32, Int16
 from realizer.core.errors import RealizerError
+from realizer.speech.utterance import RATES
 
 PCM, FLOAT, EXTENSIBLE = 1, 3, 0xFFFE
-RATES = (1000, 384_000)  # Hz
 SUPPORTED = "PCM of 8, 16, 24 or 32 bits, or 32-bit floats"
 
 

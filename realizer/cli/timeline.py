@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".toml", ".json")
 MAX_ADVICE = 20
-OWN = "urn:bml-realizer:1"
-CORE = "http://www.bml-initiative.org/bml/bml-1.0"
 
 
 @click.command()
@@ -54,6 +52,7 @@ def timeline(file: Path, **flags: Any) -> int:
     realizer timeline brows.toml -o brows.mp4
     realizer check brows.toml
     """
+    from bml_schema import CORE, OWN
     from realizer.expressions.library import library_of
 
     if flags["media"] is not None:

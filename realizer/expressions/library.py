@@ -11,10 +11,9 @@ import numpy as np
 from realizer.expressions.expression import Expression, key
 from realizer.tables.expression_words import expression_words
 from realizer.tables.lexemes import face_lexemes
-from realizer.tables.templates import Template, apex, templates
+from realizer.tables.templates import PREFIX, Template, apex, templates
 from realizer.tables.timing import Gap, gaps
 
-PREFIX = "template:"
 log = logging.getLogger(__name__)
 
 

@@ -13,9 +13,8 @@ from realizer.knowledge.placement_rules import Placement, place_expressions
 from realizer.knowledge.sentences import sentences
 from realizer.knowledge.word_languages import ENGLISH, Words, language_of
 from realizer.tables.knowledge import CompanionRule, Mood, Role, knowledge
-from realizer.tables.templates import Template, apex, templates
+from realizer.tables.templates import PREFIX, Template, apex, templates
 
-PREFIX = "template:"
 MIN_PIECE = 500  # characters; shorter texts are not split
 # Characters that a mark and an escape add to the text for a voice.
 MARK, ESCAPE = len('<mark name="w1234"/>'), len("&amp;") - 1

@@ -5,10 +5,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from bml_schema import Block, Speech
+from bml_schema.nodes import LANGUAGE, SSML
 from realizer.tables.emotional_words import WordList, word_list
-
-SSML = "application/ssml+xml"
-LANG = "{http://www.w3.org/XML/1998/namespace}lang"
 
 
 @dataclass(frozen=True)
@@ -46,14 +44,14 @@ def _languages(speech: Speech, block: Block) -> Iterator[str | None]:
             yield _ssml_language(description.content)
     if speech.text is not None:
         yield speech.text.language
-    yield speech.unknown_attributes.get(LANG)
-    yield block.unknown_attributes.get(LANG)
+    yield speech.unknown_attributes.get(LANGUAGE)
+    yield block.unknown_attributes.get(LANGUAGE)
 
 
 def _ssml_language(content: str) -> str | None:
     # Safe for untrusted content, as our parser has rejected DTDs and entities.
     try:
-        return ElementTree.fromstring(content).get(LANG)
+        return ElementTree.fromstring(content).get(LANGUAGE)
     except ElementTree.ParseError:
         return None
 

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from realizer.animation.fap.fap_clip import FAPClip
-from realizer.animation.fap.fap_reader import read_fap
+from realizer.animation.fap.fap_reader import INT32, read_fap
 from realizer.core.errors import RealizerError
 from realizer.outputs import fap_text
 from realizer.outputs.csv_table import csv_text
@@ -23,7 +23,6 @@ VISEME = tuple(f"viseme_{part}" for part in ("select1", "select2", "blend", "def
 EXPRESSION = tuple(
     f"expression_{part}" for part in ("select1", "intensity1", "select2", "intensity2", "init_face", "def")
 )
-INT32 = 2**31 - 1
 
 
 def read_clip(content: bytes) -> FAPClip:

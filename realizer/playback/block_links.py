@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 
@@ -11,8 +12,6 @@ from bml_schema import Block, SyncRef
 from realizer.playback.active_block import ActiveBlock, Dependency
 from realizer.playback.resources import ResourceClaim
 from realizer.scheduling.timing import Schedule
-
-FOREVER = float("inf")
 
 
 def dependencies(
@@ -28,7 +27,7 @@ def dependencies(
         if p.number < number
         and (
             p.block.id in block.append_after
-            or (block.composition == "APPEND" and p.character == character and p.start < FOREVER)
+            or (block.composition == "APPEND" and p.character == character and p.start < inf)
         )
     ]
     before = {id(wait.block) for p in named for wait in p.dependencies if not wait.subsiding}
@@ -58,7 +57,7 @@ def existing_claims(
         for p in alive
         if p.plan.claims
         and p.character == character
-        and (p.has_begun or (p.number < number and p.start < FOREVER))
+        and (p.has_begun or (p.number < number and p.start < inf))
         and id(p) not in gone
         for claim in p.plan.claims
     ]
@@ -90,7 +89,7 @@ def external_times(
     def instant(ref: SyncRef) -> float | None:
         for look in (schedule_of, fallback):
             schedule = look(ref.block or "")
-            if schedule is None or schedule.start == FOREVER:
+            if schedule is None or schedule.start == inf:
                 return None
             if (time := _time(ref, schedule)) is not None:
                 return schedule.start + time + ref.offset - start

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
+from math import inf
 
 from bml_schema import Block
 from realizer.behaviours.kind import BehaviourKind, BlockCommand, PlanningContext
@@ -27,7 +28,6 @@ from realizer.playback.timeline import Arrival, BlockTimeline
 from realizer.scheduling.timing import UNKNOWN, Schedule, Warning
 from realizer.speech.utterance import Utterance
 
-FOREVER = float("inf")
 # Maximum number of anticipators; of the others the oldest that no block is tied to are dropped.
 ANTICIPATORS = 2_000
 
@@ -148,7 +148,7 @@ class BlockManager:
         announced = self._announced[block.id]
         ended = self._blocks_to_end(announced)
         pending = block.preplan and not announced.activated
-        start = FOREVER if pending else max([now, *(w.until for w in waits)])
+        start = inf if pending else max([now, *(w.until for w in waits)])
         arrival = Arrival(block, character, announced.number, context)
         planned, others = self.timeline.plan(arrival, start, now, waits=waits, ended=ended)
         if planned.schedule.lengths:
@@ -185,7 +185,7 @@ class BlockManager:
 
     # time ---------------------------------------------------------------------------------------
 
-    def advance(self, now: float, starts_before: float = FOREVER) -> None:
+    def advance(self, now: float, starts_before: float = inf) -> None:
         """Process everything that is due, in order, each event at its own time.
 
         A block that starts at an instant starts after everything that arrives at this instant.
@@ -200,7 +200,7 @@ class BlockManager:
         """Return when `due` next returns something; None if nothing plays or waits; past for at once."""
         return float("-inf") if self.reports else self.timeline.events.next
 
-    def is_idle(self, now: float = -FOREVER) -> bool:
+    def is_idle(self, now: float = -inf) -> bool:
         """Whether nothing plays, waits or is visible, so that a snapshot holds the whole state.
 
         Args:
@@ -335,7 +335,7 @@ class BlockManager:
                 possible. A point that has passed stays where it was.
         """
         self.advance(now, starts_before=now)
-        tied = [p for p in self.blocks.active() if p.start < FOREVER and id in anticipators_of(p.block)]
+        tied = [p for p in self.blocks.active() if p.start < inf and id in anticipators_of(p.block)]
         soonest = {sync: max([now, *(lead_time(p, id, sync, now) for p in tied)]) for sync in syncs}
         self.blocks.anticipate(id, {sync: max(time, soonest[sync]) for sync, time in syncs.items()})
         if (beyond := len(self.blocks.anticipators) - ANTICIPATORS) > 0:
@@ -360,7 +360,7 @@ class BlockManager:
         playing = self.blocks.find(block)
         if playing is None or behaviour not in playing.plan.timings:
             return False
-        if playing.start == FOREVER:  # it is planned when its start is known
+        if playing.start == inf:  # it is planned when its start is known
             utterances = {**playing.context.utterances, behaviour: utterance}
             playing.context = replace(playing.context, utterances=utterances)
             return True
@@ -403,7 +403,7 @@ class BlockManager:
         if playing is not None:
             return playing.is_waiting
         past = self.blocks.schedule_of(id)
-        return past is not None and past.start == FOREVER
+        return past is not None and past.start == inf
 
     def _has_arrived(self, id: str, before: int) -> bool:
         """Whether a block is announced that arrived before another one, by its number."""

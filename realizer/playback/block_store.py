@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 
@@ -13,7 +14,6 @@ from realizer.scheduling.timing import Schedule
 # Maximum number of schedules of ended blocks, which references may name.
 PAST = 50  # 2 kB each
 PAST_POINTS = 50_000  # in all of them; the last schedule is kept in any case
-FOREVER = float("inf")
 # BMLA's reserved block id for points in time that a client announces.
 ANTICIPATORS = "anticipators"
 
@@ -28,7 +28,7 @@ class BlockStore:
 
     def __init__(self) -> None:
         self.last_number = 0
-        self.first_invisible = FOREVER
+        self.first_invisible = inf
         self._blocks: dict[int, ActiveBlock] = {}  # by number, in order of acceptance
         self._active: dict[str, ActiveBlock] = {}  # by id; those that are not done
         self._ended: list[ActiveBlock] = []  # those of `_blocks` that are done
@@ -57,7 +57,7 @@ class BlockStore:
             return []
         gone = [p for p in self._ended if p.invisible_after < before]
         self._ended = [p for p in self._ended if p.invisible_after >= before]
-        self.first_invisible = min((p.invisible_after for p in self._ended), default=FOREVER)
+        self.first_invisible = min((p.invisible_after for p in self._ended), default=inf)
         for playing in gone:
             self._remember(_with_lost_points(playing))
             del self._blocks[playing.number]
@@ -151,7 +151,7 @@ class BlockStore:
 
 def _revoked(id: str) -> Schedule:
     """Return the schedule of a block that ended before it started: it has no points, and never starts."""
-    return Schedule(id, {}, {}, start=FOREVER)
+    return Schedule(id, {}, {}, start=inf)
 
 
 def _points(schedule: Schedule) -> int:
@@ -173,7 +173,7 @@ def _with_lost_points(playing: ActiveBlock) -> Schedule:
         return _revoked(playing.block.id)
     schedule, first = playing.schedule, _first_schedule(playing)
     points, times = dict(schedule.points), dict(schedule.times)
-    for behaviour, names in first.points.items() if playing.start < FOREVER else ():
+    for behaviour, names in first.points.items() if playing.start < inf else ():
         known = points.get(behaviour, ())
         lost = [n for n, name in enumerate(names) if name not in known]
         if lost:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from math import inf
 
 import numpy as np
 
@@ -12,8 +13,6 @@ from realizer.playback.block_links import all_dependencies
 from realizer.playback.block_store import ANTICIPATORS
 from realizer.playback.references import external_refs, references
 from realizer.scheduling import Member
-
-FOREVER = float("inf")
 
 
 def affected_blocks(
@@ -31,7 +30,7 @@ def affected_blocks(
     Returns:
         Those of `alive` that are linked to the block, directly or through other blocks, in order.
     """
-    by_id = {p.block.id: p for p in alive if p.start < FOREVER}
+    by_id = {p.block.id: p for p in alive if p.start < inf}
     refs_by_block = [
         (block.id, external_refs(block)),
         *((id, p.external_refs) for id, p in by_id.items() if p.external_refs),

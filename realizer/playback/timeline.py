@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from graphlib import TopologicalSorter
+from math import inf
 
 from bml_schema import Block
 from realizer.behaviours.kind import BehaviourKind, PlanningContext
@@ -25,8 +26,6 @@ from realizer.scheduling import schedule_together
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.duration_fit import shortened
 from realizer.speech.utterance import Utterance
-
-FOREVER = float("inf")
 
 
 @dataclass(frozen=True)
@@ -87,7 +86,7 @@ class BlockTimeline:
             may_stretch: whether the plan may require speech of other lengths.
         """
         block, character = arrival.block, arrival.character
-        known = start < FOREVER
+        known = start < inf
         origin = start if known else now
         alive = [p for p in self.blocks.active() if p not in ended and p.block.id != block.id]
         others = affected_blocks(block, alive, now, waits) if known and not alone else []
@@ -128,7 +127,7 @@ class BlockTimeline:
         without: Collection[ActiveBlock] = (),
     ) -> list[ResourceClaim]:
         """Return the claims that a block gives way to, after the interrupts that all will make."""
-        known = (p for p in alive if p.start < FOREVER)
+        known = (p for p in alive if p.start < inf)
         promised = (cut for p in known for cut in interrupts(p.block, p.schedule) if cut[0] >= now)
         return after_interrupts(block_links.existing_claims(character, number, alive, without), promised)
 
@@ -137,7 +136,7 @@ class BlockTimeline:
         for playing, schedule in zip(blocks, schedules, strict=True):
             at = replace(schedule, start=playing.start)
             active = self.blocks.active()
-            existing = block_links.existing_claims(playing.character, FOREVER, active, blocks)
+            existing = block_links.existing_claims(playing.character, inf, active, blocks)
             if conflicts(claims(playing.block, at, self.kinds, playing.context), existing):
                 return True
         return False
@@ -145,7 +144,7 @@ class BlockTimeline:
     def place(self, playing: ActiveBlock) -> None:
         """Schedule the base states and events of a block with a new start."""
         self.characters[playing.character].add_shifts(playing.shifts.values())
-        if playing.start < FOREVER:
+        if playing.start < inf:
             self.events.add(playing)
             self.mark_changed()
 
@@ -167,7 +166,7 @@ class BlockTimeline:
                         todo.append(other)
         for first in graph.static_order():
             first.set_order()
-            if first.start < FOREVER:
+            if first.start < inf:
                 self.events.add(first)
 
     def update_followers(
@@ -191,7 +190,7 @@ class BlockTimeline:
         named = {ref.block for ref in playing.external_refs}
         if start == playing.start and after not in named:
             return False
-        is_replanned = start < FOREVER and (playing.start == FOREVER or bool(named))
+        is_replanned = start < inf and (playing.start == inf or bool(named))
         return self._place_again(playing, start, now, is_replanned=is_replanned, alone=bool(after))
 
     def resolve_conflicts(self, playing: ActiveBlock, now: float) -> bool:
@@ -241,12 +240,12 @@ class BlockTimeline:
         Blocks that it waits for stay as they are, because both would move later for ever.
         """
         tied = [p for p in self.blocks.active() if p.refers_to(playing)]
-        if not tied or playing.start == FOREVER or playing in self._moving:
+        if not tied or playing.start == inf or playing in self._moving:
             return
         dependencies = block_links.all_dependencies(playing.dependencies)
         self._moving.add(playing)
         for other in tied:
-            if other.start < FOREVER and not other.is_done and id(other) not in dependencies:
+            if other.start < inf and not other.is_done and id(other) not in dependencies:
                 linked = [p for p in self.linked_blocks(other, now) if p is not playing]
                 self.reschedule([other, *linked], other.start, now)
         self._moving.remove(playing)
@@ -351,7 +350,7 @@ class BlockTimeline:
             others: blocks that are stopped with it.
         """
         bereft = [] if playing.has_begun else self._waiting_for_points_of(playing, others)
-        tied = self.linked_blocks(playing, now) if playing.start < FOREVER else []
+        tied = self.linked_blocks(playing, now) if playing.start < inf else []
         if not playing.has_begun:  # blocks that refer to it stay, or are planned again
             tied = [p for p in tied if not p.refers_to(playing)]
         if playing.is_waiting:
@@ -375,7 +374,7 @@ class BlockTimeline:
     ) -> list[ActiveBlock]:
         """Return the planned blocks that wait and refer to one, except its followers, which move with it."""
         tied = [p for p in self.blocks.active() if p.refers_to(playing)]
-        moved = [p for p in playing.followers if p.start < FOREVER]
+        moved = [p for p in playing.followers if p.start < inf]
         gone = {*without, *moved} if tied else set()
         return [p for p in tied if p.is_waiting and p not in gone]
 
@@ -386,7 +385,7 @@ class BlockTimeline:
         self.events.drop(playing)
         self._withdraw_shifts(playing, [b for b in behaviours if b in playing.shifts], now)
         playing.cut(behaviours, now)
-        if playing.start < FOREVER:
+        if playing.start < inf:
             self.events.add(playing, pending)
         self.mark_changed()
         self.predict(playing, now, [b for b in playing.schedule.times if b in behaviours])

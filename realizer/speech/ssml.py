@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from xml.parsers import expat
 from xml.sax.saxutils import quoteattr, unescape
 
+from bml_schema.escape import ILLEGAL
 from realizer.core.errors import VoiceError
 from realizer.speech.ssml_prosody import is_supported
 from realizer.speech.utterance import MAX_TEXT, SpeechRequest
@@ -33,7 +34,6 @@ PLAIN = frozenset({"desc", "lexicon", "lookup", "meta", "metadata", "speak", "to
 STRENGTHS = {"none": 0.0, "x-weak": 0.1, "weak": 0.2, "medium": 0.4, "strong": 0.7, "x-strong": 1.2}  # s
 CLOCK = re.compile(r"\s*\+?(\d+(?:\.\d+)?|\.\d+)\s*(ms|s)\s*")
 
-NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 PICTURES = re.compile(
     "[\U0001f000-\U0001faff\u2600-\u27bf\u2b00-\u2bff\ufe00-\ufe0f\u200d\u20e3\U000e0000-\U000e007f]+"
 )
@@ -108,7 +108,7 @@ def read_script(request: SpeechRequest) -> Script:
             "split it over several behaviours"
         )
     warnings: list[str] = []
-    ssml, wrong = NOT_XML.subn(" ", request.ssml)
+    ssml, wrong = ILLEGAL.subn(" ", request.ssml)
     if wrong:
         warnings.append(f"{wrong} control characters in the text are ignored")
     try:

@@ -13,6 +13,7 @@ STRETCH = (0.6, 1.8)
 # Limits of the length of sound that is resampled, not synthesized again.
 WARP = (0.92, 1.08)
 MAX_TEXT = 20_000  # characters; about 20 minutes of speech, more than a behaviour needs
+RATES = (1000, 384_000)  # Hz of recordings
 
 
 @dataclass(frozen=True, slots=True, eq=False)

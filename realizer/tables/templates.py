@@ -12,6 +12,7 @@ from realizer.tables.lexemes import read_aus
 from realizer.tables.timing import gaps
 
 FILE = "templates.toml"
+PREFIX = "template:"  # of their names in documents
 FRAME = 1 / 25  # s; the measured films have 25 frames per second
 
 

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from realizer.behaviours.sound_file import RATES, read_sound
+from realizer.behaviours.sound_file import read_sound
 from realizer.core.array_types import Int16
 from realizer.core.errors import RealizerError
 from realizer.protocol.messages.speech import SpeechMessage, TimedText
 from realizer.protocol.wire import ClipPiece
 from realizer.server.session.control_fields import FieldError
 from realizer.speech.recorded.viseme_names import sound_of
-from realizer.speech.utterance import Phoneme, Recording, Word
+from realizer.speech.utterance import RATES, Phoneme, Recording, Word
 
 if TYPE_CHECKING:
     from realizer.speech.sound_visemes.recogniser import VisemeRecogniser

@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from realizer.core.array_types import Bool, Float32, Float64
 from realizer.speech.align.alignment import AlignError
+from realizer.speech.utterance import RATES
 
 RATE = 16_000  # Hz; speech has all relevant frequencies below half of it
 WINDOW, SPECTRUM = 400, 512  # samples: 25 ms, as usual in speech recognition
@@ -21,7 +22,6 @@ AT_ONCE = 4000  # frames; limits the memory for spectra
 # Percentiles of loudness for silence and speech, and the part of the range between them that is not silence.
 QUIET, LOUD, HEARD = 5, 95, 0.1
 MIN_RANGE, MAX_RANGE = 1.0, 5.0  # powers of ten; steady noise has no range, digital silence too much
-RATES = (1000, 384_000)  # Hz
 CHANNELS = 64
 LEAST, MOST = 0.05, 1800.0  # s
 SILENCE = 2e-4  # of the full scale: noise in the last bits
