@@ -94,7 +94,7 @@ def test_arkit_of_speech_reproduces_its_faps(spoken):
     mouth = [row.fap - 1 for row in faps() if row.group in (2, 8) and row.fap not in (14, 15)]
     assert np.abs(wanted[:, 2]).max() > 3  # mm: the jaw moves
     inside = spoken.faps.values[:, 44] < 150  # ARKit's only tongue is one that opens the jaw, too
-    assert np.abs(off[inside, 2]).max() < 0.5
+    assert np.abs(off[inside, 2]).max() < 0.6
     assert np.abs(off[:, 2]).max() < 1
     # Half a millimetre at the points of the mouth, which move by five.
     assert np.sqrt((off[:, mouth] ** 2).mean()) < 0.5
