@@ -110,7 +110,7 @@ def _faces() -> tuple[tuple[str, ...], Float64]:
     for row, lexeme in zip(faces, names.values(), strict=True):
         for (unit, side), amount in face_lexemes()[lexeme].aus.items():
             if unit not in LIPS:
-                row[[target.column for target in au(unit, side)]] = amount
+                row[[target.column for target in au(unit, side)]] = min(amount, 1.0)
     return tuple(names), faces
 
 

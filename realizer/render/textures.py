@@ -18,7 +18,7 @@ RED, GREEN, BLUE, ALPHA, SLOPE_U, SLOPE_V, OCCLUSION, ROUGHNESS, THICKNESS, FOLD
 CHANNELS = 12  # a texel begins at a multiple of four bytes
 LEVEL = np.array([255, 255, 255, 255, 128, 128, 255, 255, 255, 128, 128, 0], np.uint8)
 STEEPEST = 1.0  # slope at byte 255, metres per metre; 128 is level
-FOLD_SHADE = 0.75  # share of the light that a fold hides whose depth is 255
+FOLD_SHADE = 0.65  # share of the light that a fold hides whose depth is 255
 BAND = 64  # rows halved at once, so that memory stays small
 IRIS = (0.8125, 0.9375, 0.03125)  # place of the middle of the iris in the maps, and its radius
 DEPTH = 0.003  # metres behind the cornea of a point of an iris whose thickness is 0

@@ -15,7 +15,7 @@ FILE = "emotions.toml"
 
 @dataclass(frozen=True, slots=True)
 class EmotionFace:
-    """The face of an emotion: (AU, side LEFT | RIGHT | BOTH) -> intensity 0..1; `lexeme` may be ""."""
+    """The face of an emotion: action units as of a `FaceLexeme`; `lexeme` may be ""."""
 
     emotion: str
     lexeme: str

@@ -15,7 +15,7 @@ def test_visible_duration_is_the_apex_and_half_of_onset_and_offset() -> None:
 
 
 def test_units_have_the_notation_of_facs() -> None:
-    assert builtin()["SURPRISE"].units == "1+2+5+26"
+    assert builtin()["SURPRISE"].units == "1+2+5+25+26"
     assert builtin()["RAISE_LEFT_BROW"].units == "1L+2L"
 
 

@@ -87,7 +87,7 @@ def test_vrma_expressions_are_those_of_emotions(realization, name, lexeme):
     shown = {}
     for (unit, side), amount in face_lexemes()[lexeme].aus.items():
         for suffix in ("",) if str(unit) in axis() else {"BOTH": "LR", "LEFT": "L", "RIGHT": "R"}[side]:
-            shown[f"AU{unit}{suffix}"] = 0.6 * amount
+            shown[f"AU{unit}{suffix}"] = 0.6 * min(amount, 1.0)
     found = seen(one(realization, **shown))
     found = {key: value for key, value in found.items() if key not in ("blinkLeft", "blinkRight")}
     assert found == {name: pytest.approx(0.6, abs=0.03)}
