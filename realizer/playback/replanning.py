@@ -65,20 +65,25 @@ def affected_blocks(
 
 
 def _has_passed(ref: SyncRef, playing: ActiveBlock, now: float) -> bool:
-    """Return whether a point has passed or does not exist; no point of a waiting block has passed."""
+    """Return whether a point has passed or does not exist."""
     sync = ref.sync if ref.index is None else f"{ref.sync}:{ref.index}"
     try:
         time = playing.schedule.at(ref.behaviour or "", sync or "")
     except KeyError:
         return True
-    return playing.has_begun and playing.start + time <= now
+    return playing.start + time <= now
 
 
-def member(playing: ActiveBlock, origin: float, now: float) -> Member:
-    """Return a playing block on the clock of a block that starts at `origin`, with fixed past points."""
+def member(playing: ActiveBlock, origin: float, now: float, *, is_moved: bool = False) -> Member:
+    """Return a playing block on the clock of a block that starts at `origin`, with fixed past points.
+
+    Args:
+        is_moved: whether points at `now` may still move if the block has not started. A new block does not
+            move them: what it refers to starts in time.
+    """
     delay = playing.start - origin
     passed_times: dict[str, dict[str, float]] = {}
-    for behaviour in playing.plan.timings if playing.has_begun else ():
+    for behaviour in playing.plan.timings if playing.has_begun or not is_moved else ():
         points, times = playing.schedule.points[behaviour], playing.schedule.times[behaviour]
         passed = {
             point: float(time) + delay

@@ -329,7 +329,7 @@ class BlockTimeline:
 
     def _retime_together(self, blocks: Sequence[ActiveBlock], origin: float, now: float) -> str | None:
         """Change the times of playing blocks to the best fit; if there is none, return why."""
-        members = [member(p, origin, now) for p in blocks]
+        members = [member(p, origin, now, is_moved=True) for p in blocks]
         instants = block_links.external_times(self.blocks.schedule_of, origin, self.blocks.first_schedule_of)
         try:
             with work.limited(blocks[0].context.max_planning):
