@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -197,9 +198,9 @@ def schedule(
     player = options.planning_player(chosen, chosen.scene)
     texts = options.read_documents(documents)
     accepted, refused = plan(texts, player, chosen.voice)
-    # As later documents moved them, but complete if these cut them short.
-    pairs = [(planned, player.latest(planned)) for planned in accepted]
-    schedules = [old if old.times.keys() != new.times.keys() else new for old, new in pairs]
+    if len(accepted) > 1:  # conflicts of blocks are settled when they start
+        player.advance(inf)
+    schedules = [player.blocks.latest(planned, whole=True) for planned in accepted]
     if any(speaking.utterance.pcm is None for speaking in player.speech()):
         options.warn_no_voice(chosen.voice)
     options.print_warnings(w for w in refused if not any(w in s.warnings for s in schedules))

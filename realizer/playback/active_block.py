@@ -56,6 +56,7 @@ class ActiveBlock:
         stopped_at: when it was cut off, or None.
         external_refs: its references into other blocks.
         first_schedule: its schedule when it was accepted.
+        whole_schedule: its schedule before some of it was cut off; None if nothing was.
         channels, shifts, speech: by behaviour, on the session clock; empty while the start is unknown.
         known_since: behaviour -> when its place on the session clock became known.
     """
@@ -74,6 +75,7 @@ class ActiveBlock:
     speech: dict[str, ScheduledSpeech] = field(default_factory=dict)
     known_since: dict[str, float] = field(default_factory=dict)
     followers: list[ActiveBlock] = field(default_factory=list)
+    whole_schedule: Schedule | None = None
     order: tuple[int, int, int] = field(init=False)
     external_refs: tuple[SyncRef, ...] = field(init=False)
     first_schedule: Schedule = field(init=False)
@@ -96,11 +98,19 @@ class ActiveBlock:
     @property
     def latest(self) -> Schedule:
         """Its present schedule, with the warnings of the first one too."""
+        return self._with_first_warnings(self.schedule)
+
+    @property
+    def whole(self) -> Schedule:
+        """The same as if nothing of it had been cut off."""
+        return self._with_first_warnings(self.whole_schedule or self.schedule)
+
+    def _with_first_warnings(self, schedule: Schedule) -> Schedule:
         first = self.first_schedule
-        if self.start == float("inf"):
+        if schedule.start == float("inf"):
             return first
-        more = tuple(w for w in self.schedule.warnings if w not in first.warnings)
-        return replace(self.schedule, warnings=first.warnings + more)
+        more = tuple(w for w in schedule.warnings if w not in first.warnings)
+        return replace(schedule, warnings=first.warnings + more)
 
     @property
     def has_begun(self) -> bool:
@@ -326,6 +336,7 @@ class ActiveBlock:
         Their past sync points stay. Relax is at once, and the end is after the face has relaxed, or at once
         with `ends`, if the whole block is cut off.
         """
+        self.whole_schedule = self.whole_schedule or self.schedule
         points, times = dict(self.schedule.points), dict(self.schedule.times)
         not_begun: list[str] = []
         for behaviour in behaviours:

@@ -143,10 +143,16 @@ class BlockStore:
         times = {id: self._anticipated.times[id] for id in points}
         self._anticipated = replace(self._anticipated, points=points, times=times)
 
-    def latest(self, schedule: Schedule) -> Schedule:
-        """Return the present schedule of a block, given its first schedule."""
+    def latest(self, schedule: Schedule, *, whole: bool = False) -> Schedule:
+        """Return the present schedule of a block, given its first schedule.
+
+        Args:
+            whole: as if nothing of it had been cut off.
+        """
         playing = next((p for p in self._blocks.values() if p.first_schedule is schedule), None)
-        return schedule if playing is None else playing.latest
+        if playing is None:
+            return schedule
+        return playing.whole if whole else playing.latest
 
 
 def _revoked(id: str) -> Schedule:

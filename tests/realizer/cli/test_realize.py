@@ -16,6 +16,7 @@ from click.testing import CliRunner, Result
 from bml_schema import Block, SyncRef, parse, read
 from realizer.behaviours.registry import VOCABULARY
 from realizer.cli import cli
+from realizer.offline import realize as realize_documents
 from tests.commands import run
 from tests.rows import each_row
 
@@ -133,6 +134,28 @@ def test_schedule_keeps_the_planned_times_of_a_replaced_block() -> None:
     first, second = times(text)
     assert first["behaviours"] == times(TALK)[0]["behaviours"]
     assert second["behaviours"] == {"w": {"start": 0.0, "end": 1.0}}
+
+
+def test_schedule_drops_what_realize_drops_when_a_block_starts() -> None:
+    text = (
+        '<bml id="a"><gaze id="g" target="LEFT" start="0" end="2"/></bml>'
+        '<bml id="b"><gaze id="g" target="RIGHT" start="0" end="1"/><wait id="w" duration="1"/></bml>'
+    )
+    done = schedule("-", "--json", "--detail", "--strict", text=text)
+    played = realize_documents(text, voice="silent", idle=False).schedules
+    rows = json.loads(done.stdout)
+    assert [row["warnings"] for row in rows] == [s.to_json()["warnings"] for s in played]
+    assert [list(row["behaviours"]) for row in rows] == [["g"], ["w"]]
+    assert [gone["id"] for gone in rows[1]["dropped"]] == ["g"]
+    assert done.return_value == 1
+
+
+def test_schedule_starts_what_another_document_activates() -> None:
+    preplanned = '<bml xmlns:bmla="http://www.asap-project.org/bmla" id="a" bmla:preplan="true"/>'
+    activates = preplanned.replace('id="a" bmla:preplan="true"', 'id="b" bmla:onStart="a"')
+    late = activates.replace("/>", ' composition="APPEND"/>')
+    first, *_ = times(preplanned + '<bml id="c"><wait id="w" duration="1.5"/></bml>' + late)
+    assert first["start"] == 1.5
 
 
 def test_schedule_refuses_json_and_bml_together(tmp_path: Path) -> None:
