@@ -19,7 +19,8 @@ def dependencies(
 ) -> list[Dependency]:
     """Return the blocks that a block waits for: for APPEND all earlier of its character, and BMLA's lists.
 
-    Of blocks that wait for each other only the last is returned, because it ends when all of them have.
+    Of blocks that wait for each other only the last is returned, because it ends when all of them have. Those
+    that were put before an earlier block are returned too: if that one is revoked, nobody waits for them.
     """
     named = [
         p
@@ -30,7 +31,8 @@ def dependencies(
             or (block.composition == "APPEND" and p.character == character and p.start < inf)
         )
     ]
-    before = {id(wait.block) for p in named for wait in p.dependencies if not wait.subsiding}
+    links = ((p, wait) for p in named for wait in p.dependencies)
+    before = {id(w.block) for p, w in links if not w.subsiding and w.block.number < p.number}
     waits = [Dependency(p) for p in named if id(p) not in before]
     chunks = (p for p in alive if p.number < number and p.block.id in block.chunk_after)
     return waits + [Dependency(p, subsiding=True) for p in chunks]
