@@ -57,13 +57,21 @@ def plan(documents: Documents, player: Player, voice: Voice | str | None = None)
     return schedules, refused
 
 
-def play(documents: Documents, options: PlayOptions, voice: Voice | str | None = None) -> Realization:
-    """Play documents from 0 s to the end of the last block, without a clock."""
+def play(
+    documents: Documents, options: PlayOptions, voice: Voice | str | None = None, longest: float = inf
+) -> Realization:
+    """Play documents from 0 s to the end of the last block, without a clock.
+
+    Raises:
+        ValueError: that takes more than `longest` seconds.
+    """
     mapping = mapping_of(options.face, options.mapping)
     player = Player(
         options, history=inf, face_inputs=lambda _: input_names(options.face, deformer=options.deformer)
     )
     schedules, refused = plan(documents, player, voice)
+    if player.end > longest:
+        raise ValueError(f"wanted at most {longest:g} s, got {player.end:g} s")
     feedback = player.due(inf)
     characters = {}
     for index, name in enumerate(player.characters):

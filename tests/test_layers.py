@@ -41,7 +41,7 @@ LAYERS = (
     "realizer.protocol",
     "realizer.server",
     "realizer.facebuild",
-    "realizer.batch realizer.client",
+    "realizer.batch realizer.client realizer.asgi",
     "realizer.cli",
     "realizer.__main__",
 )
@@ -72,6 +72,7 @@ IMPORTERS = {
     "onnxruntime": ("realizer.speech.hibari.worker",),
     "redis": ("realizer.server.journal.redis_journal",),
     "pocketsphinx": ("realizer.speech.align.sphinx",),
+    "starlette": ("realizer.asgi",),
     "stomp": ("realizer.server.transports.broker",),
     "jwt": ("realizer.server.http.jwt_tokens",),
     "cryptography": ("realizer.server.http.jwt_tokens",),

@@ -226,6 +226,17 @@ class SessionHost:
 
     # sessions -----------------------------------------------------------------------------------
 
+    def end(self, name: str) -> bool:
+        """End a session and close its connections. Return False if there is none of that name."""
+        session = self._registry.sessions.get(name)
+        if session is None:
+            return False
+        numbers = self._registry.joined(session)
+        self._effects.run(session, [Close(number, 1000, "the session was ended") for number in numbers])
+        self._registry.end(session)
+        self._apply_effects(session)
+        return True
+
     def _call(self, session: Session, function: Callable[[], None]) -> bool:
         """Call a function that changes a session, and carry out the effects.
 

@@ -151,10 +151,10 @@ class SessionRegistry:
         # A restored session counts against the address of the first client that joins it.
         if id not in self._opened_by or id not in self.sessions:
             if visitor.address and self._opened_count(visitor.address) >= self._settings.max_address_sessions:
-                self._end(self._abandoned(visitor.address)[0])
+                self.end(self._abandoned(visitor.address)[0])
             if id not in self.sessions:
                 if len(self.sessions) >= self._settings.max_sessions:
-                    self._end(self._abandoned()[0])
+                    self.end(self._abandoned()[0])
                 self.sessions[id] = self._make(id, now, name is not None)
             self._opened_by[id] = visitor.address
         session = self.session_of[connection] = self.sessions[id]
@@ -248,7 +248,7 @@ class SessionRegistry:
     def remove_expired(self, now: float) -> None:
         """End the sessions that have had no connection for too long."""
         for session in [s for s in self.sessions.values() if s.is_expired(now) and not self.joined(s)]:
-            self._end(session)
+            self.end(session)
 
     def _abandoned(self, address: str | None = None) -> list[Session]:
         """Return the sessions without connections, the longest abandoned first: they make room for others.
@@ -267,7 +267,8 @@ class SessionRegistry:
     def _opened_count(self, address: str) -> int:
         return list(self._opened_by.values()).count(address)
 
-    def _end(self, session: Session) -> None:
+    def end(self, session: Session) -> None:
+        """End a session; its connections stay until they leave."""
         self._cancel(session)
         session.close()
         session.journal.writer.end()

@@ -17,7 +17,9 @@ from websockets.server import ServerProtocol
 from realizer.server.http.access import RateLimiter
 
 LONGEST_METHOD = 8  # characters, with the blank after it
-POST = "there is nothing to POST to: send BML through the WebSocket at /ws\n"
+POST = (
+    "there is nothing to POST to: send BML through the WebSocket at /ws, or run uvicorn realizer.asgi:app\n"
+)
 OTHERS = "wanted GET\n"
 SLICE = 4 * 1024  # bytes that are parsed before others have their turn: 3 ms of empty frames
 UNIT = 16 * 1024  # bytes that count as much as a frame
