@@ -11,16 +11,10 @@ from html import escape
 from pathlib import Path
 
 from realizer import realization
-from realizer.charts.chart_data import charts_of
-from realizer.charts.picture import timeline
-from realizer.charts.svg import svg
 from realizer.core.array_types import UInt8
 from realizer.core.errors import RealizerError
-from realizer.outputs.output import RenderSettings
-from realizer.outputs.png import picture_at
-from realizer.outputs.registry import OUTPUTS, output_for
 
-NOTEBOOK = RenderSettings(size=(320, 320))
+NOTEBOOK = 320, 320  # pixels of pictures
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -63,6 +57,9 @@ class Realization(realization.Realization):
             RealizerError: no block plays, or something that the format needs is not installed.
             OSError: the file cannot be written.
         """
+        from realizer.outputs.output import RenderSettings
+        from realizer.outputs.registry import output_for
+
         output, path = output_for(path), Path(path)
         drawing = RenderSettings(size, camera, at, light, background, morphs, visemes)
         output.check(drawing, self)
@@ -87,6 +84,10 @@ class Realization(realization.Realization):
 
         Arguments and errors are those of `save`.
         """
+        from realizer.outputs.output import RenderSettings
+        from realizer.outputs.png import picture_at
+        from realizer.outputs.registry import OUTPUTS
+
         drawing = RenderSettings(size, camera, at, light, background)
         OUTPUTS[".png"].check(drawing, self)
         return picture_at(self, drawing)
@@ -107,14 +108,22 @@ class Realization(realization.Realization):
         yield escape(repr(self))
         yield _shown(lambda: f'<img alt="contact sheet" src="{self._data(".png")}">')
         if self.blocks is not None:
+            from realizer.charts.chart_data import charts_of
+            from realizer.charts.picture import timeline
+            from realizer.charts.svg import svg
+
             accepted = [active.first_schedule for active in self.blocks.all()]
             yield svg(timeline(charts_of(self.blocks, accepted)))
         yield _shown(lambda: f'<video controls src="{self._data(".mp4")}"></video>')
 
     def _data(self, suffix: str) -> str:
         """Return the content of a file as an address."""
+        from realizer.outputs.output import RenderSettings
+        from realizer.outputs.registry import OUTPUTS
+
         output = OUTPUTS[suffix]
-        return f"data:{output.media_type};base64,{b64encode(output.encode(self, NOTEBOOK)).decode()}"
+        content = output.encode(self, RenderSettings(size=NOTEBOOK))
+        return f"data:{output.media_type};base64,{b64encode(content).decode()}"
 
 
 def _shown(part: Callable[[], str]) -> str:

@@ -12,10 +12,9 @@ import numpy as np
 from bml_schema import AudioFile, Speech, Sync
 from bml_schema.nodes import LANGUAGE, SSML
 from realizer.animation.channel import Channel
-from realizer.behaviours import recordings
 from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext, claiming
-from realizer.behaviours.media import MediaError
 from realizer.core.array_types import Float64
+from realizer.core.errors import RealizerError
 from realizer.scheduling.timing import Timing
 from realizer.speech.utterance import MAX_TEXT, Recording, SpeechRequest, Utterance
 
@@ -124,7 +123,11 @@ def check(node: Speech, context: PlanningContext) -> tuple[Fault, ...]:
     """
     spoken = _spoken_content(node)
     name = _audio_file(node)
-    faults = recordings.faults(name, context) if name is not None else ()
+    faults: tuple[Fault, ...] = ()
+    if name is not None:
+        from realizer.behaviours import recordings  # most speech has none
+
+        faults = recordings.faults(name, context)
     if spoken is None and name is not None and not faults:
         spoken = SpokenContent("", ())
     if spoken is None and faults:
@@ -178,9 +181,11 @@ def _recording(node: Speech, context: PlanningContext) -> Recording | None:
     name = _audio_file(node)
     if name is None:
         return None
+    from realizer.behaviours import recordings
+
     try:
         return recordings.recording(name, context)
-    except MediaError:
+    except RealizerError:
         return None
 
 

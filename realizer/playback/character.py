@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,7 +12,9 @@ from realizer.animation.axis import axis, region
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.curves import sample, weights
 from realizer.core import work
-from realizer.speech.voice_activity import VoiceActivity
+
+if TYPE_CHECKING:
+    from realizer.speech.voice_activity import VoiceActivity
 
 # Duration of the return to the base face after a release; about that of an expression.
 RELAX = 0.3  # s

@@ -27,7 +27,6 @@ from realizer.playback.face_motion import SEED_STEP, FaceMotion
 from realizer.playback.scheduled_speech import ScheduledSpeech
 from realizer.scheduling.timing import UNKNOWN, Schedule
 from realizer.speech.utterance import Recording, SpeechRequest, Utterance
-from realizer.speech.voice_activity import Turn, VoiceActivity
 from realizer.tables.cooccurrence import Rules
 
 # Frames up to this long before `now` can still be computed.
@@ -168,6 +167,8 @@ class Player(BlockManager):
             rate: Hz.
             is_last: whether no more sound follows.
         """
+        from realizer.speech.voice_activity import Turn, VoiceActivity
+
         own = self._characters[character]
         if own.heard is None or own.heard.rate != rate:
             own.heard = VoiceActivity(rate)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Collection, Mapping
+from typing import TYPE_CHECKING
 
 from realizer.server.journal.checkpoint import Checkpoint
 from realizer.server.journal.entry import Entry, Journal, JournalError, Kind, SavedSession, TakenOver
-from realizer.server.journal.recordings import RecordingFolder
+
+if TYPE_CHECKING:
+    from realizer.server.journal.recordings import RecordingFolder
 
 log = logging.getLogger(__name__)
 

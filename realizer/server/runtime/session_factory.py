@@ -1,5 +1,7 @@
 """The factory of sessions: new ones, and those restored from a journal."""
 
+from __future__ import annotations
+
 import asyncio
 import contextlib
 import functools
@@ -8,7 +10,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from itertools import islice
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from weakref import WeakValueDictionary
 
 from bml_schema import Emotion
@@ -22,9 +24,6 @@ from realizer.server.documents.document_queue import block_id_of
 from realizer.server.http.metrics import Metrics
 from realizer.server.journal import Entry, Journal, JournalError, SavedSession, TakenOver, journal_at
 from realizer.server.journal.entry import NOTE
-from realizer.server.journal.recordings import RecordingFolder, recording_head
-from realizer.server.journal.replay import catch_up, restore_session
-from realizer.server.journal.replay_watch import TRIES, ReplayNote, ReplayWatch
 from realizer.server.journal.session_journal import JournalWriter
 from realizer.server.runtime.session_registry import JoinError
 from realizer.server.session.effects import Speak
@@ -32,6 +31,10 @@ from realizer.server.session.session import Session
 from realizer.server.session.welcome import capabilities_of
 from realizer.server.streams.overload import Overload
 from realizer.speech.utterance import Utterance
+
+if TYPE_CHECKING:
+    from realizer.server.journal.recordings import RecordingFolder
+    from realizer.server.journal.replay_watch import ReplayNote, ReplayWatch
 
 log = logging.getLogger(__name__)
 
@@ -60,9 +63,8 @@ class SessionFactory:
         self._recorder: RecordingFolder | None = None
         self._scene: Mapping[str, Position] | None = None
         self._capabilities: dict[str, Any] = {}
-        self._watches = WeakValueDictionary[
-            str, ReplayWatch
-        ]()  # by session, of replays and what is left of them
+        # By session, of replays and what is left of them.
+        self._watches: WeakValueDictionary[str, ReplayWatch] = WeakValueDictionary()
 
     async def load(self) -> None:
         """Load what all sessions share. Raises as `SessionHost.start`."""
@@ -74,6 +76,8 @@ class SessionFactory:
 
             self._scene = parse_scene(settings.scene.read_text("utf-8"))
         if settings.record is not None:
+            from realizer.server.journal.recordings import RecordingFolder, recording_head
+
             self._recorder = RecordingFolder(settings.record, recording_head(settings, self._scene))
         # Load the face now: a missing one is an error before any transport opens.
         from realizer.face.load import load_face
@@ -125,12 +129,15 @@ class SessionFactory:
         """
         if self.journal is None or (saved := self.journal.claim(name)) is None:
             return None
+        from realizer.server.journal.replay import catch_up, restore_session
+        from realizer.server.journal.replay_watch import TRIES, ReplayNote, ReplayWatch
+
         loop = asyncio.get_running_loop()
         last = ReplayNote.read(saved.parts)
         parts = {part: text for part, text in saved.parts.items() if part != NOTE}
         saved = replace(saved, parts=parts)
         if last is not None and last.begun >= TRIES:
-            self._put_aside(name, saved.entries, last.entry)
+            self._put_aside(name, saved.entries, last)
         watch = ReplayWatch(
             lambda text: asyncio.run_coroutine_threadsafe(self._note(name, text), loop).result(), last
         )
@@ -155,13 +162,14 @@ class SessionFactory:
         log.info("session %s is resumed, %d entries long", name, len(saved.entries))
         return session, unanswered
 
-    def _put_aside(self, session: str, entries: list[Entry], index: int) -> None:
+    def _put_aside(self, session: str, entries: list[Entry], note: ReplayNote) -> None:
         """Replace a document in the journal by a note that it is left out.
 
         Raises:
             JournalError: it cannot be written.
         """
         assert self.journal is not None
+        index = note.entry
         if not index < len(entries) or entries[index].kind != "text":
             return  # the note is not ours
         entries[index] = replace(entries[index], kind="aside")
@@ -169,7 +177,7 @@ class SessionFactory:
         self._metrics.counts["quarantined"] += 1
         log.warning(
             "session %s: block %s, entry %d of the journal, is put aside: %d replays have not ended",
-            session, block_id_of(str(entries[index].body)), index, TRIES,
+            session, block_id_of(str(entries[index].body)), index, note.begun,
         )  # fmt: skip
 
     async def _note(self, session: str, text: str | None) -> None:

@@ -6,7 +6,6 @@ import asyncio
 from collections.abc import Callable, MutableMapping
 from functools import partial
 
-from realizer.server.journal.replay import catch_up
 from realizer.server.runtime.effect_runner import Engines
 from realizer.server.runtime.session_factory import SessionFactory
 from realizer.server.session.effects import Speak
@@ -84,5 +83,7 @@ class SessionRestorer:
             del self._restoring[name]
 
     def _catch_up(self, session: Session, seen: int) -> None:
+        from realizer.server.journal.replay import catch_up
+
         now = asyncio.get_running_loop().time()
         session.clock.opened -= catch_up(session, now, seen) - now
