@@ -191,3 +191,13 @@ def test_client_loads_no_engine() -> None:
     }
     heavy = {"scipy", "trimesh", "moderngl", "av", "PIL", "websockets"}
     assert not heavy & {name.split(".")[0] for name in loaded}
+
+
+def test_a_document_is_realized_without_loading_what_draws_serves_or_writes() -> None:
+    speech = '<bml id="b"><speech id="s"><text>Hi.</text></speech></bml>'
+    code = f"import sys, realizer; realizer.realize({speech!r}, voice='silent'); print(*sys.modules)"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
+    packages = ("render", "outputs", "charts", "protocol", "server", "facebuild", "checking", "knowledge")
+    assert [n for n in loaded if any(within(n, f"realizer.{package}") for package in packages)] == []

@@ -156,6 +156,11 @@ def test_to_xml_writes_no_exponents(time: float) -> None:
     assert "e" not in text.partition('globalTime="')[2].partition('"')[0]
 
 
+def test_to_xml_rounds_to_microseconds_decades_after_the_epoch_too() -> None:
+    text = BlockProgress(id="b:end", global_time=1_700_000_000.1234567).to_xml()
+    assert 'globalTime="1700000000.123457"' in text
+
+
 def test_to_xml_refuses_nan() -> None:
     with pytest.raises(ValueError, match="finite"):
         BlockProgress(id="b:end", global_time=float("nan")).to_xml()
