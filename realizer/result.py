@@ -88,6 +88,8 @@ class Realization(realization.Realization):
         from realizer.outputs.png import picture_at
         from realizer.outputs.registry import OUTPUTS
 
+        if at is None:
+            raise TypeError("at: wanted seconds, got None")
         drawing = RenderSettings(size, camera, at, light, background)
         OUTPUTS[".png"].check(drawing, self)
         return picture_at(self, drawing)

@@ -41,3 +41,23 @@ def test_every_name_the_root_promises_is_there() -> None:
 def test_an_unknown_name_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="no attribute 'sing'"):
         _ = realizer.sing  # type: ignore[attr-defined]
+
+
+def test_public_functions_work_when_every_module_is_imported() -> None:
+    """A module of the same name would hide a function: `realizer.check` is no module."""
+    for name in MODULES:
+        importlib.import_module(name)
+    bml = '<bml id="b"><head id="n" lexeme="NOD" stroke="1"/></bml>'
+    played = realizer.realize(bml, idle=False)
+    assert played.schedules[0].at("n", "stroke") == realizer.schedule(bml).at("n", "stroke") == 1
+    assert isinstance(played, realizer.Realization)
+    assert realizer.check(bml) == []
+    assert "<speech" in realizer.enrich("Hello there")
+    assert realizer.emotion("joy").frame().any()
+    assert "silent" in [voice.name for voice in realizer.voices()]
+    assert realizer.load_face("ada").name in [face.name for face in realizer.faces()]
+    assert realizer.Player().blocks is not None
+    assert callable(realizer.client.connect)
+    assert callable(realizer.serve)
+    functions = {name for name in realizer.__all__ if callable(getattr(realizer, name))}
+    assert not functions & {name.rpartition(".")[2] for name in MODULES if name.count(".") == 1}

@@ -114,8 +114,6 @@ def play_documents(read: Callable[[], list[str | bytes]], flags: dict[str, Any])
         if not realization.has_content:
             click.echo(f"{path}: not written, as there is nothing to play", err=True)
             return 1
-        with options.reporting(ValueError, "--"):
-            writer.check(drawing, realization)
         save(realization, writer, path, drawing)
         first, *others = (name or "the unnamed character" for name in realization.characters)
         if others and not writer.all_characters:
@@ -140,7 +138,9 @@ def writer_for(output: str | None) -> Output | None:
 
 
 def save(realization: Realization, writer: Output, path: Path, drawing: RenderSettings) -> None:
-    """Write a realization to a file and print its length."""
+    """Check the settings, write a realization to a file and print its length."""
+    with options.reporting(ValueError, "--"):
+        writer.check(drawing, realization)
     with options.writing(path):
         writer.write(realization, path, drawing)
     frames = f"{realization.frames} frames at {realization.fps:g} fps"

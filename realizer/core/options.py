@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from numbers import Integral, Real
 from pathlib import Path
@@ -71,7 +71,8 @@ class PlayOptions:
         if self.deformer not in (None, "mpeg4", "au"):
             raise ValueError(f"deformer: wanted mpeg4 or au, got {self.deformer!r}")
         for name, place in (self.scene or {}).items():
-            if len(place) != 3 or not all(isinstance(x, Real) and math.isfinite(x) for x in place):
+            numbers = list(place) if isinstance(place, Iterable) else []
+            if len(numbers) != 3 or not all(isinstance(x, Real) and math.isfinite(x) for x in numbers):
                 raise ValueError(f"scene: wanted x, y, z of {name} in metres, got {place!r}")
 
 

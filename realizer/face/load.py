@@ -138,6 +138,8 @@ def folder_of(name: str | Path, directory: Path | str | None = None) -> Path:
         UnknownFaceError: none of that name. FileNotFoundError: nothing at that path.
         FaceError: a head that cannot be imported.
     """
+    if not isinstance(name, str | Path):
+        raise TypeError(f"face: wanted the name or the path of a face, got {name!r}")
     if is_path(name):
         path = Path(name).resolve()
         if not path.exists():
@@ -211,7 +213,7 @@ def _deformer_override(deformer: str | None) -> str | None:
     chosen = deformer or os.environ.get(DEFORMER) or None
     if chosen not in (None, *DEFORMERS):
         where = "deformer" if deformer else DEFORMER
-        raise FaceError(f"{where}: wanted {' or '.join(DEFORMERS)}, got {chosen!r}")
+        raise UnknownFaceError(f"{where}: wanted {' or '.join(DEFORMERS)}, got {chosen!r}")
     return chosen
 
 

@@ -187,3 +187,10 @@ def test_load_face_hides_teeth_and_tongue_behind_the_lips(face: Face) -> None:
 def test_load_face_has_closed_lips_at_rest(face: Face) -> None:
     gap = face.points["2.2"] - face.points["2.3"]
     assert abs(gap[1]) < 0.0005
+
+
+def test_load_face_refuses_other_types_and_unknown_deformers() -> None:
+    with pytest.raises(TypeError, match="face: wanted the name or the path of a face, got 3"):
+        load_face(3)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="deformer: wanted mpeg4 or au, got 'x'"):
+        load_face(deformer="x")
