@@ -40,7 +40,7 @@ LAYERS = (
     "realizer.offline realizer.explained",
     "realizer.protocol",
     "realizer.server",
-    "realizer.facebuild",
+    "realizer.facebuild realizer.corpus",
     "realizer.batch realizer.client realizer.asgi",
     "realizer.cli",
     "realizer.__main__",

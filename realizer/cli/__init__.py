@@ -16,8 +16,8 @@ from realizer.core.errors import RealizerError, TableError, UnknownNameError
 __all__ = ["main"]
 
 COMMANDS = """
-    align batch check demo doctor emotion enrich explain expressions faces fap outputs plugins realize replay
-    schedule serve timeline track voices
+    align batch check corpus demo doctor emotion enrich explain expressions faces fap outputs plugins realize
+    replay schedule serve timeline track voices
 """
 # Commands that are not in the module of their name.
 MODULES = {"outputs": "doctor", "schedule": "realize", "voices": "doctor"}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +15,8 @@ from realizer.cli import options
 
 if TYPE_CHECKING:
     from realizer.knowledge.word_languages import Words
+    from realizer.tables.knowledge import Knowledge
+    from realizer.tables.templates import Template
 
 
 class MoodWord(click.ParamType):  # type: ignore[type-arg]
@@ -23,10 +25,9 @@ class MoodWord(click.ParamType):  # type: ignore[type-arg]
     name = "mood"
 
     def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Any:
-        from realizer.tables.knowledge import knowledge
-
+        folder = context.params.get("knowledge") if context is not None else None
         try:
-            return knowledge().mood(value)
+            return rules_for(folder)[0].mood(value)
         except KeyError as error:
             self.fail(error.args[0].removeprefix("mood: "), parameter, context)
 
@@ -89,6 +90,25 @@ def warn_unknown_languages(words: Words, languages: Iterable[str], warned: set[s
             )
 
 
+def rules_for(folder: Path | None) -> tuple[Knowledge, Mapping[str, Template] | None]:
+    """Return the rules and templates in a folder of `realizer corpus describe`, or ours and None.
+
+    Raises:
+        click.UsageError: a file that cannot be used.
+    """
+    from realizer.core.errors import TableError
+    from realizer.tables import knowledge, templates
+
+    if folder is None:
+        return knowledge.knowledge(), None
+    with options.reporting(TableError):
+        durations = folder / templates.FILE
+        return (
+            knowledge.read_knowledge(folder / knowledge.FILE),
+            templates.read_templates(durations) if durations.is_file() else None,
+        )
+
+
 @click.command()
 @click.argument("text", metavar="TEXT|FILE|-")
 @role
@@ -96,10 +116,24 @@ def warn_unknown_languages(words: Words, languages: Iterable[str], warned: set[s
 @language
 @words
 @click.option(
+    "--knowledge",
+    metavar="DIR",
+    type=options.FOLDER,
+    is_eager=True,
+    help="Folder with the rules (knowledge.toml) and durations (templates.toml) to use, as written by "
+    "`realizer corpus describe`.",
+)
+@click.option(
     "-o", "--output", metavar="OUT.bml", type=options.OUTPUT, help="File to write.  [default: print it]"
 )
 def enrich(
-    text: str, role: Any, mood: Any, language: str | None, words: Path | None, output: Path | None
+    text: str,
+    role: Any,
+    mood: Any,
+    language: str | None,
+    words: Path | None,
+    knowledge: Path | None,
+    output: Path | None,
 ) -> int:
     """Add facial expressions to a text or a BML document (Wojdel 2005, 6.5).
 
@@ -117,7 +151,8 @@ def enrich(
     source = _read(text)
     lists = words_for(language, words)
     with options.reporting(ValueError):
-        enriched = Enrichment.of(source, Enricher(role, mood, lists), partial(click.echo, err=True))
+        enricher = Enricher(role, mood, lists, *rules_for(knowledge))
+        enriched = Enrichment.of(source, enricher, partial(click.echo, err=True))
     if not options.is_quiet():
         warn_unknown_languages(lists, enriched.languages, set())
     if language is None and words is None and _is_foreign(source, lists.language):

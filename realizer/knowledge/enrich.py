@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from bml_schema import Block, Expression, Speech, Sync, SyncRef
@@ -12,7 +12,7 @@ from bml_schema.behaviours import SpeechText
 from realizer.knowledge.placement_rules import Placement, place_expressions
 from realizer.knowledge.sentences import sentences
 from realizer.knowledge.word_languages import ENGLISH, Words, language_of
-from realizer.tables.knowledge import CompanionRule, Mood, Role, knowledge
+from realizer.tables.knowledge import CompanionRule, Knowledge, Mood, Role, knowledge
 from realizer.tables.templates import PREFIX, Template, apex, templates
 
 MIN_PIECE = 500  # characters; shorter texts are not split
@@ -47,11 +47,15 @@ class Enricher:
         role: whether the character speaks or listens.
         mood: mood of the character; None: average.
         words: emotional words, and the default language.
+        rules: the rules to apply.
+        durations: templates whose usual durations placed expressions have; None: those of the player.
     """
 
     role: Role = "speaker"
     mood: Mood | None = None
     words: Words = ENGLISH
+    rules: Knowledge = field(default_factory=knowledge)
+    durations: Mapping[str, Template] | None = None
 
     def text(self, text: str, block: str = "bml1") -> Block:
         """Return a block that speaks a text with expressions, or shows a listener to it."""
@@ -112,7 +116,7 @@ class Enricher:
 
     def _placements(self, text: str, language: str) -> tuple[Placement, ...]:
         words = self.words.of(language)
-        return place_expressions(sentences(text, language), knowledge(), self.role, self.mood, words)
+        return place_expressions(sentences(text, language), self.rules, self.role, self.mood, words)
 
     def _speech(self, node: Speech, block: Block, names: _IdFactory) -> tuple[Speech, list[Expression]]:
         """Return the speech with marks, and the expressions that begin at them."""
@@ -141,8 +145,9 @@ class Enricher:
         syncs: dict[str, SyncRef] = {"start": start}
         if end is not None:
             syncs["end"] = end
-        elif self.mood is not None:
-            held = _hold_seconds(templates()[name.upper()], self.mood.length)
+        elif self.mood is not None or self.durations is not None:
+            known = {**templates(), **(self.durations or {})}
+            held = _hold_seconds(known[name.upper()], self.mood.length if self.mood else 1.0)
             syncs["relax"] = SyncRef(behaviour=id, sync="attackPeak", offset=round(held, 3))
         return Expression(id=id, name=PREFIX + name, intensity=INTENSITY, because=because, syncs=syncs)
 
@@ -150,7 +155,7 @@ class Enricher:
         self, node: Expression, beside: Sequence[Expression], names: _IdFactory
     ) -> Iterator[Expression]:
         """Yield the accompanying expressions that are missing."""
-        for company in knowledge().companies:
+        for company in self.rules.companies:
             if company.offered or company.of != template_of(node):
                 continue
             if any(template_of(e) == company.other and _refers(e, node.id) for e in beside):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from realizer.outputs import speech_spans
 from realizer.outputs.output import Output
@@ -14,6 +14,17 @@ if TYPE_CHECKING:
     from realizer.realization import Realization
 
 DIGITS = 6  # decimals: microseconds
+
+
+class TextSpan(Protocol):
+    """A text and its seconds."""
+
+    @property
+    def start(self) -> float: ...
+    @property
+    def end(self) -> float: ...
+    @property
+    def text(self) -> str: ...
 
 
 def encode_textgrid(realization: Realization) -> str:
@@ -35,7 +46,19 @@ def encode_textgrid(realization: Realization) -> str:
     ends = [*(span.end for _, tier in spans for span in tier), *(time for time, _ in points)]
     end = max([realization.duration, 1 / realization.fps, *ends])
     tiers = [_intervals(name, end, tier) for name, tier in spans]
-    tiers.append(_points("syncs", end, points))
+    return _file([*tiers, _points("syncs", end, points)], end)
+
+
+def intervals_text(tiers: Mapping[str, Iterable[TextSpan]], end: float) -> str:
+    """Return a TextGrid with tiers of intervals, each in order and without overlaps.
+
+    Args:
+        end: seconds of the whole.
+    """
+    return _file([_intervals(name, end, spans) for name, spans in tiers.items()], end)
+
+
+def _file(tiers: Sequence[Iterable[str]], end: float) -> str:
     lines = [
         'File type = "ooTextFile"', 'Object class = "TextGrid"', "",
         "xmin = 0", f"xmax = {_number(end)}", "tiers? <exists>", f"size = {len(tiers)}", "item []:",
@@ -45,7 +68,7 @@ def encode_textgrid(realization: Realization) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _intervals(name: str, end: float, spans: Iterable[Span]) -> list[str]:
+def _intervals(name: str, end: float, spans: Iterable[TextSpan]) -> list[str]:
     """Return an interval tier, in which silence is an interval without text."""
     rows = [
         (f"xmin = {_number(span.start)}", f"xmax = {_number(span.end)}", f"text = {_quoted(span.text)}")
@@ -54,7 +77,7 @@ def _intervals(name: str, end: float, spans: Iterable[Span]) -> list[str]:
     return _tier("IntervalTier", name, end, "intervals", rows)
 
 
-def _filled(end: float, spans: Iterable[Span]) -> Iterator[Span]:
+def _filled(end: float, spans: Iterable[TextSpan]) -> Iterator[Span]:
     now = 0.0
     for span in spans:
         start, last = round(max(span.start, now), DIGITS), round(span.end, DIGITS)

@@ -7,12 +7,15 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
 from math import inf
+from pathlib import Path
 from typing import Any, Literal
 
 from realizer import tables
+from realizer.core.errors import TableError
 
 Role = Literal["speaker", "listener"]
 By = Literal["before", "after", "around", "with"]
+FILE = "knowledge.toml"
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,14 +113,33 @@ class Knowledge:
 @cache
 def knowledge() -> Knowledge:
     """Return the built-in rules."""
-    table = tables.toml_table("knowledge.toml")
+    return _knowledge(tables.toml_table(FILE))
+
+
+def read_knowledge(path: Path) -> Knowledge:
+    """Return the rules of a user's file.
+
+    Raises:
+        TableError: a file that cannot be read, or rows with other keys.
+    """
+    try:
+        return _knowledge(tables.read_toml(path.read_text("utf-8"), str(path)))
+    except (OSError, UnicodeError) as error:
+        raise TableError(f"{path}: wanted rules, got: {error}") from None
+    except (TypeError, ValueError, KeyError, AttributeError) as error:
+        raise TableError(
+            f"{path}: wanted rules in the form of realizer/tables/{FILE}, got: {error}"
+        ) from None
+
+
+def _knowledge(table: Mapping[str, Any]) -> Knowledge:
     return Knowledge(
         {
-            "speaker": tuple(_placing(row) for row in table["speaker"]),
-            "listener": tuple(_placing(row) for row in table["listener"]),
+            "speaker": tuple(_placing(row) for row in table.get("speaker", ())),
+            "listener": tuple(_placing(row) for row in table.get("listener", ())),
         },
-        tuple(_company(row) for row in table["company"]),
-        table["apart"],
+        tuple(_company(row) for row in table.get("company", ())),
+        table.get("apart", {}),
         float(table["pace"]["speaker"]),
         float(table["pace"]["listener"]),
         _moods(table["mood"]),

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 from realizer import tables
+from realizer.core.errors import TableError
 from realizer.tables.lexemes import read_aus
 from realizer.tables.timing import gaps
 
@@ -49,7 +51,27 @@ def apex(visible: float) -> float:
 @cache
 def templates() -> Mapping[str, Template]:
     """Return upper-case name -> template."""
-    return {name: _template(name, row) for name, row in tables.toml_table(FILE).items()}
+    return _templates(tables.toml_table(FILE))
+
+
+def read_templates(path: Path) -> Mapping[str, Template]:
+    """Return the templates of a user's file.
+
+    Raises:
+        TableError: a file that cannot be read, or a template without a key.
+    """
+    try:
+        return _templates(tables.read_toml(path.read_text("utf-8"), str(path)))
+    except (OSError, UnicodeError) as error:
+        raise TableError(f"{path}: wanted templates, got: {error}") from None
+    except (TypeError, ValueError, KeyError, AttributeError) as error:
+        raise TableError(
+            f"{path}: wanted templates in the form of realizer/tables/{FILE}, got: {error}"
+        ) from None
+
+
+def _templates(table: Mapping[str, Any]) -> dict[str, Template]:
+    return {name: _template(name, row) for name, row in table.items()}
 
 
 def _template(name: str, row: Mapping[str, Any]) -> Template:

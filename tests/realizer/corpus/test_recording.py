@@ -1,0 +1,110 @@
+"""Tests of `realizer.corpus.recording`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from realizer.corpus.recording import (
+    Annotation,
+    CorpusError,
+    Recording,
+    Segment,
+    read_annotations,
+    read_corpus,
+    read_faps,
+    read_recording,
+    write_recording,
+)
+
+FAPS = np.round(np.random.default_rng(0).normal(0, 100, (10, 68)), 2)
+POINTS = np.random.default_rng(1).normal(0, 1, (10, 2, 3)).astype(np.float32).astype(float)
+
+
+def full() -> Recording:
+    return Recording(
+        "anna",
+        {"person": "anna", "mood": 'so "so"', "fps": 25.0, "frames": 12},
+        (Annotation(0.04, 0.2, "anger", "eva"), Annotation(0.2, 0.4, "grief", "otto")),
+        (Annotation(0.0, 0.16, "hm", "anna"), Annotation(0.2, 0.28, "ja", "bob")),
+        FAPS,
+        (("4.1", "4.2"), POINTS),
+    )
+
+
+def test_write_recording_is_read_back(tmp_path: Path) -> None:
+    write_recording(tmp_path / "anna", full())
+    back = read_recording(tmp_path / "anna")
+    assert (back.meta, back.labels, back.words) == (full().meta, full().labels, full().words)
+    assert np.allclose(back.faps, FAPS)
+    assert back.points is not None
+    assert np.allclose(back.points[1], POINTS)
+    assert back.frames == 12
+
+
+def test_segments_are_frames_of_one_annotator() -> None:
+    assert full().segments() == [Segment(1, 4, "anger", "eva")]
+    assert full().segments("otto") == [Segment(5, 9, "grief", "otto")]
+    assert len(full().segments()[0]) == 4
+    assert full().segments()[0].annotation(25.0) == full().labels[0]
+    assert [word.by for word in full().spoken] == ["subject", "other"]
+
+
+def test_read_corpus_returns_recordings_by_name(tmp_path: Path) -> None:
+    (tmp_path / "corpus.toml").write_text("version = 1\n")
+    for name in ("b", "a"):
+        write_recording(tmp_path / name, full())
+    assert [one.name for one in read_corpus(tmp_path)] == ["a", "b"]
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("meta.toml", None, r"anna: wanted meta\.toml, got none; it is half written, add it again"),
+        ("meta.toml", "fps = ", r"meta\.toml: wanted TOML with numbers fps and frames"),
+        ("meta.toml", "fps = 0", r"meta\.toml: wanted fps up to 1000"),
+        ("meta.toml", "mod = 'sad'", r"meta\.toml: wanted person, mood.*; got mod"),
+        ("labels.csv", "a,b\n", r"labels\.csv: wanted the columns start,end,expression,annotator"),
+        (
+            "labels.csv",
+            "start,end,expression,annotator\n2,1,x,y\n",
+            r"labels\.csv, line 2: wanted .* in order",
+        ),
+        ("words.csv", "start,end,word,speaker\n1,nan,x,y\n", r"words\.csv, line 2"),
+        ("faps.csv", "time\n1\n", r"faps\.csv: wanted a column time, columns named as FAPs"),
+        ("faps.csv", "time,open_jaw\n0,nan\n", r"faps\.csv: wanted finite values"),
+        ("faps.csv", "time,open_jaw\n0\n", r"faps\.csv: wanted numbers, as many in each row"),
+        ("points.npz", "no archive", r"points\.npz: wanted arrays names and points.*add it again"),
+    ],
+)
+def test_read_recording_names_a_damaged_file(
+    tmp_path: Path, name: str, content: str | None, said: str
+) -> None:
+    write_recording(tmp_path / "anna", full())
+    path = tmp_path / "anna" / name
+    if content is None:
+        path.unlink()
+    else:
+        path.write_text(content)
+    with pytest.raises(CorpusError, match=said):
+        read_recording(tmp_path / "anna")
+
+
+def test_read_corpus_refuses_other_folders(tmp_path: Path) -> None:
+    with pytest.raises(CorpusError, match=r"wanted a corpus, got no corpus\.toml"):
+        read_corpus(tmp_path)
+    (tmp_path / "corpus.toml").write_text("")
+    with pytest.raises(CorpusError, match="wanted a recording or more, got none"):
+        read_corpus(tmp_path)
+
+
+def test_read_faps_measures_the_rate() -> None:
+    values, fps = read_faps("time,open_jaw\n0,5\n0.02,6\n0.04,7\n", Path("x.csv"))
+    assert (fps, values[:, 2].tolist()) == (50.0, [5, 6, 7])
+
+
+def test_read_annotations_keeps_quoted_text() -> None:
+    text = 'start,end,word,speaker\n0,1,"so, so",bob\n'
+    assert read_annotations(text, Path("x")) == (Annotation(0.0, 1.0, "so, so", "bob"),)
