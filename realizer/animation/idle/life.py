@@ -152,17 +152,16 @@ def _breathing(seed: int, times: Float64) -> tuple[Float64, Float64]:
     facts = idle_facts()["breathing"]
     least, most = facts["period"]
     period = least + (most - least) * float(uniform(seed, BREATH, np.zeros(1, np.int64))[0])
-    passed = (
-        times / period + facts["uneven"] * _noise(seed, range(RHYTHM, RHYTHM + 1), times, facts["over"])[0]
-    )
+    (rhythm,) = _noise(seed, range(RHYTHM, RHYTHM + 1), times, facts["over"])
+    passed = times / period + facts["uneven"] * rhythm
     numbers = np.floor(passed).astype(np.int64)
     depth = 1.0 - facts["vary"] + 2.0 * facts["vary"] * uniform(seed, BREATH + 1, numbers)
     part = passed - numbers
     inhaled = np.clip(part / facts["inhale"], 0.0, 1.0)
     exhaled = np.clip((part - facts["inhale"]) / facts["exhale"], 0.0, 1.0)
-    return depth * (smooth(inhaled) - smooth(exhaled)), depth * facts["nostrils"] * 4.0 * inhaled * (
-        1.0 - inhaled
-    )
+    # Nostrils are widest in the middle of breathing in.
+    nostrils = depth * facts["nostrils"] * 4.0 * inhaled * (1.0 - inhaled)
+    return depth * (smooth(inhaled) - smooth(exhaled)), nostrils
 
 
 def _events(

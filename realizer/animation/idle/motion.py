@@ -70,11 +70,11 @@ class Motion:
         """Return the motion with other points of fixation.
 
         Args:
-            patterns: "listening" or "thinking" -> (j,) whether it holds at each saccade.
+            patterns: "listening" or "thinking" -> (j,) whether the face does so at each saccade.
         """
         aims = self.aims
-        for name, held in patterns.items():
-            aims = np.where(held, _pattern(self.seed, name, self.number, len(held)), aims)
+        for name, active in patterns.items():
+            aims = np.where(active, _pattern(self.seed, name, self.number, len(active)), aims)
         durations, points, leaps = _looks(aims)
         return replace(self, durations=durations, points=points, leaps=leaps, aims=aims)
 

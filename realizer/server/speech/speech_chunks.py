@@ -10,7 +10,7 @@ from xml.sax.saxutils import escape, quoteattr, unescape
 
 from bml_schema import Block, read
 from bml_schema.escape import sanitized
-from bml_schema.nodes import BMLA, BMLT, CORE, OWN
+from bml_schema.nodes import BMLA, BMLT, CORE, OWN, SSML
 from realizer.behaviours.registry import VOCABULARY
 from realizer.server.speech.sentence_splitter import TAG
 from realizer.speech.ssml import EMPTY, SPOKEN
@@ -88,6 +88,8 @@ def clip_block(clip: str, chunk: Chunk) -> Block:
 
 
 class _Text:
+    """The parts of a block that speaks a text: its words with syncs, the same as SSML, and behaviours."""
+
     def __init__(self, chunk: Chunk) -> None:
         self.chunk = chunk
         self.core: list[str] = []  # <text>
@@ -138,7 +140,7 @@ class _Text:
         ssml = "".join(self.ssml)
         if re.search(r"<(?!mark\b)", ssml):
             speak = f'<speak xmlns=""{lang}>{ssml}</speak>'
-            speech += f'<description priority="1" type="application/ssml+xml">{speak}</description>'
+            speech += f'<description priority="1" type="{SSML}">{speak}</description>'
         return f'<speech id="{self.chunk.speech}">{speech}</speech>' + "".join(self.behaviours)
 
     def _mark(self, name: str, attributes: str = "") -> None:

@@ -22,11 +22,11 @@ from realizer.speech.utterance import Recording, SpeechRequest, Utterance, Voice
 
 Aligner = Literal["pocketsphinx", "espeak"]
 
-DOUBT = 0.5
+DOUBT = 0.5  # a smaller confidence is a warning
 OTHER = "+f3"  # a female voice of espeak-ng, in addition to the default, which is male
 FASTEST = 4.0  # times the rate of a voice; nobody speaks faster
 
-HOP = 160  # samples
+HOP = 160  # samples between the frames in which sound is audible or not
 INSTALL = "no aligner, words are spread evenly: pip install 'bml-realizer[speech,align]'"
 CACHED = 8  # recordings; a document is planned more than once before it plays
 
