@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import secrets
+import time
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from typing import Any, Self
 
@@ -16,8 +17,9 @@ from realizer.client.speech import SpeechProgress
 from realizer.core.array_types import Float32, Float64, Int16
 from realizer.protocol.wire import ClipPiece, pack_clip
 
-# Sound without words is sent in pieces of this length; the first one starts the speech.
-PIECE = 0.2  # s
+# Sound without words is sent in pieces of this length; the first one starts the speech. They get longer if much
+# was sent ahead, which costs the service less.
+PIECE, LONGEST_PIECE = 0.2, 2.0  # s
 LONGEST = 1 << 20  # bytes of one message
 # The sound of a last word, whose end is not known, waits at most so long for the next word.
 HOLD = 1.0  # s
@@ -59,6 +61,7 @@ class Voice:
         self._sent = 0  # samples
         self._words: list[dict[str, Any]] = []  # those that are not sent; times from the start of the speech
         self._clips = 0
+        self._began = 0.0  # when the first clip was sent, on a clock that never jumps
         self._closed = False
         self._sending = asyncio.Lock()
 
@@ -76,7 +79,9 @@ class Voice:
         async with self._sending:
             self._sound = np.concatenate((self._sound, samples))
             ready = self._ready()
-            if ready >= PIECE * self._rate:
+            ahead = self._sent / self._rate - (time.monotonic() - self._began)
+            piece = min(max(PIECE, ahead / 2), LONGEST_PIECE) if self._clips else PIECE
+            if ready >= piece * self._rate:
                 await self._flush(ready)
 
     async def words(self, words: Iterable[Timed]) -> None:
@@ -141,6 +146,8 @@ class Voice:
             rate: of PCM; 0 for a sound file.
             description: fields of the message `speech` that describe it.
         """
+        if not self._clips:
+            self._began = time.monotonic()
         id = f"{self.id}-{self._clips}"
         self._clips += 1
         for number, at in enumerate(range(0, max(1, len(sound)), LONGEST)):
