@@ -10,6 +10,7 @@ from typing import Any
 from lxml import etree
 
 from bml_schema.canonical import MAX_ATTRIBUTES
+from bml_schema.dialects.greta_references import translate_reference
 from bml_schema.dialects.report import Report
 from bml_schema.dialects.speech_text import translate_speech
 from bml_schema.dialects.sync_points import POINTS, SyncPoints
@@ -103,6 +104,7 @@ class _Translation:
                 key = name = "sbm:joint"
             if name == "speech":
                 translate_speech(element, self._apply, words=self.in_dialect)
+            translate_reference(element, name, self._apply)
             own = self.table.elements.get(key) or self.table.elements.get(name)
             if not self._attributes(element, name, key):
                 continue

@@ -264,7 +264,9 @@ class BlockManager:
         announced = self._announced.get(id)
         if announced is None or announced.is_revoked:
             return False
-        self._end(self._blocks_to_end(announced), announced, now)
+        followers = block_links.followers(announced.block)
+        if all(name in announced.unstarted for name, _ in followers):  # or it would have been refused
+            self._end(self._blocks_to_end(announced), announced, now)
         self._revoke(announced, now)
         return True
 

@@ -40,6 +40,11 @@ BODIES = (
     '<bmla:interrupt id="i" target="{earlier}"/><speech id="s" start="i:end"><text>Yes</text></speech>',
     '<bmla:activate id="i" target="{earlier}" start="0.4"/>',
     '<speech id="s"><text>Four</text></speech><speech id="t" start="0.35"><text>Five six</text></speech>',
+    '<required><head id="n" lexeme="NOD" start="{other}:s:end"/></required>',
+    '<required><speech id="s"><text>Must be said</text></speech></required>',
+    '<gazeShift id="h" target="RIGHT" start="{other}:bml:end"/>',
+    '<bmla:parametervaluechange id="p" target="{earlier}:s" paramId="volume" start="0.1">'
+    '<bmla:trajectory type="instant" targetValue="20"/></bmla:parametervaluechange>',
 )
 VISIBLE = (
     *BODIES,
@@ -55,6 +60,8 @@ HEADS = (
         'composition="APPEND"',
         'composition="REPLACE"',
         'characterId="Ann"',
+        'characterId="Ann" composition="REPLACE"',
+        'characterId="Bob" composition="APPEND"',
     ),
     *(f'bmla:{name}="{{other}}"' for name in ("appendAfter", "chunkAfter", "interrupt")),
     'bmla:onStart="{earlier}"',
@@ -64,7 +71,7 @@ HEADS = (
 
 # The second speech has begun to move the lips when an interrupt cancels it.
 CUT_BEFORE_SECOND_SPEECH = [
-    f'<bml id="a">{BODIES[-1]}</bml>',
+    f'<bml id="a">{BODIES[9]}</bml>',
     '<bml xmlns:bmla="http://www.asap-project.org/bmla" id="b">'
     '<bmla:interrupt id="i" target="a" start="0.3"/></bml>',
 ]
