@@ -29,11 +29,15 @@ def block(id: str, said: str = "", inside: str = '<gaze id="g" target="x"/>') ->
 
 
 def alive(
-    id: str, character: int = 0, start: float = 0.0, waits: list[Dependency] | None = None
+    id: str,
+    character: int = 0,
+    start: float = 0.0,
+    waits: list[Dependency] | None = None,
+    number: int = 1,
 ) -> ActiveBlock:
-    made = ActiveBlock(
-        plan(block(id), KINDS, PlanningContext()), KINDS, PlanningContext(), character, 1, start, waits or []
-    )
+    context = PlanningContext()
+    planned = plan(block(id), KINDS, context)
+    made = ActiveBlock(planned, KINDS, context, character, number, start, waits or [])
     made.apply_plan(made.plan, start, start)
     return made
 
@@ -44,14 +48,24 @@ def ids(waits: list[Dependency]) -> list[tuple[str, bool]]:
 
 def test_dependencies_of_append_are_only_the_last_of_a_chain() -> None:
     first = alive("a")
-    second = alive("b", waits=[Dependency(first)])
-    apart = alive("c")
-    other = alive("d", character=1)
-    never = alive("e", start=float("inf"))
-    everyone = [first, second, apart, other, never]
-    assert ids(dependencies(block("x", 'composition="APPEND"'), 0, 2, everyone)) == [
+    second = alive("b", waits=[Dependency(first)], number=2)
+    apart = alive("c", number=3)
+    other = alive("d", character=1, number=4)
+    never = alive("e", start=float("inf"), number=5)
+    later = alive("f", number=7)
+    everyone = [first, second, apart, other, never, later]
+    assert ids(dependencies(block("x", 'composition="APPEND"'), 0, 6, everyone)) == [
         ("b", False),
         ("c", False),
+    ]
+
+
+def test_dependencies_of_append_name_what_was_put_before_an_earlier_block() -> None:
+    second = alive("b", number=2)
+    first = alive("a", waits=[Dependency(second)])
+    assert ids(dependencies(block("x", 'composition="APPEND"'), 0, 3, [first, second])) == [
+        ("a", False),
+        ("b", False),
     ]
 
 
