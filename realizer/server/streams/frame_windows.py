@@ -253,12 +253,12 @@ class FrameTimeline:
             self._seconds, self.latest_window = seconds, None
 
     def window(self, first: int, last: int) -> FrameWindow:
-        """Return a window that contains the frames first .. last."""
+        """Return a window that contains the frames first .. last, and its whole length after them."""
         window = self.latest_window
         if window is None or not self.is_current or first < window.first or last >= window.end:
             if self._mapping is None:
                 self._mapping = self._find_mapping()
-            count = max(math.ceil(self._seconds * self.fps), last - first + 1)
+            count = math.ceil(self._seconds * self.fps) + last - first
             window = self.latest_window = FrameWindow(self, self._mapping, first, count)
             self._version = self.version
         return window
