@@ -35,8 +35,9 @@ POINTS = (".csv", ".txt", "")  # suffixes of tables of points; the last is of st
 )
 @click.option(
     "--profiles",
-    type=click.Choice(["own", "published", "raw"]),
-    help="Also print which emotions are recognised, by these profiles, and when.",
+    type=options.ProfileSet(),
+    help="Also print which emotions are recognised, by these profiles (own, published, raw, or a file), when, "
+    "and how certainly.",
 )
 @click.option(
     "--face", metavar="NAME", help="Make the FAPs from the action units, by the mapping of this face."

@@ -56,6 +56,15 @@ def test_track_writes_a_fap_file_and_names_the_emotion(tmp_path: Path) -> None:
     assert done.stdout.splitlines()[-1].split()[2] == "sadness"
 
 
+def test_track_names_emotions_by_a_profile_file(tmp_path: Path) -> None:
+    acted(tmp_path / "actor.csv")
+    profile = archetypes("published")["sadness"][0]
+    (tmp_path / "mine.txt").write_text(f"Gloom 0\n{profile}\n")
+    options = ["--fps", "5", "-o", str(tmp_path / "a.fap"), "--profiles", str(tmp_path / "mine.txt")]
+    done = run(str(tmp_path / "actor.csv"), *options)
+    assert done.stdout.splitlines()[-1].split()[2] == "gloom", done.output
+
+
 @pytest.mark.parametrize(
     ("leave_out", "output", "said"),
     [
