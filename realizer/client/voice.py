@@ -13,8 +13,8 @@ from realizer.client.speech import OpenSpeech
 from realizer.core.array_types import Float32, Float64, Int16
 from realizer.protocol.wire import ClipPiece, pack_clip
 
-# Sound without words is sent in pieces of this length, the first of which starts the speech. They get longer,
-# which costs the service less, if much was sent ahead.
+# Sound without words is sent in pieces of this length; the first one starts the speech. They get longer if
+# much was sent ahead, which costs the service less.
 PIECE, LONGEST_PIECE = 0.2, 2.0  # s
 LONGEST = 1 << 20  # bytes of one message
 # The sound of a last word, whose end is not known, waits at most so long for the next word.
