@@ -41,14 +41,14 @@ def cli(context: click.Context, verbose: bool, quiet: bool) -> None:
 
     \b
     `realizer COMMAND --help` explains a command with examples. DOC is a file, or - for
-    standard input. Options can also be set by variables: REALIZER_FPS=30 means --fps 30.
+    standard input; a TEXT is spoken. Options can also be set by variables: REALIZER_FPS=30 means --fps 30.
     `realizer doctor` checks the installation.
 
     \b
     Exit status:
       0  success; warnings are on standard error
       1  a document was refused, or `check` found a fault
-      2  wrong usage
+      2  wrong usage, such as an unknown option, face or voice
       3  something is missing on this machine; the message says what
     """
     options.configure_logging(context, quiet=quiet, verbose=verbose)
@@ -74,7 +74,10 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     except click.Abort:
         sys.exit(130)
     except click.ClickException as error:
-        error.show()
+        if isinstance(error, click.exceptions.NoArgsIsHelpError):
+            error.show()
+        else:
+            click.echo(f"realizer: {error.format_message()}{_help_of(error)}", err=True)
         sys.exit(error.exit_code)
     except RealizerError as error:
         click.echo(f"realizer: {error}", err=True)
@@ -85,3 +88,9 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
             f"realizer: {error.filename or ''}: {error.strerror or error}".replace(" : ", " "), err=True
         )
         sys.exit(3)
+
+
+def _help_of(error: click.ClickException) -> str:
+    """Return where wrong usage is explained, or ""."""
+    context = getattr(error, "ctx", None)
+    return "" if context is None else f"\nrealizer: see {context.command_path} --help"

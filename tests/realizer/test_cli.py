@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from realizer.speech.espeak.voice import EspeakVoice
 from tests.commands import run
 
 GOOD = '<bml id="b"><head id="n" lexeme="NOD" start="1"/></bml>'
@@ -69,7 +70,7 @@ def test_process_of_serve_says_that_a_port_is_in_use() -> None:
 
 def test_serve_refuses_an_unknown_face() -> None:
     done = run("serve", "--port", "0", "--face", "nobody")
-    assert done.returncode == 3
+    assert done.returncode == 2
     assert "nobody" in done.stderr
 
 
@@ -134,16 +135,39 @@ def test_check_of_a_missing_file_is_wrong_usage() -> None:
     assert "nowhere.bml" in done.stderr
 
 
-def test_realize_with_a_missing_voice_exits_with_3_and_says_what_to_do() -> None:
-    done = run("realize", "-", "--voice", "no-such-voice", stdin=GOOD)
-    assert done.returncode == 3
-    assert "realizer voices" in done.stderr
+def test_realize_with_a_missing_voice_exits_with_3_and_says_what_to_do(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(EspeakVoice, "missing", classmethod(lambda cls, voice=None: "install espeak-ng"))
+    done = run("realize", "-", "--voice", "espeak", stdin=GOOD)
+    assert (done.returncode, done.stderr) == (3, "realizer: install espeak-ng\n")
 
 
-def test_realize_with_an_unknown_face_exits_with_3() -> None:
-    done = run("realize", "-", "--face", "nobody", "-o", "x.png", stdin=GOOD)
-    assert done.returncode == 3
+@pytest.mark.parametrize("flags", [("--voice", "nobody"), ("--face", "nobody"), ("--light", "nobody")])
+def test_realize_with_an_unknown_name_exits_with_2(flags: tuple[str, str]) -> None:
+    done = run("realize", "-", *flags, "-o", "x.png", stdin=GOOD)
+    assert done.returncode == 2
+    assert "wanted one of" in done.stderr
     assert "nobody" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "realize",
+        "realize no.bml",
+        "fap info no.fap",
+        "nope",
+        "replay no",
+        "realize - --fps x",
+        "faces sheet no",
+    ],
+)
+def test_errors_have_one_prefix(words: str) -> None:
+    done = run(*words.split(), stdin=GOOD)
+    assert done.returncode == 2
+    assert done.stderr
+    assert all(line.startswith("realizer: ") for line in done.stderr.splitlines())
 
 
 def test_lists_of_voices_outputs_and_faces_are_printed() -> None:
