@@ -1,4 +1,4 @@
-"""Options of the streams and speeches of a client; the service chooses what is left out."""
+"""The options of the streams of a client, as keyword arguments."""
 
 from __future__ import annotations
 
@@ -6,14 +6,26 @@ from typing import Literal, TypedDict
 
 
 class FrameOptions(TypedDict, total=False):
-    """Frames a second, and the id of a character."""
+    """Options of streams of frames.
+
+    Attributes:
+        fps: frames a second; default: the service's rate.
+        character: id of a character; default: the first.
+    """
 
     fps: float
     character: str
 
 
 class PictureOptions(FrameOptions, total=False):
-    """How pictures are drawn and encoded: width and height, names of camera, light and background."""
+    """Options of pictures.
+
+    Attributes:
+        size: width and height.
+        camera, light, background: names; default: the service's.
+        format: of the pictures; jpeg, if there is none.
+        quality: 1..100, of JPEG and WebP.
+    """
 
     size: tuple[int, int]
     camera: str
@@ -24,14 +36,24 @@ class PictureOptions(FrameOptions, total=False):
 
 
 class SoundOptions(TypedDict, total=False):
-    """Samples a second, and the id of a character."""
+    """Options of sound.
+
+    Attributes:
+        rate: samples a second.
+        character: id of a character; default: the first.
+    """
 
     rate: int
     character: str
 
 
 class SpeechOptions(TypedDict, total=False):
-    """The id of a character, and the composition of the block; APPEND by default."""
+    """Options of a speech.
+
+    Attributes:
+        character: id of a character; default: the first.
+        composition: of its block; APPEND, if there is none.
+    """
 
     character: str
     composition: Literal["MERGE", "APPEND", "REPLACE"]

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import secrets
 import time
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
-from realizer.client.speech import OpenSpeech
+from bml_schema.feedback import BlockProgress
+from realizer.client.message_router import ClientError
+from realizer.client.speech import SpeechProgress
 from realizer.core.array_types import Float32, Float64, Int16
 from realizer.protocol.wire import ClipPiece, pack_clip
 
-# Sound without words is sent in pieces of this length; the first one starts the speech. They get longer if
-# much was sent ahead, which costs the service less.
+# Sound without words is sent in pieces of this length; the first one starts the speech. They get longer if much
+# was sent ahead, which costs the service less.
 PIECE, LONGEST_PIECE = 0.2, 2.0  # s
 LONGEST = 1 << 20  # bytes of one message
 # The sound of a last word, whose end is not known, waits at most so long for the next word.
@@ -24,12 +28,20 @@ Pcm = bytes | bytearray | memoryview | Int16 | Float32 | Float64
 Timed = tuple[float, str] | tuple[float, float, str]
 
 
-class Voice(OpenSpeech):
+class Voice:
     """A speech whose sound is sent as it comes, which `Client.voice` returns.
+
+    `async with` closes it at its end, and stops it after an exception.
 
     Args:
         rate: samples a second.
+        opening: composition, character and language, as in the message `speech`.
         send: sends bytes.
+        control: sends a control message.
+        wait: waits until a condition holds.
+
+    Attributes:
+        id: of the speech, and of its block.
     """
 
     def __init__(
@@ -40,14 +52,18 @@ class Voice(OpenSpeech):
         control: Callable[..., Awaitable[None]],
         wait: Callable[[Callable[[], bool]], Awaitable[None]],
     ) -> None:
-        super().__init__(f"say-{secrets.token_hex(4)}", opening, control, wait)
+        self.id = f"say-{secrets.token_hex(4)}"
+        self.progress = SpeechProgress(self.id)
         self._rate = checked_rate(rate)
-        self._send = send
+        self._opening = dict(opening)
+        self._send, self._control, self._wait = send, control, wait
         self._sound = np.zeros(0, np.int16)  # that is not sent
         self._sent = 0  # samples
         self._words: list[dict[str, Any]] = []  # those that are not sent; times from the start of the speech
         self._clips = 0
         self._began = 0.0  # when the first clip was sent, on a clock that never jumps
+        self._closed = False
+        self._sending = asyncio.Lock()
 
     async def write(self, pcm: Pcm) -> None:
         """Add mono sound, which is spoken at once: int16, or floats from -1 to 1.
@@ -85,6 +101,11 @@ class Voice(OpenSpeech):
         self._words += added
 
     async def close(self) -> None:
+        """End the speech: what was written is spoken. Closing again does nothing.
+
+        Raises:
+            ClientError: the connection has ended.
+        """
         if self._closed:
             return
         self._closed = True
@@ -94,8 +115,29 @@ class Voice(OpenSpeech):
             await self._speech(close=True)
 
     async def stop(self) -> None:
+        """Stop speaking at once."""
         self._sound = self._sound[:0]
-        await super().stop()
+        await self._control("stop", blocks=[self.id])
+
+    async def ended(self) -> BlockProgress:
+        """Wait for the end; if the speech was cut off, `said` are the words that were heard.
+
+        Raises:
+            ClientError: the speech was refused, or the connection has ended.
+        """
+        await self._wait(lambda: self.progress.is_finished)
+        return self.progress.result()
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None:
+            await self.close()
+            return
+        with contextlib.suppress(Exception):  # keep the first exception
+            await self.stop()
+            await self.close()
 
     async def clip(self, sound: bytes, rate: int, **description: Any) -> None:
         """Send a clip and append it to the speech.
@@ -136,6 +178,15 @@ class Voice(OpenSpeech):
             for word in inside
         ]
         await self.clip(sound.astype("<i2").tobytes(), self._rate, **({"words": words} if words else {}))
+
+    async def _speech(self, **fields: Any) -> None:
+        opening, self._opening = self._opening, {}
+        await self._control("speech", id=self.id, **opening, **fields)
+
+    def _check_open(self) -> None:
+        self.progress.check()
+        if self._closed:
+            raise ClientError(f"the speech {self.id} was closed: nothing can follow", "refused")
 
 
 def timed(name: str, items: Iterable[Timed]) -> list[dict[str, Any]]:

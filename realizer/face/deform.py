@@ -9,6 +9,7 @@ from realizer.core.units import ANGLE_UNIT
 from realizer.face.au.deformer import moves_of
 from realizer.face.basis import FAPS, JAW_COS, JAW_DROP, JAW_SIN, ROWS, TONGUE_COS, TONGUE_SIN, bulge_at
 from realizer.face.contours import couple_lips
+from realizer.face.lip_room import lip_room
 from realizer.face.model import Face
 from realizer.face.tongue import tongue_room
 
@@ -41,7 +42,8 @@ def deform(face: Face, poses: Any) -> Float32:
     rows = complete_poses(poses, face.inputs)
     if not np.isfinite(rows).all():
         raise ValueError("poses: wanted finite values, got NaN or infinity")
-    basis, units, room = face.basis, moves_of(face), tongue_room(face)
+    basis, units = face.basis, moves_of(face)
+    rooms = [room for room in (lip_room(face), tongue_room(face)) if room is not None]
     rows, unit_values = rows[:, :FAPS], rows[:, FAPS:]
     moved: Bool = np.asarray(rows[:, LIDS.start : THRUST.stop].any(axis=1))
     if units is not None:
@@ -65,7 +67,7 @@ def deform(face: Face, poses: Any) -> Float32:
         here.reshape(len(here), -1)[:, 3 * first : 3 * last] += moves.T
         if units is not None:
             units(shown[part], lips[part], mixing[part], here)
-        if room is not None:
+        for room in rooms:
             room(here)
         _turn_eyes(basis, rows[part], here)
         _keep_lids_over_balls(basis, rows[part], moved[part], here)

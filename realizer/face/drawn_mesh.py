@@ -18,7 +18,7 @@ from realizer.face.subdivision import subdivided
 SKIN, EYE, HAIR, WET, CLOTH = range(5)
 KINDS: Mapping[str, int] = {
     "left_eye": EYE, "right_eye": EYE, "hair": HAIR, "brows": HAIR, "lashes": HAIR,
-    "upper_teeth": WET, "lower_teeth": WET, "tongue": WET, "shirt": CLOTH,
+    "upper_teeth": WET, "lower_teeth": WET, "tongue": WET, "tears": WET, "shirt": CLOTH,
 }  # fmt: skip
 # Parts with an inside that is never seen; all others (hair, clothes, lashes) may be sheets.
 SOLID = ("skin", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue")

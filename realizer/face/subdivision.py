@@ -15,7 +15,7 @@ from realizer.core.array_types import Bool, Float32, Float64, Int32
 from realizer.face.mesh_geometry import edges_of, half_edges, part_triangles
 from realizer.face.model import Face
 
-PARTS = ("skin", "tongue", "hair", "shirt")
+PARTS = ("skin", "tongue", "tears", "hair", "shirt")
 MOST = 20_000  # triangles of a part that is coarse enough to be seen as such
 
 

@@ -27,8 +27,8 @@ from realizer.tables.mappings import own_file, read_mapping
 FARTHEST = 20  # FAPU a FAP unit; no skin goes further than its feature point by that much
 OFF = 0.004  # m; a feature point further than this from its vertex is off the mesh
 PARTS = (
-    *NEEDED, "upper_teeth", "lower_teeth", "tongue", "brows", "lashes", "hair", "beard", "shirt", "glasses",
-    "other",
+    *NEEDED, "upper_teeth", "lower_teeth", "tongue", "tears", "brows", "lashes", "hair", "beard", "shirt",
+    "glasses", "other",
 )  # fmt: skip
 KEYS = ("name", "source", "licence", "says", "parts", "cameras", "deformer", "maps", "cards")
 TONGUE = range(43, 48)  # FAPs that may move nothing if there is no tongue

@@ -40,7 +40,7 @@ ROOF = 0.0010  # m from the crowns up to the edge of the palate
 VAULT, RISE = 0.0152, 4.0  # m, height of the palate over the bite, and its slope beside the teeth
 WITHIN = 0.0030  # m, thickness of a tooth
 IN_LIP = 0.62  # the share of the light that reaches the lower teeth past the upper ones and the lips
-LIT = 0.26, 0.72  # light at the back of the mouth, and what is added to it at the front
+LIT = 0.50, 0.48  # light at the back of the mouth, and what is added to it at the front
 WARM = np.array([1.0, 0.78, 0.64])  # the light behind the teeth comes from tongue and cheeks
 
 

@@ -9,7 +9,7 @@ from realizer.face.mesh_geometry import edge_graph, half_edges, part_triangles
 from realizer.face.model import Face
 
 # All other parts of a face move with the head alone, or grow on the skin.
-MOVED, GROWN = ("skin", "hair"), ("brows", "lashes")
+MOVED, GROWN = ("skin", "hair"), ("brows", "lashes", "tears")
 NEAR = 0.0015  # m; closer parts grow on the skin
 AROUND = 16  # number of nearest triangles to look at
 

@@ -20,6 +20,7 @@ SHORT = 0.006  # m, of the shortest beard
 SEGMENTS = 2
 LEAN = 0.45, 0.22  # how far hairs stand off the skin at the root and at the tip
 ROOT = 0.0002  # m that a root lies above the skin
+DEEPEST = 0.004  # m that a piece of a hair is lifted
 
 
 def beard(
@@ -68,6 +69,10 @@ def beard(
     lean = np.interp(s, (0, 1), LEAN)[:, None, None]
     steps = unit(way + lean * ups) * (long / SEGMENTS)[:, None]
     places = root + np.concatenate([np.zeros((1, COUNT, 3)), np.cumsum(steps[1:], axis=0)])
+    # They lie on the skin where it turns away, under the chin above all.
+    for k in range(1, SEGMENTS + 1):
+        lift, ups_there = scalp.lift(places[k])
+        places[k:] += ups_there * (ROOT - lift).clip(0, DEEPEST)[:, None]
     places = places.transpose(1, 0, 2)
     thin = (where[corners] * shares).sum(axis=1) < rng.uniform(0.4, 1.0, COUNT)
     width = WIDE * rng.uniform(0.7, 1.2, (COUNT, 1)) * np.array([0.8, 1.0, 0.7]) * min(1, 0.5 + amount)

@@ -10,7 +10,7 @@ import numpy as np
 from realizer.core.array_types import Float64, Int32
 from realizer.facebuild.hair.bun import bun
 from realizer.facebuild.hair.cards import Patch, joined, ribbons
-from realizer.facebuild.hair.strands import LEAST, Strands, edge, grow, roots, unit
+from realizer.facebuild.hair.strands import Strands, edge, grow, roots, unit
 from realizer.facebuild.hair.style import GREY, Style, colour_of
 from realizer.facebuild.hair.texture import LEVEL, place
 from realizer.facebuild.parts import smooth
@@ -18,7 +18,6 @@ from realizer.facebuild.person.scalp import Scalp
 
 BORDER, SHORTEST = 3, 0.004  # segments of cards at the hairline; m of the shortest card
 FRINGE = 0.007  # m that cards at the hairline may reach beyond it
-NEAR = 0.012  # m from the skin in which cards are kept off it
 UNDER = 0.35  # layers below that are what lies under the others
 CAP = 0.0011  # m that the cap lies above the skin
 SOFT = 0.016  # m from the hairline in which the cap gets dense; the part of its picture for that
@@ -41,10 +40,7 @@ def hair(scalp: Scalp, triangles: Int32, style: Style, colour: Any, rng: Any) ->
         parts.append(_border(scalp, style, colour, rng))
     if max(style.bun) > 0:
         parts.append(bun(scalp, style, lambda count: tints(style, colour, count, rng), rng))
-    whole = joined(parts)
-    lift, ups = scalp.lift(whole.places)
-    low = np.where(scalp.distance(whole.places) < NEAR, np.maximum(LEAST / 2 - lift, 0), 0)
-    return replace(whole, places=whole.places + ups * low[:, None])
+    return joined(parts)
 
 
 def tints(style: Style, colour: Any, count: int, rng: Any) -> Float64:

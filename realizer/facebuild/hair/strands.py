@@ -17,6 +17,7 @@ NEAR = 0.03  # m; farther away from skin, strands need not be kept off it
 SHARPEST = 0.6  # cosine of the sharpest bend between segments
 EAR = 0.015  # m that hair over an ear lies above the skull
 LEAST = 0.0006  # m that a strand lies above the skin
+DEEPEST = 0.004  # m under the skin that a strand may run before it is lifted
 DOWN = np.array([0.0, -1.0, 0.0])
 
 
@@ -186,10 +187,12 @@ def _push(scalp: Scalp, style: Style, at: Float64, layer: Float64, rise: Float64
 
 
 def _is_wrong(scalp: Scalp, style: Style, places: Float64) -> Bool:
-    """Return which strands (s,) hang before face or forehead, stand off the crown or are bent sharply."""
+    """Return which strands (s,) hang before the face, stand off the crown, are in it or are bent sharply."""
     flat = places.reshape(-1, 3)
-    off = scalp.lift(flat)[0] - 1.3 * thickness(scalp, style, flat) - 0.002
+    lift = scalp.lift(flat)[0]
+    off = lift - 1.3 * thickness(scalp, style, flat) - 0.002
     wrong = (places[..., 2] > 0.045) & (places[..., 1] < 0.04)
+    wrong |= lift.reshape(wrong.shape) < -DEEPEST  # in the nape, which is no skull
     wrong |= (off.reshape(wrong.shape) > 0) & (places[..., 1] > 0.06)
     wrong |= (edge(scalp, style, flat).reshape(wrong.shape) < -0.010) & (places[..., 1] > 0.045)
     ways = unit(np.diff(places, axis=1))

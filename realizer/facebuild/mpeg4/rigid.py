@@ -193,11 +193,12 @@ def head_weight(at: Float64, points: Mapping[str, Triple], parts: Parts) -> Floa
 def sliding(
     rows: Mapping[int, Float64], at: Float64, parts: Parts, eyes: list[tuple[Float64, float]]
 ) -> tuple[Any, Any, Any]:
-    """Return vertices of skin and lashes that slide over a ball, which ball, and their least distance."""
+    """Return vertices of skin, lashes and tears that slide over a ball, which one, and how far from it."""
     index, side, radius = [], [], []
     ours = skin_only(len(at), parts) > 0
-    if "lashes" in parts:
-        ours[slice(*parts["lashes"])] = True
+    for name in ("lashes", "tears"):
+        if name in parts:
+            ours[slice(*parts[name])] = True
     for k, (centre, size) in enumerate(eyes):
         moves = sum(np.abs(rows[fap][:, 1]) for fap in (19 + k, 21 + k) if fap in rows)
         away = np.linalg.norm(at - centre, axis=1)

@@ -16,11 +16,14 @@ from realizer.facebuild.person.lips import Lips
 from realizer.facebuild.person.person import Person
 from realizer.facebuild.person.recipe import Recipe, appearance_of
 from realizer.facebuild.person.scalp import Scalp
+from realizer.facebuild.person.tears import tears
 from realizer.facebuild.skin.atlas import EYES
 from realizer.facebuild.submesh import Submesh
 from realizer.facebuild.teeth import teeth
 
-ORDER = ("skin", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue", "shirt", "glasses")
+ORDER = (
+    "skin", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue", "tears", "shirt", "glasses",
+)  # fmt: skip
 UNDER_HAIR = 0.02  # m inside the hairline from which the skin needs few vertices
 MARGIN = 0.08  # m below the floor that the body is cut at by whole triangles first
 # Metres from the middle of the closed lips (2.2): how far the biting edges lie behind it and above it.
@@ -32,6 +35,10 @@ LOWER_ARCH = 0.0015  # m that the lower arch is narrower at each side
 # width in half widths of the arch.
 TONGUE = 0.0088, 0.0055, 0.70
 TIP = 0.55, 0.50  # from that share of its length on it gets round; its tip has this share of the width
+
+# m beside the middle of an eye, and the light from which it is no lid's; places that a mean there is of; the
+# least share of that light at the sides.
+MIDDLE, LID, MEAN, ASIDE = 0.004, 0.12, 9, 0.65
 
 
 def assemble(person: Person, lips: Lips, lids: list[Lid], recipe: Recipe) -> list[Part]:
@@ -62,7 +69,7 @@ def assemble(person: Person, lips: Lips, lids: list[Lid], recipe: Recipe) -> lis
     eyes = zip(("left_eye", "right_eye"), (29, 30), (1, -1), person.balls, strict=True)
     made += [eyeball(name, *ball, EYES, dilation, side) for name, dilation, side, ball in eyes]
     made += _teeth(person, recipe)
-    made.append(_tongue(person, recipe))
+    made += [_tongue(person, recipe), tears(ground, lids, person.balls)]
     made.append(clothing.shirt(body, at, dressed, look["shirt"]))
     if (figures := glasses_of(recipe.glasses)) is not None:
         made.append(glasses(figures, made[0].vertices, list(person.balls), [points["10.1"], points["10.2"]]))
@@ -127,7 +134,7 @@ def _tongue(person: Person, recipe: Recipe) -> Part:
     shade = 1 - 0.30 * smooth(across, 0.14, 0.0) - 0.35 * smooth(across, 0.55, 1.0)
     colours: Float64 = np.array(recipe.colours["tongue"], float) * shade[:, None]
     deep = (place[:, 2].max() - place[:, 2]) / np.ptp(place[:, 2])
-    light = 0.50 * smooth(deep, 0.70, 0.0) + 0.22
+    light = 0.30 * smooth(deep, 0.70, 0.0) + 0.45
     moves = opening_rows(place, person.jaw_pivot, np.interp(along, (0, 1), SINKS))
     moves |= tongue_bends(place, along, np.ones(len(place)))[2]
     gloss = np.full(len(place), 0.35)
@@ -145,4 +152,17 @@ def _bake(made: list[Part]) -> None:
     for part, first in zip(lit, count, strict=False):
         light = 0.25 + 0.75 * sees[first : first + len(part.vertices)]
         # The drawn light comes back from pale walls of a cavity, but those around eyes are not pale.
-        part.occlusion = light**3 if part.name in ("left_eye", "right_eye") else light
+        part.occlusion = _beside_lids(part, light**3) if part.name in ("left_eye", "right_eye") else light
+
+
+def _beside_lids(eye: Part, light: Float64) -> Float64:
+    """Return the light on an eye, of which lids and corners hide parts that are seen when it turns.
+
+    Up and down the lids go with the eye. To the sides they do not: there it gets little darker than in its
+    middle at the same height.
+    """
+    away = eye.vertices - eye.vertices.mean(axis=0)
+    middle = np.flatnonzero((np.abs(away[:, 0]) < MIDDLE) & (away[:, 2] > 0) & (light > LID))
+    middle = middle[np.argsort(away[middle, 1])]
+    row = np.convolve(np.pad(light[middle], MEAN // 2, mode="edge"), np.ones(MEAN) / MEAN, "valid")
+    return np.asarray(np.maximum(light, ASIDE * np.interp(away[:, 1], away[middle, 1], row)))

@@ -23,6 +23,9 @@ FROM_MIDDLE = 0.1, 1.0  # along the lips more and more between these u,
 CHEEK = 0.035  # m beside them less and less up to there
 LOWEST = -0.16  # m; below it only the head's FAPs move anything
 
+# Where between wing and eye the side of the nose is raised most, m around, and by what share of the tip.
+WRINKLED = 0.65, (0.016, 0.024, 0.030), 0.85
+
 
 def face_fields(ground: Ground, jaw_pivot: Float64) -> tuple[dict[int, Float64], Lips]:
     """Return row number (FAP number, or 70..73: `basis`) -> field (n, 3) on the base mesh; and the lips."""
@@ -188,6 +191,11 @@ def _nose(ground: Ground, lips: Lips) -> dict[int, Float64]:
         out[number] = scaled(ground.smoothed(reach[:, None] * way, 2), points[name], side * LEFT)
     tip = ground.point("9.3")
     reach = ground.ellipsoid(tip - [0, 0.001, 0.008], (0.025, 0.024, 0.032), 0.35)[:, None]
+    # A nose that is raised wrinkles: its sides go up with the tip.
+    along, axes, share = WRINKLED
+    for wing_name, corner_name in (("9.1", "3.11"), ("9.2", "3.8")):
+        flank = along * ground.point(wing_name) + (1 - along) * ground.point(corner_name)
+        reach = np.maximum(reach, share * ground.ellipsoid(flank, axes, 0.2)[:, None])
     out[63] = scaled(ground.smoothed(reach * (UP + 0.1 * FORWARD) * free, 1), points["9.3"], UP)
     reach = ground.ellipsoid(tip - [0, -0.004, 0.008], (0.026, 0.030, 0.032), 0.2)[:, None]
     out[64] = scaled(ground.smoothed(reach * -LEFT * free, 1), points["9.3"], -LEFT)

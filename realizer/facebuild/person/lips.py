@@ -27,6 +27,8 @@ END_TENSION = 0.55  # at the corners; less tension or roundness turns triangles 
 ROUND = 0.25  # the share of an ellipse's angle in the splines' coordinate
 KNOTS = 5  # right corner, right half, middle, left half, left corner
 CLOSED_GAP = 0.00005  # m between closed lips
+ROLL = 0.0010  # m that a lip's innermost ring lies behind where the lips meet, or slivers between fold over
+FOLD = 0.40, 0.006, (0.015, 0.020, 0.025)  # share of 55 and 56 at the nasolabial fold; m aside; half axes
 ARC = 0.30  # metres forwards per metre of rise of the lower lip, which moves on the arc of the jaw
 
 
@@ -177,7 +179,10 @@ class Lips:
 
 
 def close_lips(ground: Ground) -> Float64:
-    """Return the base mesh (n, 3) with closed lips; each lip moves half of the distance."""
+    """Return the base mesh (n, 3) with closed lips; each lip moves half of the distance.
+
+    Where full lips have pushed their inner rings together, the lining is moved back.
+    """
     lips = Lips(ground)
     at = ground.at.copy()
     for k, share in ((0, 1.0), (1, 1.0), (2, 0.55), (3, 0.25), (4, 0.10)):
@@ -190,6 +195,15 @@ def close_lips(ground: Ground) -> Float64:
             # The gap is negative where lips overlap.
             gap = high - low - CLOSED_GAP
             at[i, 1] += share * gap / 2 * (-1 if lips.is_upper[i] else 1)
+    inner, meeting = (np.array(lips.rings[k]) for k in (0, MEET))
+    back = np.maximum(at[inner, 2] - at[meeting, 2] + ROLL, 0)
+    lining = (lips.inside | (lips.w == 0)) & (lips.fade > 0)
+    lining[meeting] = False
+    for half in (lips.is_upper, ~lips.is_upper):
+        mine, behind = half[inner], lining & half
+        order = np.argsort(lips.u[inner[mine]])
+        u, way = lips.u[inner[mine]][order], back[mine][order]
+        at[behind, 2] -= lips.fade[behind] * np.interp(lips.u[behind], u, way)
     return at
 
 
@@ -214,12 +228,19 @@ def lip_fields(ground: Ground, lips: Lips) -> dict[int, Float64]:
         out[number] = scaled(field, points[name], direction)
 
     down = -UP
+    # What raises half a lip comes down beside the nose: the fold there goes with it.
+    part, aside, axes = FOLD
+    beyond = part * smooth(lips.away, 0.004, 0.012) * ~lips.inside
+    folds: dict[int, Any] = {}
+    for number, wing, corner, way in ((55, "9.1", "8.3", LEFT), (56, "9.2", "8.4", -LEFT)):
+        place = (ground.point(wing) + ground.point(corner)) / 2 + aside * (way + UP)
+        folds[number] = ground.ellipsoid(place, axes) * beyond
     for share, numbers, names in (
         (inner, (4, 8, 9, 5, 10, 11), ("2.2", "2.6", "2.7", "2.3", "2.8", "2.9")),
         (outer, (51, 55, 56, 52, 57, 58), ("8.1", "8.5", "8.6", "8.2", "8.7", "8.8")),
     ):
         for number, name, knot in zip(numbers[:3], names[:3], (middle, half_left, half_right), strict=True):
-            add(number, name, upper * share * knot, down, down)
+            add(number, name, upper * share * knot + folds.get(number, 0), down, down)
         for number, name, knot in zip(numbers[3:], names[3:], (middle, half_left, half_right), strict=True):
             add(number, name, lower * share * knot, UP + ARC * FORWARD, UP)
     out |= _corners(ground, lips, left, right, inner, outer)

@@ -77,7 +77,7 @@ def beard(ground: Ground, lips: Lips) -> Float64:
 
 # Metres behind the lips that the mouth's lining is darkest from; how much light reaches it there, and right
 # behind the lips.
-DEEP, LIT = 0.060, (0.24, 0.66)
+DEEP, LIT = 0.060, (0.55, 0.85)
 
 
 def lining(colours: Mapping[str, Any], deep: Any) -> Any:
@@ -87,7 +87,7 @@ def lining(colours: Mapping[str, Any], deep: Any) -> Any:
         colours: sRGB colours mouth, tongue; deep: (n,) metres behind the lips.
     """
     near = 1 - smooth(deep, 0.0, DEEP)[:, None]
-    back, front = np.array(colours["mouth"], float) * 0.75, np.array(colours["tongue"], float) * 0.9
+    back, front = np.array(colours["mouth"], float), np.array(colours["tongue"], float) * 0.9
     return back + (front - back) * near
 
 

@@ -168,7 +168,7 @@ def test_deform_keeps_covered_skin_covered_on_a_turned_head(face: Face, fap: int
     assert covered.any()
     for value in (52360, -52360):
         now = outside(face, deform(face, rows({fap: value}))[0].astype(float), "shirt")
-        assert (now[covered] > 0).mean() < 0.01  # at the rim of a collar single vertices may show
+        assert (now[covered] > 0).mean() < 0.007  # at the rim of a collar single vertices may show
 
 
 @pytest.mark.parametrize(
@@ -278,10 +278,6 @@ def test_deform_keeps_eyeballs_behind_the_lids_of_a_blink(face: Face) -> None:
             assert np.linalg.norm(at[lids] - centre, axis=1).min() > radius
 
 
-# Triangles of leo's full lips that still fold, by FAP.
-FOLDED = {("leo", 4): 20, ("leo", 8): 10, ("leo", 9): 10, ("leo", 17): 18}
-
-
 @each_row("row", LOW_LEVEL)
 def test_deform_flips_no_triangle_at_usual_values(face: Face, row: Fap) -> None:
     first, last = face.parts["skin"]
@@ -300,8 +296,7 @@ def test_deform_flips_no_triangle_at_usual_values(face: Face, row: Fap) -> None:
             continue
         now = ups(deform(face, rows({row.fap: v}))[0].astype(float))
         flipped = (rest * now).sum(axis=1) < -0.2 * np.linalg.norm(rest, axis=1) * np.linalg.norm(now, axis=1)
-        folded = np.flatnonzero(flipped & ~inside)
-        assert len(folded) <= FOLDED.get((face.name, row.fap), 0), folded[:10]
+        assert not (flipped & ~inside).any(), np.flatnonzero(flipped & ~inside)[:10]
     assert first == 0
 
 
@@ -310,7 +305,7 @@ def test_deform_moves_a_lip_evenly_by_equal_faps(face: Face) -> None:
     inner = [move[face.feature_points[name]] for name in ("2.8", "2.3", "2.9")]
     assert np.ptp(inner) < 0.02 * abs(inner[1])
     skin = slice(*face.parts["skin"])
-    assert move[skin].min() > 1.05 * inner[1]  # nothing between the points sinks below them
+    assert move[skin].min() > 1.045 * inner[1]  # nothing between the points sinks below them
 
 
 def test_deform_opens_a_lower_lip_without_lumps(face: Face) -> None:
@@ -319,7 +314,7 @@ def test_deform_opens_a_lower_lip_without_lumps(face: Face) -> None:
     lip = face.vertices[[face.feature_points[name] for name in LOWER]]
     away = np.linalg.norm(face.vertices[measure.skin][:, None] - lip, axis=2).min(axis=1)
     off = np.linalg.norm(move - measure.average @ move, axis=1)[measure.seen & (away < 0.006)]
-    assert np.percentile(off, 95) < 0.0011
+    assert np.percentile(off, 95) < 0.00105
 
 
 def test_deform_of_batches_equals_single_frames(face: Face) -> None:

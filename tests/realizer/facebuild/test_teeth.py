@@ -72,7 +72,7 @@ def test_parts_of_an_open_mouth_are_dark_red_not_black(name: str) -> None:
     for share in (0.4, 0.5, 0.6):
         x, y = np.rint(upper + share * (lower - upper)).astype(int)
         red, green, blue = picture[y - 1 : y + 2, x - 1 : x + 2].mean(axis=(0, 1))
-        assert 12 < red < 140, share
+        assert 36 < red < 140, share
         assert red > 1.6 * green, share
         assert abs(green - blue) < 15, share
 

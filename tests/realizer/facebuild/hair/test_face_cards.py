@@ -7,11 +7,20 @@ import numpy as np
 import pytest
 
 from realizer.face.cards import Cards, read_cards
-from realizer.face.load import folder_of
+from realizer.face.deform import deform
+from realizer.face.drawn_mesh import drawn_mesh
+from realizer.face.load import folder_of, load_face
+from realizer.face.mesh_geometry import components, edges_of, part_triangles
 from realizer.face.model import Face
 from realizer.facebuild.hair.face_cards import face_cards, write_cards
 from realizer.facebuild.hair.lashes import Margin
+from realizer.facebuild.inside import depths
 from realizer.facebuild.person.recipe import Recipe
+from tests.penetration import DEEPEST, part_of
+from tests.shipped import FACES
+
+BEYOND = 0.002  # m from a hair's root
+BESIDE_JAW = 0.0025  # m that a beard is in the throat when the jaw falls
 
 
 @pytest.fixture(scope="module")
@@ -41,3 +50,25 @@ def test_write_cards_writes_what_read_cards_reads(cards: Cards, head: Face, tmp_
     assert written.parts == cards.parts
     assert np.array_equal(written.roots, cards.roots)
     assert written.uv == pytest.approx(cards.uv, abs=1e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FACES)
+@pytest.mark.parametrize("jaw", [0, 600])
+def test_face_cards_stay_out_of_the_skin_beyond_their_roots(name: str, jaw: float) -> None:
+    face = load_face(name)
+    mesh = drawn_mesh(face)
+    pose = np.zeros((1, 68), np.float32)
+    pose[0, [2, 4, 51]] = jaw, -jaw, -jaw
+    at = np.asarray(mesh.places @ deform(face, pose)[0], float)
+    skin = part_of(face, "skin")
+    for part in ("hair", "brows", "lashes", "beard"):
+        if (ends := mesh.parts.get(f"{part}_cards")) is None:
+            continue
+        places, along = at[slice(*ends)], mesh.uv[slice(*ends), 1]
+        card = components(edges_of(part_triangles(mesh.triangles, ends))[0], len(places))
+        order = np.argsort(along, kind="stable")
+        root = order[np.unique(card[order], return_index=True)[1]]
+        away = np.linalg.norm(places - places[root][card], axis=1)
+        depth = depths(places, at, skin, 0.01)[0]
+        assert depth[away > BEYOND].max() < (BESIDE_JAW if jaw and part == "beard" else DEEPEST), part

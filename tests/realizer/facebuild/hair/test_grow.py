@@ -28,7 +28,7 @@ def test_hair_of_every_style_is_sound_and_light(skin: Skin, points: dict[str, np
     assert (patch.uv >= HAIR.left).all()
     assert 0 <= patch.occlusion.min() <= patch.occlusion.max() <= 1
     lift = scalp.lift(patch.places)[0]
-    assert lift[scalp.distance(patch.places) < 0.01].min() > -0.006
+    assert lift[scalp.distance(patch.places) < 0.01].min() > -0.010  # face_cards lifts what is in the skin
     before = patch.places[(patch.places[:, 2] > 0.03) & (patch.places[:, 1] < points["11.1"][1] - 0.025)]
     assert not len(before) or np.abs(before[:, 0]).min() > 0.04
 
