@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from itertools import islice
 from math import inf
 
 from bml_schema import Block
 from realizer.behaviours.kind import BehaviourKind, BlockCommand, PlanningContext
 from realizer.core import work
-from realizer.playback import block_links
 from realizer.playback.active_block import ActiveBlock, Dependency
+from realizer.playback.announced_blocks import AnnouncedBlock, AnnouncedBlocks, BlockRejectedError
 from realizer.playback.block_commands import CommandError, execute
 from realizer.playback.block_states import BlockEvent, State, next_state
 from realizer.playback.character import Character
@@ -30,34 +30,6 @@ from realizer.speech.utterance import Utterance
 
 # Maximum number of anticipators; of the others the oldest that no block is tied to are dropped.
 ANTICIPATORS = 2_000
-
-
-@dataclass(eq=False)
-class AnnouncedBlock:
-    """A block that was announced and has not arrived, with the commands that it received so far.
-
-    Attributes:
-        number: order of arrival.
-        state: IN_PREP, or REVOKED after it was ended and reported.
-        activated: it does not wait for activation.
-        dependencies: blocks that were placed before it.
-        unstarted: ids of the blocks that have to wait for it and had not started when it was announced.
-    """
-
-    block: Block
-    number: int
-    state: State = State.IN_PREP
-    activated: bool = False
-    dependencies: list[Dependency] = field(default_factory=list)
-    unstarted: frozenset[str] = frozenset()
-
-    @property
-    def is_revoked(self) -> bool:
-        return self.state is State.REVOKED
-
-    def change_state(self, event: BlockEvent) -> None:
-        """Change to the state that follows from an event."""
-        self.state = next_state(self.state, event)
 
 
 class BlockManager:
@@ -84,7 +56,7 @@ class BlockManager:
         self.timeline = BlockTimeline(kinds, self._characters)
         self.blocks = self.timeline.blocks
         self.reports = self.timeline.reports
-        self._announced: dict[str, AnnouncedBlock] = {}
+        self._announced = AnnouncedBlocks(self.blocks)
 
     # blocks in ----------------------------------------------------------------------------------
 
@@ -109,18 +81,15 @@ class BlockManager:
 
     def announce(self, block: Block, now: float) -> None:
         """Acknowledge a block, once: planning has begun. `accept` does it if it was not done before."""
-        character = self.character_index(block.character_id)
-        if block.id in self._announced or self._in_use(block, character):
-            return
-        names = (name for name, _ in block_links.followers(block))
-        unstarted = frozenset(filter(self._has_not_started, names))
-        self._announced[block.id] = AnnouncedBlock(block, self.blocks.new_number(), unstarted=unstarted)
-        start = max([now, *(w.until for w in self._dependencies(block, character))])
-        self.reports.add(acknowledgement(block, start if start < now + UNKNOWN else now))
+        announced = self._announced.add(block, self.character_index(block.character_id))
+        if announced is not None:
+            start = max([now, *(w.until for w in self._announced.dependencies(announced))])
+            self.reports.add(acknowledgement(block, start if start < now + UNKNOWN else now))
 
     def withdraw(self, block: Block, now: float) -> None:
         """Remove an announced block that will not be submitted, and report its end."""
-        announced = self._announced.pop(block.id, None) or AnnouncedBlock(block, 0)
+        character = self.character_index(block.character_id)
+        announced = self._announced.pop(block.id) or AnnouncedBlock(block, character)
         if not announced.is_revoked:
             self._revoke(announced, now)
 
@@ -133,27 +102,27 @@ class BlockManager:
         character = self.character_index(block.character_id)
         self.advance(now, starts_before=now)
         self.announce(block, now)
-        announced = self._announced.get(block.id)
+        announced = self._announced.find(block.id)
         if announced is not None and announced.is_revoked:  # its end has been reported
-            del self._announced[block.id]
+            self._announced.pop(block.id)
             return Schedule(block.id, {}, {}, start=now, failed=True)
+        if announced is None or self._announced.is_in_use(block, character):
+            self._announced.pop(block.id)
+            text = f"block id {block.id!r} is still in use: wanted an id of no block that plays or waits"
+            return self._refuse(block, Warning(block.id, "PARSING_FAILURE", text), now)
         try:
-            if self._in_use(block, character):
-                text = f"block id {block.id!r} is still in use: wanted an id of no block that plays or waits"
-                raise _Rejection(Warning(block.id, "PARSING_FAILURE", text))
-            waits, waiting = self._links(block, character)
-        except _Rejection as refused:
-            self._announced.pop(block.id, None)
+            waits, waiting = self._announced.links(announced)
+        except BlockRejectedError as refused:
+            self._announced.pop(block.id)
             return self._refuse(block, refused.warning, now)
-        announced = self._announced[block.id]
-        ended = self._blocks_to_end(announced)
+        ended = self._announced.blocks_to_end(announced)
         pending = block.preplan and not announced.activated
         start = inf if pending else max([now, *(w.until for w in waits)])
         arrival = Arrival(block, character, announced.number, context)
         planned, others = self.timeline.plan(arrival, start, now, waits=waits, ended=ended)
         if planned.schedule.lengths:
             return planned.schedule
-        self._announced.pop(block.id, None)
+        self._announced.pop(block.id)
         if planned.schedule.failed:
             failed = self._refuse(block, planned.schedule.warnings[0], now)
             return replace(failed, over_limit=planned.schedule.over_limit)
@@ -172,9 +141,7 @@ class BlockManager:
         for follower, subsiding in ((p, s) for p, s in waiting if not p.is_done):
             follower.add_dependency(Dependency(playing, subsiding))
             self.timeline.reorder(follower)
-        for name, subsiding in block_links.followers(block):
-            if self._has_arrived(name, announced.number):
-                self._announced[name].dependencies.append(Dependency(playing, subsiding))
+        self._announced.place_after(playing)
         self.timeline.predict(playing, now)
         for warning in planned.schedule.warnings:
             self.reports.warn(warning, block.character_id)
@@ -254,40 +221,29 @@ class BlockManager:
 
     def has_seen(self, id: str) -> bool:
         """Whether there is, was or will be such a block."""
-        return id in self._announced or self.blocks.has_seen(id)
+        return self._announced.find(id) is not None or self.blocks.has_seen(id)
 
     def revoke(self, id: str, now: float) -> bool:
         """End a block that was announced and has not arrived; return False if there is none.
 
         What it interrupts or replaces ends too, because that must not depend on how long its voice takes.
         """
-        announced = self._announced.get(id)
+        announced = self._announced.find(id)
         if announced is None or announced.is_revoked:
             return False
-        followers = block_links.followers(announced.block)
-        if all(name in announced.unstarted for name, _ in followers):  # or it would have been refused
-            self._end(self._blocks_to_end(announced), announced, now)
+        if not announced.is_too_late:
+            self._end(self._announced.blocks_to_end(announced), announced, now)
         self._revoke(announced, now)
         return True
-
-    def _blocks_to_end(self, announced: AnnouncedBlock) -> list[ActiveBlock]:
-        """Return the accepted blocks that one interrupts or replaces."""
-        earlier = (p for p in self.blocks.active() if p.number < announced.number)
-        return [p for p in earlier if self._ends(announced.block, p.block)]
 
     def _end(self, ended: Sequence[ActiveBlock], announced: AnnouncedBlock, now: float) -> None:
         """End accepted blocks, and those in preparation that a block interrupts or replaces."""
         together = frozenset(ended)
         for playing in ended:
             self.timeline.stop(playing, now, together)
-        for other in list(self._announced.values()):
-            if other.number < announced.number and self._ends(announced.block, other.block):
+        for other in self._announced.before(announced):
+            if announced.ends(other):
                 self.revoke(other.block.id, now)
-
-    def _ends(self, block: Block, other: Block) -> bool:
-        characters = (self.character_index(b.character_id) for b in (block, other))
-        replaces = block.composition == "REPLACE" and len(set(characters)) == 1
-        return replaces or other.id in block.interrupt
 
     def _revoke(self, announced: AnnouncedBlock, now: float) -> None:
         announced.change_state(BlockEvent.STOP)
@@ -316,7 +272,7 @@ class BlockManager:
         """Activate a preplanned block: it starts after its dependencies. Return False if there is none."""
         playing = self.blocks.find(id)
         if playing is None:
-            announced = self._announced.get(id)
+            announced = self._announced.find(id)
             if announced is None or not announced.block.preplan:
                 return False
             announced.activated = True
@@ -369,63 +325,7 @@ class BlockManager:
         self.timeline.update_speech(playing, behaviour, utterance, now)
         return True
 
-    # starts -------------------------------------------------------------------------------------
-
-    def _links(self, block: Block, character: int) -> tuple[list[Dependency], list[tuple[ActiveBlock, bool]]]:
-        """Return the dependencies of a block, and the blocks that have to wait for it.
-
-        Raises:
-            _Rejection: one of the latter has started, or is itself a dependency.
-        """
-        waits = self._dependencies(block, character)
-        waiting: list[tuple[ActiveBlock, bool]] = []
-        for name, subsiding in block_links.followers(block):
-            playing = self.blocks.find(name)
-            if playing is not None and playing.is_waiting:
-                waiting.append((playing, subsiding))
-            elif playing is not None or name not in self._announced[block.id].unstarted:
-                text = f"prependBefore, chunkBefore: wanted blocks that have not started, got {name!r}"
-                raise _Rejection(Warning(block.id, "TargetBlockAlreadyStartedException", text))
-        if waiting and any(id(playing) in block_links.all_dependencies(waits) for playing, _ in waiting):
-            text = "prependBefore, chunkBefore: wanted blocks that this one does not wait for itself"
-            raise _Rejection(Warning(block.id, "IMPOSSIBLE_TO_SCHEDULE", text))
-        return waits, waiting
-
-    def _dependencies(self, block: Block, character: int) -> list[Dependency]:
-        announced = self._announced[block.id]
-        placed_before = [w for w in announced.dependencies if not w.block.is_done]
-        waits = block_links.dependencies(block, character, announced.number, self.blocks.active())
-        return waits + placed_before
-
-    def _has_not_started(self, id: str) -> bool:
-        """Whether a block has been announced or planned, and has not started, was revoked or refused."""
-        announced, playing = self._announced.get(id), self.blocks.find(id)
-        if announced is not None:
-            return True
-        if playing is not None:
-            return playing.is_waiting
-        past = self.blocks.schedule_of(id)
-        return past is not None and past.start == inf
-
-    def _has_arrived(self, id: str, before: int) -> bool:
-        """Whether a block is announced that arrived before another one, by its number."""
-        announced = self._announced.get(id)
-        return announced is not None and announced.number < before
-
-    def _in_use(self, block: Block, character: int) -> bool:
-        """Whether its id belongs to a playing or waiting block that it does not end."""
-        other = self.blocks.find(block.id)
-        return other is not None and not self._ends(block, other.block)
-
     def _refuse(self, block: Block, warning: Warning, now: float) -> Schedule:
         self.reports.warn(warning, block.character_id)
         self.blocks.note_revoked(block.id)
         return Schedule(block.id, {}, {}, start=now, warnings=(warning,), failed=True)
-
-
-class _Rejection(Exception):
-    """A block cannot be accepted; the warning has the reason."""
-
-    def __init__(self, warning: Warning) -> None:
-        super().__init__(warning.text)
-        self.warning = warning
