@@ -25,7 +25,6 @@ FILES = (".bml", ".xml", ".txt")  # suffixes of a single word that is meant to b
 ROLES = ("speaker", "listener")
 MARKUP = re.compile(r"\s*<(?!\d)[\w:?!/]")  # but not "<3"
 MARKED = re.compile(rb"(?:\xef\xbb\xbf)?\s*<(?![\d\s])|\xff\xfe|\xfe\xff")
-# Characters that XML 1.0 cannot contain (production 2, Char).
 
 log = logging.getLogger(__name__)
 

@@ -70,7 +70,7 @@ def document_of(item: object, number: int = 1) -> Document:
         raise TypeError(f"source: wanted {WANTED}, got {_type(item)}")
     if isinstance(item, str) and is_file_name(item):
         if not Path(item).is_file():
-            words = "no such file; a text with this suffix or a path separator is spoken if given as bytes"
+            words = "no such file; a text with such an end or a path separator is spoken from a .txt file"
             raise FileNotFoundError(errno.ENOENT, words, item)
         item = Path(item)
     if isinstance(item, Path):

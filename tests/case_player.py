@@ -17,16 +17,21 @@ from realizer.animation.axis import AU_NAMES
 from realizer.animation.fap.conversion import to_fap
 from realizer.behaviours.registry import VOCABULARY
 from realizer.core.options import PlayOptions
+from realizer.core.settings import Settings
 from realizer.playback.feedback_events import parse_warning
 from realizer.playback.player import Player
 from realizer.playback.scheduled_speech import ScheduledSpeech
 from realizer.playback.speaking import submit_with_speech
 from realizer.scheduling.timing import Schedule
+from realizer.server.session.effects import Send, Speak
+from realizer.server.session.session import Session
+from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.silent import SilentVoice
 from realizer.tables import faps
 from tests.cases import CORPUS, Case, Instant, LogLine, log_lines
+from tests.wake_times import next_wake
 
-__all__ = ["Played", "play"]
+__all__ = ["Played", "play", "play_in_session"]
 
 MEDIA = CORPUS / "media"  # files that documents refer to
 EPOCH = 1_700_000_000.0  # Unix time of the session's start
@@ -160,6 +165,38 @@ def play(
     played.faces = sample_faces(player, instants)
     played.speeches = player.speech()
     return played
+
+
+def play_in_session(case: Case) -> list[LogLine]:
+    """Send the documents of a case to a session, at their times, and return its log without predictions."""
+    wanted = case.wanted
+    session = Session("corpus", Settings(idle=wanted.get("idle", False), media=MEDIA), 0.0, epoch=EPOCH)
+    voice, sent_texts, log = SilentVoice(), list[str](), list[LogLine]()
+    session.connect(1, 0.0)
+
+    def work(now: float) -> None:
+        session.tick(now)
+        for effect in session.take_effects():
+            if isinstance(effect, Speak):
+                session.on_speech(effect.id, speak_to_length(voice, effect.request), now)
+                work(now)
+            elif isinstance(effect, Send) and isinstance(effect.data, str) and effect.data[0] == "<":
+                sent_texts.append(effect.data)
+
+    now = 0.0
+    for time, message in [*case.messages, (math.inf, "")]:
+        while (deadline := next_wake(session)) < time:
+            now = max(now, deadline)
+            work(now)
+        if message:
+            now = time
+            session.receive(1, message, now)
+            work(now)
+            while session.has_documents:
+                work(now)
+    for text in sent_texts:
+        log += [line for line in log_lines(parse_feedback(text, VOCABULARY)) if line.kind != "prediction"]
+    return log
 
 
 def advance(player: Player, played: Played, now: float, until: float, punctual: bool) -> None:

@@ -51,6 +51,7 @@ Keys of a .toml; all but `says` and `proves` are optional:
 
 from __future__ import annotations
 
+import json
 import math
 import re
 import tomllib
@@ -63,6 +64,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bml_schema import BlockProgress, Feedback, PredictionFeedback, SyncPointProgress, WarningFeedback
+from bml_schema.document_splitter import document_spans
 
 __all__ = ["CASES", "CORPUS", "Case", "Instant", "LogLine", "log_lines"]
 
@@ -147,6 +149,25 @@ class Case:
     @property
     def document(self) -> bytes:
         return self.path.with_suffix(".xml").read_bytes()
+
+    @property
+    def messages(self) -> list[tuple[float, str]]:
+        """What a client sends, (seconds, text): the scene, then the documents of each time in one message."""
+        text = self.document.decode("utf-8-sig")
+        spans = list(document_spans(text))
+        sent = [float(time) for time in self.wanted.get("sent", ())] or [0.0]
+        sent += [max([0.0, *sent])] * (len(spans) - len(sent))
+        ends = [span.start for span in spans[1:]] + [len(text)]
+        parts: dict[float, str] = {}
+        begin = 0
+        for time, end in zip(sent, ends, strict=True):
+            parts[time] = parts.get(time, "") + text[begin:end]
+            begin = end
+        messages = list(parts.items())
+        if "scene" in self.wanted:
+            objects = {name: dict(zip("xyz", at, strict=True)) for name, at in self.wanted["scene"].items()}
+            messages.insert(0, (0.0, json.dumps({"type": "scene", "objects": objects})))
+        return messages
 
     @property
     def live_instants(self) -> list[Instant]:

@@ -23,7 +23,7 @@ from bml_schema.node_schema import schema_of
 from realizer.animation.axis import AU_NAMES
 from realizer.animation.curves import gain_at
 from realizer.behaviours.registry import VOCABULARY
-from tests.case_player import Played, play
+from tests.case_player import Played, play, play_in_session
 from tests.cases import CASES, Case, Instant, LogLine
 from tests.rows import each_row
 
@@ -274,6 +274,14 @@ def feedback_does_not_depend_on_the_calls_of_due(case: Case) -> None:
     assert list(map(str, seldom.log)) == list(map(str, punctual.log))
 
 
+def sessions_play_it_as_it_is_played_offline(case: Case) -> None:
+    """A session of the service gives the same feedback, with documents in messages and voices that answer."""
+    if "ready" in case.wanted or case.name.startswith(("documents/encoding", "invalid/not-xml")):
+        return  # voices answer at once here; messages are text that begins with "<"
+    lines = [line for line in play_once(case).log if line.kind != "prediction"]
+    assert list(map(str, play_in_session(case))) == list(map(str, lines))
+
+
 def documents_can_be_written_and_read_again(case: Case) -> None:
     for block in play_once(case).blocks:
         assert parse(write(block), VOCABULARY) == block
@@ -287,6 +295,7 @@ LAWS = (
     faces_never_jump,
     blocks_pass_every_sync_point_in_order,
     feedback_does_not_depend_on_the_calls_of_due,
+    sessions_play_it_as_it_is_played_offline,
     documents_can_be_written_and_read_again,
 )
 

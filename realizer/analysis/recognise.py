@@ -117,7 +117,7 @@ class Recogniser:
         """Return which emotions frames show, and when.
 
         Frames are averaged over a short window before, and what is shorter than it belongs to the interval
-        before it, so that noise does not split an expression.
+        before it, or else after it, so that noise does not split an expression.
         """
         values = np.asarray(frames, np.float64)
         window = min(max(round(self._model.window * fps), 1), len(values))
@@ -131,6 +131,9 @@ class Recogniser:
                 runs[-1][1].extend(beliefs)
             else:
                 runs.append((name, beliefs))
+        if len(runs) > 1 and len(runs[0][1]) < window:
+            _, first = runs.pop(0)
+            runs[0][1][:0] = first
         ends = np.cumsum([len(beliefs) for _, beliefs in runs])
         return [
             Interval((end - len(beliefs)) / fps, end / fps, name, float(np.mean(beliefs)))
@@ -171,4 +174,4 @@ def recogniser(profiles: str = "own") -> Recogniser:
 def emotion_of(name: str) -> str:
     """Return the emotion of a profile: its name without the number."""
     emotion, _, number = name.rpartition(" ")
-    return emotion if emotion and number.isdecimal() else name
+    return (emotion if emotion and number.isdecimal() else name).lower()

@@ -31,13 +31,12 @@ def corpus() -> None:
 @click.argument("folder", metavar="DIR", type=options.OUTPUT)
 def init(folder: Path) -> None:
     """Make an empty corpus."""
-    from realizer.core.atomic_files import write_text
     from realizer.corpus.recording import CORPUS
 
     if (folder / CORPUS).exists():
         raise click.UsageError(f"{folder}: wanted a new folder, got a corpus")
     folder.mkdir(parents=True, exist_ok=True)
-    write_text(folder / CORPUS, "version = 1\n")
+    (folder / CORPUS).write_text("version = 1\n", "utf-8")
     options.note(
         f"{folder}: a corpus without recordings; add some by `realizer corpus add {folder} NAME FILE`"
     )
@@ -50,7 +49,7 @@ def init(folder: Path) -> None:
 @click.option("--person", help="Who is recorded; the speaker of that name, or `subject`, is this person.")
 @click.option("--mood", help="Mood of the person; several by commas.")
 @click.option("--fragment", help="Name of the fragment or scene in tables.  [default: NAME]")
-@click.option("--language", metavar="TAG", help="Language of the words, as a BCP-47 tag.")
+@click.option("--language", metavar="TAG", help="Language of the words, as a BCP-47 tag.  [default: en]")
 @click.option("--licence", help="Licence of the recording.")
 @click.option(
     "--fps", type=options.Number(1, 1000), help="Frames per second.  [default: of the files, or 25]"
@@ -66,34 +65,27 @@ def add(folder: Path, name: str, files: tuple[Path, ...], **facts: Any) -> None:
     from realizer.corpus import recording as recordings
     from realizer.corpus.formats import merged, read_part
 
+    path = folder / name
     if not (folder / recordings.CORPUS).is_file():
         raise click.UsageError(f"{folder}: wanted a corpus; make one by `realizer corpus init {folder}`")
-    path = folder / name
     if Path(name).name != name or name.startswith("."):
         raise click.UsageError(f"wanted a name without / for the recording, got {name!r}")
-    found = recordings.Recording(name)
-    if (path / recordings.META).is_file():
-        found = recordings.read_recording(path)
+    there = (path / recordings.META).is_file()
+    found = recordings.read_recording(path) if there else recordings.Recording(name)
     for file in files:
         found = merged(found, read_part(file))
-    found = replace(
-        found, meta={**found.meta, **{key: fact for key, fact in facts.items() if fact is not None}}
-    )
+    known = {key: fact for key, fact in facts.items() if fact is not None}
+    found = replace(found, meta={**found.meta, **known})
     recordings.write_recording(path, found)
-    options.note(
-        f"{path}: {found.frames} frames, {len(found.labels)} labels, {len(found.words)} words"
-        f"{', FAPs' * (found.faps is not None)}{', points' * (found.points is not None)}"
-    )
+    options.note(f"{path}: {found.frames} frames, {len(found.labels)} labels, {len(found.words)} words")
 
 
 @corpus.command()
 @folder
 @click.argument("name")
-@click.option(
-    "-o", "--output", required=True, metavar="FILE", type=options.OUTPUT, help=".eaf, .TextGrid or .csv"
-)
+@click.option("-o", "--output", required=True, metavar="FILE", type=options.OUTPUT, help=".eaf or .TextGrid")
 def export(folder: Path, name: str, output: Path) -> None:
-    """Write the labels and words of a recording for ELAN, Praat, or as a table of labels."""
+    """Write the labels and words of a recording for ELAN or Praat."""
     from realizer.corpus.formats import write_annotations
     from realizer.corpus.recording import read_recording
 
@@ -109,13 +101,12 @@ def learn(folder: Path, seed: int) -> None:
     Typical faces get the name of their most frequent label, or else of the most similar template. Change the
     names in map.toml as you like. map.png shows where neighbours differ.
     """
-    from realizer.corpus.learn import learn as learn_map
-    from realizer.corpus.learn import save
+    from realizer.corpus import learn as learning
     from realizer.corpus.recording import read_corpus
 
-    learnt = learn_map([one for one in read_corpus(folder) if one.faps is not None or one.points], seed)
-    save(folder, learnt)
-    named = sum(bool(name) for name in learnt.names)
+    learnt = learning.learn([one for one in read_corpus(folder) if one.has_frames], seed)
+    learning.save(folder, learnt)
+    named = sum(map(bool, learnt.names))
     options.note(f"{folder}: {len(learnt.components)} components, {named} of {len(learnt.names)} cells named")
 
 
@@ -123,37 +114,28 @@ def learn(folder: Path, seed: int) -> None:
 @folder
 def find(folder: Path) -> None:
     """Find expressions by the map, and write them as labels of the annotator `map`."""
-    from realizer.corpus.find import FINDER, agreement
-    from realizer.corpus.find import find as find_segments
+    from realizer.corpus import find as finding
     from realizer.corpus.learn import load
     from realizer.corpus.recording import read_corpus, write_recording
 
     learnt = load(folder)
-    for one in read_corpus(folder):
-        if one.faps is None and one.points is None:
-            continue
-        found = find_segments(one, learnt)
-        kept = tuple(label for label in one.labels if label.by != FINDER)
-        labels = (*kept, *(segment.annotation(one.fps) for segment in found))
+    for one in (recording for recording in read_corpus(folder) if recording.has_frames):
+        found = finding.find(one, learnt)
+        kept = replace(one, labels=tuple(label for label in one.labels if label.by != finding.FINDER))
+        labels = (*kept.labels, *(segment.annotation(one.fps) for segment in found))
         write_recording(folder / one.name, replace(one, labels=labels))
-        said = f"{one.name}: {len(found)} segments"
-        if kept:
-            true = replace(one, labels=kept).segments()
-            frames, met = agreement(true, found, one.frames)
-            said += f"; {frames:.1%} of frames and {met:.1%} of segments as labelled"
-        click.echo(said)
+        frames, met = finding.agreement(kept.segments(), found, one.frames)
+        agrees = f"; {frames:.1%} of frames and {met:.1%} of segments as labelled" if kept.labels else ""
+        click.echo(f"{one.name}: {len(found)} segments{agrees}")
 
 
 @corpus.command()
 @folder
 @click.option("--annotator", help="Whose labels to describe.  [default: the first of each recording]")
 @click.option(
-    "--language", default="en", show_default=True, metavar="TAG", help="Language of emotional words."
-)
-@click.option(
     "-o", "--output", metavar="DIR", type=options.OUTPUT, help="Folder to write.  [default: DIR/report]"
 )
-def describe(folder: Path, annotator: str | None, language: str, output: Path | None) -> None:
+def describe(folder: Path, annotator: str | None, output: Path | None) -> None:
     """Write statistics as tables and report.html, and the rules, durations and profiles that follow.
 
     The tables are those of Wojdel 2005, 6.3 to 6.14, and table 4 of Raouzaiou et al. 2002. `realizer enrich
@@ -165,11 +147,9 @@ def describe(folder: Path, annotator: str | None, language: str, output: Path | 
     from realizer.corpus.statistics import Study
     from realizer.tables.emotional_words import word_list
 
-    recordings = read_corpus(folder)
-    tag = next((str(one.meta["language"]) for one in recordings if "language" in one.meta), language)
-    study = Study(recordings, annotator, word_list(tag))
+    recordings, target = read_corpus(folder), output or folder / "report"
+    language = next((str(one.meta["language"]) for one in recordings if "language" in one.meta), "en")
+    study = Study(recordings, annotator, word_list(language))
     if not study.every:
         raise click.UsageError(f"{folder}: wanted labels, got none; add some, or see `realizer corpus find`")
-    target = output or folder / "report"
-    names = write_report(target, study, folder)
-    options.note(f"{target}: {', '.join(names)}")
+    options.note(f"{target}: {', '.join(write_report(target, study, folder))}")

@@ -27,7 +27,7 @@ class MoodWord(click.ParamType):  # type: ignore[type-arg]
     def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Any:
         folder = context.params.get("knowledge") if context is not None else None
         try:
-            return rules_for(folder)[0].mood(value)
+            return rules_for(folder if isinstance(folder, Path) else None)[0].mood(value)
         except KeyError as error:
             self.fail(error.args[0].removeprefix("mood: "), parameter, context)
 

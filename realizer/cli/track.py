@@ -1,68 +1,170 @@
-"""`track`: converts tracked feature points to a FAP file."""
+"""`track`: converts films, pictures, or tracked feature points to FAPs, action units, or a document."""
 
 from __future__ import annotations
 
-from itertools import groupby
+import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from realizer.cli import options
 
 if TYPE_CHECKING:
-    from realizer.core.array_types import Float64
+    from realizer.core.array_types import Bool, Float64
     from realizer.face.model import Fapu
+    from realizer.tracking.follower import Person
+
+POINTS = (".csv", ".txt", "")  # suffixes of tables of points; the last is of standard input
 
 
 @click.command()
-@click.argument("points", type=click.Path(exists=True, dir_okay=False, allow_dash=True))
+@click.argument("source", metavar="IN", type=click.Path(exists=True, allow_dash=True))
 @click.option(
-    "-o", "--output", required=True, metavar="OUT.fap", type=options.OUTPUT, help="FAP file to write."
+    "-o",
+    "--output",
+    required=True,
+    metavar="OUT",
+    type=options.OUTPUT,
+    help="File to write: .fap, .csv, .json, .bml.",
 )
 @click.option(
-    "--fps", type=options.Number(0.1, 1000), default=25.0, show_default=True, help="Frame rate of the points."
+    "--fps",
+    type=options.Number(0.1, 1000),
+    help="Frame rate of points and of a folder of pictures, and of OUT.  [default: the film's, or 25]",
 )
 @click.option(
     "--profiles",
-    type=click.Choice(["own", "published", "raw"]),
-    help="Also print which emotions are recognised, by these profiles, and when.",
+    type=options.ProfileSet(),
+    help="Also print which emotions are recognised, by these profiles (own, published, raw, or a file), when, "
+    "and how certainly.",
 )
-def track(points: str, output: Path, fps: float, profiles: str | None) -> None:
-    """Convert tracked feature points of a face to FAPs, which any face can play.
+@click.option(
+    "--face", metavar="NAME", help="Make the FAPs from the action units, by the mapping of this face."
+)
+@click.option(
+    "--neutral", metavar="N|PICTURE", help="The face at rest: a picture, or picture N (from 0) of IN."
+)
+@click.option(
+    "--person",
+    type=click.IntRange(1),
+    default=1,
+    show_default=True,
+    help="Which of several people; 1 is seen most.",
+)
+def track(source: str, output: Path, fps: float | None, profiles: str | None, **how: Any) -> None:
+    """Convert a film, a picture, a folder of pictures, or tracked feature points to movements of a face.
 
-    POINTS is a CSV table with the columns frame,point,x,y,z: points by their MPEG-4 names, in metres, x to
-    the character's left, y up, z forward. Frame 0 shows the face at rest; its proportions are measured from
-    points 2.2, 3.1 to 3.6, 8.3, 8.4 and 9.15. Head motion is measured at points 11.1 to 11.6 or the
-    corners of the eyes. Points missing from a frame are interpolated.
+    OUT is a FAP file, which any face can play, a table of action units from 0 to 1, both in JSON, or a BML
+    document that plays it again. In a film, the face at rest is that of its quietest pictures.
+
+    Points are a CSV table with the columns frame,point,x,y,z, for a .fap: points by their MPEG-4 names, in
+    metres, x to the character's left, y up, z forward. Frame 0 shows the face at rest; its proportions are
+    measured from points 2.2, 3.1 to 3.6, 8.3, 8.4 and 9.15. Head motion is measured at points 11.1 to 11.6 or
+    the corners of the eyes. Points missing from a frame are interpolated.
 
     \b
+    realizer track talk.mp4 -o talk.csv
+    realizer track talk.mp4 -o talk.bml && realizer realize talk.bml --face ben -o again.mp4
     realizer track actor.csv --fps 30 -o actor.fap
     """
+    from realizer.core.atomic_files import write_bytes
+
+    if source == "-" or (Path(source).suffix.lower() in POINTS and Path(source).is_file()):
+        text, rate, values, seen = _from_points(source, output, fps or 25.0)
+    else:
+        text, rate, values, seen = _from_pictures(Path(source), output, fps, **how)
+    with options.writing(output):
+        write_bytes(output, text.encode())
+    if profiles is not None:
+        from realizer.analysis.recognise import recogniser
+
+        for part in recogniser(profiles).intervals(values, rate, seen):
+            click.echo(f"{part.start:8.2f} {part.end:8.2f} {part.emotion or '-'} {part.certainty:.2f}")
+
+
+def _from_points(source: str, output: Path, fps: float) -> tuple[str, float, Any, Bool]:
+    """Return the text of a FAP file, its rate, its FAPs, and which of them were seen."""
     import numpy as np
 
     from realizer.analysis.faps_from_points import faps_from_points
     from realizer.analysis.points_file import bridge, read_points
-    from realizer.analysis.recognise import recogniser
     from realizer.animation.fap.fap_clip import FAPClip
     from realizer.animation.frames import FAPFrames
     from realizer.outputs.fap_text import encode
 
     options.check_suffix(output, ".fap")
-    content = options.read_file(points)
-    text = options.decode(content, points, "a table")
+    text = options.decode(options.read_file(source), source, "a table")
     with options.reporting(ValueError):
-        moving, rest = read_points(text, points)
-        values, seen = faps_from_points(bridge(moving), rest, _fapu(rest, points))
+        moving, rest = read_points(text, source)
+        values, seen = faps_from_points(bridge(moving), rest, _fapu(rest, source))
     times = np.arange(len(values)) / fps
-    output.write_text(encode(FAPClip.of(FAPFrames(times, values, seen), fps, output.stem)), "utf-8")
     options.note(f"{output}: {len(values)} frames, {int(seen.sum())} FAPs")
-    if profiles is not None:
-        first = 0
-        for name, frames in groupby(recogniser(profiles).names(values, seen)):
-            end = first + len(list(frames))
-            click.echo(f"{first / fps:8.2f} {end / fps:8.2f} {name or '-'}")
-            first = end
+    return encode(FAPClip.of(FAPFrames(times, values, seen), fps, output.stem)), fps, values, seen
+
+
+def _from_pictures(
+    source: Path, output: Path, fps: float | None, *, face: str | None, neutral: str | None, person: int
+) -> tuple[str, float, Any, Bool]:
+    """Return the text of OUT, its rate, its FAPs, and which of them were seen."""
+    from realizer.tracking.files import FORMATS, by_mapping, mask
+    from realizer.tracking.network import TrackingError
+    from realizer.tracking.recording import rate_of, record
+
+    options.check_suffix(output, *FORMATS)
+    with options.reporting(TrackingError):
+        times, people = _follow(source, fps)
+        if person > len(people):
+            raise click.BadParameter(f"there are {len(people)} people in {source}", param_hint="--person")
+        chosen = people[person - 1]
+        rest = _neutral(neutral, chosen) if neutral is not None else None
+    recording = record(chosen, times, fps or rate_of(times), rest)
+    if face is not None:
+        recording = by_mapping(recording, face)
+    others = f"; {len(people)} people, this is --person {person}" if len(people) > 1 else ""
+    options.note(
+        f"{output}: {len(recording.times)} frames, the face is in {recording.seen.mean():.0%}{others}"
+    )
+    return FORMATS[output.suffix.lower()](recording, output.stem), recording.fps, recording.faps, mask()
+
+
+def _follow(source: Path, fps: float | None) -> tuple[list[float], list[Person]]:
+    """Return the times of all pictures, and the people in them."""
+    from realizer.tracking.follower import follow
+    from realizer.tracking.network import TrackingError
+    from realizer.tracking.pictures import read_pictures
+
+    count, pictures = read_pictures(source, fps or 25.0)
+    bar = click.progressbar(
+        pictures,
+        length=count or None,
+        label="tracking",
+        file=sys.stderr,
+        hidden=options.is_quiet() or count == 1,
+    )
+    with bar as shown:
+        times, people = follow(shown)
+    if not people:
+        raise TrackingError(
+            f"{source}: wanted a face, found none in {len(times)} picture{'s' * (len(times) != 1)}; it must "
+            "be seen from the front or a little from the side, and fill at least a tenth of the height"
+        )
+    return times, people
+
+
+def _neutral(neutral: str, person: Person) -> Person:
+    """Return the person at rest: a picture of a film by its number, or a file."""
+    from realizer.tracking.follower import Person
+
+    if neutral.isdecimal():
+        if int(neutral) not in person.frames:
+            raise click.BadParameter(f"the face is not in picture {neutral}", param_hint="--neutral")
+        return Person([0], [person.faces[person.frames.index(int(neutral))]])
+    if not Path(neutral).is_file():
+        raise click.BadParameter(
+            f"wanted the number of a picture, or a file, got {neutral!r}", param_hint="--neutral"
+        )
+    return _follow(Path(neutral), None)[1][0]
 
 
 def _fapu(rest: dict[str, Float64], where: str) -> Fapu:

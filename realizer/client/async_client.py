@@ -144,9 +144,8 @@ class Client:
         if not condition():
             self._check()
 
-    @contextlib.asynccontextmanager
-    async def speech(self, id: str, **opening: Any) -> AsyncIterator[Speech]:
-        """Open a speech whose text is streamed: `async with client.speech("s") as speech`.
+    def speech(self, id: str, **opening: Any) -> Speech:
+        """Return a speech whose text is streamed: `async with client.speech("s") as speech`.
 
         Leaving the block closes the speech without waiting for its end; an exception stops it.
 
@@ -154,16 +153,9 @@ class Client:
             id: id of the speech and of its block; other blocks refer to a sync of its text as `ID:ID:sync`.
             opening: composition, character and language, as in the message `speech`.
         """
-        speech = Speech(id, self.control, self.wait_for, self._check, opening)
+        speech = Speech(id, opening, self.control, self.wait_for, self._check)
         self._router.add_listener(speech.progress)
-        try:
-            yield speech
-        except BaseException:
-            with contextlib.suppress(Exception):  # keep the first exception
-                await speech.stop()
-                await speech.close()
-            raise
-        await speech.close()
+        return speech
 
     def voice(self, *, rate: int, language: str | None = None, **opening: Unpack[SpeechOptions]) -> Voice:
         """Return a speech whose sound is sent as it comes: write(pcm), words([...]), close(), ended().

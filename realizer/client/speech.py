@@ -2,8 +2,9 @@
 
 import asyncio
 import contextlib
-from collections.abc import Awaitable, Callable
-from typing import Any
+from abc import ABC, abstractmethod
+from collections.abc import Awaitable, Callable, Mapping
+from typing import Any, Self
 
 from bml_schema.feedback import BlockProgress, Feedback, SyncPointProgress, WarningFeedback
 from realizer.client.message_router import ClientError
@@ -81,33 +82,95 @@ class SpeechProgress:
         return self.end
 
 
-class Speech:
-    """A speech over an open connection, which `Client.speech` returns.
+class OpenSpeech(ABC):
+    """A speech that is sent in parts over an open connection.
+
+    `async with` closes it at its end, and stops it after an exception.
 
     Args:
+        opening: fields of the first message.
         control: sends a control message.
         wait: waits until a condition holds.
-        check: raises ClientError if the connection has ended.
-        opening: fields of the first message.
+
+    Attributes:
+        id: of the speech, and of its block.
     """
 
     def __init__(
         self,
         id: str,
+        opening: Mapping[str, Any],
         control: Callable[..., Awaitable[None]],
         wait: Callable[[Callable[[], bool]], Awaitable[None]],
-        check: Callable[[], None],
-        opening: dict[str, Any],
     ) -> None:
         self.id = id
         self.progress = SpeechProgress(id)
+        self._opening = dict(opening)
         self._control = control
         self._wait = wait
-        self._check = check
-        self._opening = opening
-        self._unsent = ""
         self._closed = False
         self._sending = asyncio.Lock()
+
+    @abstractmethod
+    async def close(self) -> None:
+        """End the speech: what was sent is spoken. Closing again does nothing.
+
+        Raises:
+            ClientError: the connection has ended.
+        """
+
+    async def stop(self) -> None:
+        """Stop speaking at once."""
+        await self._control("stop", blocks=[self.id])
+
+    async def ended(self) -> BlockProgress:
+        """Wait for the end of the speech; if it was cut off, `said` are the words that were spoken.
+
+        Raises:
+            ClientError: the speech was refused, or the connection has ended.
+        """
+        await self._wait(lambda: self.progress.is_finished)
+        return self.progress.result()
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None:
+            await self.close()
+            return
+        with contextlib.suppress(Exception):  # keep the first exception
+            await self.stop()
+            await self.close()
+
+    async def _speech(self, **fields: Any) -> None:
+        opening, self._opening = self._opening, {}
+        await self._control("speech", id=self.id, **opening, **fields)
+
+    def _check_open(self) -> None:
+        self.progress.check()
+        if self._closed:
+            raise ClientError(f"the speech {self.id} was closed: nothing can follow", "refused")
+
+
+class Speech(OpenSpeech):
+    """A speech whose text is sent as it comes, which `Client.speech` returns.
+
+    Args:
+        check: raises ClientError if the connection has ended.
+    """
+
+    def __init__(
+        self,
+        id: str,
+        opening: Mapping[str, Any],
+        control: Callable[..., Awaitable[None]],
+        wait: Callable[[Callable[[], bool]], Awaitable[None]],
+        check: Callable[[], None],
+    ) -> None:
+        super().__init__(id, opening, control, wait)
+        self._check = check
+        self._unsent = ""
         self._pausing: asyncio.Task[None] | None = None
 
     async def append(self, text: str) -> None:
@@ -119,21 +182,14 @@ class Speech:
             ClientError: the speech was closed, by this client or by the service when another connection that
                 it came by ended; or this connection has ended.
         """
-        self.progress.check()
+        self._check_open()
         self._check()  # text that waits to be sent would get lost
-        if self._closed:
-            raise ClientError(f"the speech {self.id} was closed: nothing can follow", "refused")
         self._unsent += text
         if self._pausing is None or self._pausing.done():
             await self._flush()
             self._pausing = asyncio.create_task(self._pause())
 
     async def close(self) -> None:
-        """Close the speech: the rest of the text is spoken. Closing again does nothing.
-
-        Raises:
-            ClientError: the connection has ended.
-        """
         if self._closed:
             return
         self._closed = True
@@ -141,9 +197,8 @@ class Speech:
             await self._flush(close=True)
 
     async def stop(self) -> None:
-        """Stop speaking at once."""
         self._unsent = ""
-        await self._control("stop", blocks=[self.id])
+        await super().stop()
 
     async def until(self, sync: str) -> float:
         """Wait until a sync of the text is spoken, and return when, in seconds on the session clock.
@@ -154,23 +209,14 @@ class Speech:
         await self._wait(lambda: sync in self.progress.points or self.progress.is_finished)
         return self.progress.point(sync)
 
-    async def ended(self) -> BlockProgress:
-        """Wait for the end of the speech; if it was cut off, `said` are the words that were spoken.
-
-        Raises:
-            ClientError: the speech was refused, or the connection has ended.
-        """
-        await self._wait(lambda: self.progress.is_finished)
-        return self.progress.result()
-
     async def _flush(self, *, close: bool = False) -> None:
         async with self._sending:  # in order: a text may take several messages
             text, self._unsent = self._unsent, ""
             least = 0 if close else 1  # an empty text begins a speech too
             for at in range(0, max(least, len(text)), LONGEST):
-                await self._send(append=text[at : at + LONGEST])
+                await self._speech(append=text[at : at + LONGEST])
             if close:
-                await self._send(close=True)
+                await self._speech(close=True)
 
     async def _pause(self) -> None:
         """Send appended text after a pause; if the connection ends, the methods that wait raise."""
@@ -179,7 +225,3 @@ class Speech:
             while self._unsent:
                 await self._flush()
                 await asyncio.sleep(PAUSE)
-
-    async def _send(self, **fields: Any) -> None:
-        opening, self._opening = self._opening, {}
-        await self._control("speech", id=self.id, **fields, **opening)

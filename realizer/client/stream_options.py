@@ -1,4 +1,4 @@
-"""The options of the streams of a client, as keyword arguments."""
+"""Options of the streams and speeches of a client; the service chooses what is left out."""
 
 from __future__ import annotations
 
@@ -6,26 +6,14 @@ from typing import Literal, TypedDict
 
 
 class FrameOptions(TypedDict, total=False):
-    """Options of streams of frames.
-
-    Attributes:
-        fps: frames a second; default: the service's rate.
-        character: id of a character; default: the first.
-    """
+    """Frames a second, and the id of a character."""
 
     fps: float
     character: str
 
 
 class PictureOptions(FrameOptions, total=False):
-    """Options of pictures.
-
-    Attributes:
-        size: width and height.
-        camera, light, background: names; default: the service's.
-        format: of the pictures; jpeg, if there is none.
-        quality: 1..100, of JPEG and WebP.
-    """
+    """How pictures are drawn and encoded: width and height, names of camera, light and background."""
 
     size: tuple[int, int]
     camera: str
@@ -36,24 +24,14 @@ class PictureOptions(FrameOptions, total=False):
 
 
 class SoundOptions(TypedDict, total=False):
-    """Options of sound.
-
-    Attributes:
-        rate: samples a second.
-        character: id of a character; default: the first.
-    """
+    """Samples a second, and the id of a character."""
 
     rate: int
     character: str
 
 
 class SpeechOptions(TypedDict, total=False):
-    """Options of a speech.
-
-    Attributes:
-        character: id of a character; default: the first.
-        composition: of its block; APPEND, if there is none.
-    """
+    """The id of a character, and the composition of the block; APPEND by default."""
 
     character: str
     composition: Literal["MERGE", "APPEND", "REPLACE"]

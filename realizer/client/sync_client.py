@@ -4,12 +4,12 @@ import asyncio
 import functools
 import threading
 from collections.abc import AsyncGenerator, AsyncIterator, Callable, Coroutine, Iterator, Mapping
-from contextlib import AbstractAsyncContextManager, contextmanager
+from contextlib import AbstractAsyncContextManager
 from typing import Any, Concatenate, Generic, ParamSpec, Self, TypeVar, Unpack
 
 from realizer.client.async_client import Client
 from realizer.client.message_router import ClientError
-from realizer.client.speech import Speech
+from realizer.client.speech import OpenSpeech, Speech
 from realizer.client.stream_options import SpeechOptions
 from realizer.client.voice import Voice
 
@@ -76,7 +76,8 @@ def waiting(
     """Return a method that waits for the result of the original's."""
 
     def call(self: Synchronous[A], /, *args: P.args, **kwargs: P.kwargs) -> T:
-        return self._thread.do(method(self._original, *args, **kwargs))
+        work: Coroutine[Any, Any, T] = getattr(self._original, method.__name__)(*args, **kwargs)
+        return self._thread.do(work)
 
     functools.update_wrapper(call, method)
     return call
@@ -88,34 +89,22 @@ def iterating(
     """Return a method that waits for each item of the original's."""
 
     def call(self: Synchronous[A], /, *args: P.args, **kwargs: P.kwargs) -> Iterator[T]:
-        return self._thread.each(method(self._original, *args, **kwargs))
+        items: AsyncIterator[T] = getattr(self._original, method.__name__)(*args, **kwargs)
+        return self._thread.each(items)
 
     functools.update_wrapper(call, method)
     return call
 
 
-class SyncSpeech(Synchronous[Speech]):
-    """A `Speech` for programs without an event loop, which `SyncClient.speech` returns."""
-
-    append = waiting(Speech.append)
-    close = waiting(Speech.close)
-    stop = waiting(Speech.stop)
-    until = waiting(Speech.until)
-    ended = waiting(Speech.ended)
-
-    @property
-    def id(self) -> str:
-        return self._original.id
+S = TypeVar("S", bound=OpenSpeech)
 
 
-class SyncVoice(Synchronous[Voice]):
-    """A `Voice` for programs without an event loop, which `SyncClient.voice` returns."""
+class SyncOpenSpeech(Synchronous[S]):
+    """An `OpenSpeech` for programs without an event loop: `with` closes it at its end."""
 
-    write = waiting(Voice.write)
-    words = waiting(Voice.words)
-    close = waiting(Voice.close)
-    stop = waiting(Voice.stop)
-    ended = waiting(Voice.ended)
+    close = waiting(OpenSpeech.close)
+    stop = waiting(OpenSpeech.stop)
+    ended = waiting(OpenSpeech.ended)
 
     @property
     def id(self) -> str:
@@ -126,6 +115,20 @@ class SyncVoice(Synchronous[Voice]):
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self._thread.do(self._original.__aexit__(kind))
+
+
+class SyncSpeech(SyncOpenSpeech[Speech]):
+    """A `Speech` for programs without an event loop, which `SyncClient.speech` returns."""
+
+    append = waiting(Speech.append)
+    until = waiting(Speech.until)
+
+
+class SyncVoice(SyncOpenSpeech[Voice]):
+    """A `Voice` for programs without an event loop, which `SyncClient.voice` returns."""
+
+    write = waiting(Voice.write)
+    words = waiting(Voice.words)
 
 
 class SyncClient(Synchronous[Client]):
@@ -181,17 +184,9 @@ class SyncClient(Synchronous[Client]):
         """Errors about messages that have no answer."""
         return self._original.errors
 
-    @contextmanager
-    def speech(self, id: str, **opening: Any) -> Iterator[SyncSpeech]:
-        """Open a speech whose text is streamed: `with client.speech("s") as speech`."""
-        manager = self._original.speech(id, **opening)
-        speech = SyncSpeech(self._thread.do(_enter(manager)), self._thread)
-        try:
-            yield speech
-        except BaseException as error:
-            self._thread.do(_exit(manager, error))
-            raise
-        self._thread.do(_exit(manager, None))
+    def speech(self, id: str, **opening: Any) -> SyncSpeech:
+        """Return a speech whose text is streamed: `with client.speech("s") as speech`."""
+        return SyncSpeech(self._original.speech(id, **opening), self._thread)
 
     def voice(self, *, rate: int, language: str | None = None, **opening: Unpack[SpeechOptions]) -> SyncVoice:
         """Return a speech whose sound is sent as it comes, as `Client.voice`."""

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
 import secrets
 import time
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
-from bml_schema.feedback import BlockProgress
-from realizer.client.message_router import ClientError
-from realizer.client.speech import SpeechProgress
+from realizer.client.speech import OpenSpeech
 from realizer.core.array_types import Float32, Float64, Int16
 from realizer.protocol.wire import ClipPiece, pack_clip
 
-# Sound without words is sent in pieces of this length; the first one starts the speech. They get longer if much
-# was sent ahead, which costs the service less.
+# Sound without words is sent in pieces of this length; the first one starts the speech. They get longer if
+# much was sent ahead, which costs the service less.
 PIECE, LONGEST_PIECE = 0.2, 2.0  # s
 LONGEST = 1 << 20  # bytes of one message
 # The sound of a last word, whose end is not known, waits at most so long for the next word.
@@ -28,20 +24,12 @@ Pcm = bytes | bytearray | memoryview | Int16 | Float32 | Float64
 Timed = tuple[float, str] | tuple[float, float, str]
 
 
-class Voice:
+class Voice(OpenSpeech):
     """A speech whose sound is sent as it comes, which `Client.voice` returns.
-
-    `async with` closes it at its end, and stops it after an exception.
 
     Args:
         rate: samples a second.
-        opening: composition, character and language, as in the message `speech`.
         send: sends bytes.
-        control: sends a control message.
-        wait: waits until a condition holds.
-
-    Attributes:
-        id: of the speech, and of its block.
     """
 
     def __init__(
@@ -52,18 +40,14 @@ class Voice:
         control: Callable[..., Awaitable[None]],
         wait: Callable[[Callable[[], bool]], Awaitable[None]],
     ) -> None:
-        self.id = f"say-{secrets.token_hex(4)}"
-        self.progress = SpeechProgress(self.id)
+        super().__init__(f"say-{secrets.token_hex(4)}", opening, control, wait)
         self._rate = checked_rate(rate)
-        self._opening = dict(opening)
-        self._send, self._control, self._wait = send, control, wait
+        self._send = send
         self._sound = np.zeros(0, np.int16)  # that is not sent
         self._sent = 0  # samples
         self._words: list[dict[str, Any]] = []  # those that are not sent; times from the start of the speech
         self._clips = 0
         self._began = 0.0  # when the first clip was sent, on a clock that never jumps
-        self._closed = False
-        self._sending = asyncio.Lock()
 
     async def write(self, pcm: Pcm) -> None:
         """Add mono sound, which is spoken at once: int16, or floats from -1 to 1.
@@ -101,11 +85,6 @@ class Voice:
         self._words += added
 
     async def close(self) -> None:
-        """End the speech: what was written is spoken. Closing again does nothing.
-
-        Raises:
-            ClientError: the connection has ended.
-        """
         if self._closed:
             return
         self._closed = True
@@ -115,29 +94,8 @@ class Voice:
             await self._speech(close=True)
 
     async def stop(self) -> None:
-        """Stop speaking at once."""
         self._sound = self._sound[:0]
-        await self._control("stop", blocks=[self.id])
-
-    async def ended(self) -> BlockProgress:
-        """Wait for the end; if the speech was cut off, `said` are the words that were heard.
-
-        Raises:
-            ClientError: the speech was refused, or the connection has ended.
-        """
-        await self._wait(lambda: self.progress.is_finished)
-        return self.progress.result()
-
-    async def __aenter__(self) -> Self:
-        return self
-
-    async def __aexit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is None:
-            await self.close()
-            return
-        with contextlib.suppress(Exception):  # keep the first exception
-            await self.stop()
-            await self.close()
+        await super().stop()
 
     async def clip(self, sound: bytes, rate: int, **description: Any) -> None:
         """Send a clip and append it to the speech.
@@ -178,15 +136,6 @@ class Voice:
             for word in inside
         ]
         await self.clip(sound.astype("<i2").tobytes(), self._rate, **({"words": words} if words else {}))
-
-    async def _speech(self, **fields: Any) -> None:
-        opening, self._opening = self._opening, {}
-        await self._control("speech", id=self.id, **opening, **fields)
-
-    def _check_open(self) -> None:
-        self.progress.check()
-        if self._closed:
-            raise ClientError(f"the speech {self.id} was closed: nothing can follow", "refused")
 
 
 def timed(name: str, items: Iterable[Timed]) -> list[dict[str, Any]]:

@@ -57,5 +57,5 @@ def agreement(true: Sequence[Segment], found: Sequence[Segment], frames: int) ->
         for one in some:
             side[names.index(one.text), one.first : one.last + 1] = True
     same = int((shown[0] == shown[1]).all(axis=0).sum())
-    met = sum(any(o.text == t.text and o.meets(t) for o in found) for t in true)
+    met = sum(any(o.text == t.text and o.gap(t) < 0 for o in found) for t in true)
     return same / max(frames, 1), met / max(len(true), 1)

@@ -7,7 +7,7 @@ import io
 import json
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -35,11 +35,7 @@ class CorpusError(TableError):
 
 @dataclass(frozen=True, slots=True)
 class Annotation:
-    """An expression or a word from `start` to `end` seconds, and who labelled or said it.
-
-    Raises:
-        CorpusError: times that are not in order, or no text.
-    """
+    """An expression or a word from `start` to `end` seconds, and who labelled or said it."""
 
     start: float
     end: float
@@ -48,7 +44,7 @@ class Annotation:
 
     def __post_init__(self) -> None:
         if not (0 <= self.start <= self.end < MAX_FRAMES and self.text):
-            raise CorpusError(f"wanted a text, a start and a later end in seconds; got {self}")
+            raise ValueError(f"a text, a start and a later end in seconds are wanted, not {self}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,9 +63,9 @@ class Segment:
         """Return it in seconds."""
         return Annotation(self.first / fps, (self.last + 1) / fps, self.text, self.by)
 
-    def meets(self, other: Segment) -> bool:
-        """Return whether both share a frame."""
-        return self.first <= other.last and other.first <= self.last
+    def gap(self, other: Segment) -> int:
+        """Return the frames between both, 0 if they adjoin, less if they share frames (eq. 6.12)."""
+        return max(self.first - other.last, other.first - self.last) - 1
 
 
 @dataclass(frozen=True)
@@ -100,9 +96,13 @@ class Recording:
     def frames(self) -> int:
         """The number of frames: of the FAPs or points, or at least to the last label or word."""
         last = max((one.end for one in (*self.labels, *self.words)), default=0.0)
-        known = [len(self.faps)] if self.faps is not None else []
-        known += [len(self.points[1])] if self.points is not None else []
+        parts = self.faps, self.points and self.points[1]
+        known = [len(part) for part in parts if part is not None]
         return max([*known, int(self.meta.get("frames", 0)), math.ceil(last * self.fps - 1e-6)])
+
+    @property
+    def has_frames(self) -> bool:
+        return self.faps is not None or self.points is not None
 
     @property
     def annotators(self) -> list[str]:
@@ -117,9 +117,7 @@ class Recording:
     def spoken(self) -> list[Segment]:
         """The words in frames; `by` is "subject" if the recorded person speaks, else "other"."""
         own = {SUBJECT, "", self.meta.get("person", SUBJECT)}
-        return self._in_frames(
-            replace(word, by=SUBJECT if word.by in own else "other") for word in self.words
-        )
+        return self._in_frames(replace(one, by=SUBJECT if one.by in own else "other") for one in self.words)
 
     def _in_frames(self, spans: Iterable[Annotation]) -> list[Segment]:
         starts = ((round(span.start * self.fps), span) for span in spans)
@@ -128,41 +126,41 @@ class Recording:
 
 
 def read_corpus(folder: Path) -> list[Recording]:
-    """Return the recordings of a corpus by name.
-
-    Raises:
-        CorpusError: no corpus, no recordings, or a file that cannot be used.
-    """
+    """Return the recordings of a corpus by name; raises CorpusError."""
     if not (folder / CORPUS).is_file():
         raise CorpusError(f"{folder}: wanted a corpus, got no {CORPUS}; make one by `realizer corpus init`")
     parts = (META, LABELS, WORDS, FAPS, POINTS)
     paths = [path for path in sorted(folder.iterdir()) if any((path / name).exists() for name in parts)]
     if not paths:
         raise CorpusError(f"{folder}: wanted a recording or more, got none; see `realizer corpus add`")
-    return [read_recording(path) for path in paths if path.name != "report"]
+    return [read_recording(path) for path in paths]
 
 
 def read_recording(folder: Path) -> Recording:
-    """Return the recording in a folder; errors as for `read_corpus`."""
-    path = folder / META
-    if not path.is_file():
+    """Return the recording in a folder; raises CorpusError."""
+    if not (folder / META).is_file():
         raise CorpusError(f"{folder}: wanted {META}, got none; it is half written, add it again")
+    path = folder / META
     try:
-        meta = parse_toml(read_text(path))
-        fps, frames = float(meta.get("fps", 25.0)), int(meta.get("frames", 0))
-    except (TypeError, ValueError) as error:
-        raise CorpusError(f"{path}: wanted TOML with numbers fps and frames, got: {error}") from None
-    if unknown := sorted(meta.keys() - {*FACTS, "fps", "frames"}):
-        raise CorpusError(f"{path}: wanted {', '.join(FACTS)}, fps, frames; got {unknown[0]}")
-    if not 0 < fps <= 1000 or not 0 <= frames <= MAX_FRAMES:
-        raise CorpusError(f"{path}: wanted fps up to 1000 and up to {MAX_FRAMES} frames, got {fps}, {frames}")
-    labels, words = (
-        read_annotations(read_text(folder / name), folder / name) if (folder / name).is_file() else ()
-        for name in COLUMNS
-    )
-    values = read_faps(read_text(folder / FAPS), folder / FAPS)[0] if (folder / FAPS).is_file() else None
-    points = _read_points(folder / POINTS) if (folder / POINTS).is_file() else None
-    return Recording(folder.name, meta, labels, words, values, points)
+        meta = parse_toml(path.read_text("utf-8"))
+        if unknown := sorted(meta.keys() - {*FACTS, "fps", "frames"}):
+            raise ValueError(f"{unknown[0]} is none of {', '.join(FACTS)}, fps, frames")
+        if not (0 < meta.get("fps", 25.0) <= 1000 and 0 <= meta.get("frames", 0) <= MAX_FRAMES):
+            raise ValueError(f"fps up to 1000 and up to {MAX_FRAMES} frames are wanted")
+        spans = {}
+        for name in COLUMNS:
+            if (path := folder / name).is_file():
+                spans[name] = read_annotations(path.read_text("utf-8"))
+        values = points = None
+        if (path := folder / FAPS).is_file():
+            values = read_faps(path.read_text("utf-8"))[0]
+        if (path := folder / POINTS).is_file():
+            with np.load(path, allow_pickle=False) as data:
+                names, places = tuple(map(str, data["names"])), np.asarray(data["points"], np.float64)
+            points = names, places.reshape(len(places), len(names), 3)
+    except (OSError, ValueError, TypeError, KeyError, EOFError) as error:
+        raise CorpusError(f"{path}: wanted a file of a recording, got: {error}; add it again") from None
+    return Recording(folder.name, meta, spans.get(LABELS, ()), spans.get(WORDS, ()), values, points)
 
 
 def write_recording(folder: Path, recording: Recording) -> None:
@@ -170,84 +168,63 @@ def write_recording(folder: Path, recording: Recording) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name, spans in ((LABELS, recording.labels), (WORDS, recording.words)):
         if spans:
-            write_text(folder / name, annotations_text(name, spans))
+            write_text(folder / name, csv_text(COLUMNS[name], map(astuple, spans)))
     if recording.faps is not None:
         rows = (
-            [f"{k / recording.fps:.4f}", *(f"{value:.6g}" for value in row)]
-            for k, row in enumerate(recording.faps.tolist())
+            [f"{k / recording.fps:.4f}", *map("{:.6g}".format, row)] for k, row in enumerate(recording.faps)
         )
         write_text(folder / FAPS, csv_text(["time", *(row.name for row in faps())], rows))
     if recording.points is not None:
-        names, places = recording.points
         with replacing(folder / POINTS) as path, path.open("wb") as file:
-            np.savez_compressed(file, names=np.array(names), points=places.astype(np.float32))
+            np.savez_compressed(file, names=np.array(recording.points[0]), points=recording.points[1])
     meta = {**recording.meta, "fps": recording.fps, "frames": recording.frames}
     lines = [f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in meta.items()]
     write_text(folder / META, "".join(lines))
 
 
-def annotations_text(name: str, spans: Iterable[Annotation]) -> str:
-    """Return labels or words as CSV."""
-    return csv_text(COLUMNS[name], ((f"{s.start:.4f}", f"{s.end:.4f}", s.text, s.by) for s in spans))
-
-
-def read_annotations(text: str, path: Path) -> tuple[Annotation, ...]:
-    """Parse labels or words in CSV; raises CorpusError for other columns, or an invalid row."""
+def read_annotations(text: str) -> tuple[Annotation, ...]:
+    """Parse labels or words in CSV; raises ValueError."""
     head, *rows = list(csv.reader(io.StringIO(text))) or [[]]
     if head not in COLUMNS.values():
-        wanted = " or ".join(",".join(columns) for columns in COLUMNS.values())
-        raise CorpusError(f"{path}: wanted the columns {wanted}, got {','.join(head)[:80]}")
+        raise ValueError(f"columns {','.join(head)[:80]}, not {','.join(COLUMNS[LABELS])}")
     found = []
     for number, row in enumerate(rows, 2):
         try:
             start, end, what, by = (cell.strip() for cell in row)
             found.append(Annotation(float(start), float(end), what, by))
-        except (ValueError, CorpusError):
-            raise CorpusError(
-                f"{path}, line {number}: wanted {','.join(head)} with times in order, got {row}"
-            ) from None
+        except ValueError as error:
+            raise ValueError(f"line {number}: {error}") from None
     return tuple(found)
 
 
-def read_faps(text: str, path: Path) -> tuple[Float64, float]:
-    """Return the FAPs (n, 68) of a CSV with the columns time and names of FAPs, and the frame rate.
+def read_faps(text: str) -> tuple[Float64, float]:
+    """Return the FAPs (n, 68) of a CSV with time and names of FAPs, and its rate; raises ValueError."""
+    columns = numbers(text)
+    places = [row.fap - 1 for row in faps() if row.name in columns]
+    if "time" not in columns or not places:
+        raise ValueError("no column time, or no columns named as FAPs")
+    values = np.zeros((len(columns["time"]), 68))
+    values[:, places] = np.stack([columns[faps()[place].name] for place in places], axis=1)
+    if not np.isfinite(values).all() or not 0 < len(values) <= MAX_FRAMES:
+        raise ValueError(f"values that are not finite, none, or more than {MAX_FRAMES}")
+    return values, rate_of(columns["time"])
 
-    Raises:
-        CorpusError: other columns, or values that are not finite.
-    """
-    head, *rows = list(csv.reader(io.StringIO(text))) or [[]]
-    places = {head.index(row.name): row.fap - 1 for row in faps() if row.name in head}
-    if "time" not in head or not places or not rows:
-        raise CorpusError(f"{path}: wanted a column time, columns named as FAPs, and rows; got {head[:5]}")
-    try:
-        cells = np.array([[float(cell) for cell in row] for row in rows]).reshape(len(rows), len(head))
-    except ValueError as error:
-        raise CorpusError(f"{path}: wanted numbers, as many in each row; got: {error}") from None
-    if not np.isfinite(cells).all() or len(cells) > MAX_FRAMES:
-        raise CorpusError(f"{path}: wanted finite values of up to {MAX_FRAMES} frames, got others")
-    values = np.zeros((len(cells), 68))
-    values[:, list(places.values())] = cells[:, list(places)]
-    return values, rate_of(cells[:, head.index("time")])
+
+def numbers(text: str) -> dict[str, Float64]:
+    """Return the columns of a CSV; cells that are no numbers are NaN."""
+
+    def number(cell: str) -> float:
+        try:
+            return float(cell)
+        except ValueError:
+            return math.nan
+
+    head, *rows = list(csv.reader(io.StringIO(text), skipinitialspace=True)) or [[]]
+    table = np.array([[number(cell) for cell in row] for row in rows]).reshape(len(rows), len(head))
+    return {name: table[:, k] for k, name in enumerate(head)}
 
 
 def rate_of(times: Float64) -> float:
     """Return the frames per second of times in seconds; 25 if they do not tell."""
     usual = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
     return round(1 / usual, 3) if usual > 0 else 25.0
-
-
-def read_text(path: Path) -> str:
-    """Return a text in UTF-8; raises CorpusError."""
-    try:
-        return path.read_text("utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise CorpusError(f"{path}: wanted a text in UTF-8, got: {error}") from None
-
-
-def _read_points(path: Path) -> tuple[tuple[str, ...], Float64]:
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            names, places = tuple(map(str, data["names"])), np.asarray(data["points"], np.float64)
-        return names, places.reshape(len(places), len(names), 3)
-    except (OSError, ValueError, KeyError, EOFError) as error:
-        raise CorpusError(f"{path}: wanted arrays names and points, got: {error}; add it again") from None

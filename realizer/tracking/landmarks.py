@@ -1,26 +1,28 @@
-"""468 landmarks of a face, with depth, and its irises."""
+"""468 landmarks of a face with depth, and the contours of its eyes."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from realizer.core.array_types import Float64
+from realizer.core.array_types import Float32, Float64
 from realizer.tracking.network import network
 from realizer.tracking.region import Region
 
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-MODEL, IRIS_MODEL = "face_landmark", "iris_landmark"
+MODEL, EYE_MODEL = "face_landmark", "iris_landmark"
 COUNT = 468
-POINTS, PRESENCE, IRISES = "conv2d_21", "conv2d_31", "output_iris"
+POINTS, PRESENCE, TRAITS = "conv2d_21", "conv2d_31", "p_re_lu_17"
+CONTOUR, IRIS = "output_eyes_contours_and_brows", "output_iris"
+IRIS_MIDDLE = 71  # row of `Landmarks.eyes`
 MIN_PRESENCE = 0.5
-# Corners of the eyes in the order of the picture, of someone who faces it: right eye outer and inner, left
-# eye inner and outer.
+# Corners of the eyes from left to right in the picture of someone who faces it: right eye outer and inner,
+# left eye inner and outer.
 RIGHT_EYE, LEFT_EYE = (33, 133), (362, 263)
 MARGIN, EYE_MARGIN = 1.5, 2.3  # of a region, relative to the points
 
@@ -32,32 +34,58 @@ class Landmarks:
     Attributes:
         points: (468, 3) pixels: x right, y down, and depth away from the camera.
         presence: 0..1, how likely there is a face.
+        traits: (1152,) what the last layer before the points says; it also tells of wrinkles and teeth.
+        eyes: (2, 76, 2) points of the left and the right eye: 71 of contour and brow, 5 of the iris. They are
+            in the square around the eye, 0..1, mirrored for the left one.
     """
 
     points: Float64
     presence: float
+    traits: Float32
+    eyes: Float32
 
     @property
     def region(self) -> Region:
         """The region in which the face of the next picture is looked for."""
-        return Region.around(self.points[:, :2], self.points[RIGHT_EYE[0]], self.points[LEFT_EYE[1]], MARGIN)
+        return face_region(self.points)
+
+    @property
+    def irises(self) -> Float64:
+        """The middles of the irises (2, 2) in pixels, of the left and the right eye."""
+        squares = (eye_region(self.points, corners) for corners in (LEFT_EYE, RIGHT_EYE))
+        both = zip(squares, self.eyes, strict=True)
+        return np.array([square.place(eye[[IRIS_MIDDLE]])[0] for square, eye in both])
 
 
-def landmarks(picture: Image, region: Region) -> Landmarks:
-    """Return the landmarks of the face in a region of a picture."""
-    model = network(MODEL)
+def face_region(points: Float64) -> Region:
+    """Return the region around the landmarks (468, 3) of a face."""
+    return Region.around(points[:, :2], points[RIGHT_EYE[0]], points[LEFT_EYE[1]], MARGIN)
+
+
+def eye_region(points: Float64, corners: tuple[int, int]) -> Region:
+    """Return the square around an eye between two landmarks; that of the left eye is mirrored."""
+    first, last = points[list(corners), :2]
+    return replace(Region.around([first, last], first, last, EYE_MARGIN), mirrored=corners == LEFT_EYE)
+
+
+def landmarks(picture: Image, region: Region, refine: bool = False) -> Landmarks:
+    """Return the landmarks of the face in a region of a picture.
+
+    Args:
+        refine: look again in the region of the landmarks, as that of a detector is not as good.
+    """
+    model = network(MODEL, TRAITS)
     outputs = model(region.cut(picture, model.size))
     points = region.place(outputs[POINTS].reshape(COUNT, 3) / model.size)
-    return Landmarks(points, 1 / (1 + math.exp(-float(np.clip(outputs[PRESENCE].item(), -50, 50)))))
+    presence = 1 / (1 + math.exp(-float(np.clip(outputs[PRESENCE].item(), -50, 50))))
+    if refine and presence >= MIN_PRESENCE:
+        return landmarks(picture, face_region(points))
+    eyes = np.stack([_eye(picture, eye_region(points, corners)) for corners in (LEFT_EYE, RIGHT_EYE)])
+    return Landmarks(points, presence, outputs[TRAITS].ravel().copy(), eyes)
 
 
-def irises(picture: Image, face: Landmarks) -> Float64:
-    """Return the middles of the irises (2, 2) in pixels, of the left and the right eye."""
-    model, middles = network(IRIS_MODEL), []
-    for (first, last), mirrored in ((LEFT_EYE, True), (RIGHT_EYE, False)):
-        corners = face.points[[first, last], :2]
-        around = Region.around(corners, corners[0], corners[1], EYE_MARGIN)
-        eye = Region(around.x, around.y, around.side, around.angle, mirrored)
-        iris = model(eye.cut(picture, model.size))[IRISES].reshape(5, 3)
-        middles.append(eye.place(iris[:1] / model.size)[0, :2])
-    return np.array(middles)
+def _eye(picture: Image, region: Region) -> Float32:
+    model = network(EYE_MODEL)
+    outputs = model(region.cut(picture, model.size))
+    rows = np.concatenate([outputs[name].reshape(-1, 3)[:, :2] for name in (CONTOUR, IRIS)])
+    return np.asarray(rows / model.size, np.float32)

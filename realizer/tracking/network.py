@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import warnings
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,28 +25,34 @@ class TrackingError(RealizerError):
 
 
 class Network:
-    """A network of one picture.
+    """A network of one picture; what its inner layers say can be read, too.
 
     Attributes:
         size: width and height of the pictures it takes, in pixels.
     """
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, inner: tuple[str, ...] = ()) -> None:
         """
         Args:
             name: the file in `models` without its suffix.
+            inner: names of tensors that are wanted beside the outputs.
 
         Raises:
-            TrackingError: ai-edge-litert is not installed.
+            RealizerError: ai-edge-litert is not installed.
         """
         if importlib.util.find_spec("ai_edge_litert") is None:
-            raise TrackingError(INSTALL)
+            raise RealizerError(INSTALL)
         from ai_edge_litert.interpreter import Interpreter
 
-        self._run: Any = Interpreter(str(FOLDER / f"{name}.tflite"), num_threads=1)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # it says that reading inner layers takes memory
+            self._run: Any = Interpreter(
+                str(FOLDER / f"{name}.tflite"), num_threads=1, experimental_preserve_all_tensors=bool(inner)
+            )
         self._run.allocate_tensors()
         self._input = self._run.get_input_details()[0]["index"]
         self._outputs = {row["name"]: row["index"] for row in self._run.get_output_details()}
+        self._outputs |= {r["name"]: r["index"] for r in self._run.get_tensor_details() if r["name"] in inner}
         self.size = int(self._run.get_input_details()[0]["shape"][1])
 
     def __call__(self, picture: Image, low: float = 0.0) -> dict[str, Float32]:
@@ -57,6 +64,6 @@ class Network:
 
 
 @cache
-def network(name: str) -> Network:
+def network(name: str, *inner: str) -> Network:
     """Return the network of that name; it is loaded once."""
-    return Network(name)
+    return Network(name, inner)

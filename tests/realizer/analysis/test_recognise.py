@@ -116,6 +116,7 @@ def test_intervals_have_times_and_certainties() -> None:
     assert [a.end for a in found[:-1]] == [b.start for b in found[1:]]
     assert found[-1].end == 4
     assert found[-1].certainty > 0.9
+    assert recogniser().intervals(frames[19:], 20)[0].emotion == "joy"
     assert abs(next(i.start for i in found if i.emotion == "fear") - 2.5) <= 0.15
     assert recogniser().intervals(frames[:1], 20)[0].emotion == "neutral"
 

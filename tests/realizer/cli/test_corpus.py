@@ -61,7 +61,7 @@ def test_corpus_refuses_what_is_none(tmp_path: Path) -> None:
         (["corpus", "init", folder], "wanted a new folder, got a corpus"),
         (["corpus", "add", tmp_path, "x"], "wanted a corpus; make one by"),
         (["corpus", "add", folder, "../x"], "wanted a name without /"),
-        (["corpus", "add", folder, "x", tmp_path / "x.csv"], "x.csv: wanted a column time"),
+        (["corpus", "add", folder, "x", tmp_path / "x.csv"], "x.csv: wanted a file of one of the formats"),
         (["corpus", "learn", folder], "wanted a recording or more, got none"),
         (["corpus", "find", folder], "wanted a map, got"),
         (["enrich", "hi", "--knowledge", folder], "knowledge.toml: wanted rules"),

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import csv
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from PIL import Image
 
+from realizer import realize
 from realizer.analysis.faps_from_mesh import points_of
 from realizer.animation.fap.fap_reader import read_fap
 from realizer.cli import cli
 from realizer.emotions.archetypes import archetypes
 from realizer.face.deform import deform
 from realizer.face.load import load_face
+from tests.portraits import LITERT, faps_of, portrait
 
 
 def run(*args: str) -> Result:
@@ -38,11 +43,11 @@ def acted(path: Path, leave_out: tuple[str, ...] = ()) -> np.ndarray:
 def test_track_writes_a_fap_file_and_names_the_emotion(tmp_path: Path) -> None:
     frames = acted(tmp_path / "actor.csv")
     done = run(
-        str(tmp_path / "actor.csv"), "--fps", "30", "-o", str(tmp_path / "a.fap"), "--profiles", "published"
+        str(tmp_path / "actor.csv"), "--fps", "5", "-o", str(tmp_path / "a.fap"), "--profiles", "published"
     )
     assert done.exit_code == 0, done.output
     clip = read_fap((tmp_path / "a.fap").read_text())
-    assert (clip.fps, len(clip.values)) == (30, 6)
+    assert (clip.fps, len(clip.values)) == (5, 6)
     moved = [19, 20, 21, 22, 31, 32]
     # Frame 3 was lost, and lies between its neighbours.
     assert np.abs(clip.values[:, [n - 1 for n in moved]] - frames[:, [n - 1 for n in moved]]).max() <= 2
@@ -51,11 +56,20 @@ def test_track_writes_a_fap_file_and_names_the_emotion(tmp_path: Path) -> None:
     assert done.stdout.splitlines()[-1].split()[2] == "sadness"
 
 
+def test_track_names_emotions_by_a_profile_file(tmp_path: Path) -> None:
+    acted(tmp_path / "actor.csv")
+    profile = archetypes("published")["sadness"][0]
+    (tmp_path / "mine.txt").write_text(f"Gloom 0\n{profile}\n")
+    options = ["--fps", "5", "-o", str(tmp_path / "a.fap"), "--profiles", str(tmp_path / "mine.txt")]
+    done = run(str(tmp_path / "actor.csv"), *options)
+    assert done.stdout.splitlines()[-1].split()[2] == "gloom", done.output
+
+
 @pytest.mark.parametrize(
     ("leave_out", "output", "said"),
     [
         (("9.15",), "a.fap", "wanted point 9.15 in frame 0, to measure the face's proportions"),
-        ((), "a.csv", "a.csv: wanted a name that ends in .fap"),
+        ((), "a.png", "a.png: wanted a name that ends in .fap"),
     ],
 )
 def test_track_refuses_missing_points_and_other_suffixes(
@@ -83,3 +97,106 @@ def test_track_refuses_other_encodings_but_takes_a_byte_order_mark(tmp_path: Pat
     acted(table)
     table.write_bytes(b"\xef\xbb\xbf" + table.read_bytes())
     assert run(str(table), "-o", str(tmp_path / "a.fap")).exit_code == 0
+
+
+@pytest.fixture(scope="module")
+def smile(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A film of somebody who begins to smile."""
+    av = pytest.importorskip("av", reason="needs the film extra")
+    path = tmp_path_factory.mktemp("film") / "smile.mp4"
+    with av.open(str(path), "w") as file:
+        stream = file.add_stream("libx264", rate=10)
+        stream.width, stream.height, stream.pix_fmt = 320, 320, "yuv420p"
+        for strength in [0.0] * 5 + [0.9] * 7:
+            picture = portrait("ben", faps_of("ben", AU12=strength) if strength else None)
+            file.mux(stream.encode(av.VideoFrame.from_image(picture)))
+        file.mux(stream.encode())
+    return path
+
+
+def rows_of(path: Path) -> list[dict[str, float]]:
+    with path.open() as file:
+        return [{name: float(cell) for name, cell in row.items() if cell} for row in csv.DictReader(file)]
+
+
+@LITERT
+@pytest.mark.gl("onboard")
+def test_track_writes_the_action_units_of_a_film(smile: Path, tmp_path: Path) -> None:
+    done = run(str(smile), "-o", str(tmp_path / "smile.csv"))
+    assert done.exit_code == 0, done.output
+    rows = rows_of(tmp_path / "smile.csv")
+    assert [row["time"] for row in rows] == pytest.approx(np.arange(12) / 10)
+    assert rows[1]["AU12L"] < 0.2
+    assert rows[10]["AU12L"] > 0.5
+    assert max(rows[10]["AU4L"], rows[10]["AU15L"]) < 0.3
+    assert all(0 <= value <= 1 for row in rows for name, value in row.items() if name != "time")
+
+
+@LITERT
+@pytest.mark.gl("onboard")
+def test_track_writes_a_document_that_plays_the_film_again(smile: Path, tmp_path: Path) -> None:
+    for name in ("smile.bml", "smile.fap", "smile.json"):
+        assert run(str(smile), "-o", str(tmp_path / name)).exit_code == 0
+    clip = read_fap((tmp_path / "smile.fap").read_text())
+    again = realize((tmp_path / "smile.bml").read_text(), fps=10, idle=False)
+    assert again.warnings == ()
+    assert len(clip.values) == 12
+    assert again.faps.values[8, [11, 12]] == pytest.approx(clip.values[8, [11, 12]], abs=40)
+    assert clip.values[10, 11] > 150
+    content = json.loads((tmp_path / "smile.json").read_text())
+    assert content["fap"]["values"][10][11] == clip.values[10, 11]
+    assert content["frames"] == len(content["au"]["values"]) == 12
+
+
+@LITERT
+@pytest.mark.gl("onboard")
+def test_track_reads_a_picture_against_a_neutral_one(tmp_path: Path) -> None:
+    portrait("ada", faps_of("ada", AU4=0.9)).convert("L").save(tmp_path / "frown.png")
+    portrait("ada").save(tmp_path / "rest.png")
+    rest = ("--neutral", str(tmp_path / "rest.png"))
+    assert run(str(tmp_path / "frown.png"), "-o", str(tmp_path / "x.csv"), *rest).exit_code == 0
+    (row,) = rows_of(tmp_path / "x.csv")
+    assert min(row["AU4L"], row["AU4R"]) > 0.4
+    assert max(row["AU12L"], row["AU2L"]) < 0.3
+
+
+@LITERT
+@pytest.mark.gl("onboard")
+def test_track_follows_one_of_two_people(tmp_path: Path) -> None:
+    both = Image.new("RGB", (640, 320))
+    both.paste(portrait("ada", faps_of("ada", AU12=1.0)), (0, 0))
+    both.paste(portrait("ben").resize((280, 280)), (330, 20))
+    both.save(tmp_path / "both.png")
+    units = []
+    for person in ("1", "2"):
+        done = run(str(tmp_path / "both.png"), "-o", str(tmp_path / "x.csv"), "--person", person)
+        assert "2 people" in done.stderr
+        units.append(rows_of(tmp_path / "x.csv")[0]["AU12L"])
+    assert units[0] > units[1] + 0.2
+    done = run(str(tmp_path / "both.png"), "-o", str(tmp_path / "x.csv"), "--person", "3")
+    assert done.exit_code == 2
+    assert "there are 2 people" in " ".join(done.stderr.split())
+
+
+@LITERT
+def test_track_says_which_file_has_no_face(tmp_path: Path) -> None:
+    Image.new("RGB", (200, 200), (90, 120, 70)).save(tmp_path / "meadow.png")
+    done = run(str(tmp_path / "meadow.png"), "-o", str(tmp_path / "x.csv"))
+    assert done.exit_code == 2
+    assert "meadow.png: wanted a face, found none in 1 picture" in " ".join(done.stderr.split())
+    assert not (tmp_path / "x.csv").exists()
+
+
+@LITERT
+@pytest.mark.gl("onboard")
+def test_track_names_the_emotion_of_pictures(tmp_path: Path) -> None:
+    folder = tmp_path / "pictures"
+    folder.mkdir()
+    joy = next(iter(archetypes("own")["joy"].values())).frame()
+    for k in range(16):
+        portrait("ida", joy if k > 7 else None).save(folder / f"{k}.png")
+    done = run(
+        str(folder), "-o", str(tmp_path / "x.fap"), "--fps", "10", "--profiles", "own", "--face", "ida"
+    )
+    assert done.exit_code == 0, done.output
+    assert done.stdout.splitlines()[-1].split()[2] == "joy"

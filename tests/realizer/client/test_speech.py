@@ -45,7 +45,7 @@ def test_speech_sends_quick_tokens_together_and_a_stop_at_once() -> None:
 
         def check() -> None: ...
 
-        speech = Speech("s1", control, wait, check, {"language": "nl"})
+        speech = Speech("s1", {"language": "nl"}, control, wait, check)
         for token in ("One ", *["two "] * 5000):
             await speech.append(token)
         assert [fields["append"] for _, fields in sent] == ["One "]
@@ -62,7 +62,7 @@ def test_speech_sends_quick_tokens_together_and_a_stop_at_once() -> None:
         )
         assert [bool(fields.get("close")) for _, fields in sent] == [False, False, False, True]
 
-        stopped = Speech("s2", control, wait, check, {})
+        stopped = Speech("s2", {}, control, wait, check)
         sent.clear()
         await stopped.append("One. ")
         await stopped.append("Two. ")

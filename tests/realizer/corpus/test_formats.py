@@ -35,10 +35,8 @@ def test_write_annotations_is_read_back(tmp_path: Path, suffix: str) -> None:
     assert sorted(back.words, key=str) == sorted(WORDS, key=str)
 
 
-def test_write_annotations_as_csv_has_the_labels(tmp_path: Path) -> None:
-    write_annotations(tmp_path / "x.csv", Recording("x", {}, LABELS, WORDS))
-    assert read_part(tmp_path / "x.csv").labels == LABELS
-    with pytest.raises(CorpusError, match=r"ends in \.csv, \.eaf or \.TextGrid"):
+def test_write_annotations_refuses_other_formats(tmp_path: Path) -> None:
+    with pytest.raises(CorpusError, match=r"x\.doc: wanted a name that ends in \.eaf or \.TextGrid"):
         write_annotations(tmp_path / "x.doc", Recording("x"))
 
 
@@ -111,14 +109,15 @@ def test_merged_adds_labels_and_words_once() -> None:
     ("name", "content", "said"),
     [
         ("x.doc", "", r"x\.doc: wanted a file that ends in \.csv, \.json, \.eaf, \.textgrid"),
-        ("x.csv", "a,b\n1,2\n", r"x\.csv: wanted a column time, columns named as FAPs"),
-        ("x.csv", "frame,AU01_r\n1\n", r"x\.csv: wanted our labels, words, FAPs or points"),
-        ("x.csv", "frame,point,x,y,z\n0,99.1,0,0,0\n", r"wanted a point of MPEG-4"),
-        ("x.json", "{}", r"x\.json: wanted results of MediaPipe"),
-        ("x.json", "[1]", r"x\.json: wanted results of MediaPipe"),
-        ("x.eaf", "<a>", r"x\.eaf: wanted an ELAN file"),
-        ("x.eaf", "<a/>", r"x\.eaf: wanted an ELAN file .*no intervals"),
-        ("x.TextGrid", "nothing", r"x\.TextGrid: wanted a TextGrid in the long format"),
+        ("x.csv", "a,b\n1,2\n", r"x\.csv: wanted .* in docs/corpus\.md, got: no column time"),
+        ("x.csv", "frame,AU01_r\n1\n", r"x\.csv: wanted"),
+        ("x.csv", "start,end,expression,annotator\n2,1,x,y\n", r"x\.csv: wanted .*line 2: .*later end"),
+        ("x.csv", "frame,point,x,y,z\n0,99.1,0,0,0\n", r"x\.csv: .*wanted a point of MPEG-4"),
+        ("x.json", "{}", r"x\.json: wanted"),
+        ("x.json", "[1]", r"x\.json: wanted"),
+        ("x.eaf", "<a>", r"x\.eaf: wanted"),
+        ("x.eaf", "<a/>", r"x\.eaf: wanted .*no interval"),
+        ("x.TextGrid", "nothing", r"x\.TextGrid: wanted .*no interval"),
     ],
 )
 def test_read_part_names_what_is_wanted(tmp_path: Path, name: str, content: str, said: str) -> None:

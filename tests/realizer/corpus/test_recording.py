@@ -63,20 +63,17 @@ def test_read_corpus_returns_recordings_by_name(tmp_path: Path) -> None:
     ("name", "content", "said"),
     [
         ("meta.toml", None, r"anna: wanted meta\.toml, got none; it is half written, add it again"),
-        ("meta.toml", "fps = ", r"meta\.toml: wanted TOML with numbers fps and frames"),
-        ("meta.toml", "fps = 0", r"meta\.toml: wanted fps up to 1000"),
-        ("meta.toml", "mod = 'sad'", r"meta\.toml: wanted person, mood.*; got mod"),
-        ("labels.csv", "a,b\n", r"labels\.csv: wanted the columns start,end,expression,annotator"),
-        (
-            "labels.csv",
-            "start,end,expression,annotator\n2,1,x,y\n",
-            r"labels\.csv, line 2: wanted .* in order",
-        ),
-        ("words.csv", "start,end,word,speaker\n1,nan,x,y\n", r"words\.csv, line 2"),
-        ("faps.csv", "time\n1\n", r"faps\.csv: wanted a column time, columns named as FAPs"),
-        ("faps.csv", "time,open_jaw\n0,nan\n", r"faps\.csv: wanted finite values"),
-        ("faps.csv", "time,open_jaw\n0\n", r"faps\.csv: wanted numbers, as many in each row"),
-        ("points.npz", "no archive", r"points\.npz: wanted arrays names and points.*add it again"),
+        ("meta.toml", "fps = ", r"meta\.toml: wanted .*; add it again"),
+        ("meta.toml", "fps = 0", r"meta\.toml: .*fps up to 1000"),
+        ("meta.toml", "fps = 'x'", r"meta\.toml: wanted"),
+        ("meta.toml", "mod = 'sad'", r"meta\.toml: .*mod is none of person, mood"),
+        ("labels.csv", "a,b\n", r"labels\.csv: .*columns a,b, not start,end,expression,annotator"),
+        ("labels.csv", "start,end,expression,annotator\n2,1,x,y\n", r"labels\.csv: .*line 2: .*later end"),
+        ("words.csv", "start,end,word,speaker\n1,nan,x,y\n", r"words\.csv: .*line 2"),
+        ("faps.csv", "time\n1\n", r"faps\.csv: .*no columns named as FAPs"),
+        ("faps.csv", "time,open_jaw\n0,nan\n", r"faps\.csv: .*not finite"),
+        ("faps.csv", "time,open_jaw\n0\n", r"faps\.csv: wanted"),
+        ("points.npz", "no archive", r"points\.npz: wanted .*add it again"),
     ],
 )
 def test_read_recording_names_a_damaged_file(
@@ -101,10 +98,10 @@ def test_read_corpus_refuses_other_folders(tmp_path: Path) -> None:
 
 
 def test_read_faps_measures_the_rate() -> None:
-    values, fps = read_faps("time,open_jaw\n0,5\n0.02,6\n0.04,7\n", Path("x.csv"))
+    values, fps = read_faps("time,open_jaw\n0,5\n0.02,6\n0.04,7\n")
     assert (fps, values[:, 2].tolist()) == (50.0, [5, 6, 7])
 
 
 def test_read_annotations_keeps_quoted_text() -> None:
     text = 'start,end,word,speaker\n0,1,"so, so",bob\n'
-    assert read_annotations(text, Path("x")) == (Annotation(0.0, 1.0, "so, so", "bob"),)
+    assert read_annotations(text) == (Annotation(0.0, 1.0, "so, so", "bob"),)

@@ -302,7 +302,7 @@ def test_neighbours_are_shares_of_segments() -> None:
 def test_sentences_end_with_signs_and_turns() -> None:
     words = said(["You", "know", "?", "Yes"], 0) + said(["No."], 50, "bob") + said(["«Go!»", "Well"], 70)
     found = list(statistics.sentences(Recording("r", {}, (), tuple(words))))
-    assert [([word.text for word in one.words], one.end) for one in found] == [
+    assert [([word.text for word in words], sign) for words, sign in found] == [
         (["You", "know?"], "?"),
         (["Yes"], "."),
         (["«Go!»"], "!"),

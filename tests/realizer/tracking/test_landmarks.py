@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from realizer.tracking.detector import detect
-from realizer.tracking.landmarks import irises, landmarks
+from realizer.tracking.landmarks import landmarks
 from realizer.tracking.region import Region
 from tests.portraits import LITERT, pixels_of, portrait
 
@@ -22,7 +22,7 @@ def test_landmarks_are_at_the_feature_points(turn: int, name: str) -> None:
     faps = np.zeros(68, np.float32)
     faps[[48, 49]] = turn, turn / 2
     picture, true = portrait(name, faps), pixels_of(name, faps)
-    face = landmarks(picture, landmarks(picture, detect(picture)[0]).region)
+    face = landmarks(picture, detect(picture)[0], refine=True)
     assert face.presence > 0.9
     wrong = [np.linalg.norm(face.points[k, :2] - true[point]) for point, k in SAME.items()]
     assert np.median(wrong) < 6  # of a face of 160 pixels
@@ -38,7 +38,7 @@ def test_irises_follow_the_gaze() -> None:
     faps = np.zeros(68, np.float32)
     faps[[22, 23]] = 30000  # to the character's left, the right of the picture
     ahead, aside = portrait(), portrait("ada", faps)
-    at = [irises(picture, landmarks(picture, detect(picture)[0])) for picture in (ahead, aside)]
+    at = [landmarks(picture, detect(picture)[0]).irises for picture in (ahead, aside)]
     assert (at[1] - at[0])[:, 0].min() > 2
     true = pixels_of("ada")
     assert at[0] == pytest.approx(np.array([true["3.5"], true["3.6"]]), abs=4)

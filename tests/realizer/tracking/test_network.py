@@ -7,7 +7,8 @@ import sys
 import pytest
 from PIL import Image
 
-from realizer.tracking.network import Network, TrackingError
+from realizer.core.errors import RealizerError
+from realizer.tracking.network import Network
 from tests.portraits import LITERT
 
 
@@ -20,5 +21,5 @@ def test_network_takes_a_square_picture() -> None:
 
 def test_network_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "ai_edge_litert", None)
-    with pytest.raises(TrackingError, match=r"pip install 'bml-realizer\[track\]'"):
+    with pytest.raises(RealizerError, match=r"pip install 'bml-realizer\[track\]'"):
         Network("face_landmark")

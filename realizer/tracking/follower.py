@@ -1,0 +1,101 @@
+"""Faces followed from picture to picture, several people at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from realizer.tracking.detector import detect
+from realizer.tracking.landmarks import MIN_PRESENCE, Landmarks, landmarks
+from realizer.tracking.pictures import Picture
+from realizer.tracking.region import Region
+
+DETECT_EVERY = 15  # pictures, for people who come later
+SAME_PLACE = 0.35  # distance of two regions of one person in one picture, relative to their side
+NEAR = 1.5  # distance of someone who was lost and is found again, relative to the side of the face
+MAX_PEOPLE = 8
+
+
+@dataclass(eq=False)
+class Person:
+    """One person over time.
+
+    Attributes:
+        frames: numbers of the pictures in which the face was found, rising.
+        faces: the face in each of them.
+    """
+
+    frames: list[int] = field(default_factory=list)
+    faces: list[Landmarks] = field(default_factory=list)
+
+    @property
+    def region(self) -> Region:
+        """The region of the face where it was seen last."""
+        return self.faces[-1].region
+
+    @property
+    def weight(self) -> float:
+        """How long and how large the person is seen."""
+        return sum(float(np.ptp(face.points[:, 1])) for face in self.faces)
+
+
+class Follower:
+    """Follows faces: each is looked for where it was; the detector finds those that are lost or new.
+
+    Attributes:
+        people: everybody who was seen, in the order of appearance.
+    """
+
+    def __init__(self) -> None:
+        self.people: list[Person] = []
+        self._count = 0
+
+    def __call__(self, picture: Picture) -> list[Person]:
+        """Look for faces in the next picture; return the people who are in it."""
+        number, self._count = self._count, self._count + 1
+        here: list[Person] = []
+        for person in [p for p in self.people if p.frames and p.frames[-1] == number - 1]:
+            self._add(person, landmarks(picture.image, person.region), number, here)
+        if not here or number % DETECT_EVERY == 0:
+            for region in detect(picture.image):
+                if any(_distance(region, person.region) < SAME_PLACE for person in here):
+                    continue
+                face = landmarks(picture.image, region, refine=True)
+                self._add(self._who(face.region, here), face, number, here)
+        return here
+
+    def _add(self, person: Person, face: Landmarks, number: int, here: list[Person]) -> None:
+        if face.presence < MIN_PRESENCE or not np.isfinite(face.points).all():
+            return
+        if any(_distance(face.region, other.region) < SAME_PLACE for other in here):
+            return  # two regions slid to one face
+        person.frames.append(number)
+        person.faces.append(face)
+        here.append(person)
+        if person not in self.people:
+            self.people.append(person)
+
+    def _who(self, region: Region, here: list[Person]) -> Person:
+        """Return who was lost near a region, or a new person."""
+        lost = [(_distance(region, p.region), k) for k, p in enumerate(self.people) if p not in here]
+        # In a crowd, the one who was lost nearest; alone, whoever was there alone before.
+        if lost and (min(lost)[0] < NEAR or len(self.people) == 1 or len(self.people) >= MAX_PEOPLE):
+            return self.people[min(lost)[1]]
+        return Person()
+
+
+def follow(pictures: Iterable[Picture]) -> tuple[list[float], list[Person]]:
+    """Return the times of all pictures, and the people in them; who is seen longest and largest is first."""
+    follower, times = Follower(), []
+    for picture in pictures:
+        times.append(picture.time)
+        follower(picture)
+    return times, sorted(follower.people, key=lambda person: -person.weight)
+
+
+def _distance(one: Region, other: Region) -> float:
+    """Return the distance of two regions and the difference of their sides, relative to the larger one."""
+    apart = np.hypot(one.x - other.x, one.y - other.y) + abs(one.side - other.side) / 2
+    return float(apart) / max(one.side, other.side)

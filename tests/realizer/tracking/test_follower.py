@@ -1,0 +1,49 @@
+"""Tests of faces followed from picture to picture."""
+
+from __future__ import annotations
+
+import pytest
+from PIL import Image
+
+from realizer.tracking.follower import follow
+from realizer.tracking.pictures import Picture
+from tests.portraits import LITERT, portrait
+
+pytestmark = [LITERT, pytest.mark.gl("onboard")]
+
+
+def scene(**places: int) -> Image.Image:
+    """A picture with faces, each so many pixels from the left."""
+    picture = Image.new("RGB", (900, 320), (80, 90, 100))
+    for name, left in places.items():
+        picture.paste(portrait(name), (left, 0))
+    return picture
+
+
+def people(*scenes: Image.Image) -> list[list[int]]:
+    pictures = [Picture(k / 10, picture, "test") for k, picture in enumerate(scenes)]
+    return [person.frames for person in follow(pictures)[1]]
+
+
+def test_follower_keeps_who_moves() -> None:
+    assert people(*(scene(ada=10 * k) for k in range(8))) == [list(range(8))]
+
+
+def test_follower_tells_people_apart() -> None:
+    scenes = [scene(ada=5 * k, ben=560 - 5 * k) for k in range(5)]
+    assert people(*scenes) == [list(range(5))] * 2
+
+
+def test_follower_knows_who_comes_back() -> None:
+    there, empty = scene(ada=300), scene()
+    assert people(there, there, empty, empty, there) == [[0, 1, 4]]
+
+
+def test_follower_finds_who_comes_later() -> None:
+    scenes = [scene(ada=0)] * 10 + [scene(ada=0, ben=500)] * 12
+    assert sorted(map(len, people(*scenes)))[1] == 22
+    assert len(people(*scenes)) == 2
+
+
+def test_follower_finds_nobody_in_an_empty_scene() -> None:
+    assert people(scene(), scene()) == []
