@@ -1,6 +1,6 @@
 """Fuzzy recognition of emotions from FAPs (Raouzaiou et al. 2002, section 5)."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import groupby
@@ -16,21 +16,6 @@ from realizer.emotions.profile import Profile
 from realizer.emotions.wheel import wheel
 from realizer.tables.emotion_model import emotion_model
 from realizer.tables.wheel_words import ring
-
-
-@dataclass(frozen=True)
-class Recognition:
-    """The result of a recognition.
-
-    Attributes:
-        emotion: emotion with the greatest belief (eq. 11); None if the face shows none of them.
-        emotions: emotion -> belief 0..1 (eq. 9).
-        profiles: profile -> belief.
-    """
-
-    emotion: str | None
-    emotions: Mapping[str, float]
-    profiles: Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -139,16 +124,6 @@ class Recogniser:
             Interval((end - len(beliefs)) / fps, end / fps, name, float(np.mean(beliefs)))
             for end, (name, beliefs) in zip(ends.tolist(), runs, strict=True)
         ]
-
-    def recognise(self, frame: Any, seen: Bool | None = None) -> Recognition:
-        """Recognise one FAP frame (68,)."""
-        beliefs = self.beliefs(np.asarray(frame)[None], seen)[0]
-        emotions: dict[str, float] = {}
-        for emotion, belief in zip(self._emotions, beliefs, strict=True):
-            emotions[emotion] = max(emotions.get(emotion, 0.0), float(belief))
-        names = (profile.name for profile in self.profiles)
-        profiles = dict(zip(names, map(float, beliefs), strict=True))
-        return Recognition(self._best(beliefs)[0], emotions, profiles)
 
     def _best(self, beliefs: Float64) -> tuple[str | None, float]:
         best = int(np.lexsort((self._count, beliefs))[-1])

@@ -36,7 +36,7 @@ POINTS = (".csv", ".txt", "")  # suffixes of tables of points; the last is of st
 @click.option(
     "--profiles",
     type=options.ProfileSet(),
-    help="Also print which emotions are recognised, by these profiles (own, published, raw, or a file), when, "
+    help="Also print which emotions are recognised by these profiles (own, published, raw or a file), when "
     "and how certainly.",
 )
 @click.option(

@@ -7,11 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import realizer
+from bml_schema import write
 from realizer.corpus.recording import Annotation, Recording
 from realizer.corpus.rules import profiles, statistics, write_rules
 from realizer.corpus.statistics import Study
 from realizer.emotions.words import emotion
 from realizer.knowledge.enrich import Enricher, template_of
+from realizer.knowledge.sentences import sentences
 from realizer.tables.emotional_words import word_list
 from realizer.tables.knowledge import read_knowledge
 from realizer.tables.templates import read_templates, templates
@@ -87,6 +90,50 @@ def test_enrich_applies_the_rules_and_durations_of_a_corpus(folder: Path) -> Non
     assert grief.syncs["relax"].offset == pytest.approx(30 / FPS - 0.45, abs=0.25)
     assert durations["GRIEF"].aus == templates()["GRIEF"].aus
     assert durations["GRIEF"].possible == (21 / FPS, 39 / FPS)
+
+
+def played(number: int) -> Recording:
+    """What our own rules show in one of ten texts, at the times of the silent voice."""
+    things = ["bread", "stone", "water", "paper", "glass", "iron", "silver", "timber", "cotton", "leather"]
+    thing = things[number]
+    text = (
+        f"We went out to buy some {thing} in the morning. Is it {thing}? They say it lasts for many years. "
+        f"This is nonsense, and the others there know it too. He has another piece of {thing} at home. "
+        f"It was a terrible story about {thing}. We walked along the river until late in the evening. "
+        f"Do you know who of them sold the {thing} to us there? The day was long and we came home by train. "
+        "Take it away! Then we had tea and looked at the garden for a while."
+    )
+    block = Enricher().text(text)
+    times = realizer.schedule(write(block), voice="silent").times
+    labels = []
+    for node in block.behaviours:
+        if name := template_of(node):
+            start, peak, relax, end = times[node.id].tolist()
+            labels.append(Annotation((start + peak) / 2, (relax + end) / 2, name, "rules"))
+    begin = float(times["speech1"][0])
+    words = [
+        Annotation(begin + word.start, begin + word.end, word.text + sign)
+        for sentence in sentences(text)
+        for word in sentence.words
+        for last in [word is sentence.words[-1]]
+        for sign in [("?" if sentence.question else "!" if sentence.exclamation else ".") if last else ""]
+    ]
+    return Recording(f"t{number}", {}, tuple(labels), tuple(words))
+
+
+def test_rules_of_what_enrich_plays_are_its_own(tmp_path: Path) -> None:
+    study = Study([played(number) for number in range(10)], words=word_list("en"))
+    write_rules(tmp_path, study)
+    found = {(r.when, *r.show): r for r in read_knowledge(tmp_path / "knowledge.toml").placings["speaker"]}
+    assert found["question", "surprise"].most_words == 5
+    assert {
+        ("disapproval", "anger"),
+        ("fright", "surprise"),
+        ("fright", "grief"),
+        ("exclamation", "anger"),
+    } <= set(found)
+    assert ("disapproval", "surprise") not in found
+    assert ("exclamation", "surprise") not in found
 
 
 def test_profiles_are_ranges_of_a_deviation_around_the_mean(study: Study, folder: Path) -> None:
