@@ -1,7 +1,5 @@
 """Agreement of annotators: Krippendorff's alpha for names."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

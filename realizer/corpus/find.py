@@ -1,7 +1,5 @@
 """Expressions found in the frames of a corpus by its map (Wojdel 2005, 7.3.2)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 import numpy as np

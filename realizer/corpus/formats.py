@@ -1,7 +1,5 @@
 """Files of other programs that belong to a recording: read by suffix and content, written by suffix."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable, Iterable, Mapping

@@ -1,7 +1,5 @@
 """Principal components and a self-organising map of the faces of a corpus (Wojdel 2005, 7.2, 7.3)."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

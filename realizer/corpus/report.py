@@ -1,7 +1,5 @@
 """The description of a corpus as files: a CSV for each table, and one HTML report."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Sequence
 from html import escape

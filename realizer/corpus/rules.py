@@ -1,7 +1,5 @@
 """What a corpus teaches: rules and durations for `enrich`, and profiles of emotions, from its statistics."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path

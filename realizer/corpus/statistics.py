@@ -1,7 +1,5 @@
 """Statistics of the expressions of a corpus: tables 6.3 to 6.14 of Wojdel 2005, of any recordings."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import csv
 import types
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from realizer.core.errors import TableError
@@ -35,6 +36,7 @@ __all__ = [
 ]
 
 Row = TypeVar("Row")
+T = TypeVar("T")
 HEAD = ("source", "units", "licence")
 
 
@@ -90,6 +92,19 @@ def read_toml(text: str, name: str) -> dict[str, Any]:
         return parse_toml(text)
     except ValueError as error:
         raise TableError(f"{name}: wanted TOML, got: {error}") from None
+
+
+def user_table(path: Path, parse: Callable[[dict[str, Any]], T]) -> T:
+    """Return what a user's TOML file means.
+
+    Raises:
+        TableError: a file that cannot be read, or that `parse` cannot use.
+    """
+    try:
+        return parse(read_toml(path.read_text("utf-8"), str(path)))
+    except (OSError, UnicodeError, TypeError, ValueError, KeyError, AttributeError) as error:
+        wanted = f"a table in the form of realizer/tables/{path.name}"
+        raise TableError(f"{path}: wanted {wanted}, got: {error!r}") from None
 
 
 def csv_rows(name: str, row_class: type[Row], package: str = __name__) -> tuple[Row, ...]:

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 from realizer import tables
-from realizer.core.errors import TableError
 
 Role = Literal["speaker", "listener"]
 By = Literal["before", "after", "around", "with"]
@@ -117,19 +116,8 @@ def knowledge() -> Knowledge:
 
 
 def read_knowledge(path: Path) -> Knowledge:
-    """Return the rules of a user's file.
-
-    Raises:
-        TableError: a file that cannot be read, or rows with other keys.
-    """
-    try:
-        return _knowledge(tables.read_toml(path.read_text("utf-8"), str(path)))
-    except (OSError, UnicodeError) as error:
-        raise TableError(f"{path}: wanted rules, got: {error}") from None
-    except (TypeError, ValueError, KeyError, AttributeError) as error:
-        raise TableError(
-            f"{path}: wanted rules in the form of realizer/tables/{FILE}, got: {error}"
-        ) from None
+    """Return the rules of a user's file; raises TableError."""
+    return tables.user_table(path, _knowledge)
 
 
 def _knowledge(table: Mapping[str, Any]) -> Knowledge:

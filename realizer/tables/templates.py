@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from realizer import tables
-from realizer.core.errors import TableError
 from realizer.tables.lexemes import read_aus
 from realizer.tables.timing import gaps
 
@@ -55,19 +54,8 @@ def templates() -> Mapping[str, Template]:
 
 
 def read_templates(path: Path) -> Mapping[str, Template]:
-    """Return the templates of a user's file.
-
-    Raises:
-        TableError: a file that cannot be read, or a template without a key.
-    """
-    try:
-        return _templates(tables.read_toml(path.read_text("utf-8"), str(path)))
-    except (OSError, UnicodeError) as error:
-        raise TableError(f"{path}: wanted templates, got: {error}") from None
-    except (TypeError, ValueError, KeyError, AttributeError) as error:
-        raise TableError(
-            f"{path}: wanted templates in the form of realizer/tables/{FILE}, got: {error}"
-        ) from None
+    """Return the templates of a user's file; raises TableError."""
+    return tables.user_table(path, _templates)
 
 
 def _templates(table: Mapping[str, Any]) -> dict[str, Template]:

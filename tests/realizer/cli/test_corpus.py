@@ -64,7 +64,10 @@ def test_corpus_refuses_what_is_none(tmp_path: Path) -> None:
         (["corpus", "add", folder, "x", tmp_path / "x.csv"], "x.csv: wanted a file of one of the formats"),
         (["corpus", "learn", folder], "wanted a recording or more, got none"),
         (["corpus", "find", folder], "wanted a map, got"),
-        (["enrich", "hi", "--knowledge", folder], "knowledge.toml: wanted rules"),
+        (
+            ["enrich", "hi", "--knowledge", folder],
+            "knowledge.toml: wanted a table in the form of realizer/tables/knowledge.toml",
+        ),
     ):
         done = run(*args)
         text = " ".join((done.output + str(done.exception)).split())

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import get_args
 
 import pytest
 
+from realizer.core.errors import TableError
 from realizer.tables.emotional_words import CATEGORIES
-from realizer.tables.knowledge import By, knowledge
+from realizer.tables.knowledge import By, knowledge, read_knowledge
 from realizer.tables.templates import templates
+
+HEAD = "# source: test\n# units: s\n# licence: MIT\n"
 
 
 def test_knowledge_names_the_source_of_every_rule() -> None:
@@ -52,3 +56,22 @@ def test_knowledge_has_the_mean_length_of_table_6_3() -> None:
 def test_mood_suggests_names_for_an_unknown_one() -> None:
     with pytest.raises(KeyError, match="wanted a word such as happy, happiness; got 'happi'"):
         knowledge().mood("happi")
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[mood]\nmean = 1\n", HEAD + "[pace]\nspeaker = 1\n", HEAD + "speaker = 3\n"]
+)
+def test_read_knowledge_names_a_damaged_file(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "knowledge.toml"
+    path.write_text(text)
+    with pytest.raises(TableError, match=r"knowledge\.toml: wanted"):
+        read_knowledge(path)
+
+
+def test_read_knowledge_needs_only_pace_and_moods(tmp_path: Path) -> None:
+    path = tmp_path / "knowledge.toml"
+    path.write_text(
+        HEAD + "[pace]\nspeaker = 2\nlistener = 4\n[mood]\nmean = 20\nglum = {distance = 3, frames = 30}\n"
+    )
+    found = read_knowledge(path)
+    assert (found.usual_distance, found.mood("glum").length, found.placings["speaker"]) == (2, 1.5, ())
