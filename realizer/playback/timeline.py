@@ -237,9 +237,11 @@ class BlockTimeline:
     def _update_referring(self, playing: ActiveBlock, now: float) -> None:
         """Move the sync points of other blocks that refer to points of a waiting block that has moved.
 
-        Blocks that it waits for stay as they are, because both would move later for ever.
+        Blocks that it waits for stay as they are, because both would move later for ever. Its followers move
+        with it.
         """
-        tied = [p for p in self.blocks.active() if p.refers_to(playing)]
+        followers = set(playing.followers)
+        tied = [p for p in self.blocks.active() if p.refers_to(playing) and p not in followers]
         if not tied or playing.start == inf or playing in self._moving:
             return
         dependencies = block_links.all_dependencies(playing.dependencies)
