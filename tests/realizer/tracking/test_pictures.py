@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import sys
 from pathlib import Path
 
@@ -104,3 +105,15 @@ def test_films_need_pyav(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setitem(sys.modules, "av", None)
     with pytest.raises(RealizerError, match="pip install"):
         read_pictures(tmp_path / "film.mp4")
+
+
+def test_a_film_that_a_telephone_took_upright_is_turned(tmp_path: Path) -> None:
+    path = write_film(tmp_path / "film.mp4", [0, 4])
+    content = path.read_bytes()
+    at = content.index(
+        struct.pack(">9i", 1 << 16, 0, 0, 0, 1 << 16, 0, 0, 0, 1 << 30), content.index(b"tkhd")
+    )
+    turned = struct.pack(">9i", 0, 1 << 16, 0, -1 << 16, 0, 0, 64 << 16, 0, 1 << 30)
+    path.write_bytes(content[:at] + turned + content[at + len(turned) :])
+    _, pictures = read_pictures(path)
+    assert next(pictures).image.size == (64, 96)

@@ -51,7 +51,7 @@ def test_faps_and_the_head_are_measured() -> None:
     faps[48] = np.radians(15) / 1e-5
     found = measured(faps).faps[0]
     assert np.degrees(found[47:50] * 1e-5) == pytest.approx((0, 15, 0), abs=6)
-    assert found[[11, 12]] == pytest.approx(faps[[11, 12]], rel=0.5)
+    assert found[[11, 12]] == pytest.approx(faps[[11, 12]], rel=0.6)
 
 
 def test_eyes_that_look_aside_are_measured() -> None:
