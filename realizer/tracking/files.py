@@ -21,7 +21,7 @@ from realizer.outputs.fap_text import encode
 from realizer.tables import by_number, faps
 from realizer.tables.cooccurrence import rules
 from realizer.tracking.recording import Recording
-from realizer.tracking.regressor import SEEN_FAPS, SEEN_UNITS
+from realizer.tracking.regressor import SEEN_FAPS, SEEN_UNITS, Measured
 
 HEAD = (48, 49, 50)
 # FAPs of rotations, which both eyes share -> the action unit of a positive value, and of a negative one.
@@ -34,11 +34,11 @@ ROTATIONS: Mapping[tuple[int, ...], tuple[int, int]] = {
 }
 
 
-def unit_columns(recording: Recording) -> dict[str, Float64]:
+def unit_columns(measured: Recording | Measured) -> dict[str, Float64]:
     """Return the values (n,) 0..1 of all action units that are measured, with those of head and eyes."""
-    columns = dict(zip(SEEN_UNITS, recording.units.T, strict=True))
+    columns = dict(zip(SEEN_UNITS, measured.units.T, strict=True))
     for numbers, units in ROTATIONS.items():
-        degrees = np.degrees(recording.faps[:, np.array(numbers) - 1].mean(axis=1) * ANGLE_UNIT)
+        degrees = np.degrees(measured.faps[:, np.array(numbers) - 1].mean(axis=1) * ANGLE_UNIT)
         for sign, unit in zip((1, -1), units, strict=True):
             share = np.clip(sign * degrees / by_number()[unit].degrees, 0, 1)
             columns |= {target.name: share for target in au(unit)}

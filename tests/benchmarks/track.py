@@ -68,7 +68,7 @@ def film(face: str, folder: Path, size: int) -> None:
     spent = time.perf_counter() - begin
     count = min(len(recording.times), len(shown.faps.times))
     print(f"{face}: {count} frames, {1000 * spent / count:.1f} ms each, seen {recording.seen.mean():.1%}")
-    units(recording, shown.aus.aus[:count])
+    units(recording, shown.aus.aus[:count].copy())
     true = shown.faps.values[:count].astype(np.float64)
     found = recording.faps[:count]
     moving = [
@@ -87,6 +87,10 @@ def film(face: str, folder: Path, size: int) -> None:
 def units(recording: Recording, true: np.ndarray) -> None:
     """Print the correlation of each action unit."""
     columns = [AU_NAMES().index(name) for name in SEEN_UNITS]
+    # The lids close in the same way in a blink.
+    for side in "LR":
+        shut, blink = (AU_NAMES().index(f"{number}{side}") for number in (43, 45))
+        true[:, shut] = np.maximum(true[:, shut], true[:, blink])
     r = correlations(recording.units[: len(true)], true[:, columns].astype(np.float64), 0.005)
     means = {}
     for number in REPORTED:

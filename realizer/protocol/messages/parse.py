@@ -21,6 +21,7 @@ from realizer.protocol.messages.requests import (
     StateQuery,
     Stop,
     Subscribe,
+    Track,
     Unsubscribe,
 )
 from realizer.protocol.messages.speech import SpeechMessage
@@ -37,6 +38,7 @@ Control = (
     | CharacterMessage
     | SetMessage
     | Heard
+    | Track
     | Anticipate
     | SpeechMessage
     | Stop

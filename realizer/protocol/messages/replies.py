@@ -177,6 +177,20 @@ class ErrorMessage(Reply):
     id: str | None = Field(None, description="id of the speech of a refused `speech` message")
 
 
+class Tracked(Reply):
+    """What a picture of `track` shows; the character shows it, too."""
+
+    type: Literal["tracked"] = "tracked"
+    character: str | None = None
+    frame: int = Field(description="the number in the header of the picture")
+    time: Seconds = Field(description="when it came, seconds on the session clock")
+    face: bool = Field(description="whether there is a face")
+    aus: dict[str, float] = Field({}, description="action units, 0..1")
+    head: list[float] | None = Field(None, description="degrees of pitch (down), yaw (left) and roll (right)")
+    emotion: str | None = None
+    certainty: float | None = Field(None, description="of the emotion, 0..1")
+
+
 class Gap(Reply):
     """Feedback after `seen` is not available; the next element has the `seq` `first`."""
 

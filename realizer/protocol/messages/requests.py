@@ -189,6 +189,21 @@ class Heard(Message):
     )
 
 
+class Track(Message):
+    """Let the face in pictures of this connection drive a character, as in a mirror.
+
+    Pictures follow as binary messages: the header with kind 3, version 1 and a number of their own, then a
+    JPEG, PNG or WebP file. Each one is answered by `tracked`, but for those that come while another one is
+    looked at: of these, the newest is looked at next. Pictures are not kept.
+    """
+
+    model_config = examples({"type": "track", "character": "Ada", "fps": 20})
+
+    type: Literal["track"]
+    character: str | None = Field(None, max_length=256, description="default: the first")
+    fps: float = Field(20.0, ge=0, le=60, description="most pictures a second; 0 ends it")
+
+
 SyncName = Annotated[str, Field(pattern=r"^[^\s:]{1,256}$")]
 
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from realizer.core import work
 from realizer.core.errors import RealizerError, RenderError, VoiceError
-from realizer.server.session.effects import Close, Draw, Effect, RenderOptions, Send, Speak
+from realizer.server.session.effects import Close, Draw, Effect, Look, RenderOptions, Send, Speak
 from realizer.server.session.session import Session
 from realizer.server.transports.transport import Outbound
 from realizer.speech.duration_fit import speak_to_length
@@ -24,6 +24,7 @@ from realizer.speech.utterance import Utterance, Voice
 
 if TYPE_CHECKING:
     from realizer.render.renderer import Renderer
+    from realizer.tracking.mirror import Sight
 
 # Each combination of face, size, camera, light and background has a renderer, which is a process.
 RENDERERS = 6
@@ -63,15 +64,23 @@ class EffectRunner:
                     self._submit(self._engines.speech_pool, self._engines.speak, session, effect)
                 case Draw():
                     self._submit(self._engines.render_pool, self._engines.draw, session, effect)
+                case Look():
+                    self._submit(self._engines.tracking_pool, self._engines.look, session, effect)
+                case Look():
+                    self._submit(self._engines.tracking_pool, self._engines.look, session, effect)
                 case Close(connection, code, reason):
                     if (client := self._clients.get(connection)) is not None:
                         client.disconnect(code, reason)
 
     def _submit(
-        self, pool: FairPool, compute: Callable[[Any], Any], session: Session, effect: Speak | Draw
+        self, pool: FairPool, compute: Callable[[Any], Any], session: Session, effect: Speak | Draw | Look
     ) -> None:
         """Compute the answer to an effect in a thread, and pass it to the session."""
-        take = session.on_speech if isinstance(effect, Speak) else session.on_picture
+        take: Callable[[int, Any, float], None] = {
+            Speak: session.on_speech,
+            Draw: session.on_picture,
+            Look: session.on_sight,
+        }[type(effect)]
 
         def answer(future: asyncio.Future[Any]) -> None:
             if not future.cancelled():
@@ -112,6 +121,7 @@ class Engines:
         # Two threads each: a long text or a starting process must not delay all other sessions.
         self.speech_pool = FairPool(2, "voice")
         self.render_pool = FairPool(2, "renderer")
+        self.tracking_pool = FairPool(1, "tracking")  # its networks are for one thread
         self._voices: dict[str | None, Voice] = {}
         self._slots: dict[tuple[str, RenderOptions], _RendererSlot] = {}
         self._begun = clock()  # when a renderer last finished starting; until then the others may have waited
@@ -144,13 +154,24 @@ class Engines:
         except Exception as error:
             return RenderError(f"the picture could not be drawn: {error}")
 
+    def look(self, order: Look) -> Sight | RealizerError | None:
+        """Return what a picture shows, or the error."""
+        try:
+            return order.mirror(order.picture, order.time)
+        except RealizerError as error:
+            return error
+        except Exception as error:
+            return RealizerError(f"the picture could not be tracked: {error}")
+
     def drop(self, owner: Hashable) -> None:
         """Drop the requests of an owner that wait in the pools."""
+        self.tracking_pool.drop(owner)
         self.speech_pool.drop(owner)
         self.render_pool.drop(owner)
 
     def close(self) -> None:
         """Close all engines, and drop the requests that wait for them."""
+        self.tracking_pool.close()
         self.speech_pool.close()
         self.render_pool.close()
         for voice in self._voices.values():

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from realizer.core.array_types import Float32
 from realizer.speech.utterance import SpeechRequest
+
+if TYPE_CHECKING:
+    from realizer.tracking.mirror import Mirror
 
 
 class Send(NamedTuple):
@@ -73,4 +76,17 @@ class Close:
     reason: str
 
 
-Effect = Send | Speak | Draw | MoveConnection | Close
+@dataclass(frozen=True, slots=True, eq=False)
+class Look:
+    """Look at a picture of a face and call `session.on_sight(id, what it shows, None or error, now)`.
+
+    `id` is the number of the connection that sent it, `time` seconds on the session clock.
+    """
+
+    id: int
+    mirror: Mirror
+    picture: bytes
+    time: float
+
+
+Effect = Send | Speak | Draw | Look | MoveConnection | Close

@@ -9,17 +9,21 @@ from bml_schema import WarningFeedback
 from realizer.playback.player import Player
 from realizer.protocol.messages.parse import Control, parse_control
 from realizer.protocol.messages.replies import ErrorMessage
-from realizer.protocol.messages.requests import Subscribe, Unsubscribe
+from realizer.protocol.messages.requests import Subscribe, Track, Unsubscribe
+from realizer.protocol.streams import STREAMS
 from realizer.server.documents.document_queue import Submission, block_id_of
 from realizer.server.journal.entry import Kind
 from realizer.server.journal.session_journal import SessionJournal
 from realizer.server.session.connections import Connections
+from realizer.server.session.control_fields import FieldError
 from realizer.server.session.control_handlers import ControlHandlers
 from realizer.server.session.query_handlers import Query, QueryHandlers
+from realizer.server.session.tracked_faces import TrackedFaces
 from realizer.server.streams.connection import Connection
 
 # Messages that affect only their own connection: they are not written to the journal.
-PASSING = (*get_args(Query), Subscribe, Unsubscribe)
+PASSING = (*get_args(Query), Subscribe, Unsubscribe, Track)
+PICTURE = bytes([STREAMS["video"].kind or 0])  # first byte of a picture
 
 
 class Inbox:
@@ -37,6 +41,7 @@ class Inbox:
         connections: Connections,
         queries: QueryHandlers,
         controls: ControlHandlers,
+        tracked: TrackedFaces,
     ) -> None:
         self.ending = False
         self._player = player
@@ -45,14 +50,19 @@ class Inbox:
         self._connections = connections
         self._queries = queries
         self._controls = controls
+        self._tracked = tracked
 
     def handle(self, connection: Connection, message: str | bytes, t: float) -> bool:
         """Handle a message, or reply with an error. Return whether it was written to the journal.
 
         Args:
-            message: bytes are a sound clip, text that starts with `{` is control, all else is BML.
+            message: bytes are a picture or a sound clip, text that starts with `{` is control, all else is
+                BML.
             t: seconds on the session clock.
         """
+        if isinstance(message, bytes) and message[:1] == PICTURE:
+            self._tracked.picture(connection.id, message, t)
+            return False
         control: Control | None = None
         if isinstance(message, str) and (text := message.lstrip("\ufeff \t\r\n")).startswith("{"):
             parsed = parse_control(text)
@@ -86,10 +96,21 @@ class Inbox:
     def _handle_passing(self, connection: Connection, control: Control, t: float) -> None:
         """Handle a message that is not written to the journal, except for the characters that it adds."""
         known = self._player.characters
-        if isinstance(control, Query):
+        if isinstance(control, Track):
+            self._start_tracking(connection, control)
+        elif isinstance(control, Query):
             self._queries.handle(connection, control, t)
         else:
             self._controls.handle(connection, control, t)
         for name in self._player.characters:
             if name not in known:  # their order matters: the first is the default
                 self._journal.note(t, "text", connection.id, json.dumps({"type": "character", "id": name}))
+
+    def _start_tracking(self, connection: Connection, message: Track) -> None:
+        try:
+            self._tracked.start(connection.id, message)
+        except FieldError as error:
+            where = f"track.{error.where}"
+            self._connections.reply(
+                connection.id, ErrorMessage(code="invalid", message=str(error), where=where)
+            )

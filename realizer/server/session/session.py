@@ -8,7 +8,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from realizer.behaviours.kind import Position
 from realizer.behaviours.registry import KINDS
@@ -31,6 +31,7 @@ from realizer.server.session.inbox import Inbox
 from realizer.server.session.query_handlers import QueryHandlers
 from realizer.server.session.session_clock import SessionClock
 from realizer.server.session.subscriptions import Subscriptions
+from realizer.server.session.tracked_faces import TrackedFaces
 from realizer.server.speech.audio_clips import AudioClips
 from realizer.server.streams.broadcast import Broadcast, FrameRun
 from realizer.server.streams.connection import Connection
@@ -38,15 +39,18 @@ from realizer.server.streams.frame_windows import EPSILON
 from realizer.server.streams.frames_ahead import AheadRun
 from realizer.speech.utterance import Utterance
 
+if TYPE_CHECKING:
+    from realizer.tracking.mirror import Sight
+
 log = logging.getLogger(__name__)
 
 
 class Session:
     """A clock, characters, blocks, a scene and a feedback log, and the connections that share them.
 
-    The host calls `receive`, `on_speech`, `on_picture` and `tick`, and carries out `take_effects` after each
-    call. It calls `tick` at `next_due`, and immediately while the session `has_documents`. Parameters `now`
-    are seconds on the host's clock, `t` seconds on the session clock.
+    The host calls `receive`, `on_speech`, `on_picture`, `on_sight` and `tick`, and carries out `take_effects`
+    after each call. It calls `tick` at `next_due`, and immediately while the session `has_documents`.
+    Parameters `now` are seconds on the host's clock, `t` seconds on the session clock.
 
     Args:
         id: the session's name.
@@ -114,8 +118,9 @@ class Session:
         controls = ControlHandlers(
             self.player, self.faces, self.clips, self.submission, self.subscriptions, reply
         )
+        self.tracked = TrackedFaces(self.player, self._add_effects, reply, self._show)
         self.inbox = Inbox(
-            self.player, self.submission, self.journal, self.connections, self.queries, controls
+            self.player, self.submission, self.journal, self.connections, self.queries, controls, self.tracked
         )
 
     # connections --------------------------------------------------------------------------------
@@ -142,6 +147,7 @@ class Session:
         if self.connections.pop(connection, None) is not None:
             self.journal.note(self.clock.read(now), "leave", connection)
         self.submission.speeches.on_disconnect(connection)
+        self.tracked.drop(connection)
         self._client_left = True
         self._forget_deadline()
         if not self.connections:
@@ -181,6 +187,11 @@ class Session:
             self.journal.note(t, "tick")
 
     # journal ------------------------------------------------------------------------------------
+
+    def _show(self, connection: int, message: str, t: float) -> None:
+        """Handle a message as if a connection had sent it."""
+        if connection in self.connections:
+            self.inbox.handle(self.connections[connection], message, t)
 
     def restore(self, parts: Mapping[str, str]) -> float:
         """Restore the state and the connections of a checkpoint. The session must be new and opened at 0.
@@ -226,6 +237,14 @@ class Session:
         self._effects += effects
         if not isinstance(result, bytes):
             self.subscriptions.end_pictures(viewers, str(result))
+        self.tick(now)
+
+    def on_sight(self, connection: int, result: Sight | RealizerError | None, now: float) -> None:
+        """Take the answer to an effect `Look`."""
+        if self.closed:
+            return
+        self._forget_deadline()
+        self.tracked.answer(connection, result, self.clock.read(now))
         self.tick(now)
 
     # time ---------------------------------------------------------------------------------------

@@ -1,0 +1,115 @@
+"""Faces in the pictures of clients, which drive characters."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from realizer.core.errors import RealizerError
+from realizer.playback.player import Player
+from realizer.protocol.messages.common import Reply
+from realizer.protocol.messages.replies import ErrorMessage, Tracked
+from realizer.protocol.messages.requests import Track
+from realizer.protocol.wire import HEADER
+from realizer.server.session.control_fields import character_index
+from realizer.server.session.effects import Effect, Look
+
+if TYPE_CHECKING:
+    from realizer.tracking.mirror import Mirror, Sight
+
+EARLY = 0.8  # of the time between two pictures; one that comes sooner is left out
+LEAST = 0.02  # a smaller action unit is not shown
+
+
+@dataclass(eq=False)
+class _Camera:
+    """The pictures of one connection.
+
+    Attributes:
+        last: time and number of the picture that was looked at last.
+        waiting: the newest picture while another one is looked at.
+    """
+
+    character: str | None
+    fps: float
+    mirror: Mirror
+    last: tuple[float, int] = (float("-inf"), 0)
+    is_busy: bool = False
+    waiting: bytes | None = None
+
+
+class TrackedFaces:
+    """Looks at the newest picture of each connection, one at a time, and makes its character show the face.
+
+    Pictures are neither kept nor written to the journal; what characters show is, as messages `set`.
+
+    Args:
+        show: handles a message of a connection, as if a client had sent it.
+    """
+
+    def __init__(
+        self,
+        player: Player,
+        add_effects: Callable[[Iterable[Effect]], None],
+        reply: Callable[[int, Reply], None],
+        show: Callable[[int, str, float], None],
+    ) -> None:
+        self._player, self._add_effects, self._reply, self._show = player, add_effects, reply, show
+        self._cameras: dict[int, _Camera] = {}
+
+    def start(self, connection: int, message: Track) -> None:
+        """Let the pictures of a connection drive a character; at 0 frames a second they no longer do.
+
+        Raises:
+            FieldError: no such character.
+        """
+        from realizer.tracking.mirror import Mirror  # slow to load
+
+        self._cameras.pop(connection, None)
+        if message.fps:
+            character_index(self._player, message.character)
+            self._cameras[connection] = _Camera(message.character, message.fps, Mirror())
+
+    def drop(self, connection: int) -> None:
+        """Forget the camera of a connection."""
+        self._cameras.pop(connection, None)
+
+    def picture(self, connection: int, message: bytes, t: float) -> None:
+        """Look at a picture, or let it wait in the place of an earlier one."""
+        camera = self._cameras.get(connection)
+        if camera is None or len(message) <= HEADER.size:
+            text = (
+                "wanted `track` before pictures" if camera is None else "wanted a picture behind the header"
+            )
+            self._reply(connection, ErrorMessage(code="unsupported", message=text))
+        elif camera.is_busy:
+            camera.waiting = message
+        elif t - camera.last[0] >= EARLY / camera.fps:
+            _, _, _, number, _ = HEADER.unpack_from(message)
+            camera.last, camera.is_busy, camera.waiting = (t, number), True, None
+            self._add_effects([Look(connection, camera.mirror, message[HEADER.size :], t)])
+
+    def answer(self, connection: int, result: Sight | RealizerError | None, t: float) -> None:
+        """Take what a picture shows; then look at the next one."""
+        camera = self._cameras.get(connection)
+        if camera is None:
+            return
+        camera.is_busy = False
+        time, number = camera.last
+        if isinstance(result, RealizerError):
+            self._reply(connection, ErrorMessage(code="unsupported", message=str(result), where="track"))
+        else:
+            seen: dict[str, Any] = {}
+            if result is not None:
+                seen = {name: getattr(result, name) for name in ("head", "emotion", "certainty")}
+                seen["aus"] = result.units
+                shown = {name: value if value >= LEAST else None for name, value in result.units.items()}
+                message = {"type": "set", "aus": shown, "character": camera.character}
+                self._show(connection, json.dumps(message), t)
+            face = result is not None
+            answer = Tracked(character=camera.character, frame=number, time=time, face=face, **seen)
+            self._reply(connection, answer)
+        if camera.waiting is not None:
+            self.picture(connection, camera.waiting, t)
