@@ -58,9 +58,9 @@ def init(folder: Path) -> None:
 def add(folder: Path, name: str, files: tuple[Path, ...], **facts: Any) -> None:
     """Add a recording NAME, or more FILES of it: FAPs, points, labels and words.
 
-    A FILE is .csv (our labels, words, FAPs or points, OpenFace, Live Link), .eaf of ELAN, .TextGrid of Praat,
-    or .json (MediaPipe, or words of `realizer align`). A tier `words` or `words SPEAKER` has words; any other
-    has the labels of the annotator of its name.
+    A FILE is .fap or .csv (of `realizer track`, our labels, words or points, OpenFace, Live Link), .eaf of
+    ELAN, .TextGrid of Praat, or .json (MediaPipe, or words of `realizer align`). A tier `words` or `words
+    SPEAKER` has words; any other has the labels of the annotator of its name.
     """
     from realizer.corpus import recording as recordings
     from realizer.corpus.formats import merged, read_part

@@ -11,12 +11,15 @@ from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
+from realizer.analysis.faps_from_points import faps_from_points
 from realizer.analysis.points_file import COLUMNS as POINT_COLUMNS
-from realizer.analysis.points_file import read_points
+from realizer.analysis.points_file import bridge, read_points
 from realizer.animation.axis import au, axis
 from realizer.animation.fap.conversion import to_fap
+from realizer.animation.fap.fap_reader import read_fap
 from realizer.animation.frames import AUFrames
 from realizer.core.array_types import Float64
+from realizer.core.errors import FaceError, RealizerError
 from realizer.corpus.recording import (
     COLUMNS,
     LABELS,
@@ -29,7 +32,9 @@ from realizer.corpus.recording import (
     read_annotations,
     read_faps,
 )
+from realizer.face.features import fapu_of
 from realizer.outputs.textgrid import intervals_text
+from realizer.tables import faps
 from realizer.tables.arkit_names import shapes
 
 WORD_TIER = re.compile(r"words?\b\s*(.*)", re.IGNORECASE)
@@ -45,14 +50,26 @@ EAF = """\
 <LINGUISTIC_TYPE LINGUISTIC_TYPE_ID="default" TIME_ALIGNABLE="true"/>
 </ANNOTATION_DOCUMENT>
 """
+# Errors of readers of a damaged file; that of XML is a SyntaxError.
+DAMAGE = (
+    OSError,
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    RecursionError,
+    SyntaxError,
+    RealizerError,
+)
 Spans = Iterable[tuple[float, float, str]]
 
 
 def read_part(path: Path) -> Recording:
     """Return what a file has of a recording: FAPs, points, labels or words.
 
-    - .csv: our labels, words, FAPs (as `realizer realize -o x.csv` writes them) or tracked points, OpenFace's
-      features, or Live Link's blend shapes;
+    - .csv: our labels, words, FAPs or action units (as `realizer realize` and `track` write them) or tracked
+      points, OpenFace's features, or Live Link's blend shapes;
+    - .fap: FAPs;
     - .eaf (ELAN) and .TextGrid (Praat): tiers of intervals; a tier `words` or `words SPEAKER` has words, any
       other labels by the annotator of its name;
     - .json: results of MediaPipe's face landmarker, or words of `realizer align`.
@@ -65,16 +82,7 @@ def read_part(path: Path) -> Recording:
         raise CorpusError(f"{path}: wanted a file that ends in {', '.join(READERS)}, got another")
     try:
         return reader(path.read_text("utf-8-sig"))
-    except (
-        OSError,
-        ValueError,
-        KeyError,
-        TypeError,
-        IndexError,
-        AttributeError,
-        RecursionError,
-        SyntaxError,
-    ) as error:
+    except DAMAGE as error:
         raise CorpusError(
             f"{path}: wanted a file of one of the formats in docs/corpus.md, got: {error}"
         ) from None
@@ -116,8 +124,15 @@ def _csv(text: str) -> Recording:
     if head == COLUMNS[WORDS]:
         return Recording("", words=read_annotations(text))
     if head == POINT_COLUMNS or text.startswith("#"):
-        moving, _ = read_points(text)
-        return Recording("", points=(tuple(moving), np.stack(list(moving.values()), axis=1)))
+        moving, rest = read_points(text)
+        tracked = tuple(moving), np.stack(list(moving.values()), axis=1)
+        try:
+            fapu = fapu_of({name: place.astype(np.float32) for name, place in rest.items()})
+        except (KeyError, FaceError):  # too few points for FAPs
+            return Recording("", points=tracked)
+        return Recording(
+            "", faps=faps_from_points(bridge(moving), rest, fapu)[0].astype(float), points=points
+        )
     columns = {name: np.nan_to_num(cells) for name, cells in numbers(text).items()}
     if "AU01_r" in head:  # OpenFace: intensities of 0 to 5; landmarks in space, y down and z away
         units = {
@@ -130,8 +145,18 @@ def _csv(text: str) -> Recording:
     if "blendshapecount" in map(str.lower, head):  # Live Link: names with a capital, 60 frames a second
         weights = {name[:1].lower() + name[1:]: cells for name, cells in columns.items()}
         return Recording("", {"fps": 60.0}, faps=_faps_of(_units_of(weights)))
+    if "time" in head and not {row.name for row in faps()} & {*head}:  # action units of `realizer track`
+        named = ((re.fullmatch(r"AU(\d+)([LR]?)", name), name) for name in head)
+        units = {(int(match[1]), SIDES[match[2]]): columns[name] for match, name in named if match}
+        if units:
+            return Recording("", {"fps": rate_of(columns["time"])}, faps=_faps_of(units))
     values, fps = read_faps(text)
     return Recording("", {"fps": fps}, faps=values)
+
+
+def _fap(text: str) -> Recording:
+    clip = read_fap(text)
+    return Recording("", {"fps": float(clip.fps)}, faps=clip.values.astype(np.float64))
 
 
 def _json(text: str) -> Recording:
@@ -234,5 +259,5 @@ def _eaf(tiers: Mapping[str, Iterable[Annotation]]) -> str:
 
 
 READERS: dict[str, Callable[[str], Recording]] = {
-    ".csv": _csv, ".json": _json, ".eaf": _read_eaf, ".textgrid": _textgrid,
+    ".csv": _csv, ".fap": _fap, ".json": _json, ".eaf": _read_eaf, ".textgrid": _textgrid,
 }  # fmt: skip

@@ -8,8 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from realizer import realize
+from realizer.analysis.faps_from_mesh import points_of
 from realizer.corpus.formats import merged, read_part, write_annotations
 from realizer.corpus.recording import Annotation, CorpusError, Recording
+from realizer.face.deform import deform
+from realizer.face.load import load_face
 from realizer.tables import by_number, faps
 from realizer.tables.arkit_names import shapes
 
@@ -93,6 +97,35 @@ def test_read_part_takes_words_of_align_and_our_points(tmp_path: Path) -> None:
     assert (points[0], points[1].shape) == (("4.1",), (2, 1, 3))
 
 
+def test_read_part_takes_what_track_and_realize_write(tmp_path: Path) -> None:
+    document = '<bml id="b"><faceLexeme id="f" lexeme="RAISE_BROWS" start="0.2" end="2"/></bml>'
+    made = realize(document, fps=20, idle=False)
+    for name in ("x.csv", "x.fap"):
+        made.save(tmp_path / name)
+    table, clip = (read_part(tmp_path / name) for name in ("x.csv", "x.fap"))
+    assert table.fps == clip.fps == 20
+    assert np.allclose(table.faps, made.faps.values, atol=1)
+    assert np.allclose(clip.faps, made.faps.values, atol=1)
+    (tmp_path / "units.csv").write_text("time,AU1L,AU12\n0.0,0.5,0\n0.1,0.0,1\n")
+    units = read_part(tmp_path / "units.csv")
+    assert units.fps == 10
+    assert fap(units, "raise_l_i_eyebrow")[0] > 50 > fap(units, "raise_r_i_eyebrow")[0]
+    assert fap(units, "raise_r_cornerlip")[1] > 100
+
+
+def test_read_part_measures_the_faps_of_points(tmp_path: Path) -> None:
+    face = load_face("ada")
+    raised = np.zeros((3, 68), np.float32)
+    raised[1:, 30] = 150
+    rows = ["frame,point,x,y,z"]
+    for name, way in points_of(face, deform(face, raised)).items():
+        rows += [f"{k},{name},{x:.6f},{y:.6f},{z:.6f}" for k, (x, y, z) in enumerate(way)]
+    (tmp_path / "points.csv").write_text("\n".join(rows))
+    found = read_part(tmp_path / "points.csv")
+    assert fap(found, "raise_l_i_eyebrow") == pytest.approx([0, 150, 150], abs=20)
+    assert found.points is not None
+
+
 def test_merged_adds_labels_and_words_once() -> None:
     both = merged(
         Recording("x", {"person": "anna"}, LABELS[:2]), Recording("y", {"fps": 50.0}, LABELS[1:], WORDS)
@@ -108,11 +141,12 @@ def test_merged_adds_labels_and_words_once() -> None:
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
-        ("x.doc", "", r"x\.doc: wanted a file that ends in \.csv, \.json, \.eaf, \.textgrid"),
+        ("x.doc", "", r"x\.doc: wanted a file that ends in \.csv, \.fap, \.json, \.eaf, \.textgrid"),
         ("x.csv", "a,b\n1,2\n", r"x\.csv: wanted .* in docs/corpus\.md, got: no column time"),
         ("x.csv", "frame,AU01_r\n1\n", r"x\.csv: wanted"),
         ("x.csv", "start,end,expression,annotator\n2,1,x,y\n", r"x\.csv: wanted .*line 2: .*later end"),
         ("x.csv", "frame,point,x,y,z\n0,99.1,0,0,0\n", r"x\.csv: .*wanted a point of MPEG-4"),
+        ("x.fap", "3.1 x 25 1", r"x\.fap: wanted"),
         ("x.json", "{}", r"x\.json: wanted"),
         ("x.json", "[1]", r"x\.json: wanted"),
         ("x.eaf", "<a>", r"x\.eaf: wanted"),
