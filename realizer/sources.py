@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -15,6 +16,12 @@ from bml_schema.element_reader import Vocabulary
 Source = str | bytes | Path
 # Suffixes of files that we read. A text in a .txt file is spoken; those of timelines are read by `check`.
 SUFFIXES = (".bml", ".xml", ".txt", ".toml", ".json")
+LONGEST = 10_000  # characters of one speech
+# A part of a long text: up to the last end of a sentence in it, or else the last blank, or else cut.
+_PIECE = re.compile(
+    rf"\S(?:.{{0,{LONGEST - 2}}}(?:[.!?…](?=\s|\Z)|[。！？])|.{{0,{LONGEST - 1}}}(?=\s|\Z)|.{{0,{LONGEST - 1}}})",
+    re.DOTALL,
+)
 WANTED = "BML, a text, bytes, a pathlib.Path, or a list of these"
 
 
@@ -59,9 +66,13 @@ def first_error(documents: Sequence[Document], vocabulary: Vocabulary, *, strict
 
 
 def spoken(text: str, number: int = 1) -> str:
-    """Return the document that speaks a text after those of smaller numbers."""
-    speech = Speech(id="speech", text=SpeechText(parts=(text,)))
-    return write(Block(id=f"text{number}", composition="APPEND", children=(speech,)))
+    """Return the document that speaks a text after those of smaller numbers; several for a long text."""
+    blocks = []
+    for k, piece in enumerate(_PIECE.findall(text) if len(text) > LONGEST else [text]):
+        speech = Speech(id="speech", text=SpeechText(parts=(piece,)))
+        id = f"text{number}-{k + 1}" if k else f"text{number}"
+        blocks.append(write(Block(id=id, composition="APPEND", children=(speech,))))
+    return "".join(blocks)
 
 
 def document_of(item: object, number: int = 1) -> Document:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bml_schema import BMLError, Speech, parse
+from bml_schema import Block, BMLError, Speech, parse, read
 from realizer.behaviours.registry import VOCABULARY
 from realizer.sources import documents_of, first_error, is_file_name
 
@@ -31,6 +31,25 @@ def test_is_file_name_of_a_suffix_or_a_path(text: str, is_file: bool) -> None:
 def test_documents_of_a_text_speak_it(source: str | bytes) -> None:
     (document,) = documents_of(source)
     assert text_of(document.bml) == "Tom & Jerry, 1 > 0?"
+
+
+def test_documents_of_a_long_text_speak_all_of_it_in_parts() -> None:
+    text = " ".join(f"This is sentence {k}." for k in range(2_000))
+    (document,) = documents_of(text)
+    blocks = [block for block in read(document.bml) if isinstance(block, Block)]
+    assert [block.id for block in blocks] == ["text1", *(f"text1-{k}" for k in range(2, len(blocks) + 1))]
+    parts = [str(node.text) for block in blocks for node in block.behaviours if isinstance(node, Speech)]
+    assert " ".join(parts) == text
+    assert all(part.endswith(".") and len(part) <= 10_000 for part in parts)
+
+
+@pytest.mark.parametrize("text", ["x" * 25_000, "これはペンです。" * 3_000])
+def test_documents_of_a_long_text_without_blanks_speak_all_of_it(text: str) -> None:
+    (document,) = documents_of(text)
+    blocks = [block for block in read(document.bml) if isinstance(block, Block)]
+    parts = [str(node.text) for block in blocks for node in block.behaviours if isinstance(node, Speech)]
+    assert "".join(parts) == text
+    assert max(map(len, parts)) <= 10_000
 
 
 def test_documents_of_a_file_are_its_content(tmp_path: Path) -> None:
