@@ -131,7 +131,7 @@ def _csv(text: str) -> Recording:
         except (KeyError, FaceError):  # too few points for FAPs
             return Recording("", points=tracked)
         return Recording(
-            "", faps=faps_from_points(bridge(moving), rest, fapu)[0].astype(float), points=points
+            "", faps=faps_from_points(bridge(moving), rest, fapu)[0].astype(float), points=tracked
         )
     columns = {name: np.nan_to_num(cells) for name, cells in numbers(text).items()}
     if "AU01_r" in head:  # OpenFace: intensities of 0 to 5; landmarks in space, y down and z away
