@@ -1,4 +1,4 @@
-"""WebSocket connections: admission, session, messages."""
+"""WebSocket connections: admission, session, messages; whichever library serves them."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ import asyncio
 import contextlib
 import http
 import logging
+from collections.abc import Callable, Mapping
 from functools import lru_cache
+from typing import Protocol
 
 from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
 from websockets.frames import Frame, Opcode
-from websockets.http11 import Request
 from websockets.protocol import State
 
 from realizer.core.settings import Settings, limit_hint
@@ -22,6 +23,7 @@ from realizer.server.http.jwt_tokens import Grant
 from realizer.server.journal import JournalError
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError, Visitor
+from realizer.server.transports.transport import Outbound
 from realizer.server.transports.websocket.protocol import Connection
 from realizer.server.transports.websocket.request import address_of, headers_of, path_of, session_of
 
@@ -29,6 +31,41 @@ log = logging.getLogger(__name__)
 
 GOODBYE = 2.0  # s; a client that has not answered a close frame by then is gone
 REASON = 123  # bytes of a reason in a close frame
+
+
+class ClientSocket(Outbound, Protocol):
+    """The WebSocket of a client.
+
+    Attributes:
+        address: IP address, or "".
+        target: path and query of its request.
+        headers: of its request, by lower-case names.
+    """
+
+    address: str
+    target: str
+    headers: Mapping[str, str]
+
+    @property
+    def close_code(self) -> int | None:
+        """The code with which it was closed."""
+        ...
+
+    def on_rate(self, warn: Callable[[str], None]) -> None:
+        """Call `warn` with a notice when the client sends too fast."""
+        ...
+
+    async def receive(self) -> str | bytes | None:
+        """Return the next message; None after the last."""
+        ...
+
+    async def send_all(self, text: str) -> None:
+        """Send a message, and wait until the network has taken it, or the connection has ended."""
+        ...
+
+    async def close(self, code: int, reason: str) -> None:
+        """Close the connection and wait until it is closed."""
+        ...
 
 
 class WebSocketConnections:
@@ -41,121 +78,150 @@ class WebSocketConnections:
         self._checking = asyncio.Lock()
         self._from: list[str] = []  # the addresses of the open WebSockets
 
-    def check_room(self, socket: ServerConnection) -> None:
-        """Raise JoinError if too many connections of the client's address are open."""
+    def admit(self, target: str, headers: Mapping[str, str], address: str) -> None:
+        """Check whether a WebSocket may be opened at /ws or /check.
+
+        Raises:
+            JoinError: the client may not open it.
+        """
+        checks = path_of(target) == "/check"
+        grant = self._access.request(target, headers, later=not checks)
+        self._check_room(address)
+        if checks:
+            self._access.check_memory()
+        else:
+            # Without a grant its sessions are not known yet.
+            visitor = Visitor(address, None if grant is None else grant.sessions)
+            self._sessions.check(session_of(target)[0], visitor)
+
+    def _check_room(self, address: str) -> None:
+        """Raise JoinError if too many connections of an address are open."""
         most = self._settings.max_connections
-        if self._from.count(address_of(socket)) >= most:
-            words = (
-                f"{most} connections from {address_of(socket)} are open: wanted fewer "
-                f"{limit_hint('max_connections')}"
-            )
-            raise JoinError(http.HTTPStatus.TOO_MANY_REQUESTS, words)
+        if self._from.count(address) >= most:
+            words = f"{most} connections from {address} are open: wanted fewer"
+            raise JoinError(http.HTTPStatus.TOO_MANY_REQUESTS, f"{words} {limit_hint('max_connections')}")
 
     async def handle(self, socket: ServerConnection) -> None:
-        """Serve one WebSocket until it closes."""
-        assert socket.request is not None
-        address = address_of(socket)
-        try:
-            self.check_room(socket)  # again: others may have connected since the HTTP request
-        except JoinError as error:
-            await WebSocketWriter(socket).close(1013, str(error))
-            return
-        self._from.append(address)
-        try:
-            if path_of(socket.request) == "/check":
-                await self._check(socket)
-            else:
-                await self._serve(socket, socket.request)
-        finally:
-            self._from.remove(address)
+        """Serve a WebSocket of the websockets library until it closes."""
+        await self.serve(WebSocketClient(socket))
 
-    async def _serve(self, socket: ServerConnection, request: Request) -> None:
-        client, hello, address = WebSocketWriter(socket), None, address_of(socket)
+    async def serve(self, client: ClientSocket) -> None:
+        """Serve one WebSocket until it closes."""
         try:
-            grant = self._access.request(request.path, headers_of(request), later=True)
+            self._check_room(client.address)  # again: others may have connected since the HTTP request
+        except JoinError as error:
+            await client.close(1013, str(error))
+            return
+        self._from.append(client.address)
+        try:
+            await (self._check(client) if path_of(client.target) == "/check" else self._serve(client))
+        finally:
+            self._from.remove(client.address)
+
+    async def _serve(self, client: ClientSocket) -> None:
+        hello = None
+        try:
+            grant = self._access.request(client.target, client.headers, later=True)
             if grant is None:
-                hello, grant = await self._first_message(socket)
-            visitor = Visitor(address, grant.sessions)
-            name, seen = session_of(request)
+                hello, grant = await self._first_message(client)
+            visitor = Visitor(client.address, grant.sessions)
+            name, seen = session_of(client.target)
             self._sessions.check(name, visitor)  # again: the grant of a hello is known only now
             await self._sessions.restore(name, seen)
             number = self._sessions.join(client, name, seen, visitor)
         except JoinError as error:
-            await self._reject(socket, client, error)
+            await self._reject(client, error)
             return
         except JournalError as error:
             await client.close(1013, str(error))
             return
-        fields = {"connection": number, "session": name, "address": address}
+        fields = {"connection": number, "session": name, "address": client.address}
         log.info("joined", extra=fields)
         try:
             if hello is not None:
                 self._sessions.receive(number, hello)
             async with asyncio.timeout(grant.seconds_left):
-                await self._read(socket, number, client)
-        except ConnectionClosed:
-            pass
+                await self._read(client, number)
         except TimeoutError:
             await client.close(1008, "token: it has expired")
         finally:
             self._sessions.leave(number)
-            log.info("left", extra={**fields, "code": socket.close_code})
+            log.info("left", extra={**fields, "code": client.close_code})
 
-    async def _read(self, socket: ServerConnection, number: int, client: WebSocketWriter) -> None:
-        """Pass on messages; `Connection` limits their rate."""
-        if isinstance(socket, Connection):
-            socket.warn = lambda notice: client.send(ErrorMessage(code="rate", message=notice).text())
-        async for message in socket:
+    async def _read(self, client: ClientSocket, number: int) -> None:
+        """Pass on messages, whose rate the client's socket limits."""
+        client.on_rate(lambda notice: client.send(ErrorMessage(code="rate", message=notice).text()))
+        while (message := await client.receive()) is not None:
             if not self._sessions.receive(number, message):
                 return
             await asyncio.sleep(0)  # one read may hold many messages
             await self._sessions.wait_for_room(number)
 
-    async def _first_message(self, socket: ServerConnection) -> tuple[str | bytes, Grant]:
+    async def _first_message(self, client: ClientSocket) -> tuple[str | bytes, Grant]:
         """Return the first message of a client without a token, and the grant of the token in it.
 
         Raises:
             JoinError: 401, no message came in time, or it has no valid token.
         """
         message: str | bytes = ""
-        with contextlib.suppress(ConnectionClosed, TimeoutError):
+        with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(access.PATIENCE):
-                message = await socket.recv()
+                message = await client.receive() or ""
         return message, self._access.check_hello(message)
 
-    async def _reject(self, socket: ServerConnection, client: WebSocketWriter, error: JoinError) -> None:
+    async def _reject(self, client: ClientSocket, error: JoinError) -> None:
         self._sessions.metrics.counts["refused"] += 1
-        log.info("refused: %s", error, extra={"address": address_of(socket), "status": error.status})
+        log.info("refused: %s", error, extra={"address": client.address, "status": error.status})
         forbidden = error.status in (http.HTTPStatus.UNAUTHORIZED, http.HTTPStatus.FORBIDDEN)
         if forbidden:
             where = "hello.token" if error.status == http.HTTPStatus.UNAUTHORIZED else "hello.session"
             message = ErrorMessage(code="token", message=str(error), where=where)
-            with contextlib.suppress(ConnectionClosed):
-                await socket.send(message.text())
+            await client.send_all(message.text())
         await client.close(1008 if forbidden else 1013, str(error))
 
-    async def _check(self, socket: ServerConnection) -> None:
+    async def _check(self, client: ClientSocket) -> None:
         """Serve the WebSocket of an editor: send the faults of each text that arrives."""
         from realizer.server.http.page_tools import lint
 
         loop = asyncio.get_running_loop()
-        with contextlib.suppress(ConnectionClosed):
-            async for text in socket:
-                if isinstance(text, bytes):
-                    await socket.close(1003, "wanted text")
-                    return
-                # One text at a time for all editors: sessions come first.
-                async with self._checking:
-                    faults = await loop.run_in_executor(None, lint, text, self._settings)
-                await socket.send(faults)
+        while (text := await client.receive()) is not None:
+            if isinstance(text, bytes):
+                await client.close(1003, "wanted text")
+                return
+            # One text at a time for all editors: sessions come first.
+            async with self._checking:
+                faults = await loop.run_in_executor(None, lint, text, self._settings)
+            await client.send_all(faults)
 
 
-class WebSocketWriter:
-    """The way out to one WebSocket, an `Outbound`: data goes directly to the socket's own buffer."""
+class WebSocketClient:
+    """A `ClientSocket` of the websockets library: data goes directly to the socket's own buffer."""
 
     def __init__(self, socket: ServerConnection) -> None:
         self._socket = socket
         self._end: asyncio.Task[None] | None = None
+        self.address, request = address_of(socket), socket.request
+        assert request is not None
+        self.target = request.path
+        self.headers: Mapping[str, str] = headers_of(request)
+
+    @property
+    def close_code(self) -> int | None:
+        return self._socket.close_code
+
+    def on_rate(self, warn: Callable[[str], None]) -> None:
+        if isinstance(self._socket, Connection):
+            self._socket.warn = warn
+
+    async def receive(self) -> str | bytes | None:
+        try:
+            return await self._socket.recv()
+        except ConnectionClosed:
+            return None
+
+    async def send_all(self, text: str) -> None:
+        with contextlib.suppress(ConnectionClosed):
+            await self._socket.send(text)
 
     @property
     def unsent_bytes(self) -> int:

@@ -25,18 +25,18 @@ def headers_of(request: Request) -> dict[str, str]:
     return {name.lower(): value for name, value in request.headers.raw_items()}
 
 
-def query_of(request: Request) -> dict[str, str]:
-    """Return the query of a request; of several values with one name the last."""
-    return dict(parse_qsl(request.path.partition("?")[2], keep_blank_values=True))
+def query_of(target: str) -> dict[str, str]:
+    """Return the query of a request's target; of several values with one name the last."""
+    return dict(parse_qsl(target.partition("?")[2], keep_blank_values=True))
 
 
-def session_of(request: Request) -> tuple[str | None, int | None]:
+def session_of(target: str) -> tuple[str | None, int | None]:
     """Return the session and the number in `?session=ID&seen=N`.
 
     Raises:
         JoinError: 400, `seen` is not a number.
     """
-    query = query_of(request)
+    query = query_of(target)
     session, seen = query.get("session") or None, query.get("seen")
     if seen is None:
         return session, None
@@ -45,9 +45,9 @@ def session_of(request: Request) -> tuple[str | None, int | None]:
     return session, int(seen)
 
 
-def path_of(request: Request) -> str:
-    """Return the path of a request as it was sent, without its query."""
-    return request.path.partition("?")[0]
+def path_of(target: str) -> str:
+    """Return the path of a request's target as it was sent, without its query."""
+    return target.partition("?")[0]
 
 
 def response_to(answer: HttpResponse, origin: str | None = None) -> Response:

@@ -1,8 +1,6 @@
 """The WebSocket transport: sessions at /ws, checks at /check, HTTP beside them."""
 
 import asyncio
-import http
-import logging
 import os
 import socket
 import tempfile
@@ -18,22 +16,17 @@ from websockets.protocol import State
 
 from realizer.core.settings import Settings
 from realizer.server.http.access import EVERYWHERE, AccessControl
-from realizer.server.http.http_site import TEXT, HttpResponse, HttpSite
-from realizer.server.http.metrics import MEDIA_TYPE
+from realizer.server.http.requests import SOCKETS, HttpRequests
 from realizer.server.runtime.session_host import SessionHost
-from realizer.server.runtime.session_registry import JoinError, Visitor
+from realizer.server.runtime.session_registry import JoinError
 from realizer.server.transports.websocket.connection import GOODBYE, WebSocketConnections
 from realizer.server.transports.websocket.protocol import Connection, Protocol
 from realizer.server.transports.websocket.request import (
     address_of,
     headers_of,
     path_of,
-    query_of,
     response_to,
-    session_of,
 )
-
-log = logging.getLogger(__name__)
 
 PATIENCE: Mapping[str, Any] = {"ping_interval": 20, "ping_timeout": 60}  # s
 OPENING = 10.0  # s; time for the HTTP request
@@ -49,13 +42,12 @@ class WebSocketTransport:
     def __init__(self, sessions: SessionHost, settings: Settings, *, worker: int | None = None) -> None:
         self.port = settings.port
         self._listens = worker is None
-        self._worker = worker or 0
         self._tasks: set[asyncio.Task[Any]] = set()
         self._sessions = sessions
         self._settings = settings
         self._access = AccessControl(settings)
         self._connections = WebSocketConnections(sessions, settings, self._access)
-        self._site = HttpSite(sessions.health, settings)
+        self._requests = HttpRequests(sessions, settings, self._access, worker or 0)
         self._socket: SocketServer | None = None
         self._opened = WeakSet[ServerConnection]()
         self._closing: set[asyncio.Task[None]] = set()
@@ -132,64 +124,18 @@ class WebSocketTransport:
 
     async def _http(self, connection: ServerConnection, request: Request) -> Response | None:
         """Answer a request; return None if a WebSocket may be opened."""
-        headers = headers_of(request)
-        try:
-            answer = await self._answer(connection, request, headers)
-        except JoinError as error:
-            answer = self._refused(connection, error)
-        origin = headers.get("origin") if self._access.allows_origin(headers) else None
-        return None if answer is None else response_to(answer, origin)
-
-    async def _answer(
-        self, connection: ServerConnection, request: Request, headers: Mapping[str, str]
-    ) -> HttpResponse | None:
-        """Return the answer to a request; None if a WebSocket may be opened.
-
-        Raises:
-            JoinError: the client may not do this.
-        """
-        self._access.check_host(headers)
-        path = path_of(request)
+        target, headers, address = request.path, headers_of(request), address_of(connection)
         upgrade = headers.get("upgrade", "").lower() == "websocket"
-        if path in ("/ws", "/check") and upgrade:
-            grant = self._access.request(request.path, headers, later=path == "/ws")
-            self._connections.check_room(connection)
-            if path == "/check":
-                self._access.check_memory()
-            else:
-                # Without a grant its sessions are not known yet.
-                visitor = Visitor(address_of(connection), None if grant is None else grant.sessions)
-                self._sessions.check(session_of(request)[0], visitor)
-            return None
-        if path in ("/ws", "/check") or upgrade:
-            got = "a WebSocket" if upgrade else "plain HTTP"
-            words = f"wanted a WebSocket at /ws or /check, got {got} at {path}\n"
-            return HttpResponse(426 if not upgrade else 404, TEXT, words.encode())
-        if path in ("/metrics", "/healthz") and (wrong := self._wrong_worker(request)) is not None:
-            return HttpResponse(404, TEXT, f"{wrong}\n".encode())
-        if not self._site.is_public(path):
-            grant = self._access.request(request.path, headers)
-            if path == "/metrics" and (grant is None or grant.sessions is not None):
-                raise JoinError(http.HTTPStatus.FORBIDDEN, "metrics: wanted a token for all sessions")
-        if path == "/metrics":
-            return HttpResponse(200, MEDIA_TYPE, self._sessions.metrics_text().encode())
-        loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(
-            None, self._site.answer, request.path, headers.get("if-none-match", "")
-        )
-
-    def _wrong_worker(self, request: Request) -> str | None:
-        """Return the error if a request names another worker, or None."""
-        worker = query_of(request).get("worker")
-        if worker in (None, str(self._worker)):
-            return None
-        return f"worker: wanted a number of 0..{self._settings.workers - 1}, got {worker[:80]!r}"
-
-    def _refused(self, connection: ServerConnection, error: JoinError) -> HttpResponse:
-        self._sessions.metrics.counts["refused"] += 1
-        log.info("refused: %s", error, extra={"address": address_of(connection), "status": error.status})
-        headers = (("WWW-Authenticate", "Bearer"),) if error.status == http.HTTPStatus.UNAUTHORIZED else ()
-        return HttpResponse(error.status, TEXT, f"{error}\n".encode(), headers)
+        try:
+            self._access.check_host(headers)
+            if upgrade and path_of(target) in SOCKETS:
+                self._connections.admit(target, headers, address)
+                return None
+            answer = await self._requests.answer(target, headers, upgrade=upgrade)
+        except JoinError as error:
+            answer = self._requests.refuse(error, address)
+        origin = headers.get("origin") if self._access.allows_origin(headers) else None
+        return response_to(answer, origin)
 
 
 def _unreachable_socket() -> socket.socket:

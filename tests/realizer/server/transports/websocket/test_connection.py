@@ -17,7 +17,7 @@ from websockets.exceptions import ConnectionClosed
 from realizer.core.settings import Settings
 from realizer.server.journal import JournalError
 from realizer.server.serve import Server
-from realizer.server.transports.websocket.connection import WebSocketWriter
+from realizer.server.transports.websocket.connection import WebSocketClient
 
 LIMIT = 30  # s
 TOKEN = "a-token-of-many-letters-and-0123456789"
@@ -78,7 +78,7 @@ def test_connection_logs_its_begin_and_end(caplog: pytest.LogCaptureFixture) -> 
     assert (left.session, left.code) == ("show", 1000)  # type: ignore[attr-defined]
 
 
-def between(test: Callable[[WebSocketWriter, ClientConnection], Awaitable[None]]) -> None:
+def between(test: Callable[[WebSocketClient, ClientConnection], Awaitable[None]]) -> None:
     """Run a test with both ends of a connection."""
 
     async def run() -> None:
@@ -91,7 +91,7 @@ def between(test: Callable[[WebSocketWriter, ClientConnection], Awaitable[None]]
         async with asyncio.timeout(LIMIT), serve(handle, "127.0.0.1", 0, compression=None) as server:
             port = server.sockets[0].getsockname()[1]
             async with connect(f"ws://127.0.0.1:{port}", max_size=None, max_queue=None) as theirs:
-                await test(WebSocketWriter(await ours), theirs)
+                await test(WebSocketClient(await ours), theirs)
 
     asyncio.run(run())
 
@@ -104,7 +104,7 @@ def test_writer_sends_messages_of_any_length_whole_and_in_order() -> None:
             bytes(range(256)) * (length // 256) + bytes(length % 256),
         ]
 
-    async def test(client: WebSocketWriter, theirs: ClientConnection) -> None:
+    async def test(client: WebSocketClient, theirs: ClientConnection) -> None:
         for message in sent:
             client.send(message)
         assert [await theirs.recv() for _ in sent] == sent
@@ -113,7 +113,7 @@ def test_writer_sends_messages_of_any_length_whole_and_in_order() -> None:
 
 
 def test_writer_is_not_disturbed_by_frames_of_the_library() -> None:
-    async def test(client: WebSocketWriter, theirs: ClientConnection) -> None:
+    async def test(client: WebSocketClient, theirs: ClientConnection) -> None:
         client.send("one")
         assert await asyncio.wait_for(await theirs.ping(), LIMIT) >= 0
         client.send(b"two")
@@ -123,7 +123,7 @@ def test_writer_is_not_disturbed_by_frames_of_the_library() -> None:
 
 
 def test_writer_sends_nothing_after_the_end() -> None:
-    async def test(client: WebSocketWriter, theirs: ClientConnection) -> None:
+    async def test(client: WebSocketClient, theirs: ClientConnection) -> None:
         client.send("last")
         client.disconnect(1013, "enough")
         client.send("too late")
@@ -140,7 +140,7 @@ def test_writer_sends_nothing_after_the_end() -> None:
 
 
 def test_writer_counts_what_is_not_read() -> None:
-    async def test(client: WebSocketWriter, theirs: ClientConnection) -> None:
+    async def test(client: WebSocketClient, theirs: ClientConnection) -> None:
         theirs.transport.pause_reading()
         while client.unsent_bytes < 100_000:
             client.send(bytes(1_000_000))
@@ -153,7 +153,7 @@ def test_writer_counts_what_is_not_read() -> None:
 
 
 def test_writer_cuts_a_long_reason() -> None:
-    async def test(client: WebSocketWriter, theirs: ClientConnection) -> None:
+    async def test(client: WebSocketClient, theirs: ClientConnection) -> None:
         client.disconnect(1013, "é" * 100)  # two bytes each, and room for 123
         with pytest.raises(ConnectionClosed) as closed:
             await theirs.recv()

@@ -11,10 +11,6 @@ from realizer.server.runtime.session_registry import JoinError
 from realizer.server.transports.websocket.request import headers_of, query_of, response_to, session_of
 
 
-def request(path: str, **headers: str) -> Request:
-    return Request(path, Headers(headers))
-
-
 @pytest.mark.parametrize(
     ("query", "session", "seen"),
     [
@@ -27,18 +23,18 @@ def request(path: str, **headers: str) -> Request:
     ],
 )
 def test_session_of_reads_the_address(query: str, session: str | None, seen: int | None) -> None:
-    assert session_of(request(f"/ws{query}")) == (session, seen)
+    assert session_of(f"/ws{query}") == (session, seen)
 
 
 @pytest.mark.parametrize("seen", ["", "abc", "-1", "1.5", "9" * 16])
 def test_session_of_refuses_a_bad_number_in_seen(seen: str) -> None:
     with pytest.raises(JoinError, match="seen: wanted the number of the last feedback that came") as refused:
-        session_of(request(f"/ws?session=show&seen={seen}"))
+        session_of(f"/ws?session=show&seen={seen}")
     assert refused.value.status == 400
 
 
 def test_headers_of_and_query_of_take_the_last_of_one_name() -> None:
-    assert query_of(request("/metrics?worker=1&worker=&x")) == {"worker": "", "x": ""}
+    assert query_of("/metrics?worker=1&worker=&x") == {"worker": "", "x": ""}
     several = Headers([("X-One", "1"), ("x-one", "2"), ("Host", "here")])
     assert headers_of(Request("/", several)) == {"x-one": "2", "host": "here"}
 
