@@ -72,7 +72,7 @@ IMPORTERS = {
     "onnxruntime": ("realizer.speech.hibari.worker",),
     "redis": ("realizer.server.journal.redis_journal",),
     "pocketsphinx": ("realizer.speech.align.sphinx",),
-    "starlette": ("realizer.asgi",),
+    "starlette": ("realizer.server.asgi",),
     "stomp": ("realizer.server.transports.broker",),
     "jwt": ("realizer.server.http.jwt_tokens",),
     "cryptography": ("realizer.server.http.jwt_tokens",),

@@ -1,0 +1,1 @@
+"""The service as an ASGI application, under uvicorn or inside another application."""

@@ -1,0 +1,161 @@
+"""The service as an application under uvicorn, and inside another application."""
+
+from __future__ import annotations
+
+import http.client
+import json
+from collections.abc import Iterator
+from functools import partial
+from urllib.parse import urlsplit
+
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+
+pytest.importorskip("starlette", reason="needs the asgi extra")
+
+from realizer.core.settings import Settings, SettingsError
+from realizer.server.asgi.app import create_app, event_of
+from tests.realizer.server.asgi.conftest import LIMIT, Served
+
+NOD = '<bml id="a"><head id="n" lexeme="NOD"/></bml>'
+
+
+@pytest.fixture(scope="module")
+def app(serve) -> Iterator[Served]:
+    with serve(create_app(Settings(voice="silent"))) as served:
+        yield served
+
+
+def events(app: Served, session: str, **headers: str) -> Iterator[tuple[str, str, str]]:
+    """Yield name, id and data of the events of a session, from the beginning of the stream."""
+    connection = http.client.HTTPConnection(urlsplit(app.url).netloc, timeout=LIMIT)
+    connection.request("GET", f"/sessions/{session}/feedback", headers=headers)
+    answer = connection.getresponse()
+    assert (answer.status, answer.headers["Content-Type"].split(";")[0]) == (200, "text/event-stream")
+    fields: dict[str, str] = {}
+    try:
+        for line in answer:
+            name, _, value = line.decode().rstrip("\n").partition(": ")
+            if name:
+                fields[name] = fields[name] + "\n" + value if name in fields else value
+            elif fields:
+                yield fields["event"], fields.get("id", ""), fields["data"]
+                fields = {}
+    finally:
+        connection.close()
+
+
+def test_app_serves_page_health_and_faces(app) -> None:
+    assert json.loads(app("GET", "/healthz")[2])["status"] == "ok"
+    assert app("GET", "/faces/ada")[2][:4] == b"glTF"
+    assert app("GET", "/nothing")[0] == 404
+
+
+def test_app_describes_itself(app) -> None:
+    paths = json.loads(app("GET", "/openapi.json")[2])["paths"]
+    assert set(paths) >= {"/realize", "/check", "/sessions/{session}/bml", "/sessions/{session}/feedback"}
+
+
+def test_app_plays_over_its_websocket(app) -> None:
+    with connect(app.url.replace("http", "ws") + "/ws?session=w", open_timeout=LIMIT) as socket:
+        socket.send('{"type": "subscribe", "stream": "fap", "encoding": "json"}')
+        socket.send(NOD)
+        got = ""
+        while "a:end" not in got:
+            got += str(socket.recv(LIMIT))
+    assert '"type":"subscribed"' in got
+    assert '"type":"fap"' in got
+
+
+def test_app_plays_documents_that_are_posted_and_streams_their_feedback(app) -> None:
+    status, _, answer = app("POST", "/sessions/show/bml", NOD)
+    assert (status, json.loads(answer)) == (202, {"session": "show"})
+    got = []
+    for name, number, data in events(app, "show", **{"Last-Event-ID": "0"}):
+        got.append((name, number))
+        if 'id="a:end"' in data:
+            break
+    assert [number for _, number in got] == [str(k + 1) for k in range(len(got))]
+    assert {name for name, _ in got} == {"feedback"}
+
+
+def test_app_speaks_a_text_that_is_posted(app) -> None:
+    app("POST", "/sessions/talk/bml", "Hello there")
+    feedback = (data for _, _, data in events(app, "talk", **{"Last-Event-ID": "0"}))
+    assert 'id="text1:start"' in next(data for data in feedback if "blockProgress" in data)
+
+
+def test_app_ends_a_session_with_its_connections(app) -> None:
+    app("POST", "/sessions/over/bml", NOD)
+    with connect(app.url.replace("http", "ws") + "/ws?session=over", open_timeout=LIMIT) as socket:
+        assert app("DELETE", "/sessions/over")[0] == 204
+        with pytest.raises(ConnectionClosed, match="the session was ended"):
+            list(iter(partial(socket.recv, LIMIT), None))
+    assert app.error("DELETE", "/sessions/over") == (404, "session: wanted one that is open, got 'over'")
+
+
+def test_app_checks_documents(app) -> None:
+    faulty = '<bml id="a"><head id="n" lexeme="NOPE"/></bml>'
+    (finding,) = json.loads(app("POST", "/check", faulty)[2])
+    at = faulty.index('"NOPE"') + 1
+    assert (finding["line"], finding["column"] - at in (0, 1), finding["id"]) == (1, True, "a:n")
+    assert json.loads(app("POST", "/check", NOD)[2]) == []
+
+
+@pytest.mark.parametrize("path", ["/check", "/realize", "/sessions/s/bml"])
+def test_app_refuses_bodies_that_are_empty_or_too_long(app, path) -> None:
+    assert app.error("POST", path, " ") == (400, "body: wanted BML or a text to speak, got nothing")
+    status, words = app.error("POST", path, "x" * (2**20 + 1))
+    assert status == 413
+    assert words.startswith("body: wanted at most")
+
+
+def test_app_refuses_bad_names_and_other_origins(app) -> None:
+    assert app.error("POST", "/sessions/a%20b/bml", NOD)[0] == 400
+    assert app.error("GET", "/sessions/s/feedback?seen=x")[0] == 400
+    assert app.error("POST", "/check", NOD, Origin="http://evil.example")[0] == 403
+    assert app.error("POST", "/check", NOD, Host="evil.example")[0] == 403
+    assert app("PUT", "/check", NOD)[0] == 405
+
+
+def test_app_asks_for_its_token(serve) -> None:
+    with serve(create_app(Settings(voice="silent", token="secret"))) as app:
+        for method, path in (("POST", "/check"), ("POST", "/sessions/s/bml"), ("DELETE", "/sessions/s")):
+            assert app.error(method, path, NOD)[0] == 401
+        assert app("POST", "/check", NOD, Authorization="Bearer secret")[0] == 200
+        assert app("POST", "/check?token=secret", NOD)[0] == 200
+        with connect(app.url.replace("http", "ws") + "/ws?token=secret", open_timeout=LIMIT) as socket:
+            socket.send('{"type": "ping"}')
+            assert '"pong"' in str(socket.recv(LIMIT))
+        with pytest.raises(InvalidStatus) as refused:
+            connect(app.url.replace("http", "ws") + "/ws?token=wrong", open_timeout=LIMIT)
+        assert refused.value.response.status_code == 401
+
+
+@pytest.mark.parametrize("passes_lifespan_on", [True, False])
+def test_app_runs_inside_another_application(serve, passes_lifespan_on) -> None:
+    fastapi = pytest.importorskip("fastapi")
+    face = create_app(Settings(voice="silent"))
+    lifespan = face.router.lifespan_context if passes_lifespan_on else None
+    outer = fastapi.FastAPI(lifespan=lifespan)
+    outer.mount("/face", face)
+    with serve(outer) as served:
+        assert json.loads(served("GET", "/face/healthz")[2])["status"] == "ok"
+        assert json.loads(served("GET", "/face/openapi.json")[2])["servers"] == [{"url": "/face"}]
+        with connect(served.url.replace("http", "ws") + "/face/ws", open_timeout=LIMIT) as socket:
+            socket.send(NOD)
+            assert "predictionFeedback" in str(socket.recv(LIMIT))
+        assert served("POST", "/face/check", NOD)[0] == 200
+
+
+def test_create_app_refuses_workers() -> None:
+    with pytest.raises(SettingsError, match="an ASGI application is one process"):
+        create_app(Settings(workers=2))
+
+
+def test_event_of_names_elements_and_messages() -> None:
+    assert event_of('<blockProgress r:seq="7">\n</blockProgress>') == (
+        'event: feedback\nid: 7\ndata: <blockProgress r:seq="7">\ndata: </blockProgress>\n\n'
+    )
+    assert event_of('{"type":"gap"}') == 'event: gap\ndata: {"type":"gap"}\n\n'
