@@ -16,10 +16,10 @@ from bml_schema.element_reader import Vocabulary
 Source = str | bytes | Path
 # Suffixes of files that we read. A text in a .txt file is spoken; those of timelines are read by `check`.
 SUFFIXES = (".bml", ".xml", ".txt", ".toml", ".json")
-LONGEST = 10_000  # characters of one speech
+LONGEST = 10_000  # characters of one speech, as in `_PIECE`
 # A part of a long text: up to the last end of a sentence in it, or else the last blank, or else cut.
 _PIECE = re.compile(
-    rf"\S(?:.{{0,{LONGEST - 2}}}(?:[.!?…](?=\s|\Z)|[。！？])|.{{0,{LONGEST - 1}}}(?=\s|\Z)|.{{0,{LONGEST - 1}}})",
+    r"\S(?:.{0,9998}(?:[.!?…](?=\s|\Z)|[。！？])|.{0,9999}(?=\s|\Z)|.{0,9999})",
     re.DOTALL,
 )
 WANTED = "BML, a text, bytes, a pathlib.Path, or a list of these"
