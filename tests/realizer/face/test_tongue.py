@@ -17,6 +17,7 @@ from realizer.face.load import load_face
 from realizer.face.mesh_geometry import edges_of, part_triangles, triangle_normals
 from realizer.face.model import Face
 from realizer.tables import action_units, faps
+from tests.penetration import MouthParts, action_unit_poses, emotion_poses, fap_poses, viseme_poses
 from tests.shipped import FACES
 
 DEEPEST = 0.0003  # m
@@ -111,3 +112,15 @@ def test_tongue_room_keeps_the_tongue_out_of_teeth_and_lips(name: str) -> None:
     flesh, walls = surfaces(face)
     depths = np.array([deepest(shape, flesh, walls) for shape in shapes])
     assert depths.max() < DEEPEST, np.argsort(-depths)[:5]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FACES)
+def test_tongue_room_keeps_the_drawn_tongue_out_of_walls_in_usual_poses(name: str) -> None:
+    face = load_face(name)
+    groups = action_unit_poses(face, 3), viseme_poses(), fap_poses(), emotion_poses(face)
+    labels = [label for names, _ in groups for label in names]
+    mouth = MouthParts(face)
+    shapes = deform(face, np.concatenate([rows[:, :68] for _, rows in groups]))
+    depth = np.array([mouth.tongue_in_walls(shape) for shape in shapes])
+    assert depth.max() < DEEPEST, [(labels[k], 1000 * depth[k]) for k in np.flatnonzero(depth >= DEEPEST)]

@@ -16,7 +16,7 @@ from tests.shipped import DEFAULT, FACES, FOLDERS
 
 FORMS = ("published", "extended")
 # Mean and worst e/d_max; her own mean is 0.12.
-AIMS = {"published": (0.072, 0.135), "extended": (0.058, 0.13)}
+AIMS = {"published": (0.072, 0.133), "extended": (0.058, 0.13)}
 
 
 @pytest.fixture(params=FACES)
