@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import lru_cache
 from itertools import groupby
 from operator import itemgetter
 from typing import Any
@@ -131,7 +131,7 @@ class Recogniser:
         return (self._emotions[best] if belief >= self._model.least_belief else None), belief
 
 
-@cache
+@lru_cache(maxsize=8)
 def recogniser(profiles: str = "own") -> Recogniser:
     """Return the recogniser of all profiles of a set, and of the neutral face.
 

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping
-from functools import cache
+from functools import lru_cache
 from pathlib import Path
 
 from realizer.emotions.profile import Profile
@@ -14,7 +14,7 @@ SETS = ("own", "published", "raw")
 CHOSEN = re.compile(r"\s*(\D*\w)\s+(\d{1,9})\s*")
 
 
-@cache
+@lru_cache(maxsize=64)
 def archetypes(profiles: str = "own") -> Mapping[str, Mapping[int, Profile]]:
     """Return emotion -> number -> profile; the first profile of an emotion is the one that stands for it.
 

@@ -2,7 +2,7 @@
 
 import math
 from bisect import bisect_right
-from functools import cache
+from functools import lru_cache
 
 from realizer.emotions.archetypes import archetypes
 from realizer.emotions.intermediate import Anchor
@@ -113,7 +113,7 @@ def _plain(name: str) -> str:
     return name.rpartition(" ")[0] or name
 
 
-@cache
+@lru_cache(maxsize=64)
 def _anchors(profiles: str, ring: str) -> tuple[tuple[Anchor, ...], tuple[float, ...]]:
     """Return the emotions of a ring that have a profile in the set, by angle, and their angles."""
     model, known = emotion_model(), archetypes(profiles)
