@@ -24,10 +24,6 @@ class Shape:
     serves: str
     without: str
 
-    @property
-    def faps(self) -> tuple[int, ...]:
-        return tuple(int(fap) for fap in self.serves.split())
-
 
 @cache
 def shapes() -> dict[str, Shape]:
