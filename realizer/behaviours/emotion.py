@@ -137,7 +137,7 @@ def _set_of(node: Emotion | Mood, context: PlanningContext) -> str:
         name = str(media_file(name, context))
     elif name not in PUBLISHED:
         return "own"
-    return ", ".join([name, *(f"{emotion} {number}" for emotion, number in chosen)])
+    return ", ".join([name, *(f"{emotion} {number}" for emotion, number in chosen.items())])
 
 
 def _varied(aus: Mapping[tuple[int, str], float], seed: int) -> dict[tuple[int, str], float]:

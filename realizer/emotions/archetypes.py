@@ -1,6 +1,5 @@
 """The profiles of the archetypal emotions: our own, published, as printed, or of a file."""
 
-import re
 from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -11,7 +10,6 @@ from realizer.tables.emotion_model import emotion_model
 from realizer.tables.profiles import own_ranges, published_ranges
 
 SETS = ("own", "published", "raw")
-CHOSEN = re.compile(r"\s*(\D*\w)\s+(\d{1,9})\s*")
 
 
 @lru_cache(maxsize=64)
@@ -32,22 +30,26 @@ def archetypes(profiles: str = "own") -> Mapping[str, Mapping[int, Profile]]:
         emotion, _, digits = profile.name.lower().rpartition(" ")
         found.setdefault(emotion, {})[int(digits)] = profile
     usual = emotion_model().chosen if name in ("published", "raw") else {}
-    for emotion, number in [*usual.items(), *chosen]:
+    for emotion, number in [*usual.items(), *chosen.items()]:
         numbered = found.get(emotion, {})
         if number not in numbered:
             known = ", ".join(profile.name for every in found.values() for profile in every.values())
-            raise ValueError(f"profiles: wanted one of {known}; got '{emotion} {number}'")
+            raise ValueError(f"profiles: wanted one of {known}; got '{emotion[:60]} {number}'")
         found[emotion] = {number: numbered[number]} | numbered
     return found
 
 
-def split_set(profiles: str) -> tuple[str, list[tuple[str, int]]]:
-    """Return the name of a set, and the profiles chosen after it: "raw, fear 3" is "raw", [("fear", 3)]."""
-    name, *parts = re.split(r",(?=[^,]*\s\d+\s*(?:,|$))", profiles)
-    matches = [CHOSEN.fullmatch(part) for part in parts]
-    if not all(matches):
-        return profiles.strip(), []
-    return name.strip(), [(match[1].lower(), int(match[2])) for match in matches if match]
+def split_set(profiles: str) -> tuple[str, dict[str, int]]:
+    """Return the name of a set, and the profiles chosen after it: "raw, fear 3" is "raw", {"fear": 3}."""
+    name, *parts = profiles.split(",")
+    chosen: dict[str, int] = {}
+    while parts:
+        emotion, _, number = parts[-1].strip().rpartition(" ")
+        if not (emotion and number.isdecimal() and len(number) < 10):
+            break
+        chosen.setdefault(emotion.strip().lower(), int(number))
+        parts.pop()
+    return ",".join([name, *parts]).strip(), chosen
 
 
 def is_profile_file(name: str) -> bool:
@@ -76,7 +78,7 @@ def _profiles_of(name: str) -> tuple[Profile, ...]:
     if is_profile_file(name):
         return read_profile_file(Path(name))
     if name not in SETS:
-        raise ValueError(f"profiles: wanted {', '.join(SETS)} or a file FILE.txt, got {name!r}")
+        raise ValueError(f"profiles: wanted {', '.join(SETS)} or a file FILE.txt, got {name[:60]!r}")
     ranges: dict[tuple[str, int], dict[int, tuple[float, float]]] = {}
     if name == "own":
         for own in own_ranges():

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from realizer.emotions.archetypes import archetypes
+from realizer.emotions.archetypes import archetypes, split_set
 from realizer.tables import faps
 
 SIX = {"anger", "sadness", "joy", "disgust", "fear", "surprise"}
@@ -81,3 +81,22 @@ def test_archetypes_refuse_a_damaged_file(content: bytes | None, said: str, tmp_
         (tmp_path / "x.txt").write_bytes(content)
     with pytest.raises(ValueError, match=said):
         archetypes(str(tmp_path / "x.txt"))
+
+
+@pytest.mark.parametrize(
+    ("profiles", "name", "chosen"),
+    [
+        ("own", "own", {}),
+        ("published, fear 3,Joy  0", "published", {"fear": 3, "joy": 0}),
+        ("a, b 2.txt", "a, b 2.txt", {}),
+        ("a, b.txt, fear 1", "a, b.txt", {"fear": 1}),
+        ("x, 3", "x, 3", {}),
+    ],
+)
+def test_split_set_takes_profiles_from_the_end(profiles: str, name: str, chosen: dict[str, int]) -> None:
+    assert split_set(profiles) == (name, chosen)
+
+
+def test_split_set_takes_long_texts_in_one_pass() -> None:
+    for text in (", 1 1" * 200_000, "," + " " * 1_000_000 + "x", ", fear 3" * 100_000):
+        assert split_set(text)[0] is not None
