@@ -106,7 +106,8 @@ def learn(recordings: Sequence[Recording], seed: int = 0) -> FaceMap:
         )
     neurons = train(places[far], seed)
     near = distances(places, neurons)
-    own = [np.asarray(far & (near.argmin(axis=1) == k)) for k in range(SIDE * SIDE)]
+    nearest = near.argmin(axis=1)
+    own = [np.asarray(far & (nearest == k)) for k in range(SIDE * SIDE)]
     labels = _labels(recordings, [len(part) for part in frames])
     names = _by_labels(own, labels) if labels else _by_templates(own, whole)
     accepted = [
