@@ -3,6 +3,7 @@ import { Checker } from "./checker.js";
 import { at, choose, make, tabs } from "./dom.js";
 import { Editor } from "./editor.js";
 import { Log } from "./log.js";
+import { Mirror } from "./mirror.js";
 import { download, Pose } from "./pose.js";
 import { Clock, Realizer, Sound } from "bml-realizer-client";
 import { Recorder } from "./record.js";
@@ -31,6 +32,7 @@ const editor = new Editor(at("editor"), new Checker(), showFaults);
 const timeline = new Timeline(at("score"), scrub, () => stage.oldest);
 const units = new ActionUnits(at("au-sliders"), at("find-aus"), pose);
 const params = new Faps(at("fap-sliders"), at("find-faps"), pose);
+const mirror = new Mirror(link, (message) => log.error(message));
 const wheel = new Wheel(at("wheel"), pose, (message) => log.error(message));
 
 const alive = new Set(); // ids of blocks that were accepted and have not ended
@@ -53,7 +55,10 @@ link.onopen = () => {
   if (!pose.empty) link.ask(pose.message);
   subscribe();
 };
-link.onlost = () => status("lost", "Reconnecting");
+link.onlost = () => {
+  mirror.stop();
+  status("lost", "Reconnecting");
+};
 link.onfeedback = (element, seq) => {
   log.feedback(element, seq);
   timeline.feedback(element);
@@ -63,6 +68,7 @@ link.onfeedback = (element, seq) => {
   else if (element.localName === "blockProgress" && id.endsWith(":end")) alive.delete(id.slice(0, -4));
 };
 link.onreply = (message) => {
+  mirror.reply(message);
   if (message.type === "gap") log.last = 0;
   if (message.type === "welcome") faces = message.capabilities.faces ?? [];
   if (message.type === "state") showVoice(message.characters[0]?.voice ?? message.voice.name);
@@ -87,7 +93,10 @@ link.onframe = (frame) => {
     sound.packet(frame.time, frame.values(), frame.forget);
     if (recorder.on) recorder.packet(frame.time, frame.values());
   } else if (frame.stream === "schedule") timeline.plan(frame);
-  else timeline.kinds[frame.stream]?.add(frame.time, frame.values());
+  else {
+    if (frame.stream === "fap") mirror.fap(frame.values());
+    timeline.kinds[frame.stream]?.add(frame.time, frame.values());
+  }
 };
 
 function subscribe() {
@@ -272,7 +281,7 @@ at("record").onclick = async () => {
 // the pose ------------------------------------------------------------------------------------
 
 tabs(at("tabs"), (tab) => {
-  at("pose").hidden = tab === "tab-script";
+  at("pose").hidden = tab === "tab-script" || tab === "tab-mirror";
 });
 pose.addEventListener("change", () => {
   const parts = [pose.emotion && "an emotion", pose.aus.size && `${pose.aus.size} AU${pose.aus.size > 1 ? "s" : ""}`, pose.faps.size && `${pose.faps.size} FAP${pose.faps.size > 1 ? "s" : ""}`];
@@ -308,6 +317,7 @@ async function vocabulary() {
   units.know(known);
   params.know(known);
   wheel.know(known);
+  mirror.know(known);
   showVoices(known.voices);
   const unit = new Map(known.aus.map(({ au, name }) => [String(au), name]));
   const param = new Map(known.faps.map((row) => [row.name, row]));

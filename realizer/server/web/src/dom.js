@@ -29,7 +29,7 @@ export function choose(place, names, pressed, take, title = (name) => name[0].to
   place.hidden = buttons.length < 2;
 }
 
-// A tab strip after WAI-ARIA: one tab stop, arrow keys between tabs.
+// A tab strip after WAI-ARIA: one tab stop, arrow keys between tabs. The address names the open tab, as in #aus.
 export function tabs(strip, shown) {
   const all = [...strip.querySelectorAll('[role="tab"]')];
   const show = (tab) => {
@@ -39,6 +39,8 @@ export function tabs(strip, shown) {
       one.tabIndex = here ? 0 : -1;
       at(one.getAttribute("aria-controls")).hidden = !here;
     }
+    const open = tab === all[0] ? "" : `#${tab.getAttribute("aria-controls")}`;
+    if (location.hash !== open) history.replaceState(null, "", location.pathname + location.search + open);
     shown(tab.id);
   };
   for (const tab of all) tab.onclick = () => show(tab);
@@ -50,5 +52,7 @@ export function tabs(strip, shown) {
     all[next].focus();
     show(all[next]);
   };
-  show(all[0]);
+  const named = () => all.find((tab) => location.hash === `#${tab.getAttribute("aria-controls")}`) ?? all[0];
+  addEventListener("hashchange", () => show(named()));
+  show(named());
 }

@@ -21,6 +21,22 @@ const place = (angle, activation) => {
   return [away * Math.cos(turn), -away * Math.sin(turn)];
 };
 
+// A small wheel without names, and its dot.
+export function dial() {
+  const dot = svg("circle", { r: 8, class: "dot" });
+  const rings = RINGS.map((ring) => svg("circle", { r: (RADIUS * ring) / MOST, class: "ring" }));
+  const picture = svg("svg", { viewBox: "-108 -108 216 216", role: "img", "aria-label": "Place on the wheel of emotions" }, ...rings, dot);
+  spot(dot, null);
+  return [picture, dot];
+}
+
+// Move a dot to [angle, activation], or hide it.
+export function spot(dot, where) {
+  dot.style.display = where ? "" : "none";
+  const [x, y] = place(...(where ?? [0, 0]));
+  for (const [name, value] of Object.entries({ cx: x, cy: y })) dot.setAttribute(name, value);
+}
+
 export class Wheel {
   // told(message): a place that cannot be shown.
   constructor(panel, pose, told) {
