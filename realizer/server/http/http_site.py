@@ -33,8 +33,8 @@ The WebSocket at /ws works without it.
 FRAMES = "frame-ancestors 'self'"
 # The page loads nothing from other hosts, and opens no other connections than WebSockets.
 POLICY = (
-    "default-src 'self'; img-src 'self' data: blob:; media-src 'self' blob:; style-src 'self' 'unsafe-inline'; "
-    f"connect-src 'self' ws: wss:; {FRAMES}"
+    "default-src 'self'; img-src 'self' data: blob:; media-src 'self' blob:; "
+    f"style-src 'self' 'unsafe-inline'; connect-src 'self' ws: wss:; {FRAMES}"
 )
 NAME = re.compile(r"[a-z0-9_-]{1,64}")  # in a URL
 
