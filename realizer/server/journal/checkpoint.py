@@ -18,7 +18,6 @@ from realizer.server.journal.entry import JournalError
 from realizer.server.session.character_faces import CharacterFaces
 from realizer.server.session.feedback_log import FeedbackLog
 from realizer.server.speech.audio_clips import AudioClips, Clip
-from realizer.speech.voice_activity import VoiceActivity
 
 VERSION = 1
 STATE, CLIP = "state", "clip:"
@@ -148,6 +147,8 @@ def character_from_json(data: Mapping[str, Any]) -> Character:
     # Journals of 0.1 have no responses and hear no sound.
     responses = [_channel_from_json(channel) for channel in data.get("responses", ())]
     if (heard := data.get("heard")) is not None:
+        from realizer.speech.voice_activity import VoiceActivity
+
         heard = VoiceActivity(**{**heard, "rest": np.array(heard["rest"], np.int16)})
     return Character(data["id"], shifts, direct, emotion, responses, heard)
 

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from realizer.behaviours.sound_file import read_sound
 from realizer.core.array_types import Int16
 from realizer.core.errors import RealizerError
 from realizer.protocol.messages.speech import SpeechMessage, TimedText
@@ -214,6 +213,8 @@ class AudioClips:
                 if clip.recogniser is not None:
                     clip.heard += clip.recogniser.close()
             else:
+                from realizer.behaviours.sound_file import read_sound  # most clips are PCM
+
                 sound = read_sound(content)
                 clip.sound = sound.rate, sound.pcm
         except RealizerError as error:
