@@ -20,7 +20,7 @@ from realizer.tables import faps
 from realizer.tables.templates import templates
 
 VARIANCE = 0.9  # of the data that the components keep
-FAR = 0.2  # of the frames, those farthest from the mean, train the map
+FAR = 0.3  # of the frames, those farthest from the mean, train the map; hers show expressions in 28 %
 SIDE = 10  # neurons of a side of the map
 ROUNDS = 60  # of its training
 WIDEST, NARROWEST = SIDE / 3, 0.6  # radius of a neuron's neighbourhood at the first and last round
