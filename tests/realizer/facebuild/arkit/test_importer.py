@@ -38,7 +38,7 @@ def brought(ada_glb: Path, place: Path) -> tuple[Face, Report]:
 def test_import_head_keeps_size_and_parts(brought: tuple[Face, Report]) -> None:
     face, report = brought
     first = load_face("ada")
-    assert set(face.parts) == set(first.parts)
+    assert set(face.parts) == set(first.parts) - {"tears"}  # what lies before eyes is left out
     for unit in ("es0", "ens0", "mns0", "mw0", "irisd0"):
         assert getattr(face.fapu, unit) == pytest.approx(getattr(first.fapu, unit), rel=0.05)
     assert any("in metres" in line for line in report.found)
