@@ -43,7 +43,7 @@ def test_units_of_one_side_are_told_apart() -> None:
     right = [13, 7, 60, 54, 9, 11, 56, 58, 42]
     faps[[fap - 1 for fap in right]] = 0
     values = dict(zip(SEEN_UNITS, measured(faps).units[0], strict=True))
-    assert values["12L"] > values["12R"] + 0.2
+    assert values["12L"] > values["12R"] + 0.1
 
 
 def test_faps_and_the_head_are_measured() -> None:
