@@ -23,9 +23,10 @@ from websockets.asyncio.client import connect as dial
 from websockets.exceptions import InvalidStatus
 
 from realizer.core.settings import Settings
-from realizer.protocol.wire import unpack
+from realizer.protocol.wire import HEADER, unpack
 from realizer.server.serve import Server
 from tests.benchmarks.packets import encode_text
+from tests.portraits import LITERT, faps_of, portrait
 from tests.programs import SERVE, running
 
 WAIT = '<bml id="{}"><wait id="w" duration="0.3"/></bml>'
@@ -320,3 +321,24 @@ def test_websocket_leaves_no_traceback_when_a_client_resets() -> None:
         service.send_signal(signal.SIGTERM)
         _, logged = service.communicate(timeout=20)
     assert not logged
+
+
+@LITERT
+@pytest.mark.gl("onboard")
+def test_pictures_of_a_camera_drive_the_face() -> None:
+    content = io.BytesIO()
+    portrait("ada", faps_of("ada", AU12=0.9)).save(content, "jpeg")
+
+    async def test(server: Server) -> None:
+        async with connect(server.url) as socket:
+            await socket.send(json.dumps({"type": "track", "fps": 20}))
+            await socket.send(HEADER.pack(3, 1, 0, 5, 0.0) + content.getvalue())
+            tracked = json.loads(await socket.recv())
+            assert (tracked["type"], tracked["frame"], tracked["face"]) == ("tracked", 5, True)
+            subscribed = await ask(socket, type="subscribe", stream="au", encoding="json", fps=25)
+            smile = subscribed["names"].index("12L")
+            while json.loads(await socket.recv())["values"][smile] < 0.95 * tracked["aus"]["12L"]:
+                pass  # it begins to smile
+            assert tracked["aus"]["12L"] > 0.4
+
+    serving(test, idle=False)
