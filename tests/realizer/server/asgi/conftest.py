@@ -32,7 +32,8 @@ class Served:
             with urlopen(request, timeout=LIMIT) as answer:
                 return answer.status, dict(answer.headers), answer.read()
         except HTTPError as error:
-            return error.code, dict(error.headers), error.read()
+            with error:
+                return error.code, dict(error.headers), error.read()
 
     def error(self, method: str, path: str, body: bytes | str = b"", **headers: str) -> tuple[int, str]:
         status, _, text = self(method, path, body, **headers)

@@ -43,6 +43,7 @@ def events(app: Served, session: str, **headers: str) -> Iterator[tuple[str, str
                 yield fields["event"], fields.get("id", ""), fields["data"]
                 fields = {}
     finally:
+        answer.close()
         connection.close()
 
 

@@ -164,7 +164,7 @@ def test_broadcast_sends_all_streams_side_by_side(driver) -> None:
 def test_broadcast_forgets_timelines_without_subscribers(driver) -> None:
     def alive() -> int:
         gc.collect()
-        return sum(isinstance(o, FrameTimeline | AudioStream) for o in gc.get_objects())
+        return sum(type(o) in (FrameTimeline, AudioStream) for o in gc.get_objects())
 
     before = alive()
     for k in range(20):
