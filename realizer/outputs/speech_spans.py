@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+from realizer.animation.lips.visemes import sounds
 
 if TYPE_CHECKING:
     from realizer.playback.scheduled_speech import ScheduledSpeech
@@ -31,6 +33,26 @@ def words(speaking: ScheduledSpeech) -> Iterator[Span]:
 def phonemes(speaking: ScheduledSpeech) -> Iterator[Span]:
     """Yield the phonemes of an utterance in IPA, without pauses."""
     return _audible(speaking, ((phoneme, phoneme.ipa) for phoneme in speaking.utterance.phonemes))
+
+
+def visemes(speaking: ScheduledSpeech, name: Callable[[int, str], str]) -> list[Span]:
+    """Return the strongest viseme of each sound; neighbours of one name are joined.
+
+    Args:
+        name: (viseme of MPEG-4, phoneme in IPA) -> the text of a span.
+    """
+    spans: list[Span] = []
+    for phoneme in phonemes(speaking):
+        start = phoneme.start
+        for sound in sounds(phoneme.text):
+            end = start + sound.share * (phoneme.end - phoneme.start)
+            if sound.mix:
+                text = name(max(sound.mix, key=lambda part: part[1])[0], phoneme.text)
+                if spans and spans[-1].text == text and start - spans[-1].end < MIN_LENGTH:
+                    start = spans.pop().start
+                spans.append(Span(start, end, text))
+            start = end
+    return spans
 
 
 def points(realization: Realization) -> Iterator[tuple[float, str]]:

@@ -11,14 +11,12 @@ import numpy as np
 
 from realizer.animation.arkit import ARKIT_NAMES, arkit
 from realizer.animation.lips.viseme_weights import oculus_visemes
-from realizer.animation.lips.visemes import sounds
 from realizer.outputs import speech_spans
 from realizer.outputs.json_text import json_line
 from realizer.outputs.output import Output
 from realizer.outputs.speech_spans import Span
 
 if TYPE_CHECKING:
-    from realizer.playback.scheduled_speech import ScheduledSpeech
     from realizer.realization import Realization
 
 RATE = 22050  # Hz; TalkingHead's default for PCM
@@ -41,7 +39,12 @@ def encode_talkinghead(realization: Realization) -> str:
     """
     own = tuple(s for s in realization.speeches if s.character == 0)
     words = [word for speaking in own for word in speech_spans.words(speaking)]
-    visemes = [viseme for speaking in own for viseme in _visemes(speaking)]
+    names = {row.viseme: NAMES.get(row.name, row.name) for row in oculus_visemes()}
+    visemes = [
+        viseme
+        for speaking in own
+        for viseme in speech_spans.visemes(speaking, lambda viseme, _: names[viseme])
+    ]
     points = sorted(speech_spans.points(realization))
     sound = replace(realization, speeches=own).sound(RATE)
     content = {
@@ -63,23 +66,6 @@ def _timed(name: str, letter: str, spans: Iterable[Span]) -> dict[str, Any]:
         f"{letter}times": [_ms(span.start) for span in spans],
         f"{letter}durations": [_ms(span.end - span.start) for span in spans],
     }
-
-
-def _visemes(speaking: ScheduledSpeech) -> list[Span]:
-    """Return the strongest viseme of each sound; equal neighbours are joined."""
-    names = {row.viseme: NAMES.get(row.name, row.name) for row in oculus_visemes()}
-    spans: list[Span] = []
-    for phoneme in speech_spans.phonemes(speaking):
-        start = phoneme.start
-        for sound in sounds(phoneme.text):
-            end = start + sound.share * (phoneme.end - phoneme.start)
-            if sound.mix:
-                name = names[max(sound.mix, key=lambda part: part[1])[0]]
-                if spans and spans[-1].text == name and start - spans[-1].end < speech_spans.MIN_LENGTH:
-                    start = spans.pop().start
-                spans.append(Span(start, end, name))
-            start = end
-    return spans
 
 
 def _anim(realization: Realization) -> dict[str, Any]:
