@@ -3,6 +3,9 @@
 Its settings are REALIZER_* variables, as for `realizer serve`; `create_app(settings)` takes others.
 """
 
+from realizer.core.threads import use_one_thread
+
+use_one_thread()
 try:
     from realizer.server.asgi.app import create_app
 except ImportError as error:

@@ -17,10 +17,9 @@ from typing import Any
 
 from realizer.batch.task import Options, Task
 from realizer.batch.worker import Outcome, Worker, failure
+from realizer.core.threads import SINGLE_THREAD
 
 TRIES = 3  # a task whose process has died so often fails
-# There is a process for each core: libraries that start threads as well would only slow each other down.
-SINGLE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 class ProcessPool:

@@ -12,6 +12,7 @@ import click
 import realizer
 from realizer.cli import options
 from realizer.core.errors import RealizerError, TableError, UnknownNameError
+from realizer.core.threads import use_one_thread
 
 __all__ = ["main"]
 
@@ -51,6 +52,7 @@ def cli(context: click.Context, verbose: bool, quiet: bool) -> None:
       2  wrong usage, such as an unknown option, face or voice
       3  something is missing on this machine; the message says what
     """
+    use_one_thread()
     options.configure_logging(context, quiet=quiet, verbose=verbose)
 
 

@@ -260,10 +260,6 @@ def fit(
     --deformer au draws a face with the extended form. After `realizer faces build`, use --data to measure the
     new shapes.
     """
-    import os
-
-    # Thousands of small matrix products: further threads only slow them down.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from realizer.face.au.file import write_model
     from realizer.face.load import folder_of, load_face
     from realizer.facebuild.au.fit import fit_models, left_out_text, table, table_text

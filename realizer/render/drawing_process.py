@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from realizer.core.errors import RenderError
+from realizer.core.threads import SINGLE_THREAD
 from realizer.render.backdrop import channels
 from realizer.render.process_messages import Failed, Open, Pixels, connection
 
@@ -119,5 +120,4 @@ def _environment() -> dict[str, str]:
     """Return our environment with our package first and one thread for linear algebra (9 times faster)."""
     ours = str(Path(__file__).parents[2])
     paths = [ours, *filter(None, [os.environ.get("PYTHONPATH")])]
-    threads = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-    return {**os.environ, **threads, "PYTHONPATH": os.pathsep.join(paths)}
+    return {**os.environ, **SINGLE_THREAD, "PYTHONPATH": os.pathsep.join(paths)}
