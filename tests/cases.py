@@ -151,6 +151,11 @@ class Case:
         return self.path.with_suffix(".xml").read_bytes()
 
     @property
+    def is_bytes(self) -> bool:
+        """Whether the case is about bytes that a message, which is text that begins with "<", cannot be."""
+        return self.name.startswith(("documents/encoding", "invalid/not-xml"))
+
+    @property
     def messages(self) -> list[tuple[float, str]]:
         """What a client sends, (seconds, text): the scene, then the documents of each time in one message."""
         text = self.document.decode("utf-8-sig")
