@@ -73,7 +73,14 @@ def _served_face(value: str | None) -> str | None:
 @setting_options(("tls_cert", "FILE"), ("tls_key", "FILE"), ("log", "text|json"))
 @setting_option("asap_ports", "BML FEEDBACK", nargs=2)
 @setting_options(
-    ("xface_port", "PORT"), ("xface_player", "HOST:PORT"), ("stomp", "HOST:PORT"), ("journal", "FILE|URL")
+    ("xface_port", "PORT"),
+    ("xface_player", "HOST:PORT"),
+    ("stomp", "HOST:PORT"),
+    ("journal", "FILE|URL"),
+    ("vmc", "HOST:PORT"),
+    ("livelink", "HOST:PORT"),
+    ("avatar_session", "NAME"),
+    ("avatar_fps", "N"),
 )
 @setting_option("record", "DIR", type=click.Path(file_okay=False, path_type=Path))
 @setting_option("face", "NAME|PATH", callback=lambda context, parameter, value: _served_face(value))

@@ -69,6 +69,9 @@ def _row(
     return field(default=default, repr=not secret, metadata=metadata)
 
 
+_SESSION = kind.matching(r"[A-Za-z0-9._~-]{1,64}", "1..64 letters, digits or . _ ~ -")
+
+
 # Not a pydantic model: importing pydantic takes longer than planning a document.
 @dataclass(frozen=True, kw_only=True)
 class Settings:
@@ -133,12 +136,22 @@ class Settings:
     )
     xface_player_session: str = _row(
         "xface-player",
-        kind.matching(r"[A-Za-z0-9._~-]{1,64}", "1..64 letters, digits or . _ ~ -"),
+        _SESSION,
         "session that xface_player shows",
     )
     xface_player_interval: float = _row(
         0.25, kind.real(0, 60), "seconds between frames for xface_player; it stops at shorter ones"
     )
+    vmc: str | None = _row(
+        None, kind.address, "HOST:PORT that a session is sent to in the VMC protocol; none: off"
+    )
+    livelink: str | None = _row(
+        None, kind.address, "HOST:PORT that a session is sent to as Live Link Face does; none: off"
+    )
+    avatar_session: str | None = _row(
+        None, _SESSION, "session that vmc and livelink send; none: the oldest with a client"
+    )
+    avatar_fps: int = _row(30, kind.whole(1, 120), "frames per second of vmc and livelink")
     stomp: str | None = _row(None, kind.address, "HOST:PORT of a STOMP broker; none: off")
     stomp_login: str | None = _row(None, kind.text, "login for the broker")
     stomp_password: str | None = _row(None, kind.text, "password for the broker", secret=True)

@@ -226,6 +226,14 @@ class SessionHost:
 
     # sessions -----------------------------------------------------------------------------------
 
+    def oldest_in_use(self, ignored: type) -> str | None:
+        """Return the name of the oldest session with a client of another class than `ignored`, or None."""
+        for name, session in self._registry.sessions.items():
+            numbers = self._registry.joined(session)
+            if not session.closed and any(not isinstance(self._clients[k], ignored) for k in numbers):
+                return name
+        return None
+
     def end(self, name: str) -> bool:
         """End a session and close its connections. Return False if there is none of that name."""
         session = self._registry.sessions.get(name)

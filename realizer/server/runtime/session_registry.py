@@ -22,7 +22,11 @@ FIRST_WORKER = re.compile("(asap|xface|stomp)-")
 
 def worker_of(session: str, workers: int, settings: Settings) -> int:
     """Return the number of the worker that has the session of that name."""
-    if workers == 1 or FIRST_WORKER.match(session) or session == settings.xface_player_session:
+    if (
+        workers == 1
+        or FIRST_WORKER.match(session)
+        or session in (settings.xface_player_session, settings.avatar_session)
+    ):
         return 0
     return zlib.crc32(session.encode()) % workers
 

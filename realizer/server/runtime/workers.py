@@ -248,5 +248,6 @@ def _work(
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to the parent, which ends the workers
     if number:  # other transports than the WebSocket are open in the first worker only
         settings = replace(settings, asap_ports=None, xface_port=None, xface_player=None, stomp=None)
+        settings = replace(settings, vmc=None, livelink=None)
     control.setblocking(False)
     serve(replace(settings, port=port), number, control)

@@ -1,1 +1,1 @@
-"""Transports: WebSocket, Xface, Asap and STOMP, all leading into the same sessions."""
+"""Transports: WebSocket, Xface, Asap, STOMP, VMC and Live Link, all leading into the same sessions."""

@@ -13,6 +13,8 @@ TRANSPORTS: Registry[Callable[..., Transport | None]] = Registry(
         "asap_ports": "realizer.server.transports.asap:AsapTransport",
         "xface_port": "realizer.server.transports.xface.server:XfaceTransport",
         "xface_player": "realizer.server.transports.xface.player:XfacePlayerTransport",
+        "vmc": "realizer.server.transports.vmc:VmcTransport",
+        "livelink": "realizer.server.transports.livelink:LivelinkTransport",
         "stomp": "realizer.server.transports.stomp:StompTransport",
     },
     wanted="a function or class that takes the session host and the settings",
