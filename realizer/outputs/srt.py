@@ -9,7 +9,7 @@ from realizer.realization import Realization
 def encode_srt(realization: Realization) -> str:
     """Return numbered captions; simultaneous speech is in separate lines of one caption."""
     return "\n".join(
-        f"{number}\n{_clock(caption.start)} --> {_clock(caption.end)}\n{caption.text}\n"
+        f"{number}\n{_clock(caption.start)} --> {_clock(min(caption.end, realization.duration))}\n{caption.text}\n"
         for number, caption in enumerate(captions(realization), 1)
     )
 
