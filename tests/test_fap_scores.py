@@ -51,7 +51,7 @@ def test_mean_score_of_each_face_is_above_paul_s(truths: tuple[FapScore, ...]) -
 def test_score_faps_finds_no_error_on_shipped_faces(truths: tuple[FapScore, ...]) -> None:
     # Lips that are pushed back stop at the teeth.
     assert {(t.fap, t.sign) for t in truths if t.error >= 0.02} <= {(16, -1), (17, -1)}
-    assert all(t.mirror < 0.01 and t.others < 0.05 for t in truths)
+    assert all(t.mirror < 0.012 and t.others < 0.05 for t in truths)
 
 
 def test_mean_score_gives_back_paul_s_own_figures() -> None:

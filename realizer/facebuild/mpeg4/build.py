@@ -90,7 +90,8 @@ def setup_of(folder: Path) -> Setup:
     at, mesh, parts, points = _read(folder)
     if (folder / FILE).is_file():
         setup = read_setup(folder / FILE)
-        return synchronised(replace(setup, points=points | dict(setup.points)), at)
+        # Twins of vertices of the skin are of the skin.
+        return synchronised(replace(setup, points=points | dict(setup.points)), at[: parts["skin"][1]])
     return default_setup(at, np.asarray(mesh["triangles"], np.int32), points, parts["skin"])
 
 

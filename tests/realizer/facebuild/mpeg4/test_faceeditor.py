@@ -117,7 +117,8 @@ def test_read_faceeditor_makes_a_face_as_true(tmp_path: Path) -> None:
         assert ran.exit_code == 0, ran.output
     truths = score_faps(load_face("two", tmp_path))
     assert mean_score(truths) > 2.6
-    assert max(t.error for t in truths) < 0.02
+    # Lips that are pushed back stop at the teeth.
+    assert {(t.fap, t.sign) for t in truths if t.error >= 0.02} <= {(16, -1), (17, -1)}
 
 
 @pytest.mark.parametrize(
