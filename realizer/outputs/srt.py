@@ -8,9 +8,10 @@ from realizer.realization import Realization
 
 def encode_srt(realization: Realization) -> str:
     """Return numbered captions; simultaneous speech is in separate lines of one caption."""
+    last = realization.duration
     return "\n".join(
-        f"{number}\n{_clock(caption.start)} --> {_clock(min(caption.end, realization.duration))}\n{caption.text}\n"
-        for number, caption in enumerate(captions(realization), 1)
+        f"{number}\n{_clock(shown.start)} --> {_clock(min(shown.end, last))}\n{shown.text}\n"
+        for number, shown in enumerate(captions(realization), 1)
     )
 
 
