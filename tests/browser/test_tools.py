@@ -368,7 +368,7 @@ def test_page_is_light_or_dark(page) -> None:  # type: ignore[no-untyped-def]
 
 def test_page_is_usable_by_keyboard(page) -> None:  # type: ignore[no-untyped-def]
     page.focus("#tab-script")
-    for panel in ("aus", "faps", "emotion", "script"):
+    for panel in ("aus", "faps", "emotion", "mirror", "script"):
         page.keyboard.press("ArrowRight")
         assert page.locator(f"#{panel}").is_visible()
     page.click("#help")
