@@ -105,7 +105,8 @@ class Knowledge:
         name = word.strip().lower()
         if name not in self.moods:
             near = get_close_matches(name, self.moods, 3, 0.6) or sorted(self.moods)
-            raise KeyError(f"mood: wanted a word such as {', '.join(near)}; got {word!r}")
+            wanted = f"a word such as {', '.join(near)}" if near else "none, as this knowledge has no moods"
+            raise KeyError(f"mood: wanted {wanted}; got {word!r}")
         return self.moods[name]
 
 

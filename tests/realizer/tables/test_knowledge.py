@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
@@ -56,6 +57,11 @@ def test_knowledge_has_the_mean_length_of_table_6_3() -> None:
 def test_mood_suggests_names_for_an_unknown_one() -> None:
     with pytest.raises(KeyError, match="wanted a word such as happy, happiness; got 'happi'"):
         knowledge().mood("happi")
+
+
+def test_mood_says_that_there_are_none() -> None:
+    with pytest.raises(KeyError, match="wanted none, as this knowledge has no moods; got 'happy'"):
+        replace(knowledge(), moods={}).mood("happy")
 
 
 @pytest.mark.parametrize(
