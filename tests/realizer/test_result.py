@@ -28,7 +28,7 @@ def test_save_writes_every_suffix_and_returns_the_path(
 ) -> None:
     path = played.save(str(tmp_path / f"x{suffix}"))
     assert path == tmp_path / f"x{suffix}"
-    assert path.stat().st_size
+    assert path.stat().st_size or suffix == ".srt"  # nobody speaks
 
 
 @pytest.mark.gl
