@@ -21,7 +21,6 @@ from realizer.server.transports import registry
 from realizer.server.transports.transport import Transport
 from realizer.server.transports.websocket.server import WebSocketTransport, startup_lines
 
-DRAIN_STEP = 0.05  # s; how often the drain checks whether everything has ended
 # s; a thread waits so long before it takes Python's lock from the event loop. While documents are planned the
 # loop pauses every 4 ms (`turns.SLICE`) and takes the lock back at once: with the usual 5 ms threads
 # would wait until the end.
@@ -226,10 +225,7 @@ class Server:
         self._sessions.stop_accepting()
         for transport in self.transports:
             transport.stop_accepting()
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(self.settings.drain):
-                while self._sessions.busy:
-                    await asyncio.sleep(DRAIN_STEP)
+        await self._sessions.drain()
 
     async def close(self) -> None:
         """Close all connections and engines."""

@@ -22,8 +22,8 @@ from starlette.websockets import WebSocket
 from realizer.core.settings import Settings, SettingsError, limit_hint
 from realizer.outputs.registry import OUTPUTS
 from realizer.server.asgi.client import AsgiClient
-from realizer.server.asgi.openapi import description
-from realizer.server.asgi.renderings import Renderings, findings_json
+from realizer.server.asgi.openapi import FINDING, description
+from realizer.server.asgi.renderings import Renderings
 from realizer.server.http.access import AccessControl
 from realizer.server.http.http_site import FRAMES
 from realizer.server.http.page_tools import MAX_TEXT
@@ -35,7 +35,6 @@ from realizer.server.transports.websocket.connection import WebSocketConnections
 from realizer.server.transports.websocket.request import session_of
 from realizer.sources import document_of
 
-DRAIN_STEP = 0.05  # s
 KEEP_ALIVE = 15.0  # s; proxies close connections in which nothing comes
 MOST_UNREAD = 10_000  # messages; a client that reads no more of its feedback is disconnected
 SEQ = re.compile(r'\bseq="(\d+)"')
@@ -79,10 +78,7 @@ class Hub:
             yield
         finally:
             self.sessions.stop_accepting()
-            with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(self.settings.drain):
-                    while self.sessions.busy:
-                        await asyncio.sleep(DRAIN_STEP)
+            await self.sessions.drain()
             await self.sessions.close()
             self._starting = None
 
@@ -206,7 +202,7 @@ async def _check(hub: Hub, request: Request) -> Response:
         found = await loop.run_in_executor(
             None, partial(check, body, strict_bml=hub.settings.strict_bml, media=hub.settings.media)
         )
-    return Response(findings_json(list(found)), media_type="application/json")
+    return JSONResponse([{name: getattr(finding, name) for name in FINDING} for finding in found])
 
 
 async def _send_bml(hub: Hub, request: Request) -> Response:

@@ -72,10 +72,7 @@ class AsgiClient:
             words = f"wanted messages of at most {self._most} bytes {limit_hint('max_message')}"
             await self.close(1009, words)
             return None
-        pause = self._limiter.wait(asyncio.get_running_loop().time(), 1 + len(got) / UNIT)
-        if self._limiter.notice is not None:
-            self._warn(self._limiter.notice)
-        await asyncio.sleep(pause)
+        await self._limiter.pause(self._warn, 1 + len(got) / UNIT)
         return got
 
     def disconnect(self, code: int, reason: str) -> None:

@@ -14,15 +14,12 @@ ERROR = {
     "type": "object",
     "properties": {"error": {"type": "string", "description": "what was wanted, and what came"}},
 }
+# Attributes of a finding that are told -> their types.
 FINDING = {
-    "type": "object",
-    "properties": {
-        "line": {"type": ["integer", "null"]},
-        "column": {"type": ["integer", "null"]},
-        **{name: {"type": "string"} for name in ("type", "id", "text", "help")},
-    },
+    **{name: {"type": ["integer", "null"]} for name in ("line", "column")},
+    **{name: {"type": "string"} for name in ("type", "id", "text", "help")},
 }
-FINDINGS = {"type": "array", "items": FINDING}
+FINDINGS = {"type": "array", "items": {"type": "object", "properties": FINDING}}
 ACCEPTED = {"type": "object", "properties": {"session": {"type": "string"}}}
 SESSION = {"name": "session", "in": "path", "required": True, "schema": {"type": "string"}}
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import re
 import shutil
 import sys
@@ -130,10 +129,3 @@ def fault_of(said: str, folder: Path) -> str:
     lines = [line for line in said.splitlines() if line and not line.startswith(("Usage: ", "Try "))]
     lines = [re.sub("^(realizer|Error): ", "", line) for line in lines if str(folder) not in line]
     return "\n".join(lines[-20:]) or "the renderer ended"
-
-
-def findings_json(findings: list[object]) -> str:
-    """Return findings of `realizer.check` as JSON."""
-    names = ("line", "column", "type", "id", "text", "help")
-    rows = [{name: getattr(finding, name) for name in names} for finding in findings]
-    return json.dumps(rows, ensure_ascii=False)

@@ -207,8 +207,8 @@ class RateLimiter:
         self._was_limited = bool(pause)
         return pause
 
-    async def pause(self, warn: Callable[[str], None]) -> None:
-        """Wait as long as the message that was just read demands.
+    async def pause(self, warn: Callable[[str], None], count: float = 1.0) -> None:
+        """Wait as long as the message that was just read, or several, demand.
 
         Others run in between also if that is 0: one read may hold many messages, which must not delay the
         frames of other clients.
@@ -216,7 +216,7 @@ class RateLimiter:
         Args:
             warn: takes `notice`, if there is one.
         """
-        seconds = self.wait(asyncio.get_running_loop().time())
+        seconds = self.wait(asyncio.get_running_loop().time(), count)
         if self.notice is not None:
             warn(self.notice)
         await asyncio.sleep(seconds)

@@ -1,6 +1,7 @@
 """The host of sessions in an event loop: delivers messages, carries out effects."""
 
 import asyncio
+import contextlib
 import functools
 import itertools
 import logging
@@ -29,6 +30,7 @@ from realizer.server.transports.transport import Outbound
 
 log = logging.getLogger(__name__)
 
+DRAIN_STEP = 0.05  # s; how often `drain` checks whether everything has ended
 FRAME_SLICES = 5  # of time; frames that take longer to compute are continued with the documents, in turn
 MOST_WAITING = 100  # messages to a session that plans; then its clients are read more slowly
 CONGESTION = 0.02  # s; how often a client looks whether its session can take messages again
@@ -104,6 +106,13 @@ class SessionHost:
         self._factory.ending = True
         for session in self._registry.sessions.values():
             session.inbox.ending = True
+
+    async def drain(self) -> None:
+        """Wait at most `settings.drain` seconds for what plays."""
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(self.settings.drain):
+                while self.busy:
+                    await asyncio.sleep(DRAIN_STEP)
 
     @property
     def busy(self) -> bool:
