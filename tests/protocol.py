@@ -256,6 +256,7 @@ def constants() -> str:
             f"const FORGET = {FLUSH:#x}; // flag: forget everything from this time on",
             f"const LAST = {FINAL:#x}; // flag: the last piece of a clip",
             f"const SOUND = {STREAMS['audio'].kind}; // kind of a clip",
+            f"const PICTURE = {STREAMS['video'].kind}; // kind of a picture",
             "const KINDS = {",
             *kinds,
             "};",

@@ -7,6 +7,7 @@ const HEADER = 16; // bytes: u8 kind, u8 version, u16 flags, u32 frame, f64 time
 const FORGET = 0x100; // flag: forget everything from this time on
 const LAST = 0x200; // flag: the last piece of a clip
 const SOUND = 4; // kind of a clip
+const PICTURE = 3; // kind of a picture
 const KINDS = {
   1: ["fap", Int32Array],
   2: ["au", Float32Array],
@@ -51,15 +52,28 @@ export function frameOf(buffer) {
   };
 }
 
+/** Return a message of `size` bytes behind its header, and a view of it. */
+function headed(kind, flags, number, size) {
+  const message = new Uint8Array(HEADER + size);
+  const view = new DataView(message.buffer);
+  view.setUint8(0, kind);
+  view.setUint8(1, VERSION);
+  view.setUint16(2, flags, true);
+  view.setUint32(4, number, true);
+  return [message, view];
+}
+
+/** Encode a picture for `track`: the bytes of its file, and a number of your own. */
+export function packPicture(number, file) {
+  const [message] = headed(PICTURE, 0, number, file.length);
+  message.set(file, HEADER);
+  return message;
+}
+
 /** Encode a piece of a sound clip; `rate` 0: the pieces are a sound file. */
 export function packClip({ id, number, rate, sound, final }) {
   const name = new TextEncoder().encode(id);
-  const message = new Uint8Array(HEADER + 5 + name.length + sound.length);
-  const view = new DataView(message.buffer);
-  view.setUint8(0, SOUND);
-  view.setUint8(1, VERSION);
-  view.setUint16(2, final ? LAST : 0, true);
-  view.setUint32(4, number, true);
+  const [message, view] = headed(SOUND, final ? LAST : 0, number, 5 + name.length + sound.length);
   view.setUint32(HEADER, rate, true);
   view.setUint8(HEADER + 4, name.length);
   message.set(name, HEADER + 5);

@@ -125,6 +125,9 @@ export class Realizer {
 /** Decode a binary message. */
 export function frameOf(buffer: ArrayBuffer): Frame;
 
+/** Encode a picture for `track`: the bytes of its file, and a number of your own. */
+export function packPicture(number: number, file: Uint8Array): Uint8Array;
+
 /** An estimate of the session clock. */
 export class Clock {
   reset(): void;

@@ -1,4 +1,5 @@
 // The mirror: pictures of a camera or a film go to the service, which moves the face as the person in them moves.
+import { packPicture } from "bml-realizer-client";
 import { at, make } from "./dom.js";
 import { download } from "./pose.js";
 import { dial, spot } from "./wheel.js";
@@ -6,7 +7,6 @@ import { dial, spot } from "./wheel.js";
 const FPS = 20; // most pictures a second
 const WIDTH = 480; // pixels of a picture
 const LEAST = 0.05; // a smaller action unit is not listed
-const PICTURE = 3; // kind of binary messages
 const CURVE_RATE = 25; // frames a second of the FAP stream
 
 export class Mirror {
@@ -91,13 +91,7 @@ export class Mirror {
   }
 
   async send(blob) {
-    const picture = new Uint8Array(await blob.arrayBuffer());
-    const message = new Uint8Array(16 + picture.length);
-    const view = new DataView(message.buffer);
-    view.setUint8(0, PICTURE);
-    view.setUint8(1, 1);
-    view.setUint32(4, ++this.frame, true);
-    message.set(picture, 16);
+    const message = packPicture(++this.frame, new Uint8Array(await blob.arrayBuffer()));
     if (this.running) this.link.send(message);
   }
 

@@ -21,11 +21,12 @@ const place = (angle, activation) => {
   return [away * Math.cos(turn), -away * Math.sin(turn)];
 };
 
+const rings = () => RINGS.map((ring) => svg("circle", { r: (RADIUS * ring) / MOST, class: "ring" }));
+
 // A small wheel without names, and its dot.
 export function dial() {
   const dot = svg("circle", { r: 8, class: "dot" });
-  const rings = RINGS.map((ring) => svg("circle", { r: (RADIUS * ring) / MOST, class: "ring" }));
-  const picture = svg("svg", { viewBox: "-108 -108 216 216", role: "img", "aria-label": "Place on the wheel of emotions" }, ...rings, dot);
+  const picture = svg("svg", { viewBox: "-108 -108 216 216", role: "img", "aria-label": "Place on the wheel of emotions" }, ...rings(), dot);
   spot(dot, null);
   return [picture, dot];
 }
@@ -64,7 +65,7 @@ export class Wheel {
       const [x2, y2] = place(to, MOST);
       root.append(svg("path", { d: `M0 0L${x1} ${y1}A${RADIUS} ${RADIUS} 0 0 0 ${x2} ${y2}Z`, class: `wedge wedge-${k}` }));
     });
-    for (const ring of RINGS) root.append(svg("circle", { r: (RADIUS * ring) / MOST, class: "ring" }));
+    root.append(...rings());
     for (const { name, kind, angle } of this.emotions.filter((e) => e.kind !== "rest")) {
       const basic = kind === "basic";
       const [x, y] = place(angle, basic ? MOST * 1.1 : MOST * 0.87);
@@ -176,9 +177,8 @@ export class Wheel {
     if (!this.root) return;
     const { angle, activation } = this.place ?? { angle: 0, activation: 0 };
     const [x, y] = place(angle, activation);
-    for (const [name, value] of Object.entries({ cx: x, cy: y })) this.dot.setAttribute(name, value);
+    spot(this.dot, this.place && [angle, activation]);
     for (const [name, value] of Object.entries({ x2: x, y2: y })) this.line.setAttribute(name, value);
-    this.dot.style.display = this.place ? "" : "none";
     this.line.style.display = this.place ? "" : "none";
     for (const [name, value] of Object.entries({ valuemin: 0, valuemax: 360, valuenow: Math.round(angle) })) this.root.setAttribute(`aria-${name}`, value);
     this.root.setAttribute("aria-valuetext", at("feels").textContent);
