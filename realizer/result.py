@@ -37,6 +37,7 @@ class Realization(realization.Realization):
         at: float | None = None,
         morphs: str = "fap",
         visemes: bool = False,
+        avatar: Path | str | None = None,
     ) -> Path:
         """Write a file in the format of its suffix, of which `realizer outputs` has a list.
 
@@ -48,6 +49,7 @@ class Realization(realization.Realization):
             at: for .png: the picture of this instant, in seconds, instead of a contact sheet.
             morphs: for .glb: "fap" or "arkit".
             visemes: for .fap: whether to write FAP 1 too.
+            avatar: for .glb: a .glb or .vrm file to animate instead of the face; it has ARKit's shapes.
 
         Returns:
             The path.
@@ -61,7 +63,7 @@ class Realization(realization.Realization):
         from realizer.outputs.registry import output_for
 
         output, path = output_for(path), Path(path)
-        drawing = RenderSettings(size, camera, at, light, background, morphs, visemes)
+        drawing = RenderSettings(size, camera, at, light, background, morphs, visemes, avatar)
         output.check(drawing, self)
         if not path.parent.is_dir():
             raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path.parent))

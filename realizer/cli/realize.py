@@ -20,7 +20,16 @@ if TYPE_CHECKING:
     from realizer.scheduling.timing import Schedule
 
 PICTURES = (".png", ".webp", ".mp4", ".webm")
-DRAWN = ("size", "camera", "at", "light", "background", "morphs", "visemes")  # fields of RenderSettings
+DRAWN = (
+    "size",
+    "camera",
+    "at",
+    "light",
+    "background",
+    "morphs",
+    "visemes",
+    "avatar",
+)  # fields of RenderSettings
 
 
 performance_options = options.several(
@@ -55,6 +64,12 @@ output_options = options.several(
         default="fap",
         show_default=True,
         help="With .glb: morph targets that show each frame exactly, or ARKit's 52 shapes.",
+    ),
+    click.option(
+        "--avatar",
+        metavar="GLB",
+        type=click.Path(exists=True, dir_okay=False),
+        help="With .glb: animate this .glb or .vrm file, which has ARKit's shapes, instead of the face.",
     ),
     click.option("--visemes", is_flag=True, help="With .fap: also write the visemes (FAP 1)."),
     performance_options,

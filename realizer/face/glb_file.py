@@ -1,8 +1,9 @@
-"""A writer of GLB files from a glTF 2.0 document and arrays."""
+"""A writer of GLB files from a glTF 2.0 document and arrays, and their division into both."""
 
 import json
 import struct
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -16,12 +17,16 @@ MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
 
 
 class GlbFile:
-    """A GLB file to which arrays are added as accessors."""
+    """A GLB file to which arrays are added as accessors.
 
-    def __init__(self) -> None:
-        self._views: list[dict[str, Any]] = []
-        self._accessors: list[dict[str, Any]] = []
-        self._data = bytearray()
+    Args:
+        document, data: the file to add to; see `read_glb`.
+    """
+
+    def __init__(self, document: Mapping[str, Any] = MappingProxyType({}), data: bytes = b"") -> None:
+        self._views: list[dict[str, Any]] = [*document.get("bufferViews", ())]
+        self._accessors: list[dict[str, Any]] = [*document.get("accessors", ())]
+        self._data = bytearray(data + b"\0" * (-len(data) % 4))
 
     def add(
         self, array: Any, *, target: int | None = None, normalised: bool = False, bounds: bool = False
@@ -86,7 +91,7 @@ class GlbFile:
             **document,
             "accessors": self._accessors,
             "bufferViews": self._views,
-            "buffers": [{"byteLength": len(self._data)}],
+            "buffers": [{"byteLength": len(self._data)}, *document.get("buffers", ())[1:]],
         }
         text = json.dumps(whole, separators=(",", ":")).encode()
         text += b" " * (-len(text) % 4)
@@ -108,6 +113,26 @@ class GlbFile:
             accessor["min"], accessor["max"] = rows.min(axis=0).tolist(), rows.max(axis=0).tolist()
         self._accessors.append(accessor)
         return len(self._accessors) - 1
+
+
+def read_glb(raw: bytes) -> tuple[dict[str, Any], bytes]:
+    """Return the document and the binary chunk of a GLB file of glTF 2.0 that contains its data.
+
+    Raises:
+        ValueError: it is another file, or truncated.
+    """
+    if len(raw) < 20 or raw[:4] != b"glTF":
+        raise ValueError("wanted a GLB file (binary glTF 2.0), got another one")
+    if len(raw) < (length := struct.unpack_from("<I", raw, 8)[0]):
+        raise ValueError(f"wanted {length} bytes, as its header says, got {len(raw)}: it is truncated")
+    size, kind = struct.unpack_from("<II", raw, 12)
+    if kind != JSON_CHUNK:
+        raise ValueError("wanted a GLB file of glTF 2.0, got one of another version")
+    document = json.loads(raw[20 : 20 + size])
+    more = 20 + size + 8
+    if len(raw) < more or "uri" in document.get("buffers", [{}])[0]:
+        raise ValueError("wanted a GLB file that contains its data, got one with data beside it")
+    return document, raw[more : more + struct.unpack_from("<I", raw, more - 8)[0]]
 
 
 def _little(array: Any) -> Any:

@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from realizer.core.array_types import Float32
 from realizer.face.glb_file import GlbFile
 from realizer.outputs.arkit_targets import make_arkit_targets
+from realizer.outputs.avatar import read_avatar
+from realizer.outputs.avatar_glb import encode_avatar
 from realizer.outputs.glb_mesh import GlbMesh
 from realizer.outputs.morph_targets import MorphTargets, make_morph_targets
 from realizer.outputs.output import Output, RenderSettings
+from realizer.outputs.rotations import quaternions
 
 if TYPE_CHECKING:
     from realizer.face.model import Face
@@ -75,16 +77,9 @@ def encode_glb(face: Face, targets: MorphTargets, fps: float) -> bytes:
     )
 
 
-def quaternions(turns: Float32) -> Float32:
-    """Convert pitch, yaw, roll (n, 3) to x, y, z, w (n, 4), as `face.deform` does: roll first, yaw last."""
-    from scipy.spatial.transform import Rotation
-
-    rotations = Rotation.from_euler("YXZ", turns[:, [1, 0, 2]].astype(np.float64)).as_quat()
-    out: Float32 = np.where(rotations[:, 3:] < 0, -rotations, rotations).astype(np.float32)
-    return out
-
-
 def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
+    if drawing.avatar is not None:
+        return encode_avatar(realization, read_avatar(drawing.avatar))
     if drawing.morphs == "arkit":
         return encode_glb(realization.face, make_arkit_targets(realization), realization.fps)
     targets = make_morph_targets(realization.face, realization.poses)

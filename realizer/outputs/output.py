@@ -23,6 +23,7 @@ MORPHS = ("fap", "arkit")
 ONLY_FOR = {
     "at": (".png", "for the picture of an instant"),
     "morphs": (".glb", "to write morph targets into"),
+    "avatar": (".glb", "to write the avatar into"),
     "visemes": (".fap", "to write FAP 1 into"),
 }
 
@@ -38,6 +39,7 @@ class RenderSettings:
     background: str | None = None  # "#rrggbb", a picture's path, or for a single picture "transparent"
     morphs: str = "fap"  # names of a .glb file's morph targets: "fap" or "arkit"
     visemes: bool = False  # whether a .fap file has FAP 1 in addition to the FAPs of the lips
+    avatar: str | Path | None = None  # a .glb or .vrm file to animate in a .glb file, instead of the face
     renderer: Renderer | None = None  # started by `Output.begin`
 
     def check_types(self) -> None:
@@ -114,6 +116,7 @@ _TYPES: Mapping[str, tuple[type | tuple[type, ...], str]] = {
     "light": _WORD,
     "background": _WORD,
     "morphs": (str, " or ".join(MORPHS)),
+    "avatar": ((str, Path, type(None)), "a path"),
     "visemes": (bool, "True or False"),
 }
 
@@ -162,6 +165,10 @@ class Output:
                 raise ValueError(f"{name}: wanted a {suffix} file {reason}, got {self.suffix}")
         if drawing.morphs not in MORPHS:
             raise ValueError(f"morphs: wanted {' or '.join(MORPHS)}, got {drawing.morphs!r}")
+        if drawing.avatar is not None and realization is None:
+            from realizer.outputs.avatar import read_avatar
+
+            read_avatar(drawing.avatar)
         if drawing.background == "transparent" and not single:
             raise ValueError(
                 "background: wanted a colour such as #d8dde2: only the picture of one instant, a .png with a "

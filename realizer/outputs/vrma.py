@@ -12,8 +12,8 @@ from realizer.animation.arkit import ARKIT_NAMES, arkit
 from realizer.animation.axis import AU_NAMES, au
 from realizer.core.array_types import Float32, Float64
 from realizer.face.glb_file import GlbFile
-from realizer.outputs.glb import quaternions
 from realizer.outputs.output import Output
+from realizer.outputs.rotations import quaternions
 from realizer.tables import toml_table
 from realizer.tables.lexemes import face_lexemes
 

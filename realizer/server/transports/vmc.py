@@ -7,7 +7,7 @@ import numpy as np
 
 from realizer.animation.arkit import ARKIT_NAMES
 from realizer.core.settings import Settings
-from realizer.outputs.glb import quaternions
+from realizer.outputs.rotations import half_turns, quaternions
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.transports.avatar import AvatarTransport
 
@@ -43,8 +43,7 @@ def _bones(turns: Sequence[float]) -> Iterator[tuple[str, list[float]]]:
     yaw, pitch, roll, *eyes = turns
     rows = np.array([[pitch, yaw, roll], [eyes[1], eyes[0], 0], [eyes[3], eyes[2], 0]], np.float32)
     head, left, right = quaternions(rows) * np.array([1, -1, -1, 1], np.float32)
-    half = head + np.array([0, 0, 0, 1], np.float32)  # neck and head turn by half the angle each
-    half /= np.linalg.norm(half)
+    half = half_turns(head)
     for bone, rotation in (("Neck", half), ("Head", half), ("LeftEye", left), ("RightEye", right)):
         yield bone, rotation.tolist()
 

@@ -17,6 +17,7 @@ from bml_schema import Block, SyncRef, parse, read
 from realizer.behaviours.registry import VOCABULARY
 from realizer.cli import cli
 from realizer.offline import realize as realize_documents
+from tests import avatars
 from tests.commands import run
 from tests.rows import each_row
 
@@ -231,6 +232,27 @@ def test_realize_refuses_morphs_except_for_glb_files(tmp_path: Path) -> None:
     done = CliRunner().invoke(cli, [*arguments, "-o", str(tmp_path / "x.fap")], input=TALK)
     assert done.exit_code == 2
     assert "wanted a .glb file to write morph targets into" in done.stderr
+
+
+def test_realize_animates_an_avatar_and_says_which_names_it_wants(tmp_path: Path) -> None:
+    (tmp_path / "mine.glb").write_bytes(avatars.avatar())
+    (tmp_path / "foreign.vrm").write_bytes(avatars.avatar(("grin",)))
+    for name, status in (("mine.glb", 0), ("foreign.vrm", 2), ("none.glb", 2)):
+        out = tmp_path / f"{name}-out.glb"
+        arguments = [
+            "-q",
+            "realize",
+            "-",
+            "-o",
+            str(out),
+            "--voice",
+            "silent",
+            "--avatar",
+            str(tmp_path / name),
+        ]
+        done = CliRunner().invoke(cli, arguments, input=TALK)
+        assert (done.exit_code, out.exists()) == (status, status == 0)
+        assert ("wanted morph targets with ARKit's names" in done.stderr) == (name == "foreign.vrm")
 
 
 DIALECT = '<act><bml><head type="NOD"/></bml></act>'

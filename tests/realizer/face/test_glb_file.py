@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.face.glb_file import GlbFile
+from realizer.face.glb_file import GlbFile, read_glb
 from realizer.facebuild.arkit.gltf import Gltf
 
 ARRAYS = {
@@ -42,3 +42,16 @@ def test_glb_file_stores_only_the_rows_of_a_sparse_array(tmp_path, rows):
     np.testing.assert_array_equal(found.accessor(0), array)
     assert found.json["buffers"][0]["byteLength"] == len(rows) * (4 + 12)
     assert found.json["accessors"][0]["min"] == ([0, 0, -2] if rows else [0, 0, 0])
+
+
+def test_glb_file_adds_to_a_file_that_was_read(tmp_path):
+    first = GlbFile()
+    first.add(ARRAYS["shorts"])
+    document, data = read_glb(first.bytes_of({"asset": {"version": "2.0"}, "extras": 7}))
+    file = GlbFile(document, data)
+    assert file.add(ARRAYS["floats"]) == 1
+    (tmp_path / "x.glb").write_bytes(file.bytes_of(document))
+    found = Gltf(tmp_path / "x.glb")
+    assert found.json["extras"] == 7
+    np.testing.assert_array_equal(found.accessor(0).squeeze(), ARRAYS["shorts"])
+    np.testing.assert_array_equal(found.accessor(1), ARRAYS["floats"])
