@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -123,7 +124,7 @@ def test_a_table_names_every_message_stream_and_kind() -> None:
     assert all(f"| {kind}: {row.payload} |" in text for kind, row in KINDS.items())
 
 
-def test_what_the_service_says_fits_the_file() -> None:
+def test_what_the_service_says_fits_the_file(tmp_path: Path) -> None:
     replies: list[dict[str, Any]] = []
     asked = [
         {"type": "hello", "seen": 99},
@@ -134,6 +135,7 @@ def test_what_the_service_says_fits_the_file() -> None:
         {"type": "character", "face": "ben"},
         {"type": "set", "aus": {"12": 0.5}},
         {"type": "state"},
+        {"type": "save", "kind": "expression", "name": "smirk", "content": "aus = { 12L = 0.6 }"},
         {"type": "ping", "id": "x"},
     ]
 
@@ -150,8 +152,10 @@ def test_what_the_service_says_fits_the_file() -> None:
     def missing() -> list[str]:
         return sorted(payloads.keys() - {message["type"] for message in replies})
 
+    settings = Settings(port=0, voice="silent", edit=tmp_path)
+
     async def run() -> None:
-        async with asyncio.timeout(LIMIT), Server(Settings(port=0, voice="silent")) as server:
+        async with asyncio.timeout(LIMIT), Server(settings) as server:
             socket = await connect(server.url)
             async with socket:
                 await socket.send('<bml id="b"><speech id="s"><text>One two.</text></speech></bml>')

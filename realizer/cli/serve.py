@@ -92,6 +92,7 @@ def _served_face(value: str | None) -> str | None:
 @options.scene
 @options.media
 @options.expressions
+@setting_option("edit", "DIR", type=click.Path(path_type=Path))
 @setting_option("seed", "N")
 @click.option("--idle/--no-idle", default=None, help="Blinks and small head motion of an idle face.")
 @options.liveliness

@@ -96,6 +96,9 @@ def _existing(is_kind: Callable[[Path], object], kind: str) -> Callable[[Any], P
 
 
 folder, file = _existing(os.path.isdir, "folder"), _existing(os.path.isfile, "file")
+writable_folder = _existing(
+    lambda path: path.is_dir() and os.access(path, os.W_OK | os.X_OK), "folder that can be written to"
+)
 
 
 def background(value: Any) -> str:

@@ -192,6 +192,12 @@ class Settings:
     expressions: Path | None = _row(
         None, kind.folder, "folder of a user's expressions; none: only built-in ones"
     )
+    edit: Path | None = _row(
+        None,
+        kind.writable_folder,
+        "folder in which clients may save expressions, in DIR/expressions, which are then played too; none: "
+        "they save nothing",
+    )
     seed: int = _row(0, kind.whole(-(2**63), 2**63 - 1), "seed of idle motion")
     idle: bool = _row(True, kind.flag, "blinks and small head motion")
     liveliness: float = _row(
@@ -256,6 +262,10 @@ class Settings:
             except ValueError as wanted:
                 got = "something else" if f.metadata["secret"] else repr(value)
                 raise SettingsError(f"setting {f.name}: wanted {wanted}, got {got}", f.name) from None
+        own = self.library_folder
+        if own is not None and self.expressions is not None and self.expressions.resolve() != own.resolve():
+            words = f"wanted no other folder of expressions than {own}, got {self.expressions} too"
+            raise SettingsError(f"setting edit: {words}", "edit")
         if self.tls_key is not None and self.tls_cert is None:
             raise SettingsError("setting tls_key: wanted tls_cert too, got none", "tls_key")
         if self.tls_cert is not None and self.workers > 1:
@@ -281,10 +291,16 @@ class Settings:
                     tokenless[0],
                 )
 
+    @property
+    def library_folder(self) -> Path | None:
+        """The folder of the user's expressions, which may not exist yet; None: only built-in ones."""
+        return self.expressions if self.edit is None else self.edit / "expressions"
+
     def play_options(self, scene: Mapping[str, tuple[float, float, float]] | None = None) -> PlayOptions:
         """Return the options for playing; `scene` is the content of the file `self.scene`."""
         names = (f.name for f in fields(PlayOptions) if f.name != "scene")
-        return PlayOptions(**{name: getattr(self, name) for name in names}, scene=scene)
+        values = {name: getattr(self, name) for name in names}
+        return PlayOptions(**values | {"expressions": self.library_folder}, scene=scene)
 
     @classmethod
     def read(

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from realizer.core.errors import TableError
 from realizer.expressions.expression import Expression, key
 from realizer.tables.expression_words import expression_words
 from realizer.tables.lexemes import face_lexemes
@@ -25,15 +26,19 @@ class Library(Mapping[str, Expression]):
     """
 
     def __init__(self, expressions: Iterable[Expression]) -> None:
-        self._known: dict[str, Expression] = {}
+        self.replace(expressions)
+
+    def replace(self, expressions: Iterable[Expression]) -> None:
+        """Replace all expressions."""
+        known: dict[str, Expression] = {}
         notes = []
         for expression in expressions:
-            replaced = self._known.get(key(expression.name))
+            replaced = known.get(key(expression.name))
             if replaced is not None:
                 notes.append(f"{expression.file}: {expression.name} replaces the built-in {replaced.name}")
-            self._known[key(expression.name)] = expression
+            known[key(expression.name)] = expression
         self.notes = tuple(notes)
-        self._as_written = {expression.name: expression for expression in self._known.values()}
+        self._known, self._as_written = known, {expression.name: expression for expression in known.values()}
 
     def __getitem__(self, name: str) -> Expression:
         # Spellings are nearly always exact.
@@ -68,25 +73,55 @@ def builtin() -> Library:
 
 
 def library_of(folder: Path | None = None) -> Library:
-    """Return the built-in expressions, replaced and extended by those of a user's folder, which is read once.
+    """Return the built-in expressions, replaced and extended by those of a user's folder.
+
+    The folder is read again when its files have changed; who has its library has the new expressions then. If
+    they cannot be read, the library stays as it is, and the log says why.
 
     Raises:
         TableError: invalid files; the text has a line for each fault, with file and key.
     """
-    return builtin() if folder is None else _with_own(folder.resolve())
+    if folder is None:
+        return builtin()
+    own = _own(folder.resolve())
+    own.refresh()
+    return own.library
 
 
-@lru_cache(maxsize=16)
-def _with_own(folder: Path) -> Library:
-    from realizer.expressions.user_expressions import read_folder
+class _OwnLibrary:
+    """The library of a user's folder."""
 
-    own = read_folder(folder)
-    library = Library([*builtin().values(), *own])
-    for note in library.notes:
-        log.warning(note)
-    if not own:
-        log.warning("%s: wanted expressions, one .toml file each, found none", folder)
-    return library
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._files = self._stamp()
+        self.library = Library(self._expressions())
+        for note in self.library.notes:
+            log.warning(note)
+        if len(self.library) == len(builtin()) and not self.library.notes and folder.exists():
+            log.warning("%s: wanted expressions, one .toml file each, found none", folder)
+
+    def refresh(self) -> None:
+        """Read the folder again if a file of it has changed."""
+        if (files := self._stamp()) == self._files:
+            return
+        self._files = files
+        try:
+            self.library.replace(self._expressions())
+        except TableError as error:
+            log.warning("expressions stay as they were: %s", error)
+
+    def _expressions(self) -> list[Expression]:
+        from realizer.expressions.user_expressions import read_folder
+
+        return [*builtin().values(), *read_folder(self._folder)]
+
+    def _stamp(self) -> dict[str, tuple[int, int]]:
+        """Return the time of the last change and the size of each file."""
+        found = ((path.name, path.stat()) for path in self._folder.glob("*.toml") if path.exists())
+        return {name: (stat.st_mtime_ns, stat.st_size) for name, stat in found}
+
+
+_own = lru_cache(maxsize=16)(_OwnLibrary)
 
 
 def _of_lexeme(name: str) -> Expression:

@@ -3,6 +3,7 @@
 import difflib
 import math
 import re
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -35,11 +36,22 @@ def read_folder(folder: Path) -> tuple[Expression, ...]:
     Raises:
         TableError: the text has a line for each fault, with file and key.
     """
+    return _read(sorted(folder.glob("*.toml")))
+
+
+def check_file(path: Path, content: bytes) -> None:
+    """Raise TableError if the folder of a file could not be read any more if the file had that content."""
+    others = set(path.parent.glob("*.toml")) - {path}
+    _read([*sorted(others), path], {path: content})
+
+
+def _read(paths: Iterable[Path], unsaved: Mapping[Path, bytes] = {}) -> tuple[Expression, ...]:
+    """Return the expressions of files; the contents of some are not those on the disk."""
     found: dict[str, Expression] = {}
     faults: list[str] = []
-    for path in sorted(folder.glob("*.toml")):
+    for path in paths:
         try:
-            row = parse_toml(path.read_text("utf-8"))
+            row = parse_toml((unsaved[path] if path in unsaved else path.read_bytes()).decode())
         except OSError as error:
             faults.append(f"{path}: {error.strerror}")
             continue

@@ -17,7 +17,7 @@ const KINDS = {
   6: ["arkit", Float32Array],
 };
 export const JSON_STREAMS = ["fap", "au", "arkit", "schedule"];
-export const ANSWERS = { hello: "welcome", subscribe: "subscribed", state: "state", ping: "pong" };
+export const ANSWERS = { hello: "welcome", subscribe: "subscribed", save: "saved", state: "state", ping: "pong" };
 // end of protocol
 
 /** Why the service refused a message; `code` and `where` are those of the message `error`. */

@@ -11,10 +11,18 @@ from realizer.protocol.streams import STREAMS
 PROTOCOL = 1
 
 # Type of a control message -> type of its answer; other messages have none.
-ANSWERS: Mapping[str, str] = {"hello": "welcome", "subscribe": "subscribed", "state": "state", "ping": "pong"}
+ANSWERS: Mapping[str, str] = {
+    "hello": "welcome",
+    "subscribe": "subscribed",
+    "save": "saved",
+    "state": "state",
+    "ping": "pong",
+}
 
 # Longest control message: a scene of a few thousand objects.
 MAX_CONTROL = 256 * 1024  # bytes
+# Longest content of a `save` message: a face as GLB in base64.
+MAX_CONTENT = 12 * 2**20  # characters
 # The highest rate of frames; ten times as fast as a film.
 MAX_FPS = 240
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, get_args
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from realizer.protocol.messages.common import MAX_CONTROL
+from realizer.protocol.messages.common import MAX_CONTENT, MAX_CONTROL
 from realizer.protocol.messages.replies import ErrorMessage
 from realizer.protocol.messages.requests import (
     Anticipate,
@@ -16,6 +16,7 @@ from realizer.protocol.messages.requests import (
     Heard,
     Hello,
     Ping,
+    Save,
     SceneMessage,
     SetMessage,
     StateQuery,
@@ -39,6 +40,7 @@ Control = (
     | SetMessage
     | Heard
     | Track
+    | Save
     | Anticipate
     | SpeechMessage
     | Stop
@@ -81,13 +83,14 @@ _SURROGATE = re.compile(r"[\ud800-\udfff]|\\u[dD][89a-fA-F]")
 _ADAPTER: TypeAdapter[Control] = TypeAdapter(Annotated[Control, Field(discriminator="type")])
 
 
-def parse_control(text: str) -> Control | ErrorMessage:
-    """Parse a control message, or return the error: code bad-json, too-large, unsupported or invalid."""
-    if len(text) > MAX_CONTROL:
-        return ErrorMessage(
-            code="too-large",
-            message=f"wanted a control message of at most {MAX_CONTROL} bytes, got {len(text)}",
-        )
+def parse_control(text: str, *, can_save: bool = False) -> Control | ErrorMessage:
+    """Parse a control message, or return the error: code bad-json, too-large, unsupported or invalid.
+
+    Args:
+        can_save: whether a `save` message may be longer than others.
+    """
+    if len(text) > MAX_CONTROL and not (can_save and len(text) < 2 * MAX_CONTENT):
+        return _too_large(text)
     try:
         message = json.loads(text)
     except RecursionError:
@@ -104,6 +107,8 @@ def parse_control(text: str) -> Control | ErrorMessage:
             message=f"wanted a type of {', '.join(SUPPORTED)}; got {_short(kind)}",
             where="type",
         )
+    if kind != "save" and len(text) > MAX_CONTROL:
+        return _too_large(text)
     if kind == "subscribe" and message.get("stream") not in tuple(STREAMS):
         return ErrorMessage(
             code="unsupported",
@@ -118,6 +123,11 @@ def parse_control(text: str) -> Control | ErrorMessage:
         same = [other for other in errors if _where(other, message) == where]
         id = message.get("id") if kind == "speech" and isinstance(message.get("id"), str) else None
         return ErrorMessage(code="invalid", message=_explain(same), where=where, id=id)
+
+
+def _too_large(text: str) -> ErrorMessage:
+    words = f"wanted a control message of at most {MAX_CONTROL} bytes, got {len(text)}"
+    return ErrorMessage(code="too-large", message=words)
 
 
 def _where(error: ErrorDetails, message: object) -> str:

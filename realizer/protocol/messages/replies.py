@@ -24,6 +24,7 @@ class Capabilities(Reply):
     voices: list[str] = Field([], description="names of the installed voices")
     cameras: list[str] = Field([], description="names of cameras for `subscribe`")
     lights: list[str] = Field([], description="names of lights for `subscribe`")
+    edit: bool = Field(False, description="whether this connection may `save`")
 
 
 class Limits(Reply):
@@ -32,6 +33,7 @@ class Limits(Reply):
     message: int = Field(description="bytes of a WebSocket message")
     document: int = Field(description="bytes of BML in a message")
     control: int = Field(description="bytes of a control message")
+    content: int = Field(description="characters of the content of a `save` message")
     elements: int = Field(description="XML elements in a message")
     behaviours: int = Field(description="behaviours in a block")
     duration: float = Field(description="duration of a block in seconds")
@@ -164,6 +166,8 @@ ErrorCode = Literal[
     "rate",
     "token",
     "journal",
+    "edit",
+    "conflict",
 ]
 
 
@@ -189,6 +193,16 @@ class Tracked(Reply):
     head: list[float] | None = Field(None, description="degrees of pitch (down), yaw (left) and roll (right)")
     emotion: str | None = None
     certainty: float | None = Field(None, description="of the emotion, 0..1")
+
+
+class Saved(Reply):
+    """The answer to `save`. If the file has changed since `version`, the error `conflict` is sent instead."""
+
+    type: Literal["saved"] = "saved"
+    kind: str
+    name: str
+    version: str = Field(description="of the file, for the next `save`")
+    file: str = Field(description="path in the folder of the service's setting `edit`")
 
 
 class Gap(Reply):

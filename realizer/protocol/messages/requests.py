@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AliasChoices, Field, field_validator
 
 from realizer.protocol.messages.common import (
+    MAX_CONTENT,
     MAX_FPS,
     PROTOCOL,
     WHOLE,
@@ -202,6 +203,26 @@ class Track(Message):
     type: Literal["track"]
     character: str | None = Field(None, max_length=256, description="default: the first")
     fps: float = Field(20.0, ge=0, le=60, description="most pictures a second; 0 ends it")
+
+
+class Save(Message):
+    """Save a file of the service, if its setting `edit` allows that. The answer is `saved`.
+
+    A file that has changed since it was read is not replaced: the error has the code `conflict`.
+    """
+
+    model_config = examples(
+        {"type": "save", "kind": "expression", "name": "smirk", "content": "aus = { 12L = 0.6 }"}
+    )
+
+    type: Literal["save"]
+    kind: Literal["expression"] = Field(description="expression: its TOML, as in a folder of expressions")
+    name: str = Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,63}$", description="of the file, without its suffix")
+    content: str = Field(max_length=MAX_CONTENT, description="of the file")
+    encoding: Literal["text", "base64"] = Field("text", description="of `content`")
+    version: str | None = Field(
+        None, max_length=64, description="of the file that this replaces; absent: there is none of that name"
+    )
 
 
 SyncName = Annotated[str, Field(pattern=r"^[^\s:]{1,256}$")]

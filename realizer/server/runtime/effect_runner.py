@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 from realizer.core import work
 from realizer.core.errors import RealizerError, RenderError, VoiceError
-from realizer.server.session.effects import Close, Draw, Effect, Look, RenderOptions, Send, Speak
+from realizer.server.edits.saving import save
+from realizer.server.session.effects import Close, Draw, Effect, Look, RenderOptions, Send, Speak, Write
 from realizer.server.session.session import Session
 from realizer.server.transports.transport import Outbound
 from realizer.speech.duration_fit import speak_to_length
@@ -66,21 +67,27 @@ class EffectRunner:
                     self._submit(self._engines.render_pool, self._engines.draw, session, effect)
                 case Look():
                     self._submit(self._engines.tracking_pool, self._engines.look, session, effect)
-                case Look():
-                    self._submit(self._engines.tracking_pool, self._engines.look, session, effect)
+                case Write():
+                    self._submit(self._engines.file_pool, save, session, effect)
                 case Close(connection, code, reason):
                     if (client := self._clients.get(connection)) is not None:
                         client.disconnect(code, reason)
 
     def _submit(
-        self, pool: FairPool, compute: Callable[[Any], Any], session: Session, effect: Speak | Draw | Look
+        self,
+        pool: FairPool,
+        compute: Callable[[Any], Any],
+        session: Session,
+        effect: Speak | Draw | Look | Write,
     ) -> None:
         """Compute the answer to an effect in a thread, and pass it to the session."""
-        take: Callable[[int, Any, float], None] = {
+        takers: dict[type, Callable[[int, Any, float], None]] = {
             Speak: session.on_speech,
             Draw: session.on_picture,
             Look: session.on_sight,
-        }[type(effect)]
+            Write: session.on_saved,
+        }
+        take = takers[type(effect)]
 
         def answer(future: asyncio.Future[Any]) -> None:
             if not future.cancelled():
@@ -122,6 +129,7 @@ class Engines:
         self.speech_pool = FairPool(2, "voice")
         self.render_pool = FairPool(2, "renderer")
         self.tracking_pool = FairPool(1, "tracking")  # its networks are for one thread
+        self.file_pool = FairPool(1, "files")  # one file at a time: each is compared before it is replaced
         self._voices: dict[str | None, Voice] = {}
         self._slots: dict[tuple[str, RenderOptions], _RendererSlot] = {}
         self._begun = clock()  # when a renderer last finished starting; until then the others may have waited
@@ -171,6 +179,7 @@ class Engines:
 
     def close(self) -> None:
         """Close all engines, and drop the requests that wait for them."""
+        self.file_pool.close()
         self.tracking_pool.close()
         self.speech_pool.close()
         self.render_pool.close()

@@ -86,7 +86,7 @@ class SessionFactory:
         # Emotions take half a frame to import: too long for the event loop.
         await loop.run_in_executor(None, KINDS.__getitem__, Emotion.tag)
         mapping_of(settings.face, settings.mapping)
-        library_of(settings.expressions)
+        library_of(settings.library_folder)
         self._capabilities = await loop.run_in_executor(None, capabilities_of, settings)
 
     def close(self) -> None:

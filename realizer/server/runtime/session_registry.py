@@ -46,10 +46,12 @@ class Visitor:
     Attributes:
         address: IP address; "" if unknown, as for other transports than the WebSocket.
         sessions: names of the sessions it may join; None: any.
+        may_edit: whether it may save files of the service.
     """
 
     address: str = ""
     sessions: frozenset[str] | None = None
+    may_edit: bool = False
 
 
 ANYBODY = Visitor()
@@ -164,7 +166,7 @@ class SessionRegistry:
         session = self.session_of[connection] = self.sessions[id]
         self._joined.setdefault(session, set()).add(connection)
         self._visitors[connection] = visitor
-        self._call(session, partial(session.connect, connection, now, seen))
+        self._call(session, partial(session.connect, connection, now, seen, may_edit=visitor.may_edit))
         return session
 
     def leave(self, connection: int, now: float) -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from pathlib import Path
 
 from realizer.core import work
 from realizer.protocol.messages.common import Reply
 from realizer.protocol.messages.replies import Gap
-from realizer.server.session.effects import Close, Effect, MoveConnection, Send
+from realizer.protocol.messages.requests import Save
+from realizer.server.session.effects import Close, Effect, MoveConnection, Send, Write
 from realizer.server.session.feedback_log import FeedbackLog
 from realizer.server.streams.connection import SLOW, STUCK, Connection
 
@@ -60,6 +62,10 @@ class Connections(dict[int, Connection]):
         """Send a message to a connection."""
         if self:  # the session has not ended
             self._add_effects([Send(id, reply.text())])
+
+    def write(self, id: int, message: Save, folder: Path) -> None:
+        """Save a file for a connection, which gets the answer."""
+        self._add_effects([Write(id, message, folder)])
 
     def send_feedback(self, texts: list[str]) -> None:
         """Send feedback to all that want it."""

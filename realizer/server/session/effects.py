@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from realizer.core.array_types import Float32
+from realizer.protocol.messages.requests import Save
 from realizer.speech.utterance import SpeechRequest
 
 if TYPE_CHECKING:
@@ -89,4 +91,16 @@ class Look:
     time: float
 
 
-Effect = Send | Speak | Draw | Look | MoveConnection | Close
+@dataclass(frozen=True, slots=True, eq=False)
+class Write:
+    """Save a file in a folder and call `session.on_saved(id, the reply, now)`.
+
+    `id` is the number of the connection that asks for it.
+    """
+
+    id: int
+    message: Save
+    folder: Path
+
+
+Effect = Send | Speak | Draw | Look | Write | MoveConnection | Close

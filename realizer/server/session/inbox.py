@@ -65,7 +65,7 @@ class Inbox:
             return False
         control: Control | None = None
         if isinstance(message, str) and (text := message.lstrip("\ufeff \t\r\n")).startswith("{"):
-            parsed = parse_control(text)
+            parsed = parse_control(text, can_save=connection.may_edit)
             if isinstance(parsed, ErrorMessage):
                 self._connections.reply(connection.id, parsed)
                 return False

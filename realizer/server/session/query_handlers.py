@@ -1,4 +1,4 @@
-"""Handlers of the messages that change nothing in a session: hello, state and ping."""
+"""Handlers of the messages that change nothing in a session: hello, save, state and ping."""
 
 from __future__ import annotations
 
@@ -17,14 +17,16 @@ from realizer.protocol.messages.replies import (
     StateMessage,
     VoiceState,
 )
-from realizer.protocol.messages.requests import Hello, Ping, StateQuery
+from realizer.protocol.messages.requests import Hello, Ping, Save, StateQuery
 from realizer.server.documents.document_queue import Submission
 from realizer.server.session.character_faces import CharacterFaces
 from realizer.server.session.connections import Connections
 from realizer.server.session.welcome import build_welcome
 from realizer.server.streams.connection import Connection
 
-Query = Hello | StateQuery | Ping
+Query = Hello | Save | StateQuery | Ping
+OFF = "wanted a service that saves files: `realizer serve --edit DIR`"
+BARRED = "wanted a token for all sessions"
 
 
 @dataclass(eq=False)
@@ -55,13 +57,17 @@ class QueryHandlers:
                 self._hello(connection, message, t)
             case StateQuery():
                 self.connections.reply(connection.id, self._state(connection, t))
+            case Save():
+                self._save(connection, message)
             case Ping():
                 self.connections.reply(connection.id, Pong(id=message.id, time=t))
 
     def send_welcome(self, connection: int, t: float) -> None:
         """Send `welcome` to a connection."""
         seq = self.connections.log.newest
-        self.connections.reply(connection, build_welcome(self.id, t, seq, self.settings, self.capabilities))
+        capabilities = {**self.capabilities, "edit": self.connections[connection].may_edit}
+        welcome = build_welcome(self.id, t, seq, self.settings, capabilities)
+        self.connections.reply(connection, welcome)
 
     def _hello(self, connection: Connection, message: Hello, t: float) -> None:
         if message.version != PROTOCOL:
@@ -75,6 +81,14 @@ class QueryHandlers:
             self.send_welcome(connection.id, t)
             if message.seen is not None:
                 self.connections.send_missed_feedback(connection.id, message.seen)
+
+    def _save(self, connection: Connection, message: Save) -> None:
+        folder = self.settings.edit
+        if folder is None or not connection.may_edit:
+            error = ErrorMessage(code="edit", message=OFF if folder is None else BARRED, where="save")
+            self.connections.reply(connection.id, error)
+        else:
+            self.connections.write(connection.id, message, folder)
 
     def _state(self, connection: Connection, t: float) -> StateMessage:
         state = self.player.state(t)

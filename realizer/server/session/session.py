@@ -16,6 +16,7 @@ from realizer.core import work
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
 from realizer.playback.player import Player
+from realizer.protocol.messages.common import Reply
 from realizer.server.documents.document_queue import Submission
 from realizer.server.documents.limits import duration_error
 from realizer.server.journal import TakenOver
@@ -125,13 +126,21 @@ class Session:
 
     # connections --------------------------------------------------------------------------------
 
-    def connect(self, connection: int, now: float, seen: int | None = None) -> None:
-        """Add a connection. With `seen` it gets all feedback after that one, without it only new feedback."""
+    def connect(
+        self, connection: int, now: float, seen: int | None = None, *, may_edit: bool = False
+    ) -> None:
+        """Add a connection. With `seen` it gets all feedback after that one, without it only new feedback.
+
+        Args:
+            may_edit: whether it may save files of the service.
+        """
         if self.closed:  # it ended while the client waited for it
             self._effects.append(Close(connection, 1012, f"session {self.id} has ended: reconnect"))
             return
         self._forget_deadline()
-        self.connections[connection] = Connection(connection)
+        self.connections[connection] = Connection(
+            connection, may_edit=may_edit and self.settings.edit is not None
+        )
         if not self.journal.note(self.clock.read(now), "join", connection):
             return
         self.empty_since = None
@@ -246,6 +255,11 @@ class Session:
         self._forget_deadline()
         self.tracked.answer(connection, result, self.clock.read(now))
         self.tick(now)
+
+    def on_saved(self, connection: int, reply: Reply, now: float) -> None:
+        """Take the answer to an effect `Write`."""
+        if connection in self.connections:
+            self.connections.reply(connection, reply)
 
     # time ---------------------------------------------------------------------------------------
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from realizer.core.settings import Settings
 from realizer.expressions.library import library_of
-from realizer.protocol.messages.common import MAX_CONTROL, MAX_FPS, PICTURES
+from realizer.protocol.messages.common import MAX_CONTENT, MAX_CONTROL, MAX_FPS, PICTURES
 from realizer.protocol.messages.replies import Capabilities, Limits, Welcome
 from realizer.protocol.streams import STREAMS
 from realizer.server.documents.limits import MAX_CHARACTERS
@@ -30,12 +30,17 @@ def build_welcome(id: str, t: float, seq: int, s: Settings, capabilities: Mappin
             streams={stream: list(row.encodings) for stream, row in STREAMS.items()},
             pictures=list(PICTURES),
             fps=s.fps,
-            **capabilities,
+            # Those of a folder may have changed since the service began.
+            **{
+                **capabilities,
+                **({} if s.edit is None else {"expressions": sorted(library_of(s.library_folder))}),
+            },
         ),
         limits=Limits(
             message=s.max_message,
             document=s.max_document,
             control=MAX_CONTROL,
+            content=MAX_CONTENT,
             behaviours=s.max_behaviours,
             elements=s.max_elements,
             duration=s.max_duration,
@@ -67,7 +72,7 @@ def capabilities_of(settings: Settings) -> dict[str, Any]:
         "behaviours": sorted(tag.partition("}")[2] for tag in KINDS),
         "lexemes": {"faceLexeme": sorted(face_lexemes()), "head": sorted(head_lexemes())},
         "emotions": sorted(known_words()),
-        "expressions": sorted(library_of(settings.expressions)),
+        "expressions": sorted(library_of(settings.library_folder)),
         "aus": list(AU_NAMES()),
         "faces": [face.name for face in list_faces()],
         "voices": [voice.name for voice in voices() if voice.available],

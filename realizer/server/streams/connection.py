@@ -75,6 +75,7 @@ class Connection:
         is_slow: whether more than SLOW bytes are unsent.
         dropped: number of frames, pictures and sound packets it missed because it was slow.
         subscriptions: (stream, character, view) -> subscription.
+        may_edit: whether it may save files of the service.
     """
 
     id: int
@@ -82,3 +83,4 @@ class Connection:
     is_slow: bool = False
     dropped: int = 0
     subscriptions: dict[tuple[str, str | None, str | None], Subscription] = field(default_factory=dict)
+    may_edit: bool = False

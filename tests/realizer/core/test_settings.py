@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -148,6 +148,11 @@ def test_settings_listen_beyond_this_machine_with_protection(settings: dict[str,
         ),
         ({"host": "::"}, "setting host: wanted token"),
         ({"host": "face.example", "allow": ["192.0.2.1"]}, "setting host: wanted token"),
+        (
+            {"edit": Path(__file__).parent, "expressions": Path(__file__).parent},
+            "setting edit: wanted no other folder of expressions than .*expressions, got",
+        ),
+        ({"edit": Path(__file__)}, "setting edit: wanted an existing folder that can be written to, got"),
     ],
 )
 def test_settings_refuse_contradictions(settings: dict[str, Any], says: str) -> None:
@@ -161,3 +166,9 @@ def test_settings_play_options_have_the_values_of_the_settings() -> None:
     settings = Settings(fps=50, idle=False, cooccurrence="off", prosody=False, seed=3)
     expected = PlayOptions(fps=50, idle=False, cooccurrence="off", prosody=False, seed=3, scene=cup)
     assert settings.play_options(cup) == expected
+
+
+def test_settings_play_the_expressions_that_may_be_edited(tmp_path: Path) -> None:
+    settings = Settings(edit=tmp_path)
+    assert settings.play_options().expressions == tmp_path / "expressions"
+    assert replace(settings, fps=50).library_folder == settings.library_folder

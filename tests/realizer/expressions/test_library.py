@@ -73,3 +73,17 @@ def test_library_of_an_empty_folder_logs_a_warning(folder, caplog) -> None:
 def test_library_of_a_folder_with_a_bad_file_fails(folder) -> None:
     with pytest.raises(TableError, match=r"smirk\.toml: aus"):
         library_of(folder(smirk="onset = 1\n"))
+
+
+def test_library_of_a_changed_folder_is_read_again(folder, caplog) -> None:
+    made = folder(smirk=SMIRK)
+    library = library_of(made)
+    (made / "wry.toml").write_text(SMIRK.replace("12L", "14L"), "utf-8")
+    assert "wry" not in library
+    assert library_of(made) is library
+    assert library["wry"].units == "14L+2R"
+    (made / "wry.toml").write_text("aus = {}", "utf-8")
+    assert "wry" in library_of(made)
+    assert "expressions stay as they were" in caplog.text
+    (made / "wry.toml").unlink()
+    assert "wry" not in library_of(made)

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from realizer.core.errors import TableError
-from realizer.expressions.user_expressions import read_folder
+from realizer.expressions.user_expressions import check_file, read_folder
 
 
 def test_read_folder_reads_all_keys(folder) -> None:
@@ -93,3 +93,14 @@ def test_read_folder_reports_all_faults_at_once(folder) -> None:
 def test_read_folder_refuses_two_files_of_one_name(folder) -> None:
     with pytest.raises(TableError, match=r"b.toml: name: wanted one of its own, got 'A', which .*a.toml has"):
         read_folder(folder(a="aus = { 12 = 1 }", b='name = "A"\naus = { 12 = 1 }'))
+
+
+def test_check_file_compares_with_the_other_files_of_the_folder(folder) -> None:
+    made = folder(one='name = "wry"\naus = { 12 = 1 }')
+    check_file(made / "one.toml", b'name = "wry"\naus = { 14 = 1 }')
+    check_file(made / "two.toml", b"aus = { 14 = 1 }")
+    with pytest.raises(TableError, match=r"two.toml: name: wanted one of its own, got 'Wry'"):
+        check_file(made / "two.toml", b'name = "Wry"\naus = { 14 = 1 }')
+    with pytest.raises(TableError, match=r"two.toml: wanted TOML"):
+        check_file(made / "two.toml", b"\xff")
+    assert [path.name for path in made.iterdir()] == ["one.toml"]

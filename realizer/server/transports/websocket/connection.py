@@ -124,7 +124,8 @@ class WebSocketConnections:
             grant = self._access.request(client.target, client.headers, later=True)
             if grant is None:
                 hello, grant = await self._first_message(client)
-            visitor = Visitor(client.address, grant.sessions)
+            # What a token for some sessions allows must not change others.
+            visitor = Visitor(client.address, grant.sessions, may_edit=grant.sessions is None)
             name, seen = session_of(client.target)
             self._sessions.check(name, visitor)  # again: the grant of a hello is known only now
             await self._sessions.restore(name, seen)

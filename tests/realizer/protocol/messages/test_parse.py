@@ -22,6 +22,7 @@ def test_parse_control_accepts_every_type() -> None:
         "character": ',"id":"Ada"',
         "speech": ',"id":"turn","append":"Hello. "',
         "heard": ',"speaking":true',
+        "save": ',"kind":"expression","name":"smirk","content":""',
         "anticipate": ',"id":"clock","syncs":{"beat":2.5}',
     }
     for kind in SUPPORTED:

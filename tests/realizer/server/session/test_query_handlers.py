@@ -1,7 +1,11 @@
-"""Tests of the answers to hello, state and ping."""
+"""Tests of the answers to hello, save, state and ping."""
 
 from __future__ import annotations
 
+import json
+
+from realizer.protocol.messages.common import MAX_CONTROL
+from realizer.server.edits.saving import save
 from tests.realizer.server.conftest import NOD, TALK, Driver
 
 
@@ -68,3 +72,46 @@ def test_replies_round_times_to_microseconds(drive) -> None:
     assert pong["time"] == state["time"] == welcome["time"] == 0.333333
     (block,) = state["blocks"]
     assert (block["start"], block["end"]) == (0.333333, 0.45679)
+
+
+SAVE = {"type": "save", "kind": "expression", "name": "smirk", "content": "aus = { 12L = 0.6 }"}
+
+
+def test_save_is_refused_where_the_service_or_the_token_does_not_allow_it(drive, tmp_path) -> None:
+    for folder, may_edit, says in ((None, True, "--edit DIR"), (tmp_path, False, "a token for all sessions")):
+        driver = drive(edit=folder)
+        driver.session.connect(2, driver.opened, may_edit=may_edit)
+        client = driver.send(SAVE, 2)
+        (error,) = client.of("error")
+        assert (error["code"], says in error["message"]) == ("edit", True)
+        (welcome,) = driver.send({"type": "hello"}, 2).of("welcome")
+        assert welcome["capabilities"]["edit"] is False
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_save_becomes_an_effect_whose_answer_the_client_gets(drive, tmp_path) -> None:
+    driver = drive(edit=tmp_path)
+    driver.session.connect(2, driver.opened, may_edit=True)
+    driver.session.receive(2, json.dumps(SAVE), driver.opened)
+    (effect,) = driver.session.take_effects()
+    assert (effect.id, effect.message.name, effect.folder) == (2, "smirk", tmp_path)
+    driver.session.on_saved(2, save(effect), driver.opened)
+    driver.collect()
+    (saved,) = driver.clients[2].of("saved")
+    assert saved["file"] == "expressions/smirk.toml"
+    (welcome,) = driver.send({"type": "hello"}, 2).of("welcome")
+    assert welcome["capabilities"]["edit"]
+    assert "smirk" in welcome["capabilities"]["expressions"]
+
+
+def test_save_may_be_longer_than_other_messages_where_it_is_allowed(drive, tmp_path) -> None:
+    long = SAVE | {"content": "# " + MAX_CONTROL * "x"}
+    driver = drive(edit=tmp_path)
+    driver.session.connect(2, driver.opened, may_edit=True)
+    assert driver.send(long).of("error")[0]["code"] == "too-large"
+    driver.session.receive(2, json.dumps(long), driver.opened)
+    (effect,) = driver.session.take_effects()
+    assert effect.message.content == long["content"]
+    driver.session.receive(2, json.dumps({"type": "ping", "id": MAX_CONTROL * "x"}), driver.opened)
+    driver.collect()
+    assert driver.clients[2].of("error")[0]["code"] == "too-large"

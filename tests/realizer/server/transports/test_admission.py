@@ -456,3 +456,23 @@ def test_admission_names_a_certificate_without_key_before_it_opens(certificate: 
 
     with pytest.raises(SettingsError, match=r"wanted certificates in PEM, .* got .*cert\.pem and none"):
         serving(test, tls_cert=certificate[0])
+
+
+def test_admission_to_save_needs_a_token_for_all_sessions(tmp_path: Path) -> None:
+    async def test(server: Server) -> None:
+        save = {"type": "save", "kind": "expression", "name": "smirk", "content": "aus = { 12L = 1 }"}
+        some, all_ = signed(session="show"), signed()
+        replies = [
+            await answer(f"{server.url}?session=show&token={token}", save) for token in (some, all_, all_)
+        ]
+        assert [reply.get("code", reply["type"]) for reply in replies] == ["edit", "saved", "conflict"]
+        with pytest.raises(InvalidStatus):
+            await answer(f"{server.url}?token=x", save)
+
+    async def answer(url: str, message: dict[str, Any]) -> dict[str, Any]:
+        async with connect(url) as socket:
+            await socket.send(json.dumps(message))
+            reply: dict[str, Any] = json.loads(await socket.recv())
+            return reply
+
+    serving(test, jwt_key=SECRET, edit=tmp_path)

@@ -1,0 +1,1 @@
+"""Files that clients save: `realizer serve --edit DIR`."""
