@@ -173,7 +173,7 @@ class Required(Part):
 
 @node
 class Block:
-    """One <bml> element.
+    """A block: one <bml> element, a set of behaviours that are scheduled together.
 
     Attributes:
         id: never empty, never "bml".

@@ -10,7 +10,7 @@ import mimetypes
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.resources import files
+from importlib.resources import as_file, files
 from pathlib import Path
 from urllib.parse import parse_qs
 
@@ -36,6 +36,14 @@ POLICY = (
     "default-src 'self'; img-src 'self' data: blob:; media-src 'self' blob:; "
     f"style-src 'self' 'unsafe-inline'; connect-src 'self' ws: wss:; {FRAMES}"
 )
+# Pages of mkdocs have scripts in them, and search in a worker.
+DOCUMENTATION_POLICY = (
+    "default-src 'self'; script-src 'self' 'unsafe-inline'; worker-src 'self' blob:; "
+    f"img-src 'self' data:; style-src 'self' 'unsafe-inline'; {FRAMES}"
+)
+NO_DOCUMENTATION = """The documentation has not been built.
+Build it in a checkout: pip install -e '.[docs]' && python -m mkdocs build
+"""
 NAME = re.compile(r"[a-z0-9_-]{1,64}")  # in a URL
 
 
@@ -60,6 +68,7 @@ class HttpSite:
     def __init__(self, health: Callable[[], dict[str, object]], settings: Settings | None = None) -> None:
         self._settings = settings or Settings()
         self._static = files("realizer.server").joinpath("static")
+        self._documentation = files("realizer.server").joinpath("docs")
         self._routes: dict[str, Callable[[dict[str, str]], HttpResponse]] = {
             "/": lambda asked: self._file("index.html"),
             "/healthz": lambda asked: _json(json.dumps({"status": "ok", **health()})),
@@ -74,8 +83,8 @@ class HttpSite:
         }
 
     def is_public(self, path: str) -> bool:
-        """Return whether anybody may get what is at a path: the page, its files, and the health."""
-        return path in ("/", "/healthz") or path[1:] in self._names
+        """Return whether anybody may get what is at a path: page, documentation, health."""
+        return path in ("/", "/healthz", "/docs") or path.startswith("/docs/") or path[1:] in self._names
 
     def answer(self, target: str, known: str = "") -> HttpResponse:
         """Return the response to `GET target`. May block while a face is loaded for the first time.
@@ -88,6 +97,8 @@ class HttpSite:
         try:
             if path in self._routes:
                 return self._routes[path](asked)
+            if path == "/docs" or path.startswith("/docs/"):
+                return self._document(path.removeprefix("/docs").removeprefix("/"))
             if path.startswith("/faces/"):
                 glb, tag = _glb(_face(path.removeprefix("/faces/").removesuffix(".glb")))
                 headers = (("Cache-Control", "no-cache"), ("ETag", tag))
@@ -127,18 +138,39 @@ class HttpSite:
         headers = (("Content-Disposition", 'attachment; filename="pose.fap"'),)
         return HttpResponse(200, "text/x-fap", pose.encode(), headers)
 
+    @functools.cached_property
+    def _documents(self) -> frozenset[str]:
+        """The names of the files of the documentation, below its folder; none if it was not built."""
+        with as_file(self._documentation) as folder:
+            return frozenset(f.relative_to(folder).as_posix() for f in folder.rglob("*") if f.is_file())
+
+    def _document(self, name: str) -> HttpResponse:
+        """Return a file of the documentation."""
+        if not self._documents:
+            return HttpResponse(404, TEXT, NO_DOCUMENTATION.encode())
+        if name not in self._documents:
+            # Links of a page are relative to its folder, which is /docs/.
+            return HttpResponse(302, TEXT, b"", (("Location", "/docs/index.html"),))
+        body = self._documentation.joinpath(name).read_bytes()
+        headers = (("Cache-Control", "no-cache"), ("Content-Security-Policy", DOCUMENTATION_POLICY))
+        return HttpResponse(200, _media_type(name), body, headers)
+
     def _file(self, name: str) -> HttpResponse:
         """Return a file of the page. Only names in its folder are accepted, so that no path can leave it."""
         if name in self._names and (file := self._static.joinpath(name)).is_file():
-            media_type = mimetypes.guess_type(name)[0] or "application/octet-stream"
-            if media_type.startswith("text/") or media_type.endswith("svg+xml"):
-                media_type += "; charset=utf-8"
             headers = (("Cache-Control", "no-cache"), ("Content-Security-Policy", POLICY))
-            return HttpResponse(200, media_type, file.read_bytes(), headers)
+            return HttpResponse(200, _media_type(name), file.read_bytes(), headers)
         if name == "index.html":
             return HttpResponse(503, TEXT, NOT_BUILT.encode())
         words = f"/{name[:80]} is not here; there are / /ws /faces/NAME /healthz\n"
         return HttpResponse(404, TEXT, words.encode())
+
+
+def _media_type(name: str) -> str:
+    media_type = mimetypes.guess_type(name)[0] or "application/octet-stream"
+    if media_type.startswith("text/") or media_type.endswith("svg+xml"):
+        media_type += "; charset=utf-8"
+    return media_type
 
 
 def _json(text: str | bytes) -> HttpResponse:

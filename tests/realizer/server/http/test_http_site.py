@@ -45,6 +45,21 @@ def test_site_has_faces_as_glb_and_no_unknown_face() -> None:
     assert b"nobody" in missing.body
 
 
+def test_site_has_the_documentation_once_it_is_built(tmp_path: Path) -> None:
+    assert b"mkdocs build" in HttpSite(dict).answer("/docs/").body or (SITE.answer("/docs").status == 302)
+    (tmp_path / "how-to").mkdir()
+    (tmp_path / "index.html").write_text("<p>Words</p>", "utf-8")
+    (tmp_path / "how-to" / "embed.html").write_text("<p>Embed</p>", "utf-8")
+    site = HttpSite(dict)
+    site._documentation = tmp_path
+    assert dict(site.answer("/docs").headers) == {"Location": "/docs/index.html"}
+    assert site.answer("/docs/how-to/embed.html").body == b"<p>Embed</p>"
+    assert site.answer("/docs/index.html").media_type == "text/html; charset=utf-8"
+    outside = site.answer("/docs/../http_site.py")
+    assert (outside.status, outside.body) == (302, b"")
+    assert site.is_public("/docs/how-to/embed.html")
+
+
 def test_site_sends_a_face_once_to_who_keeps_it() -> None:
     first = SITE.answer("/faces/default")
     tag = dict(first.headers)["ETag"]
