@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import re
 from functools import cache
 from pathlib import Path
 
 import pytest
 
+import realizer
+
 ROOT = Path(__file__).parent.parent
-FILES = ("README.md", "docs/**/*.md", "faces/*.md", "docker/*.md", "bml_schema/xsd/*.md")
+FILES = ("*.md", "*.txt", "examples/*.md", "docs/**/*.md", "faces/*.md", "docker/*.md", "bml_schema/xsd/*.md")
 PAGES = [page for pattern in FILES for page in sorted(ROOT.glob(pattern))]
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 CODE = re.compile(r"```.*?```|`[^`\n]+`", re.DOTALL)
@@ -93,3 +96,10 @@ def test_architecture_names_every_folder() -> None:
     ]
     missing = {f"{relative(package)}/" for package in packages} - named - {"realizer/"}
     assert not missing
+
+
+def test_versions_are_the_same() -> None:
+    package = ROOT / "clients" / "javascript" / "package.json"
+    if not package.is_file():
+        pytest.skip("no JavaScript client beside the tests")
+    assert json.loads(package.read_text("utf-8"))["version"] == realizer.__version__
