@@ -148,3 +148,18 @@ export class Sound {
   forget(time: number): void;
   playhead(): number | null;
 }
+
+/** Receive the picture and the sound of a session by WebRTC; browsers only. */
+export function watch(options: {
+  url?: string | URL;
+  session: string;
+  token?: string;
+  size?: string;
+  fps?: number | string;
+  camera?: string;
+  light?: string;
+  background?: string;
+  character?: string;
+  /** How long the browser holds back picture and sound, in ms. */
+  buffer?: number | string;
+}): Promise<{ stream: MediaStream; connection: RTCPeerConnection; close: () => void }>;

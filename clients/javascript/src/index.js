@@ -32,3 +32,4 @@ export { Clock, DELAY } from "./playout.js";
 export { BMLA, Realizer } from "./realizer.js";
 export { Sound } from "./sound.js";
 export { Voice } from "./voice.js";
+export { watch } from "./watch.js";

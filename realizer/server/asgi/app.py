@@ -10,7 +10,7 @@ import shutil
 from collections.abc import AsyncIterator, Callable
 from functools import partial
 from http import HTTPStatus
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from starlette.applications import Starlette
 from starlette.background import BackgroundTask
@@ -24,16 +24,21 @@ from realizer.outputs.registry import OUTPUTS
 from realizer.server.asgi.client import AsgiClient
 from realizer.server.asgi.openapi import FINDING, description
 from realizer.server.asgi.renderings import Renderings
-from realizer.server.http.access import AccessControl
+from realizer.server.http.access import ANY_GRANT, AccessControl
 from realizer.server.http.http_site import FRAMES
+from realizer.server.http.jwt_tokens import Grant
 from realizer.server.http.page_tools import MAX_TEXT
 from realizer.server.http.requests import SOCKETS, HttpRequests
 from realizer.server.journal import JournalError
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError, Visitor
+from realizer.server.transports.transport import Outbound
 from realizer.server.transports.websocket.connection import WebSocketConnections
 from realizer.server.transports.websocket.request import session_of
 from realizer.sources import document_of
+
+if TYPE_CHECKING:
+    from realizer.server.asgi.webrtc import Peers
 
 KEEP_ALIVE = 15.0  # s; proxies close connections in which nothing comes
 MOST_UNREAD = 10_000  # messages; a client that reads no more of its feedback is disconnected
@@ -69,6 +74,7 @@ class Hub:
         self.requests = HttpRequests(self.sessions, self.settings, self.access)
         self.renderings = Renderings(self.settings)
         self.checking = asyncio.Lock()
+        self.peers: Peers | None = None
 
     @contextlib.asynccontextmanager
     async def lifespan(self, _: object) -> AsyncIterator[None]:
@@ -79,19 +85,24 @@ class Hub:
         finally:
             self.sessions.stop_accepting()
             await self.sessions.drain()
+            if self.peers is not None:
+                await self.peers.close()
             await self.sessions.close()
             self._starting = None
 
-    def admit(self, connection: HTTPConnection) -> Visitor:
-        """Return who makes a request.
+    def grant(self, connection: HTTPConnection) -> Grant:
+        """Return what the token of a request allows.
 
         Raises:
             JoinError: 401 or 403, the client may not make it.
         """
         headers = dict(connection.headers)
         self.access.check_host(headers)
-        grant = self.access.request(f"?{connection.url.query}", headers)
-        return Visitor(address_of(connection), None if grant is None else grant.sessions)
+        return self.access.request(f"?{connection.url.query}", headers) or ANY_GRANT
+
+    def admit(self, connection: HTTPConnection) -> Visitor:
+        """Return who makes a request; raises as `grant`."""
+        return Visitor(address_of(connection), self.grant(connection).sessions)
 
 
 def create_app(settings: Settings | None = None) -> Starlette:
@@ -113,6 +124,8 @@ def create_app(settings: Settings | None = None) -> Starlette:
         ("/check", "POST", _check),
         ("/sessions/{session}/bml", "POST", _send_bml),
         ("/sessions/{session}/feedback", "GET", _feedback),
+        ("/sessions/{session}/webrtc", "POST", _connect_peer),
+        ("/sessions/{session}/webrtc/{peer:int}", "DELETE", _disconnect_peer),
         ("/sessions/{session}", "DELETE", _end),
         ("/openapi.json", "GET", _openapi),
         ("/{path:path}", "GET", _site),
@@ -210,7 +223,7 @@ async def _send_bml(hub: Hub, request: Request) -> Response:
     visitor, name = hub.admit(request), request.path_params["session"]
     document = document_of(await _body(hub, request)).bml
     text = document.decode("utf-8", "replace") if isinstance(document, bytes) else document
-    async with _joined(hub, name, None, visitor) as (number, _):
+    async with _joined(hub, _Listener(), name, None, visitor) as number:
         hub.sessions.receive(number, text)
         await hub.sessions.wait_for_room(number)
     return JSONResponse({"session": name}, HTTPStatus.ACCEPTED)
@@ -221,15 +234,15 @@ async def _feedback(hub: Hub, request: Request) -> Response:
     visitor, name = hub.admit(request), request.path_params["session"]
     seen = request.query_params.get("seen") or request.headers.get("last-event-id")
     _, number = session_of("/" if seen is None else f"/?seen={seen}")
-    joined = _joined(hub, name, number, visitor)
-    _, messages = await joined.__aenter__()  # a refusal is the answer, not an event
+    joined = _joined(hub, listener := _Listener(), name, number, visitor)
+    await joined.__aenter__()  # a refusal is the answer, not an event
 
     async def events() -> AsyncIterator[str]:
         try:
             while True:
                 try:
                     async with asyncio.timeout(KEEP_ALIVE):
-                        message = await messages.get()
+                        message = await listener.messages.get()
                 except TimeoutError:
                     yield ": nothing new\n\n"
                     continue
@@ -249,6 +262,41 @@ async def _end(hub: Hub, request: Request) -> Response:
     hub.sessions.check(name, visitor)
     if not hub.sessions.end(name):
         raise JoinError(HTTPStatus.NOT_FOUND, f"session: wanted one that is open, got {name!r}")
+    return Response(status_code=HTTPStatus.NO_CONTENT)
+
+
+async def _connect_peer(hub: Hub, request: Request) -> Response:
+    """Answer the SDP offer in the body: a peer gets the picture and the sound of a session by WebRTC."""
+    try:
+        from realizer.server.asgi.webrtc import Peer, Peers, offer_of
+    except ImportError as error:
+        if error.name is None or error.name.partition(".")[0] not in ("aiortc", "av"):
+            raise
+        words = "WebRTC: wanted the webrtc extra: pip install 'bml-realizer[webrtc]'"
+        raise JoinError(HTTPStatus.SERVICE_UNAVAILABLE, words) from None
+    grant, name = hub.grant(request), request.path_params["session"]
+    visitor, peers = Visitor(address_of(request), grant.sessions), hub.peers or Peers(hub.sessions)
+    hub.peers = peers
+    peers.check_room()
+    offer, is_json = offer_of(await _body(hub, request, MAX_TEXT))
+    async with contextlib.AsyncExitStack() as entered:
+        entered.enter_context(hub.connections.place(visitor.address))
+        peer = Peer(name, grant.seconds_left)
+        peer.number = await entered.enter_async_context(_joined(hub, peer, name, None, visitor))
+        sdp = await peers.answer(offer, dict(request.query_params), peer, entered)
+    if is_json:
+        return JSONResponse({"type": "answer", "sdp": sdp})
+    place = f"{request.url.path}/{peer.number}"
+    return Response(sdp, HTTPStatus.CREATED, {"Location": place}, "application/sdp")
+
+
+async def _disconnect_peer(hub: Hub, request: Request) -> Response:
+    """End the WebRTC connection that an answer has named."""
+    visitor, name = hub.admit(request), request.path_params["session"]
+    hub.sessions.check(name, visitor)
+    number = request.path_params["peer"]
+    if hub.peers is None or not hub.peers.end(name, number):
+        raise JoinError(HTTPStatus.NOT_FOUND, f"peer: wanted one of this session, got {number}")
     return Response(status_code=HTTPStatus.NO_CONTENT)
 
 
@@ -281,9 +329,9 @@ class _Listener:
 
 @contextlib.asynccontextmanager
 async def _joined(
-    hub: Hub, name: str, seen: int | None, visitor: Visitor
-) -> AsyncIterator[tuple[int, asyncio.Queue[str | None]]]:
-    """Join a session, and leave it; give the number of the connection, and what the session sends.
+    hub: Hub, client: Outbound, name: str, seen: int | None, visitor: Visitor
+) -> AsyncIterator[int]:
+    """Let a client join a session, and leave it; give the number of the connection.
 
     Raises:
         JoinError: the client may not join it.
@@ -291,11 +339,11 @@ async def _joined(
     try:
         hub.sessions.check(name, visitor)
         await hub.sessions.restore(name, seen)
-        number = hub.sessions.join(listener := _Listener(), name, seen, visitor)
+        number = hub.sessions.join(client, name, seen, visitor)
     except JournalError as error:
         raise JoinError(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from None
     try:
-        yield number, listener.messages
+        yield number
     finally:
         hub.sessions.leave(number)
 

@@ -22,6 +22,21 @@ FINDING = {
 FINDINGS = {"type": "array", "items": {"type": "object", "properties": FINDING}}
 ACCEPTED = {"type": "object", "properties": {"session": {"type": "string"}}}
 SESSION = {"name": "session", "in": "path", "required": True, "schema": {"type": "string"}}
+PEER = {"name": "peer", "in": "path", "required": True, "schema": {"type": "integer"}}
+# Options of the pictures of a WebRTC peer, as of the stream `video`.
+VIDEO = ("character", "size", "fps", "camera", "light", "background")
+DESCRIPTION = {
+    "type": "object",
+    "properties": {"type": {"enum": ["offer", "answer"]}, "sdp": {"type": "string"}},
+}
+OFFER = {
+    "required": True,
+    "description": "an offer with all its candidates",
+    "content": {
+        "application/json": {"schema": DESCRIPTION},
+        "application/sdp": {"schema": {"type": "string"}},
+    },
+}
 
 
 def description(prefix: str = "") -> dict[str, Any]:
@@ -33,6 +48,7 @@ def description(prefix: str = "") -> dict[str, Any]:
         _query(name, {"type": "string", "pattern": f"^({form.pattern})$"})
         for name, (_, form) in OPTIONS.items()
     ]
+    video = [_query(name, {"type": "string"}) for name in VIDEO]
     seen = _query("seen", {"type": "integer"}, "send also the feedback after this seq")
     return {
         "openapi": "3.1.0",
@@ -56,6 +72,16 @@ def description(prefix: str = "") -> dict[str, Any]:
                     "Follow the feedback of a session: an event for each element",
                     [SESSION, seen], 200, {"text/event-stream": {"schema": {"type": "string"}}},
                 )
+            },
+            "/sessions/{session}/webrtc": {
+                "post": _operation(
+                    "Answer the offer of a WebRTC peer, which gets picture and sound of a session; an offer "
+                    "in SDP alone (WHEP) is answered by 201 and SDP",
+                    [SESSION, *video], 200, _json(DESCRIPTION), OFFER,
+                )
+            },
+            "/sessions/{session}/webrtc/{peer}": {
+                "delete": _operation("Disconnect a WebRTC peer", [SESSION, PEER], 204, {})
             },
             "/sessions/{session}": {"delete": _operation("End a session", [SESSION], 204, {})},
         },

@@ -64,7 +64,8 @@ def bundle() -> None:
             raise RuntimeError(_failed(step, str(error))) from None
         if done.returncode:
             raise RuntimeError(_failed(step, (done.stderr or done.stdout).strip()[-2000:]))
-    shutil.copyfile(WEB / "index.html", STATIC / "index.html")
+    for page in WEB.glob("*.html"):
+        shutil.copyfile(page, STATIC / page.name)
     (STATIC / MARK).write_text(_hash() + "\n", "utf-8")
 
 

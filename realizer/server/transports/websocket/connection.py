@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import http
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache
 from typing import Protocol
 
@@ -76,7 +76,7 @@ class WebSocketConnections:
         self._settings = settings
         self._access = access
         self._checking = asyncio.Lock()
-        self._from: list[str] = []  # the addresses of the open WebSockets
+        self._from: list[str] = []  # the addresses of the open connections
 
     def admit(self, target: str, headers: Mapping[str, str], address: str) -> None:
         """Check whether a WebSocket may be opened at /ws or /check.
@@ -94,6 +94,20 @@ class WebSocketConnections:
             visitor = Visitor(address, None if grant is None else grant.sessions)
             self._sessions.check(session_of(target)[0], visitor)
 
+    @contextlib.contextmanager
+    def place(self, address: str) -> Iterator[None]:
+        """Count a connection from an address, such as a WebSocket, as long as it lasts.
+
+        Raises:
+            JoinError: too many are open.
+        """
+        self._check_room(address)
+        self._from.append(address)
+        try:
+            yield
+        finally:
+            self._from.remove(address)
+
     def _check_room(self, address: str) -> None:
         """Raise JoinError if too many connections of an address are open."""
         most = self._settings.max_connections
@@ -107,16 +121,12 @@ class WebSocketConnections:
 
     async def serve(self, client: ClientSocket) -> None:
         """Serve one WebSocket until it closes."""
+        serve = self._check if path_of(client.target) == "/check" else self._serve
         try:
-            self._check_room(client.address)  # again: others may have connected since the HTTP request
+            with self.place(client.address):  # others may have connected since the HTTP request
+                await serve(client)
         except JoinError as error:
             await client.close(1013, str(error))
-            return
-        self._from.append(client.address)
-        try:
-            await (self._check(client) if path_of(client.target) == "/check" else self._serve(client))
-        finally:
-            self._from.remove(client.address)
 
     async def _serve(self, client: ClientSocket) -> None:
         hello = None

@@ -1,0 +1,48 @@
+import { RealizerError } from "./frames.js";
+
+const GATHERING = 3000; // ms; addresses that are found later are left out of the offer
+const BUFFER = 150; // ms; a busy machine sends unevenly
+
+/**
+ * Receive the picture and the sound of a session by WebRTC, from the service as an ASGI application; browsers only.
+ *
+ *   const face = await watch({ url: "http://127.0.0.1:8765/", session: "show", size: "512x512" });
+ *   video.srcObject = face.stream;
+ *
+ * @param {object} options
+ * @param {string|URL} [options.url] of the application; default: where this file comes from
+ * @param {string} options.session name of the session, which is opened if it is not there
+ * @param {string} [options.token] the access token, if the service requires one
+ * @param {string} [options.size] and fps, camera, light, background, character: of the pictures
+ * @param {number} [options.buffer] how long the browser holds back both picture and sound, ms: the same from the start,
+ *   it need not bring them together, which takes it half a minute
+ * @returns {Promise<{stream: MediaStream, connection: RTCPeerConnection, close: function}>}
+ */
+export async function watch({ url, session, token, buffer = BUFFER, ...options }) {
+  const target = new URL(`sessions/${encodeURIComponent(session)}/webrtc`, url ?? import.meta.url);
+  for (const [name, value] of Object.entries({ ...options, token })) if (value != null) target.searchParams.set(name, value);
+  const connection = new RTCPeerConnection();
+  const stream = new MediaStream();
+  connection.ontrack = ({ track }) => stream.addTrack(track);
+  try {
+    for (const kind of ["video", "audio"]) connection.addTransceiver(kind, { direction: "recvonly" });
+    for (const receiver of connection.getReceivers()) receiver.jitterBufferTarget = Number(buffer);
+    await connection.setLocalDescription();
+    await new Promise((resolve) => {
+      const check = () => connection.iceGatheringState === "complete" && resolve();
+      connection.addEventListener("icegatheringstatechange", check);
+      setTimeout(resolve, GATHERING);
+      check();
+    });
+    const { type, sdp } = connection.localDescription;
+    // As text, which needs no preflight request from a page of another origin.
+    const answer = await fetch(target, { method: "POST", headers: { "Content-Type": "text/plain" }, body: JSON.stringify({ type, sdp }) });
+    const body = await answer.json();
+    if (!answer.ok) throw new RealizerError(body.error);
+    await connection.setRemoteDescription(body);
+  } catch (error) {
+    connection.close();
+    throw error;
+  }
+  return { stream, connection, close: () => connection.close() };
+}
