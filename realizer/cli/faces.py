@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from realizer.cli import options
+from realizer.cli.edit_face import edit_face
 from realizer.cli.sheet import sheet
 from realizer.core.errors import FaceError
 
@@ -26,6 +27,7 @@ def faces() -> None:
 
 
 faces.add_command(sheet)
+faces.add_command(edit_face)
 
 
 @faces.command("list")

@@ -107,7 +107,7 @@ def page(opened):  # type: ignore[no-untyped-def]
 def picture(page):  # type: ignore[no-untyped-def]
     from PIL import Image
 
-    return Image.open(io.BytesIO(page.locator("#face").screenshot())).convert("RGB")
+    return Image.open(io.BytesIO(page.locator("#head").screenshot())).convert("RGB")
 
 
 def pixel(image, across: float, down: float) -> tuple[int, int, int]:  # type: ignore[no-untyped-def]

@@ -83,11 +83,11 @@ def import_head(path: Path, folder: Path, name: str | None = None) -> Report:
 
 def _write(head: Head, folder: Path, name: str) -> Report:
     surface, ranges = head.surface, head.ranges
-    _write_head(folder / "face.toml", name, head)
+    describe_head(folder / "face.toml", name, head)
     points, guesses = points_of(surface, ranges, head.painted)
     write_features(folder / "features.csv", points)
     atlas = make_atlas(head.gltf, surface, ranges)
-    _write_mesh(folder, surface, ranges, atlas)
+    write_surface(folder, surface, ranges, atlas)
     made, words = _write_fields(folder, head, points)
     report = head.report
     if atlas is not None:
@@ -107,7 +107,8 @@ def _write(head: Head, folder: Path, name: str) -> Report:
     return Report(found, (*report.missing, *head.gltf.notes), unsure, sources)
 
 
-def _write_head(path: Path, name: str, head: Head) -> None:
+def describe_head(path: Path, name: str, head: Head) -> None:
+    """Write face.toml, with what the file says about its maker."""
     asset = head.gltf.json["asset"]
     extras = asset.get("extras") if isinstance(asset.get("extras"), dict) else {}
     author = str(extras.get("author") or asset.get("generator") or "its maker")
@@ -118,7 +119,7 @@ def _write_head(path: Path, name: str, head: Head) -> None:
     write_head(path, values, head.ranges)
 
 
-def _write_mesh(
+def write_surface(
     folder: Path, surface: Surface, ranges: dict[str, tuple[int, int]], atlas: Atlas | None
 ) -> None:
     """Write mesh.npz and the maps. Without maps the colours of materials become those of vertices."""

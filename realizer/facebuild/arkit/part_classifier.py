@@ -17,6 +17,7 @@ ROUND = 0.06  # of its radius: how far an eyeball's vertices may lie off the bal
 BALL = (0.006, 0.022)  # m, radii of eyeballs
 EYEBALL = 0.012  # m, the radius of people's eyes
 AT_EYE = 0.016  # m; a ball that has its middle so near to where the lids close is an eye
+USUAL_MOUTH = np.array([0.0, -0.072, 0.028])  # m; of a head without shapes
 FLOOR, ASIDE = -0.31, 0.24  # m; the bust ends there
 LOOKS = ("eyeLookDown", "eyeLookUp", "eyeLookIn", "eyeLookOut")
 ORDER = (
@@ -69,13 +70,16 @@ def part_of(names: tuple[str, ...]) -> str:
 def sort_parts(surface: Surface) -> HeadParts:
     """Return the parts of an upright head in metres with its origin between the eyes.
 
+    Where there are no shapes, the largest piece is the skin.
+
     Raises:
         FaceError: no skin that the shapes move, or no eyes.
     """
     n = len(surface.vertices)
     label = surface.components()
     named = [part_of(names) for names in surface.names]
-    total = np.sum([np.linalg.norm(move, axis=1) for move in surface.moves.values()], axis=0)
+    sizes = [np.linalg.norm(move, axis=1) for move in surface.moves.values()]
+    total = np.sum(sizes, axis=0) if sizes else np.ones(n)
     moved = np.bincount(label, total)
     if not moved.any():
         raise FaceError("wanted shapes that move the skin, got none that moves a vertex")
@@ -128,8 +132,8 @@ def _by_shape(surface: Surface, mine: Any, named: str) -> str:
     if named == "skin":
         return "skin"
     moves = [move for name, move in surface.moves.items() if name.startswith("mouth") and move.any()]
-    if moves:
-        mouth = surface.centre(moves)
+    if moves or not surface.moves:
+        mouth = surface.centre(moves) if moves else USUAL_MOUTH
         inside = (np.abs(at[:, 0]) < 0.035) & (at[:, 2] < mouth[2] + 0.006)
         if inside.all() and abs(middle[1] - mouth[1]) < 0.035 and middle[2] > mouth[2] - 0.07:
             return "tongue" if _amount(surface, mine, "tongueOut") > 0.002 else "teeth"

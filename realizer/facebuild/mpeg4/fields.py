@@ -33,7 +33,8 @@ class _Pair:
 
 
 @cache
-def _pairs() -> tuple[_Pair, ...]:
+def pairs() -> tuple[_Pair, ...]:
+    """Return the FAPs whose feature points are neighbours."""
     return csv_rows("neighbours.csv", _Pair, __package__)
 
 
@@ -87,7 +88,7 @@ def _shared(
     alone: Mapping[int, Float64],
 ) -> dict[int, Float64]:
     """Return the influence of each zone after overlapping neighbours have shared it."""
-    links = [pair for pair in _pairs() if pair.one in setup.zones and pair.other in setup.zones]
+    links = [pair for pair in pairs() if pair.one in setup.zones and pair.other in setup.zones]
     order = sorted(setup.zones)
     joined = np.array([[order.index(pair.one), order.index(pair.other)] for pair in links], np.int32)
     label = components(joined.reshape(-1, 2), len(order))

@@ -38,7 +38,7 @@ class _Template:
 
 
 @cache
-def _template() -> tuple[dict[str, Float64], dict[str, Float64]]:
+def template() -> tuple[dict[str, Float64], dict[str, Float64]]:
     """Return feature points and anchors of the template, in eye distances from between the eyes."""
     table = csv_rows("template.csv", _Template, __package__)
     rows = {row.name: np.array([row.x, row.y, row.z]) for row in table}
@@ -90,7 +90,7 @@ def find_points(
         if name not in parts:
             raise FaceError(f"parts: wanted {name!r}, got {', '.join(parts) or 'none'}")
     head, origin, unit = head_of(vertices, triangles, parts)
-    marks, anchors = _template()
+    marks, anchors = template()
     found = find_anchors(head)
     shared = [name for name in anchors if name in found]
     found |= {name: np.where(np.isfinite(found[name]), found[name], anchors[name]) for name in shared}

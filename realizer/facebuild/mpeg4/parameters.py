@@ -30,6 +30,15 @@ def read_setup(path: Path) -> Setup:
     """
     with face_errors(path, "a TOML file with the deformer's zones"):
         read = parse_toml(path.read_text("utf-8"))
+    return setup_from(path, read)
+
+
+def setup_from(path: Path | str, read: dict[str, Any]) -> Setup:
+    """Return the parameters in a table with the keys of the file, as `setup_table` makes it.
+
+    Raises:
+        FaceError: as `read_setup`; `path` begins its text.
+    """
     if unknown := sorted(set(read) - set(KEYS)):
         raise FaceError(f"{path}: wanted {', '.join(KEYS)}; got {', '.join(unknown)}")
     zones: dict[int, Zone] = {}
@@ -49,6 +58,18 @@ def read_setup(path: Path) -> Setup:
         for key in ("synced", "whole")
     )
     return Setup(points, zones, masks, synced, bool(read.get("joined", True)), whole)
+
+
+def setup_table(setup: Setup) -> dict[str, Any]:
+    """Return the parameters as a table with the keys of the file, for JSON."""
+    return {
+        "joined": setup.joined,
+        "synced": sorted(setup.synced),
+        "whole": sorted(setup.whole),
+        "points": {name: list(place) for name, place in setup.points.items()},
+        "zone": [asdict(setup.zones[fap]) for fap in sorted(setup.zones)],
+        "masks": {str(fap): _ranges(mask) for fap, mask in sorted(setup.masks.items())},
+    }
 
 
 def write_setup(path: Path, setup: Setup) -> None:
@@ -95,7 +116,9 @@ def _zone(where: str, entry: Any) -> Zone:
         raise FaceError(f"{where}: {error}") from None
 
 
-def _entry(path: Path, read: dict[str, Any], key: str, kind: type[list[Any]] | type[dict[str, Any]]) -> Any:
+def _entry(
+    path: Path | str, read: dict[str, Any], key: str, kind: type[list[Any]] | type[dict[str, Any]]
+) -> Any:
     value = read.get(key, kind())
     if not isinstance(value, kind):
         raise FaceError(f"{path}: {key}: wanted a {'list' if kind is list else 'table'}, got {value!r}")
@@ -122,7 +145,7 @@ def _whole(where: str, value: Any) -> int:
 
 
 def _triple(where: str, value: Any) -> tuple[float, float, float]:
-    if not isinstance(value, list) or len(value) != 3:
+    if not isinstance(value, list | tuple) or len(value) != 3:
         raise FaceError(f"{where}: wanted three numbers, got {value!r}")
     x, y, z = (_number(where, number) for number in value)
     return x, y, z

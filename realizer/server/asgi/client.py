@@ -53,7 +53,7 @@ class AsgiClient:
             self._unsent += len(data)
             self._wake()
 
-    async def send_all(self, text: str) -> None:
+    async def send_all(self, text: str | bytes) -> None:
         self.send(text)
         async with self._changed:
             await self._changed.wait_for(lambda: not self._unsent or self.close_code is not None)

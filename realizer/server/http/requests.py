@@ -15,7 +15,7 @@ from realizer.server.transports.websocket.request import path_of, query_of
 
 log = logging.getLogger(__name__)
 
-SOCKETS = ("/ws", "/check")  # paths of WebSockets
+SOCKETS = ("/ws", "/check", "/studio")  # paths of WebSockets
 
 
 class HttpRequests:
@@ -48,7 +48,7 @@ class HttpRequests:
         path = path_of(target)
         if path in SOCKETS or upgrade:
             got = "a WebSocket" if upgrade else "plain HTTP"
-            words = f"wanted a WebSocket at /ws or /check, got {got} at {path}\n"
+            words = f"wanted a WebSocket at {', '.join(SOCKETS)}, got {got} at {path}\n"
             return HttpResponse(426 if not upgrade else 404, TEXT, words.encode())
         if path in ("/metrics", "/healthz") and (wrong := self._wrong_worker(target)) is not None:
             return HttpResponse(404, TEXT, f"{wrong}\n".encode())

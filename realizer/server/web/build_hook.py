@@ -90,6 +90,7 @@ def _hash() -> str:
     digest = hashlib.sha256()
     own = [p for p in WEB.iterdir() if p.suffix in (".css", ".html", ".json")]
     client = [CLIENT / "package.json", *(CLIENT / "src").iterdir()]
-    for path in [*sorted([*own, *(WEB / "src").iterdir()]), *sorted(client), SHADER]:
+    source = [p for p in (WEB / "src").rglob("*") if p.is_file()]
+    for path in [*sorted([*own, *source]), *sorted(client), SHADER]:
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()

@@ -196,6 +196,19 @@ def test_serve_checks_the_texts_of_an_editor_one_after_the_other() -> None:
     serving(test)
 
 
+def test_serve_answers_the_face_tab_in_order_and_saves_only_where_it_may() -> None:
+    async def test(server: Server) -> None:
+        async with connect(server.url.removesuffix("/ws") + "/studio", max_size=None) as page:
+            for question in ({"type": "save", "name": "x", "setup": {}}, {"type": "open", "face": "ada"}):
+                await page.send(json.dumps(question))
+            assert "--edit DIR" in json.loads(await page.recv())["error"]
+            head = await page.recv()
+            assert isinstance(head, bytes)
+            assert not json.loads(head[4 : 4 + int.from_bytes(head[:4], "little")])["editable"]
+
+    serving(test)
+
+
 def test_server_drain_waits_for_what_plays_and_refuses_documents() -> None:
     async def test(server: Server) -> None:
         async with connect(server.url) as socket:

@@ -6,8 +6,9 @@ import asyncio
 import contextlib
 import http
 import logging
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Awaitable, Callable, Iterator, Mapping
 from functools import lru_cache
+from importlib import import_module
 from typing import Protocol
 
 from websockets.asyncio.server import ServerConnection
@@ -30,6 +31,9 @@ from realizer.server.transports.websocket.request import address_of, headers_of,
 log = logging.getLogger(__name__)
 
 GOODBYE = 2.0  # s; a client that has not answered a close frame by then is gone
+STUDIO = (
+    "realizer.facebuild.studio.studio"  # imported by name when a face is edited, as nothing else needs it
+)
 REASON = 123  # bytes of a reason in a close frame
 
 
@@ -59,7 +63,7 @@ class ClientSocket(Outbound, Protocol):
         """Return the next message; None after the last."""
         ...
 
-    async def send_all(self, text: str) -> None:
+    async def send_all(self, text: str | bytes) -> None:
         """Send a message, and wait until the network has taken it, or the connection has ended."""
         ...
 
@@ -75,19 +79,23 @@ class WebSocketConnections:
         self._sessions = sessions
         self._settings = settings
         self._access = access
-        self._checking = asyncio.Lock()
+        self._work: dict[str, Callable[[ClientSocket], Awaitable[None]]] = {
+            "/check": self._check,
+            "/studio": self._edit,
+        }
+        self._checking, self._editing = asyncio.Lock(), asyncio.Lock()
         self._from: list[str] = []  # the addresses of the open connections
 
     def admit(self, target: str, headers: Mapping[str, str], address: str) -> None:
-        """Check whether a WebSocket may be opened at /ws or /check.
+        """Check whether a WebSocket may be opened at one of `SOCKETS`.
 
         Raises:
             JoinError: the client may not open it.
         """
-        checks = path_of(target) == "/check"
-        grant = self._access.request(target, headers, later=not checks)
+        works = path_of(target) in self._work
+        grant = self._access.request(target, headers, later=not works)
         self._check_room(address)
-        if checks:
+        if works:
             self._access.check_memory()
         else:
             # Without a grant its sessions are not known yet.
@@ -121,7 +129,7 @@ class WebSocketConnections:
 
     async def serve(self, client: ClientSocket) -> None:
         """Serve one WebSocket until it closes."""
-        serve = self._check if path_of(client.target) == "/check" else self._serve
+        serve = self._work.get(path_of(client.target), self._serve)
         try:
             with self.place(client.address):  # others may have connected since the HTTP request
                 await serve(client)
@@ -204,6 +212,20 @@ class WebSocketConnections:
                 faults = await loop.run_in_executor(None, lint, text, self._settings)
             await client.send_all(faults)
 
+    async def _edit(self, client: ClientSocket) -> None:
+        """Serve the WebSocket of a page that edits a face: answer its messages in their order."""
+        grant = self._access.request(client.target, client.headers)
+        may_save = grant is not None and grant.sessions is None
+        studio = import_module(STUDIO).Studio(self._settings.edit if may_save else None)
+        loop = asyncio.get_running_loop()
+        try:
+            while (message := await client.receive()) is not None:
+                async with self._editing:  # one at a time for all pages, because each may take seconds
+                    answer = await loop.run_in_executor(None, studio.answer, message)
+                await client.send_all(answer)
+        finally:
+            await loop.run_in_executor(None, studio.close)
+
 
 class WebSocketClient:
     """A `ClientSocket` of the websockets library: data goes directly to the socket's own buffer."""
@@ -230,7 +252,7 @@ class WebSocketClient:
         except ConnectionClosed:
             return None
 
-    async def send_all(self, text: str) -> None:
+    async def send_all(self, text: str | bytes) -> None:
         with contextlib.suppress(ConnectionClosed):
             await self._socket.send(text)
 

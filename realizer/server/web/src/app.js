@@ -2,6 +2,7 @@
 import { Checker } from "./checker.js";
 import { at, choose, make, tabs } from "./dom.js";
 import { Editor } from "./editor.js";
+import { FaceRoom } from "./face/room.js";
 import { Log } from "./log.js";
 import { Mirror } from "./mirror.js";
 import { download, Pose } from "./pose.js";
@@ -20,7 +21,7 @@ const AHEAD = 0.2; // s; curves are sent so long before their time
 const BLOCK = /(<(?:\w+:)?bml\b[^<>]*?\sid\s*=\s*)(["'])(.*?)\2/;
 const THEMES = { "": "as the system", light: "light", dark: "dark" };
 
-const stage = new Stage(at("face"));
+const stage = new Stage(at("head"));
 const clock = new Clock();
 const sound = new Sound(clock);
 const recorder = new Recorder(stage, sound);
@@ -33,6 +34,7 @@ const timeline = new Timeline(at("score"), scrub, () => stage.oldest);
 const units = new ActionUnits(at("au-sliders"), at("find-aus"), pose);
 const params = new Faps(at("fap-sliders"), at("find-faps"), pose);
 const mirror = new Mirror(link, (message) => log.error(message));
+const room = new FaceRoom();
 const wheel = new Wheel(at("wheel"), pose, (message) => log.error(message));
 
 const alive = new Set(); // ids of blocks that were accepted and have not ended
@@ -126,6 +128,7 @@ document.addEventListener("visibilitychange", () => {
 
 async function showFace(message) {
   showFaces(message);
+  if (room.open) room.turn(true, faces, message.face);
   const key = `${message.face}/${message.vertices}`;
   if (face?.key === key) return;
   face = { key, name: message.face };
@@ -159,7 +162,8 @@ at("live").onclick = () => timeline.look(null);
 
 function draw() {
   const now = sound.playhead() ?? clock.playhead(performance.now() / 1000);
-  stage.draw(timeline.scrub ?? now, recorder.on);
+  if (room.open) room.draw(performance.now());
+  else stage.draw(timeline.scrub ?? now, recorder.on);
   if (recorder.on) {
     recorder.draw();
     at("record").lastElementChild.textContent = `Stop ${recorder.seconds.toFixed(0)} s`;
@@ -281,7 +285,9 @@ at("record").onclick = async () => {
 // the pose ------------------------------------------------------------------------------------
 
 tabs(at("tabs"), (tab) => {
-  at("pose").hidden = tab === "tab-script" || tab === "tab-mirror";
+  at("pose").hidden = ["tab-script", "tab-mirror", "tab-face"].includes(tab);
+  at("face-stage").hidden = tab !== "tab-face";
+  room.turn(tab === "tab-face", faces, face?.name);
 });
 pose.addEventListener("change", () => {
   const parts = [pose.emotion && "an emotion", pose.aus.size && `${pose.aus.size} AU${pose.aus.size > 1 ? "s" : ""}`, pose.faps.size && `${pose.faps.size} FAP${pose.faps.size > 1 ? "s" : ""}`];
@@ -341,4 +347,4 @@ link.connect();
 requestAnimationFrame(draw);
 
 // For tests of the page: what has been shown.
-globalThis.realizerPage = { stage, sound, link, clock, editor, timeline, pose, recorder };
+globalThis.realizerPage = { stage, sound, link, clock, editor, timeline, pose, recorder, room };

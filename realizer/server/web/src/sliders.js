@@ -39,14 +39,14 @@ class Sliders {
   }
 }
 
-function slider(label, low, high, step, changed) {
+export function slider(label, low, high, step, changed) {
   const input = make("input", { type: "range", min: low, max: high, step, value: 0, ariaLabel: label });
   input.oninput = () => changed(Number(input.value));
   return input;
 }
 
 // A slider that shows its distance from neutral.
-function show(input, value) {
+export function show(input, value) {
   if (Number(input.value) !== value) input.value = value;
   const [low, high] = [Number(input.min), Number(input.max)];
   const place = (x) => (100 * (Math.min(high, Math.max(low, x)) - low)) / (high - low);

@@ -15,8 +15,8 @@ from realizer.face.model import Face
 from realizer.facebuild.check import check_face
 from realizer.facebuild.mpeg4.build import FILES, apply_zones, copy_with_zones, setup_of, with_brows
 from realizer.facebuild.mpeg4.faceeditor import write_faceeditor
+from realizer.facebuild.mpeg4.fap_scores import mean_score, score_faps
 from realizer.facebuild.mpeg4.parameters import FILE, write_setup
-from tests.fap_scores import mean_score, score_faps
 
 pytestmark = pytest.mark.xdist_group("faces")
 

@@ -12,8 +12,8 @@ from realizer.core.errors import FaceError
 from realizer.face.load import folder_of, load_face
 from realizer.facebuild.mpeg4.build import setup_of
 from realizer.facebuild.mpeg4.faceeditor import fitted, read_faceeditor, write_faceeditor
+from realizer.facebuild.mpeg4.fap_scores import mean_score, score_faps
 from realizer.facebuild.mpeg4.zones import Setup, Zone
-from tests.fap_scores import mean_score, score_faps
 
 FILE = """<?xml version="1.0"?>
 <!DOCTYPE faceeditor-parameters [

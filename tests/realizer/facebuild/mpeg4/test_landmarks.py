@@ -13,8 +13,8 @@ from realizer.core.errors import FaceError
 from realizer.face.features import NAMES
 from realizer.face.load import folder_of, list_faces, load_face
 from realizer.facebuild.check import check_face
+from realizer.facebuild.mpeg4.fap_scores import mean_score, score_faps
 from realizer.facebuild.mpeg4.landmarks import find_points
-from tests.fap_scores import mean_score, score_faps
 
 FACES = [info.name for info in list_faces()]
 BENT: dict[str, Callable[[np.ndarray], np.ndarray]] = {

@@ -6,14 +6,14 @@ right, 0 nothing. Here rules give the score, so that it can be repeated.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 
 from realizer.face.model import Face
 from realizer.facebuild.mpeg4.fap_limits import ROLLED, accompanying_faps, usual_range
-from realizer.tables import Fap, faps, read_csv
-from tests.fap_measures import Measure, error_of, flips_of, mirror_of, others_of, rough_of
+from realizer.facebuild.mpeg4.fap_measures import Measure, error_of, flips_of, mirror_of, others_of, rough_of
+from realizer.tables import Fap, csv_rows, faps
 
 # The scores of other faces (Paul 2010, tables 4.5), with FAPs that they lack counted as 0.
 PEERS = {"FaceEditor": 2.60, "Greta": 2.32, "Miraface": 1.96, "Xface": 1.32}
@@ -24,6 +24,14 @@ HALF, TURN = 512.0, 20000.0  # FAPU, angle units: half a face distance is what P
 RIGHT = (0.02, 0.01, 0.05, 1e-4, 0.25)
 ODD = (0.25, 0.15, 0.25, 0.02, 0.45)
 KNOWN = 0.75
+# What each fault is, in the same order.
+RULES = (
+    "its feature point goes {:.1%} too far, too short or astray",
+    "left and right differ by {:.1%}",
+    "a point that must stay goes along by {:.1%}",
+    "{:.2%} of the moved skin turns over",
+    "neighbours move apart by {:.0%}",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,17 +75,27 @@ class FapScore:
             return 2
         return 1 if self.error <= KNOWN else 0
 
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """A sentence for each rule that keeps the score under 3."""
+        return tuple(
+            rule.format(fault)
+            for rule, fault, most in zip(RULES, self.faults, RIGHT, strict=True)
+            if fault > most
+        )
+
 
 def mean_score(truths: tuple[FapScore, ...]) -> float:
-    """The mean weighted by how much each FAP matters."""
+    """Return the mean weighted by how much each FAP matters."""
     return sum(t.weight * t.score for t in truths) / sum(t.weight for t in truths)
 
 
-def score_faps(face: Face) -> tuple[FapScore, ...]:
-    """Every FAP from 3 to 68, in each of its directions: 127."""
+def score_faps(face: Face, only: Collection[int] = ()) -> tuple[FapScore, ...]:
+    """Return the scores of the FAPs from 3 to 68 in each of their directions, 127, or of `only` some FAPs."""
     return tuple(
         _score_fap(Measure.of(face), row, sign)
         for row in faps()[2:]
+        if not only or row.fap in only
         for sign in ((1, -1) if row.least < 0 else (1,))
     )
 
@@ -90,8 +108,7 @@ class _Weight:
 
 @cache
 def _weights() -> dict[int, int]:
-    path = Path(__file__).with_name("fap_weights.csv")
-    return {row.fap: row.weight for row in read_csv(path.read_text("utf-8"), _Weight, path.name)}
+    return {row.fap: row.weight for row in csv_rows("fap_weights.csv", _Weight, __package__)}
 
 
 def _score_fap(measure: Measure, row: Fap, sign: int) -> FapScore:

@@ -8,7 +8,7 @@ import pytest
 
 from realizer.face.load import load_face
 from realizer.face.model import Face
-from tests.fap_scores import PEERS, FapScore, mean_score, score_faps
+from realizer.facebuild.mpeg4.fap_scores import PEERS, FapScore, mean_score, score_faps
 from tests.shipped import DEFAULT, FACES
 
 pytestmark = pytest.mark.xdist_group("scores")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -43,7 +43,7 @@ class Measure:
     paired: Bool  # (skin,) the twin is the mirror image
 
     @classmethod
-    @cache
+    @lru_cache(maxsize=4)
     def of(cls, face: Face) -> Measure:
         first, last = face.parts["skin"]
         mine = part_triangles(face.triangles, face.parts["skin"])

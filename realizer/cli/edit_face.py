@@ -1,0 +1,64 @@
+"""`faces edit`: opens the page's Face tab on a copy of a face."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from realizer.core.settings import Settings
+
+
+@click.command("edit")
+@click.argument("name")
+@click.option(
+    "--edit",
+    "folder",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=Path("edited"),
+    show_default=True,
+    help="Folder to save in; the copy of the face is in its folder faces.",
+)
+@click.option("--port", default=0, help="Port of the page.  [default: a free one]")
+@click.option("--browser/--no-browser", default=True, help="Open the page in the browser.")
+def edit_face(name: str, folder: Path, port: int, browser: bool) -> None:
+    """Edit the feature points and zones of a face in the browser, on a copy of it.
+
+    Serves the page on this machine until Ctrl-C and prints its address. A copy that is there already is
+    edited further.
+
+    \b
+    realizer faces edit ada
+    realizer realize hello.bml -o hello.mp4 --face edited/faces/ada
+    """
+    import asyncio
+    import os
+    import shutil
+
+    from realizer.core.settings import Settings
+    from realizer.face.load import VARIABLE, folder_of
+
+    source = folder_of(name)
+    copy = (folder / "faces" / source.name).resolve()
+    if not copy.exists():
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copytree(source, copy)
+    os.environ[VARIABLE] = str(copy.parent)
+    settings = Settings.read({"host": "127.0.0.1", "port": port, "face": copy.name, "edit": folder})
+    asyncio.run(_serve(settings, copy, browser))
+
+
+async def _serve(settings: Settings, copy: Path, browser: bool) -> None:
+    """Serve the page until the command is stopped."""
+    import webbrowser
+
+    from realizer.server.serve import Server
+
+    async with Server(settings) as server:
+        click.echo(f"{copy}: the copy that is edited")
+        click.echo(f"page: {server.page}#face")
+        if browser:
+            webbrowser.open(f"{server.page}#face")
+        await server.wait_closed()

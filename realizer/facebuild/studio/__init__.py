@@ -1,0 +1,1 @@
+"""What the Face tab of the page asks of the service."""

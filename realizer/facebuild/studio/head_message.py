@@ -1,0 +1,150 @@
+"""What the page gets of a head: mesh, feature points, zones, and the tables that they need."""
+
+from __future__ import annotations
+
+import json
+import re
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from realizer.core.array_types import Float64
+from realizer.core.errors import FaceError
+from realizer.face.features import read_features
+from realizer.face.load import load_folder
+from realizer.facebuild.mpeg4 import rigid
+from realizer.facebuild.mpeg4.build import GROWN, NEAR, setup_of
+from realizer.facebuild.mpeg4.defaults import default_setup
+from realizer.facebuild.mpeg4.fap_limits import usual_range
+from realizer.facebuild.mpeg4.fields import WAYS, pairs
+from realizer.facebuild.mpeg4.landmarks import template
+from realizer.facebuild.mpeg4.parameters import FILE, read_setup, setup_table
+from realizer.tables import csv_rows, faps
+
+FACE_NAME = re.compile(r"[^a-z0-9_-]+")  # what a face's name has not
+ALIGN = 8  # bytes; arrays begin at a multiple of it
+
+
+@dataclass(frozen=True)
+class _PointName:
+    name: str
+    says: str
+
+
+def packed(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> bytes:
+    """Return JSON and arrays as one message: the length of the JSON (u32), the JSON, and the arrays.
+
+    `arrays` of the JSON has the name, the type as numpy's and the offset from the message's start of each.
+    """
+    rows = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
+    listed = {name: [array.dtype.str[1:], array.size, 0] for name, array in rows.items()}
+    room = len(json.dumps({**header, "arrays": listed})) + 12 * len(rows) + 4
+    at = -(-room // ALIGN) * ALIGN
+    start = at
+    for name, array in rows.items():
+        listed[name][2] = at
+        at += -(-array.nbytes // ALIGN) * ALIGN
+    text = json.dumps({**header, "arrays": listed}).ljust(start - 4).encode()
+    body = b"".join(
+        array.tobytes().ljust(-(-array.nbytes // ALIGN) * ALIGN, b"\0") for array in rows.values()
+    )
+    return len(text).to_bytes(4, "little") + text + body
+
+
+def unpacked(message: str | bytes) -> tuple[dict[str, Any], bytes]:
+    """Return the JSON of a message of the page, and the bytes behind it.
+
+    Raises:
+        FaceError: it is no such message.
+    """
+    try:
+        if isinstance(message, str):
+            asked, payload = json.loads(message), b""
+        else:
+            (length,) = struct.unpack_from("<I", message)
+            asked, payload = json.loads(message[4 : 4 + length]), message[4 + length :]
+    except (ValueError, struct.error) as error:
+        raise FaceError(f"wanted JSON, or a length, JSON and bytes: {error}") from None
+    if not isinstance(asked, dict):
+        raise FaceError(f"wanted a JSON object, got {str(asked)[:80]!r}")
+    return asked, payload
+
+
+def head_message(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the description of the head in a folder, and its arrays.
+
+    Raises:
+        FaceError: the folder is no sound face.
+    """
+    face = load_folder(folder, "mpeg4")
+    at, parts = face.vertices.astype(np.float64), dict(face.parts)
+    points = {name: point.place for name, point in read_features(folder / "features.csv").items()}
+    setup = default_setup(at, face.triangles, points, parts["skin"])
+    table, by = setup_table(setup), []
+    if (folder / FILE).is_file():
+        # Zones that the face has, and for its other FAPs the usual ones, which do not move it yet.
+        by = sorted(read_setup(folder / FILE).zones)
+        mine = setup_table(setup_of(folder))
+        zones = {zone["fap"]: zone for zone in (*table["zone"], *mine["zone"])}
+        table |= {**mine, "zone": list(zones.values()), "masks": table["masks"] | mine["masks"]}
+    head = {
+        "type": "head",
+        "name": face.name,
+        "parts": parts,
+        "points": points,
+        "setup": {**table, "points": points},
+        "by": by,
+        "keep": set(by) < set(setup.zones),  # something else moves FAPs that have no zone of their own
+        "fapu": {unit: face.fapu.metres(unit) for unit in ("MNS", "MW", "ENS", "ES", "IRISD")},
+        **_tables(),
+    }
+    vertex, near, share = grown(at, parts)
+    arrays = {
+        "vertices": face.vertices, "triangles": face.triangles.astype(np.uint32),
+        "grown": vertex, "near": near, "share": share,
+    }  # fmt: skip
+    head["eyes"] = [
+        {
+            "centre": centre.tolist(), "size": size,
+            "ball": float(bulge[2]), "angles": bulge[0].tolist(), "heights": bulge[1].tolist(),
+        }
+        for (_, size), (_, centre), bulge in zip(
+            rigid.balls(at, parts), face.basis["eyes"], face.basis["bulges"], strict=True
+        )
+    ]  # fmt: skip
+    return head, arrays
+
+
+def grown(at: Float64, parts: Mapping[str, Any]) -> tuple[Any, Any, Any]:
+    """Return vertices (k,) that grow on the skin, the skin's vertices (k, 3) they follow, and the shares."""
+    from scipy.spatial import cKDTree
+
+    mine = [np.arange(*parts[name]) for name in GROWN if name in parts]
+    vertex = np.concatenate([*mine, np.zeros(0, int)]).astype(np.uint32)
+    off, near = cKDTree(at[slice(*parts["skin"])]).query(at[vertex], NEAR)
+    share = 1 / np.maximum(off, 1e-5)
+    share = share / np.maximum(share.sum(axis=1, keepdims=True), 1e-30)
+    return vertex, near.astype(np.uint32) + parts["skin"][0], share
+
+
+@cache
+def _tables() -> dict[str, Any]:
+    """Return the tables of FAPs, neighbours and feature points."""
+    rows = [
+        {
+            "fap": row.fap, "name": row.name, "unit": row.unit, "point": row.feature_point,
+            "mirror": row.mirror, "sign": row.sign, "least": row.least, "most": row.most,
+            "way": WAYS.get(row.direction),
+            "usual": [-usual_range(row.fap, -1) if row.least < 0 else 0, usual_range(row.fap, 1)],
+        }
+        for row in faps()[2:]
+    ]  # fmt: skip
+    marks = {name: place.round(4).tolist() for name, place in template()[0].items()}
+    says = {row.name: row.says for row in csv_rows("point_names.csv", _PointName, __package__)}
+    links = [[pair.one, pair.other] for pair in pairs()]
+    return {"faps": rows, "pairs": links, "template": marks, "says": says}

@@ -1,0 +1,115 @@
+// How the edited head moves: fields that are computed in slices, shapes and rigid parts from the service.
+import { coupled, fapuOf, keepLids, lidsOf } from "./deform.js";
+import { fieldOf } from "./zones.js";
+
+const LIDS = new Set([19, 20, 21, 22]);
+const EYEBALLS = new Set([27, 28]); // the service moves what lies behind the lids, too
+
+export class Motion {
+  // ask(question): of the service; failed(text): why something cannot move.
+  constructor(draft, ask, failed) {
+    Object.assign(this, { draft, ask, failed, fields: new Map(), fap: 4, value: 0, own: false });
+  }
+
+  begin() {
+    this.shapes = new Map(); // FAP -> the head's own field
+    this.forget();
+  }
+
+  forget() {
+    this.fields.clear();
+    this.job = this.lids = null;
+    this.pending = true;
+  }
+
+  test(fap, value) {
+    Object.assign(this, { fap, value, pending: true });
+  }
+
+  // Whether a FAP has a field; jaw, tongue, eyeballs and head have none.
+  has(fap) {
+    return this.draft.state.zones.has(fap) && !EYEBALLS.has(fap);
+  }
+
+  // What is shown of a FAP, in metres for each metre of its point; null until it is known.
+  field(fap) {
+    if (!this.own && this.draft.state.by.has(fap)) return this.fields.get(fap) ?? null;
+    if (!this.shapes.has(fap)) {
+      this.shapes.set(fap, null);
+      this.ask({ type: "field", fap }).then(({ arrays }) => {
+        const unit = fapuOf(this.draft.head.points)[this.draft.rows.get(fap).unit];
+        this.shapes.set(fap, Float64Array.from(arrays.field, (x) => x / unit));
+        this.pending = true;
+      }, () => this.shapes.delete(fap));
+    }
+    return this.shapes.get(fap);
+  }
+
+  get moving() {
+    return coupled(this.fap, this.value, this.draft.state.points, this.draft.rows).filter(([fap, value]) => fap === this.fap || value);
+  }
+
+  // Go on with the fields for at most `budget` ms. Return the vertices, if they are all there and new.
+  step(budget) {
+    if (!this.pending || !this.draft.mesh) return null;
+    if (!this.has(this.fap)) return this.remote();
+    const wanted = [...this.moving.map(([fap]) => fap), ...(LIDS.has(this.fap) ? LIDS : [])];
+    const end = performance.now() + budget;
+    for (const fap of wanted) {
+      const mine = !this.own && this.draft.state.by.has(fap);
+      while (mine && !this.fields.has(fap)) {
+        if (performance.now() > end) return null;
+        this.advance(fap);
+      }
+      if (!this.field(fap)) return null;
+    }
+    this.pending = false;
+    return this.posed();
+  }
+
+  advance(fap) {
+    if (this.job?.fap !== fap) this.job = { fap, work: fieldOf(fap, this.draft.acting, this.draft.mesh, this.draft.rows, this.draft.head.pairs) };
+    try {
+      const { done, value } = this.job.work.next();
+      if (!done) return;
+      this.fields.set(fap, value);
+    } catch (error) {
+      this.fields.set(fap, new Float64Array(this.draft.mesh.vertices.length));
+      this.failed(error.message);
+    }
+    this.job = null;
+  }
+
+  posed() {
+    const at = this.draft.mesh.vertices.slice();
+    if (!this.value) return at;
+    const units = fapuOf(this.draft.state.points);
+    for (const [fap, value] of this.moving) {
+      const [field, far] = [this.field(fap), value * units[this.draft.rows.get(fap).unit]];
+      for (let i = 0; i < at.length; i++) if (field[i]) at[i] += far * field[i];
+    }
+    if (LIDS.has(this.fap)) keepLids((this.lids ??= lidsOf(this.draft.mesh, (fap) => this.field(fap))), at);
+    return at;
+  }
+
+  // Vertices that the service moves: one question at a time, the latest value wins.
+  remote() {
+    if (this.asking) return null;
+    if (!this.value) {
+      this.pending = false;
+      return this.draft.mesh.vertices.slice();
+    }
+    this.asking = true;
+    this.pending = false;
+    const { fap, value } = this;
+    this.ask({ type: "pose", values: { [fap]: value } }).then(({ arrays }) => (this.got = { fap, at: arrays.vertices }), (error) => this.failed(error.message)).finally(() => (this.asking = false));
+    return null;
+  }
+
+  // Vertices that have come from the service.
+  get arrived() {
+    const { got } = this;
+    this.got = null;
+    return got?.fap === this.fap && this.value ? got.at : null;
+  }
+}

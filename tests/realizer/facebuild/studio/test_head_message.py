@@ -1,0 +1,47 @@
+"""The description of a head for the page."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+
+from realizer.face.features import NAMES
+from realizer.face.load import folder_of
+from realizer.facebuild.studio.head_message import grown, head_message, packed, unpacked
+
+
+def test_packed_begins_arrays_where_its_json_says() -> None:
+    arrays = {"a": np.arange(3, dtype=np.float32), "b": np.arange(5, dtype=np.float64)}
+    message = packed({"id": 1}, arrays)
+    length = int.from_bytes(message[:4], "little")
+    header = json.loads(message[4 : 4 + length])
+    assert header["id"] == 1
+    for name, array in arrays.items():
+        kind, count, start = header["arrays"][name]
+        assert start % 8 == 0
+        assert (np.frombuffer(message, f"<{kind}", count, start) == array).all()
+
+
+def test_unpacked_is_the_json_and_the_bytes_behind_it() -> None:
+    assert unpacked('{"type": "open"}') == ({"type": "open"}, b"")
+    assert unpacked(b"\2\0\0\0{}mesh") == ({}, b"mesh")
+
+
+def test_head_message_has_points_zones_and_tables() -> None:
+    head, arrays = head_message(folder_of("ada"))
+    assert set(head["points"]) == set(head["says"]) == set(head["template"]) == set(NAMES)
+    assert [row["fap"] for row in head["faps"]] == list(range(3, 69))
+    assert head["by"] == []
+    assert head["keep"], "the face has shapes of its own"
+    assert arrays["vertices"].shape[0] == max(last for _, last in head["parts"].values())
+    json.dumps(head)
+
+
+def test_grown_vertices_follow_the_nearest_skin() -> None:
+    at = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0.5]], float)
+    vertex, near, share = grown(at, {"skin": (0, 3), "brows": (3, 4)})
+    assert vertex.tolist() == [3]
+    assert near[0, 0] == 0
+    assert share.sum() == 1
+    assert len(grown(at, {"skin": (0, 4)})[0]) == 0
