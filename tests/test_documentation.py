@@ -66,7 +66,11 @@ def test_code_of_a_page_runs(
 
 
 def commands(page: Path) -> Iterator[list[str]]:
-    """Yield the words of each call of the command line on a page."""
+    """Yield the words of each call of the command line on a page, also within a sentence."""
+    text = page.read_text("utf-8")
+    known = "|".join(cli.commands)
+    for words in re.findall(rf"(?<!`)`(?:realizer )?((?:{known}) --[^`\n]+)`", text):
+        yield words.split()
     for block in blocks(page, "sh"):
         for line in block.replace("\\\n", " ").splitlines():
             for part in re.split(r"&&|\|(?!\|)", line):
@@ -77,7 +81,7 @@ def commands(page: Path) -> Iterator[list[str]]:
                     yield words[1:]
 
 
-@pytest.mark.parametrize("page", with_code("sh"), ids=name)
+@pytest.mark.parametrize("page", [page for page in PAGES if page.is_file()], ids=name)
 def test_commands_of_a_page_exist(page: Path) -> None:
     wrong = [" ".join(words) for words in commands(page) if (unknown := unknown_words(words)) and unknown]
     assert not wrong

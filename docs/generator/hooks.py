@@ -22,14 +22,17 @@ sys.path.insert(0, str(ROOT))
 # Files of other folders that are pages or pictures of the site.
 OTHERS = (
     "CHANGELOG.md",
+    "CONTRIBUTING.md",
     "bml_schema/CONFORMANCE.md",
     "clients/javascript/README.md",
     "docker/README.md",
+    "examples/README.md",
     "faces/README.md",
     "realizer/examples/faces.png",
     "realizer/examples/greeting.png",
     "realizer/examples/page.png",
     "realizer/examples/schedule.svg",
+    "realizer/examples/speaking.webp",
 )
 LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
 FENCE = re.compile(r"(^```.*?^```$)", re.DOTALL | re.MULTILINE)

@@ -12,6 +12,7 @@ from PIL import Image, ImageDraw
 import realizer
 from realizer.examples import examples
 from realizer.outputs.output import RenderSettings
+from realizer.render.light import presets
 
 ROOT = Path(__file__).parents[2]
 EMOTIONS = "ada JOY, ben SURPRISE, ida SADNESS, leo ANGER, nia DISGUST, omar FEAR"
@@ -25,6 +26,18 @@ LOOK_BACK = """async () => {
   Object.assign(realizerPage.stage, { pace() {}, part: 2, stale: true });
   await after(4000);
 }"""
+EMOTION = """<bml id="b" xmlns:r="urn:bml-realizer:1">
+  <r:emotion id="e" name="{}" start="0" end="2"/>
+</bml>"""
+HELLO = """<bml id="hello" xmlns:r="urn:bml-realizer:1">
+  <speech id="s" start="0.2">
+    <text>Hello! <sync id="send"/>Send me a text, <sync id="and"/>and I will speak it.</text>
+  </speech>
+  <faceLexeme id="brows" lexeme="RAISE_BROWS" amount="0.5" start="s:start-0.1" end="s:start+0.9"/>
+  <faceLexeme id="smile" lexeme="SMILE" amount="0.6" start="s:and" end="s:end+0.8"/>
+  <head id="nod" lexeme="NOD" amount="0.6" stroke="s:send"/>
+</bml>"""
+SPEAKERS = ("ida", "omar", "nia")
 COLUMNS, TILE = 12, 104  # pictures of the film in a row, pixels
 
 
@@ -35,6 +48,42 @@ def faces(path: Path) -> None:
         played = realizer.realize(FEELS.format(emotion), face=name, idle=False)
         pairs.append(np.vstack([played.picture(at=at, size=(230, 280)) for at in (0, 1.2)]))
     Image.fromarray(np.hstack(pairs)).save(path, optimize=True)
+
+
+def speaking(path: Path) -> None:
+    """Three people who say hello, as an animated picture."""
+    rows = []
+    for seed, name in enumerate(SPEAKERS):
+        played = realizer.realize(HELLO, face=name, seed=seed, fps=12.5)
+        frames = list(range(played.frames))
+        rows.append(list(RenderSettings(light="daylight").pictures(played, (230, 260), frames)))
+    pictures = [Image.fromarray(np.hstack(pixels)) for pixels in zip(*rows, strict=False)]
+    pictures[0].save(
+        path, save_all=True, append_images=pictures[1:], duration=80, loop=0, quality=70, method=6
+    )
+
+
+def lights(path: Path) -> None:
+    """One face in each light, and from each camera."""
+    played = realizer.realize(FEELS.format("SMILE"), face="leo", idle=False)
+    names = [light.name for light in presets().values()]
+    row = np.hstack([played.picture(at=1.2, light=name, size=(230, 260)) for name in names])
+    cameras = ("front", "three-quarter", "profile", "close")
+    turned = [played.picture(at=1.2, camera=name, size=(230, 260)) for name in cameras]
+    turned.append(played.picture(at=1.2, background="#7d8f86", size=(230, 260)))
+    Image.fromarray(np.vstack([row, np.hstack(turned)])).save(path, quality=88, optimize=True)
+
+
+def emotions(path: Path) -> None:
+    """The six archetypes on two faces."""
+    rows = []
+    for face in ("nia", "ben"):
+        row = []
+        for word in ("joy", "surprise", "fear", "sadness", "disgust", "anger"):
+            played = realizer.realize(EMOTION.format(word), face=face, idle=False)
+            row.append(played.picture(at=1, size=(192, 230)))
+        rows.append(np.hstack(row))
+    Image.fromarray(np.vstack(rows)).save(path, quality=88, optimize=True)
 
 
 def film(path: Path) -> None:
@@ -75,5 +124,8 @@ if __name__ == "__main__":
     sheet = realizer.realize(examples()["greeting"]).save(ROOT / "realizer/examples/greeting.png")
     Image.open(sheet).save(sheet, optimize=True)
     faces(ROOT / "realizer/examples/faces.png")
+    speaking(ROOT / "realizer/examples/speaking.webp")
+    lights(ROOT / "docs" / "lights.jpg")
+    emotions(ROOT / "docs" / "emotions.jpg")
     film(ROOT / "docs" / "film-after.jpg")
     page(ROOT / "realizer/examples/page.png")
