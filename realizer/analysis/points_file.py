@@ -2,7 +2,7 @@
 
 import csv
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
@@ -13,7 +13,9 @@ COLUMNS = ["frame", "point", "x", "y", "z"]
 MAX_FRAMES = 100_000  # an hour at 25 frames a second, and a little
 
 
-def read_points(text: str, where: str = "points") -> tuple[dict[str, Float64], dict[str, Float64]]:
+def read_points(
+    text: str, where: str = "points", names: Collection[str] | None = NAMES
+) -> tuple[dict[str, Float64], dict[str, Float64]]:
     """Parse a CSV text and return the trajectory (n, 3) and the position at rest (3,) of each point.
 
     The columns are frame,point,x,y,z; frames count from 0, and points have their MPEG-4 names ("4.1"). Lines
@@ -21,6 +23,7 @@ def read_points(text: str, where: str = "points") -> tuple[dict[str, Float64], d
 
     Args:
         where: name of the file in messages.
+        names: of possible points; None: all.
 
     Raises:
         ValueError: invalid columns, cells or points; the text names the line.
@@ -42,7 +45,7 @@ def read_points(text: str, where: str = "points") -> tuple[dict[str, Float64], d
             raise ValueError(
                 f"{place}: wanted a frame 0..{MAX_FRAMES - 1} and finite places, got {line[:60]!r}"
             )
-        if name not in NAMES:
+        if names is not None and name not in names:
             raise ValueError(f"{place}: wanted a point of MPEG-4, 2.1 to 11.6, got {name[:20]!r}")
         if frame in found.setdefault(name, {}):
             raise ValueError(f"{place}: point {name} is there twice in frame {frame}")

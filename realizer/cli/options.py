@@ -376,6 +376,12 @@ def note(text: str) -> None:
         click.echo(text, err=True)
 
 
+def progress(pictures: Iterable[Any], label: str, count: int) -> Any:
+    """Return a context of the same pictures that shows a bar on standard error; 0 is an unknown number."""
+    hidden = is_quiet() or count == 1
+    return click.progressbar(pictures, length=count or None, label=label, file=sys.stderr, hidden=hidden)
+
+
 def warn_no_voice(voice: str | None) -> None:
     """Print a warning if no voice was requested and only the silent one is installed."""
     from realizer.speech.registry import find_voice, voices

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import click
 
 from realizer.cli import options
+from realizer.cli.marker_options import follow as follow_markers
+from realizer.cli.marker_options import look_of, marker_options
 
 if TYPE_CHECKING:
-    from realizer.core.array_types import Bool, Float64
+    from realizer.core.array_types import Float64
     from realizer.face.model import Fapu
     from realizer.tracking.follower import Person
+    from realizer.tracking.markers.film import Look
 
+# The text of OUT, its rate, its FAPs, and which of them were seen.
+Tracked: TypeAlias = "tuple[str, float, Any, Any]"
 POINTS = (".csv", ".txt", "")  # suffixes of tables of points; the last is of standard input
 
 
@@ -52,6 +56,7 @@ POINTS = (".csv", ".txt", "")  # suffixes of tables of points; the last is of st
     show_default=True,
     help="Which of several people; 1 is seen most.",
 )
+@marker_options
 def track(source: str, output: Path, fps: float | None, profiles: str | None, **how: Any) -> None:
     """Convert a film, a picture, a folder of pictures, or tracked feature points to movements of a face.
 
@@ -63,10 +68,14 @@ def track(source: str, output: Path, fps: float | None, profiles: str | None, **
     measured from points 2.2, 3.1 to 3.6, 8.3, 8.4 and 9.15. Head motion is measured at points 11.1 to 11.6 or
     the corners of the eyes. Points missing from a frame are interpolated.
 
+    With --markers, --marker-colour or --marker-at, painted markers are followed instead of the face. OUT is
+    then a table of points, JSON, or FAPs or a document if the layout names feature points.
+
     \b
     realizer track talk.mp4 -o talk.csv
     realizer track talk.mp4 -o talk.bml && realizer realize talk.bml --face ben -o again.mp4
     realizer track actor.csv --fps 30 -o actor.fap
+    realizer track dots.mp4 --markers green,blue -o dots.csv
     """
     from realizer.core.atomic_files import write_bytes
 
@@ -79,12 +88,16 @@ def track(source: str, output: Path, fps: float | None, profiles: str | None, **
     if profiles is not None:
         from realizer.analysis.recognise import recogniser
 
+        if values is None:
+            raise click.UsageError(
+                "--profiles needs feature points of MPEG-4 among the markers; see --layout"
+            )
         for part in recogniser(profiles).intervals(values, rate, seen):
             click.echo(f"{part.start:8.2f} {part.end:8.2f} {part.emotion or '-'} {part.certainty:.2f}")
 
 
-def _from_points(source: str, output: Path, fps: float) -> tuple[str, float, Any, Bool]:
-    """Return the text of a FAP file, its rate, its FAPs, and which of them were seen."""
+def _from_points(source: str, output: Path, fps: float) -> Tracked:
+    """Return what feature points show, as a FAP file."""
     import numpy as np
 
     from realizer.analysis.faps_from_points import faps_from_points
@@ -103,22 +116,50 @@ def _from_points(source: str, output: Path, fps: float) -> tuple[str, float, Any
     return encode(FAPClip.of(FAPFrames(times, values, seen), fps, output.stem)), fps, values, seen
 
 
+def _from_markers(source: Path, output: Path, fps: float | None, look: Look, face: str) -> Tracked:
+    """Return what painted markers show."""
+    from realizer.tracking.markers.film import FORMATS, faps_of
+    from realizer.tracking.network import TrackingError
+
+    options.check_suffix(output, *FORMATS)
+    with options.reporting(TrackingError):
+        markers = follow_markers(source, look, fps)
+        text = FORMATS[output.suffix.lower()](markers, face, output.stem)
+        known = len([name for name in markers.layout.feature_points if name]) > 1
+        faps, seen = faps_of(markers, face) if known else (None, None)
+    found = f"{len(markers.layout)} markers, {markers.seen.mean():.1%} of them seen"
+    options.note(f"{output}: {len(markers.points)} frames, {found}")
+    return text, markers.fps, faps, seen
+
+
 def _from_pictures(
-    source: Path, output: Path, fps: float | None, *, face: str | None, neutral: str | None, person: int
-) -> tuple[str, float, Any, Bool]:
-    """Return the text of OUT, its rate, its FAPs, and which of them were seen."""
+    source: Path,
+    output: Path,
+    fps: float | None,
+    *,
+    face: str | None,
+    neutral: str | None,
+    person: int,
+    **chosen: Any,
+) -> Tracked:
+    """Return what the face in pictures does, or what painted markers on it do."""
     from realizer.tracking.files import FORMATS, by_mapping, mask
     from realizer.tracking.network import TrackingError
     from realizer.tracking.recording import rate_of, record
 
+    with options.reporting(TrackingError):
+        number = int(neutral) if neutral is not None and neutral.isdecimal() else None
+        look = look_of(source, chosen, number)
+    if look is not None:
+        return _from_markers(source, output, fps, look, face or "default")
     options.check_suffix(output, *FORMATS)
     with options.reporting(TrackingError):
         times, people = _follow(source, fps)
         if person > len(people):
             raise click.BadParameter(f"there are {len(people)} people in {source}", param_hint="--person")
-        chosen = people[person - 1]
-        rest = _neutral(neutral, chosen) if neutral is not None else None
-    recording = record(chosen, times, fps or rate_of(times), rest)
+        subject = people[person - 1]
+        rest = _neutral(neutral, subject) if neutral is not None else None
+    recording = record(subject, times, fps or rate_of(times), rest)
     if face is not None:
         recording = by_mapping(recording, face)
     others = f"; {len(people)} people, this is --person {person}" if len(people) > 1 else ""
@@ -135,14 +176,7 @@ def _follow(source: Path, fps: float | None) -> tuple[list[float], list[Person]]
     from realizer.tracking.pictures import read_pictures
 
     count, pictures = read_pictures(source, fps or 25.0)
-    bar = click.progressbar(
-        pictures,
-        length=count or None,
-        label="tracking",
-        file=sys.stderr,
-        hidden=options.is_quiet() or count == 1,
-    )
-    with bar as shown:
+    with options.progress(pictures, "tracking", count) as shown:
         times, people = follow(shown)
     if not people:
         raise TrackingError(

@@ -124,7 +124,7 @@ def _csv(text: str) -> Recording:
     if head == COLUMNS[WORDS]:
         return Recording("", words=read_annotations(text))
     if head == POINT_COLUMNS or text.startswith("#"):
-        moving, rest = read_points(text)
+        moving, rest = read_points(text, names=None)
         tracked = tuple(moving), np.stack(list(moving.values()), axis=1)
         try:
             fapu = fapu_of({name: place.astype(np.float32) for name, place in rest.items()})

@@ -18,6 +18,8 @@ from realizer.cli import cli
 from realizer.emotions.archetypes import archetypes
 from realizer.face.deform import deform
 from realizer.face.load import load_face
+from tests.painted import acted as moved
+from tests.painted import plain, truth
 from tests.portraits import LITERT, faps_of, portrait
 
 
@@ -200,3 +202,46 @@ def test_track_names_the_emotion_of_pictures(tmp_path: Path) -> None:
     )
     assert done.exit_code == 0, done.output
     assert done.stdout.splitlines()[-1].split()[2] == "joy"
+
+
+@pytest.fixture(scope="module")
+def dots(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of pictures with painted markers."""
+    folder = tmp_path_factory.mktemp("dots")
+    for k, picture in enumerate(plain(truth("ada", moved(8)))):
+        picture.image.save(folder / f"{k}.png")
+    return folder
+
+
+def test_track_follows_painted_markers(dots: Path, tmp_path: Path) -> None:
+    colours = ("--markers", "green,blue")
+    at = truth("ada", moved(1))[0] + (0, 2)
+    done = run(str(dots), *colours, "-o", str(tmp_path / "dots.csv"))
+    assert done.exit_code == 0, done.output
+    assert "8 frames, 31 markers, 100.0% of them seen" in done.stderr
+    assert len((tmp_path / "dots.csv").read_text().splitlines()) == 1 + 8 * 31
+    clicks = [part for k in (0, 7, 9) for part in ("--marker-at", "{:.0f},{:.0f}".format(*at[k]))]
+    done = run(str(dots), *clicks, "-o", str(tmp_path / "dots.fap"), "--profiles", "own")
+    assert done.exit_code == 0, done.output
+    assert read_fap((tmp_path / "dots.fap").read_text()).values[2, 30] > 50
+    assert done.stdout
+
+
+@pytest.mark.parametrize(
+    ("args", "said"),
+    [
+        (["--markers", "mauve"], "wanted some of red, yellow"),
+        (["--markers", "red"], "found 0 in most pictures; click on some by --marker-at"),
+        (["--marker-at", "5"], "wanted X,Y in pixels, got '5'"),
+        (["--marker-at", "1,1", "--neutral", "99"], "there is no picture 99"),
+        (["--markers", "green", "--region", "9,9,5,5"], "wanted a left below the right"),
+        (["--region", "1,1,5,5"], "--layout and --region are for markers"),
+        (["--markers", "green,blue", "--region", "250,60,470,200", "--profiles", "own"], "see --layout"),
+    ],
+)
+def test_track_says_which_marker_option_is_wrong(
+    dots: Path, tmp_path: Path, args: list[str], said: str
+) -> None:
+    done = run(str(dots), *args, "-o", str(tmp_path / "x.csv"))
+    assert done.exit_code == 2, done.output
+    assert said in " ".join(done.stderr.split())
