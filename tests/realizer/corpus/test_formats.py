@@ -145,7 +145,7 @@ def test_merged_adds_labels_and_words_once() -> None:
         ("x.csv", "a,b\n1,2\n", r"x\.csv: wanted .* in docs/corpus\.md, got: no column time"),
         ("x.csv", "frame,AU01_r\n1\n", r"x\.csv: wanted"),
         ("x.csv", "start,end,expression,annotator\n2,1,x,y\n", r"x\.csv: wanted .*line 2: .*later end"),
-        ("x.csv", "frame,point,x,y,z\n0,99.1,0,0,0\n", r"x\.csv: .*wanted a point of MPEG-4"),
+        ("x.csv", "frame,point,x,y,z\n0,1,nan,0,0\n", r"x\.csv: .*finite places"),
         ("x.fap", "3.1 x 25 1", r"x\.fap: wanted"),
         ("x.json", "{}", r"x\.json: wanted"),
         ("x.json", "[1]", r"x\.json: wanted"),
@@ -162,3 +162,11 @@ def test_read_part_names_what_is_wanted(tmp_path: Path, name: str, content: str,
 
 def test_action_units_of_shapes_are_known() -> None:
     assert {shape.au for shape in shapes().values()} - {0} <= set(by_number())
+
+
+def test_read_part_takes_points_of_any_names(tmp_path: Path) -> None:
+    (tmp_path / "dots.csv").write_text("frame,point,x,y,z\n0,nose,1,2,0\n1,nose,3,2,0\n0,31,5,5,0\n")
+    names, places = read_part(tmp_path / "dots.csv").points or ((), np.zeros(0))
+    assert names == ("nose", "31")
+    assert places[1, 0].tolist() == [3, 2, 0]
+    assert np.isnan(places[1, 1]).all()
