@@ -8,9 +8,7 @@ from functools import cache
 from lxml import etree
 
 import realizer
-from realizer.charts.chart_data import charts_of
-from realizer.charts.picture import timeline
-from realizer.charts.svg import svg
+from docs.generator.steps import drawing
 from tests.cases import CASES, Case
 
 
@@ -55,4 +53,4 @@ def plot(example: Example) -> str | None:
     played = realizer.realize(example.text, voice="silent", idle=False)
     if not any(schedule.behaviours for schedule in played.schedules):
         return None
-    return svg(timeline(charts_of(played.blocks, played.schedules)))
+    return drawing(played)

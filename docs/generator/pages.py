@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from docs.generator import steps
 from realizer import cli as commands
 from realizer import tables
 from realizer.core.settings import PREFIX, Settings
@@ -152,6 +153,7 @@ PAGES: Mapping[str, Callable[[], dict[str, str]]] = {
     "cli": cli,
     "messages": messages,
     "settings": settings,
+    "steps": steps.page,
     "tables": value_tables,
 }
 
