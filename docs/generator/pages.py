@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields
 from functools import cache
@@ -125,7 +126,8 @@ def bml() -> dict[str, str]:
     ]
     for element in vocabulary()["elements"]:
         name = f"{element['prefix']}:{element['name']}" if element["prefix"] else element["name"]
-        parts.append(f"## {name}\n\n{element.get('about', '')}\n")
+        about = re.sub(r"(<[\w:]+>)", r"`\1`", element["about"])
+        parts.append(f"## {name}\n\n{about}\n")
         rows = [
             (f"`{a['name']}`", a["wanted"], "required" if a["required"] else "")
             for a in element["attributes"]

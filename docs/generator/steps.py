@@ -28,4 +28,5 @@ def page() -> dict[str, str]:
 def drawing(played: Realization) -> str:
     """Return the schedules of what was played, as SVG."""
     assert played.blocks is not None
-    return svg(timeline(charts_of(played.blocks, played.schedules)))
+    accepted = [active.first_schedule for active in played.blocks.all()]
+    return svg(timeline(charts_of(played.blocks, accepted)))
