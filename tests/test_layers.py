@@ -41,6 +41,7 @@ LAYERS = (
     "realizer.protocol",
     "realizer.server",
     "realizer.facebuild realizer.corpus",
+    "realizer.study",
     "realizer.batch realizer.client realizer.asgi",
     "realizer.cli",
     "realizer.__main__",

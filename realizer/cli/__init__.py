@@ -18,7 +18,7 @@ __all__ = ["main"]
 
 COMMANDS = """
     align batch check corpus demo doctor emotion enrich explain expressions faces fap outputs plugins realize
-    replay schedule serve timeline track voices
+    replay schedule serve study timeline track voices
 """
 # Commands that are not in the module of their name.
 MODULES = {"outputs": "doctor", "schedule": "realize", "voices": "doctor"}

@@ -9,21 +9,25 @@ from realizer.corpus.recording import Recording
 from realizer.corpus.statistics import Table
 
 
-def alpha(codes: Float64) -> float | None:
-    """Return Krippendorff's alpha of nominal codes (annotators, units); NaN: not annotated.
+def alpha(codes: Float64, numbers: bool = False) -> float | None:
+    """Return Krippendorff's alpha of codes (annotators, units); NaN: not annotated.
 
     1 is full agreement, 0 that of chance. None: fewer than two codes can be compared, or all are the same.
+
+    Args:
+        numbers: codes are numbers, which differ by the square of their distance; otherwise they are names.
     """
     values = np.unique(codes[np.isfinite(codes)])
     counts = np.stack([(codes == value).sum(axis=0) for value in values]) if len(values) else np.zeros((0, 0))
     counts = counts[:, counts.sum(axis=0) > 1].astype(np.float64)
+    apart = np.subtract.outer(values, values)
+    differ = np.square(apart) if numbers else (apart != 0).astype(np.float64)
     per_unit, per_value = counts.sum(axis=0), counts.sum(axis=1)
-    total = per_unit.sum()
-    expected = total**2 - np.square(per_value).sum()
+    expected = per_value @ differ @ per_value
     if not expected:
         return None
-    observed = ((np.square(per_unit) - np.square(counts).sum(axis=0)) / (per_unit - 1)).sum()
-    return float(1 - (total - 1) * observed / expected)
+    observed = ((differ @ counts * counts).sum(axis=0) / (per_unit - 1)).sum()
+    return float(1 - (per_unit.sum() - 1) * observed / expected)
 
 
 def agreement(recordings: Sequence[Recording]) -> Table:

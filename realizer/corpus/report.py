@@ -1,7 +1,7 @@
 """The description of a corpus as files: a CSV for each table, and one HTML report."""
 
-import base64
-from collections.abc import Sequence
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,13 @@ from realizer.corpus.rules import statistics, write_rules
 from realizer.corpus.statistics import TABLES, Study, Table
 from realizer.outputs.csv_table import csv_text
 
-STYLE = "body{font:15px sans-serif;margin:2em}td,th{padding:.1em .7em;text-align:right}"
+STYLE = (
+    ":root{color-scheme:light dark}body{font:15px sans-serif;margin:2em}"
+    "table{border-collapse:collapse;display:block;overflow-x:auto}"
+    "td,th{padding:.1em .7em;text-align:right}tr:nth-child(even){background:#8881}"
+    "figure{display:inline-block;vertical-align:top;margin:0 1.5em 1em 0;max-width:100%}"
+    "figure img{max-height:24em;max-width:100%}figure img:not(:only-of-type){max-height:11em}"
+)
 
 
 def describe(folder: Path, study: Study, corpus: Path) -> list[str]:
@@ -25,29 +31,47 @@ def describe(folder: Path, study: Study, corpus: Path) -> list[str]:
     tables = [make(study) for make in TABLES]
     tables += [agreement(study.recordings)] if any(len(r.annotators) > 1 for r in study.recordings) else []
     tables += [statistics(study)] if any(r.faps is not None for r in study.recordings) else []
-    for table in tables:
-        write_text(folder / f"{table.name}.csv", csv_text(table.columns, map(_cells, table.rows)))
+    write_tables(folder, tables)
     names = [f"{table.name}.csv" for table in tables] + write_rules(folder, study)
-    write_text(folder / "report.html", html(tables, corpus / "map.png"))
+    picture = corpus / "map.png"
+    pictures = {"Map of faces": [picture.read_bytes()]} if picture.is_file() else {}
+    write_text(folder / "report.html", html("Corpus", tables, pictures))
     return [*names, "report.html"]
 
 
-def html(tables: Sequence[Table], picture: Path) -> str:
-    """Return a page with all tables, and the picture if there is one."""
-    parts = [f"<!DOCTYPE html><meta charset=utf-8><title>Corpus</title><style>{STYLE}</style><h1>Corpus</h1>"]
+def write_tables(folder: Path, tables: Sequence[Table]) -> None:
+    """Write a CSV for each table."""
+    for table in tables:
+        write_text(folder / f"{table.name}.csv", csv_text(table.columns, map(_cells, table.rows)))
+
+
+def html(title: str, tables: Sequence[Table], pictures: Mapping[str, Sequence[bytes]]) -> str:
+    """Return a page with all tables, and pictures (PNG or WebP) by their captions."""
+    parts = [
+        f"<!DOCTYPE html><meta charset=utf-8><title>{title}</title><style>{STYLE}</style><h1>{title}</h1>"
+    ]
     for table in tables:
         rows = ["".join(f"<th>{escape(column)}" for column in table.columns)]
         rows += ["".join(f"<td>{escape(cell)}" for cell in _cells(row)) for row in table.rows]
         parts.append(
             f"<h2>{escape(table.name)}: {escape(table.title)}</h2><table><tr>{'<tr>'.join(rows)}</table>"
         )
-    if picture.is_file():
-        data = base64.b64encode(picture.read_bytes()).decode()
-        parts.append(
-            f'<h2>Map of faces</h2><img alt="distances of neurons" src="data:image/png;base64,{data}">'
-        )
+    parts += ["<h2>Pictures</h2>"] if pictures else []
+    for caption, files in pictures.items():
+        shown = [
+            f'<img alt="" src="data:image/{_kind(file)};base64,{b64encode(file).decode()}">' for file in files
+        ]
+        parts.append(f"<figure>{' '.join(shown)}<figcaption>{escape(caption)}</figcaption></figure>")
     return "\n".join(parts) + "\n"
 
 
 def _cells(row: Sequence[Any]) -> list[str]:
-    return ["" if cell is None else f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in row]
+    # NaN is not equal to itself.
+    return [
+        "" if cell is None or cell != cell else f"{cell:.4g}" if isinstance(cell, float) else str(cell)
+        for cell in row
+    ]
+
+
+def _kind(file: bytes) -> str:
+    return "webp" if file[8:12] == b"WEBP" else "png"

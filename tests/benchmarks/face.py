@@ -13,8 +13,8 @@ from tempfile import TemporaryDirectory
 
 from realizer.face.load import folder_of, list_faces, load_face
 from realizer.facebuild.mpeg4.build import copy_with_zones
-from realizer.tables import read_csv
 from realizer.facebuild.mpeg4.fap_scores import PEERS, FapScore, mean_score, score_faps
+from realizer.tables import read_csv
 
 BY_EYE = Path(__file__).with_name("fap_scores_by_eye.csv")
 

@@ -107,7 +107,8 @@ class _Weight:
 
 
 @cache
-def _weights() -> dict[int, int]:
+def weights() -> dict[int, int]:
+    """Return how much each FAP matters (Paul 2010, table 4.3): 1, 2 or 3."""
     return {row.fap: row.weight for row in csv_rows("fap_weights.csv", _Weight, __package__)}
 
 
@@ -123,7 +124,7 @@ def _score_fap(measure: Measure, row: Fap, sign: int) -> FapScore:
         fap=row.fap,
         name=row.name,
         sign=sign,
-        weight=_weights()[row.fap],
+        weight=weights()[row.fap],
         error=max(error_of(measure, row, v, m) for v, m in zip(asked, moves, strict=True)),
         mirror=mirror_of(measure, row, moves[0], measure.moves({row.mirror: value * row.sign})),
         others=others_of(measure, row, asked, moves),

@@ -21,11 +21,11 @@ def test_describe_writes_a_table_each_and_one_report(tmp_path: Path) -> None:
     assert "<td>anger<td>1" in (tmp_path / "out" / "report.html").read_text()
 
 
-def test_html_escapes_names_and_shows_the_picture(tmp_path: Path) -> None:
-    (tmp_path / "map.png").write_bytes(b"png")
-    page = html([Table("x", "a < b", ("<c>",), ((None,), (0.12345,)))], tmp_path / "map.png")
+def test_html_escapes_names_and_shows_the_picture() -> None:
+    page = html("Title", [Table("x", "a < b", ("<c>",), ((None,), (0.12345,)))], {"a > b": [b"png"]})
     assert "a &lt; b" in page
     assert "<th>&lt;c&gt;" in page
     assert "<td>0.1235" in page or "<td>0.1234" in page
     assert "data:image/png;base64,cG5n" in page
-    assert "<img" not in html([], tmp_path / "none.png")
+    assert "a &gt; b" in page
+    assert "<img" not in html("Title", [], {})

@@ -1,0 +1,184 @@
+"""`study`: kits of pictures and films for judges, and the analysis of their answers."""
+
+from __future__ import annotations
+
+import secrets
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from realizer.cli import options
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from realizer.study.drawing import Variant
+
+# Not imported for --help.
+KINDS = ("visual", "emotional", "naming", "displacements", "films")
+
+
+@click.group()
+def study() -> None:
+    """Let people judge faces by eye (Wojdel 2005, 5.3.2; Paul 2010, 4.4), and analyse their answers.
+
+    \b
+    realizer study make faces --kind visual --kind naming --face ada --face ben --judges 25
+    realizer study judge faces -o machine.csv
+    realizer study analyse answers-*.csv machine.csv --key faces.key.json -o report
+    """
+
+
+def _key(value: Path | None, answers: Sequence[Path]) -> Path:
+    """Return the key that was named, or the only one beside the answers."""
+    found = [value] if value else sorted({key for file in answers for key in file.parent.glob("*.key.json")})
+    if len(found) != 1:
+        raise click.UsageError(f"wanted --key DIR.key.json, got {len(found)} keys beside the answers")
+    return found[0]
+
+
+@contextmanager
+def _progress(label: str, count: int) -> Iterator[Callable[[int], object]]:
+    with click.progressbar(length=count, label=label, file=sys.stderr, hidden=options.is_quiet()) as bar:
+        yield bar.update
+
+
+@study.command()
+@click.argument("folder", metavar="DIR", type=options.OUTPUT)
+@click.option(
+    "--kind",
+    "kinds",
+    multiple=True,
+    type=click.Choice(KINDS),
+    default=("visual", "naming"),
+    help="Questions; may be repeated.  [default: visual and naming]",
+)
+@click.option(
+    "--face", "faces", multiple=True, metavar="NAME", help="Face; several are compared.  [default: ada]"
+)
+@click.option(
+    "--deformer", "deformers", multiple=True, type=click.Choice(["mpeg4", "au"]), help="Several are compared."
+)
+@click.option(
+    "--mapping",
+    "mappings",
+    multiple=True,
+    type=options.MappingFile(exists=True, dir_okay=False, path_type=Path),
+    help="Mapping of action units to FAPs; several are compared.",
+)
+@click.option(
+    "--references",
+    "source",
+    metavar="FOLDER|FACE",
+    help="To compare with: photographs with labels.csv (file,aus), or a face.  [default: another face]",
+)
+@click.option("--judges", type=click.IntRange(1, 1000), default=10, show_default=True, help="Judges to come.")
+@click.option(
+    "--items", "most", type=click.IntRange(1), help="Draw so many questions of each kind.  [default: all]"
+)
+@click.option(
+    "--seed", type=click.IntRange(0), help="Seed of all choices.  [default: a random one, told in the key]"
+)
+@click.option(
+    "--language",
+    type=click.Choice(["en", "de", "pl"]),
+    default="en",
+    show_default=True,
+    help="First language of the page.",
+)
+def make(folder: Path, kinds: tuple[str, ...], judges: int, seed: int | None, **what: Any) -> None:
+    """Write DIR, which opens in any browser, and its right answers to DIR.key.json beside it.
+
+    Hand out the folder, with a number to each judge, and keep the key. Answers come back as CSV.
+    """
+    from realizer.study.kit import check_folder, write_kit
+    from realizer.study.plan import Plan
+    from realizer.tracking.network import TrackingError
+
+    with options.reporting(ValueError):
+        check_folder(folder)
+    variants = _variants(what.pop("faces"), what.pop("deformers"), what.pop("mappings"))
+    plan = Plan(kinds, variants, seed=secrets.randbelow(2**32) if seed is None else seed, **what)
+    with options.reporting(TrackingError), _progress("drawing", plan.drawn) as step:
+        items = plan.items(step)
+    about = {"judges": judges, "language": plan.language, "seed": plan.seed}
+    with options.writing(folder), options.reporting(ValueError):
+        key = write_kit(folder, items, about | {"variants": [one.name for one in variants]})
+    options.note(f"{folder}: {len(items)} questions; open {folder / 'index.html'}; the right answers: {key}")
+
+
+@study.command()
+@click.argument("folder", metavar="DIR", type=options.FOLDER)
+@click.option(
+    "-o", "--output", required=True, metavar="FILE.csv", type=options.OUTPUT, help="Answers to write."
+)
+def judge(folder: Path, output: Path) -> None:
+    """Let a machine answer the study in DIR from its pictures alone; it is marked as a machine.
+
+    It needs the extra `track`, and leaves out scores and films, which it cannot judge.
+    """
+    from realizer.core.atomic_files import write_text
+    from realizer.outputs.csv_table import csv_text
+    from realizer.study import judge as machine
+    from realizer.study.answers import COLUMNS
+
+    options.check_suffix(output, ".csv")
+    count = len(machine.read_items(folder)["items"])
+    with _progress("judging", count) as step:
+        rows = list(machine.judge(folder, step))
+    if not rows:
+        raise click.UsageError(f"{folder}: wanted questions about matching or naming, got none of them")
+    with options.writing(output):
+        write_text(output, csv_text(COLUMNS, rows))
+    options.note(f"{output}: {len(rows)} of {count} questions answered")
+
+
+@study.command()
+@click.argument("files", metavar="ANSWERS.csv...", nargs=-1, required=True, type=options.FILE)
+@click.option(
+    "--key", type=options.FILE, help="Right answers.  [default: the only *.key.json beside the answers]"
+)
+@click.option("-o", "--output", required=True, metavar="DIR", type=options.OUTPUT, help="Folder to write.")
+@click.option(
+    "--pictures", metavar="DIR", type=options.FOLDER, help="Folder of the study.  [default: beside the key]"
+)
+@click.option("--keep", is_flag=True, help="Count judges who failed attention items, too.")
+def analyse(
+    files: tuple[Path, ...], key: Path | None, output: Path, pictures: Path | None, keep: bool
+) -> None:
+    """Write tables as CSV and report.html: who matched, named and scored what, with 95 % intervals.
+
+    Judges who failed more than a quarter of their attention items are named and left out.
+    """
+    from realizer.study.answers import inattentive, read_answers, read_key
+    from realizer.study.report import write_report
+
+    key = _key(key, files)
+    truths = read_key(key)
+    answers = read_answers(files, truths)
+    failed = inattentive(answers)
+    if failed:
+        named = ", ".join(f"{judge} ({who})" for who, judge in failed)
+        click.echo(f"failed attention items, {'kept' if keep else 'left out'}: {named}", err=True)
+    if not keep and len(failed) == len({(one.who, one.judge) for one in answers}):
+        raise click.UsageError("wanted answers of a judge who passed the attention items; see --keep")
+    with options.writing(output):
+        names = write_report(output, truths, answers, pictures or key.parent / truths["folder"], keep)
+    options.note(f"{output}: {', '.join(names)}")
+
+
+def _variants(faces: Sequence[str], deformers: Sequence[str], mappings: Sequence[Path]) -> list[Variant]:
+    from realizer.study.drawing import Variant
+
+    for face in faces:
+        options.check_face(face)
+    every = product(faces or ("ada",), deformers or (None,), mappings or (None,))
+    variants = [Variant(*one) for one in every]
+    if len({one.name for one in variants}) < len(variants):
+        raise click.UsageError(f"wanted different names, got {', '.join(one.name for one in variants)}")
+    return variants

@@ -1,0 +1,34 @@
+"""Tests of `realizer.study.films`."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import bml_schema
+from realizer.behaviours.registry import VOCABULARY
+from realizer.study.drawing import Variant
+from realizer.study.films import TAG, control, films
+
+
+def test_control_has_as_many_expressions_at_words() -> None:
+    text = "Well, <you> & me?"
+    documents = {control(text, 3, np.random.default_rng(seed)) for seed in range(9)}
+    assert len(documents) == 9
+    for document in documents:
+        assert document.count(TAG) == 3
+        block = bml_schema.parse(document, VOCABULARY)
+        assert str(block.behaviours[0].text).split() == text.split()
+
+
+@pytest.mark.gl
+@pytest.mark.slow
+def test_films_are_pairs_with_and_without_rules() -> None:
+    pytest.importorskip("av")
+    found = list(films([Variant("ada")], ["Why?"], "en", np.random.default_rng(1), lambda count: None))
+    assert ["enriched", "plain"] in [one.truth["pair"] for one in found]
+    for one in found:
+        assert list(one.options) == one.truth["pair"]
+        assert all(content[:4] == b"\x1aE\xdf\xa3" for content in one.options.values())
+        assert len(set(one.options.values())) == 2
+        assert not any(word in content for content in one.options.values() for word in (b"template", b"bml"))
