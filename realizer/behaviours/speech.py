@@ -128,6 +128,10 @@ def check(node: Speech, context: PlanningContext) -> tuple[Fault, ...]:
         from realizer.behaviours import recordings  # most speech has none
 
         faults = recordings.faults(name, context)
+    elif unread := [d for d in node.descriptions if d.content.strip().startswith("clip:")]:
+        got = f'a description of type "{unread[0].type}" with {unread[0].content.strip()[:80]!r}'
+        wanted = f'wanted <bmlt:audiofile fileName="clip:ID"/> in its description, got {got}'
+        faults = (Fault("CANNOT_CREATE_BEHAVIOR", wanted),)
     if spoken is None and name is not None and not faults:
         spoken = SpokenContent("", ())
     if spoken is None and faults:

@@ -19,6 +19,7 @@ PIECE, LONGEST_PIECE = 0.2, 2.0  # s
 LONGEST = 1 << 20  # bytes of one message
 # The sound of a last word, whose end is not known, waits at most so long for the next word.
 HOLD = 1.0  # s
+DESCRIBING = ("text", "words", "phonemes", "visemes")  # fields of `speech`
 
 Pcm = bytes | bytearray | memoryview | Int16 | Float32 | Float64
 Timed = tuple[float, str] | tuple[float, float, str]
@@ -108,10 +109,16 @@ class Voice(OpenSpeech):
             self._began = time.monotonic()
         id = f"{self.id}-{self._clips}"
         self._clips += 1
+        # With its words before its sound, no mouth shapes are recognised in it. Otherwise the speech follows
+        # the first piece: it begins while the rest of a long clip is on its way.
+        is_described = any(description.get(name) not in (None, []) for name in DESCRIBING)
+        if is_described:
+            await self._speech(clip=id, **description)
         for number, at in enumerate(range(0, max(1, len(sound)), LONGEST)):
             final = at + LONGEST >= len(sound)
             await self._send(pack_clip(ClipPiece(id, number, rate, sound[at : at + LONGEST], final)))
-        await self._speech(clip=id, **description)
+            if not (number or is_described):
+                await self._speech(clip=id, **description)
 
     def _ready(self) -> int:
         """Return how many samples can be sent: all, or up to the start of a word that may go on."""

@@ -94,14 +94,19 @@ export class Voice {
     this.clip(joined.subarray(0, count), this.#rate, words.length ? { words } : {});
   }
 
-  /** Send a clip, and append it to the speech, with the fields of `speech` that describe it. */
+  /**
+   * Send a clip, and append it to the speech, with the fields of `speech` that describe it. With words before its sound, no
+   * mouth shapes are recognised in it. Otherwise the speech follows the first piece: it begins while the rest is on its way.
+   */
   clip(sound, rate, description) {
     const id = `${this.id}-${this.#clips++}`;
     const bytes = new Uint8Array(sound.buffer, sound.byteOffset, sound.byteLength);
+    const isDescribed = description.text !== undefined || ["words", "phonemes", "visemes"].some((name) => description[name]?.length);
+    if (isDescribed) this.#speech({ clip: id, ...description });
     for (let at = 0, number = 0; at < Math.max(1, bytes.length); at += LONGEST, number++) {
       this.#send(packClip({ id, number, rate, sound: bytes.subarray(at, at + LONGEST), final: at + LONGEST >= bytes.length }));
+      if (!number && !isDescribed) this.#speech({ clip: id, ...description });
     }
-    this.#speech({ clip: id, ...description });
   }
 
   #speech(fields) {

@@ -40,6 +40,8 @@ class SpeechMessage(Message):
     A clip is sent as binary messages, little-endian: u8 kind 4, u8 version 1, u16 flags (0x200: the last
     piece), u32 number of the piece, f64 0, u32 rate in Hz of raw mono int16 PCM (0: the pieces are a WAV,
     FLAC, Ogg, MP3 or WebM file), u8 length of the id, the id, sound. Documents name it as a file: `clip:ID`.
+    A speech may name a clip of PCM whose pieces are still to come, if this message describes it or a piece
+    has arrived: it begins with the first 200 ms, or where words are known, at the end of a word after these.
     Raw PCM with the id `heard:CHARACTER` is no clip: that character hears it (see `heard`).
     """
 

@@ -17,7 +17,8 @@ from realizer.server.documents.document_queue import Submission
 from realizer.server.journal.entry import JournalError
 from realizer.server.session.character_faces import CharacterFaces
 from realizer.server.session.feedback_log import FeedbackLog
-from realizer.server.speech.audio_clips import AudioClips, Clip
+from realizer.server.speech.audio_clips import AudioClips
+from realizer.server.speech.clip import Clip
 
 VERSION = 1
 STATE, CLIP = "state", "clip:"

@@ -98,11 +98,41 @@ class ControlHandlers:
             if piece.id.startswith(HEARD):
                 self._hear(piece, t)
             else:
-                self.clips.add_chunk(piece)
+                self._clip_piece(piece)
         except WireError as error:
             self.reply(connection.id, ErrorMessage(code="unsupported", message=str(error)))
         except FieldError as error:
             self.reply(connection.id, _error("clip", error, error.where))
+
+    def _clip_piece(self, piece: ClipPiece) -> None:
+        """Add a piece of a clip, and pass on what of it can be spoken."""
+        try:
+            self.clips.add_chunk(piece)
+        except ClipError as error:
+            self._speak_parts(piece.id, is_last=True, fault=str(error))
+            raise
+        self._speak_parts(piece.id, is_last=piece.final)
+
+    def _speak_parts(self, clip: str, *, is_last: bool, fault: str | None = None) -> None:
+        """Pass on what has arrived of a clip to the speech that waits for it.
+
+        Args:
+            fault: why no more of it will come.
+        """
+        speeches = self.submission.speeches
+        wanted = speeches.parts_wanted(clip)
+        if wanted < 0:
+            self.clips.unfollow(clip)
+        elif wanted or is_last:
+            parts = self.clips.next_parts(clip, is_last=is_last)
+            said = None if fault is None else f"clip {clip!r}: {fault}"
+            speeches.add_parts(clip, parts, is_last=is_last, fault=said)
+
+    def on_disconnect(self, connection: int) -> None:
+        """Close the speeches of a connection that has left; the rest of what it sent is spoken."""
+        for clip in self.submission.speeches.arriving(connection):
+            self._speak_parts(clip, is_last=True, fault="its last piece was not sent")
+        self.submission.speeches.on_disconnect(connection)
 
     def _hear(self, piece: ClipPiece, t: float) -> None:
         """Pass sound that a character hears to the player."""
@@ -140,7 +170,10 @@ class ControlHandlers:
         if annotates:
             self.clips.annotate(message)
         if message.id is not None:
-            self.submission.speeches.handle(message, connection.id, t)
+            is_arriving = message.clip is not None and self.clips.follow(message.clip)
+            self.submission.speeches.handle(message, connection.id, t, is_arriving=is_arriving)
+            if is_arriving:
+                self._speak_parts(message.clip or "", is_last=False)
 
     def _character(self, message: CharacterMessage) -> None:
         if message.face is not None:

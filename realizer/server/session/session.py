@@ -116,12 +116,18 @@ class Session:
         self.queries = QueryHandlers(
             id, settings, capabilities or {}, self.player, self.faces, self.submission, self.connections
         )
-        controls = ControlHandlers(
+        self._controls = ControlHandlers(
             self.player, self.faces, self.clips, self.submission, self.subscriptions, reply
         )
         self.tracked = TrackedFaces(self.player, self._add_effects, reply, self._show)
         self.inbox = Inbox(
-            self.player, self.submission, self.journal, self.connections, self.queries, controls, self.tracked
+            self.player,
+            self.submission,
+            self.journal,
+            self.connections,
+            self.queries,
+            self._controls,
+            self.tracked,
         )
 
     # connections --------------------------------------------------------------------------------
@@ -155,7 +161,7 @@ class Session:
         """
         if self.connections.pop(connection, None) is not None:
             self.journal.note(self.clock.read(now), "leave", connection)
-        self.submission.speeches.on_disconnect(connection)
+        self._controls.on_disconnect(connection)
         self.tracked.drop(connection)
         self._client_left = True
         self._forget_deadline()

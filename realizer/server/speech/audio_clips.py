@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-import base64
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from realizer.core.array_types import Int16
 from realizer.core.errors import RealizerError
 from realizer.protocol.messages.speech import SpeechMessage, TimedText
 from realizer.protocol.wire import ClipPiece
 from realizer.server.session.control_fields import FieldError
+from realizer.server.speech.clip import ArrivingClip, Clip, samples_of
 from realizer.speech.recorded.viseme_names import sound_of
 from realizer.speech.utterance import RATES, Phoneme, Recording, Word
-
-if TYPE_CHECKING:
-    from realizer.speech.sound_visemes.recogniser import VisemeRecogniser
 
 MAX_BYTES = 64 * 2**20  # of all clips of a session: half an hour of speech; the oldest are removed
 MAX_CLIPS = 1000  # of a session
@@ -34,68 +27,6 @@ class ClipError(FieldError):
     """A clip or its annotation is invalid; `where` is the field."""
 
 
-@dataclass(eq=False)
-class Clip:
-    """A clip, complete or not.
-
-    Attributes:
-        pieces: the bytes received so far, until the last piece has arrived.
-        rate: Hz of raw PCM; 0 for a sound file.
-        sound: rate and int16 samples; None until the last piece has arrived.
-        is_annotated: whether the annotation is complete.
-        recogniser: recognises mouth shapes in the pieces; None if they come too fast, or are not needed.
-        heard: the phonemes that it has recognised.
-    """
-
-    pieces: list[bytes] = field(default_factory=list)
-    rate: int = 0
-    sound: tuple[int, Int16] | None = None
-    text: str | None = None
-    words: list[TimedText] = field(default_factory=list)
-    phonemes: list[TimedText] = field(default_factory=list)
-    is_annotated: bool = True
-    recogniser: VisemeRecogniser | None = None
-    heard: list[Phoneme] = field(default_factory=list)
-
-    @property
-    def size(self) -> int:
-        return sum(map(len, self.pieces)) if self.sound is None else self.sound[1].nbytes
-
-    @property
-    def is_described(self) -> bool:
-        """Whether its text or its times are known, so that mouth shapes need not be recognised."""
-        return bool(self.text or self.words or self.phonemes)
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the fields as JSON values, without what can be recognised again."""
-        sound = None
-        if self.sound is not None:
-            sound = {"rate": self.sound[0], "pcm": _base64(self.sound[1].astype("<i2").tobytes())}
-        return {
-            "pieces": [_base64(piece) for piece in self.pieces],
-            "rate": self.rate,
-            "sound": sound,
-            "text": self.text,
-            "words": [word.model_dump() for word in self.words],
-            "phonemes": [phoneme.model_dump() for phoneme in self.phonemes],
-            "told": self.is_annotated,
-        }
-
-    @classmethod
-    def from_json(cls, fields: Mapping[str, Any]) -> Clip:
-        """Return the clip that `to_json` wrote.
-
-        Raises:
-            KeyError, TypeError, ValueError: it is not one.
-        """
-        sound = None
-        if fields["sound"] is not None:
-            sound = int(fields["sound"]["rate"]), _samples(base64.b64decode(fields["sound"]["pcm"]))
-        words, phonemes = ([TimedText(**item) for item in fields[name]] for name in ("words", "phonemes"))
-        pieces = [base64.b64decode(piece) for piece in fields["pieces"]]
-        return cls(pieces, fields["rate"], sound, fields["text"], words, phonemes, fields["told"])
-
-
 class AudioClips:
     """The sound clips of one session.
 
@@ -106,6 +37,8 @@ class AudioClips:
     def __init__(self) -> None:
         self.recordings: dict[str, Recording] = {}
         self._clips: dict[str, Clip] = {}
+        self._arriving: dict[str, ArrivingClip] = {}  # those that are spoken already
+        self._refused: set[str] = set()
         self._changed: set[str] = set()
 
     @property
@@ -137,10 +70,19 @@ class AudioClips:
             ClipError: the piece is out of order, too large or has a wrong rate; or the sound file is invalid,
                 and the clip is removed.
         """
+        if len(self._refused) >= MAX_CLIPS:
+            self._refused.clear()
+        self._refused.add(piece.id)
+        self._add(piece)
+        self._refused.discard(piece.id)
+
+    def _add(self, piece: ClipPiece) -> None:
         where, begins = f"clip:{piece.id}", piece.number == 0
         clip = self._clips.get(piece.id)
         if clip is None or (begins and clip.sound is not None):
             clip = Clip()
+        if begins and clip.pieces and piece.id in self._arriving:
+            raise ClipError(where, f"wanted piece {len(clip.pieces)} of the clip that is spoken, got piece 0")
         pieces = [] if begins else clip.pieces
         size = sum(map(len, pieces)) + len(piece.sound)
         if piece.number != len(pieces):
@@ -160,10 +102,13 @@ class AudioClips:
             clip.recogniser = VisemeRecogniser(piece.rate) if piece.rate >= LOWEST else None
             clip.heard = []
         pieces.append(piece.sound)
+        if (arriving := self._arriving.get(piece.id)) is not None:
+            arriving.rate, clip.recogniser = piece.rate, None
+            arriving.sound += piece.sound
         if clip.is_described or len(piece.sound) > 2 * MAX_PIECE * piece.rate:
             clip.recogniser = None
         if clip.recogniser is not None:
-            clip.heard += clip.recogniser.feed(_samples(piece.sound))
+            clip.heard += clip.recogniser.feed(samples_of(piece.sound))
         self._changed.add(piece.id)
         if piece.final:
             self._complete(piece.id, clip)
@@ -173,12 +118,56 @@ class AudioClips:
         """Check that the clip that a message names can be spoken, if it is annotated by that message or not.
 
         Raises:
-            FieldError: its sound or its annotation is not complete.
+            FieldError: nothing came of it, it was refused, or its annotation is not complete.
         """
-        clip = self._clips.get(message.clip or "")
-        is_annotated = clip is not None and (message.final if annotates else clip.is_annotated)
-        if clip is None or clip.sound is None or not is_annotated:
+        id = message.clip or ""
+        clip = self._clips.get(id)
+        is_annotated = message.final if annotates else clip is not None and clip.is_annotated
+        is_refused = id in self._refused and (clip is None or clip.sound is None)
+        if not is_annotated or is_refused:
             raise FieldError("clip", f"wanted a clip that was sent to its last piece, got {message.clip!r}")
+        if id in self._arriving:
+            raise FieldError("clip", f"wanted a clip that no speech waits for, got {message.clip!r}")
+
+    def follow(self, id: str) -> bool:
+        """Divide a clip into parts from now on, as it arrives. Return False if it is complete."""
+        clip = self._clips[id]
+        if clip.sound is not None:
+            return False
+        clip.recogniser = None
+        sound = bytearray(b"".join(clip.pieces))
+        self._arriving[id] = ArrivingClip(clip.rate, clip.words, clip.phonemes, sound)
+        return True
+
+    def unfollow(self, id: str) -> None:
+        """Divide a clip no longer, because no speech waits for it."""
+        self._arriving.pop(id, None)
+
+    def next_parts(self, id: str, *, is_last: bool) -> list[str]:
+        """Return the ids of new parts of a clip that arrives; of a clip in one piece, its own id.
+
+        Args:
+            is_last: whether no more will be spoken of it.
+        """
+        clip, arriving = self._clips.get(id), self._arriving[id]
+        if is_last:
+            del self._arriving[id]
+        if clip is None:
+            return []
+        if clip.sound is not None and not arriving.count:
+            return [id]
+        # A text is found in the whole sound only, and a file is read as a whole.
+        is_whole = not clip.rate or (clip.text is not None and not (clip.words or clip.phonemes))
+        count = 0 if is_whole else len(arriving.sound) // 2 if is_last else arriving.ready
+        if not count:
+            return []
+        part = f"{id}/{arriving.count}"
+        pcm, words, phonemes = arriving.take(count)
+        self._clips[part] = Clip(rate=clip.rate, sound=(clip.rate, pcm), words=words, phonemes=phonemes)
+        self._changed.add(part)
+        self._publish(part, self._clips[part])
+        self._make_room(part)
+        return [part]
 
     def annotate(self, message: SpeechMessage) -> None:
         """Set the text and the times of a clip, or add to them after an annotation that was not final.
@@ -207,7 +196,7 @@ class AudioClips:
         content, clip.pieces = b"".join(clip.pieces), []
         try:
             if clip.rate:
-                clip.sound = clip.rate, _samples(content)
+                clip.sound = clip.rate, samples_of(content)
                 if not len(clip.sound[1]):
                     raise RealizerError("wanted sound, got none")
                 if clip.recogniser is not None:
@@ -240,7 +229,7 @@ class AudioClips:
         """Remove the oldest clips if there are too many. Blocks that play have their own reference."""
         sizes = {id: clip.size for id, clip in self._clips.items()}
         while sum(sizes.values()) > MAX_BYTES or len(sizes) > MAX_CLIPS:
-            oldest = next(id for id in sizes if id != newest)
+            oldest = next(id for id in sizes if id != newest and id not in self._arriving)
             del sizes[oldest], self._clips[oldest]
             self._changed.add(oldest)
             self.recordings.pop(oldest, None)
@@ -253,7 +242,7 @@ def heard_samples(piece: ClipPiece) -> Int16:
         ClipError: it is not raw PCM, or of an unusual rate.
     """
     _check_pcm(piece)
-    return _samples(piece.sound)
+    return samples_of(piece.sound)
 
 
 def _check_pcm(piece: ClipPiece, otherwise: str = "") -> None:
@@ -262,14 +251,6 @@ def _check_pcm(piece: ClipPiece, otherwise: str = "") -> None:
         raise ClipError(where, f"wanted {RATES[0]}..{RATES[1]} Hz,{otherwise} got {piece.rate}")
     if len(piece.sound) % 2:
         raise ClipError(where, f"wanted samples of two bytes, got {len(piece.sound)} bytes")
-
-
-def _base64(data: bytes) -> str:
-    return base64.b64encode(data).decode()
-
-
-def _samples(data: bytes) -> Int16:
-    return np.frombuffer(data, "<i2").astype(np.int16, copy=False)
 
 
 def _phonemes(message: SpeechMessage) -> list[TimedText]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 from bml_schema import Block, read
@@ -22,6 +23,7 @@ class SpeechStream:
         chunk: the last chunk.
         unspoken: (sentence or id of a clip, whether it is a clip) of what is in no block yet.
         marks: sync -> id of its chunk's block.
+        arriving: ids of clips in `unspoken` that are spoken while they arrive.
         partial_chunks: ids of blocks that speak only part of a sentence.
         unplanned: ids of blocks that are not planned yet, in order.
         scheduled: ids of blocks that are planned and have not ended, in order.
@@ -40,6 +42,7 @@ class SpeechStream:
     splitter: SentenceSplitter = field(default_factory=SentenceSplitter)
     unspoken: deque[tuple[str, bool]] = field(default_factory=deque)
     marks: dict[str, str] = field(default_factory=dict)
+    arriving: set[str] = field(default_factory=set)
     partial_chunks: set[str] = field(default_factory=set)
     unplanned: list[str] = field(default_factory=list)
     scheduled: list[str] = field(default_factory=list)
@@ -57,6 +60,20 @@ class SpeechStream:
         self.unspoken.extend((piece, False) for piece in self.splitter.feed(text, close=clip is not None))
         if clip is not None:
             self.unspoken.append((clip, True))
+
+    def add_parts(self, clip: str, parts: Iterable[str], *, is_last: bool) -> None:
+        """Add parts of a clip that arrives, before what follows it."""
+        at = self.unspoken.index((clip, True))
+        if is_last:
+            self.arriving.discard(clip)
+            del self.unspoken[at]
+        for place, part in enumerate(parts, at):
+            self.unspoken.insert(place, (part, True))
+
+    @property
+    def has_piece(self) -> bool:
+        """Whether the next sentence or clip is there."""
+        return bool(self.unspoken) and not (self.unspoken[0][1] and self.unspoken[0][0] in self.arriving)
 
     def close(self) -> None:
         """End the text: its rest is complete."""

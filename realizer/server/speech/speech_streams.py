@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from bml_schema import Block, BlockProgress, Feedback, SyncRef
 from realizer.playback.player import Player
 from realizer.playback.references import references, with_references
 from realizer.protocol.messages.speech import SpeechMessage
-from realizer.scheduling.timing import UNKNOWN
+from realizer.scheduling.timing import UNKNOWN, Warning
 from realizer.server.session.control_fields import FieldError
 from realizer.server.speech.speech_chunks import Chunk
 from realizer.server.speech.speech_stream import SpeechStream
@@ -21,6 +21,7 @@ BEHIND = 1e-3  # s
 SAME = 1e-6  # s
 # So many chunks are prepared ahead. An interruption makes the work for more useless.
 AHEAD = 6
+PARTS = 2  # of a clip that arrives, ahead of those: later, a part can be longer
 MOST = 500_000  # waiting characters of one speech; nine hours
 MAX_SPEECHES = 1_000  # of a session
 CUT_OFF = ("INTERRUPTED", "REVOKED")
@@ -59,8 +60,10 @@ class SpeechStreams:
         if waiting + len(message.append or "") > MOST:
             raise FieldError("append", f"wanted at most {MOST} characters that wait to be spoken, got more")
 
-    def handle(self, message: SpeechMessage, connection: int, t: float) -> None:
+    def handle(self, message: SpeechMessage, connection: int, t: float, *, is_arriving: bool = False) -> None:
         """Begin, continue or close a speech, with a message that `check` has passed.
+
+        `is_arriving`: the clip of the message is not complete; `add_parts` adds what there is of it.
 
         Messages for a speech that was cut off are ignored; its id is free again after `close`.
         """
@@ -76,8 +79,34 @@ class SpeechStreams:
                 self._forget(message.id)
             return
         speech.add(message.append or "", message.clip)
+        if is_arriving and message.clip is not None:
+            speech.arriving.add(message.clip)
         if message.close:
             speech.close()
+
+    def parts_wanted(self, clip: str) -> int:
+        """Return how many parts of a clip that arrives can be prepared now; -1 if no speech waits for it."""
+        speech = self._speaker(clip)
+        return -1 if speech is None else max(0, PARTS - speech.unspoken.index((clip, True)))
+
+    def arriving(self, connection: int) -> list[str]:
+        """Return the clips for which the speeches of a connection wait."""
+        speeches = [speech for speech in self._speeches.values() if speech.connection == connection]
+        return [clip for speech in speeches for clip in sorted(speech.arriving)]
+
+    def add_parts(self, clip: str, parts: Sequence[str], *, is_last: bool, fault: str | None = None) -> None:
+        """Add parts of a clip to the speech that waits for it.
+
+        Args:
+            fault: why no more will come, which is published as a warning.
+        """
+        speech = self._speaker(clip)
+        if speech is None:
+            return
+        speech.add_parts(clip, parts, is_last=is_last)
+        if fault is not None:
+            warning = Warning(f"{speech.id}:{speech.id}", "CANNOT_CREATE_BEHAVIOR", f"speech: {fault}")
+            self._player.refuse(warning, speech.chunk.character)
 
     def on_disconnect(self, connection: int) -> None:
         """Close the speeches of a connection that has left; the rest of their text is spoken."""
@@ -198,12 +227,15 @@ class SpeechStreams:
         name, _, number = block.rpartition(".")
         return self._speeches.get(name if number.isdigit() and name in self._speeches else block)
 
+    def _speaker(self, clip: str) -> SpeechStream | None:
+        return next((s for s in self._speeches.values() if clip in s.arriving and not s.is_finished), None)
+
     def _has_next(self, speech: SpeechStream) -> bool:
         if speech.is_finished:
             return False
         if not speech.is_announced:
             return True
-        ready = bool(speech.unspoken) and len(speech.open_chunks) < AHEAD
+        ready = speech.has_piece and len(speech.open_chunks) < AHEAD
         return ready and self._player.blocks.find(speech.id) is not None
 
     def _is_speech_sync(self, ref: SyncRef) -> bool:

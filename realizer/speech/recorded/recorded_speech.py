@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
+from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
@@ -17,6 +18,7 @@ from realizer.speech.utterance import Phoneme, Recording, SpeechRequest, Utteran
 # time this much before the start of the next one.
 EDGE = 1e-4  # s
 SIDE = 1e-3  # letters
+SLACK = 0.1  # s by which times of words may be wrong without a warning, as those of many voices are
 STEP = 0.02  # s between the instants at which sounds are compared
 CACHED = 8  # recordings; a document is planned more than once before it plays
 
@@ -79,9 +81,33 @@ def _utterance(
         now = end
     if tiled and now < duration:
         tiled.append(Phoneme(now, duration, ""))
-    kept = (replace(w, start=min(w.start, duration), end=min(w.end, duration)) for w in words)
+    kept = tuple(replace(w, start=min(w.start, duration), end=min(w.end, duration)) for w in words)
     inside = {name: min(max(time, 0.0), duration) for name, time in marks.items()}
-    return Utterance(duration, tuple(kept), tuple(tiled), inside, recording.rate, recording.pcm)
+    rate, faults = recording.rate, _time_faults(words, duration)
+    return Utterance(duration, kept, tuple(tiled), inside, rate, recording.pcm, warnings=faults)
+
+
+def _time_faults(words: Sequence[Word], duration: float) -> tuple[str, ...]:
+    """Return what is wrong with the times of words, a sentence for each kind of fault."""
+    late = [word for word in words if word.start > duration + SLACK]
+    torn = [(one, two) for one, two in pairwise(words) if one.end > two.start + SLACK]
+    faults = []
+    if late:
+        faults.append(
+            f"wanted words that begin within the {duration:.2f} s of the sound, got {late[0].text!r} at "
+            f"{late[0].start:.2f} s{_more(late)}"
+        )
+    if torn:
+        one, two = torn[0]
+        faults.append(
+            f"wanted words that follow each other, got {one.text!r} up to {one.end:.2f} s and {two.text!r} "
+            f"from {two.start:.2f} s on{_more(torn)}"
+        )
+    return tuple(faults)
+
+
+def _more(found: Sequence[object]) -> str:
+    return f", and {len(found) - 1} more" if len(found) > 1 else ""
 
 
 def _one_word(phonemes: Sequence[Phoneme], reference: Utterance) -> tuple[Word, ...]:

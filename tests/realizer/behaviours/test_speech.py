@@ -105,3 +105,10 @@ def test_speech_moves_the_lips_from_its_start_on() -> None:
     assert {channel.layer for channel in channels} == {Layer.SPEECH}
     assert {channel.source for channel in channels} == {"x"}
     assert at(channels, "lips", 2.9, 3.6) == [0, 1]
+
+
+def test_check_explains_a_description_that_names_a_clip_wrongly() -> None:
+    wrong = '<description priority="1" type="audio/x-clip">clip:c1</description>'
+    (fault,) = check(f'<speech id="x"><text>Hello</text>{wrong}</speech>')
+    assert not fault.fatal
+    assert fault.text.startswith('wanted <bmlt:audiofile fileName="clip:ID"/> in its description, got a desc')

@@ -12,7 +12,7 @@ import pytest
 
 from bml_schema.feedback import BlockProgress
 from realizer.client import Client, ClientError, connect
-from realizer.client.voice import Timed, Voice, samples_of, timed
+from realizer.client.voice import LONGEST, Timed, Voice, samples_of, timed
 from realizer.protocol.wire import unpack_clip
 from realizer.speech.registry import find_voice
 from realizer.speech.utterance import SpeechRequest
@@ -148,6 +148,7 @@ def test_voice_reports_the_words_that_were_heard_before_a_stop() -> None:
     ("sound", "rate", "options", "words"),
     [
         (b"", RATE, {}, "wanted sound, got none"),
+        (b"", RATE, {"words": [(0.0, "a")]}, "wanted sound, got none"),
         (b"no file", None, {}, "wanted"),
         (TONE, 10, {}, "Hz"),
         (TONE, RATE, {"words": [(0.5, "b"), (0.1, "a")]}, "wanted times that rise"),
@@ -213,16 +214,21 @@ class Sent:
     def __init__(self) -> None:
         self.clips: list[tuple[float, list[tuple[float, str]]]] = []
         self.voice = Voice(1000, {}, self._send, self._control, self._wait)
+        self.order: list[str] = []
         self._lengths: list[float] = []
+        self._words: list[tuple[float, str]] = []
 
     async def _send(self, message: bytes) -> None:
-        self._lengths.append(len(unpack_clip(message).sound) / 2000)
+        piece = unpack_clip(message)
+        self.order.append(f"sound {piece.number}")
+        self._lengths.append(len(piece.sound) / 2000)
+        if piece.final:
+            self.clips.append((sum(self._lengths), self._words))
+            self._lengths, self._words = [], []
 
     async def _control(self, type: str, **fields: Any) -> None:
-        if "clip" in fields:
-            words = [(round(w["start"], 3), w["text"]) for w in fields.get("words", ())]
-            self.clips.append((sum(self._lengths), words))
-            self._lengths = []
+        self.order.append(" ".join(["speech", *(name for name in ("words", "close") if name in fields)]))
+        self._words = [(round(w["start"], 3), w["text"]) for w in fields.get("words", ())]
 
     async def _wait(self, condition: Any) -> None: ...
 
@@ -242,6 +248,25 @@ def test_voice_cuts_clips_where_a_word_begins() -> None:
         assert sent.clips[1:] == [(0.3, [(0.0, "two")])]
         await sent.voice.close()
         assert sent.clips[2:] == [(0.3, [(0.0, "three")])]
+
+    asyncio.run(test())
+
+
+def test_voice_sends_words_before_their_sound() -> None:
+    async def test() -> None:
+        sent = Sent()
+        await sent.voice.words([(0.1, "one"), (0.5, "two")])
+        await sent.voice.write(second(0.7))
+        assert sent.order == ["speech words", "sound 0"]
+
+    asyncio.run(test())
+
+
+def test_clip_of_unknown_words_is_spoken_from_its_first_piece_on() -> None:
+    async def test() -> None:
+        sent = Sent()
+        await sent.voice.clip(bytes(5 * LONGEST // 2), 1000, close=True)
+        assert sent.order == ["sound 0", "speech close", "sound 1", "sound 2"]
 
     asyncio.run(test())
 

@@ -314,7 +314,7 @@ def test_handle_changes_nothing_with_an_error(drive, monkeypatch) -> None:
         {"type": "character", "id": "Eve", "face": "nobody", "voice": "silent"},
         {"type": "character", "id": "Eve", "face": "default", "voice": "nope"},
         {"type": "speech", "id": "turn", "character": "Eve", "append": "far too long a text"},
-        {"type": "speech", "id": "turn", "character": "Eve", "clip": "part", "words": words},
+        {"type": "speech", "id": "turn", "clip": "part", "words": words, "final": False},
         {"type": "speech", "id": "turn", "clip": "nothing"},
         {"type": "speech", "id": "turn", "clip": "whole", "words": words, "final": False},
         {"type": "speech", "id": "turn", "clip": "whole", "visemes": [{"start": 0, "text": "PPP"}]},

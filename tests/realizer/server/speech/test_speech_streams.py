@@ -509,3 +509,120 @@ def test_speech_streams_stop_within_50_ms_over_a_websocket() -> None:
     feedback = [parse_feedback(m) for m in messages if isinstance(m, str) and m.startswith("<")]
     (end,) = (f for f in feedback if getattr(f, "id", "") == "turn:end")
     assert (end.status, (end.said or "").split()[:1]) == ("INTERRUPTED", ["Well"])
+
+
+# clips that arrive slowly ----------------------------------------------------------------------------------
+
+WORDS = [{"start": 0.1, "text": "One"}, {"start": 0.7, "text": "two"}, {"start": 1.2, "text": "three"}]
+SLOW = (np.arange(16000) % 9000 + 50).astype("<i2")  # 2 s at 8 kHz
+
+
+def arrive(driver: Driver, pieces: list[int], *, last: bool = True, seconds: float = 0.1) -> None:
+    """Send these of 20 pieces of a clip, one each tenth of a second."""
+    for number in pieces:
+        piece = SLOW[number * 800 :][:800].tobytes()
+        final = last and number == 19
+        message = pack_clip(ClipPiece("c", number, 8000, piece, final=final))
+        driver.session.receive(1, message, driver.opened + driver.now)
+        driver.collect()
+        driver.run(driver.now + seconds)
+
+
+def heard(client: Client, rate: int = 8000) -> np.ndarray:
+    """Return the sound of all packets, on a clock of samples."""
+    out = np.zeros(10 * rate, np.int16)
+    for frame in client.frames:
+        if frame.stream == "audio":
+            at = round(frame.time * rate)
+            if frame.flush:
+                out[at:] = 0
+            out[at : at + len(frame.values)] = frame.values
+    return out
+
+
+@pytest.mark.parametrize("words", [[], WORDS], ids=["sound", "words"])
+def test_clip_that_comes_slowly_is_spoken_as_it_arrives(words) -> None:
+    driver = Talker()
+    driver.send({"type": "subscribe", "stream": "audio", "rate": 8000})
+    if words:
+        driver.send({"type": "speech", "id": "turn", "clip": "c", "words": words, "close": True})
+        arrive(driver, [0])
+    else:
+        arrive(driver, [0])
+        driver.send({"type": "speech", "id": "turn", "clip": "c", "close": True})
+    arrive(driver, list(range(1, 20)), seconds=0.05)
+    at = times(driver.run(9))
+    assert at["turn.1:start"] < 0.6, "long before the last piece"
+    assert "turn:end" in at
+    assert not [f for f in driver.clients[1].feedback if isinstance(f, WarningFeedback)]
+    sound = heard(driver.clients[1])
+    start = round(at["turn.1:start"] * 8000)
+    assert np.array_equal(sound[start : start + len(SLOW)], SLOW), "without a gap"
+    parts = [id for id in at if re.fullmatch(r"turn\.\d+:start", id)]
+    assert len(parts) > 2
+
+
+def test_clip_that_arrives_keeps_its_place_between_texts() -> None:
+    driver = Talker()
+    arrive(driver, [0, 1])
+    driver.append("Listen", clip="c")
+    driver.append("Well. ", close=True)
+    driver.run(2)
+    assert [order.request.recording is None for order in driver.spoken] == [True, False]
+    arrive(driver, list(range(2, 20)))
+    driver.run(9)
+    assert [order.request.recording is None for order in driver.spoken][-1] is True
+    assert texts(driver)[0] == "Listen"
+    assert texts(driver)[-1] == "Well."
+
+
+def test_clip_that_arrives_is_warned_of_when_its_sender_leaves() -> None:
+    driver = Talker(named=True)
+    driver.join(2)
+    driver.send({"type": "subscribe", "stream": "audio", "rate": 8000}, 2)
+    driver.send({"type": "speech", "id": "turn", "clip": "c", "words": WORDS})
+    arrive(driver, [0, 1, 2, 3, 4, 5], last=False)
+    driver.leave(1)
+    driver.run(9)
+    client = driver.clients[2]
+    (warning,) = [f for f in client.feedback if isinstance(f, WarningFeedback) and f.id == "turn:turn"]
+    assert warning.text.endswith("clip 'c': its last piece was not sent")
+    assert "turn:end" in times(client)
+    start = round(times(client)["turn.1:start"] * 8000)
+    assert np.array_equal(heard(client)[start : start + 4800], SLOW[:4800])
+
+
+@pytest.mark.parametrize(
+    ("piece", "says"),
+    [
+        (ClipPiece("c", 0, 8000, b"ab"), "wanted piece 3 of the clip that is spoken, got piece 0"),
+        (ClipPiece("c", 3, 16000, b"ab"), "wanted 8000 Hz as in piece 0, got 16000"),
+        (ClipPiece("c", 5, 8000, b"ab"), "wanted piece 3, got 5"),
+    ],
+)
+def test_clip_that_arrives_wrongly_is_an_error_and_a_warning(piece, says) -> None:
+    driver = Talker()
+    driver.send({"type": "speech", "id": "turn", "clip": "c", "words": WORDS, "close": True})
+    arrive(driver, [0, 1, 2])
+    driver.session.receive(1, pack_clip(piece), driver.opened + driver.now)
+    driver.collect()
+    client = driver.run(9)
+    assert [error["message"] for error in client.of("error")] == [says]
+    assert [f.id for f in client.feedback if isinstance(f, WarningFeedback)] == ["turn:turn"]
+    assert "turn:end" in times(client)
+
+
+def test_clip_that_arrives_can_be_interrupted_and_spoken_again() -> None:
+    driver = Talker()
+    driver.send({"type": "speech", "id": "turn", "clip": "c", "words": WORDS, "close": True})
+    twice = driver.send({"type": "speech", "id": "other", "clip": "c", "close": True}).of("error")
+    assert [error["message"] for error in twice] == ["wanted a clip that no speech waits for, got 'c'"]
+    arrive(driver, list(range(12)))
+    driver.run(driver.now + 0.4)
+    driver.send({"type": "stop", "blocks": ["turn"]})
+    arrive(driver, list(range(12, 20)))
+    (end,) = [f for f in driver.run(5).feedback if isinstance(f, BlockProgress) and f.id == "turn:end"]
+    assert (end.status, end.said) == ("INTERRUPTED", "One")
+    driver.send({"type": "speech", "id": "again", "clip": "c", "close": True})
+    at = times(driver.run(9))
+    assert at["again:end"] - at["again:start"] == pytest.approx(2.0, abs=0.01)

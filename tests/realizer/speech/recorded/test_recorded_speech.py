@@ -123,3 +123,22 @@ def test_by_loudness_opens_the_jaw() -> None:
     channels = lip_channels(by_loudness(tone((0.3, 0.0), (0.4, 1.0), (0.3, 0.0)), RATE), 0.0)
     jaw = next(c for c in channels if c.target.name == "open_jaw")
     assert np.interp(0.5, jaw.times, jaw.values) > 5 * max(np.interp(0.1, jaw.times, jaw.values), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("words", "faults"),
+    [
+        (WORDS, ()),
+        ((*WORDS, Word(2.05, 2.2, "now")), ()),
+        (
+            (*WORDS, Word(7, 8, "so"), Word(8, 9, "late")),
+            ("wanted words that begin within the 2.00 s of the sound, got 'so' at 7.00 s, and 1 more",),
+        ),
+        (
+            (Word(0.2, 0.9, "One"), Word(0.5, 1.0, "two")),
+            ("wanted words that follow each other, got 'One' up to 0.90 s and 'two' from 0.50 s on",),
+        ),
+    ],
+)
+def test_utterance_of_warns_of_words_in_wrong_places(words, faults) -> None:
+    assert said(words=words).warnings == faults

@@ -1,0 +1,153 @@
+"""A sound clip, and its division into parts that are spoken while it arrives."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from realizer.core.array_types import Int16
+from realizer.protocol.messages.speech import TimedText
+from realizer.speech.utterance import Phoneme
+
+if TYPE_CHECKING:
+    from realizer.speech.sound_visemes.recogniser import VisemeRecogniser
+
+FIRST = 0.2  # s; the least length of a part
+HOLD = 1.0  # s; a last word whose end is not known waits at most so long for the end of the clip
+
+
+@dataclass(eq=False)
+class Clip:
+    """A clip, complete or not.
+
+    Attributes:
+        pieces: the bytes received so far, until the last piece has arrived.
+        rate: Hz of raw PCM; 0 for a sound file.
+        sound: rate and int16 samples; None until the last piece has arrived.
+        is_annotated: whether the annotation is complete.
+        recogniser: recognises mouth shapes in the pieces; None if they come too fast, or are not needed.
+        heard: the phonemes that it has recognised.
+    """
+
+    pieces: list[bytes] = field(default_factory=list)
+    rate: int = 0
+    sound: tuple[int, Int16] | None = None
+    text: str | None = None
+    words: list[TimedText] = field(default_factory=list)
+    phonemes: list[TimedText] = field(default_factory=list)
+    is_annotated: bool = True
+    recogniser: VisemeRecogniser | None = None
+    heard: list[Phoneme] = field(default_factory=list)
+
+    @property
+    def size(self) -> int:
+        return sum(map(len, self.pieces)) if self.sound is None else self.sound[1].nbytes
+
+    @property
+    def is_described(self) -> bool:
+        """Whether its text or its times are known, so that mouth shapes need not be recognised."""
+        return bool(self.text or self.words or self.phonemes)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the fields as JSON values, without what can be recognised again."""
+        sound = None
+        if self.sound is not None:
+            sound = {"rate": self.sound[0], "pcm": _base64(self.sound[1].astype("<i2").tobytes())}
+        return {
+            "pieces": [_base64(piece) for piece in self.pieces],
+            "rate": self.rate,
+            "sound": sound,
+            "text": self.text,
+            "words": [word.model_dump() for word in self.words],
+            "phonemes": [phoneme.model_dump() for phoneme in self.phonemes],
+            "told": self.is_annotated,
+        }
+
+    @classmethod
+    def from_json(cls, fields: Mapping[str, Any]) -> Clip:
+        """Return the clip that `to_json` wrote.
+
+        Raises:
+            KeyError, TypeError, ValueError: it is not one.
+        """
+        sound = None
+        if fields["sound"] is not None:
+            sound = int(fields["sound"]["rate"]), samples_of(base64.b64decode(fields["sound"]["pcm"]))
+        words, phonemes = ([TimedText(**item) for item in fields[name]] for name in ("words", "phonemes"))
+        pieces = [base64.b64decode(piece) for piece in fields["pieces"]]
+        return cls(pieces, fields["rate"], sound, fields["text"], words, phonemes, fields["told"])
+
+
+@dataclass(eq=False)
+class ArrivingClip:
+    """The sound of a clip that is in no part yet.
+
+    Attributes:
+        rate: Hz.
+        words, phonemes: of the whole clip; without any, mouth shapes are recognised in each part.
+        sound: little-endian int16 samples.
+        taken: samples in parts.
+        count: the number of parts.
+    """
+
+    rate: int
+    words: list[TimedText]
+    phonemes: list[TimedText]
+    sound: bytearray = field(default_factory=bytearray)
+    taken: int = 0
+    count: int = 0
+
+    @property
+    def ready(self) -> int:
+        """The number of samples that the next part can have now; 0 if there are too few."""
+        there = len(self.sound) // 2
+        ends = [self._at(word.start) for word in self.words[1:]]
+        if self.words:
+            last = self.words[-1]
+            ends.append(self._at(last.start + HOLD if last.end is None else last.end))
+        # Behind the last word, or without words, a part may end anywhere.
+        is_free = not ends or there >= ends[-1]
+        count = there if is_free else max((end for end in ends if end <= there), default=0)
+        return count if count >= FIRST * self.rate else 0
+
+    def take(self, count: int) -> tuple[Int16, list[TimedText], list[TimedText]]:
+        """Return so many samples as the next part, the words that begin in it, and its phonemes."""
+        begin, start, end = self.taken, self.taken / self.rate, (self.taken + count) / self.rate
+        words = [w for w in self.words if 0 <= self._at(w.start) < count]
+        following = [*(p.start for p in self.phonemes[1:]), math.inf]
+        spans = [
+            (p, later if p.end is None else p.end) for p, later in zip(self.phonemes, following, strict=False)
+        ]
+        phonemes = [(p, min(until, end)) for p, until in spans if p.start < end and until > start]
+        pcm = samples_of(bytes(self.sound[: 2 * count]))
+        del self.sound[: 2 * count]
+        self.taken, self.count = begin + count, self.count + 1
+        return (
+            pcm,
+            [_moved(word, word.end, start) for word in words],
+            [_moved(phoneme, until, start) for phoneme, until in phonemes],
+        )
+
+    def _at(self, time: float) -> int:
+        """Return a time in the clip as samples after those that are taken."""
+        return round(time * self.rate) - self.taken
+
+
+def _moved(item: TimedText, end: float | None, start: float) -> TimedText:
+    """Return a word or a phoneme with times from the start of a part."""
+    moved = {"start": max(0.0, item.start - start), "end": None if end is None else end - start}
+    return item.model_copy(update=moved)
+
+
+def _base64(data: bytes) -> str:
+    return base64.b64encode(data).decode()
+
+
+def samples_of(data: bytes) -> Int16:
+    """Return little-endian int16 samples."""
+    return np.frombuffer(data, "<i2").astype(np.int16, copy=False)
