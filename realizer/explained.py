@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from html import escape
 from typing import NamedTuple
 
@@ -12,7 +13,10 @@ import numpy as np
 from bml_schema import Behaviour
 from realizer.animation.axis import AU_NAMES
 from realizer.charts.chart_data import charts_of
+from realizer.charts.panels import Panel, panels
 from realizer.charts.picture import timeline
+from realizer.charts.scale import scale_of
+from realizer.charts.shapes import Picture
 from realizer.charts.svg import svg
 from realizer.core.array_types import Float64
 from realizer.core.errors import RealizerError
@@ -83,6 +87,24 @@ def as_html(steps: list[Step], played: Realization) -> str:
     return "\n".join(parts) + "\n"
 
 
+def as_picture(steps: list[Step], played: Realization) -> Picture:
+    """Return a picture of the steps: their lines, the timeline of step 3, the curves of steps 5 and 6."""
+    blocks = [] if played.blocks is None else list(played.blocks.all())
+    charts = [] if played.blocks is None else charts_of(played.blocks, [b.first_schedule for b in blocks])
+    times = np.arange(played.frames) / played.fps
+    curves = {"blend": played.aus.aus, "map": played.faps.values}
+    parts = []
+    for number, step in enumerate(steps, 1):
+        part = Panel(f"{number} {step.name}", f"{step.description} ({step.place})", step.lines)
+        if step.name == "schedule":
+            part = replace(part, inset=timeline(charts))
+        if step.name in curves:
+            values = np.asarray(curves[step.name], np.float64)
+            part = replace(part, curves=values[:, _largest(values)], times=times)
+        parts.append(part)
+    return panels("The eight steps", parts, scale_of(charts))
+
+
 def _each(active: list[ActiveBlock], lines: Callable[[ActiveBlock], Iterator[str]]) -> list[str]:
     return [line for block in active for line in lines(block)]
 
@@ -141,10 +163,17 @@ def _faps(played: Realization) -> list[str]:
 def _strongest(names: tuple[str, ...], values: Float64, fps: float, form: str) -> list[str]:
     """Return the columns with the largest peaks, and when they have them."""
     peaks = np.abs(values).argmax(axis=0)
-    sizes = np.abs(values).max(axis=0)
-    chosen = [column for column in np.argsort(-sizes)[:MOST] if sizes[column] > 0]
-    lines = [f"{names[c]:<26} {form.format(values[peaks[c], c])} at {peaks[c] / fps:.2f} s" for c in chosen]
+    lines = [
+        f"{names[c]:<26} {form.format(values[peaks[c], c])} at {peaks[c] / fps:.2f} s"
+        for c in _largest(values)
+    ]
     return [f"{len(values)} frames of {values.shape[1]} values, the largest:", *lines]
+
+
+def _largest(values: Float64) -> list[int]:
+    """Return the columns with the largest peaks that are not 0."""
+    sizes = np.abs(values).max(axis=0)
+    return [int(column) for column in np.argsort(-sizes)[:MOST] if sizes[column] > 0]
 
 
 def _vertices(played: Realization) -> list[str]:

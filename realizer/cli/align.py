@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from realizer.cli import options
+from realizer.core.errors import RealizerError
 
 if TYPE_CHECKING:
     from realizer.speech.align.alignment import Alignment
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     "--language", default="en-US", metavar="TAG", help="Language, as a BCP-47 tag.  [default: en-US]"
 )
 @click.option("--aligner", type=click.Choice(["pocketsphinx", "espeak"]), help="Use only this aligner.")
-@click.option("-o", "output", metavar="FILE", type=options.OUTPUT, help="Write a .json or .vtt file.")
+@click.option("-o", "--output", metavar="FILE", type=options.OUTPUT, help="Write a .json or .vtt file.")
 def align(audio: Path, text: str, language: str, aligner: str | None, output: Path | None) -> None:
     """Find when each word of a recording is spoken.
 
@@ -39,8 +40,12 @@ def align(audio: Path, text: str, language: str, aligner: str | None, output: Pa
     if text.startswith("@"):
         content = options.read_file(text[1:])
         text = options.decode(content, text[1:], "a text")
-    recording = read_sound(audio.read_bytes())
-    alignment = find_words(recording.pcm, recording.rate, text, language, aligner=aligner)  # type: ignore[arg-type]
+    try:
+        recording = read_sound(audio.read_bytes())
+    except RealizerError as error:
+        raise click.ClickException(f"{audio}: {error}") from None
+    with options.waiting("aligning"):
+        alignment = find_words(recording.pcm, recording.rate, text, language, aligner=aligner)  # type: ignore[arg-type]
     for warning in alignment.warnings:
         click.echo(f"realizer: {warning}", err=True)
     if output is None:
@@ -48,7 +53,8 @@ def align(audio: Path, text: str, language: str, aligner: str | None, output: Pa
         for word, confidence in zip(alignment.words, alignment.confidences, strict=True):
             click.echo(f"{word.start:8.3f} {word.end:8.3f}  {confidence:.2f}  {word.text}")
     else:
-        output.write_text((_json if output.suffix.lower() == ".json" else _vtt)(alignment), "utf-8")
+        with options.writing(output):
+            output.write_text((_json if output.suffix.lower() == ".json" else _vtt)(alignment), "utf-8")
 
 
 def _json(alignment: Alignment) -> str:

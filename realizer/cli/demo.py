@@ -57,7 +57,8 @@ def _film(documents: list[str], voice: str | None, face: str) -> None:
     for path in (FRAMES, FILM):
         click.echo(f"writing {path} ({realization.duration:.1f} s) ...")
         try:
-            output_for(path).write(realization, path, RenderSettings())
+            with options.steps("drawing") as drawn:
+                output_for(path).write(realization, path, RenderSettings(drawn=drawn))
         except RealizerError as error:
             click.echo(f"realizer: {path} was left out: {error}", err=True)
 

@@ -16,9 +16,9 @@ from realizer.cli import options
 @click.option(
     "-o",
     "--output",
-    metavar="FILE.html",
+    metavar="FILE",
     type=options.OUTPUT,
-    help="Write a page with the timeline and a picture.  [default: print text]",
+    help="Write a page (.html), or a drawing of the steps (.svg, .png).  [default: print text]",
 )
 @options.face("Face that is moved")
 @click.option("--no-idle", is_flag=True, help="No blinks or small head motion of an idle face.")
@@ -31,15 +31,18 @@ def explain(
     \b
     realizer explain hello.bml
     realizer explain "Hello there" -o hello.html
+    realizer explain hello.bml -o hello.svg
 
     Prints the nodes, the gaps that behaviours prefer, the scheduling problem and its solution, the channels,
     the strongest action units and FAPs, and how far the face moves.
     """
-    options.check_suffix(output, ".html")
+    from realizer.charts.write_chart import WRITERS
+
+    options.check_suffix(output, ".html", *WRITERS)
     chosen = options.settings(**flags)
     texts = options.read_documents(documents)
     from realizer import pipeline
-    from realizer.explained import as_html, as_text, steps_of
+    from realizer.explained import as_html, as_picture, as_text, steps_of
     from realizer.result import Realization
 
     play = chosen.play_options(options.read_scene(chosen.scene))
@@ -52,5 +55,7 @@ def explain(
         click.echo(as_text(steps), nl=False)
     else:
         with options.writing(output):
-            output.write_text(as_html(steps, played), "utf-8")
+            write = WRITERS.get(output.suffix.lower())
+            page = as_html(steps, played).encode() if write is None else write(as_picture(steps, played))
+            output.write_bytes(page)
     return 1 if played.refusals or (strict and any(s.dropped for s in played.schedules)) else 0

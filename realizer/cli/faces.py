@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import count
 from pathlib import Path
 
 import click
@@ -15,6 +16,7 @@ HEADS = (".glb", ".gltf")
 SHAPES = "au_shapes.npz"
 FORMS = ("published", "extended")
 RECIPE = "recipe.toml"
+BUILD_STEPS = 6  # of `build_face`
 
 
 @click.group()
@@ -99,9 +101,10 @@ def build(name: str, data: Path, output: Path | None, seed: int | None) -> None:
             raise FaceError(f"{folder / RECIPE}: there is another recipe already; wanted a new folder (-o)")
         folder.mkdir(parents=True, exist_ok=True)
         (folder / RECIPE).write_text(text, "utf-8")
-    click.echo(
-        f"{build_face(name, data, folder, lambda step: click.echo(f'{name}: {step} ...', err=True))}: built"
-    )
+    with options.steps(name) as show:
+        done = count(0)
+        built = build_face(name, data, folder, lambda step: show(next(done), BUILD_STEPS, step))
+    click.echo(f"{built}: built")
 
 
 @faces.command()
@@ -147,7 +150,9 @@ def import_(head: Path, name: str | None, output: Path | None) -> None:
     from realizer.facebuild.arkit.importer import import_head
 
     folder = output or Path("faces") / (name or head.stem)
-    for line in import_head(head, folder, name or folder.name).lines:
+    with options.waiting("importing"):
+        report = import_head(head, folder, name or folder.name)
+    for line in report.lines:
         click.echo(line)
     options.note(f"{folder}: written; look at it: realizer faces sheet {folder.name} -o {folder.name}.png")
 
@@ -159,7 +164,7 @@ def check(names: tuple[str, ...]) -> int:
 
     For a GLB or glTF head, prints what `realizer faces import` would find.
     """
-    from realizer.face.load import face_folders
+    from realizer.face.load import face_folders, folder_of
     from realizer.facebuild.check import check_face
 
     status = 0
@@ -171,6 +176,7 @@ def check(names: tuple[str, ...]) -> int:
             folder = path.resolve()
             faults = check_face(folder.name, folder.parent)
         else:
+            folder_of(name)
             faults = check_face(name)
         for fault in faults:
             click.echo(fault)
@@ -286,14 +292,15 @@ def fit(
             f"{folder / SHAPES}: wanted this face's own shapes, found none; "
             "give landmarks with --from, or the data it was built from with --data"
         )
-    done = 0
-
-    def report(text: str) -> None:
-        nonlocal done
-        done += 1
-        options.note(f"{done}/{len(measured)} {text}")
-
-    models = fit_models(face, measured, tuple(files), report, source)
+    with options.steps("fitting") as show:
+        done = count(1)
+        models = fit_models(
+            face,
+            measured,
+            tuple(files),
+            lambda text: show(at := next(done), len(measured), f"{at}/{len(measured)} {text}"),
+            source,
+        )
     faults = [
         f"{kind}: {fault}" for kind, model in models.items() for fault in runaways(face, model, measured)
     ]

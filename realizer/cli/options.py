@@ -6,8 +6,10 @@ import errno
 import math
 import re
 import sys
+import threading
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
@@ -380,6 +382,59 @@ def progress(pictures: Iterable[Any], label: str, count: int) -> Any:
     """Return a context of the same pictures that shows a bar on standard error; 0 is an unknown number."""
     hidden = is_quiet() or count == 1
     return click.progressbar(pictures, length=count or None, label=label, file=sys.stderr, hidden=hidden)
+
+
+@contextmanager
+def steps(label: str) -> Iterator[Callable[..., None]]:
+    """Give a function (done, count, text="") that shows how much of a work is done.
+
+    On a terminal it shows a bar; elsewhere the texts are printed, a line each.
+    """
+    with ExitStack() as stack:
+        bar: Any = None
+
+        def show(done: int, count: int, text: str = "") -> None:
+            nonlocal bar
+            if not sys.stderr.isatty():
+                if text:
+                    note(f"{label}: {text} ...")
+                return
+            if bar is None:
+                hidden = is_quiet() or count == 1
+                bar = stack.enter_context(
+                    click.progressbar(
+                        length=count,
+                        label=label,
+                        file=sys.stderr,
+                        hidden=hidden,
+                        item_show_func=lambda item: item or "",
+                    )
+                )
+            bar.update(done - bar.pos, text)
+
+        yield show
+
+
+@contextmanager
+def waiting(label: str) -> Iterator[None]:
+    """Show on a terminal for how many seconds a work lasts that has no steps to count."""
+    over, began = threading.Event(), time.monotonic()
+
+    def show() -> None:
+        while not over.wait(1.0):
+            click.echo(f"\r{label}: {time.monotonic() - began:.0f} s", nl=False, err=True)
+        click.echo("\r" + " " * (len(label) + 10) + "\r", nl=False, err=True)
+
+    thread = threading.Thread(target=show, daemon=True)
+    shown = sys.stderr.isatty() and not is_quiet()
+    if shown:
+        thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        if shown:
+            thread.join()
 
 
 def warn_no_voice(voice: str | None) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -156,8 +157,8 @@ def save(realization: Realization, writer: Output, path: Path, drawing: RenderSe
     """Check the settings, write a realization to a file and print its length."""
     with options.reporting(ValueError, "--"):
         writer.check(drawing, realization)
-    with options.writing(path):
-        writer.write(realization, path, drawing)
+    with options.writing(path), options.steps("drawing") as drawn:
+        writer.write(realization, path, replace(drawing, drawn=drawn))
     frames = f"{realization.frames} frames at {realization.fps:g} fps"
     options.note(f"{path}: {realization.duration:.2f} s, {frames}")
 

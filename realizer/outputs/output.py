@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from numbers import Integral, Real
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -41,6 +41,8 @@ class RenderSettings:
     visemes: bool = False  # whether a .fap file has FAP 1 in addition to the FAPs of the lips
     avatar: str | Path | None = None  # a .glb or .vrm file to animate in a .glb file, instead of the face
     renderer: Renderer | None = None  # started by `Output.begin`
+    # Called with the number of pictures that are drawn, and of all.
+    drawn: Callable[[int, int], None] | None = field(default=None, compare=False)
 
     def check_types(self) -> None:
         """Raise TypeError for a value of another type, and ValueError for an impossible size."""
@@ -73,6 +75,7 @@ class RenderSettings:
         ends = [*(first for first, _ in faces[1:]), realization.frames]
         with ExitStack() as stack:
             renderers: dict[str, Renderer] = {}
+            done = 0
             for (first, part), end in zip(faces, ends, strict=True):
                 rows = [frame - first for frame in frames if first <= frame < end]
                 if not rows:
@@ -81,7 +84,11 @@ class RenderSettings:
                     renderers[part.face_name] = stack.enter_context(
                         self.make_renderer(realization, size, part.face_name)
                     )
-                yield from pictures(part, renderers[part.face_name], rows)
+                for picture in pictures(part, renderers[part.face_name], rows):
+                    yield picture
+                    done += 1
+                    if self.drawn is not None:
+                        self.drawn(done, len(frames))
 
     def make_renderer(
         self, realization: Realization, size: tuple[int, int], face: str, *, alpha: bool = False

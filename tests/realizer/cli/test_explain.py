@@ -29,6 +29,14 @@ def test_explain_writes_a_page(tmp_path: Path) -> None:
     assert run("explain", "-", "-o", str(tmp_path / "x.txt"), stdin=BML).returncode == 2
 
 
+def test_explain_draws_the_steps(tmp_path: Path) -> None:
+    drawing = tmp_path / "x.svg"
+    assert run("explain", "-", "-o", str(drawing), stdin=BML).returncode == 0
+    text = drawing.read_text()
+    assert all(f">{number} {name}<" in text for number, name in ((1, "parse"), (3, "schedule"), (8, "draw")))
+    assert text.count("<path") + text.count("<polyline") > 10  # the timeline and the curves
+
+
 def test_explain_reports_a_document_that_is_refused() -> None:
     done = run("explain", "-", stdin="<bml/>")
     assert (done.returncode, done.stdout) == (1, "")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import click
@@ -9,12 +10,13 @@ import pytest
 from click.shell_completion import ShellComplete
 from click.testing import CliRunner, Result
 
-from realizer.cli import cli
+from realizer.cli import cli, options
 from realizer.cli.options import parse_size
 from realizer.server import serve
 from realizer.speech.espeak.voice import EspeakVoice
 from realizer.speech.registry import VOICES
 from realizer.speech.silent import SilentVoice
+from tests.commands import run as run_command
 from tests.rows import each_row
 
 CONTEXT, OPTION = click.Context(cli), click.Option(["--size"])
@@ -154,3 +156,71 @@ def test_options_complete_their_values(words: str, found: str) -> None:
     *before, typed = words.split()
     completion = ShellComplete(cli, {}, "realizer", "_REALIZER_COMPLETE")
     assert found in [item.value for item in completion.get_completions(before, typed)]
+
+
+class Terminal(io.StringIO):
+    """Standard error of somebody who looks at it."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def context() -> click.Context:
+    return click.Context(cli, obj={})
+
+
+def test_steps_shows_a_bar_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stderr", terminal := Terminal())
+    with context(), options.steps("drawing") as show:
+        for done in range(1, 5):
+            show(done, 4)
+    assert "drawing" in terminal.getvalue()
+    assert "100%" in terminal.getvalue()
+
+
+def test_steps_prints_texts_elsewhere(capsys: pytest.CaptureFixture[str]) -> None:
+    with context(), options.steps("ada") as show:
+        show(0, 2, "paint the skin")
+        show(1, 2)
+    assert capsys.readouterr().err == "ada: paint the skin ...\n"
+
+
+def test_waiting_ends_with_its_work(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with context(), options.waiting("importing"):
+        pass
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr("sys.stderr", terminal := Terminal())
+    with context(), pytest.raises(ValueError, match="bad"), options.waiting("importing"):
+        raise ValueError("bad")
+    assert terminal.getvalue().strip() == ""  # the line is cleared
+
+
+def test_every_option_has_a_long_name() -> None:
+    def nameless(command: click.Command, path: str) -> list[str]:
+        found = [
+            f"{path} {option.opts}"
+            for option in command.params
+            if isinstance(option, click.Option) and not any(name.startswith("--") for name in option.opts)
+        ]
+        nested = command.commands.items() if isinstance(command, click.Group) else ()
+        return found + [row for name, each in nested for row in nameless(each, f"{path} {name}")]
+
+    assert nameless(cli, "realizer") == []
+
+
+@pytest.mark.parametrize(
+    ("command", "status"),
+    [
+        (["faces", "check", "adda"], 2),
+        (["faces", "sheet", "adda", "-o", "x.png"], 2),
+        (["align", "{file}", "words"], 1),
+    ],
+)
+def test_commands_exit_with_one_prefix_and_the_status_of_the_fault(
+    command: list[str], status: int, tmp_path: Path
+) -> None:
+    (file := tmp_path / "hi.bml").write_text("<bml/>")
+    done = run_command(*(word.format(file=file) for word in command))
+    assert (done.returncode, done.stderr.startswith("realizer: ")) == (status, True)
