@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from realizer.analysis.recognise import recogniser
-from realizer.core.array_types import Float64
 from realizer.core.errors import TableError
 from realizer.study.answers import COLUMNS
 from realizer.study.items import NAMES
@@ -65,46 +64,31 @@ class _Eyes:
 
     def answer(self, item: Mapping[str, Any]) -> tuple[str, str] | None:
         """Return an answer and an angle on the wheel, or None."""
-        if item["kind"] == "naming":
-            return self._name(item["shown"]["face"])
-        if item["kind"] in ("visual", "emotional"):
-            chosen = self._most_similar(item)
-            return None if chosen is None else (chosen, "")
-        return None
-
-    def _name(self, file: str) -> tuple[str, str] | None:
-        seen = self._seen(file)
-        if seen is None:
+        kind, shown = item["kind"], item["shown"]
+        if kind not in ("visual", "emotional", "naming"):
             return None
-        (name,) = recogniser().names(measure(seen).faps, mask())
-        return (name, f"{ring('paul')[name].angle:g}") if name in NAMES else ("other", "")
-
-    def _most_similar(self, item: Mapping[str, Any]) -> str | None:
-        shown = item["shown"]
-        wanted = self._measured(shown["reference"], shown.get("rest"))
-        faces = [self._measured(file, shown["neutral"]) for file in item["options"]]
-        if wanted is None or None in faces:
+        pairs = [(shown["face"], "")] if kind == "naming" else [(shown["reference"], shown.get("rest", ""))]
+        faces = [
+            self._measured(*pair) for pair in [*pairs, *((o, shown["neutral"]) for o in item["options"])]
+        ]
+        found = [face for face in faces if face is not None]
+        if len(found) < len(faces):
             return None
-        kind = _emotions if item["kind"] == "emotional" else _units
-        apart = [float(np.linalg.norm(kind(face) - kind(wanted))) for face in faces if face is not None]
-        if kind is _units and min(apart) > NEAR:
-            return "none"
-        return str(item["options"][int(np.argmin(apart))])
+        if kind == "naming":
+            (name,) = recogniser().names(found[0].faps, mask())
+            return (name, f"{ring('paul')[name].angle:g}") if name in NAMES else ("other", "")
+        if kind == "emotional":
+            values = [recogniser().beliefs(face.faps, mask())[0] for face in found]
+        else:
+            values = [face.units[0] for face in found]
+        apart = np.linalg.norm(np.stack(values[1:]) - values[0], axis=1)
+        too_far = kind == "visual" and apart.min() > NEAR
+        return "none" if too_far else str(item["options"][int(np.argmin(apart))]), ""
 
-    def _measured(self, file: str, rest: str | None) -> Measured | None:
-        seen, neutral = self._seen(file), rest and self._seen(rest)
+    def _measured(self, file: str, rest: str) -> Measured | None:
+        seen, neutral = self._seen(file), self._seen(rest) if rest else None
         return None if seen is None else measure(seen, neutral.values[0] if neutral else None)
 
     def _look(self, file: str) -> Components | None:
         people = follow([Picture(0.0, read_picture(self._folder / file), file)])[1]
         return components(people[0].faces) if people else None
-
-
-def _units(face: Measured) -> Float64:
-    values: Float64 = face.units[0]
-    return values
-
-
-def _emotions(face: Measured) -> Float64:
-    beliefs: Float64 = recogniser().beliefs(face.faps, mask())[0]
-    return beliefs

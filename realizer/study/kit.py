@@ -36,16 +36,13 @@ def texts() -> dict[str, Any]:
 
 def check_folder(folder: Path) -> None:
     """Raise ValueError unless a study can be written there without replacing anything."""
+    parent = folder.resolve().parent
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise ValueError(f"{folder}: wanted a new or empty folder, got one with files in it")
     if key_of(folder).exists():
-        raise ValueError(
-            f"{key_of(folder)}: the key of an earlier study is there; move it or name another DIR"
-        )
-    if not folder.resolve().parent.is_dir():
-        raise ValueError(
-            f"{folder.resolve().parent}: wanted a folder in which to make {folder.name}, got none"
-        )
+        raise ValueError(f"{key_of(folder)}: is the key of an earlier study; move it, or name another DIR")
+    if not (parent.is_dir() and os.access(parent, os.W_OK)):
+        raise ValueError(f"{parent}: wanted a folder that can be written, to make {folder.name} in it")
 
 
 def write_kit(folder: Path, items: Sequence[Item], about: Mapping[str, Any]) -> Path:

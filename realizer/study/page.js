@@ -77,7 +77,7 @@ function consent() {
     if (storage) hint.textContent = count ? say("resume", { count }) : "";
   };
   number.addEventListener("input", look);
-  number.value = kept("last") ?? (location.hash.slice(1) || "");
+  number.value = location.hash.slice(1) || (kept("last") ?? "");
   const form = make("form", { onsubmit: (event) => {
     event.preventDefault();
     judge = kept(number.value) ?? { number: Number(number.value), place: 0, answers: {} };

@@ -68,7 +68,7 @@ def test_make_refuses_before_it_draws(tmp_path: Path) -> None:
     kit(tmp_path / "s", named())
     for args, said in (
         ((tmp_path / "s",), "wanted a new or empty folder"),
-        ((tmp_path / "no" / "s",), "wanted a folder in which to make s"),
+        ((tmp_path / "no" / "s",), "wanted a folder that can be written, to make s in it"),
         ((tmp_path / "x", "--face", "zorg"), "zorg"),
         ((tmp_path / "x", "--face", "ada", "--face", "ada"), "wanted different names"),
         ((tmp_path / "x", "--kind", "smell"), "smell"),

@@ -66,7 +66,7 @@ def test_check_folder_refuses_to_replace_anything(tmp_path: Path) -> None:
     for name, said in (
         ("full", "files in it"),
         ("old", "key of an earlier"),
-        ("no/where", "wanted a folder in"),
+        ("no/where", "that can be written"),
     ):
         with pytest.raises(ValueError, match=said):
             check_folder(tmp_path / name)
