@@ -9,6 +9,7 @@ import numpy as np
 
 from realizer.analysis.statistics import from_faces
 from realizer.core.atomic_files import write_text
+from realizer.corpus.expressions import found_expressions, write_expressions
 from realizer.corpus.statistics import (
     FEWEST,
     KINDS,
@@ -43,7 +44,7 @@ Rules = Iterator[tuple[str, dict[str, Any]]]
 
 
 def write_rules(folder: Path, study: Study) -> list[str]:
-    """Write knowledge.toml, templates.toml and profiles.txt, as far as there is data; return their names."""
+    """Write rules, durations, profiles and expressions as far as there is data; return the files' names."""
     tables = [*_placements(study), *_companions(study), *_paces(study)]
     texts = {"knowledge.toml": _toml(tables), "templates.toml": _toml(_durations(study))}
     found = {name: HEAD.format(len(study.recordings)) + text for name, text in texts.items() if text}
@@ -51,7 +52,7 @@ def write_rules(folder: Path, study: Study) -> list[str]:
         found["profiles.txt"] = write_profiles(shown)
     for name, text in found.items():
         write_text(folder / name, text)
-    return list(found)
+    return [*found, *write_expressions(folder, study)]
 
 
 def _placements(study: Study) -> Rules:
@@ -117,15 +118,17 @@ def _paces(study: Study) -> Rules:
 
 
 def _durations(study: Study) -> Rules:
-    """Yield the templates whose names a corpus has, with its durations."""
-    rate = study.recordings[0].fps
+    """Yield the expressions that are templates or whose faces a corpus has, with its durations."""
+    rate, found = study.recordings[0].fps, {one.name: one.aus for one in found_expressions(study)}
     for name, least, most, mean, deviation in lengths(study).rows:
-        if (template := templates().get(name.upper())) is None:
+        template, aus = templates().get(name.upper()), found.get(name)
+        if template is not None:
+            units = template.aus.items()
+            aus = {f"{number}{side[0] if side != 'BOTH' else ''}": v for (number, side), v in units}
+        if aus is None:
             continue
-        aus = {
-            f"{number}{side[0] if side != 'BOTH' else ''}": v for (number, side), v in template.aus.items()
-        }
-        row: dict[str, Any] = {"features": template.features, "aus": aus, "frames": mean / (rate * FRAME)}
+        features = template.features if template is not None else ""
+        row: dict[str, Any] = {"features": features, "aus": aus, "frames": mean / (rate * FRAME)}
         if deviation is not None:
             own = [len(segment) / rate for segment in study.every if segment.text == name]
             row |= {"deviation": deviation / (rate * FRAME), "possible": [least / rate, most / rate]}

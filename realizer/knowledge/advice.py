@@ -83,7 +83,8 @@ def advise(
 
 def _duration(one: VisibleExpression, mood: Mood | None) -> Iterator[Advice]:
     """Yield advice on a duration that was never or rarely observed, considering the mood."""
-    template = templates()[one.template.upper()]
+    if (template := templates().get(one.template.upper())) is None:
+        return  # an expression of the user's that is named like a template
     source = "Wojdel 2005, table 6.15"
     lasts, probable = one.end - one.start, template.probable
     if probable is not None:

@@ -146,9 +146,10 @@ class Enricher:
         if end is not None:
             syncs["end"] = end
         elif self.mood is not None or self.durations is not None:
-            known = {**templates(), **(self.durations or {})}
-            held = _hold_seconds(known[name.upper()], self.mood.length if self.mood else 1.0)
-            syncs["relax"] = SyncRef(behaviour=id, sync="attackPeak", offset=round(held, 3))
+            known = {**templates(), **(self.durations or {})}.get(name.upper())
+            if known is not None:  # rules of one's own may show others
+                held = _hold_seconds(known, self.mood.length if self.mood else 1.0)
+                syncs["relax"] = SyncRef(behaviour=id, sync="attackPeak", offset=round(held, 3))
         return Expression(id=id, name=PREFIX + name, intensity=INTENSITY, because=because, syncs=syncs)
 
     def _company(

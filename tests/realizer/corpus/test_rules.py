@@ -59,7 +59,8 @@ def study() -> Study:
 @pytest.fixture(scope="module")
 def folder(study: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("rules")
-    assert write_rules(path, study) == ["knowledge.toml", "templates.toml", "profiles.txt"]
+    tables = ["knowledge.toml", "templates.toml", "profiles.txt"]
+    assert write_rules(path, study) == [*tables, "expressions/grief.toml"]
     return path
 
 
