@@ -135,12 +135,13 @@ def find(folder: Path) -> None:
 @click.option(
     "-o", "--output", metavar="DIR", type=options.OUTPUT, help="Folder to write.  [default: DIR/report]"
 )
-def describe(folder: Path, annotator: str | None, output: Path | None) -> None:
-    """Write statistics as tables and report.html, and the rules, durations and profiles that follow.
+@click.option("--word", "watched", multiple=True, help="A word with a row in table 6.11 even if it is rare.")
+def describe(folder: Path, annotator: str | None, output: Path | None, watched: tuple[str, ...]) -> None:
+    """Write statistics as tables and report.html, and the rules, durations, profiles and expressions.
 
     The tables are those of Wojdel 2005, 6.3 to 6.14, and table 4 of Raouzaiou et al. 2002. `realizer enrich
     --knowledge DIR/report` uses the rules, `realizer emotion --profiles DIR/report/profiles.txt` the
-    profiles.
+    profiles, and `realizer realize --expressions DIR/report/expressions` the expressions.
     """
     from realizer.corpus.recording import read_corpus
     from realizer.corpus.report import describe as write_report
@@ -149,7 +150,7 @@ def describe(folder: Path, annotator: str | None, output: Path | None) -> None:
 
     recordings, target = read_corpus(folder), output or folder / "report"
     language = next((str(one.meta["language"]) for one in recordings if "language" in one.meta), "en")
-    study = Study(recordings, annotator, word_list(language))
+    study = Study(recordings, annotator, word_list(language), frozenset(map(str.lower, watched)))
     if not study.every:
         raise click.UsageError(f"{folder}: wanted labels, got none; add some, or see `realizer corpus find`")
     options.note(f"{target}: {', '.join(write_report(target, study, folder))}")

@@ -49,11 +49,13 @@ class Study:
         recordings: at least one.
         annotator: whose labels count; None: the first of each recording.
         words: emotional words; None: there are none.
+        watched: words that have a row in table 6.11 however rare they are.
     """
 
     recordings: Sequence[Recording]
     annotator: str | None = None
     words: WordList | None = None
+    watched: frozenset[str] = frozenset()
 
     @cached_property
     def parts(self) -> list[tuple[Recording, list[Segment]]]:
@@ -235,14 +237,16 @@ def questions(study: Study) -> Table:
 
 
 def words(study: Study) -> Table:
-    """Table 6.11: expressions at frequent words of the subject."""
+    """Table 6.11: expressions at words of the subject that are frequent, or watched."""
     said = [(text, shown) for text, _, by, shown in study.linked if by == SUBJECT and text]
     found = Counter((text, name) for text, shown in said for name in shown)
     usual = [
-        (text, count) for text, count in Counter(text for text, _ in said).most_common() if count >= FEWEST
+        (text, count)
+        for text, count in Counter(text for text, _ in said).most_common()
+        if count >= FEWEST or text in study.watched
     ]
     rows = tuple((text, count, *(found[text, name] for name in study.totals)) for text, count in usual)
-    return Table("6.11", "Expressions at frequent words", ("word", "count", *study.totals), rows)
+    return Table("6.11", "Expressions at words", ("word", "count", *study.totals), rows)
 
 
 def emotional(study: Study) -> Table:

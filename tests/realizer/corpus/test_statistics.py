@@ -63,6 +63,14 @@ QUESTIONS = {
 }
 SENTENCES = (9, 33, 11, 19)
 TEXTS = (["really?"], ["are", "you", "sure?"], ["do", "you", "know", "who", "he", "is?"], ["go", "away!"])
+# Table 6.11: how often each word was said, and with which expressions.
+SHOWN = ("anger", "surprise", "grief", "disgust")
+WORDS = {
+    "Co?": (19, (6, 8, 5, 1)),
+    "coś": (6, (3, 2, 1, 0)),
+    "jakiś": (1, (1, 0, 0, 0)),
+    "nic": (3, (2, 1, 0, 0)),
+}
 # Table 6.14: expressions at emotional words, of 78.
 EMOTIONAL = {"surprise": 21, "grief": 8, "anger": 21, "disgust": 9, "happiness": 10}
 
@@ -226,12 +234,19 @@ def test_questions_are_those_of_table_6_10(asked: Study) -> None:
 
 
 def test_words_have_the_expressions_of_table_6_11() -> None:
-    texts = {"surprise": 8, "grief": 5, "anger": 6, "disgust": 1}
-    labels = [label(60 * k, 10, name) for name, count in texts.items() for k in range(count)]
-    words = [word for k in range(19) for word in said(["Co?"], 60 * k)]
-    table = statistics.words(Study([Recording("r", {}, tuple(labels), tuple(words))]))
-    assert table.rows == (("co", 19, 8, 6, 5, 1),)
-    assert table.columns[2:] == ("surprise", "anger", "grief", "disgust")
+    labels, words, at = [], [], 0
+    for text, (count, shown) in WORDS.items():
+        for k in range(count):
+            words += said([text], at)
+            labels += [label(at, 10, name) for name, times in zip(SHOWN, shown, strict=True) if k < times]
+            at += 60
+    recording = Recording("r", {}, tuple(labels), tuple(words))
+    table = statistics.words(Study([recording], watched=frozenset({"coś", "jakiś", "nic"})))
+    assert table.columns == ("word", "count", *SHOWN)
+    assert {row[0]: (row[1], row[2:]) for row in table.rows} == {
+        k.strip("?").lower(): v for k, v in WORDS.items()
+    }
+    assert [row[0] for row in statistics.words(Study([recording])).rows] == ["co"]
 
 
 def test_emotional_words_are_those_of_table_6_12() -> None:
