@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import click
 
 from realizer.cli import options
+from realizer.cli.marker_options import follow as follow_markers
+from realizer.cli.marker_options import look_of, marker_options
+from realizer.cli.track import follow as follow_faces
 
 folder = click.argument("folder", metavar="DIR", type=options.FOLDER)
+SEGMENT = (click.FLOAT, click.FLOAT, click.STRING)
+Spans: TypeAlias = tuple[tuple[float, float, str], ...]
 
 
 @click.group()
@@ -20,6 +25,8 @@ def corpus() -> None:
     \b
     realizer corpus init films
     realizer corpus add films anna --person anna --mood anxiety anna.csv anna.eaf
+    realizer corpus track films
+    realizer corpus label films anna --annotator eva --add 1.2 1.9 surprise
     realizer corpus learn films
     realizer corpus find films
     realizer corpus describe films
@@ -56,28 +63,117 @@ def init(folder: Path) -> None:
 )
 @click.option("--frames", type=click.IntRange(1, 1_000_000), help="Frames, if more than files tell.")
 def add(folder: Path, name: str, files: tuple[Path, ...], **facts: Any) -> None:
-    """Add a recording NAME, or more FILES of it: FAPs, points, labels and words.
+    """Add a recording NAME, or more FILES of it: a film, FAPs, points, labels and words.
 
-    A FILE is .fap or .csv (of `realizer track`, our labels, words or points, OpenFace, Live Link), .eaf of
-    ELAN, .TextGrid of Praat, or .json (MediaPipe, or words of `realizer align`). A tier `words` or `words
-    SPEAKER` has words; any other has the labels of the annotator of its name.
+    A FILE is a film, which is copied for `realizer corpus track`, .fap or .csv (of `realizer track`, our
+    labels, words or points, OpenFace, Live Link), .eaf of ELAN, .TextGrid of Praat, or .json (MediaPipe, or
+    words of `realizer align`). A tier `words` or `words SPEAKER` has words; any other has the labels of the
+    annotator of its name.
     """
+    import shutil
+
+    from realizer.core.atomic_files import replacing
     from realizer.corpus import recording as recordings
+    from realizer.corpus.films import is_film
     from realizer.corpus.formats import merged, read_part
 
     path = folder / name
-    if not (folder / recordings.CORPUS).is_file():
-        raise click.UsageError(f"{folder}: wanted a corpus; make one by `realizer corpus init {folder}`")
+    _check_corpus(folder)
     if Path(name).name != name or name.startswith("."):
         raise click.UsageError(f"wanted a name without / for the recording, got {name!r}")
     there = (path / recordings.META).is_file()
     found = recordings.read_recording(path) if there else recordings.Recording(name)
     for file in files:
-        found = merged(found, read_part(file))
+        if is_film(file):
+            path.mkdir(exist_ok=True)
+            with replacing(path / f"film{file.suffix.lower()}") as draft:
+                shutil.copyfile(file, draft)
+        else:
+            found = merged(found, read_part(file))
     known = {key: fact for key, fact in facts.items() if fact is not None}
     found = replace(found, meta={**found.meta, **known})
     recordings.write_recording(path, found)
     options.note(f"{path}: {found.frames} frames, {len(found.labels)} labels, {len(found.words)} words")
+
+
+@corpus.command()
+@folder
+@click.argument("names", nargs=-1)
+@marker_options
+@click.option("--neutral", type=click.IntRange(0), help="Number of the picture that shows markers at rest.")
+@options.face("Face whose feature points markers are laid on", default="default", show_default=True)
+def track(folder: Path, names: tuple[str, ...], neutral: int | None, face: str, **chosen: Any) -> int:
+    """Track the films of a corpus, or of recordings NAMES, that have no points or FAPs yet.
+
+    A film is in the folder of its recording, or beside these folders, with the name of its recording. With
+    --markers, --marker-colour or --marker-at, painted markers are followed instead of the face. What was
+    interrupted is done again, what is done is left alone. Exits with 1 if a film cannot be tracked.
+    """
+    from realizer.corpus import films
+    from realizer.corpus.recording import CorpusError, write_recording
+    from realizer.tracking.network import TrackingError
+
+    _check_corpus(folder)
+    found = films.films(folder)
+    if unknown := sorted({*names} - {target.name for target in found.values()}):
+        raise click.UsageError(f"{folder}: wanted recordings with a film, got {unknown[0]!r}")
+    failed = done = 0
+    for film, target in found.items():
+        try:
+            if (names and target.name not in names) or (known := films.to_track(target)) is None:
+                continue
+            look = look_of(film, chosen, neutral)
+            if look is not None:
+                known = films.with_markers(known, follow_markers(film, look, None), face)
+            else:
+                times, people = follow_faces(film, None)
+                known = films.with_face(known, people[0], times)
+                if len(people) > 1:
+                    options.note(f"{film}: {len(people)} people; took the one who is seen most")
+            write_recording(target, known)
+        except (TrackingError, CorpusError) as error:
+            click.echo(f"realizer: {error}", err=True)
+            failed += 1
+            continue
+        done += 1
+        options.note(f"{target}: {known.frames} frames")
+    options.note(f"{folder}: {done} of {len(found)} films tracked, {failed} failed")
+    return 1 if failed else 0
+
+
+@corpus.command()
+@folder
+@click.argument("name")
+@click.option("--annotator", default="me", show_default=True, help="Whose labels to add or remove.")
+@click.option("--add", "added", type=SEGMENT, multiple=True, metavar="START END EXPRESSION", help="Seconds.")
+@click.option("--remove", "removed", type=SEGMENT, multiple=True, metavar="START END EXPRESSION")
+def label(folder: Path, name: str, annotator: str, added: Spans, removed: Spans) -> None:
+    """Add or remove segments of a recording NAME, and print them with the agreement of annotators.
+
+    Segments of other programs come in by `realizer corpus add`, and go out by `realizer corpus export`.
+    """
+    from realizer.corpus.agreement import agreement
+    from realizer.corpus.labels import change
+    from realizer.corpus.recording import CorpusError, read_recording, write_recording
+
+    with options.reporting(CorpusError):
+        found = read_recording(folder / name)
+        if added or removed:
+            found = change(found, annotator, added, removed)
+            write_recording(folder / name, found)
+    for one in found.labels:
+        click.echo(f"{one.start:9.3f} {one.end:9.3f}  {one.text}  [{one.by}]")
+    if len(found.annotators) > 1:
+        table = agreement([found])
+        for expression, alpha in table.rows:
+            click.echo(f"{table.title}, {expression}: {'-' if alpha is None else f'{alpha:.2f}'}")
+
+
+def _check_corpus(folder: Path) -> None:
+    from realizer.corpus.recording import CORPUS
+
+    if not (folder / CORPUS).is_file():
+        raise click.UsageError(f"{folder}: wanted a corpus; make one by `realizer corpus init {folder}`")
 
 
 @corpus.command()

@@ -154,7 +154,7 @@ def _from_pictures(
         return _from_markers(source, output, fps, look, face or "default")
     options.check_suffix(output, *FORMATS)
     with options.reporting(TrackingError):
-        times, people = _follow(source, fps)
+        times, people = follow(source, fps)
         if person > len(people):
             raise click.BadParameter(f"there are {len(people)} people in {source}", param_hint="--person")
         subject = people[person - 1]
@@ -169,7 +169,7 @@ def _from_pictures(
     return FORMATS[output.suffix.lower()](recording, output.stem), recording.fps, recording.faps, mask()
 
 
-def _follow(source: Path, fps: float | None) -> tuple[list[float], list[Person]]:
+def follow(source: Path, fps: float | None) -> tuple[list[float], list[Person]]:
     """Return the times of all pictures, and the people in them."""
     from realizer.tracking.follower import follow
     from realizer.tracking.network import TrackingError
@@ -198,7 +198,7 @@ def _neutral(neutral: str, person: Person) -> Person:
         raise click.BadParameter(
             f"wanted the number of a picture, or a file, got {neutral!r}", param_hint="--neutral"
         )
-    return _follow(Path(neutral), None)[1][0]
+    return follow(Path(neutral), None)[1][0]
 
 
 def _fapu(rest: dict[str, Float64], where: str) -> Fapu:

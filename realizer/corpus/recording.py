@@ -139,10 +139,17 @@ def read_corpus(folder: Path) -> list[Recording]:
 def read_recording(folder: Path) -> Recording:
     """Return the recording in a folder; raises CorpusError."""
     if not (folder / META).is_file():
-        raise CorpusError(f"{folder}: wanted {META}, got none; it is half written, add it again")
+        raise CorpusError(
+            f"{folder}: wanted {META}, got none; it is half written: add it, or track its film, again"
+        )
+    return read_parts(folder)
+
+
+def read_parts(folder: Path) -> Recording:
+    """Return what a folder has of a recording, even if it has no facts; raises CorpusError."""
     path = folder / META
     try:
-        meta = parse_toml(path.read_text("utf-8"))
+        meta = parse_toml(path.read_text("utf-8")) if path.is_file() else {}
         if unknown := sorted(meta.keys() - {*FACTS, "fps", "frames"}):
             raise ValueError(f"{unknown[0]} is none of {', '.join(FACTS)}, fps, frames")
         if not (0 < meta.get("fps", 25.0) <= 1000 and 0 <= meta.get("frames", 0) <= MAX_FRAMES):
@@ -167,7 +174,7 @@ def write_recording(folder: Path, recording: Recording) -> None:
     """Write a recording; its facts come last, so that what is half written is seen."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, spans in ((LABELS, recording.labels), (WORDS, recording.words)):
-        if spans:
+        if spans or (folder / name).exists():
             write_text(folder / name, csv_text(COLUMNS[name], map(astuple, spans)))
     if recording.faps is not None:
         rows = (
