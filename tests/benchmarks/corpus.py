@@ -4,8 +4,9 @@ python tests/benchmarks/corpus.py [--minutes 3] [--frames 15000] [--keep DIR]
 
 Films of three faces with 31 painted dots, 720 x 576, show random timelines of the twelve templates while
 the mouth speaks and the head moves; 2 % of the dots are hidden, in spells. The face below the dots is drawn
-once a second, as drawing is slow; the dots move in every frame, and the film is compressed. Asked are a median
-error of the markers under 2 pixels, and the right order in 99.5 % of the frames. A map learns what was tracked.
+once a second, as drawing is slow; the dots move in every frame, and the film is compressed. Asked are a
+median error of the markers under 2 pixels, and the right order in 99.5 % of the frames. A map learns what
+was tracked.
 
 Then four recordings show the templates as often as those of Wojdel 2005 (table 6.3), at random times,
 lengths and strengths, with a mouth that speaks and with noise. A map learns two of them, with their labels

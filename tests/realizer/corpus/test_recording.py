@@ -62,7 +62,7 @@ def test_read_corpus_returns_recordings_by_name(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
-        ("meta.toml", None, r"anna: wanted meta\.toml, got none; it is half written: add it, or track its film, again"),
+        ("meta.toml", None, r"anna: wanted meta\.toml, got none; it is half written: add it, or track"),
         ("meta.toml", "fps = ", r"meta\.toml: wanted .*; add it again"),
         ("meta.toml", "fps = 0", r"meta\.toml: .*fps up to 1000"),
         ("meta.toml", "fps = 'x'", r"meta\.toml: wanted"),
