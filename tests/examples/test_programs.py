@@ -158,3 +158,13 @@ def test_notebook_runs_from_top_to_bottom(tmp_path: Path, monkeypatch: pytest.Mo
             exec("".join(cell["source"]), names)
     assert (tmp_path / "hello.webp").stat().st_size > 10_000
     assert "<video" in names["r"]._repr_html_()  # type: ignore[attr-defined]
+
+
+@pytest.mark.espeak
+def test_languages_speaks_each_of_them(run: Callable[..., str], tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setenv("REALIZER_VOICE", "espeak")
+    lines = run("languages.py", "de", "ru").splitlines()
+    assert [line.partition(":")[0] for line in lines] == ["de.TextGrid", "ru.TextGrid"]
+    assert all(float(re.findall(r"by ([\d.]+)", line)[0]) > 0.2 for line in lines)
+    assert '"Guten"' in (tmp_path / "de.TextGrid").read_text("utf-8")
+    assert "лицо" in (tmp_path / "ru.TextGrid").read_text("utf-8")
