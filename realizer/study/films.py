@@ -85,7 +85,17 @@ def films(
                     encoded[name] = _film(played[name])
                     step(1)
                 truth = {"variant": variant.name, "text": text, "pair": list(pair)}
-                yield Item("films", truth, {}, {name: encoded[name] for name in pair}, {"text": text})
+                shown = {name: padded(encoded[name], draws) for name in pair}
+                yield Item("films", truth, {}, shown, {"text": text})
+
+
+def padded(film: bytes, draws: np.random.Generator) -> bytes:
+    """Return a WebM file with a Void element of random length, so that no two files of one film are the same.
+
+    Otherwise the film that is in most pairs would be known as the enriched one.
+    """
+    size = int(draws.integers(1000, 16000))
+    return film + b"\xec" + (0x4000 | size).to_bytes(2, "big") + draws.bytes(size)
 
 
 def _film(played: Realization) -> bytes:

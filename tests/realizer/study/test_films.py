@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+
 import numpy as np
 import pytest
 
@@ -24,9 +26,12 @@ def test_control_has_as_many_expressions_at_words() -> None:
 @pytest.mark.gl
 @pytest.mark.slow
 def test_films_are_pairs_with_and_without_rules() -> None:
-    pytest.importorskip("av")
+    av = pytest.importorskip("av")
     found = list(films([Variant("ada")], ["Why?"], "en", np.random.default_rng(1), lambda count: None))
     assert ["enriched", "plain"] in [one.truth["pair"] for one in found]
+    files = [content for one in found for content in one.options.values()]
+    assert len({len(content) for content in files}) == len(files)
+    assert av.open(io.BytesIO(files[0])).duration > 500_000  # microseconds
     for one in found:
         assert list(one.options) == one.truth["pair"]
         assert all(content[:4] == b"\x1aE\xdf\xa3" for content in one.options.values())
