@@ -347,4 +347,4 @@ link.connect();
 requestAnimationFrame(draw);
 
 // For tests of the page: what has been shown.
-globalThis.realizerPage = { stage, sound, link, clock, editor, timeline, pose, recorder, room };
+globalThis.realizerPage = { stage, sound, link, clock, editor, timeline, pose, recorder, room, mirror };

@@ -124,7 +124,7 @@ export class Mirror {
 
   // A frame of the stream of FAPs.
   fap(values) {
-    if (this.rows) this.faps.push(Array.from(values));
+    if (this.rows && this.running) this.faps.push(Array.from(values));
   }
 
   record() {
@@ -148,7 +148,8 @@ export class Mirror {
   }
 
   show() {
-    at("mirror-stop").disabled = at("mirror-record").disabled = !this.running;
+    at("mirror-stop").disabled = !this.running;
+    at("mirror-record").disabled = !this.running && !this.rows; // what was recorded can be saved after the film's end
     at("mirror-video").hidden = !this.running;
     at("mirror-record").textContent = this.rows ? "Save" : "Record";
     at("mirror-record").ariaPressed = String(Boolean(this.rows));
