@@ -9,6 +9,7 @@ import click
 
 from realizer.cli import options
 from realizer.cli.edit_face import edit_face
+from realizer.cli.photo import photo
 from realizer.cli.sheet import sheet
 from realizer.core.errors import FaceError
 
@@ -30,6 +31,7 @@ def faces() -> None:
 
 faces.add_command(sheet)
 faces.add_command(edit_face)
+faces.add_command(photo)
 
 
 @faces.command("list")

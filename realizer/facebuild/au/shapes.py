@@ -18,6 +18,7 @@ from realizer.facebuild.person.base_mesh import Ground
 from realizer.facebuild.person.lips import Lips
 from realizer.facebuild.person.person import person_of
 from realizer.facebuild.person.recipe import read_recipe
+from realizer.facebuild.photo.warp import read_warp
 from realizer.facebuild.submesh import Submesh
 
 OPEN = 0.3  # baked light below this: inside the head, or the inner side of a lip
@@ -42,7 +43,8 @@ def measure_shapes(
         FaceError: no recipe or data, or a skin that is not made from them.
     """
     data = makehuman.data_folder(data)
-    ground = person_of(data, read_recipe(folder / "recipe.toml", data).targets).ground
+    targets = read_recipe(folder / "recipe.toml", data).targets
+    ground = person_of(data, targets, read_warp(folder)).ground
     mesh, at = ground.mesh, ground.at
     twin = mesh.mirror()
     first, last = face.parts["skin"]

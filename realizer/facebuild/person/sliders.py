@@ -66,6 +66,11 @@ def person_tables(person: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     }
 
 
+def person_targets(person: Mapping[str, Any]) -> dict[str, float]:
+    """Return [targets] alone; sliders are within their ranges."""
+    return _targets({**DEFAULTS, **person})
+
+
 def description_of(person: Mapping[str, Any]) -> str:
     """Return a sentence about a person, for lists of faces; faulty sliders count as their defaults."""
     told = {key: person[key] for key in ("age", "sex") if _number(person.get(key))}

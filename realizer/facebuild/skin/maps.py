@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -81,6 +81,7 @@ def bake(
     recipe: Recipe,
     part: Part,
     size: int = atlas.SIZE,
+    paint: Callable[[Skin, Float32], Float32] | None = None,
 ) -> SkinMaps:
     """Bake the maps of a person's skin.
 
@@ -88,6 +89,7 @@ def bake(
         name: the face's, from which its spots, pores and lines are drawn.
         part: the skin, with its broad colours.
         size: texels of a side.
+        paint: takes the skin and its colours (k, 3), sRGB 0..255, to other colours.
     """
     patch = part.patch
     assert patch is not None
@@ -97,6 +99,7 @@ def bake(
     lines = lines_of(skin)
     relief = relief_of(skin, lines)
     albedo = paint_albedo(skin, relief.pores, relief.lines)
+    albedo = albedo if paint is None else paint(skin, albedo)
     surface = surface_of(skin, relief)
     # Slopes are drawn as if all texels were of one width.
     step = 255 / RELIEF * np.clip(TEXEL / texels.width, 0.4, 1.5)

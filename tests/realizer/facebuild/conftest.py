@@ -18,7 +18,10 @@ from realizer.facebuild.person.bust import assemble
 from realizer.facebuild.person.makehuman import BaseMesh
 from realizer.facebuild.person.person import Person
 from realizer.facebuild.person.recipe import Recipe
+from realizer.facebuild.skin.atlas import corners
 from realizer.facebuild.skin.maps import SkinMaps, bake
+from realizer.facebuild.skin.skin import Skin
+from realizer.facebuild.skin.texels import Texels
 
 STEP = 0.006  # m between the vertices of the mask
 COUNT = 13_400  # above the highest number that the rings have
@@ -185,3 +188,15 @@ def fields(ground: Ground, person: Person) -> dict[int, np.ndarray]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(fap_fields, "without_flips", lambda fields, *_: dict(fields))
         return fap_fields.face_fields(ground, person.jaw_pivot)[0]
+
+
+@pytest.fixture(scope="session")
+def skin(
+    person: Person, mask_lips: lips.Lips, mask_lids: list[lids.Lid], recipe: Recipe, parts: list[Part]
+) -> Skin:
+    """The skin of an old mask with freckles and stubble, on small maps."""
+    part = parts[0]
+    assert part.patch is not None
+    texels = Texels(part.vertices, part.triangles, corners(person.ground.mesh, part.patch), 256)
+    old = Recipe("An old mask", {}, recipe.colours, {}, {"age": 0.8, "freckles": 1.0, "stubble": 0.8})
+    return Skin(texels, part, person, mask_lips, mask_lids, old, seed=5)
