@@ -60,15 +60,15 @@ def test_projected_counts_what_faces_the_camera_and_lies_inside(skin: Skin) -> N
 
 
 def test_painter_paints_a_spot_where_both_pictures_show_it(skin: Skin) -> None:
-    place = skin.person.ground.point("5.4")  # of the right cheek
+    place = skin.person.ground.point("9.3")  # the tip of the nose
     shown = sight(picture(tuple(AHEAD([place])[0][0])))
     fit = Fit({}, (shown, shown), (AHEAD, AHEAD))
     albedo = np.tile(np.float32([200, 160, 130]), (len(skin.at), 1))
     painted = Painter(fit)(skin, albedo)
-    cheek = near(skin, place + np.array([0, 0.02, 0]), 0.006)
+    plain = near(skin, place + np.array([0, 0.02, 0]), 0.006)
     spot = near(skin, place, 0.002)
-    assert painted[cheek].mean(axis=0) == pytest.approx([200, 160, 130], abs=12)
-    ratio = linear(painted[spot]).mean() / linear(painted[cheek]).mean()
+    assert painted[plain].mean(axis=0) == pytest.approx([200, 160, 130], abs=12)
+    ratio = linear(painted[spot]).mean() / linear(painted[plain]).mean()
     assert ratio == pytest.approx(float(linear(np.float32(0.8 * 190)) / linear(np.float32(190))), abs=0.15)
     wet = ~skin.dry
     assert painted[wet] == pytest.approx(255 * srgb(linear(albedo[wet])), abs=1)
