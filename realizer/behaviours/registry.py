@@ -8,6 +8,7 @@ from typing import Any
 
 from bml_schema import VOCABULARY as SCHEMA
 from bml_schema.node_schema import local
+from realizer.behaviours.guarded import guarded
 from realizer.behaviours.kind import BehaviourKind
 from realizer.core.registry import Registry
 
@@ -62,7 +63,7 @@ class _Kinds(Mapping[str, BehaviourKind]):
         for _, family in FAMILIES.working([name]):
             for kind in family:
                 if self._families.get(kind.tag, name) == name:
-                    self._kinds.setdefault(kind.tag, kind)
+                    self._kinds.setdefault(kind.tag, kind if name in ELEMENTS else guarded(kind, name))
 
     def __getitem__(self, tag: str) -> BehaviourKind:
         if tag not in self._kinds and tag in self._families:

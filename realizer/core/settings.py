@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ipaddress
 import os
+import socket
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -268,6 +269,9 @@ class Settings:
             raise SettingsError(f"setting edit: {words}", "edit")
         if self.tls_key is not None and self.tls_cert is None:
             raise SettingsError("setting tls_key: wanted tls_cert too, got none", "tls_key")
+        if self.workers > 1 and not hasattr(socket, "send_fds"):
+            words = f"wanted 1, got {self.workers}: processes of this system cannot share a port"
+            raise SettingsError(f"setting workers: {words}", "workers")
         if self.tls_cert is not None and self.workers > 1:
             raise SettingsError(
                 f"setting tls_cert: wanted workers = 1, got {self.workers}: connections are distributed to "

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from realizer.core.array_types import UInt8
 from realizer.core.atomic_files import write_bytes
+from realizer.core.errors import PluginError, RealizerError
 
 if TYPE_CHECKING:
     from realizer.face.model import Face
@@ -189,11 +190,23 @@ class Output:
             drawing.check_look(realization.face)
 
     def write(self, realization: Realization, path: Path, drawing: RenderSettings) -> None:
-        """Write the file completely or not at all; `path` may be a device or a pipe."""
-        if self.save is not None:
-            self.save(realization, path, drawing)
-        else:
-            write_bytes(path, self.encode(realization, drawing))
+        """Write the file completely or not at all; `path` may be a device or a pipe.
+
+        Raises:
+            PluginError: this is the output of a plug-in, and has failed.
+        """
+        try:
+            if self.save is not None:
+                self.save(realization, path, drawing)
+            else:
+                write_bytes(path, self.encode(realization, drawing))
+        except (OSError, RealizerError):
+            raise
+        except Exception as error:
+            if self.encode.__module__.startswith("realizer."):
+                raise
+            words = f"the output {self.suffix} of a plug-in failed: {type(error).__name__}: {error}"
+            raise PluginError(words) from error
 
     def begin(self, drawing: RenderSettings, face: str, deformer: str | None = None) -> RenderSettings:
         """Return the settings for `write` with a renderer that starts now, during planning.

@@ -36,6 +36,9 @@ def synthesize(requests: Mapping[str, SpeechRequest], voice: Voice) -> dict[str,
             utterances[behaviour] = speak_to_length(voice, request)
         except VoiceError as error:
             utterances[behaviour] = silent_fallback(request, error)
+        except Exception as error:  # of a plug-in
+            words = f"the voice failed: {type(error).__name__}: {error}"
+            utterances[behaviour] = silent_fallback(request, words)
     return utterances
 
 

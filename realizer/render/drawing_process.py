@@ -23,6 +23,8 @@ class DrawingProcess:
     """A drawing process, which opens its canvas while its owner continues."""
 
     def __init__(self, order: Open) -> None:
+        if os.name == "nt":
+            raise RenderError("pictures are drawn by a process that shares files: wanted Linux or macOS")
         self._opened = threading.Event()
         self.pixels = Pixels(order.memory, order.slots, order.size, channels(order.background))
         self._popen = subprocess.Popen(

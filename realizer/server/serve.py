@@ -123,12 +123,18 @@ def _wait_for_signal(*signals: signal.Signals) -> asyncio.Future[None]:
 
     def handle() -> None:
         for number in signals:
-            loop.remove_signal_handler(number)
+            try:
+                loop.remove_signal_handler(number)
+            except NotImplementedError:
+                signal.signal(number, signal.SIG_DFL)
         if not received.done():
             received.set_result(None)
 
     for number in signals:
-        loop.add_signal_handler(number, handle)
+        try:
+            loop.add_signal_handler(number, handle)
+        except NotImplementedError:  # the event loops of Windows have none
+            signal.signal(number, lambda *_: loop.call_soon_threadsafe(handle))
     return received
 
 

@@ -1,10 +1,14 @@
 """The registry of transports beside the WebSocket."""
 
+import logging
 from collections.abc import Callable, Iterator
+from functools import partial
 
 from realizer.core.registry import Registry
 from realizer.core.settings import Settings
 from realizer.server.transports.transport import Transport
+
+log = logging.getLogger(__name__)
 
 # The name is the setting that requests the transport. One of a plug-in has none and is always requested.
 TRANSPORTS: Registry[Callable[..., Transport | None]] = Registry(
@@ -23,7 +27,15 @@ TRANSPORTS: Registry[Callable[..., Transport | None]] = Registry(
 
 
 def requested(settings: Settings) -> Iterator[Callable[..., Transport | None]]:
-    """Yield the factories of the transports that the settings request."""
+    """Yield the factories of the transports that the settings request; where one of a plug-in fails, None."""
     names = [name for name in TRANSPORTS if getattr(settings, name, name) is not None]
-    for _, make in TRANSPORTS.working(names):
-        yield make
+    for name, make in TRANSPORTS.working(names):
+        yield make if hasattr(settings, name) else partial(_made, name, make)
+
+
+def _made(name: str, make: Callable[..., Transport | None], *arguments: object) -> Transport | None:
+    try:
+        return make(*arguments)
+    except Exception as error:
+        log.warning("the transport of the plug-in %s is not open: %s: %s", name, type(error).__name__, error)
+        return None

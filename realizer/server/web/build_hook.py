@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import shutil
 import subprocess
@@ -17,6 +18,7 @@ CLIENT = WEB.parents[2] / "clients" / "javascript"
 STATIC = WEB.parent / "static"
 SHADER = WEB.parents[1] / "render" / "surface.glsl"  # the page draws by the formula of stills
 MARK = "sources.sha256"
+NOTICES = "THIRD_PARTY_NOTICES.txt"
 SKIP = "REALIZER_NO_PAGE"
 TIMEOUT = 600  # s; npm on a slow line
 
@@ -64,9 +66,31 @@ def bundle() -> None:
             raise RuntimeError(_failed(step, str(error))) from None
         if done.returncode:
             raise RuntimeError(_failed(step, (done.stderr or done.stdout).strip()[-2000:]))
+    (STATIC / NOTICES).write_text(notices(), "utf-8")
     for page in WEB.glob("*.html"):
         shutil.copyfile(page, STATIC / page.name)
     (STATIC / MARK).write_text(_hash() + "\n", "utf-8")
+
+
+def notices() -> str:
+    """Return the licences of the packages whose code is in the bundles.
+
+    Raises:
+        RuntimeError: a package has no licence.
+    """
+    lock = json.loads((WEB / "package-lock.json").read_text("utf-8"))
+    parts = ["The page contains code of these packages.\n"]
+    for place, package in sorted(lock["packages"].items()):
+        folder = WEB / place
+        # Packages of types have no code.
+        if not place or package.get("dev") or "/types-" in place:
+            continue
+        licences = sorted(path for path in folder.glob("*") if path.stem.upper() in ("LICENSE", "LICENCE"))
+        if not licences:
+            raise RuntimeError(f"{folder}: wanted a file LICENSE, found none; it must go with the page")
+        name = place.rpartition("node_modules/")[2]
+        parts.append(f"## {name} {package['version']}\n\n{licences[0].read_text('utf-8').strip()}\n")
+    return "\n".join(parts)
 
 
 def _failed(step: list[str], output: str) -> str:

@@ -172,3 +172,9 @@ def test_settings_play_the_expressions_that_may_be_edited(tmp_path: Path) -> Non
     settings = Settings(edit=tmp_path)
     assert settings.play_options().expressions == tmp_path / "expressions"
     assert replace(settings, fps=50).library_folder == settings.library_folder
+
+
+def test_settings_refuse_workers_where_processes_cannot_share_a_port(monkeypatch) -> None:
+    monkeypatch.delattr("socket.send_fds")
+    with pytest.raises(SettingsError, match="setting workers: wanted 1, got 2"):
+        Settings(workers=2)

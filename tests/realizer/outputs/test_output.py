@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from realizer.animation.fap.fap_reader import read_fap
-from realizer.outputs.output import RenderSettings
+from realizer.core.errors import PluginError
+from realizer.outputs.output import Output, RenderSettings
 from realizer.outputs.registry import OUTPUTS, output_for
 from realizer.speech.utterance import Phoneme
 
@@ -88,3 +89,12 @@ def test_output_of_fap_has_fap_1_on_request(realization, tmp_path):
     assert clip.visemes[[0, -1]].tolist() == [[0, 0, 63, 0]] * 2
     OUTPUTS[".fap"].write(spoken, path, RenderSettings())
     assert not read_fap(path.read_text()).mask[0]
+
+
+def test_write_reports_a_plugin_that_fails(tmp_path) -> None:
+    def encode(realization, drawing):
+        raise KeyError("words")
+
+    output = Output(".words", "text/plain", "words", encode)
+    with pytest.raises(PluginError, match=r"the output \.words of a plug-in failed: KeyError: 'words'"):
+        output.write(None, tmp_path / "x.words", RenderSettings())

@@ -21,7 +21,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from bml_schema.feedback import BlockProgress, SyncPointProgress, parse_feedback
 from realizer.core.settings import Settings, SettingsError
 from realizer.protocol.wire import unpack
-from realizer.server.serve import Server, serve, work
+from realizer.server.serve import Server, _wait_for_signal, serve, work
 from realizer.server.session.session import Session
 from tests.programs import SERVE, running
 
@@ -328,6 +328,34 @@ def test_serve_plays_messages_in_quick_succession(loop) -> None:
             assert sum(":end" in m for m in messages) == 20
 
     serving(test, factory)
+
+
+class WindowsLoop(asyncio.SelectorEventLoop):
+    """An event loop without signal handlers, as those of Windows."""
+
+    def add_signal_handler(self, sig: int, callback: object, *args: object) -> None:
+        raise NotImplementedError
+
+    def remove_signal_handler(self, sig: int) -> bool:
+        raise NotImplementedError
+
+
+@pytest.mark.parametrize("loop", [asyncio.SelectorEventLoop, WindowsLoop])
+def test_serve_ends_at_a_signal_in_every_event_loop(loop) -> None:
+    before = signal.getsignal(signal.SIGTERM)
+
+    async def end() -> object:
+        ending = _wait_for_signal(signal.SIGTERM)
+        signal.raise_signal(signal.SIGTERM)
+        async with asyncio.timeout(10):
+            await ending
+        return signal.getsignal(signal.SIGTERM)
+
+    try:
+        with asyncio.Runner(loop_factory=loop) as runner:
+            assert runner.run(end()) == signal.SIG_DFL  # a second one ends the process
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def test_worker_can_be_terminated_before_it_is_ready() -> None:

@@ -23,5 +23,17 @@ def test_registry_names_transports_after_settings() -> None:
 def test_registry_always_requests_the_transport_of_a_plugin(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(TRANSPORTS._ours, "bell", "tests_bell:make")  # type: ignore[index]
     monkeypatch.setitem(sys.modules, "tests_bell", type(sys)("tests_bell"))
-    sys.modules["tests_bell"].make = print  # type: ignore[attr-defined]
-    assert list(requested(Settings())) == [print]
+    sys.modules["tests_bell"].make = lambda host, settings: host  # type: ignore[attr-defined]
+    (make,) = requested(Settings())
+    assert make("the host", Settings()) == "the host"
+
+
+def test_registry_leaves_out_a_transport_of_a_plugin_that_fails(monkeypatch, caplog) -> None:
+    def fail(host: object, settings: object) -> None:
+        raise RuntimeError("no port")
+
+    monkeypatch.setattr(TRANSPORTS, "working", lambda names: [("oops", fail)])
+    (make,) = requested(Settings())
+    assert make(None, Settings()) is None
+    (record,) = caplog.records
+    assert record.getMessage() == "the transport of the plug-in oops is not open: RuntimeError: no port"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import shutil
 from pathlib import Path
 
@@ -22,6 +23,9 @@ def hook(tmp_path, monkeypatch):
     web, static = tmp_path / "web", tmp_path / "static"
     shutil.copytree(HOOK.parent, web, ignore=shutil.ignore_patterns("node_modules"))
     static.mkdir()
+    for place in json.loads((web / "package-lock.json").read_text())["packages"]:
+        (web / place).mkdir(parents=True, exist_ok=True)
+        (web / place / "LICENSE").write_text(f"licence of {place}")
     monkeypatch.setattr(module, "WEB", web)
     monkeypatch.setattr(module, "STATIC", static)
     monkeypatch.delenv(module.SKIP, raising=False)
@@ -92,3 +96,35 @@ def test_bundle_copies_the_page_as_it_is(hook, tmp_path, monkeypatch) -> None:
     hook.bundle()
     assert (hook.STATIC / "index.html").read_bytes() == (hook.WEB / "index.html").read_bytes()
     assert build(hook).dependencies() == []
+
+
+def test_notices_have_the_licence_of_every_package_in_the_page(hook) -> None:
+    text = hook.notices()
+    for name in (
+        "three",
+        "@pixiv/three-vrm",
+        "@codemirror/view",
+        "@lezer/lr",
+        "style-mod",
+        "w3c-keyname",
+        "crelt",
+    ):
+        assert f"\n## {name} " in text
+        assert f"licence of node_modules/{name}\n" in text
+    assert "esbuild" not in text  # makes the bundle, and is not in it
+
+
+def test_notices_refuse_a_package_without_a_licence(hook) -> None:
+    (hook.WEB / "node_modules" / "three" / "LICENSE").unlink()
+    with pytest.raises(RuntimeError, match="three: wanted a file LICENSE"):
+        hook.notices()
+
+
+def test_bundle_writes_the_notices_beside_the_page(hook, tmp_path, monkeypatch) -> None:
+    npm = tmp_path / "npm"
+    npm.write_text("#!/bin/sh\nexit 0\n")
+    npm.chmod(0o755)
+    monkeypatch.setattr(hook.shutil, "which", lambda name: str(npm))
+    hook.bundle()
+    assert (hook.STATIC / hook.NOTICES).read_text("utf-8") == hook.notices()
+    assert hook.NOTICES in (hook.STATIC / "index.html").read_text("utf-8")
