@@ -74,6 +74,14 @@ def test_track_markers_puts_an_uneven_film_on_an_even_rate() -> None:
 def test_track_markers_says_what_was_found_instead() -> None:
     with pytest.raises(TrackingError, match=r"film: wanted markers of the colours red, found 0"):
         track_markers(plain(truth("ada", acted(2))), Look((named("red"),)), "film")
+    grey = [
+        one.__class__(one.time, one.image.convert("L").convert("RGB"), one.name)
+        for one in plain(truth("ada", acted(2)))
+    ]
+    with pytest.raises(
+        TrackingError, match=r"film: wanted markers of the colours green, blue, found 0 in most"
+    ):
+        track_markers(grey, Look(COLOURS), "film")
     with pytest.raises(TrackingError, match=r"wanted a picture from 0 to 1 as --neutral, got 9"):
         track_markers(plain(truth("ada", acted(2))), Look(COLOURS, neutral=9), "film")
     with pytest.raises(TrackingError, match=r"wanted the 31 markers of the layout, found 5"):
