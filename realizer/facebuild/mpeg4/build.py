@@ -185,6 +185,8 @@ def with_brows(at: Float64, parts: Mapping[str, tuple[int, int]], field: Float64
 
     out, skin = np.array(row), slice(*parts["skin"])
     out[skin] = field
+    if not set(GROWN) & set(parts):
+        return out
     tree = cKDTree(at[skin])
     for name in GROWN:
         if name in parts:

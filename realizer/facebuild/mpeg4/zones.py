@@ -162,6 +162,17 @@ def synchronised(setup: Setup, vertices: Float64 | None = None) -> Setup:
     return replace(setup, zones=zones, masks=masks)
 
 
+def mirrorable(setup: Setup, vertices: Float64) -> Setup:
+    """Return the setup in which no FAPs are synchronised whose masks have no mirror image.
+
+    Args:
+        vertices: (n, 3) metres, of the skin.
+    """
+    twin = mirror_twins(vertices, MARGIN)
+    lost = {fap for fap, mask in setup.masks.items() if (twin[mask] < 0).any()}
+    return replace(setup, synced=setup.synced - lost - {faps()[fap - 1].mirror for fap in lost})
+
+
 def mirror_mask(mask: Int32, vertices: Float64, fap: int) -> Int32:
     """Return the mirror images of a mask's vertices, ascending.
 

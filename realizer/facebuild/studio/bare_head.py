@@ -26,6 +26,7 @@ from realizer.facebuild.arkit.scene import read_pieces
 from realizer.facebuild.mpeg4.build import apply_zones
 from realizer.facebuild.mpeg4.defaults import default_setup
 from realizer.facebuild.mpeg4.parameters import FILE, write_setup
+from realizer.facebuild.mpeg4.zones import mirrorable
 
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply")
 FEWEST = 24  # vertices of an eyeball
@@ -73,6 +74,7 @@ def import_bare(path: Path, folder: Path, name: str) -> tuple[str, ...]:
         write_surface(folder, surface, ranges, make_atlas(gltf, surface, ranges))
     places = {key: point.place for key, point in points.items()}
     setup = default_setup(surface.vertices, surface.triangles, places, ranges["skin"])
+    setup = mirrorable(setup, surface.vertices[slice(*ranges["skin"])])
     write_setup(folder / FILE, setup)
     apply_zones(folder, setup)
     mouth = (np.array(places["2.2"]) + np.array(places["2.3"])) / 2

@@ -24,6 +24,7 @@ from realizer.facebuild.mpeg4.fap_limits import usual_range
 from realizer.facebuild.mpeg4.fields import WAYS, pairs
 from realizer.facebuild.mpeg4.landmarks import template
 from realizer.facebuild.mpeg4.parameters import FILE, read_setup, setup_table
+from realizer.facebuild.mpeg4.zones import mirrorable
 from realizer.tables import csv_rows, faps
 
 FACE_NAME = re.compile(r"[^a-z0-9_-]+")  # what a face's name has not
@@ -84,7 +85,7 @@ def head_message(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     face = load_folder(folder, "mpeg4")
     at, parts = face.vertices.astype(np.float64), dict(face.parts)
     points = {name: point.place for name, point in read_features(folder / "features.csv").items()}
-    setup = default_setup(at, face.triangles, points, parts["skin"])
+    setup = mirrorable(default_setup(at, face.triangles, points, parts["skin"]), at[slice(*parts["skin"])])
     table, by = setup_table(setup), []
     if (folder / FILE).is_file():
         # Zones that the face has, and for its other FAPs the usual ones, which do not move it yet.

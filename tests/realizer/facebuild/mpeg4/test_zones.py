@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 
 from realizer.core.errors import FaceError
-from realizer.facebuild.mpeg4.zones import FALLOFFS, Setup, Zone, mirror_mask, smooth_curve, synchronised
+from realizer.facebuild.mpeg4.zones import (
+    FALLOFFS,
+    Setup,
+    Zone,
+    mirror_mask,
+    mirrorable,
+    smooth_curve,
+    synchronised,
+)
 
 
 @pytest.mark.parametrize("falloff", FALLOFFS)
@@ -76,3 +84,10 @@ def test_mirror_mask_needs_a_twin_of_each_vertex() -> None:
     assert mirror_mask(np.array([0], np.int32), at, 31).tolist() == [1]
     with pytest.raises(FaceError, match="has no twin"):
         mirror_mask(np.array([2], np.int32), at, 31)
+
+
+def test_mirrorable_lets_go_of_both_sides_of_a_mask_without_twins() -> None:
+    at = np.array([[1, 0, 0], [-1, 0, 0], [2, 5, 0.0]])
+    masks = {31: np.array([0], np.int32), 33: np.array([2], np.int32)}
+    setup = Setup({}, {}, masks, frozenset({31, 32, 33, 34}))
+    assert mirrorable(setup, at).synced == {31, 32}

@@ -18,7 +18,7 @@ export class HeadMesh {
     this.ring = this.ringOf();
     this.touching = this.touchingOf();
     this.found = new Map();
-    this.turned = new Set(); // triangles whose normals are not those of the neutral face
+    this.turned = []; // triangles whose normals are not those of the neutral face
     for (let t = 0; t < triangles.length; t += 3) this.turn(t);
     for (let i = 0; i < this.count; i++) this.settle(i);
     this.rest = this.normals.slice();
@@ -161,19 +161,24 @@ export class HeadMesh {
   // Draw the vertices at `at` (3 numbers each); only triangles that move, or moved before, are turned.
   pose(at) {
     const { starts, list } = this.touching;
-    const turned = new Set();
+    const [turned, around] = [[], []];
+    const [inTurned, inAround] = [new Uint8Array(this.triangles.length / 3), new Uint8Array(this.count)];
     for (let i = 0; i < this.count; i++) {
       const k = 3 * i;
-      const moved = Math.abs(at[k] - this.vertices[k]) + Math.abs(at[k + 1] - this.vertices[k + 1]) + Math.abs(at[k + 2] - this.vertices[k + 2]) > HOME;
-      if (moved) for (let j = starts[i]; j < starts[i + 1]; j++) turned.add(list[j]);
+      if (Math.abs(at[k] - this.vertices[k]) + Math.abs(at[k + 1] - this.vertices[k + 1]) + Math.abs(at[k + 2] - this.vertices[k + 2]) <= HOME) continue;
+      for (let j = starts[i]; j < starts[i + 1]; j++) {
+        if (!inTurned[list[j] / 3]) turned.push(list[j]);
+        inTurned[list[j] / 3] = 1;
+      }
     }
     this.posed.set(at);
-    const around = new Set();
-    for (const set of [this.turned, turned])
-      for (const t of set) {
-        this.turn(t);
-        for (let k = 0; k < 3; k++) around.add(this.triangles[t + k]);
+    for (const t of [...turned, ...this.turned.filter((t) => !inTurned[t / 3])]) {
+      this.turn(t);
+      for (let k = t; k < t + 3; k++) {
+        if (!inAround[this.triangles[k]]) around.push(this.triangles[k]);
+        inAround[this.triangles[k]] = 1;
       }
+    }
     for (const i of around) this.settle(i);
     this.turned = turned;
   }

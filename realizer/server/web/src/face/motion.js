@@ -13,6 +13,8 @@ export class Motion {
 
   begin() {
     this.shapes = new Map(); // FAP -> the head's own field
+    this.lists = new WeakMap();
+    this.at = this.written = null;
     this.forget();
   }
 
@@ -80,16 +82,35 @@ export class Motion {
     this.job = null;
   }
 
+  // The vertices now; only those that a field moves, or moved before, are written.
   posed() {
-    const at = this.draft.mesh.vertices.slice();
-    if (!this.value) return at;
+    const { vertices } = this.draft.mesh;
+    const at = (this.at ??= vertices.slice());
+    for (const i of this.written ?? []) at[i] = vertices[i];
+    this.written = [];
     const units = fapuOf(this.draft.state.points);
-    for (const [fap, value] of this.moving) {
+    for (const [fap, value] of this.value ? this.moving : []) {
       const [field, far] = [this.field(fap), value * units[this.draft.rows.get(fap).unit]];
-      for (let i = 0; i < at.length; i++) if (field[i]) at[i] += far * field[i];
+      const moved = this.moved(field);
+      for (const i of moved) at[i] += far * field[i];
+      this.written.push(moved);
     }
-    if (LIDS.has(this.fap)) keepLids((this.lids ??= lidsOf(this.draft.mesh, (fap) => this.field(fap))), at);
+    this.written = this.written.length === 1 ? this.written[0] : this.written.flat();
+    if (this.value && LIDS.has(this.fap)) {
+      this.lids ??= lidsOf(this.draft.mesh, (fap) => this.field(fap));
+      keepLids(this.lids, at);
+      this.written = [...this.written, ...this.lids.map(({ i }) => 3 * i + 2)];
+    }
     return at;
+  }
+
+  // The numbers of a field that are not zero.
+  moved(field) {
+    if (this.lists.has(field)) return this.lists.get(field);
+    const found = [];
+    for (let i = 0; i < field.length; i++) if (field[i]) found.push(i);
+    this.lists.set(field, found);
+    return found;
   }
 
   // Vertices that the service moves: one question at a time, the latest value wins.

@@ -91,25 +91,27 @@ export class Points {
   }
 
   drag(name, mark) {
-    let grabbed = false;
+    let [grabbed, moved] = [false, false];
+    const spot = (event) => {
+      const box = this.layer.getBoundingClientRect();
+      return [event.clientX - box.left, event.clientY - box.top];
+    };
     mark.onpointerdown = (event) => {
-      this.choose(this.draft.state.asked.length ? this.asked : name);
-      this.chosen = name;
-      this.list.value = name;
+      [grabbed, moved] = [true, false];
       mark.setPointerCapture(event.pointerId);
-      grabbed = true;
-      event.stopPropagation();
     };
     mark.onpointermove = (event) => {
-      if (!grabbed || !event.buttons) return;
-      const box = this.layer.getBoundingClientRect();
-      const hit = !INSIDE.has(name) && this.view.hit(event.clientX - box.left, event.clientY - box.top);
+      if (!grabbed || !event.buttons || !(event.movementX || event.movementY)) return;
+      moved = true;
+      const hit = !INSIDE.has(name) && this.view.hit(...spot(event));
       const [right, up] = this.view.axes;
       const pixel = this.view.pixel(this.draft.state.points[name]);
       const at = this.draft.state.points[name].map((x, k) => x + pixel * (event.movementX * right[k] - event.movementY * up[k]));
       this.draft.place(name, hit ? hit.place : at, `Drag ${name}:`);
     };
-    mark.onpointerup = mark.onpointercancel = () => {
+    mark.onpointerup = mark.onpointercancel = (event) => {
+      // A click on a mark is one on the head where a point is asked for, and chooses it otherwise.
+      if (grabbed && !moved) this.asked ? this.click(...spot(event)) : this.choose(name);
       grabbed = false;
       this.draft.rest();
     };

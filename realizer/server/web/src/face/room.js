@@ -195,8 +195,14 @@ export class FaceRoom {
     this.step = step;
     for (const [name, section] of Object.entries(this.sections)) section.hidden = name !== step;
     at("face-marks").hidden = step !== "points" || !this.marks;
+    if (this.points.says) this.refresh();
     this.repaint = true;
     this.view.stale = true;
+  }
+
+  refresh() {
+    if (this.step === "points") this.points.refresh();
+    if (this.step === "zones") this.faps.refresh();
   }
 
   toggle(button, name) {
@@ -223,10 +229,7 @@ export class FaceRoom {
     Object.assign(this.redo, { disabled: !future.length });
     this.motion.forget();
     for (const score of this.faps.scores.values()) score.stale = true;
-    if (this.points.says && state) {
-      this.points.refresh();
-      this.faps.refresh();
-    }
+    if (this.points.says && state) this.refresh();
     this.repaint = true;
   }
 
@@ -260,8 +263,7 @@ export class FaceRoom {
     const key = [field, zone, this.strokes.mask, this.faps.tool, this.faps.mask, this.marks];
     if (this.painted?.every((one, k) => one === key[k]) && !this.strokes.mask) return;
     [this.painted, this.repaint] = [key, false];
-    const amount = field && Float32Array.from({ length: this.draft.mesh.count }, (_, i) => Math.hypot(field[3 * i], field[3 * i + 1], field[3 * i + 2]));
-    this.view.paint(amount, zone && this.faps.tool ? (this.strokes.mask ?? this.faps.mask) : null);
+    this.view.paint(field, zone && this.faps.tool ? (this.strokes.mask ?? this.faps.mask) : null);
     if (zone && this.marks) this.view.wire(this.draft.state.points[this.draft.rows.get(fap).point], zone.scale.map((scale) => scale * zone.size * (1 + zone.smooth_side)));
     else this.view.wire(null);
   }

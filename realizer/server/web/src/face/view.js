@@ -76,19 +76,26 @@ export class View {
     this.stale = true;
   }
 
-  // Colour vertices by an amount 0..1 each, and by a mask; null: clay.
-  paint(amount, mask) {
+  // Colour vertices by how far a field moves them, 0..1, and by a mask; null: clay.
+  paint(field, mask) {
     const { array } = this.shape.geometry.attributes.color;
     array.set(this.clay);
-    const colour = new Color();
-    for (let i = 0; amount && i < this.mesh.count; i++) {
-      if (amount[i] < 0.002) continue;
-      const share = Math.min(0.9, 5 * amount[i]); // the edge of a zone is soft
-      const step = Math.min(amount[i], 0.9999) * (HEAT.length - 1);
-      colour.lerpColors(HEAT[Math.floor(step)], HEAT[Math.floor(step) + 1], step % 1);
-      for (const [k, part] of [colour.r, colour.g, colour.b].entries()) array[3 * i + k] += share * (part - array[3 * i + k]);
+    for (let i = 0, k = 0; field && i < this.mesh.count; i++, k = 3 * i) {
+      if (!field[k] && !field[k + 1] && !field[k + 2]) continue;
+      const amount = Math.min(0.9999, Math.sqrt(field[k] ** 2 + field[k + 1] ** 2 + field[k + 2] ** 2));
+      const share = Math.min(0.9, 5 * amount); // the edge of a zone is soft
+      const step = amount * (HEAT.length - 1);
+      const [low, high, t] = [HEAT[Math.floor(step)], HEAT[Math.floor(step) + 1], step % 1];
+      array[k] += share * (low.r + t * (high.r - low.r) - array[k]);
+      array[k + 1] += share * (low.g + t * (high.g - low.g) - array[k + 1]);
+      array[k + 2] += share * (low.b + t * (high.b - low.b) - array[k + 2]);
     }
-    for (let i = 0; mask && i < this.mesh.count; i++) if (mask[i]) for (const [k, part] of [MASKED.r, MASKED.g, MASKED.b].entries()) array[3 * i + k] = 0.55 * part + 0.45 * array[3 * i + k];
+    for (let i = 0, k = 0; mask && i < this.mesh.count; i++, k = 3 * i) {
+      if (!mask[i]) continue;
+      array[k] = 0.55 * MASKED.r + 0.45 * array[k];
+      array[k + 1] = 0.55 * MASKED.g + 0.45 * array[k + 1];
+      array[k + 2] = 0.55 * MASKED.b + 0.45 * array[k + 2];
+    }
     this.touch("color");
   }
 

@@ -6,7 +6,9 @@ const NEAREST = 1e-9; // in radii
 const POWER = 1.2; // of the distance
 const LEAST = 2e-3; // of the point's move: smaller moves are not stored
 const PUPILS = new Set(["3.5", "3.6"]);
-const SLICE = 4096; // vertices between two looks at the clock
+// Vertices between two looks at the clock: near a zone, and far from it.
+const SLICE = 256;
+const FAR_SLICE = 16384;
 const curves = new Map();
 
 export const FALLOFFS = ["ease", "smooth", "cosine", "linear"];
@@ -66,30 +68,30 @@ export function group(fap, zones, pairs) {
 // stops for a moment after every slice of vertices, so that a page can go on drawing.
 // setup: { points, zones: Map, masks: Map of Uint8Array, joined }; mesh: of mesh.js; rows: FAP -> its row of the table.
 export function* fieldOf(fap, setup, mesh, rows, pairs) {
-  const weight = yield* weightOf(fap, setup, mesh, rows, pairs);
+  const [weight, active] = yield* weightOf(fap, setup, mesh, rows, pairs);
   const zone = setup.zones.get(fap);
   const row = rows.get(fap);
   const middle = setup.points[row.point];
   const field = new Float64Array(mesh.vertices.length);
-  const [first, last] = mesh.skin;
   const v = mesh.vertices;
   const way = row.way.map((x, k) => x + (k === 2 ? zone.slide : 0));
   const arm = Math.max(Math.hypot(...middle.map((x, k) => x - zone.pivot[k])), 1e-9);
-  for (let i = first; i < last; i++) {
-    if (!weight[i]) continue;
-    for (let k = 0; k < 3; k++) {
-      const away = (v[3 * i + k] - zone.pivot[k]) / arm;
-      field[3 * i + k] = (zone.radial ? (1 - zone.radial) * way[k] + zone.radial * away : way[k]) * weight[i];
-    }
-  }
   const nearest = mesh.nearest(middle);
-  const here = row.way.reduce((sum, x, k) => sum + x * field[3 * nearest + k], 0);
+  const moveOf = (i, k) => (zone.radial ? (1 - zone.radial) * way[k] + (zone.radial * (v[3 * i + k] - zone.pivot[k])) / arm : way[k]) * weight[i];
+  const here = row.way.reduce((sum, x, k) => sum + x * moveOf(nearest, k), 0);
   if (here < 1e-3) throw new Error(`FAP ${fap} does not move the skin at its feature point ${row.point}: make its zone larger, or take the point's place into its mask`);
-  for (let i = 3 * first; i < 3 * last; i++) field[i] /= here;
-  yield;
-  return stored(grow(soften(field, setup, mesh, rows), mesh));
+  for (let n = 0; n < active.length; n++) {
+    if (n % SLICE === 0) yield;
+    for (let k = 0; k < 3; k++) field[3 * active[n] + k] = moveOf(active[n], k) / here;
+  }
+  const [out, touched] = yield* soften(field, active, setup, mesh, rows);
+  grow(out, mesh);
+  stored(out, touched);
+  stored(out, mesh.grown);
+  return out;
 }
 
+// The influence of a FAP's zone at each vertex, and the vertices where there is some.
 function* weightOf(fap, setup, mesh, rows, pairs) {
   const zone = setup.zones.get(fap);
   const members = setup.joined ? group(fap, setup.zones, pairs) : [fap];
@@ -100,22 +102,24 @@ function* weightOf(fap, setup, mesh, rows, pairs) {
   });
   const own = each[members.indexOf(fap)];
   const ends = links.map(([one, other]) => [each[members.indexOf(one)], each[members.indexOf(other)]]);
-  const weight = new Float64Array(mesh.count);
+  const [weight, active] = [new Float64Array(mesh.count), []];
   const box = boxOf(each);
   const [v, alone] = [mesh.vertices, members.length === 1];
-  const distances = new Float64Array(each.length);
   for (let i = mesh.skin[0], seen = 0; i < mesh.skin[1]; i++) {
-    if (++seen % SLICE === 0) yield;
+    if (i % FAR_SLICE === 0) yield;
     const [x, y, z] = [v[3 * i], v[3 * i + 1], v[3 * i + 2]];
     if (x < box[0] || y < box[1] || z < box[2] || x > box[3] || y > box[4] || z > box[5]) continue;
+    if (++seen % SLICE === 0) yield;
     if (alone) {
       weight[i] = influence(zone, far(x, y, z, own.at, own.size)) * own.open(i);
+      if (weight[i]) active.push(i);
       continue;
     }
+    if (!own.open(i) || far(x, y, z, own.at, own.size) >= 2) continue;
     let [envelope, whole, mine] = [0, 0, 0];
     for (let k = 0; k < each.length; k++) {
       const { zone, at, size, open, number } = each[k];
-      const d = (distances[k] = far(x, y, z, at, size));
+      const d = far(x, y, z, at, size);
       const free = open(i);
       if (free) envelope = Math.max(envelope, influence(zone, d));
       const say = free * Math.max(2 - d, 0) ** 2 / Math.max(d, NEAREST) ** POWER;
@@ -125,8 +129,9 @@ function* weightOf(fap, setup, mesh, rows, pairs) {
     if (!mine) continue;
     for (const [one, other] of ends) if (one.open(i) && other.open(i)) envelope = Math.max(envelope, between(one, other, x, y, z));
     weight[i] = (envelope * mine) / Math.max(whole, 1e-30);
+    if (weight[i]) active.push(i);
   }
-  return weight;
+  return [weight, active];
 }
 
 function far(x, y, z, at, size) {
@@ -158,13 +163,31 @@ function boxOf(each) {
   return [...ends(-1), ...ends(1)];
 }
 
-// Half of a vertex's own move and half of its neighbours' mean; feature points keep theirs.
-function soften(field, setup, mesh, rows) {
+// Half of a vertex's own move and half of its neighbours' mean; feature points keep theirs. Also which may move.
+function* soften(field, active, setup, mesh, rows) {
   const out = field.slice();
   const { starts, neighbours } = mesh.ring;
-  const fixed = new Set([...setup.zones.keys()].map((fap) => rows.get(fap).point).filter((name) => !PUPILS.has(name)).map((name) => mesh.nearest(setup.points[name])));
-  for (let i = mesh.skin[0]; i < mesh.skin[1]; i++) {
+  const fixed = new Set();
+  for (const fap of setup.zones.keys()) {
+    const { point } = rows.get(fap);
+    if (PUPILS.has(point)) continue;
+    fixed.add(mesh.nearest(setup.points[point]));
+    yield;
+  }
+  const [seen, touched] = [new Uint8Array(mesh.count), []];
+  const touch = (i) => {
+    if (!seen[i]) touched.push(i);
+    seen[i] = 1;
+  };
+  for (const i of active) {
+    touch(i);
+    for (let j = starts[i]; j < starts[i + 1]; j++) touch(neighbours[j]);
+  }
+  yield;
+  for (let n = 0; n < touched.length; n++) {
+    const i = touched[n];
     const [from, to] = [starts[i], starts[i + 1]];
+    if (n % SLICE === 0) yield;
     if (fixed.has(i)) continue;
     for (let k = 0; k < 3; k++) {
       let sum = 0;
@@ -172,7 +195,7 @@ function soften(field, setup, mesh, rows) {
       out[3 * i + k] = 0.5 * field[3 * i + k] + (0.5 * sum) / Math.max(to - from, 1);
     }
   }
-  return out;
+  return [out, touched];
 }
 
 // Brows, lashes and beard follow the skin under them.
@@ -183,16 +206,15 @@ function grow(field, { grown, near, share }) {
       for (let j = 3 * g; j < 3 * g + 3; j++) sum += share[j] * field[3 * near[j] + k];
       field[3 * grown[g] + k] = sum;
     }
-  return field;
 }
 
 // What a face folder keeps of a field: half precision, without moves that nobody sees.
-function stored(field) {
-  for (let i = 0; i < field.length; i += 3) {
+function stored(field, vertices) {
+  for (const vertex of vertices) {
+    const i = 3 * vertex;
     const most = Math.max(Math.abs(field[i]), Math.abs(field[i + 1]), Math.abs(field[i + 2]));
     for (let k = i; k < i + 3; k++) field[k] = most > LEAST ? half(field[k]) : 0;
   }
-  return field;
 }
 
 function half(x) {
