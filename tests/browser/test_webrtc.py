@@ -35,6 +35,7 @@ Curve = np.ndarray[Any, Any]
 RATE = 24000
 SETTLING = 8000  # ms; browsers bring picture and sound together slowly
 BEEP = 0.24  # s
+ENOUGH = 8  # pictures a second
 STARTS = (0.5, 1.13, 1.71, 2.47, 3.02, 3.83, 4.36, 5.2, 5.71, 6.5, 7.03, 7.9)  # s; irregular
 # Of the picture, where an open mouth is dark: left, top, width, height.
 MOUTH = (0.4, 0.66, 0.2, 0.14)
@@ -202,8 +203,10 @@ def test_page_plays_a_session_by_webrtc_with_lips_and_sound(browser) -> None:  #
     assert found["pictures_per_second"] > 2
     assert found["change_of_light"] > 5  # the mouth opens
     assert found["loudest"] > 0.1
-    # Few cores that draw, encode and decode send unevenly; the timestamps are exact, see test_tracks.
-    assert abs(found["lips_late_ms"]) < 400
+    # The timestamps are exact, see test_tracks; what is left is the browser's, which few busy cores delay.
+    if found["pictures_per_second"] < ENOUGH:
+        pytest.skip(f"too busy to measure the lips: {found['pictures_per_second']:g} pictures a second")
+    assert abs(found["lips_late_ms"]) < 200
 
 
 def test_page_says_what_is_wrong_with_an_option(browser) -> None:  # type: ignore[no-untyped-def]

@@ -160,6 +160,6 @@ export function watch(options: {
   light?: string;
   background?: string;
   character?: string;
-  /** How long the browser holds back picture and sound, in ms. */
+  /** How long the browser should hold back picture and sound, in ms; default: as it likes. */
   buffer?: number | string;
 }): Promise<{ stream: MediaStream; connection: RTCPeerConnection; close: () => void }>;

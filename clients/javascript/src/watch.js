@@ -1,7 +1,6 @@
 import { RealizerError } from "./frames.js";
 
 const GATHERING = 3000; // ms; addresses that are found later are left out of the offer
-const BUFFER = 150; // ms; a busy machine sends unevenly
 
 /**
  * Receive the picture and the sound of a session by WebRTC, from the service as an ASGI application; browsers only.
@@ -14,11 +13,10 @@ const BUFFER = 150; // ms; a busy machine sends unevenly
  * @param {string} options.session name of the session, which is opened if it is not there
  * @param {string} [options.token] the access token, if the service requires one
  * @param {string} [options.size] and fps, camera, light, background, character: of the pictures
- * @param {number} [options.buffer] how long the browser holds back both picture and sound, ms: the same from the start,
- *   it need not bring them together, which takes it half a minute
+ * @param {number} [options.buffer] how long the browser should hold back picture and sound, ms; default: as it likes
  * @returns {Promise<{stream: MediaStream, connection: RTCPeerConnection, close: function}>}
  */
-export async function watch({ url, session, token, buffer = BUFFER, ...options }) {
+export async function watch({ url, session, token, buffer, ...options }) {
   const target = new URL(`sessions/${encodeURIComponent(session)}/webrtc`, url ?? import.meta.url);
   for (const [name, value] of Object.entries({ ...options, token })) if (value != null) target.searchParams.set(name, value);
   const connection = new RTCPeerConnection();
@@ -26,7 +24,7 @@ export async function watch({ url, session, token, buffer = BUFFER, ...options }
   connection.ontrack = ({ track }) => stream.addTrack(track);
   try {
     for (const kind of ["video", "audio"]) connection.addTransceiver(kind, { direction: "recvonly" });
-    for (const receiver of connection.getReceivers()) receiver.jitterBufferTarget = Number(buffer);
+    if (buffer) for (const receiver of connection.getReceivers()) receiver.jitterBufferTarget = Number(buffer);
     await connection.setLocalDescription();
     await new Promise((resolve) => {
       const check = () => connection.iceGatheringState === "complete" && resolve();
