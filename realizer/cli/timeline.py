@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,8 +14,6 @@ from realizer.cli.realize import output_options, play_documents
 
 if TYPE_CHECKING:
     from realizer.expressions.library import Library
-    from realizer.expressions.timeline import Timeline
-    from realizer.knowledge.advice import Advice
     from realizer.tables.knowledge import Mood, Role
 
 SUFFIXES = (".toml", ".json")
@@ -45,7 +42,7 @@ def timeline(file: Path, **flags: Any) -> int:
     entries = [
         { expression = "template:surprise", intensity = 0.8, duration = 1.2 },
         { expression = "neutral", duration = 0.5 },
-        { expression = "template:anger" },
+        { expression = "template:anger", onset = 0.2, offset = 0.6 },
     ]
 
     \b
@@ -88,31 +85,14 @@ def advice_on(
     Args:
         impossible: whether to return only what was never observed.
     """
+    from realizer.checking.timeline_advice import timeline_advice
     from realizer.expressions.timeline import remarks
     from realizer.expressions.timeline_reader import read_timeline
 
     timeline = read_timeline(content)
     advice = (
         f"{item.id + ': ' if item.id else ''}{item.text}; {item.hint}"
-        for item in _advice(timeline, library, role, mood)
+        for item in timeline_advice(timeline, library, role, mood)
         if item.is_impossible or not impossible
     )
     return list(islice(chain(() if impossible else remarks(timeline), advice), MAX_ADVICE))
-
-
-def _advice(timeline: Timeline, library: Library, role: Role, mood: Mood | None) -> Iterator[Advice]:
-    from bml_schema import Block
-    from realizer.expressions.spans import visible_spans
-    from realizer.knowledge.advice import VisibleExpression, advise, duration_advice
-
-    seen = []
-    for place, expression, begin, end in visible_spans(timeline, library):
-        family, _, template = expression.name.rpartition(":")
-        if family == "template" and expression.file is None:
-            seen.append(VisibleExpression(place, template, begin, end))
-            continue
-        source = str(expression.file or expression.source)
-        yield from duration_advice(
-            place, expression.name, end - begin, expression.possible, expression.probable, source
-        )
-    yield from advise(Block(id="timeline"), seen, {}, role, mood)

@@ -23,7 +23,10 @@ class Library(Mapping[str, Expression]):
 
     Attributes:
         notes: messages about replaced expressions.
+        edition: increases whenever the expressions are replaced.
     """
+
+    edition = 0
 
     def __init__(self, expressions: Iterable[Expression]) -> None:
         self.replace(expressions)
@@ -38,6 +41,7 @@ class Library(Mapping[str, Expression]):
                 notes.append(f"{expression.file}: {expression.name} replaces the built-in {replaced.name}")
             known[key(expression.name)] = expression
         self.notes = tuple(notes)
+        self.edition += 1
         self._known, self._as_written = known, {expression.name: expression for expression in known.values()}
 
     def __getitem__(self, name: str) -> Expression:

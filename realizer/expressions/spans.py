@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 from realizer.expressions.expression import Expression
 from realizer.expressions.timeline import Entry, Timeline, Track
@@ -25,6 +26,25 @@ class Span:
     end: float
 
 
+class VisibleSpan(NamedTuple):
+    """The seconds for which an entry is visible.
+
+    Attributes:
+        place: of the entry, for messages.
+        begin, end: seconds from the start of the timeline.
+        track, entry: numbers of the entry, from 0.
+        times: of the entry.
+    """
+
+    place: str
+    expression: Expression
+    begin: float
+    end: float
+    track: int
+    entry: int
+    times: Span
+
+
 def spans(track: Track, library: Mapping[str, Expression]) -> list[Span]:
     """Return the times of each entry of a track.
 
@@ -38,11 +58,11 @@ def spans(track: Track, library: Mapping[str, Expression]) -> list[Span]:
         KeyError: an expression that is not in the library.
     """
     begins, lengths = [track.start], []
-    for entry in track.entries:
-        own = BREAK if entry.neutral else library[entry.expression].duration
+    times = [_onset_and_offset(entry, library) for entry in track.entries]
+    for entry, (onset, offset) in zip(track.entries, times, strict=True):
+        own = BREAK if entry.neutral else onset + library[entry.expression].apex + offset
         lengths.append(own if entry.duration is None else entry.duration)
         begins.append(begins[-1] + lengths[-1])
-    times = [_onset_and_offset(entry, library) for entry in track.entries]
     # Seconds of the transition after the begin of each entry, and before its end.
     rises, falls = [times[0][0]], []
     for (one, (_, offset)), (other, (onset, _)) in pairwise(zip(track.entries, times, strict=True)):
@@ -67,25 +87,28 @@ def duration_of(timeline: Timeline, library: Mapping[str, Expression]) -> float:
     return max(spans(track, library)[-1].end for track in timeline.tracks)
 
 
-def visible_spans(
-    timeline: Timeline, library: Mapping[str, Expression]
-) -> Iterator[tuple[str, Expression, float, float]]:
-    """Yield (place, expression, begin, end) of each entry except breaks: the seconds for which it is visible.
+def visible_spans(timeline: Timeline, library: Mapping[str, Expression]) -> Iterator[VisibleSpan]:
+    """Yield the seconds for which each entry except breaks is visible.
 
     An expression is visible from the middle of the transition to it to the middle of the next one.
     """
-    for track in timeline.tracks:
+    for number, track in enumerate(timeline.tracks):
         shown = spans(track, library)
         lefts = [shown[0].start, *(span.left for span in shown)]
         reached = [*(span.reached for span in shown), shown[-1].end]
         for k, span in enumerate(shown):
             if not span.entry.neutral:
                 begin, end = (lefts[k] + span.reached) / 2, (span.left + reached[k + 1]) / 2
-                yield f"channel {track.name}, entry {k + 1}", library[span.entry.expression], begin, end
+                place, expression = f"channel {track.name}, entry {k + 1}", library[span.entry.expression]
+                yield VisibleSpan(place, expression, begin, end, number, k, span)
 
 
 def _onset_and_offset(entry: Entry, library: Mapping[str, Expression]) -> tuple[float, float]:
     if entry.neutral:
         return 0.0, 0.0
     expression = library[entry.expression]
-    return expression.onset, expression.offset
+    onset, offset = entry.onset, entry.offset
+    return (
+        expression.onset if onset is None else onset,
+        expression.offset if offset is None else offset,
+    )

@@ -21,11 +21,16 @@ class Entry:
         expression: name in the library; "neutral" is a break.
         intensity: 0..1.
         duration: seconds including onset and offset; None: the expression's own, or 0.5 s of a break.
+        onset, offset: seconds; None: the expression's own. A break has none.
+        because: the reason for it, for readers of the file.
     """
 
     expression: str
     intensity: float = 1.0
     duration: float | None = None
+    onset: float | None = None
+    offset: float | None = None
+    because: str | None = None
 
     @property
     def neutral(self) -> bool:

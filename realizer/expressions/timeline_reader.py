@@ -14,7 +14,7 @@ from realizer.tables import action_units
 MIN_SECONDS, MAX_SECONDS = 0.04, 3600.0
 TIMELINE = ("mixer", "order", "channel")
 TRACK = ("name", "start", "joins", "curve", "entries")
-ENTRY = ("expression", "intensity", "duration")
+ENTRY = ("expression", "intensity", "duration", "onset", "offset", "because")
 
 
 def read_timeline(content: bytes) -> Timeline:
@@ -31,7 +31,7 @@ def read_timeline(content: bytes) -> Timeline:
         entries = [
             { expression = "template:surprise", intensity = 0.8, duration = 1.2 },
             { expression = "neutral", duration = 0.5 },
-            { expression = "template:anger" },
+            { expression = "template:anger", onset = 0.2, offset = 0.6, because = "an exclamation" },
         ]
 
     Raises:
@@ -137,12 +137,16 @@ class _TimelineReader:
         if not isinstance(expression, str) or not expression.strip():
             self._fault(f"{place}, expression", "the name of an expression, or neutral", expression)
             expression = ""
-        duration = (
-            self._number(row, "duration", MIN_SECONDS, MIN_SECONDS, MAX_SECONDS, place)
-            if "duration" in row
-            else None
+        duration, onset, offset = (
+            self._number(row, name, MIN_SECONDS, MIN_SECONDS, MAX_SECONDS, place) if name in row else None
+            for name in ("duration", "onset", "offset")
         )
-        return Entry(expression, self._number(row, "intensity", 1.0, 0.0, 1.0, place), duration)
+        because = row.get("because")
+        if because is not None and not isinstance(because, str):
+            self._fault(f"{place}, because", "a text", because)
+            because = None
+        intensity = self._number(row, "intensity", 1.0, 0.0, 1.0, place)
+        return Entry(expression, intensity, duration, onset, offset, because)
 
     def _choice(self, row: Mapping[str, Any], name: str, known: Sequence[str], place: str) -> str:
         value = row.get(name, known[0])

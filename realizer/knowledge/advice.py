@@ -144,11 +144,15 @@ def _distance(one: VisibleExpression, seen: Sequence[VisibleExpression]) -> Iter
 def _companion(
     one: VisibleExpression, company: CompanionRule, seen: Sequence[VisibleExpression]
 ) -> Iterator[Advice]:
+    if stands_alone(one, company, seen):
+        adds = "" if company.offered else "; `realizer enrich` adds what is missing"
+        yield Advice(one.id, f"{one.template} stands alone", company.says + adds)
+
+
+def stands_alone(one: VisibleExpression, company: CompanionRule, seen: Sequence[VisibleExpression]) -> bool:
+    """Return whether an expression is without its company."""
     others = seen if company.offered else [other for other in seen if other.template == company.other]
-    if any(o is not one and o.start - NEAR < one.end and one.start < o.end + NEAR for o in others):
-        return
-    adds = "" if company.offered else "; `realizer enrich` adds what is missing"
-    yield Advice(one.id, f"{one.template} stands alone", company.says + adds)
+    return not any(o is not one and o.start - NEAR < one.end and one.start < o.end + NEAR for o in others)
 
 
 def _missing_expressions(

@@ -50,6 +50,18 @@ def test_spans_have_rising_times(entries, joins, start: float) -> None:
 
 def test_visible_spans_begin_and_end_in_the_middle_of_transitions() -> None:
     track = Track("a", (Entry("template:surprise", 1.0, 1.0), Entry("neutral"), Entry("smile")))
-    (place, one, begin, end), (_, other, _, _) = visible_spans(Timeline((track,)), builtin())
-    assert (place, one.name, other.name) == ("channel a, entry 1", "template:surprise", "SMILE")
-    assert (begin, end) == pytest.approx((0.15, 0.75))
+    one, other = visible_spans(Timeline((track,)), builtin())
+    assert one.place == "channel a, entry 1"
+    assert (one.expression.name, other.expression.name) == ("template:surprise", "SMILE")
+    assert (one.begin, one.end) == pytest.approx((0.15, 0.75))
+    assert (other.track, other.entry, other.times.entry) == (0, 2, track.entries[2])
+
+
+def test_spans_take_the_onset_and_offset_of_an_entry() -> None:
+    apex = builtin()["smile"].apex
+    one, _, other = spans(
+        Track("a", (Entry("smile", onset=0.2, offset=0.7), Entry("neutral"), Entry("smile", 1.0, 3.0, 1.0))),
+        builtin(),
+    )
+    assert (one.reached, one.left, one.end) == pytest.approx((0.2, 0.2 + apex, 0.9 + apex))
+    assert (other.reached - other.start, other.end - other.start) == pytest.approx((1.0, 3.0))

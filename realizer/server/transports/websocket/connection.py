@@ -199,7 +199,8 @@ class WebSocketConnections:
         await client.close(1008 if forbidden else 1013, str(error))
 
     async def _check(self, client: ClientSocket) -> None:
-        """Serve the WebSocket of an editor: send the faults of each text that arrives."""
+        """Serve the WebSocket of an editor: answer each text that arrives, BML by its faults."""
+        from realizer.server.design.requests import answer
         from realizer.server.http.page_tools import lint
 
         loop = asyncio.get_running_loop()
@@ -209,8 +210,9 @@ class WebSocketConnections:
                 return
             # One text at a time for all editors: sessions come first.
             async with self._checking:
-                faults = await loop.run_in_executor(None, lint, text, self._settings)
-            await client.send_all(faults)
+                tool = answer if text.startswith("{") else lint
+                found = await loop.run_in_executor(None, tool, text, self._settings)
+            await client.send_all(found)
 
     async def _edit(self, client: ClientSocket) -> None:
         """Serve the WebSocket of a page that edits a face: answer its messages in their order."""

@@ -1,5 +1,6 @@
 // The page: wires the face, the sound, the editor, the tools and the feedback log to one connection.
 import { Checker } from "./checker.js";
+import { DesignTab } from "./design/tab.js";
 import { at, choose, make, tabs } from "./dom.js";
 import { Editor } from "./editor.js";
 import { FaceRoom } from "./face/room.js";
@@ -35,6 +36,7 @@ const units = new ActionUnits(at("au-sliders"), at("find-aus"), pose);
 const params = new Faps(at("fap-sliders"), at("find-faps"), pose);
 const mirror = new Mirror(link, (message) => log.error(message));
 const room = new FaceRoom();
+const design = new DesignTab(link, stage);
 const wheel = new Wheel(at("wheel"), pose, (message) => log.error(message));
 
 const alive = new Set(); // ids of blocks that were accepted and have not ended
@@ -71,6 +73,7 @@ link.onfeedback = (element, seq) => {
 };
 link.onreply = (message) => {
   mirror.reply(message);
+  design.reply(message);
   if (message.type === "gap") log.last = 0;
   if (message.type === "welcome") faces = message.capabilities.faces ?? [];
   if (message.type === "state") showVoice(message.characters[0]?.voice ?? message.voice.name);
@@ -136,6 +139,7 @@ async function showFace(message) {
     await stage.load(message.face, message.scale, message.offset);
     at("stage-note").textContent = "";
     showLights();
+    design.begin();
   } catch (error) {
     face = null;
     at("stage-note").textContent = `The face could not be shown: ${error.message}`;
@@ -162,8 +166,9 @@ at("live").onclick = () => timeline.look(null);
 
 function draw() {
   const now = sound.playhead() ?? clock.playhead(performance.now() / 1000);
+  const designed = design.frames();
   if (room.open) room.draw(performance.now());
-  else stage.draw(timeline.scrub ?? now, recorder.on);
+  else stage.draw(designed?.time ?? timeline.scrub ?? now, recorder.on, designed?.frames);
   if (recorder.on) {
     recorder.draw();
     at("record").lastElementChild.textContent = `Stop ${recorder.seconds.toFixed(0)} s`;
@@ -285,9 +290,10 @@ at("record").onclick = async () => {
 // the pose ------------------------------------------------------------------------------------
 
 tabs(at("tabs"), (tab) => {
-  at("pose").hidden = ["tab-script", "tab-mirror", "tab-face"].includes(tab);
+  at("pose").hidden = ["tab-script", "tab-mirror", "tab-face", "tab-design"].includes(tab);
   at("face-stage").hidden = tab !== "tab-face";
   room.turn(tab === "tab-face", faces, face?.name);
+  design.show(tab === "tab-design");
 });
 pose.addEventListener("change", () => {
   const parts = [pose.emotion && "an emotion", pose.aus.size && `${pose.aus.size} AU${pose.aus.size > 1 ? "s" : ""}`, pose.faps.size && `${pose.faps.size} FAP${pose.faps.size > 1 ? "s" : ""}`];
@@ -324,6 +330,7 @@ async function vocabulary() {
   params.know(known);
   wheel.know(known);
   mirror.know(known);
+  design.know(known);
   showVoices(known.voices);
   const unit = new Map(known.aus.map(({ au, name }) => [String(au), name]));
   const param = new Map(known.faps.map((row) => [row.name, row]));
@@ -347,4 +354,4 @@ link.connect();
 requestAnimationFrame(draw);
 
 // For tests of the page: what has been shown.
-globalThis.realizerPage = { stage, sound, link, clock, editor, timeline, pose, recorder, room, mirror };
+globalThis.realizerPage = { stage, sound, link, clock, editor, timeline, pose, recorder, room, mirror, design };

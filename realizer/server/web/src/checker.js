@@ -9,6 +9,11 @@ export class Checker {
 
   // Return the faults of a text; reject if the service cannot be reached.
   async ask(text) {
+    return (await this.send(text)).faults;
+  }
+
+  // Return the answer to a text, or to a request of the designer.
+  async send(text) {
     const socket = await this.open();
     return new Promise((resolve, reject) => {
       this.waiting.push({ resolve, reject });
@@ -28,7 +33,7 @@ export class Checker {
         this.opening = null;
         resolve(socket);
       };
-      socket.onmessage = (event) => this.waiting.shift()?.resolve(JSON.parse(event.data).faults);
+      socket.onmessage = (event) => this.waiting.shift()?.resolve(JSON.parse(event.data));
       socket.onclose = () => {
         this.opening = null;
         const lost = new Error("the service cannot be asked");

@@ -144,10 +144,11 @@ export class Stage {
   }
 
   // Draw the face if something has changed, or `always`: the canvas keeps its picture on the page only.
-  draw(playhead, always = false) {
+  // `frames` are those among which `playhead` is, if not those of the stream.
+  draw(playhead, always = false, frames = this.frames) {
     if (!this.head) return;
     this.fit();
-    if (playhead !== null) this.pose(playhead);
+    if (playhead !== null) this.pose(playhead, frames);
     const ease = 0.18;
     for (const axis of ["yaw", "pitch", "zoom"]) {
       const away = this.want[axis] - this.view[axis];
@@ -180,11 +181,11 @@ export class Stage {
   }
 
   // Vertices at `playhead`, interpolated between two frames.
-  pose(playhead) {
-    if (!this.frames.length) return;
-    const first = Math.max(0, this.frames.findLastIndex(({ time }) => time <= playhead));
-    const a = this.frames[first];
-    const b = this.frames[first + 1] ?? a;
+  pose(playhead, frames) {
+    if (!frames.length) return;
+    const first = Math.max(0, frames.findLastIndex(({ time }) => time <= playhead));
+    const a = frames[first];
+    const b = frames[first + 1] ?? a;
     if (a.face !== this.name) return; // the face is still being loaded
     const t = b.time > a.time ? Math.min(1, Math.max(0, (playhead - a.time) / (b.time - a.time))) : 0;
     if (this.shown === a.values && this.shownAt === t) return;

@@ -1,0 +1,1 @@
+"""Tools of the page's designer of timelines: checks, frames, import and export."""

@@ -1,0 +1,170 @@
+"""Requests of the designer: each is a JSON object with the name of a tool, answered by JSON."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, replace
+from typing import TYPE_CHECKING, Any
+
+from realizer.core.errors import RealizerError, TableError
+from realizer.core.settings import Settings
+from realizer.expressions.expression import Expression
+from realizer.expressions.library import library_of
+from realizer.expressions.timeline import Timeline, faults_of
+from realizer.expressions.timeline_reader import read_timeline
+
+if TYPE_CHECKING:
+    from realizer.tables.knowledge import Mood, Role
+
+MAX_REQUEST = 1_000_000  # characters
+
+
+class DesignError(RealizerError):
+    """A request that cannot be answered; the text says what was wanted."""
+
+
+def answer(text: str, settings: Settings) -> str:
+    """Return the answer to a request as JSON; {"error": text} if there is none.
+
+    Args:
+        text: {"tool": a key of `TOOLS`, ...}.
+    """
+    try:
+        if len(text) > MAX_REQUEST:
+            raise DesignError(f"wanted at most {MAX_REQUEST} characters, got {len(text)}")
+        request = json.loads(text)
+        tool = TOOLS.get(request.get("tool")) if isinstance(request, dict) else None
+        if tool is None:
+            raise DesignError(f"tool: wanted one of {', '.join(TOOLS)}")
+        return json.dumps(tool(request, settings), ensure_ascii=False, separators=(",", ":"))
+    except (RealizerError, ValueError, TypeError, KeyError, RecursionError) as error:
+        words = error.args[0] if isinstance(error, KeyError) and error.args else error
+        return json.dumps({"error": str(words)})
+
+
+def timeline_of(request: Mapping[str, Any], settings: Settings) -> Timeline:
+    """Return the timeline of a request, without faults.
+
+    Raises:
+        TableError: it has faults, a line for each.
+    """
+    timeline = read_timeline(json.dumps(request.get("timeline")).encode())
+    if faults := faults_of(timeline, library_of(settings.library_folder)):
+        raise TableError("\n".join(faults))
+    return timeline
+
+
+def _library(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
+    """Return the expressions, all or those that match `find`: words, or action units such as "1+2+12L"."""
+    from realizer.expressions.search import by_action_units, by_meaning
+    from realizer.tables.knowledge import knowledge
+    from realizer.tables.lexemes import read_aus
+
+    library = library_of(settings.library_folder)
+    known = list(library.values())
+    query = str(request.get("find", "")).strip()
+    parts = query.upper().replace("AU", " ").replace(",", " ").replace("+", " ").split()
+    if parts and all(part.rstrip("LR").isdigit() for part in parts):
+        units = read_aus(dict.fromkeys(parts, 1.0), "find")
+        known = [match for match, _ in by_action_units(units, known)]
+    elif query:
+        known = [match for match, _ in by_meaning(query, known)]
+    return {"expressions": [_row(expression) for expression in known], "moods": sorted(knowledge().moods)}
+
+
+def _row(expression: Expression) -> dict[str, Any]:
+    """Return an expression for the page, with the version of its file but not the path."""
+    row = expression.to_json()
+    file = expression.file
+    row |= {name: row[name]["seconds"] for name in ("onset", "apex", "offset")}
+    row |= {"file": None if file is None else file.stem, "units": expression.units}
+    if file is not None:
+        from realizer.server.edits.edit_folder import version_of
+
+        row |= {"source": expression.source, "version": version_of(file.read_bytes())}
+    return row
+
+
+def _check(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
+    """Return what is unusual about a timeline, the expressions it lacks, and its duration."""
+    from itertools import islice
+
+    from realizer.checking.timeline_advice import missing_companions, timeline_advice
+    from realizer.expressions.spans import duration_of, spans, visible_spans
+    from realizer.expressions.timeline import remarks
+
+    library = library_of(settings.library_folder)
+    timeline = _distinct(timeline_of(request, settings))
+    places = {span.place: (span.track, span.entry) for span in visible_spans(timeline, library)}
+    role: Role = "listener" if request.get("role") == "listener" else "speaker"
+    advice = islice(timeline_advice(timeline, library, role, mood_of(request)), 200)
+    return {
+        "duration": duration_of(timeline, library),
+        "spans": [
+            [[s.start, s.reached, s.left, s.end] for s in spans(track, library)] for track in timeline.tracks
+        ],
+        "advice": [
+            {"place": places.get(one.id), "text": one.text, "hint": one.hint, "impossible": one.is_impossible}
+            for one in advice
+        ],
+        "remarks": remarks(timeline),
+        "companions": [one._asdict() for one in missing_companions(timeline, library)],
+    }
+
+
+def _distinct(timeline: Timeline) -> Timeline:
+    """Return a timeline whose channels have names of their own, by which advice finds them."""
+    names = Counter(track.name for track in timeline.tracks)
+    tracks = (
+        track if names[track.name] == 1 else replace(track, name=f"{track.name} ({number})")
+        for number, track in enumerate(timeline.tracks, 1)
+    )
+    return replace(timeline, tracks=tuple(tracks))
+
+
+def mood_of(request: Mapping[str, Any]) -> Mood | None:
+    """Return the mood that a request names; raises KeyError."""
+    from realizer.tables.knowledge import knowledge
+
+    return knowledge().mood(str(request["mood"])) if request.get("mood") else None
+
+
+def _frames(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
+    from realizer.server.design.frames import expression_frame, timeline_frames
+
+    if "aus" in request:
+        return expression_frame(request, settings)
+    return timeline_frames(request, timeline_of(request, settings), settings)
+
+
+def _open(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
+    from realizer.server.design.documents import open_file
+
+    return asdict(open_file(str(request.get("text", "")), settings))
+
+
+def _enrich(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
+    from realizer.server.design.documents import enrich_text
+
+    listener = request.get("role") == "listener"
+    return asdict(enrich_text(str(request.get("text", "")), settings, mood_of(request), listener=listener))
+
+
+def _export(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
+    from realizer.server.design.documents import export
+
+    text = request.get("text")
+    timeline = timeline_of(request, settings)
+    return {"text": export(timeline, str(request.get("form")), settings, None if text is None else str(text))}
+
+
+TOOLS: Mapping[Any, Callable[[Mapping[str, Any], Settings], dict[str, Any]]] = {
+    "library": _library,
+    "check": _check,
+    "frames": _frames,
+    "open": _open,
+    "enrich": _enrich,
+    "export": _export,
+}

@@ -1,0 +1,93 @@
+// The library of the designer: expressions with pictures, found by word, meaning or action units.
+import { at, make } from "../dom.js";
+import { ask } from "../service.js";
+import { keyOf, titleOf } from "./model.js";
+
+const COLUMNS = 8; // of the sheet of pictures
+
+export class Strip {
+  // ask(request): the service's answer. add(expression, event): use it; the event is where it was dropped.
+  constructor(ask, design, add) {
+    Object.assign(this, { ask, design, add, order: new Map() });
+    this.panel = at("design-cards");
+    at("design-find").oninput = () => this.find(at("design-find").value.trim());
+  }
+
+  // Read the library, and its pictures of a face when they are drawn.
+  async load(face) {
+    const { expressions, moods } = await this.ask({ tool: "library" });
+    if (at("design-mood").length === 1) at("design-mood").append(...moods.map((mood) => make("option", { value: mood }, mood)));
+    this.order = new Map(expressions.map(({ name }, k) => [name, k]));
+    this.design.rows = new Map(expressions.map((row) => [keyOf(row.name), row]));
+    this.design.dispatchEvent(new Event("change"));
+    await this.find(at("design-find").value.trim(), expressions);
+    this.draw(face);
+  }
+
+  // Show the pictures of the library; the service may draw them for a while.
+  async draw(face) {
+    this.face = face;
+    const answer = await ask(`expressions.webp?face=${encodeURIComponent(face)}`);
+    if (face !== this.face || !answer.ok) return;
+    if (answer.status === 202) return this.draw(face);
+    const sheet = URL.createObjectURL(await answer.blob());
+    this.panel.style.setProperty("--sheet", `url("${sheet}")`);
+    this.panel.style.setProperty("--rows", Math.ceil(this.order.size / COLUMNS));
+    this.panel.classList.add("drawn");
+  }
+
+  async find(words, all) {
+    const asked = (this.asked = words);
+    let found = all;
+    try {
+      found ??= (await this.ask({ tool: "library", find: words })).expressions;
+    } catch (error) {
+      return this.none(error.message);
+    }
+    if (asked !== this.asked) return;
+    if (!found.length) return this.none("None is called so.");
+    // Without a search those first about whose lengths and company something is known.
+    const known = words ? found : found.toSorted((a, b) => b.name.startsWith("template:") - a.name.startsWith("template:"));
+    this.panel.replaceChildren(...known.map((row) => this.card(row)));
+  }
+
+  none(words) {
+    this.panel.replaceChildren(make("p.hint", {}, words));
+  }
+
+  card(row) {
+    const { name, features, means, units } = row;
+    const k = this.order.get(name) ?? 0;
+    const face = make("i.thumb", { ariaHidden: "true" });
+    face.style.setProperty("--x", k % COLUMNS);
+    face.style.setProperty("--y", Math.floor(k / COLUMNS));
+    const title = `${name}: ${features || means.join(", ")} (${units})`;
+    const card = make("button.d-card", { type: "button", title, ariaLabel: `Add ${titleOf({ expression: name })}: ${features || means.join(", ")}` }, face, make("b", {}, titleOf({ expression: name })), make("span", {}, units));
+    card.onclick = () => this.dropped || this.add(row);
+    card.onpointerdown = (event) => this.drag(event, row, card);
+    return card;
+  }
+
+  // Drag a card to a lane. A finger that moves up or down scrolls instead.
+  drag(began, row, card) {
+    this.dropped = false;
+    const move = ({ clientX, clientY }) => {
+      if (!this.dropped && Math.hypot(clientX - began.clientX, clientY - began.clientY) < 8) return;
+      this.dropped = true;
+      this.shade ??= document.body.appendChild(Object.assign(card.cloneNode(true), { className: "d-card d-shade drawn", ariaHidden: "true" }));
+      this.shade.style.translate = `${clientX - 40}px ${clientY - 30}px`;
+      this.shade.style.cssText += `;--sheet:${this.panel.style.getPropertyValue("--sheet")};--rows:${this.panel.style.getPropertyValue("--rows")}`;
+    };
+    const end = (event) => {
+      removeEventListener("pointermove", move);
+      removeEventListener("pointerup", end);
+      removeEventListener("pointercancel", end);
+      this.shade?.remove();
+      this.shade = null;
+      if (this.dropped && event.type === "pointerup") this.add(row, event);
+    };
+    addEventListener("pointermove", move);
+    addEventListener("pointerup", end);
+    addEventListener("pointercancel", end);
+  }
+}
