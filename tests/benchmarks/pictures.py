@@ -119,6 +119,35 @@ def page(path: Path) -> None:
     Image.open(path).convert("RGB").save(path, optimize=True)
 
 
+def designer(path: Path, theme: str = "light", size: tuple[int, int] = (1440, 900)) -> None:
+    """The tab Design with the lanes of a text, at the second expression."""
+    from playwright.sync_api import sync_playwright
+
+    from tests.browser.test_page import ARGUMENTS, CHROMIUM, PATIENCE, serving
+
+    command = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--no-idle", "--voice", "espeak"]
+    with serving(command) as address, sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        width, height = size
+        opened = browser.new_page(
+            viewport={"width": width, "height": height}, bypass_csp=True, color_scheme=theme
+        )
+        opened.set_default_timeout(PATIENCE)
+        opened.goto(f"{address}#design")
+        opened.wait_for_selector("#lights button")
+        opened.wait_for_selector("#design-cards.drawn")
+        opened.fill("#design-text", "Are you sure? That is terrible! Yes, I understand.")
+        opened.press("#design-text", "Enter")
+        opened.wait_for_selector(".d-block")
+        opened.click('.d-card[title^="template:disgust:"]')
+        opened.wait_for_selector(".d-ghost")
+        opened.evaluate("Object.assign(realizerPage.stage, { pace() {}, part: 2, stale: true })")
+        opened.evaluate("realizerPage.design.look(realizerPage.design.preview.time + 0.2)")
+        opened.wait_for_timeout(4000)
+        opened.screenshot(path=path, full_page=width < 900)
+    Image.open(path).convert("RGB").save(path, optimize=True)
+
+
 if __name__ == "__main__":
     os.environ["REALIZER_DRAW"] = "onboard"
     sheet = realizer.realize(examples()["greeting"]).save(ROOT / "realizer/examples/greeting.png")
@@ -129,3 +158,4 @@ if __name__ == "__main__":
     emotions(ROOT / "docs" / "emotions.jpg")
     film(ROOT / "docs" / "film-after.jpg")
     page(ROOT / "realizer/examples/page.png")
+    designer(ROOT / "docs" / "design.png")

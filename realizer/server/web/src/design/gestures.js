@@ -38,6 +38,7 @@ export class Gestures {
       removeEventListener("pointermove", move);
       removeEventListener("keydown", escape, true);
       this.dragging = false;
+      this.fit();
       this.line.hidden = true;
       if (moved) commit ? design.end() : design.cancel();
       if (moved && !commit) design.select(began.entry);
@@ -75,10 +76,11 @@ export class Gestures {
   resize(entry, length, free, lane, commit) {
     const { design } = this;
     const [duration, words] = design.limited(entry, length, free);
-    if (words) this.told(words, true);
     const { end } = design.span(entry);
     const made = design.change(entry, { duration }, lane === null ? commit : false);
-    return lane === null ? made : design.place(made, lane, ms(end - duration), commit);
+    const shown = lane === null ? made : design.place(made, lane, ms(end - duration), commit);
+    if (words) this.told(words);
+    return shown;
   }
 
   key(event) {

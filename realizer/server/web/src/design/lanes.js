@@ -36,7 +36,9 @@ export class Lanes extends Gestures {
     return Math.max(4, this.design.duration + 1, ...(this.design.speech.words).map(([, end]) => end));
   }
 
+  // Fit the time across, but never under a pointer.
   fit() {
+    if (this.dragging) return;
     const room = this.panel.clientWidth - this.labels;
     this.scale = Math.max(room / this.reach, this.zoom ?? 0, 12);
     this.panel.style.setProperty("--s", `${this.scale}px`);

@@ -117,10 +117,12 @@ export class Design extends EventTarget {
 
   step(from, to) {
     if (!from.length) return;
+    const [lane, k] = (this.selected && this.find(this.selected)) ?? [];
     to.push(this.state);
     Object.assign(this, { state: from.pop(), preview: null });
     this.dispatchEvent(new Event("change"));
-    this.select(this.selected && this.find(this.selected) ? this.selected : null);
+    const same = this.shown.channel[lane]?.entries[k];
+    this.select(same && !isBreak(same) ? same : null);
     this.kept();
   }
 

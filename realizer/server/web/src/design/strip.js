@@ -85,6 +85,7 @@ export class Strip {
       this.shade?.remove();
       this.shade = null;
       if (this.dropped && event.type === "pointerup") this.add(row, event);
+      setTimeout(() => (this.dropped = false)); // after the click that may follow
     };
     addEventListener("pointermove", move);
     addEventListener("pointerup", end);

@@ -19,7 +19,7 @@ export class DesignTab {
     this.tool = new Checker();
     this.model = new Design();
     this.preview = new Preview((request) => this.ask(request), stage, this.model, () => this.showPlaying());
-    this.lanes = new Lanes(at("design-score"), this.model, { told: (words) => this.tell(words, "amber"), scrub: (time) => this.look(time), inspect: () => at("design-inspector").querySelector("input")?.focus() });
+    this.lanes = new Lanes(at("design-score"), this.model, { told: (words) => this.stop(words), scrub: (time) => this.look(time), inspect: () => at("design-inspector").querySelector("input")?.focus() });
     this.strip = new Strip((request) => this.ask(request), this.model, (row, event) => this.add(row, event));
     this.inspector = new Inspector(this.model, { marks: (entry) => this.marks.get(entry) ?? [], edit: (row) => this.edit(row), lanes: this.lanes });
     this.expression = new Expression({ preview: this.preview, save: (message) => link.ask(message), told: (words) => this.tell(words), saved: () => this.strip.load(stage.name) });
@@ -48,7 +48,7 @@ export class DesignTab {
       preview.loop = !preview.loop;
       at("design-loop").ariaPressed = String(preview.loop);
     };
-    for (const place of ["design", "design-time"]) at(place).addEventListener("keydown", (event) => this.key(event));
+    addEventListener("keydown", (event) => this.open && this.key(event));
     for (const event of ["change", "commit"]) model.addEventListener(event, () => this.showState());
   }
 
@@ -169,7 +169,7 @@ export class DesignTab {
     this.checking = true;
     try {
       const { advice, companions, remarks } = await this.ask({ tool: "check", timeline, mood: at("design-mood").value, role: at("design-role").value });
-      if (model.file && JSON.stringify(model.file) === JSON.stringify(timeline)) this.judge(advice, companions, timeline);
+      if (model.file && JSON.stringify(model.file) === JSON.stringify(timeline)) this.judge(advice, companions);
       const whole = [...remarks, ...advice.filter(({ place }) => !place).map(({ text, hint }) => `${text}; ${hint}`)];
       this.tell(whole[0] ?? "", "amber", !whole.length);
     } catch (error) {
@@ -182,7 +182,7 @@ export class DesignTab {
     this.check();
   }
 
-  judge(advice, companions, timeline) {
+  judge(advice, companions) {
     const { model } = this;
     // The file has no empty channels: its numbers are those of the others.
     const lanes = model.shown.channel.map((one, lane) => ({ one, lane })).filter(({ one }) => one.entries.length);
@@ -200,8 +200,13 @@ export class DesignTab {
     this.lanes.judge(this.marks, placed);
     this.inspector.draw();
     const first = model.selected && this.marks.get(model.selected)?.[0];
-    if (first) this.tell(`${first.text}; ${first.hint}`, "amber");
-    void timeline;
+    if (first && model.selected !== this.stopped) this.tell(`${first.text}; ${first.hint}`, "amber");
+  }
+
+  // A rule has stopped the chosen block; the sentence stays until another change.
+  stop(words) {
+    this.tell(words, "amber");
+    this.stopped = this.model.selected;
   }
 
   // A sentence below the lanes; `quiet`: only take the last one away if it was of that kind.
