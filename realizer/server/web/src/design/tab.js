@@ -171,9 +171,11 @@ export class DesignTab {
       const { advice, companions, remarks } = await this.ask({ tool: "check", timeline, mood: at("design-mood").value, role: at("design-role").value });
       if (model.file && JSON.stringify(model.file) === JSON.stringify(timeline)) this.judge(advice, companions);
       const whole = [...remarks, ...advice.filter(({ place }) => !place).map(({ text, hint }) => `${text}; ${hint}`)];
-      this.tell(whole[0] ?? "", "amber", !whole.length);
+      if (["", "check"].includes(at("design-status").dataset.from ?? "")) this.tell(whole[0] ?? "", "amber", "check");
+      const first = model.selected && this.marks.get(model.selected)?.[0];
+      if (first && model.selected !== this.stopped) this.tell(`${first.text}; ${first.hint}`, "amber", "check");
     } catch (error) {
-      this.tell(error.message, "bad");
+      this.tell(error.message, "bad", "check");
     } finally {
       this.checking = false;
     }
@@ -199,8 +201,6 @@ export class DesignTab {
     });
     this.lanes.judge(this.marks, placed);
     this.inspector.draw();
-    const first = model.selected && this.marks.get(model.selected)?.[0];
-    if (first && model.selected !== this.stopped) this.tell(`${first.text}; ${first.hint}`, "amber");
   }
 
   // A rule has stopped the chosen block; the sentence stays until another change.
@@ -209,12 +209,11 @@ export class DesignTab {
     this.stopped = this.model.selected;
   }
 
-  // A sentence below the lanes; `quiet`: only take the last one away if it was of that kind.
-  tell(words, state = "", quiet = false) {
+  // Show a sentence below the lanes; "check": another check may replace it.
+  tell(words, state = "", from = "user") {
     const place = at("design-status");
-    if (quiet && (place.dataset.state !== state || this.marks.size) && place.dataset.state !== "bad") return;
     place.textContent = words;
-    place.dataset.state = words ? state : "";
+    Object.assign(place.dataset, { state: words ? state : "", from: words ? from : "" });
   }
 
   async enrich() {
