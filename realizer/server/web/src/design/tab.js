@@ -131,6 +131,7 @@ export class DesignTab {
 
   look(time) {
     this.preview.look(time);
+    this.lanes.now(this.preview.time); // at once: the next key may come before the next picture
     this.showPlaying();
   }
 
