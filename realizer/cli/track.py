@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from realizer.face.model import Fapu
     from realizer.tracking.follower import Person
     from realizer.tracking.markers.film import Look
+    from realizer.tracking.unfinished import Unfinished
 
 # The text of OUT, its rate, its FAPs, and which of them were seen.
 Tracked: TypeAlias = "tuple[str, float, Any, Any]"
@@ -146,6 +147,7 @@ def _from_pictures(
     from realizer.tracking.files import FORMATS, by_mapping, mask
     from realizer.tracking.network import TrackingError
     from realizer.tracking.recording import rate_of, record
+    from realizer.tracking.unfinished import Unfinished
 
     with options.reporting(TrackingError):
         number = int(neutral) if neutral is not None and neutral.isdecimal() else None
@@ -154,7 +156,8 @@ def _from_pictures(
         return _from_markers(source, output, fps, look, face or "default")
     options.check_suffix(output, *FORMATS)
     with options.reporting(TrackingError):
-        times, people = follow(source, fps)
+        kept = Unfinished(output.with_name(f"{output.name}.part"), source) if source.is_file() else None
+        times, people = follow(source, fps, kept)
         if person > len(people):
             raise click.BadParameter(f"there are {len(people)} people in {source}", param_hint="--person")
         subject = people[person - 1]
@@ -166,18 +169,23 @@ def _from_pictures(
     options.note(
         f"{output}: {len(recording.times)} frames, the face is in {recording.seen.mean():.0%}{others}"
     )
-    return FORMATS[output.suffix.lower()](recording, output.stem), recording.fps, recording.faps, mask()
+    text = FORMATS[output.suffix.lower()](recording, output.stem)
+    if kept is not None:
+        kept.remove()
+    return text, recording.fps, recording.faps, mask()
 
 
-def follow(source: Path, fps: float | None) -> tuple[list[float], list[Person]]:
-    """Return the times of all pictures, and the people in them."""
+def follow(
+    source: Path, fps: float | None, kept: Unfinished | None = None
+) -> tuple[list[float], list[Person]]:
+    """Return the times of all pictures, and the people in them; what is kept is not looked at again."""
     from realizer.tracking.follower import follow
     from realizer.tracking.network import TrackingError
     from realizer.tracking.pictures import read_pictures
 
     count, pictures = read_pictures(source, fps or 25.0)
     with options.progress(pictures, "tracking", count) as shown:
-        times, people = follow(shown)
+        times, people = follow(shown, kept)
     if not people:
         raise TrackingError(
             f"{source}: wanted a face, found none in {len(times)} picture{'s' * (len(times) != 1)}; it must "

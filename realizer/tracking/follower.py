@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
@@ -48,9 +49,13 @@ class Follower:
         people: everybody who was seen, in the order of appearance.
     """
 
-    def __init__(self) -> None:
-        self.people: list[Person] = []
-        self._count = 0
+    def __init__(self, people: Iterable[Person] = (), count: int = 0) -> None:
+        """
+        Args:
+            people: who was seen in earlier pictures, in the order of appearance; count: of those pictures.
+        """
+        self.people = list(people)
+        self._count = count
 
     def __call__(self, picture: Picture) -> list[Person]:
         """Look for faces in the next picture; return the people who are in it."""
@@ -86,12 +91,37 @@ class Follower:
         return Person()
 
 
-def follow(pictures: Iterable[Picture]) -> tuple[list[float], list[Person]]:
-    """Return the times of all pictures, and the people in them; who is seen longest and largest is first."""
-    follower, times = Follower(), []
-    for picture in pictures:
+class Kept(Protocol):
+    """What keeps what was seen, as `unfinished.Unfinished` does.
+
+    Attributes:
+        every: number of pictures after which `add` is called.
+    """
+
+    every: int
+
+    def read(self) -> tuple[list[float], Follower]:
+        """Return the times of all pictures that were looked at, and the follower after them."""
+
+    def add(self, times: Sequence[float], people: Sequence[Person]) -> None:
+        """Keep what was seen in the last pictures."""
+
+
+def follow(pictures: Iterable[Picture], kept: Kept | None = None) -> tuple[list[float], list[Person]]:
+    """Return the times of all pictures, and the people in them; who is seen longest and largest is first.
+
+    Args:
+        kept: what was seen in an interrupted run, which is not looked at again, and what is seen now.
+    """
+    times, follower = kept.read() if kept is not None else ([], Follower())
+    known = len(times)
+    for number, picture in enumerate(pictures):
+        if number < known:
+            continue
         times.append(picture.time)
         follower(picture)
+        if kept is not None and len(times) % kept.every == 0:
+            kept.add(times, follower.people)
     return times, sorted(follower.people, key=lambda person: -person.weight)
 
 
