@@ -233,14 +233,21 @@ def report(name: str, result: np.ndarray, wanted: np.ndarray, neutral: np.ndarra
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, default=Path("/tmp"), help="where faces*.npz are kept")
-    parser.add_argument("--prepare", type=int, metavar="SEED", help="draw faces first")
+    parser.add_argument(
+        "--prepare",
+        type=int,
+        nargs="*",
+        default=[],
+        metavar="SEED",
+        help="draw faces first, a set for each seed",
+    )
     parser.add_argument("--sittings", type=int, default=400)
     parser.add_argument("--steps", type=int, default=STEPS)
     parser.add_argument("--without", nargs="*", default=[], help="faces to leave out")
     parser.add_argument("-o", "--output", type=Path, default=WEIGHTS)
     options = parser.parse_args()
-    if options.prepare is not None:
-        prepare(options.data, options.prepare, options.sittings)
+    for seed in options.prepare:
+        prepare(options.data, seed, options.sittings)
     arrays = trained(read(options.data), options.without, options.steps)
     np.savez_compressed(options.output, **arrays)
     print(f"{options.output}: {options.output.stat().st_size} bytes")
