@@ -158,27 +158,36 @@ export class HeadMesh {
     for (let k = 3 * i; k < 3 * i + 3; k++) normals[k] = sums[k] / length;
   }
 
-  // Draw the vertices at `at` (3 numbers each); only triangles that move, or moved before, are turned.
-  pose(at) {
-    const { starts, list } = this.touching;
-    const [turned, around] = [[], []];
-    const [inTurned, inAround] = [new Uint8Array(this.triangles.length / 3), new Uint8Array(this.count)];
-    for (let i = 0; i < this.count; i++) {
-      const k = 3 * i;
-      if (Math.abs(at[k] - this.vertices[k]) + Math.abs(at[k + 1] - this.vertices[k + 1]) + Math.abs(at[k + 2] - this.vertices[k + 2]) <= HOME) continue;
-      for (let j = starts[i]; j < starts[i + 1]; j++) {
-        if (!inTurned[list[j] / 3]) turned.push(list[j]);
-        inTurned[list[j] / 3] = 1;
+  // Draw the vertices at `at` (3 numbers each), of which only the numbers `changed` may be new; null: any.
+  // Only triangles that move, or moved before, are turned.
+  pose(at, changed = null) {
+    const [{ starts, list }, { posed, vertices }] = [this.touching, this];
+    const [turned, again, around] = [[], this.turned, []];
+    if (!changed) posed.set(at);
+    this.mark = (this.mark ?? 0) + 1; // of what this call has seen
+    const [triangleMarks, vertexMarks] = [(this.triangleMarks ??= new Uint32Array(this.triangles.length / 3)), (this.vertexMarks ??= new Uint32Array(this.count))];
+    const move = (i) => {
+      if (Math.abs(at[i] - vertices[i]) <= HOME) return;
+      const vertex = Math.floor(i / 3);
+      for (let j = starts[vertex]; j < starts[vertex + 1]; j++) {
+        if (triangleMarks[list[j] / 3] === this.mark) continue;
+        triangleMarks[list[j] / 3] = this.mark;
+        turned.push(list[j]);
       }
-    }
-    this.posed.set(at);
-    for (const t of [...turned, ...this.turned.filter((t) => !inTurned[t / 3])]) {
+    };
+    if (changed) for (const i of changed) posed[i] = at[i];
+    if (changed) changed.forEach(move);
+    else for (let i = 0; i < at.length; i++) move(i);
+    const settle = (t) => {
       this.turn(t);
       for (let k = t; k < t + 3; k++) {
-        if (!inAround[this.triangles[k]]) around.push(this.triangles[k]);
-        inAround[this.triangles[k]] = 1;
+        const vertex = this.triangles[k];
+        if (vertexMarks[vertex] !== this.mark) around.push(vertex);
+        vertexMarks[vertex] = this.mark;
       }
-    }
+    };
+    turned.forEach(settle);
+    for (const t of again) if (triangleMarks[t / 3] !== this.mark) settle(t);
     for (const i of around) this.settle(i);
     this.turned = turned;
   }

@@ -14,7 +14,7 @@ export class Motion {
   begin() {
     this.shapes = new Map(); // FAP -> the head's own field
     this.lists = new WeakMap();
-    this.at = this.written = null;
+    this.at = this.written = this.changed = null; // numbers: of all, moved, and moved or moved back
     this.forget();
   }
 
@@ -86,7 +86,8 @@ export class Motion {
   posed() {
     const { vertices } = this.draft.mesh;
     const at = (this.at ??= vertices.slice());
-    for (const i of this.written ?? []) at[i] = vertices[i];
+    const before = this.written ?? [];
+    for (const i of before) at[i] = vertices[i];
     this.written = [];
     const units = fapuOf(this.draft.state.points);
     for (const [fap, value] of this.value ? this.moving : []) {
@@ -101,6 +102,7 @@ export class Motion {
       keepLids(this.lids, at);
       this.written = [...this.written, ...this.lids.map(({ i }) => 3 * i + 2)];
     }
+    this.changed = [...before, ...this.written];
     return at;
   }
 

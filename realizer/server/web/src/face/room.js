@@ -246,8 +246,10 @@ export class FaceRoom {
     if (!this.draft.mesh || !this.points.says) return;
     const begin = performance.now();
     this.faps.tick(now);
-    const posed = this.motion.step(BUDGET) ?? this.motion.arrived;
-    if (posed) this.view.pose(posed);
+    const moved = this.motion.step(BUDGET);
+    const posed = moved ?? this.motion.arrived;
+    if (posed) this.view.pose(posed, moved && this.last === moved ? this.motion.changed : null);
+    this.last = posed ?? this.last;
     if (posed || this.repaint) this.paint();
     this.spent = performance.now() - begin; // ms of script before the picture is drawn
     if (!this.view.draw()) return;

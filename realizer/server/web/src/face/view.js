@@ -99,9 +99,9 @@ export class View {
     this.touch("color");
   }
 
-  // Draw vertices (3 numbers each).
-  pose(at) {
-    this.mesh.pose(at);
+  // Draw vertices (3 numbers each), of which only the numbers `changed` are new; null: any.
+  pose(at, changed = null) {
+    this.mesh.pose(at, changed);
     this.touch("position", "normal");
   }
 
