@@ -108,7 +108,7 @@ def _style(pixels: Float64, points: Float64, hair: Float64, skin: Float64, sex: 
         for k, way in zip(JAW, (-1, 1), strict=True)
         for share in BESIDE
     ]
-    hanging = sum(_apart(side, hair) < min(_apart(side, behind), _apart(side, skin)) for side in sides)
+    hanging = sum(_apart(side, hair) < _apart(side, behind) for side in sides)
     if hanging >= len(sides) / 2:
         return "bob"
     return "bun" if sex < 0.4 else "short"
