@@ -13,6 +13,7 @@ export class Inspector {
   }
 
   draw() {
+    if (this.lanes.dragging) return; // the fields follow at its end
     const { design, panel } = this;
     const focused = panel.contains(document.activeElement) ? document.activeElement.ariaLabel : null;
     const { selected: entry } = design;

@@ -5,6 +5,8 @@ import { isBreak, ms, titleOf } from "./model.js";
 
 const HANDLES = { start: "start", onset: "end of the onset", offset: "begin of the offset", end: "end", amount: "amount" };
 
+const NONE = [];
+
 export class Lanes extends Gestures {
   // told(sentence): what a gesture meets. scrub(time): another time is looked at. inspect(): look at the block's fields.
   constructor(panel, design, { told, scrub, inspect }) {
@@ -64,7 +66,8 @@ export class Lanes extends Gestures {
       return { channel: one, rows: this.design.rows, element: this.laneOf(one, lane) };
     });
     const held = document.activeElement?.entry;
-    if (rows.length !== this.drawn.length || rows.some((row, k) => row !== this.drawn[k])) this.lanes.replaceChildren(...rows.map(({ element }) => element));
+    if (rows.length !== this.drawn.length) this.lanes.replaceChildren(...rows.map(({ element }) => element));
+    else rows.forEach((row, k) => row === this.drawn[k] || this.drawn[k].element.replaceWith(row.element));
     this.drawn = rows;
     this.fit();
     this.mark();
@@ -104,8 +107,10 @@ export class Lanes extends Gestures {
     const stop = all.find(({ entry }) => entry === design.selected) ?? all[0];
     for (const block of all) {
       const { entry } = block;
-      const advice = this.marks.get(entry) ?? [];
+      const advice = this.marks.get(entry) ?? NONE;
       block.tabIndex = block === stop ? 0 : -1;
+      if (block.known?.advice === advice && block.known.chosen === (entry === design.selected)) continue;
+      block.known = { advice, chosen: entry === design.selected };
       block.ariaSelected = String(entry === design.selected);
       block.dataset.state = !design.row(entry) ? "unknown" : advice.some(({ impossible }) => impossible) ? "impossible" : advice.length ? "unusual" : "";
       const words = [...(design.row(entry) ? [] : ["no such expression"]), ...advice.map(({ text, hint }) => `${text}; ${hint}`), entry.because ?? ""].filter(Boolean).join(". ");
