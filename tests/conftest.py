@@ -38,6 +38,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--sessions", type=int, default=200, help="how many random sessions test_composition plays"
     )
+    parser.addoption(
+        "--pipecat", action="store_true", help="install Pipecat for tests/examples/test_pipecat.py"
+    )
     parser.addoption("--seed", type=int, default=0, help="of the mutants of test_fuzz")
 
 

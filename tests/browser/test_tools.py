@@ -67,7 +67,7 @@ def shown(page, **aus: float) -> None:  # type: ignore[no-untyped-def]
 
 
 def slide(page, label: str, value: float) -> None:  # type: ignore[no-untyped-def]
-    page.locator(f'input[type="range"][aria-label="{label}"]').fill(str(value))
+    page.locator(f'input[type="range"][aria-label="{label}"]:visible').fill(str(value))
 
 
 def write(page, text: str, cursor: str = "|") -> None:  # type: ignore[no-untyped-def]
@@ -226,7 +226,7 @@ def test_timeline_scrubs_by_mouse_and_keyboard(page) -> None:  # type: ignore[no
 
 def test_sliders_set_action_units_on_both_sides_or_one(page) -> None:  # type: ignore[no-untyped-def]
     page.click("#tab-aus")
-    assert page.locator(".row.au").count() == len(action_units())
+    assert page.locator("#au-sliders .row.au").count() == len(action_units())
     slide(page, "AU 12 Lip corner puller, left", 0.8)
     shown(page, au12L=0.8, au12R=0.8)
     page.click("button[aria-label='AU 12: both sides together']")
@@ -368,7 +368,7 @@ def test_page_is_light_or_dark(page) -> None:  # type: ignore[no-untyped-def]
 
 def test_page_is_usable_by_keyboard(page) -> None:  # type: ignore[no-untyped-def]
     page.focus("#tab-script")
-    for panel in ("aus", "faps", "emotion", "mirror", "script"):
+    for panel in ("aus", "faps", "emotion", "design", "face", "mirror", "script"):
         page.keyboard.press("ArrowRight")
         assert page.locator(f"#{panel}").is_visible()
     page.click("#help")
