@@ -231,6 +231,7 @@ def test_page_draws_skin_like_stills_in_every_light(quiet_page) -> None:  # type
         assert np.abs(here[100:200, 5:40] - there[100:200, 5:40]).mean() < 12, light
 
 
+@pytest.mark.long
 def test_page_draws_folds_like_stills(quiet_page) -> None:  # type: ignore[no-untyped-def]
     import numpy as np
 

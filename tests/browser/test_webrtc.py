@@ -197,6 +197,7 @@ def measure(browser, url: str, size: str, shot: str | None = None) -> dict[str, 
     }
 
 
+@pytest.mark.long
 def test_page_plays_a_session_by_webrtc_with_lips_and_sound(browser) -> None:  # type: ignore[no-untyped-def]
     with application() as url:
         found = measure(browser, url, "96x96")

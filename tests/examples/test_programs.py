@@ -68,6 +68,7 @@ def test_programs_are_short_and_say_how_to_run_them() -> None:
 
 
 @pytest.mark.gl
+@pytest.mark.long
 def test_film_from_text_makes_a_film(run: Callable[..., str], tmp_path: Path) -> None:
     assert "film.mp4" in run("film_from_text.py", "Are you sure? Nonsense!", "film.mp4")
     assert (tmp_path / "film.mp4").stat().st_size > 20_000
@@ -138,6 +139,7 @@ def test_fastapi_app_has_the_face_and_makes_films(monkeypatch: pytest.MonkeyPatc
 
 @LITERT
 @pytest.mark.gl
+@pytest.mark.long
 def test_track_and_replay_plays_a_film_on_another_head(run: Callable[..., str], tmp_path: Path) -> None:
     import realizer
 
@@ -149,6 +151,7 @@ def test_track_and_replay_plays_a_film_on_another_head(run: Callable[..., str], 
 
 
 @pytest.mark.gl
+@pytest.mark.long
 def test_notebook_runs_from_top_to_bottom(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("REALIZER_VOICE", "silent")

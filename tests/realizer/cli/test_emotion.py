@@ -117,6 +117,7 @@ def test_emotion_refuses_a_file_that_is_not_text(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_emotion_draws_a_word_and_the_wheel_of_64_faces(tmp_path: Path) -> None:
     from PIL import Image
 

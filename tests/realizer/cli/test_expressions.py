@@ -76,6 +76,7 @@ def test_find_without_a_match_exits_with_1() -> None:
 
 @pytest.mark.xdist_group("picture_search")
 @pytest.mark.slow
+@pytest.mark.long
 def test_find_like_a_neutral_face_that_idles_has_no_match(tmp_path: Path) -> None:
     import numpy as np
     from PIL import Image

@@ -25,6 +25,7 @@ def test_control_has_as_many_expressions_at_words() -> None:
 
 @pytest.mark.gl
 @pytest.mark.slow
+@pytest.mark.long
 def test_films_are_pairs_with_and_without_rules() -> None:
     av = pytest.importorskip("av")
     found = list(films([Variant("ada")], ["Why?"], "en", np.random.default_rng(1), lambda count: None))

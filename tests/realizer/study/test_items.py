@@ -21,6 +21,7 @@ def test_checks_demand_an_answer_that_the_key_holds() -> None:
 
 @pytest.mark.gl
 @pytest.mark.slow
+@pytest.mark.long
 def test_naming_and_displacements_are_as_many_as_published() -> None:
     with Drawer() as draw:
         named = list(naming([Variant("ada")], draw))

@@ -17,6 +17,7 @@ def test_plan_counts_what_it_draws() -> None:
 
 @pytest.mark.gl
 @pytest.mark.slow
+@pytest.mark.long
 def test_items_of_one_seed_are_the_same() -> None:
     plan = Plan(("naming", "visual"), (Variant("ada"),), "ben", most=4, seed=3)
     one, two = plan.items(), plan.items()

@@ -70,6 +70,7 @@ def drawn(at: np.ndarray) -> Image.Image:
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_fit_follows_the_outline_of_a_profile_to_either_side(data: Path) -> None:
     _, at = person(data)
     pose = Pose(np.zeros(3), SCALE, np.array([500.0, 450.0]))
