@@ -202,6 +202,7 @@ class RealtimeModel:
 
 
 @pytest.mark.parametrize("prefix", ["output_audio", "audio"])
+@pytest.mark.slow
 def test_realtime_voice_is_interrupted_and_tells_what_was_heard(
     prefix: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

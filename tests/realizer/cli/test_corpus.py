@@ -129,6 +129,7 @@ def test_corpus_track_does_what_is_not_done_yet(tmp_path: Path) -> None:
 
 @LITERT
 @pytest.mark.gl("onboard")
+@pytest.mark.slow
 def test_corpus_track_finds_faces_without_markers(tmp_path: Path) -> None:
     run("corpus", "init", tmp_path)
     smile = faps_of("ben", AU12=0.9)

@@ -126,6 +126,7 @@ def fitted(known: Model, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path
         (["--form", "both"], ["au_published.toml", "au_extended.toml"]),
     ],
 )
+@pytest.mark.slow
 def test_fit_command_writes_a_file_for_each_form(
     fitted: tuple[Path, dict[str, Model]],
     tmp_path: Path,

@@ -99,6 +99,7 @@ def test_views_say_why_a_photograph_is_of_no_use(
         read_views(files[front], files[side])
 
 
+@pytest.mark.slow
 def test_views_read_a_photograph_of_20_megabytes(files: dict[str, Path], tmp_path: Path) -> None:
     large = np.asarray(portrait("ida").resize((2600, 2600)), np.int16)
     noise = np.random.default_rng(2).integers(-9, 10, large.shape)
