@@ -15,7 +15,8 @@ from docs.generator import steps
 from realizer import cli as commands
 from realizer import tables
 from realizer.core.settings import PREFIX, Settings
-from realizer.server.http import http_site
+from realizer.server.http.http_site import asyncapi
+from realizer.server.http.vocabulary import vocabulary as served_vocabulary
 from realizer.tables.lexemes import face_lexemes
 
 
@@ -62,7 +63,7 @@ def settings() -> dict[str, str]:
 
 def messages() -> dict[str, str]:
     """Return every message of the WebSocket with its fields, from the AsyncAPI document of the service."""
-    document = json.loads(http_site._asyncapi())
+    document = json.loads(asyncapi())
     parts = [
         "# Messages, field by field\n\nMade from `GET /asyncapi.json`. "
         "[Protocol](../protocol.md) explains them.\n"
@@ -163,7 +164,7 @@ PAGES: Mapping[str, Callable[[], dict[str, str]]] = {
 @cache
 def vocabulary() -> dict[str, Any]:
     """Return what `GET /vocabulary.json` of the service answers."""
-    found: dict[str, Any] = json.loads(http_site._vocabulary())
+    found: dict[str, Any] = json.loads(served_vocabulary())
     return found
 
 

@@ -43,7 +43,11 @@ FACES: Registry[Path | str] = Registry(
 )
 HEADS = (".glb",)  # suffixes of heads that are imported on first use
 IMPORT = b"1"  # changed when heads come out of the import differently, so that they are imported again
-IMPORTER = "realizer.facebuild.arkit.importer"  # imported by name: nothing else that runs needs `facebuild`
+# Tools of `realizer.facebuild` -> their modules. What runs imports them only here, by name, on first use.
+FACE_TOOLS = {
+    "import_head": "realizer.facebuild.arkit.importer",
+    "Studio": "realizer.facebuild.studio.studio",
+}
 DEFAULT = "ada"  # the face that the name "default" stands for
 VARIABLE = "REALIZER_FACES"
 DEFORMER = "REALIZER_DEFORMER"
@@ -53,6 +57,11 @@ MESH = {"vertices": 2, "triangles": 2, "colours": 2, "occlusion": 1, "gloss": 1}
 
 
 log = logging.getLogger(__name__)
+
+
+def face_tool(name: str) -> Any:
+    """Return a tool of FACE_TOOLS, loaded on first use."""
+    return getattr(import_module(FACE_TOOLS[name]), name)
 
 
 def face_name(name: str) -> str:
@@ -169,7 +178,7 @@ def _imported(head: Path) -> Path:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(dir=folder.parent) as place:
             draft = Path(place) / head.stem
-            import_module(IMPORTER).import_head(head, draft)
+            face_tool("import_head")(head, draft)
             with contextlib.suppress(OSError):  # another process has imported it meanwhile
                 draft.rename(folder)
     return folder

@@ -1,11 +1,10 @@
-"""Measures what a session costs without sockets, and what two of its mechanisms for speed save.
+"""Measures what a session costs without sockets, and what the garbage collection policy saves.
 
 Run: python tests/benchmarks/session_cost.py [--sessions 50] [--cycles 4] [--ahead 0.2]
 
 Each session has one subscriber of 25 FAP frames a second and plays the document of `listeners.py` every ten
-seconds. Time is simulated; costs are processor time. Three rounds alternate between the session as it is,
-without its fast path for frames (`FrameRun`), and with Python's automatic garbage collection instead of
-`GcPolicy`.
+seconds. Time is simulated; costs are processor time. Three rounds alternate between the session as it is
+and with Python's automatic garbage collection instead of `GcPolicy`.
 """
 
 from __future__ import annotations
@@ -22,7 +21,6 @@ from listeners import BODY, FPS, SCENE
 
 from realizer.core.settings import Settings
 from realizer.server.session.session import Session
-from realizer.server.streams.broadcast import Broadcast
 
 CYCLE = 10.0  # s
 ROUNDS = 3
@@ -55,9 +53,6 @@ def new_session(number: int, ahead: float) -> Session:
 
 def tick(session: Session, now: float) -> float:
     """Do what the host does at a deadline. Return the next one."""
-    run = session.fast_path
-    if run is not None and run.next_message(now) is not None:
-        return run.wake_at
     if (found := session.frames(now)) is not None:
         return found[1]
     session.tick(now)
@@ -98,11 +93,9 @@ def main() -> None:
     parser.add_argument("--ahead", type=float, default=0.0, help="seconds that frames are sent ahead")
     options = parser.parse_args()
     frames = options.sessions * options.cycles * CYCLE * FPS
-    fast_path = Broadcast.fast_path
-    rows: dict[str, list[Cost]] = {"as it is": [], "no fast path": [], "automatic gc": []}
+    rows: dict[str, list[Cost]] = {"as it is": [], "automatic gc": []}
     for _ in range(ROUNDS):
         for name, costs in rows.items():
-            Broadcast.fast_path = (lambda *_: None) if name == "no fast path" else fast_path
             gc.collect()
             gc.freeze()
             gc.enable() if name == "automatic gc" else gc.disable()

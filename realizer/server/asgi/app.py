@@ -231,7 +231,8 @@ async def _send_bml(hub: Hub, request: Request) -> Response:
 
 async def _feedback(hub: Hub, request: Request) -> Response:
     """Stream the feedback of a session as server-sent events, also what came after `Last-Event-ID`."""
-    visitor, name = hub.admit(request), request.path_params["session"]
+    grant, name = hub.grant(request), request.path_params["session"]
+    visitor = Visitor(address_of(request), grant.sessions)
     seen = request.query_params.get("seen") or request.headers.get("last-event-id")
     _, number = session_of("/" if seen is None else f"/?seen={seen}")
     joined = _joined(hub, listener := _Listener(), name, number, visitor)
@@ -239,9 +240,9 @@ async def _feedback(hub: Hub, request: Request) -> Response:
 
     async def events() -> AsyncIterator[str]:
         try:
-            while True:
+            while (left := grant.seconds_left) is None or left:  # as long as the token is valid
                 try:
-                    async with asyncio.timeout(KEEP_ALIVE):
+                    async with asyncio.timeout(KEEP_ALIVE if left is None else min(left, KEEP_ALIVE)):
                         message = await listener.messages.get()
                 except TimeoutError:
                     yield ": nothing new\n\n"
@@ -331,7 +332,7 @@ class _Listener:
 async def _joined(
     hub: Hub, client: Outbound, name: str, seen: int | None, visitor: Visitor
 ) -> AsyncIterator[int]:
-    """Let a client join a session, and leave it; give the number of the connection.
+    """Join a client to a session until the block ends; the value is the number of the connection.
 
     Raises:
         JoinError: the client may not join it.

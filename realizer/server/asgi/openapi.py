@@ -14,7 +14,7 @@ ERROR = {
     "type": "object",
     "properties": {"error": {"type": "string", "description": "what was wanted, and what came"}},
 }
-# Attributes of a finding that are told -> their types.
+# Attributes of a finding in an answer -> their types.
 FINDING = {
     **{name: {"type": ["integer", "null"]} for name in ("line", "column")},
     **{name: {"type": "string"} for name in ("type", "id", "text", "help")},

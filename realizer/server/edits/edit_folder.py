@@ -67,7 +67,7 @@ class EditFolder:
             version: of the file that this replaces; None: there is none.
 
         Raises:
-            EditError: a wrong name; too much; the file has changed since `version`; or the disk takes it not.
+            EditError: a wrong name; too much; the file has changed since `version`; or it cannot be written.
         """
         path = self.path(*names, suffix=suffix)
         place = path.relative_to(self._folder)

@@ -20,6 +20,7 @@ import numpy as np
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
 from realizer.server.http.page_tools import ToolError, UnknownName, export_pose, preview_emotion
+from realizer.server.http.vocabulary import vocabulary
 
 log = logging.getLogger(__name__)
 
@@ -76,9 +77,9 @@ class HttpSite:
         self._routes: dict[str, Callable[[dict[str, str]], HttpResponse]] = {
             "/": lambda asked: self._file("index.html"),
             "/healthz": lambda asked: _json(json.dumps({"status": "ok", **health()})),
-            "/asyncapi.json": lambda asked: _json(_asyncapi()),
+            "/asyncapi.json": lambda asked: _json(asyncapi()),
             "/examples.json": lambda asked: _json(_examples()),
-            "/vocabulary.json": lambda asked: _json(_vocabulary()),
+            "/vocabulary.json": lambda asked: _json(vocabulary()),
             "/feeling.json": lambda asked: _json(preview_emotion(asked.get("of", ""))),
             "/look.json": self._look,
             "/mirror": lambda asked: _bytes(_mirror(asked.get("light", ""))),
@@ -153,9 +154,11 @@ class HttpSite:
         """Return a file of the documentation."""
         if not self._documents:
             return HttpResponse(404, TEXT, NO_DOCUMENTATION.encode())
-        if name not in self._documents:
+        if not name:
             # Links of a page are relative to its folder, which is /docs/.
             return HttpResponse(302, TEXT, b"", (("Location", "/docs/index.html"),))
+        if name not in self._documents:
+            return _missing(f"docs/{name}")
         body = self._documentation.joinpath(name).read_bytes()
         headers = (("Cache-Control", "no-cache"), ("Content-Security-Policy", DOCUMENTATION_POLICY))
         return HttpResponse(200, _media_type(name), body, headers)
@@ -178,8 +181,12 @@ class HttpSite:
             return HttpResponse(200, _media_type(name), file.read_bytes(), headers)
         if name == "index.html":
             return HttpResponse(503, TEXT, NOT_BUILT.encode())
-        words = f"/{name[:80]} is not here; there are / /ws /faces/NAME /healthz\n"
-        return HttpResponse(404, TEXT, words.encode())
+        return _missing(name)
+
+
+def _missing(name: str) -> HttpResponse:
+    words = f"/{name[:80]} is not here; there are / /ws /faces/NAME /healthz\n"
+    return HttpResponse(404, TEXT, words.encode())
 
 
 def _media_type(name: str) -> str:
@@ -207,14 +214,9 @@ def _face(name: str) -> str:
     return name
 
 
-def _asyncapi() -> bytes:
+def asyncapi() -> bytes:
+    """Return the AsyncAPI document of the WebSocket, as JSON."""
     return files("realizer.server").joinpath("asyncapi.json").read_bytes()
-
-
-def _vocabulary() -> bytes:
-    from realizer.server.http.vocabulary import vocabulary
-
-    return vocabulary()
 
 
 @functools.cache

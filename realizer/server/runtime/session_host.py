@@ -248,11 +248,14 @@ class SessionHost:
         session = self._registry.sessions.get(name)
         if session is None:
             return False
+        self._end(session, 1000, "the session was ended")
+        return True
+
+    def _end(self, session: Session, code: int, reason: str) -> None:
         numbers = self._registry.joined(session)
-        self._effects.run(session, [Close(number, 1000, "the session was ended") for number in numbers])
+        self._effects.run(session, [Close(number, code, reason) for number in numbers])
         self._registry.end(session)
         self._apply_effects(session)
-        return True
 
     def _call(self, session: Session, function: Callable[[], None]) -> bool:
         """Call a function that changes a session, and carry out the effects.
@@ -303,16 +306,6 @@ class SessionHost:
         self._overload.note(now - when, now)
         if self._calls.is_busy(session):
             return  # it is woken again when its call has ended
-        run = session.fast_path
-        if run is not None and (data := run.next_message(now)) is not None:
-            client = self._clients[run.connection]
-            client.send(data)
-            while run.wake_at <= now and (data := run.next_message(now)) is not None:
-                client.send(data)
-            if (waiting := client.unsent_bytes) > SLOW:
-                session.update_backlog(run.connection, waiting)
-            self._wake_ups.set(session, run.wake_at)
-            return
         self._calls.call(session, functools.partial(self._send_due, session, now), FRAME_SLICES)
 
     def _send_due(self, session: Session, now: float) -> None:
@@ -364,10 +357,7 @@ class SessionHost:
         """Log an internal error and end its session; the others play on."""
         log.exception("session %s ends: it failed", session.id)
         self.metrics.counts["failures"] += 1
-        self._effects.run(session, [Close(number, 1011, "internal error") for number in session.connections])
-        session.close()
-        session.journal.writer.end()  # a restored session would fail again
-        self._registry.remove(session)
+        self._end(session, 1011, "internal error")  # in the journal, too: a restored session would fail again
 
     def _deliver(self, session: Session, answer: Callable[[], None]) -> None:
         """Pass the answer of a voice or a renderer to a session."""

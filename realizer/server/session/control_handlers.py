@@ -27,6 +27,7 @@ from realizer.server.session.character_faces import CharacterFaces
 from realizer.server.session.control_fields import FieldError, character_index, direct_values, emotion_values
 from realizer.server.session.subscriptions import Subscriptions
 from realizer.server.speech.audio_clips import HEARD, AudioClips, ClipError, heard_samples
+from realizer.server.speech.speech_streams import PATIENCE
 from realizer.server.streams.connection import Connection
 
 
@@ -98,29 +99,29 @@ class ControlHandlers:
             if piece.id.startswith(HEARD):
                 self._hear(piece, t)
             else:
-                self._clip_piece(piece)
+                self._clip_piece(piece, t)
         except WireError as error:
             self.reply(connection.id, ErrorMessage(code="unsupported", message=str(error)))
         except FieldError as error:
             self.reply(connection.id, _error("clip", error, error.where))
 
-    def _clip_piece(self, piece: ClipPiece) -> None:
+    def _clip_piece(self, piece: ClipPiece, t: float) -> None:
         """Add a piece of a clip, and pass on what of it can be spoken."""
         try:
             self.clips.add_chunk(piece)
         except ClipError as error:
-            self._speak_parts(piece.id, is_last=True, fault=str(error))
+            self._speak_parts(piece.id, t, is_last=True, fault=str(error))
             raise
-        self._speak_parts(piece.id, is_last=piece.final)
+        self._speak_parts(piece.id, t, is_last=piece.final)
 
-    def _speak_parts(self, clip: str, *, is_last: bool, fault: str | None = None) -> None:
+    def _speak_parts(self, clip: str, t: float, *, is_last: bool, fault: str | None = None) -> None:
         """Pass on what has arrived of a clip to the speech that waits for it.
 
         Args:
             fault: why no more of it will come.
         """
         speeches = self.submission.speeches
-        wanted = speeches.parts_wanted(clip)
+        wanted = speeches.parts_wanted(clip, t)
         if wanted < 0:
             self.clips.unfollow(clip)
         elif wanted or is_last:
@@ -128,11 +129,16 @@ class ControlHandlers:
             said = None if fault is None else f"clip {clip!r}: {fault}"
             speeches.add_parts(clip, parts, is_last=is_last, fault=said)
 
-    def on_disconnect(self, connection: int) -> None:
+    def on_disconnect(self, connection: int, t: float) -> None:
         """Close the speeches of a connection that has left; the rest of what it sent is spoken."""
         for clip in self.submission.speeches.arriving(connection):
-            self._speak_parts(clip, is_last=True, fault="its last piece was not sent")
+            self._speak_parts(clip, t, is_last=True, fault="its last piece was not sent")
         self.submission.speeches.on_disconnect(connection)
+
+    def end_overdue_clips(self, t: float) -> None:
+        """Speak clips of which nothing has come for long without their rest."""
+        for clip in self.submission.speeches.overdue(t):
+            self._speak_parts(clip, t, is_last=True, fault=f"no piece of it has come for {PATIENCE:g} s")
 
     def _hear(self, piece: ClipPiece, t: float) -> None:
         """Pass sound that a character hears to the player."""
@@ -173,7 +179,7 @@ class ControlHandlers:
             is_arriving = message.clip is not None and self.clips.follow(message.clip)
             self.submission.speeches.handle(message, connection.id, t, is_arriving=is_arriving)
             if is_arriving:
-                self._speak_parts(message.clip or "", is_last=False)
+                self._speak_parts(message.clip or "", t, is_last=False)
 
     def _character(self, message: CharacterMessage) -> None:
         if message.face is not None:

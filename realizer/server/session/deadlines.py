@@ -71,7 +71,9 @@ class Deadlines:
             if self._submission.has_work and (start := self._clock.start_of(event)) > event:
                 self._feedback = start
             other = streams.next_other if streams.active else math.inf
-            other = other if answer_due is None else min(other, answer_due)
+            other = min(other, math.inf if answer_due is None else answer_due)
+            if not has_documents:
+                other = min(other, self._submission.speeches.deadline())
             # Open speeches and slow clients are checked with every frame, schedules with all feedback: then
             # the deadline cannot be kept.
             shown = streams.active and bool(streams.schedule_subscribers)

@@ -34,10 +34,9 @@ from realizer.server.session.session_clock import SessionClock
 from realizer.server.session.subscriptions import Subscriptions
 from realizer.server.session.tracked_faces import TrackedFaces
 from realizer.server.speech.audio_clips import AudioClips
-from realizer.server.streams.broadcast import Broadcast, FrameRun
+from realizer.server.streams.broadcast import Broadcast
 from realizer.server.streams.connection import Connection
 from realizer.server.streams.frame_windows import EPSILON
-from realizer.server.streams.frames_ahead import AheadRun
 from realizer.speech.utterance import Utterance
 
 if TYPE_CHECKING:
@@ -67,7 +66,6 @@ class Session:
     Attributes:
         clock: the session clock.
         feedback_log: the published feedback.
-        fast_path: the frames of the only client, which need no call of the session; None if more is due.
     """
 
     def __init__(
@@ -106,9 +104,8 @@ class Session:
         self._deadlines = Deadlines(
             self.clock, self.player, self.submission, self.broadcast, self.connections
         )
-        self.fast_path: FrameRun | AheadRun | None = None
         self._effects: list[Effect] = []
-        self._client_left = False  # its open speeches end with the next tick
+        self._must_end_speech = False  # with the next tick, as a client has left, or sends no more of a clip
         reply = self.connections.reply
         self.subscriptions = Subscriptions(
             settings, self.player, self.faces, self.broadcast, self.connections, reply
@@ -143,7 +140,7 @@ class Session:
         if self.closed:  # it ended while the client waited for it
             self._effects.append(Close(connection, 1012, f"session {self.id} has ended: reconnect"))
             return
-        self._forget_deadline()
+        self._deadlines.forget()
         self.connections[connection] = Connection(
             connection, may_edit=may_edit and self.settings.edit is not None
         )
@@ -161,10 +158,10 @@ class Session:
         """
         if self.connections.pop(connection, None) is not None:
             self.journal.note(self.clock.read(now), "leave", connection)
-        self._controls.on_disconnect(connection)
+        self._controls.on_disconnect(connection, self.clock.read(now))
         self.tracked.drop(connection)
-        self._client_left = True
-        self._forget_deadline()
+        self._must_end_speech = True
+        self._deadlines.forget()
         if not self.connections:
             self.empty_since = now
             if not self.named and not is_awaited:
@@ -177,7 +174,7 @@ class Session:
     def close(self) -> None:
         """Close the session: it does and sends nothing any more."""
         self.closed = True
-        self._forget_deadline()
+        self._deadlines.forget()
         self.connections.clear()
         self.submission.queue.clear()
         self._effects.clear()
@@ -185,7 +182,7 @@ class Session:
     def update_backlog(self, connection: int, waiting: int) -> None:
         """Take the number of unsent bytes of a client, as `Connections.update_backlog`."""
         if self.connections.update_backlog(connection, waiting):
-            self._forget_deadline()
+            self._deadlines.forget()
 
     # messages in --------------------------------------------------------------------------------
 
@@ -246,7 +243,7 @@ class Session:
         """Take the answer to an effect `Draw`. If it is an error, the subscriptions to the picture end."""
         if self.closed:
             return
-        self._forget_deadline()
+        self._deadlines.forget()
         picture = result if isinstance(result, bytes) else None
         effects, viewers = self.broadcast.video.on_picture(draw, picture, self.connections.values())
         self._effects += effects
@@ -258,7 +255,7 @@ class Session:
         """Take the answer to an effect `Look`."""
         if self.closed:
             return
-        self._forget_deadline()
+        self._deadlines.forget()
         self.tracked.answer(connection, result, self.clock.read(now))
         self.tick(now)
 
@@ -290,19 +287,17 @@ class Session:
             self._publish(t)
             deadlines.update_feedback()
             if self.player.version != version:
-                self._forget_deadline()
+                self._deadlines.forget()
         sends, following = self.broadcast.frames_due(t)
         effects = [*self.take_effects(), *sends]
         if not deadlines.is_known:
             return effects, self.next_due()
-        event = deadlines.next_event + opened
-        self.fast_path = self.broadcast.fast_path(opened, event)
-        return effects, min(event, following + opened)
+        return effects, min(deadlines.next_event, following) + opened
 
     def compact_journal(self, now: float) -> None:
         """Replace the journal by a checkpoint if it has grown; due feedback is published first."""
         if self.journal.writer.needs_checkpoint and not self.closed:
-            self._forget_deadline()
+            self._deadlines.forget()
             self._publish(t := self.clock.read(now))
             self.journal.compact(t)
 
@@ -328,8 +323,8 @@ class Session:
         Args:
             starts: whether blocks that start at `t` start.
         """
-        self._client_left = False
-        self._forget_deadline()
+        self._must_end_speech = bool(self.submission.speeches.overdue(t))
+        self._deadlines.forget()
         self._publish(t, starts=starts)
         if self.broadcast.active or self.connections.has_subscriptions:
             self.broadcast.set_subscribers(self.connections.values())
@@ -340,7 +335,9 @@ class Session:
         # frames are sent in between.
         if not read_documents:
             return False
-        done = self.submission.work(t)
+        self._controls.end_overdue_clips(t)
+        done = self.submission.work(t) or self._must_end_speech
+        self._must_end_speech = False
         if self.submission.speeches.advance(t) or done:
             self._publish(t, starts=False)
             return True
@@ -351,17 +348,13 @@ class Session:
         """Whether a document can be read or planned now."""
         if self.closed or self._deadlines.is_known:
             return False
-        return self._client_left or self.submission.has_work
+        return self._must_end_speech or self.submission.has_work
 
     def next_due(self) -> float:
         """Return the time of the next event other than documents; infinity if there is none."""
         if self.closed:
             return math.inf
         return self._deadlines.next(has_documents=self.has_documents) + self.clock.opened
-
-    def _forget_deadline(self) -> None:
-        self._deadlines.forget()
-        self.fast_path = None
 
     @property
     def busy(self) -> bool:

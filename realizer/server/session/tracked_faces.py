@@ -60,7 +60,7 @@ class TrackedFaces:
         self._cameras: dict[int, _Camera] = {}
 
     def start(self, connection: int, message: Track) -> None:
-        """Let the pictures of a connection drive a character; at 0 frames a second they no longer do.
+        """Make a character follow the pictures of a connection; at 0 frames a second, no longer.
 
         Raises:
             FieldError: no such character.

@@ -23,7 +23,7 @@ class SpeechStream:
         chunk: the last chunk.
         unspoken: (sentence or id of a clip, whether it is a clip) of what is in no block yet.
         marks: sync -> id of its chunk's block.
-        arriving: ids of clips in `unspoken` that are spoken while they arrive.
+        arriving: id of a clip in `unspoken` that is spoken while it arrives -> when its last piece came.
         partial_chunks: ids of blocks that speak only part of a sentence.
         unplanned: ids of blocks that are not planned yet, in order.
         scheduled: ids of blocks that are planned and have not ended, in order.
@@ -42,7 +42,7 @@ class SpeechStream:
     splitter: SentenceSplitter = field(default_factory=SentenceSplitter)
     unspoken: deque[tuple[str, bool]] = field(default_factory=deque)
     marks: dict[str, str] = field(default_factory=dict)
-    arriving: set[str] = field(default_factory=set)
+    arriving: dict[str, float] = field(default_factory=dict)
     partial_chunks: set[str] = field(default_factory=set)
     unplanned: list[str] = field(default_factory=list)
     scheduled: list[str] = field(default_factory=list)
@@ -65,7 +65,7 @@ class SpeechStream:
         """Add parts of a clip that arrives, before what follows it."""
         at = self.unspoken.index((clip, True))
         if is_last:
-            self.arriving.discard(clip)
+            self.arriving.pop(clip, None)
             del self.unspoken[at]
         for place, part in enumerate(parts, at):
             self.unspoken.insert(place, (part, True))

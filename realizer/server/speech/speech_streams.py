@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 
@@ -24,6 +25,7 @@ AHEAD = 6
 PARTS = 2  # of a clip that arrives, ahead of those: later, a part can be longer
 MOST = 500_000  # waiting characters of one speech; nine hours
 MAX_SPEECHES = 1_000  # of a session
+PATIENCE = 20.0  # s; a clip of which no piece has come for so long is spoken without the rest
 CUT_OFF = ("INTERRUPTED", "REVOKED")
 
 
@@ -80,19 +82,36 @@ class SpeechStreams:
             return
         speech.add(message.append or "", message.clip)
         if is_arriving and message.clip is not None:
-            speech.arriving.add(message.clip)
+            speech.arriving[message.clip] = t
         if message.close:
             speech.close()
 
-    def parts_wanted(self, clip: str) -> int:
-        """Return how many parts of a clip that arrives can be prepared now; -1 if no speech waits for it."""
+    def parts_wanted(self, clip: str, t: float) -> int:
+        """Return how many parts of a clip that arrives can be prepared now; -1 if no speech waits for it.
+
+        Args:
+            t: when a piece of it came.
+        """
         speech = self._speaker(clip)
+        if speech is not None:
+            speech.arriving[clip] = t
         return -1 if speech is None else max(0, PARTS - speech.unspoken.index((clip, True)))
 
     def arriving(self, connection: int) -> list[str]:
         """Return the clips for which the speeches of a connection wait."""
         speeches = [speech for speech in self._speeches.values() if speech.connection == connection]
         return [clip for speech in speeches for clip in sorted(speech.arriving)]
+
+    def overdue(self, t: float) -> list[str]:
+        """Return the clips of which no piece has come for PATIENCE seconds."""
+        return [clip for clip, last in self._last_pieces() if t >= last + PATIENCE]
+
+    def deadline(self) -> float:
+        """Return the time at which a clip is overdue; infinity without one."""
+        return min((last + PATIENCE for _, last in self._last_pieces()), default=math.inf)
+
+    def _last_pieces(self) -> list[tuple[str, float]]:
+        return [item for s in self._speeches.values() if not s.is_finished for item in s.arriving.items()]
 
     def add_parts(self, clip: str, parts: Sequence[str], *, is_last: bool, fault: str | None = None) -> None:
         """Add parts of a clip to the speech that waits for it.

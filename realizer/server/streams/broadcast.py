@@ -15,11 +15,10 @@ from realizer.server.streams.frame_windows import (
     FrameSubscription,
     FrameTimeline,
     FrameWindow,
-    PackedFrames,
     last_frame_at,
 )
-from realizer.server.streams.frames_ahead import AheadRun, AheadSubscription
-from realizer.server.streams.overload import OUTDATED, Overload
+from realizer.server.streams.frames_ahead import AheadSubscription
+from realizer.server.streams.overload import Overload
 from realizer.server.streams.schedule_stream import ScheduleStream, schedule_message
 from realizer.server.streams.video_stream import VideoStream
 
@@ -46,7 +45,6 @@ class Fanout:
         self._overload = overload
         self.members = [(c, s) for c, s in members if not isinstance(s, AheadSubscription)]
         self.ahead = [(c, s) for c, s in members if isinstance(s, AheadSubscription)]
-        self._packed: PackedFrames | None = None  # the next frames of a single subscriber
 
     @property
     def next(self) -> int:
@@ -61,11 +59,6 @@ class Fanout:
         for connection, s in self.ahead:
             due = min(due, s.next_due(is_slow=connection.is_slow))
         return due
-
-    @property
-    def packed(self) -> PackedFrames | None:
-        """The packed next frames, if there is one subscriber and the plan has not changed."""
-        return self._packed if self.timeline.is_current and not self.ahead else None
 
     def send(self, newest: int, now: float, sends: list[Send]) -> None:
         """Send all frames up to `newest` to the subscribers that have not received them."""
@@ -82,9 +75,6 @@ class Fanout:
                 for number in range(s.next, newest + 1):
                     sends.append(Send(connection.id, window.message(s, number)))
             s.next = max(s.next, newest + 1)
-        is_packed = s.encoding == "binary" and s.stream != "mesh"
-        if len(self.members) == 1 and is_packed and not connection.is_slow:
-            self._packed = window.packed(s)
         self._drop_source(window)
 
     def send_ahead(self, newest: int, now: float, sends: list[Send], *, is_reading: bool) -> int:
@@ -112,59 +102,6 @@ class Fanout:
 
     def _drop_source(self, window: FrameWindow) -> None:
         window.drop_source(s for _, s in (*self.members, *self.ahead))
-
-
-class FrameRun:
-    """A run of packed frames for one connection, which are sent without a call of the session.
-
-    Args:
-        client: the connection.
-        subscription: its subscription, which is advanced.
-        packed: the frames.
-        zero: the caller's clock when the session clock was 0.
-        overload: whether late frames are left out.
-
-    Attributes:
-        connection: id of the connection.
-        until: time of the next other event, on the caller's clock.
-        wake_at: time at which `next_message` or another event is due, on the caller's clock.
-    """
-
-    def __init__(
-        self,
-        client: Connection,
-        subscription: FrameSubscription,
-        packed: PackedFrames,
-        zero: float,
-        until: float,
-        overload: Overload,
-    ) -> None:
-        self.connection = client.id
-        self._client = client
-        self._overload = overload
-        self._subscription = subscription
-        self._packed = packed
-        self._fps = subscription.timeline.fps
-        self._zero = zero
-        self._next = subscription.next
-        self._due = self._next / self._fps + zero
-        self.until = until
-        self.wake_at = min(self._due, until)
-
-    def next_message(self, now: float) -> bytes | None:
-        """Return the message of the next frame; None if it is not due, far too late, or more is due."""
-        number, passed = self._next, now + EPSILON
-        if not self._due <= passed < self.until or passed > self._due + OUTDATED:
-            return None
-        if self._overload.is_active:
-            number = max(number, last_frame_at(now - self._zero, self._fps))
-        if number >= self._packed.end:
-            return None
-        self._client.dropped += number - self._next
-        self._subscription.next = self._next = number + 1
-        self._due = (number + 1) / self._fps + self._zero
-        self.wake_at = min(self._due, self.until)
-        return self._packed[number]
 
 
 class Broadcast:
@@ -283,25 +220,6 @@ class Broadcast:
                 taken_back = fanout.send_ahead(newest, now, sends, is_reading=is_reading)
                 self.counts["taken_back"] += taken_back
         return sends, self.next_frame
-
-    def fast_path(self, zero: float, until: float) -> FrameRun | AheadRun | None:
-        """Return the frames of the only subscriber; None if there are other or more subscribers.
-
-        Args:
-            zero: the caller's clock when the session clock was 0.
-            until: time of the next other event, on the caller's clock.
-        """
-        if len(self._fanouts) != 1:
-            return None
-        fanout = self._fanouts[0]
-        if len(fanout.ahead) == 1 and not fanout.members:
-            ((client, ahead),) = fanout.ahead
-            can_run = ahead.can_run and not client.is_slow
-            return AheadRun(client.id, ahead, zero, until) if can_run else None
-        if (packed := fanout.packed) is None:
-            return None
-        ((connection, s),) = fanout.members
-        return FrameRun(connection, s, packed, zero, until, self.overload)
 
     @property
     def next_frame(self) -> float:

@@ -96,55 +96,6 @@ class AheadSubscription(FrameSubscription):
         return message
 
     @property
-    def can_run(self) -> bool:
-        """Whether `run_on` can be called: the plan has not changed since the last message."""
-        return not self.takes_back and self.version == self.timeline.version and self._window is not None
-
-    def run_on(self, now: float) -> str | bytes | None:
-        """Return the message of the due rows as `message`; None if rows are late, not due, or not computed.
-
-        The plan must not have changed since `can_run` was true.
-        """
-        window, fps = self._window, self.timeline.fps
-        assert window is not None
-        newest, last = last_frame_at(now, fps), last_frame_at(now + self.ahead, fps)
-        if self._due > now + EPSILON or not newest < self.next <= last < window.end:
-            return None
-        return self.message(newest, now, is_slow=False)
-
-    @property
     def _is_outdated(self) -> bool:
         """Whether rows may be wrong that were sent and not shown."""
         return self.version != self.timeline.version and self.final < self.next and self._window is not None
-
-
-class AheadRun:
-    """Rows of one connection, which are sent without a call of the session, like a `FrameRun`.
-
-    Args:
-        connection: id of the connection.
-        subscription: its subscription, which is advanced.
-        zero: the caller's clock when the session clock was 0.
-        until: time of the next other event, on the caller's clock.
-
-    Attributes:
-        wake_at: time at which `next_message` or another event is due, on the caller's clock.
-    """
-
-    def __init__(self, connection: int, subscription: AheadSubscription, zero: float, until: float) -> None:
-        self.connection = connection
-        self.until = until
-        self._subscription = subscription
-        self._zero = zero
-        self._find_next()
-
-    def next_message(self, now: float) -> str | bytes | None:
-        """Return the message that is due; None if there is none, or anything else is due."""
-        if now + EPSILON >= self.until:
-            return None
-        message = self._subscription.run_on(now - self._zero)
-        self._find_next()
-        return message
-
-    def _find_next(self) -> None:
-        self.wake_at = min(self._subscription.next_due(is_slow=False) + self._zero, self.until)

@@ -123,11 +123,7 @@ class Driver:
 
     def wake(self) -> None:
         """As the shell does it."""
-        now, run = self.opened + self.now, self.session.fast_path
-        if run is not None and (data := run.next_message(now)) is not None:
-            assert run.wake_at == self.session.next_due()
-            self.do(Send(run.connection, data))
-            return
+        now = self.opened + self.now
         found = None if self.session.has_documents else self.session.frames(now)
         if found is None:
             self.session.tick(self.opened + self.now)

@@ -8,7 +8,6 @@ import http
 import logging
 from collections.abc import Awaitable, Callable, Iterator, Mapping
 from functools import lru_cache
-from importlib import import_module
 from typing import Protocol
 
 from websockets.asyncio.server import ServerConnection
@@ -31,9 +30,6 @@ from realizer.server.transports.websocket.request import address_of, headers_of,
 log = logging.getLogger(__name__)
 
 GOODBYE = 2.0  # s; a client that has not answered a close frame by then is gone
-STUDIO = (
-    "realizer.facebuild.studio.studio"  # imported by name when a face is edited, as nothing else needs it
-)
 REASON = 123  # bytes of a reason in a close frame
 
 
@@ -216,9 +212,11 @@ class WebSocketConnections:
 
     async def _edit(self, client: ClientSocket) -> None:
         """Serve the WebSocket of a page that edits a face: answer its messages in their order."""
+        from realizer.face.load import face_tool
+
         grant = self._access.request(client.target, client.headers)
         may_save = grant is not None and grant.sessions is None
-        studio = import_module(STUDIO).Studio(self._settings.edit if may_save else None)
+        studio = face_tool("Studio")(self._settings.edit if may_save else None)
         loop = asyncio.get_running_loop()
         try:
             while (message := await client.receive()) is not None:

@@ -51,7 +51,6 @@ export class Stage {
     if (look.background === "/background") await this.fetchPicture();
     const maps = await mapsOf(glb, this.renderer, this.full);
     if (this.awaited !== name) return; // another face was requested in the meantime
-    if (this.awaited !== name) return; // another face was requested in the meantime
     Object.assign(this, { look, preset: look.camera });
     await this.shine(this.light);
     if (this.awaited !== name) return;

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import json
+import time
 from collections.abc import Iterator
 from functools import partial
 from urllib.parse import urlsplit
@@ -16,6 +17,7 @@ pytest.importorskip("starlette", reason="needs the asgi extra")
 
 from realizer.core.settings import Settings, SettingsError
 from realizer.server.asgi.app import create_app, event_of
+from realizer.server.http.jwt_tokens import LEEWAY
 from tests.realizer.server.asgi.conftest import LIMIT, Served
 
 NOD = '<bml id="a"><head id="n" lexeme="NOD"/></bml>'
@@ -132,6 +134,13 @@ def test_app_asks_for_its_token(serve) -> None:
         with pytest.raises(InvalidStatus) as refused:
             connect(app.url.replace("http", "ws") + "/ws?token=wrong", open_timeout=LIMIT)
         assert refused.value.response.status_code == 401
+
+
+def test_app_ends_a_stream_of_feedback_when_its_token_expires(serve) -> None:
+    jwt = pytest.importorskip("jwt")
+    with serve(create_app(Settings(voice="silent", jwt_key="secret" * 6))) as app:
+        token = jwt.encode({"exp": time.time() - LEEWAY + 1.0}, "secret" * 6, "HS256")
+        assert list(events(app, "s", Authorization=f"Bearer {token}")) == []
 
 
 @pytest.mark.parametrize("passes_lifespan_on", [True, False])

@@ -58,7 +58,8 @@ def test_site_has_the_documentation_once_it_is_built(tmp_path: Path) -> None:
     assert site.answer("/docs/how-to/embed.html").body == b"<p>Embed</p>"
     assert site.answer("/docs/index.html").media_type == "text/html; charset=utf-8"
     outside = site.answer("/docs/../http_site.py")
-    assert (outside.status, outside.body) == (302, b"")
+    assert (outside.status, b"/docs/../http_site.py is not here" in outside.body) == (404, True)
+    assert site.answer("/docs/how-to/missing.html").status == 404
     assert site.is_public("/docs/how-to/embed.html")
 
 

@@ -25,6 +25,7 @@ from realizer.protocol.wire import ClipPiece, pack_clip, unpack
 from realizer.server.serve import Server
 from realizer.server.session.effects import Effect, Speak
 from realizer.server.speech import speech_streams
+from realizer.server.speech.speech_streams import PATIENCE
 from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Phoneme, Utterance, Word
@@ -590,6 +591,20 @@ def test_clip_that_arrives_is_warned_of_when_its_sender_leaves() -> None:
     assert "turn:end" in times(client)
     start = round(times(client)["turn.1:start"] * 8000)
     assert np.array_equal(heard(client)[start : start + 4800], SLOW[:4800])
+
+
+def test_clip_that_arrives_no_further_ends_with_a_warning() -> None:
+    driver = Talker()
+    driver.send({"type": "speech", "id": "turn", "clip": "c", "words": WORDS, "close": True})
+    arrive(driver, [0, 1, 2, 3, 4, 5], last=False)
+    last = driver.now - 0.1
+    driver.run(last + PATIENCE - 0.01)
+    assert not [f for f in driver.clients[1].feedback if isinstance(f, WarningFeedback)]
+    client = driver.run(last + PATIENCE + 2)
+    (warning,) = [f for f in client.feedback if isinstance(f, WarningFeedback)]
+    assert warning.id == "turn:turn"
+    assert warning.text.endswith("clip 'c': no piece of it has come for 20 s")
+    assert last + PATIENCE < times(client)["turn:end"] < last + PATIENCE + 1
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,6 @@ from realizer.server.journal import Entry, SavedSession
 from realizer.server.journal.replay import restore_session
 from realizer.server.session.session import Session
 from realizer.server.streams.frame_windows import FrameTimeline, FrameWindow
-from realizer.server.streams.frames_ahead import AheadRun
 from realizer.server.streams.overload import OUTDATED
 from tests.example_counts import examples
 from tests.realizer.server.conftest import NOD, TALK, Client, Driver, spoken
@@ -181,16 +180,6 @@ def test_ahead_goes_on_when_the_face_has_changed(driver) -> None:
     driver.session.broadcast.face_changed(0)
     driver.run(2.0)
     assert list(shown(driver.clients[1]))[:51] == list(range(51))
-
-
-def test_ahead_run_returns_messages_until_another_event_is_due(driver) -> None:
-    driver.send(subscribe())
-    driver.run(1.01)
-    run = driver.session.fast_path
-    assert isinstance(run, AheadRun)
-    assert run.next_message(run.wake_at) is not None
-    run.until = run.wake_at
-    assert run.next_message(run.wake_at) is None
 
 
 ACTIONS = st.one_of(
