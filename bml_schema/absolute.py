@@ -1,7 +1,5 @@
 """Conversion of a block to absolute times."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

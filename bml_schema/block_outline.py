@@ -1,7 +1,5 @@
 """A first pass over a <bml> element: its children, and the sync points that references can name."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from lxml import etree
@@ -15,19 +13,13 @@ from bml_schema.sync_refs import Names, Points
 
 
 class Kind(NamedTuple):
-    """The common properties of all children of a block with the same tag.
-
-    Attributes:
-        step: name in paths.
-        cls: node class; None for a constraint and an unknown element.
-        points: sync points that references can name; None if unknown.
-        varies: the sync points depend on the element: on its number of strokes, or the marks in its text.
-    """
+    """The common properties of all children of a block with the same tag."""
 
     tag: str
-    step: str
-    cls: type[Behaviour] | None = None
-    points: Points | None = None
+    step: str  # name in paths
+    cls: type[Behaviour] | None = None  # node class; None for a constraint and an unknown element
+    points: Points | None = None  # sync points that references can name; None if unknown
+    # The sync points depend on the element: on its number of strokes, or the marks in its text.
     varies: bool = False
 
 

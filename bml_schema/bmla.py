@@ -1,7 +1,5 @@
 """The behaviours of BMLA and BMLT (AsapRealizer, Elckerlyc) that concern a face."""
 
-from __future__ import annotations
-
 from bml_schema.node_schema import attribute, child, node, text
 from bml_schema.nodes import Behaviour, Part, bmla, bmlt
 from bml_schema.values import Value, block_name, name, names, number, one_of, word

@@ -1,7 +1,5 @@
 """Reading and writing of XML: a parser for untrusted text, and the canonical text of an element."""
 
-from __future__ import annotations
-
 from typing import Any, cast
 
 from lxml import etree

@@ -1,7 +1,5 @@
 """A splitter that finds the documents and the broken stretches in a text."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from itertools import count

@@ -1,7 +1,5 @@
 """The reader of documents: decoding, limits, well-formedness, several documents in one text."""
 
-from __future__ import annotations
-
 import codecs
 import re
 from collections import deque

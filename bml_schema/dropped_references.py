@@ -1,7 +1,5 @@
 """Removal of behaviours from a block, with everything that refers to them."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -21,18 +19,13 @@ def listed(references: Sequence[str]) -> str:
 
 
 class ReducedBlock(NamedTuple):
-    """A block without some of its behaviours.
+    """A block without some of its behaviours."""
 
-    Attributes:
-        block: the rest; its places and problems are those of the original.
-        lost_references: id of a removed behaviour -> the references and constraints that were removed with
-            it: "behaviour:sync", or the id or path of a constraint.
-        fatal: ids of removed behaviours that a constraint inside <required> names.
-    """
-
-    block: Block
+    block: Block  # the rest; its places and problems are those of the original
+    # Id of a removed behaviour -> the references and constraints that were removed with it: "behaviour:sync",
+    # or the id or path of a constraint.
     lost_references: Mapping[str, tuple[str, ...]]
-    fatal: frozenset[str]
+    fatal: frozenset[str]  # ids of removed behaviours that a constraint inside <required> names
 
 
 def without(block: Block, gone: Collection[str]) -> ReducedBlock:

@@ -3,8 +3,6 @@
 It raises the first fault as a Fault; the caller decides what is dropped.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 from typing import Any, cast

@@ -5,8 +5,6 @@ BMLError               no block: too big, no usable id, not a <bml>
 └── BMLSyntaxError     not well-formed XML, or XML with a DTD or entities
 """
 
-from __future__ import annotations
-
 import difflib
 import re
 from collections.abc import Iterable

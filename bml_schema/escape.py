@@ -1,7 +1,5 @@
 """Escaping of text as XML character data and attribute values."""
 
-from __future__ import annotations
-
 import re
 
 # The characters that XML 1.0 cannot hold (production 2, Char).

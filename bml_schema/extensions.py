@@ -1,7 +1,5 @@
 """The behaviours that this project adds to BML, in the namespace `urn:bml-realizer:1`."""
 
-from __future__ import annotations
-
 from bml_schema.behaviours import AMOUNT, PEAK, SIDES
 from bml_schema.node_schema import attribute, children, node
 from bml_schema.nodes import Behaviour, Part, own

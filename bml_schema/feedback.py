@@ -5,8 +5,6 @@ session clock was 0; with `epoch` every time of the session clock is also writte
 BMLA does. Neither is part of ==.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import field, replace
 from typing import Any

@@ -13,8 +13,6 @@ A node class is a few lines::
 descriptions, faults and round trip come with the base class.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, field, fields
 from typing import Any, TypeVar, dataclass_transform
@@ -57,29 +55,20 @@ class Child:
 
 @dataclass(frozen=True, slots=True)
 class NodeSchema:
-    """The attributes and children of an element, for the parser and the writer.
+    """The attributes and children of an element, for the parser and the writer."""
 
-    Attributes:
-        attributes: XML name -> Attribute; `old`: the same by their names in drafts.
-        children: in order of declaration.
-        by_tag: Clark tag -> (Child, class); `by_local`: the same by local name, for documents that put an
-            extension's own children into another namespace.
-        mixed: field of the mixed content (text and children in order), or "".
-        text: field of the character data, or "".
-        name: local name of the element.
-        timed: it has sync points, and can have descriptions and unknown attributes and children.
-    """
-
-    attributes: Mapping[str, Attribute]
+    attributes: Mapping[str, Attribute]  # XML name -> Attribute; `old`: the same by their names in drafts
     old: Mapping[str, Attribute]
     required: tuple[Attribute, ...]
-    children: tuple[Child, ...]
+    children: tuple[Child, ...]  # in order of declaration
+    # Clark tag -> (Child, class); `by_local`: the same by local name, for documents that put an extension's
+    # own children into another namespace.
     by_tag: Mapping[str, tuple[Child, type[Any]]]
     by_local: Mapping[str, tuple[Child, type[Any]]]
-    mixed: str = ""
-    text: str = ""
-    name: str = ""
-    timed: bool = False
+    mixed: str = ""  # field of the mixed content (text and children in order), or ""
+    text: str = ""  # field of the character data, or ""
+    name: str = ""  # local name of the element
+    timed: bool = False  # it has sync points, and can have descriptions and unknown attributes and children
     sync_points: tuple[str, ...] = ()
 
     @property

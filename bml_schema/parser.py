@@ -4,8 +4,6 @@ A behaviour or constraint with a fault is dropped and reported in one Problem; t
 Unknown attributes are reported too, and nothing is dropped because of them.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

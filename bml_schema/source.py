@@ -3,8 +3,6 @@
 The parser only knows lines; this module scans the text again, and tolerates errors.
 """
 
-from __future__ import annotations
-
 import html
 import re
 from bisect import bisect_right

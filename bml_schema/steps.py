@@ -1,7 +1,5 @@
 """A hook for programs that count the steps of long reading and writing, or let other work go on meanwhile."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextvars import ContextVar
 

@@ -1,7 +1,5 @@
 """Sync references such as `b1:head1:stroke + 0.5`: parser, value and writer."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
@@ -22,21 +20,13 @@ _OFFSET_LIKE = re.compile(r".*[+-]\s*(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)")
 
 @node
 class SyncRef:
-    """A point in time in a document.
+    """A point in time in a document."""
 
-    Attributes:
-        block: another block's id; None for the own block.
-        behaviour: a behaviour's id, "bml" for the block itself, None for a plain number.
-        sync: sync point name; None for a plain number.
-        index: n of "stroke:n", counted from 1, or None.
-        offset: seconds after that point; for a plain number, seconds after block start.
-    """
-
-    block: str | None = None
-    behaviour: str | None = None
-    sync: str | None = None
-    index: int | None = None
-    offset: float = 0.0
+    block: str | None = None  # another block's id; None for the own block
+    behaviour: str | None = None  # a behaviour's id, "bml" for the block itself, None for a plain number
+    sync: str | None = None  # sync point name; None for a plain number
+    index: int | None = None  # n of "stroke:n", counted from 1, or None
+    offset: float = 0.0  # seconds after that point; for a plain number, seconds after block start
 
     def __str__(self) -> str:
         if self.behaviour is None or self.sync is None:

@@ -1,7 +1,5 @@
 """A scanner of start tags and attributes that also works on text that is not well-formed."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -27,23 +25,15 @@ class ScanError(NamedTuple):
 
 @dataclass(slots=True)
 class Element:
-    """A start tag.
+    """A start tag."""
 
-    Attributes:
-        name: as written, with its prefix.
-        offset, end: of "<", and after ">".
-        attributes: name as written -> (offset, end) of its value without the quotes.
-        parent: number of the parent element, or -1.
-        nth: position among the children of the parent with the same name, from 1.
-        root: number of the nearest <bml> around it, or its own; -1 if there is none.
-    """
-
-    name: str
-    offset: int
-    end: int
-    parent: int
-    nth: int = 1
-    root: int = -1
+    name: str  # as written, with its prefix
+    offset: int  # of "<"
+    end: int  # after ">"
+    parent: int  # number of the parent element, or -1
+    nth: int = 1  # position among the children of the parent with the same name, from 1
+    root: int = -1  # number of the nearest <bml> around it, or its own; -1 if there is none
+    # Name as written -> (offset, end) of its value without the quotes.
     attributes: dict[str, tuple[int, int]] = field(default_factory=dict)
 
 

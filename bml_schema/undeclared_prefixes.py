@@ -1,7 +1,5 @@
 """Documents whose only fault is that they do not declare the prefixes of some names."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Conversion of attribute text to Python values and back, with a description of what is accepted."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,24 +18,15 @@ _FANCY = re.compile(r"[+-]?(?:nan|inf|infinity|[0-9.]+e[+-]?[0-9]+)", re.IGNOREC
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """The values of an attribute.
+    """The values of an attribute."""
 
-    Attributes:
-        wanted: the end of the sentence "wanted ...".
-        read: text -> value; raises ValueError.
-        write: value -> text, such that read(write(v)) == v.
-        type: XSD type, which a test compares with the schema.
-        words: the closed set of words, or ().
-        low, high: the range of a number.
-    """
-
-    wanted: str
-    read: Callable[[str], Any]
-    write: Callable[[Any], str] = str
-    type: str = "string"
-    words: tuple[str, ...] = ()
-    low: float | None = None
-    high: float | None = None
+    wanted: str  # the end of the sentence "wanted ..."
+    read: Callable[[str], Any]  # text -> value; raises ValueError
+    write: Callable[[Any], str] = str  # value -> text, such that read(write(v)) == v
+    type: str = "string"  # XSD type, which a test compares with the schema
+    words: tuple[str, ...] = ()  # the closed set of words, or ()
+    low: float | None = None  # the range of a number
+    high: float | None = None  # the range of a number
 
     def fold(self, text: str) -> Any:
         """Return the value of a word in another case, or None."""

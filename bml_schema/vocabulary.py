@@ -1,7 +1,5 @@
 """The table of elements and their node classes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Final
 

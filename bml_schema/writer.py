@@ -1,7 +1,5 @@
 """The writer of blocks: parse(write(block)) == block."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from typing import Any
 

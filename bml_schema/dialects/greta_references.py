@@ -1,7 +1,5 @@
 """Heads and faces of Greta that a description names, as in `<reference>head=head_nod</reference>`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

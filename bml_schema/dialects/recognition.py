@@ -1,7 +1,5 @@
 """Recognition of documents in a dialect; what they mean in BML 1.0 is in the translator."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache, lru_cache
 

@@ -1,7 +1,5 @@
 """The report about a translation: the dialect of a document, and what was read how."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass
 
@@ -16,17 +14,11 @@ _MAX_LISTED = 12  # words in the text
 
 @dataclass(frozen=True)
 class Report:
-    """A report; it is false if nothing was translated.
+    """A report; it is false if nothing was translated."""
 
-    Attributes:
-        rows: the rows of the table that were used, in order.
-        made: what was given an id, in words.
-        wrapper: local name of the element around the document, or "".
-    """
-
-    rows: Collection[Row] = ()
-    made: Collection[str] = ()
-    wrapper: str = ""
+    rows: Collection[Row] = ()  # the rows of the table that were used, in order
+    made: Collection[str] = ()  # what was given an id, in words
+    wrapper: str = ""  # local name of the element around the document, or ""
 
     def __bool__(self) -> bool:
         return bool(self.rows or self.made)

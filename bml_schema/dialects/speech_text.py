@@ -1,7 +1,5 @@
 """Translation of a <speech> in a dialect: text outside <text>, and other names for <sync>."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The sync points of dialects: their names in attributes and references become those of BML 1.0."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -22,17 +20,11 @@ _FUNCTION = re.compile(r"\s*(?:after|before)\s*\((.*)\)\s*")
 
 @dataclass(frozen=True)
 class SyncPoints:
-    """The sync points of one document.
+    """The sync points of one document."""
 
-    Attributes:
-        kinds: id of a behaviour -> name of its element.
-        apply: called with each used row of the table.
-        in_dialect: whether the document is in a dialect, so that rows for any dialect apply too.
-    """
-
-    kinds: Mapping[str, str]
-    apply: Callable[[Row], None]
-    in_dialect: bool
+    kinds: Mapping[str, str]  # id of a behaviour -> name of its element
+    apply: Callable[[Row], None]  # called with each used row of the table
+    in_dialect: bool  # whether the document is in a dialect, so that rows for any dialect apply too
 
     def translate(self, element: Any) -> None:
         """Rename the sync points of a behaviour, and those that it refers to."""

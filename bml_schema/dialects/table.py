@@ -13,8 +13,6 @@ Columns:
     says       a remark for the documentation and for warnings
 """
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
@@ -52,21 +50,14 @@ class Row(NamedTuple):
 
 
 class Table(NamedTuple):
-    """The rows of the table.
+    """The rows of the table."""
 
-    Attributes:
-        rows: all rows, in order.
-        elements: name of an element -> its row.
-        attributes: element -> attribute without prefix -> its rows, in order.
-        missing: element -> the rows for missing attributes.
-        points: name of a sync point, as written or `squeezed` -> its row.
-    """
-
-    rows: Sequence[Row]
-    elements: Mapping[str, Row]
+    rows: Sequence[Row]  # all rows, in order
+    elements: Mapping[str, Row]  # name of an element -> its row
+    # Element -> attribute without prefix -> its rows, in order.
     attributes: Mapping[str, Mapping[str, Sequence[Row]]]
-    missing: Mapping[str, Sequence[Row]]
-    points: Mapping[str, Row]
+    missing: Mapping[str, Sequence[Row]]  # element -> the rows for missing attributes
+    points: Mapping[str, Row]  # name of a sync point, as written or `squeezed` -> its row
 
 
 def point_row(name: str) -> Row | None:

@@ -1,7 +1,5 @@
 """Translates an element tree from a dialect to BML 1.0, in place, before it is parsed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from copy import deepcopy
 from itertools import count, repeat

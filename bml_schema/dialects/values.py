@@ -3,8 +3,6 @@
 They return None to leave the value as it is.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from typing import Final

@@ -34,18 +34,13 @@ class UnknownPictureError(RealizerError):
 
 @dataclass(frozen=True, eq=False)
 class Likeness:
-    """A recognised picture: face, light and expression.
-
-    Attributes:
-        matches: (expression, cosine between its and the picture's difference to the neutral face), best
-            first.
-        neutral: whether the picture shows the neutral face.
-    """
+    """A recognised picture: face, light and expression."""
 
     face: str
     light: str
+    # (expression, cosine between its and the picture's difference to the neutral face), best first.
     matches: Sequence[tuple[Expression, float]]
-    neutral: bool
+    neutral: bool  # whether the picture shows the neutral face
 
 
 def read_picture(path: Path) -> UInt8:

@@ -1,7 +1,5 @@
 """Films of a corpus: which of them are still to be tracked, and what tracking adds to a recording."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

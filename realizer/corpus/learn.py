@@ -36,20 +36,13 @@ AGAIN = "make it by `realizer corpus learn`"
 
 @dataclass(frozen=True, eq=False)
 class FaceMap:
-    """A map of faces.
+    """A map of faces."""
 
-    Attributes:
-        mean: (d,) mean frame; components: (k, d) principal components.
-        neurons: (SIDE * SIDE, k), in rows.
-        accepted: (SIDE * SIDE,) distance up to which a frame belongs to a neuron.
-        names: expression of each neuron; "" for none.
-    """
-
-    mean: Float64
-    components: Float64
-    neurons: Float64
-    accepted: Float64
-    names: tuple[str, ...]
+    mean: Float64  # (d,) mean frame
+    components: Float64  # (k, d) principal components
+    neurons: Float64  # (SIDE * SIDE, k), in rows
+    accepted: Float64  # (SIDE * SIDE,) distance up to which a frame belongs to a neuron
+    names: tuple[str, ...]  # expression of each neuron; "" for none
 
     def places(self, frames: Float64) -> Float64:
         """Return frames (n, d) as (n, k) by their components."""
@@ -169,11 +162,7 @@ def save(folder: Path, learnt: FaceMap) -> None:
 
 
 def load(folder: Path) -> FaceMap:
-    """Return the map of a corpus.
-
-    Raises:
-        CorpusError: no map, or one that cannot be used.
-    """
+    """Return the map of a corpus; raises CorpusError: no map, or one that cannot be used."""
     try:
         with np.load(folder / MAP, allow_pickle=False) as data:
             mean, components, neurons, accepted = (np.asarray(data[name], np.float64) for name in ARRAYS)

@@ -70,22 +70,16 @@ class Segment:
 
 @dataclass(frozen=True)
 class Recording:
-    """A recording.
+    """A recording."""
 
-    Attributes:
-        name: of its folder.
-        meta: person, mood, fragment, language, licence, fps and frames.
-        labels: expressions with their annotators.
-        words: words with their speakers, in order; punctuation belongs to the word before it.
-        faps: (n, 68) FAPs, or None.
-        points: names and positions (n, points, 3) of feature points, NaN where lost, or None.
-    """
-
-    name: str
+    name: str  # of its folder
+    # Person, mood, fragment, language, licence, fps and frames.
     meta: Mapping[str, Any] = field(default_factory=dict)
-    labels: tuple[Annotation, ...] = ()
+    labels: tuple[Annotation, ...] = ()  # expressions with their annotators
+    # Words with their speakers, in order; punctuation belongs to the word before it.
     words: tuple[Annotation, ...] = ()
-    faps: Float64 | None = None
+    faps: Float64 | None = None  # (n, 68) FAPs, or None
+    # Names and positions (n, points, 3) of feature points, NaN where lost, or None.
     points: tuple[tuple[str, ...], Float64] | None = None
 
     @property

@@ -43,19 +43,12 @@ class Table:
 
 @dataclass(frozen=True)
 class Study:
-    """Recordings with one annotator's segments.
+    """Recordings with one annotator's segments."""
 
-    Attributes:
-        recordings: at least one.
-        annotator: whose labels count; None: the first of each recording.
-        words: emotional words; None: there are none.
-        watched: words that have a row in table 6.11 however rare they are.
-    """
-
-    recordings: Sequence[Recording]
-    annotator: str | None = None
-    words: WordList | None = None
-    watched: frozenset[str] = frozenset()
+    recordings: Sequence[Recording]  # at least one
+    annotator: str | None = None  # whose labels count; None: the first of each recording
+    words: WordList | None = None  # emotional words; None: there are none
+    watched: frozenset[str] = frozenset()  # words that have a row in table 6.11 however rare they are
 
     @cached_property
     def parts(self) -> list[tuple[Recording, list[Segment]]]:

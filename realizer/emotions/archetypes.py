@@ -58,11 +58,7 @@ def is_profile_file(name: str) -> bool:
 
 
 def read_profile_file(path: Path) -> tuple[Profile, ...]:
-    """Return the profiles of a file.
-
-    Raises:
-        ValueError: a file that cannot be read, or has no profiles.
-    """
+    """Return the profiles of a file; raises ValueError: a file that cannot be read, or has no profiles."""
     try:
         found = read_profiles(path.read_text("utf-8-sig"), str(path))
     except UnicodeDecodeError as error:

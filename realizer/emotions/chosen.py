@@ -1,7 +1,5 @@
 """The profile of an emotion that is given as a word or as a place: `realizer.emotion`."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 

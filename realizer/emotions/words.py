@@ -14,19 +14,15 @@ from realizer.tables.wheel_words import own_words, ring, whissell_words
 
 
 class WordPlace(NamedTuple):
-    """A place on a ring of the wheel.
-
-    Attributes:
-        activation: None for an emotion of the wheel itself, which has the activation of its archetypes.
-        between: whether the word belongs to no archetype, so that published profiles are interpolated.
-        strength: factor of a word that is a milder or stronger form of another one.
-    """
+    """A place on a ring of the wheel."""
 
     ring: str
     angle: float
+    # None for an emotion of the wheel itself, which has the activation of its archetypes.
     activation: float | None = None
+    # Whether the word belongs to no archetype, so that published profiles are interpolated.
     between: bool = False
-    strength: float = 1.0
+    strength: float = 1.0  # factor of a word that is a milder or stronger form of another one
 
 
 class UnknownWordError(ValueError):

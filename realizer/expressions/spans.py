@@ -27,22 +27,15 @@ class Span:
 
 
 class VisibleSpan(NamedTuple):
-    """The seconds for which an entry is visible.
+    """The seconds for which an entry is visible."""
 
-    Attributes:
-        place: of the entry, for messages.
-        begin, end: seconds from the start of the timeline.
-        track, entry: numbers of the entry, from 0.
-        times: of the entry.
-    """
-
-    place: str
+    place: str  # of the entry, for messages
     expression: Expression
-    begin: float
-    end: float
-    track: int
-    entry: int
-    times: Span
+    begin: float  # seconds from the start of the timeline
+    end: float  # seconds from the start of the timeline
+    track: int  # number of the track, from 0
+    entry: int  # number of the entry in it, from 0
+    times: Span  # of the entry
 
 
 def spans(track: Track, library: Mapping[str, Expression]) -> list[Span]:

@@ -15,22 +15,15 @@ NEUTRAL = "NEUTRAL"
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """An entry of a track.
+    """An entry of a track."""
 
-    Attributes:
-        expression: name in the library; "neutral" is a break.
-        intensity: 0..1.
-        duration: seconds including onset and offset; None: the expression's own, or 0.5 s of a break.
-        onset, offset: seconds; None: the expression's own. A break has none.
-        because: the reason for it, for readers of the file.
-    """
-
-    expression: str
-    intensity: float = 1.0
+    expression: str  # name in the library; "neutral" is a break
+    intensity: float = 1.0  # 0..1
+    # Seconds including onset and offset; None: the expression's own, or 0.5 s of a break.
     duration: float | None = None
-    onset: float | None = None
-    offset: float | None = None
-    because: str | None = None
+    onset: float | None = None  # seconds; None: the expression's own. A break has none.
+    offset: float | None = None  # seconds; None: the expression's own. A break has none.
+    because: str | None = None  # the reason for it, for readers of the file
 
     @property
     def neutral(self) -> bool:
@@ -39,36 +32,24 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """A sequence of expressions that blend into each other (a channel of Wojdel 2005, 5.4.2).
+    """A sequence of expressions that blend into each other (a channel of Wojdel 2005, 5.4.2)."""
 
-    Attributes:
-        name: name in messages.
-        entries: at least one.
-        joins: transition between entries: "offset" of the first, "onset" of the second, or both.
-        curve: shape of transitions; Wojdel's are "linear".
-        start: seconds from the start of the timeline.
-    """
-
-    name: str
-    entries: tuple[Entry, ...]
-    joins: Joins = "both"
-    curve: Curve = "linear"
-    start: float = 0.0
+    name: str  # name in messages
+    entries: tuple[Entry, ...]  # at least one
+    joins: Joins = "both"  # transition between entries: "offset" of the first, "onset" of the second, or both
+    curve: Curve = "linear"  # shape of transitions; Wojdel's are "linear"
+    start: float = 0.0  # seconds from the start of the timeline
 
 
 @dataclass(frozen=True, slots=True)
 class Timeline:
-    """Tracks that play together.
+    """Tracks that play together."""
 
-    Attributes:
-        tracks: at least one.
-        mixer: how action units of the whole face are combined: added up ("additive"), or applied one after
-            the other ("successive"; Wojdel 2005, 5.1 and 5.4.1).
-        order: action units that the successive mixer applies first; the others follow by number.
-    """
-
-    tracks: tuple[Track, ...]
+    tracks: tuple[Track, ...]  # at least one
+    # How action units of the whole face are combined: added up ("additive"), or applied one after the other
+    # ("successive"; Wojdel 2005, 5.1 and 5.4.1).
     mixer: Mixer = "additive"
+    # Action units that the successive mixer applies first; the others follow by number.
     order: tuple[int, ...] = ()
 
 

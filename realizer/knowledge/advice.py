@@ -30,19 +30,12 @@ class VisibleExpression:
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """Advice on an unusual expression.
+    """Advice on an unusual expression."""
 
-    Attributes:
-        id: behaviour that it is about; "" for the whole block.
-        text: description of what is unusual.
-        hint: what would be usual, with the source.
-        is_impossible: whether it was never observed, and not only rarely.
-    """
-
-    id: str
-    text: str
-    hint: str
-    is_impossible: bool = False
+    id: str  # behaviour that it is about; "" for the whole block
+    text: str  # description of what is unusual
+    hint: str  # what would be usual, with the source
+    is_impossible: bool = False  # whether it was never observed, and not only rarely
 
 
 def advise(

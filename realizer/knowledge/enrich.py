@@ -41,20 +41,13 @@ class SpokenText(NamedTuple):
 
 @dataclass(frozen=True)
 class Enricher:
-    """Adds expressions to texts and blocks for a character.
+    """Adds expressions to texts and blocks for a character."""
 
-    Attributes:
-        role: whether the character speaks or listens.
-        mood: mood of the character; None: average.
-        words: emotional words, and the default language.
-        rules: the rules to apply.
-        durations: templates whose usual durations placed expressions have; None: those of the player.
-    """
-
-    role: Role = "speaker"
-    mood: Mood | None = None
-    words: Words = ENGLISH
-    rules: Knowledge = field(default_factory=knowledge)
+    role: Role = "speaker"  # whether the character speaks or listens
+    mood: Mood | None = None  # mood of the character; None: average
+    words: Words = ENGLISH  # emotional words, and the default language
+    rules: Knowledge = field(default_factory=knowledge)  # the rules to apply
+    # Templates whose usual durations placed expressions have; None: those of the player.
     durations: Mapping[str, Template] | None = None
 
     def text(self, text: str, block: str = "bml1") -> Block:

@@ -11,17 +11,11 @@ from realizer.tables.emotional_words import WordList, word_list
 
 @dataclass(frozen=True)
 class Words:
-    """The emotional words of each language.
+    """The emotional words of each language."""
 
-    Attributes:
-        language: BCP-47 tag of text without xml:lang.
-        own: a user's list, which overrides the built-in one.
-        everywhere: whether `own` is for texts in all languages, not only in `language`.
-    """
-
-    language: str = "en"
-    own: WordList | None = None
-    everywhere: bool = True
+    language: str = "en"  # BCP-47 tag of text without xml:lang
+    own: WordList | None = None  # a user's list, which overrides the built-in one
+    everywhere: bool = True  # whether `own` is for texts in all languages, not only in `language`
 
     def of(self, language: str) -> WordList | None:
         """Return the words of a language ("en-GB" is "en"), or None if there is no list."""

@@ -1,7 +1,5 @@
 """Tables of a study: Wojdel 2005, 5.1; Paul 2010, 4.4 and 4.5; confusion, the wheel, films, agreement."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from itertools import combinations
 from typing import Any

@@ -1,7 +1,5 @@
 """Answers of judges, joined with the key of the study."""
 
-from __future__ import annotations
-
 import csv
 import json
 from collections.abc import Iterable, Mapping, Sequence
@@ -20,23 +18,16 @@ PASSED = 0.75  # share of attention items that must be right
 
 @dataclass(frozen=True)
 class Answer:
-    """An answer to one item.
+    """An answer to one item."""
 
-    Attributes:
-        judge: number; who: "people", "machine" or "simulated": groups that are never mixed.
-        truth: of the item, from the key.
-        role: what was chosen: a role of `truth["options"]` such as "right", or a word.
-        text: free words; angle: degrees on the wheel, or None; seconds it took.
-    """
-
-    judge: str
-    who: str
+    judge: str  # the judge's number
+    who: str  # "people", "machine" or "simulated": groups that are never mixed
     item: str
-    truth: Mapping[str, Any]
-    role: str
-    text: str
-    angle: float | None
-    seconds: float
+    truth: Mapping[str, Any]  # of the item, from the key
+    role: str  # what was chosen: a role of `truth["options"]` such as "right", or a word
+    text: str  # free words
+    angle: float | None  # degrees on the wheel, or None
+    seconds: float  # that it took
 
     @property
     def kind(self) -> str:

@@ -30,15 +30,11 @@ Units = Mapping[tuple[int, str], float]  # (AU, side LEFT | RIGHT | BOTH) -> int
 
 @dataclass(frozen=True)
 class Variant:
-    """One of the ways to draw faces that a study compares.
+    """One of the ways to draw faces that a study compares."""
 
-    Attributes:
-        face: name or path; deformer: "mpeg4", "au" or None; mapping: file of AUs to FAPs, or None.
-    """
-
-    face: str
-    deformer: str | None = None
-    mapping: Path | None = None
+    face: str  # name or path
+    deformer: str | None = None  # "mpeg4", "au" or None
+    mapping: Path | None = None  # file of AUs to FAPs, or None
 
     @property
     def name(self) -> str:
@@ -48,13 +44,9 @@ class Variant:
 
 @dataclass
 class Drawer:
-    """Draws rows of the animation axis; a context manager that ends the renderers.
+    """Draws rows of the animation axis; a context manager that ends the renderers."""
 
-    Attributes:
-        step: called with 1 after each picture.
-    """
-
-    step: Callable[[int], object] = lambda count: None
+    step: Callable[[int], object] = lambda count: None  # called with 1 after each picture
     _open: dict[tuple[Variant, str], Renderer] = field(default_factory=dict)
     _stack: ExitStack = field(default_factory=ExitStack)
 

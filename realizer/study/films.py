@@ -1,7 +1,5 @@
 """Pairs of films: with and without rules about expressions, and with random ones, the control."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path

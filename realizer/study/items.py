@@ -1,7 +1,5 @@
 """Questions about single faces: emotions to name, and displacements of FAPs (Paul 2010, 4.4)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -35,22 +33,16 @@ WHEEL = {place.name: place.angle for place in ring("paul").values() if place.kin
 
 @dataclass(frozen=True, eq=False)
 class Item:
-    """One question of a study.
+    """One question of a study."""
 
-    Attributes:
-        kind: one of `KINDS`.
-        shown: role -> picture (WebP) that the question is about, such as "reference".
-        options: role -> picture or film to choose from, such as "right"; empty if answers are words.
-        truth: what only the key tells.
-        text: words for the question.
-        check: the answer that the question itself demands, to find judges who do not read; or None.
-    """
-
-    kind: str
-    truth: Mapping[str, Any]
+    kind: str  # one of `KINDS`
+    truth: Mapping[str, Any]  # what only the key tells
+    # Role -> picture (WebP) that the question is about, such as "reference".
     shown: Mapping[str, bytes] = field(default_factory=dict)
+    # Role -> picture or film to choose from, such as "right"; empty if answers are words.
     options: Mapping[str, bytes] = field(default_factory=dict)
-    text: Mapping[str, str] = field(default_factory=dict)
+    text: Mapping[str, str] = field(default_factory=dict)  # words for the question
+    # The answer that the question itself demands, to find judges who do not read; or None.
     check: str | None = None
 
 

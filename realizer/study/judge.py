@@ -1,7 +1,5 @@
 """A machine that judges a study from its pictures alone, by the networks of the tracking."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache

@@ -1,7 +1,5 @@
 """The folder of a study, which any browser opens, and the key to its right answers, which lies outside it."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """Visual and emotional matching: a reference, and three faces of which one is right (Wojdel 2005, 5.3.2)."""
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Iterator, Sequence
@@ -33,18 +31,12 @@ HEAD, TURNED = (48, 49, 50), 6000  # FAPs of the head, and 3.4 degrees
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """An expression that judges compare with.
+    """An expression that judges compare with."""
 
-    Attributes:
-        name: template, emotion or file.
-        units: its action units.
-        picture: a WebP; rest: the same person at rest, or None.
-    """
-
-    name: str
-    units: Units
-    picture: bytes
-    rest: bytes | None
+    name: str  # template, emotion or file
+    units: Units  # its action units
+    picture: bytes  # a WebP
+    rest: bytes | None  # the same person at rest, or None
 
 
 def references(source: str, draw: Drawer) -> list[Reference]:

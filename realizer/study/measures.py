@@ -1,7 +1,5 @@
 """Statistics of judgements: intervals, hit rates, errors on a circle, chi-square."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """What a study asks: kinds of questions about variants of faces, drawn by a seed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -21,23 +19,14 @@ DRAWN = {"visual": 300, "emotional": 300, "naming": 36, "displacements": 129, "f
 
 @dataclass(frozen=True)
 class Plan:
-    """A study.
+    """A study."""
 
-    Attributes:
-        kinds: of `KINDS`.
-        variants: ways to draw faces, which are compared.
-        source: folder of photographs to compare with, a face, or None for another face.
-        language: of films.
-        most: questions of each kind at most; None: all.
-        seed: of all choices.
-    """
-
-    kinds: Sequence[str]
-    variants: Sequence[Variant]
-    source: str | None = None
-    language: str = "en"
-    most: int | None = None
-    seed: int = 0
+    kinds: Sequence[str]  # of `KINDS`
+    variants: Sequence[Variant]  # ways to draw faces, which are compared
+    source: str | None = None  # folder of photographs to compare with, a face, or None for another face
+    language: str = "en"  # of films
+    most: int | None = None  # questions of each kind at most; None: all
+    seed: int = 0  # of all choices
 
     @property
     def drawn(self) -> int:

@@ -1,7 +1,5 @@
 """The results of a study as files: a CSV for each table, and one HTML report with pictures."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -4,8 +4,6 @@ Every file begins with comments that name its `source:`, `units:` and `licence:`
 class for its rows.
 """
 
-from __future__ import annotations
-
 import csv
 import types
 from collections.abc import Callable, Mapping
@@ -169,23 +167,16 @@ class Fap:
 
 @dataclass(frozen=True, slots=True)
 class ActionUnit:
-    """A FACS action unit.
-
-    Attributes:
-        sides: whether it can show on one side alone.
-        combine: how channels of one layer combine: the stronger ("max"), or added ("sum").
-        degrees: rotation at intensity 1; 0 if it is not a rotation.
-        strength: size of full intensity, relative to the shape in which it was measured.
-        no_fap: why no FAP shows it; "" if FAPs do.
-    """
+    """A FACS action unit."""
 
     au: int
     name: str
-    sides: bool
+    sides: bool  # whether it can show on one side alone
+    # How channels of one layer combine: the stronger ("max"), or added ("sum").
     combine: Literal["max", "sum"]
-    degrees: float
-    strength: float
-    no_fap: str
+    degrees: float  # rotation at intensity 1; 0 if it is not a rotation
+    strength: float  # size of full intensity, relative to the shape in which it was measured
+    no_fap: str  # why no FAP shows it; "" if FAPs do
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,5 @@
 """ARKit's blend shapes, and recognition of their names in the spellings of other tools."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """Groups of FAPs and AUs for user interfaces (`regions.toml`)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 

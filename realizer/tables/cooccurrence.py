@@ -1,7 +1,5 @@
 """The co-occurrence rules of action units (`cooccurrence.toml`, or a user's file)."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -32,19 +30,12 @@ class Unit:
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """A rule by which action units weaken another one.
+    """A rule by which action units weaken another one."""
 
-    Attributes:
-        kind: class of the rule.
-        weaker: the weakened AU; the first AU of an opposition.
-        stronger: the AUs that weaken it together; only a domination has several.
-        text: as written.
-    """
-
-    kind: Kind
-    weaker: int
-    stronger: tuple[Unit, ...]
-    text: str
+    kind: Kind  # class of the rule
+    weaker: int  # the weakened AU; the first AU of an opposition
+    stronger: tuple[Unit, ...]  # the AUs that weaken it together; only a domination has several
+    text: str  # as written
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,5 @@
 """The categories of emotional words (`emotional_words_LANGUAGE.csv`, or a user's file)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -26,15 +24,11 @@ class _Row:
 
 @dataclass(frozen=True)
 class WordList:
-    """Words, phrases and beginnings of words, with their categories.
+    """Words, phrases and beginnings of words, with their categories."""
 
-    Attributes:
-        phrases: first word -> (words, category) of each phrase, the longest first.
-        beginnings: beginning of a word -> category.
-    """
-
+    # First word -> (words, category) of each phrase, the longest first.
     phrases: Mapping[str, tuple[tuple[tuple[str, ...], str], ...]]
-    beginnings: Mapping[str, str]
+    beginnings: Mapping[str, str]  # beginning of a word -> category
 
     def categories(self, words: Sequence[str]) -> list[str]:
         """Return the category of each word, or ""; all words of a phrase have the category of the phrase.
@@ -74,11 +68,7 @@ def word_list(language: str) -> WordList | None:
 
 @cache
 def words_of(path: Path) -> WordList:
-    """Return the list of a user's file.
-
-    Raises:
-        TableError: an unreadable file, or as `read_words`.
-    """
+    """Return the list of a user's file; raises TableError: an unreadable file, or as `read_words`."""
     try:
         return read_words(path.read_text("utf-8-sig"), str(path))
     except (OSError, UnicodeError) as error:

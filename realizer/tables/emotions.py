@@ -1,7 +1,5 @@
 """The action units of the archetypal emotions (`emotions.toml`)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache

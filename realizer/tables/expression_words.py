@@ -1,7 +1,5 @@
 """Search words and descriptions of the built-in expressions (`expression_words.csv`)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """Distances between feature points, and the FAPs that follow from them (`facial_features.csv`)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 
@@ -10,23 +8,15 @@ from realizer import tables
 
 @dataclass(frozen=True, slots=True)
 class FacialFeature:
-    """The change of a distance between two feature points (Raouzaiou et al. 2002, table 3).
-
-    Attributes:
-        first, second: names of the MPEG-4 feature points.
-        growth: 1 if moving apart is positive, -1 if approaching is.
-        unit: FAPU.
-        signs: {FAP: 1 or -1}; the feature is the sum of these FAPs.
-        also: FAPs of the inner lips that follow from the feature with sign 1.
-    """
+    """The change of a distance between two feature points (Raouzaiou et al. 2002, table 3)."""
 
     number: int
-    first: str
-    second: str
-    growth: int
-    unit: str
-    signs: dict[int, int]
-    also: tuple[int, ...]
+    first: str  # name of an MPEG-4 feature point
+    second: str  # name of an MPEG-4 feature point
+    growth: int  # 1 if moving apart is positive, -1 if approaching is
+    unit: str  # FAPU
+    signs: dict[int, int]  # {FAP: 1 or -1}; the feature is the sum of these FAPs
+    also: tuple[int, ...]  # FAPs of the inner lips that follow from the feature with sign 1
 
 
 @dataclass(frozen=True, slots=True)

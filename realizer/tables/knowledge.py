@@ -1,7 +1,5 @@
 """The rules of the knowledge base of expressions (Wojdel 2005; `knowledge.toml`)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -19,81 +17,50 @@ FILE = "knowledge.toml"
 
 @dataclass(frozen=True, slots=True)
 class PlacementRule:
-    """Expressions for a kind of sentence, or for words of a category.
+    """Expressions for a kind of sentence, or for words of a category."""
 
-    Attributes:
-        when: "question", "exclamation", or a category of words.
-        show: templates, in lower case, that are shown together.
-        says: the rule as a sentence, with its source.
-        unless: categories of words that exclude a sentence.
-        beside: categories of words of which a sentence must have one; (): any sentence.
-        most_words: most words of a sentence.
-        outlasts: seconds for which the expression outlasts the speech, whose last sentence it must be; 0: no.
-        keep: whether to warn if an expression is missing.
-    """
-
-    when: str
-    show: tuple[str, ...]
-    says: str
-    unless: tuple[str, ...] = ()
-    beside: tuple[str, ...] = ()
-    most_words: float = inf
+    when: str  # "question", "exclamation", or a category of words
+    show: tuple[str, ...]  # templates, in lower case, that are shown together
+    says: str  # the rule as a sentence, with its source
+    unless: tuple[str, ...] = ()  # categories of words that exclude a sentence
+    beside: tuple[str, ...] = ()  # categories of words of which a sentence must have one; (): any sentence
+    most_words: float = inf  # most words of a sentence
+    # Seconds for which the expression outlasts the speech, whose last sentence it must be; 0: no.
     outlasts: float = 0.0
-    keep: bool = False
+    keep: bool = False  # whether to warn if an expression is missing
 
 
 @dataclass(frozen=True, slots=True)
 class CompanionRule:
-    """An expression that accompanies another one.
+    """An expression that accompanies another one."""
 
-    Attributes:
-        of, other: templates, in lower case.
-        by: when `other` is shown.
-        says: the rule as a sentence, with its source.
-        lead: seconds by which `other` begins before `of` and, if around it, ends after it.
-        keep: whether to warn if `other` is missing.
-        offered: whether `other` is only suggested, not placed.
-    """
-
-    of: str
-    other: str
-    by: By
-    says: str
-    lead: float = 0.0
-    keep: bool = False
-    offered: bool = False
+    of: str  # template, in lower case
+    other: str  # template, in lower case
+    by: By  # when `other` is shown
+    says: str  # the rule as a sentence, with its source
+    lead: float = 0.0  # seconds by which `other` begins before `of` and, if around it, ends after it
+    keep: bool = False  # whether to warn if `other` is missing
+    offered: bool = False  # whether `other` is only suggested, not placed
 
 
 @dataclass(frozen=True, slots=True)
 class Mood:
-    """A mood.
-
-    Attributes:
-        distance: average seconds from the end of one expression to the start of the next.
-        length: average duration of expressions, relative to the usual one.
-    """
+    """A mood."""
 
     name: str
-    distance: float
-    length: float
+    distance: float  # average seconds from the end of one expression to the start of the next
+    length: float  # average duration of expressions, relative to the usual one
 
 
 @dataclass(frozen=True)
 class Knowledge:
-    """The rules.
+    """The rules."""
 
-    Attributes:
-        placings: role -> rules, most important first.
-        apart: template -> seconds that must pass after the end of another expression.
-        usual_distance: average seconds between two expressions of a speaker.
-        listener_distance: least seconds between two expressions of a listener.
-    """
-
-    placings: Mapping[Role, tuple[PlacementRule, ...]]
+    placings: Mapping[Role, tuple[PlacementRule, ...]]  # role -> rules, most important first
     companies: tuple[CompanionRule, ...]
-    apart: Mapping[str, float]
-    usual_distance: float
-    listener_distance: float
+    apart: Mapping[str, float]  # template -> seconds that must pass after the end of another expression
+    usual_distance: float  # average seconds between two expressions of a speaker
+    listener_distance: float  # least seconds between two expressions of a listener
     moods: Mapping[str, Mood]
 
     def mood(self, word: str) -> Mood:

@@ -1,7 +1,5 @@
 """The lexemes of faceLexeme and head: action units and head poses (`lexemes.toml`)."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -28,22 +26,14 @@ class FaceLexeme:
 
 @dataclass(frozen=True, slots=True)
 class HeadLexeme:
-    """A head movement as three poses, AU -> degrees at amount 1.
-
-    Attributes:
-        ready: pose before the first stroke.
-        stroke: pose at each stroke.
-        back: pose between strokes, and from strokeEnd to relax.
-        decay: size of each stroke relative to the one before, 0..1.
-        eyes: share of a turn that the eyes compensate, 0..1.
-    """
+    """A head movement as three poses, AU -> degrees at amount 1."""
 
     name: str
-    ready: Mapping[int, float]
-    stroke: Mapping[int, float]
-    back: Mapping[int, float]
-    decay: float
-    eyes: float
+    ready: Mapping[int, float]  # pose before the first stroke
+    stroke: Mapping[int, float]  # pose at each stroke
+    back: Mapping[int, float]  # pose between strokes, and from strokeEnd to relax
+    decay: float  # size of each stroke relative to the one before, 0..1
+    eyes: float  # share of a turn that the eyes compensate, 0..1
 
 
 @cache

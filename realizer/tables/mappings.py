@@ -12,8 +12,6 @@ open:
   lines of both.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -65,11 +63,7 @@ def published_file(name: str) -> Path | None:
 
 
 def own_file(folder: Path) -> Path | None:
-    """Return the mapping file of a face folder, or None.
-
-    Raises:
-        TableError: there are two.
-    """
+    """Return the mapping file of a face folder, or None; raises TableError: there are two."""
     own = [path for path in (folder / f"{OWN}{form}" for form in FORMS) if path.is_file()]
     if len(own) > 1:
         raise TableError(f"{folder}: wanted one of {' and '.join(path.name for path in own)}, got both")

@@ -1,7 +1,5 @@
 """The articulatory features of phonemes (`phonemes.csv`)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache

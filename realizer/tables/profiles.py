@@ -1,7 +1,5 @@
 """The FAP ranges of emotions (`profiles_*.csv`, `fap_statistics.csv`)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 

@@ -1,7 +1,5 @@
 """The twelve expression templates of Wojdel 2005 (`templates.toml`)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -19,23 +17,16 @@ FRAME = 1 / 25  # s; the measured films have 25 frames per second
 
 @dataclass(frozen=True, slots=True)
 class Template:
-    """An expression that was observed on people.
-
-    Attributes:
-        features: visible features, in Wojdel's words.
-        aus: (AU, side LEFT | RIGHT | BOTH) -> intensity 0..1 at intensity 1.
-        evident: average seconds for which it is visible on still pictures.
-        deviation: standard deviation of these seconds; None if there were too few observations.
-        possible, probable: least and most seconds; None if not published.
-    """
+    """An expression that was observed on people."""
 
     name: str
-    features: str
-    aus: Mapping[tuple[int, str], float]
-    evident: float
+    features: str  # visible features, in Wojdel's words
+    aus: Mapping[tuple[int, str], float]  # (AU, side LEFT | RIGHT | BOTH) -> intensity 0..1 at intensity 1
+    evident: float  # average seconds for which it is visible on still pictures
+    # Standard deviation of these seconds; None if there were too few observations.
     deviation: float | None = None
-    possible: tuple[float, float] | None = None
-    probable: tuple[float, float] | None = None
+    possible: tuple[float, float] | None = None  # least and most seconds; None if not published
+    probable: tuple[float, float] | None = None  # least and most seconds; None if not published
 
 
 def apex(visible: float) -> float:

@@ -1,7 +1,5 @@
 """The preferred gaps of behaviours, by element and variant (`timing.toml`)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """Words for emotions and their places on the emotion wheel (`words_*.csv`, `emotion_wheel.csv`)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -12,34 +10,23 @@ from realizer import tables
 
 @dataclass(frozen=True, slots=True)
 class WhissellWord:
-    """A word of Raouzaiou et al. 2002, table 6.
-
-    Attributes:
-        raw_activation: as printed.
-        activation: as the paper uses it.
-        angle: degrees on the ring "plutchik".
-        category: archetype of the word; "" for a word between two archetypes.
-    """
+    """A word of Raouzaiou et al. 2002, table 6."""
 
     word: str
-    raw_activation: float | None
-    activation: float | None
+    raw_activation: float | None  # as printed
+    activation: float | None  # as the paper uses it
     evaluation: float | None
-    angle: float
-    category: str
+    angle: float  # degrees on the ring "plutchik"
+    category: str  # archetype of the word; "" for a word between two archetypes
 
 
 @dataclass(frozen=True, slots=True)
 class OwnWord:
-    """Another name or degree, chosen for this project, of a word of the wheel or of Whissell.
-
-    Attributes:
-        strength: factor of the word that it is like.
-    """
+    """Another name or degree, chosen for this project, of a word of the wheel or of Whissell."""
 
     word: str
     like: str
-    strength: float
+    strength: float  # factor of the word that it is like
     source: Literal["own", "plutchik"]
 
 

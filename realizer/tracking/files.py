@@ -1,7 +1,5 @@
 """Files of a recording: FAPs, tables, JSON, and a document that plays it again."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import replace

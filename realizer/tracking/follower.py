@@ -1,7 +1,5 @@
 """Faces followed from picture to picture, several people at once."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -21,15 +19,11 @@ MAX_PEOPLE = 8
 
 @dataclass(eq=False)
 class Person:
-    """One person over time.
+    """One person over time."""
 
-    Attributes:
-        frames: numbers of the pictures in which the face was found, rising.
-        faces: the face in each of them.
-    """
-
+    # Numbers of the pictures in which the face was found, rising.
     frames: list[int] = field(default_factory=list)
-    faces: list[Landmarks] = field(default_factory=list)
+    faces: list[Landmarks] = field(default_factory=list)  # the face in each of them
 
     @property
     def region(self) -> Region:
@@ -92,13 +86,9 @@ class Follower:
 
 
 class Kept(Protocol):
-    """What keeps what was seen, as `unfinished.Unfinished` does.
+    """What keeps what was seen, as `unfinished.Unfinished` does."""
 
-    Attributes:
-        every: number of pictures after which `add` is called.
-    """
-
-    every: int
+    every: int  # number of pictures after which `add` is called
 
     def read(self) -> tuple[list[float], Follower]:
         """Return the times of all pictures that were looked at, and the follower after them."""

@@ -29,19 +29,13 @@ MARGIN, EYE_MARGIN = 1.5, 2.3  # of a region, relative to the points
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Landmarks:
-    """A face in a picture.
+    """A face in a picture."""
 
-    Attributes:
-        points: (468, 3) pixels: x right, y down, and depth away from the camera.
-        presence: 0..1, how likely there is a face.
-        traits: (1152,) what the last layer before the points says; it also tells of wrinkles and teeth.
-        eyes: (2, 76, 2) points of the left and the right eye: 71 of contour and brow, 5 of the iris. They are
-            in the square around the eye, 0..1, mirrored for the left one.
-    """
-
-    points: Float64
-    presence: float
-    traits: Float32
+    points: Float64  # (468, 3) pixels: x right, y down, and depth away from the camera
+    presence: float  # 0..1, how likely there is a face
+    traits: Float32  # (1152,) what the last layer before the points says; it also tells of wrinkles and teeth
+    # (2, 76, 2) points of the left and the right eye: 71 of contour and brow, 5 of the iris. They are in the
+    # square around the eye, 0..1, mirrored for the left one.
     eyes: Float32
 
     @property

@@ -1,7 +1,5 @@
 """A face in front of a camera, picture by picture, as it moves."""
 
-from __future__ import annotations
-
 import io
 import math
 from collections import deque
@@ -28,17 +26,11 @@ SMOOTHING = 0.05  # s, in which an old value loses most of its weight
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """What a picture shows.
+    """What a picture shows."""
 
-    Attributes:
-        units: action units by name, 0..1, with those of head and eyes.
-        head: degrees of pitch, yaw and roll.
-        emotion: the recognised one, or None, with its certainty.
-    """
-
-    units: Mapping[str, float]
-    head: tuple[float, float, float]
-    emotion: str | None
+    units: Mapping[str, float]  # action units by name, 0..1, with those of head and eyes
+    head: tuple[float, float, float]  # degrees of pitch, yaw and roll
+    emotion: str | None  # the recognised one, or None
     certainty: float
 
 

@@ -24,17 +24,11 @@ INSTALL = "reading films needs PyAV: pip install 'bml-realizer[track]'"
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Picture:
-    """A picture of a film or folder.
+    """A picture of a film or folder."""
 
-    Attributes:
-        time: seconds from the first.
-        image: RGB, upright.
-        name: the file and the time in it, for messages.
-    """
-
-    time: float
-    image: Image
-    name: str
+    time: float  # seconds from the first
+    image: Image  # RGB, upright
+    name: str  # the file and the time in it, for messages
 
 
 def read_pictures(path: Path, fps: float = 25.0) -> tuple[int, Iterator[Picture]]:

@@ -1,7 +1,5 @@
 """What a person does in a film: measured, filled and smoothed, at an even rate."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,21 +19,13 @@ ROUNDS = 3
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """One person at an even rate.
+    """One person at an even rate."""
 
-    Attributes:
-        fps: frames a second.
-        times: (n,) seconds.
-        units: (n, len(SEEN_UNITS)) 0..1; 0 where the person is not seen.
-        faps: (n, 68) FAPU; 0 where the person is not seen.
-        seen: (n,) whether the person is seen, or was lost for a short time only.
-    """
-
-    fps: float
-    times: Float64
-    units: Float64
-    faps: Float64
-    seen: Bool
+    fps: float  # frames a second
+    times: Float64  # (n,) seconds
+    units: Float64  # (n, len(SEEN_UNITS)) 0..1; 0 where the person is not seen
+    faps: Float64  # (n, 68) FAPU; 0 where the person is not seen
+    seen: Bool  # (n,) whether the person is seen, or was lost for a short time only
 
 
 def record(person: Person, times: Sequence[float], fps: float, neutral: Person | None = None) -> Recording:

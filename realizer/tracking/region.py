@@ -14,20 +14,13 @@ from realizer.core.array_types import Float64
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """A square in a picture.
+    """A square in a picture."""
 
-    Attributes:
-        x, y: its centre in pixels from the top left corner.
-        side: its length in pixels.
-        angle: radians by which it is turned clockwise.
-        mirrored: whether it is seen as in a mirror.
-    """
-
-    x: float
-    y: float
-    side: float
-    angle: float = 0.0
-    mirrored: bool = False
+    x: float  # its centre in pixels from the top left corner
+    y: float  # its centre in pixels from the top left corner
+    side: float  # its length in pixels
+    angle: float = 0.0  # radians by which it is turned clockwise
+    mirrored: bool = False  # whether it is seen as in a mirror
 
     @classmethod
     def around(cls, points: Any, left: Any, right: Any, scale: float) -> Region:

@@ -4,8 +4,6 @@
 compared with those of the same person at rest; without a picture of it, a second network does its best.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -31,28 +29,18 @@ PARTS = ("shape", "traits", "eyes")  # of the components
 
 @dataclass(frozen=True, eq=False)
 class Components:
-    """What is seen of a face in n pictures, in few numbers.
+    """What is seen of a face in n pictures, in few numbers."""
 
-    Attributes:
-        values: (n, k) principal components.
-        rotations: (n, 3, 3) of the head, roughly.
-    """
-
-    values: Float64
-    rotations: Float64
+    values: Float64  # (n, k) principal components
+    rotations: Float64  # (n, 3, 3) of the head, roughly
 
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """What n pictures of a face show.
+    """What n pictures of a face show."""
 
-    Attributes:
-        units: (n, len(SEEN_UNITS)) 0..1.
-        faps: (n, 68) FAPU; those that are not in `SEEN_FAPS` are 0, except the rotations of the head.
-    """
-
-    units: Float64
-    faps: Float64
+    units: Float64  # (n, len(SEEN_UNITS)) 0..1
+    faps: Float64  # (n, 68) FAPU; those that are not in `SEEN_FAPS` are 0, except the rotations of the head
 
 
 def components(faces: Sequence[Landmarks], weights: Mapping[str, Any] | None = None) -> Components:

@@ -1,7 +1,5 @@
 """Shapes of faces, without the pose of the head."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What was seen of a film so far, kept in a folder, so that an interrupted run goes on where it ended."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import zipfile

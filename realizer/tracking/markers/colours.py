@@ -24,16 +24,11 @@ SAME = 40.0  # degrees of hue between pixels of one colour
 
 @dataclass(frozen=True, slots=True)
 class Colour:
-    """A box of colours.
+    """A box of colours."""
 
-    Attributes:
-        name: for messages.
-        centre: hue in degrees, saturation and value in per cent.
-        spread: the distances from the centre, of each, up to which a pixel has the colour.
-    """
-
-    name: str
-    centre: tuple[float, float, float]
+    name: str  # for messages
+    centre: tuple[float, float, float]  # hue in degrees, saturation and value in per cent
+    # The distances from the centre, of each, up to which a pixel has the colour.
     spread: tuple[float, float, float] = SPREAD
 
     def mask(self, hsv: Image) -> Bool:
@@ -64,11 +59,7 @@ NAMED = {
 
 
 def named(name: str) -> Colour:
-    """Return a colour by its name.
-
-    Raises:
-        TrackingError: none of `NAMED`.
-    """
+    """Return a colour by its name; raises TrackingError: none of `NAMED`."""
     if (colour := NAMED.get(name.strip().lower())) is None:
         raise TrackingError(
             f"marker colours: wanted some of {', '.join(NAMED)}, got {name!r}; other colours are given by "

@@ -1,7 +1,5 @@
 """Markers of a film: found, ordered, repaired and without the motion of the head; and their files."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -36,38 +34,25 @@ HEAD = range(47, 50)  # columns of FAPs of the head's rotation
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """What markers look like.
+    """What markers look like."""
 
-    Attributes:
-        colours: of the markers; the second one is the paint on the lids.
-        layout: of the points, in any unit; None: Wojdel's 31 points if they fit, or else numbers.
-        region: left, top, right, bottom in pixels; None is the whole picture.
-        neutral: number of the picture that shows the face at rest; None looks for one with all markers.
-    """
-
-    colours: Sequence[Colour]
+    colours: Sequence[Colour]  # of the markers; the second one is the paint on the lids
+    # Of the points, in any unit; None: Wojdel's 31 points if they fit, or else numbers.
     layout: Layout | None = None
-    region: Box | None = None
+    region: Box | None = None  # left, top, right, bottom in pixels; None is the whole picture
+    # Number of the picture that shows the face at rest; None looks for one with all markers.
     neutral: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Markers:
-    """Markers at an even rate.
+    """Markers at an even rate."""
 
-    Attributes:
-        fps: frames a second.
-        layout: names, and places at rest without the head's pose.
-        pixels: (n, k, 2) x right, y down.
-        points: (n, k, 2) without the head's place, size and roll; x to the person's left, y up.
-        seen: (n, k) whether a point was seen; the others are repaired.
-    """
-
-    fps: float
-    layout: Layout
-    pixels: Float64
-    points: Float64
-    seen: Bool
+    fps: float  # frames a second
+    layout: Layout  # names, and places at rest without the head's pose
+    pixels: Float64  # (n, k, 2) x right, y down
+    points: Float64  # (n, k, 2) without the head's place, size and roll; x to the person's left, y up
+    seen: Bool  # (n, k) whether a point was seen; the others are repaired
 
 
 def track_markers(pictures: Iterable[Picture], look: Look, where: str, fps: float | None = None) -> Markers:

@@ -34,19 +34,12 @@ class Row:
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """Markers of a face at rest.
+    """Markers of a face at rest."""
 
-    Attributes:
-        names: of the points.
-        feature_points: of MPEG-4 whose FAPs they show; "" for none.
-        colours: (k,) which colour each has, from 0.
-        places: (k, 2) x to the person's left, y up, in any unit.
-    """
-
-    names: tuple[str, ...]
-    feature_points: tuple[str, ...]
-    colours: Index
-    places: Float64
+    names: tuple[str, ...]  # of the points
+    feature_points: tuple[str, ...]  # of MPEG-4 whose FAPs they show; "" for none
+    colours: Index  # (k,) which colour each has, from 0
+    places: Float64  # (k, 2) x to the person's left, y up, in any unit
 
     def __len__(self) -> int:
         return len(self.names)

@@ -1,7 +1,5 @@
 """The order of markers: which blob of a picture is which point (Wojdel 2005, 7.1.3)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Repair of tracked markers, and removal of the head's motion (Wojdel 2005, 7.2.1)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from realizer.core.array_types import Bool, Float64
