@@ -50,7 +50,7 @@ class Words:
 
 
 async def say(address: str, socket: ClientConnection, texts: Iterable[str]) -> BlockProgress:
-    """Let a voice speak texts, and a face speak its sound; return the feedback of the end."""
+    """Speak texts by a voice, and play its sound on a face; return the feedback of the end."""
     async with connect(address) as client, client.voice(rate=RATE) as voice:
         await socket.send(json.dumps({"text": " "}))  # opens the speech
         for text in texts:

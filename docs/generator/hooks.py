@@ -52,7 +52,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Let the links of a page lead to pages of the site, or into the repository."""
+    """Point the links of a page to pages of the site, or into the repository."""
     uri = page.file.src_uri
     here = posixpath.dirname(uri.removeprefix("project/") if uri.startswith("project/") else f"docs/{uri}")
 

@@ -127,7 +127,7 @@ class Loudspeaker(BaseOutputTransport):
 
 
 async def main(url: str, *, foreign_voice: bool = False) -> None:
-    """Let the user ask, interrupt the answer, and hear the second one."""
+    """Play a user who asks, interrupts the answer, and hears the second one."""
     context = LLMContext()
     turns = UserTurnStrategies(
         start=[TranscriptionUserTurnStartStrategy()], stop=[SpeechTimeoutUserTurnStopStrategy()]

@@ -25,7 +25,7 @@ KINDS = ("visual", "emotional", "naming", "displacements", "films")
 
 @click.group()
 def study() -> None:
-    """Let people judge faces by eye (Wojdel 2005, 5.3.2; Paul 2010, 4.4), and analyse their answers.
+    """Make studies of faces that people judge (Wojdel 2005, 5.3.2; Paul 2010, 4.4); analyse the answers.
 
     \b
     realizer study make faces --kind visual --kind naming --face ada --face ben --judges 25
@@ -118,7 +118,7 @@ def make(folder: Path, kinds: tuple[str, ...], judges: int, seed: int | None, **
     "-o", "--output", required=True, metavar="FILE.csv", type=options.OUTPUT, help="Answers to write."
 )
 def judge(folder: Path, output: Path) -> None:
-    """Let a machine answer the study in DIR from its pictures alone; it is marked as a machine.
+    """Answer the study in DIR by a machine, from its pictures alone; its answers are marked.
 
     It needs the extra `track`, and leaves out scores and films, which it cannot judge.
     """

@@ -248,7 +248,7 @@ PICKS: tuple[Callable[[Answer], str], ...] = (lambda a: a.judge, lambda a: a.ite
 
 
 def judges(answers: Sequence[Answer]) -> Table:
-    """Who answered how much, how fast, and how many attention items right."""
+    """Return the number, speed and attention of the answers of each judge."""
     rows = []
     failed = inattentive(answers)
     for (who, judge), (right, every) in attention(answers).items():

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.browser.test_page import ARGUMENTS, CHROMIUM, PATIENCE, pytestmark, serving
+from tests.browser.test_page import PATIENCE, browser, pytestmark, serving
 from tests.test_documentation import PAGES, ROOT, blocks, name
 
-__all__ = ["pytestmark"]
+__all__ = ["browser", "pytestmark"]
 
 CLIENT = ROOT / "clients" / "javascript" / "README.md"
 WITH_CODE = [page for page in (*PAGES, CLIENT) if page.is_file() and blocks(page, "js")]
@@ -27,24 +27,20 @@ def address() -> Iterator[str]:
 
 
 @pytest.mark.parametrize("page", WITH_CODE, ids=name)
-def test_javascript_of_a_page_runs(page: Path, address: str) -> None:
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        opened = browser.new_page(bypass_csp=True)
-        opened.set_default_timeout(PATIENCE)
-        faults: list[str] = []
-        opened.on("pageerror", lambda error: faults.append(str(error)))
-        opened.goto(f"{address}/healthz")
-        opened.add_script_tag(content=AROUND)
-        for block in blocks(page, "js"):
-            code = block.replace("http://127.0.0.1:8765", address)
-            code = code.replace("ws://127.0.0.1:8765", address.replace("http", "ws"))
-            code = re.sub(r'"bml-realizer-client"', '"/realizer.js"', code)
-            # A module that fails never gets to its last line.
-            opened.add_script_tag(type="module", content=f"{code}\nglobalThis.finished = true;")
-            opened.wait_for_function("globalThis.finished")
-            opened.evaluate("globalThis.finished = false")
-        browser.close()
+def test_javascript_of_a_page_runs(page: Path, browser, address: str) -> None:  # type: ignore[no-untyped-def]
+    opened = browser.new_page(bypass_csp=True)
+    opened.set_default_timeout(PATIENCE)
+    faults: list[str] = []
+    opened.on("pageerror", lambda error: faults.append(str(error)))
+    opened.goto(f"{address}/healthz")
+    opened.add_script_tag(content=AROUND)
+    for block in blocks(page, "js"):
+        code = block.replace("http://127.0.0.1:8765", address)
+        code = code.replace("ws://127.0.0.1:8765", address.replace("http", "ws"))
+        code = re.sub(r'"bml-realizer-client"', '"/realizer.js"', code)
+        # A module that fails never gets to its last line.
+        opened.add_script_tag(type="module", content=f"{code}\nglobalThis.finished = true;")
+        opened.wait_for_function("globalThis.finished")
+        opened.evaluate("globalThis.finished = false")
+    opened.close()
     assert not faults

@@ -115,7 +115,7 @@ def light(picture: PictureFrame) -> float:
 
 
 async def curves(url: str, session: str, size: str) -> tuple[Curve, Curve]:
-    """Let a session beep with an opening mouth; return rows of (time, value): the mouth, and the sound."""
+    """Make a session beep with an opening mouth; return rows of (time, value): the mouth, and the sound."""
     visemes = [pair for start in STARTS for pair in ((start, "aa"), (start + BEEP, "sil"))]
     mouth: list[tuple[float, float]] = []
     sound: list[tuple[float, float]] = []
