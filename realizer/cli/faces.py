@@ -82,8 +82,8 @@ def build(name: str, data: Path, output: Path | None, seed: int | None) -> None:
     """
     from realizer.facebuild.person.build import build_face
     from realizer.facebuild.person.makehuman import data_folder
-    from realizer.facebuild.person.random_person import random_person
     from realizer.facebuild.person.recipe import read_recipe, recipe_text
+    from realizer.facebuild.person.sliders import random_person
 
     given = Path(name) if name.endswith(".toml") else None
     if given is not None:

@@ -1,7 +1,5 @@
 """Cards: strips with pictures of hairs that follow the mesh of a face."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -7,11 +7,19 @@ import numpy as np
 from realizer.core.array_types import Bool, Float32, Float64
 from realizer.core.units import ANGLE_UNIT
 from realizer.face.au.deformer import moves_of
-from realizer.face.basis import FAPS, JAW_COS, JAW_DROP, JAW_SIN, ROWS, TONGUE_COS, TONGUE_SIN, bulge_at
-from realizer.face.contours import couple_lips
-from realizer.face.lip_room import lip_room
+from realizer.face.basis import (
+    FAPS,
+    JAW_COS,
+    JAW_DROP,
+    JAW_SIN,
+    ROWS,
+    TONGUE_COS,
+    TONGUE_SIN,
+    bulge_at,
+    couple_lips,
+)
 from realizer.face.model import Face
-from realizer.face.tongue import tongue_room
+from realizer.face.mouth_room import lip_room, tongue_room
 
 # Columns of poses.
 OPEN_JAW, TONGUE_ROLL, HEAD, EYES, THRUST = 2, 46, slice(47, 50), slice(22, 26), slice(26, 28)

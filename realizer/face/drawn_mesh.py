@@ -1,7 +1,5 @@
 """The mesh that is drawn: a smooth subdivision of the one that is deformed, with places in maps, and hair."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache

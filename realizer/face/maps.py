@@ -1,7 +1,5 @@
 """The maps of a face: pictures that give its surface colour, relief and other values at each texel."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -3,8 +3,6 @@
 Source: Loop 1987, "Smooth subdivision surfaces based on triangles", with rims as in Hoppe et al. 1994.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any

@@ -4,8 +4,6 @@ The pupil is in the middle of their square in the maps. The distance from it gro
 optical axis up to the limbus, half-way to the side, and from there with the angle up to `WIDEST`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -7,8 +7,7 @@ import numpy as np
 
 from realizer.core.array_types import Bool, Float32, Float64
 from realizer.face.au.model import Model, rotation
-from realizer.face.au.mouth import shares
-from realizer.face.au.skin_binding import attached_parts, skin
+from realizer.face.au.regions import attached_parts, shares, skin
 from realizer.face.au.successive_mixer import MIN_MOVE, SuccessiveMixer
 from realizer.face.au.units import units
 from realizer.face.basis import FAPS, JAW_SIN

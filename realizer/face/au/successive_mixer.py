@@ -6,8 +6,7 @@ import numpy as np
 
 from realizer.core.array_types import Float64
 from realizer.face.au.model import Model, half
-from realizer.face.au.mouth import shares
-from realizer.face.au.skin_binding import attached_parts, skin
+from realizer.face.au.regions import attached_parts, shares, skin
 from realizer.face.model import Face
 
 MIN_MOVE = 1e-5  # m; smaller displacements are ignored

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import Field, ValidationError, create_model
 
 Index = Annotated[int, Field(strict=True, ge=0, lt=2**31)]
 Number = Annotated[float, Field(strict=True)]  # or infinity or NaN, which are found where vertices are placed
@@ -15,197 +15,87 @@ Matrix = Annotated[list[Number], Field(min_length=16, max_length=16)]
 Component = Literal[5120, 5121, 5122, 5123, 5125, 5126]
 
 
-class _SparseIndices(BaseModel):
-    bufferView: Index
-    byteOffset: Index = 0
-    componentType: Literal[5121, 5123, 5125]
+def _object(name: str, needed: str = "", **members: Any) -> Any:
+    """Return the schema of an object: the kinds of its members, of which some are needed."""
+    rows = {key: (kind, ... if key in needed.split() else None) for key, kind in members.items()}
+    return create_model(f"_{name}", **rows)  # type: ignore[call-overload]
 
 
-class _SparseValues(BaseModel):
-    bufferView: Index
-    byteOffset: Index = 0
-
-
-class _Sparse(BaseModel):
-    count: Index
-    indices: _SparseIndices
-    values: _SparseValues
-
-
-class _Accessor(BaseModel):
-    bufferView: Index | None = None
-    byteOffset: Index = 0
-    componentType: Component
-    count: Index
-    type: Literal["SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"]
-    sparse: _Sparse | None = None
-
-
-class _Meshopt(BaseModel):
-    buffer: Index
-    byteOffset: Index = 0
-    byteLength: Index
-    byteStride: Annotated[int, Field(strict=True, ge=2, le=256, multiple_of=2)]
-    count: Index
-    mode: Literal["ATTRIBUTES", "TRIANGLES", "INDICES"]
-    filter: Literal["NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR"] = "NONE"
-
-
-class _ViewExtensions(BaseModel):
-    EXT_meshopt_compression: _Meshopt | None = None
-    KHR_meshopt_compression: _Meshopt | None = None
-
-
-class _BufferView(BaseModel):
-    buffer: Index = 0
-    byteOffset: Index = 0
-    byteLength: Index = 0
-    byteStride: Index | None = None
-    extensions: _ViewExtensions = _ViewExtensions()
-
-
-class _Buffer(BaseModel):
-    uri: str | None = None
-
-
-class _Image(BaseModel):
-    uri: str = ""
-    bufferView: Index = 0
-
-
-class _TextureSource(BaseModel):
-    source: Index | None = None
-
-
-class _TextureSources(BaseModel):
-    EXT_texture_webp: _TextureSource = _TextureSource()
-    EXT_texture_avif: _TextureSource = _TextureSource()
-    KHR_texture_basisu: _TextureSource = _TextureSource()
-
-
-class _Texture(BaseModel):
-    source: Index | None = None
-    sampler: Index | None = None
-    extensions: _TextureSources = _TextureSources()
-
-
-class _Sampler(BaseModel):
-    wrapS: Literal[10497, 33071, 33648] = 10497
-    wrapT: Literal[10497, 33071, 33648] = 10497
-
-
-class _TextureTransform(BaseModel):
-    offset: Pair = [0, 0]
-    scale: Pair = [1, 1]
-    rotation: Finite = 0
-    texCoord: Index = 0
-
-
-class _TextureExtensions(BaseModel):
-    KHR_texture_transform: _TextureTransform = _TextureTransform()
-
-
-class _TextureInfo(BaseModel):
-    index: Index
-    texCoord: Index = 0
-    scale: Finite = 1
-    strength: Finite = 1
-    extensions: _TextureExtensions = _TextureExtensions()
-
-
-class _Surface(BaseModel):
-    baseColorFactor: Colour = [1, 1, 1, 1]
-    baseColorTexture: _TextureInfo | None = None
-    metallicRoughnessTexture: _TextureInfo | None = None
-    roughnessFactor: Finite = 1
-
-
-class _GlossySurface(BaseModel):
-    diffuseFactor: Colour = [1, 1, 1, 1]
-    diffuseTexture: _TextureInfo | None = None
-
-
-class _Strength(BaseModel):
-    emissiveStrength: Finite = 1
-
-
-class _Transmission(BaseModel):
-    transmissionFactor: Finite = 0
-
-
-class _MaterialExtensions(BaseModel):
-    KHR_materials_pbrSpecularGlossiness: _GlossySurface = _GlossySurface()
-    KHR_materials_emissive_strength: _Strength = _Strength()
-    KHR_materials_transmission: _Transmission = _Transmission()
-
-
-class _Material(BaseModel):
-    pbrMetallicRoughness: _Surface = _Surface()
-    normalTexture: _TextureInfo | None = None
-    occlusionTexture: _TextureInfo | None = None
-    emissiveTexture: _TextureInfo | None = None
-    emissiveFactor: Annotated[list[Finite], Field(min_length=3, max_length=3)] = [0, 0, 0]
-    alphaMode: Literal["OPAQUE", "MASK", "BLEND"] = "OPAQUE"
-    alphaCutoff: Finite = 0.5
-    extensions: _MaterialExtensions = _MaterialExtensions()
-
-
-class _Draco(BaseModel):
-    bufferView: Index
-    attributes: dict[str, Index]
-
-
-class _PrimitiveExtensions(BaseModel):
-    KHR_draco_mesh_compression: _Draco | None = None
-
-
-class _Primitive(BaseModel):
-    attributes: dict[str, Index] = {}
-    indices: Index = 0
-    material: Index = 0
-    mode: Index = 4
-    targets: list[dict[str, Index]] = []
-    extensions: _PrimitiveExtensions = _PrimitiveExtensions()
-
-
-class _Mesh(BaseModel):
-    primitives: list[_Primitive] = []
-
-
-class _Node(BaseModel):
-    children: list[Index] = []
-    mesh: Index = 0
-    skin: Index = 0
-    matrix: Matrix = [0] * 16
-    rotation: Quadruple = [0, 0, 0, 1]
-    scale: Triple = [1, 1, 1]
-    translation: Triple = [0, 0, 0]
-
-
-class _Skin(BaseModel):
-    joints: list[Index] = []
-    inverseBindMatrices: Index = 0
-
-
-class _Scene(BaseModel):
-    nodes: list[Index] = []
-
-
-class _Document(BaseModel):
-    asset: dict[str, Any]
-    extensionsRequired: list[str] = []
-    scene: Index = 0
-    scenes: list[_Scene] = []
-    nodes: list[_Node] = []
-    meshes: list[_Mesh] = []
-    skins: list[_Skin] = []
-    materials: list[_Material] = []
-    textures: list[_Texture] = []
-    samplers: list[_Sampler] = []
-    images: list[_Image] = []
-    accessors: list[_Accessor] = []
-    bufferViews: list[_BufferView] = []
-    buffers: list[_Buffer] = []
+_SparseIndices = _object(
+    "SparseIndices", "bufferView componentType", bufferView=Index, byteOffset=Index,
+    componentType=Literal[5121, 5123, 5125],
+)  # fmt: skip
+_SparseValues = _object("SparseValues", "bufferView", bufferView=Index, byteOffset=Index)
+_Sparse = _object("Sparse", "count indices values", count=Index, indices=_SparseIndices, values=_SparseValues)
+_Accessor = _object(
+    "Accessor", "componentType count type", bufferView=Index | None, byteOffset=Index,
+    componentType=Component, count=Index,
+    type=Literal["SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"], sparse=_Sparse | None,
+)  # fmt: skip
+_Meshopt = _object(
+    "Meshopt", "buffer byteLength byteStride count mode", buffer=Index, byteOffset=Index, byteLength=Index,
+    byteStride=Annotated[int, Field(strict=True, ge=2, le=256, multiple_of=2)], count=Index,
+    mode=Literal["ATTRIBUTES", "TRIANGLES", "INDICES"],
+    filter=Literal["NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR"],
+)  # fmt: skip
+_ViewExtensions = _object(
+    "ViewExtensions", EXT_meshopt_compression=_Meshopt | None, KHR_meshopt_compression=_Meshopt | None,
+)  # fmt: skip
+_BufferView = _object(
+    "BufferView", buffer=Index, byteOffset=Index, byteLength=Index, byteStride=Index | None,
+    extensions=_ViewExtensions,
+)  # fmt: skip
+_Buffer = _object("Buffer", uri=str | None)
+_Image = _object("Image", uri=str, bufferView=Index)
+_TextureSource = _object("TextureSource", source=Index | None)
+_TextureSources = _object(
+    "TextureSources", EXT_texture_webp=_TextureSource, EXT_texture_avif=_TextureSource,
+    KHR_texture_basisu=_TextureSource,
+)  # fmt: skip
+_Texture = _object("Texture", source=Index | None, sampler=Index | None, extensions=_TextureSources)
+_Sampler = _object("Sampler", wrapS=Literal[10497, 33071, 33648], wrapT=Literal[10497, 33071, 33648])
+_TextureTransform = _object("TextureTransform", offset=Pair, scale=Pair, rotation=Finite, texCoord=Index)
+_TextureExtensions = _object("TextureExtensions", KHR_texture_transform=_TextureTransform)
+_TextureInfo = _object(
+    "TextureInfo", "index", index=Index, texCoord=Index, scale=Finite, strength=Finite,
+    extensions=_TextureExtensions,
+)  # fmt: skip
+_Surface = _object(
+    "Surface", baseColorFactor=Colour, baseColorTexture=_TextureInfo | None,
+    metallicRoughnessTexture=_TextureInfo | None, roughnessFactor=Finite,
+)  # fmt: skip
+_GlossySurface = _object("GlossySurface", diffuseFactor=Colour, diffuseTexture=_TextureInfo | None)
+_Strength = _object("Strength", emissiveStrength=Finite)
+_Transmission = _object("Transmission", transmissionFactor=Finite)
+_MaterialExtensions = _object(
+    "MaterialExtensions", KHR_materials_pbrSpecularGlossiness=_GlossySurface,
+    KHR_materials_emissive_strength=_Strength, KHR_materials_transmission=_Transmission,
+)  # fmt: skip
+_Material = _object(
+    "Material", pbrMetallicRoughness=_Surface, normalTexture=_TextureInfo | None,
+    occlusionTexture=_TextureInfo | None, emissiveTexture=_TextureInfo | None,
+    emissiveFactor=Annotated[list[Finite], Field(min_length=3, max_length=3)],
+    alphaMode=Literal["OPAQUE", "MASK", "BLEND"], alphaCutoff=Finite, extensions=_MaterialExtensions,
+)  # fmt: skip
+_Draco = _object("Draco", "bufferView attributes", bufferView=Index, attributes=dict[str, Index])
+_PrimitiveExtensions = _object("PrimitiveExtensions", KHR_draco_mesh_compression=_Draco | None)
+_Primitive = _object(
+    "Primitive", attributes=dict[str, Index], indices=Index, material=Index, mode=Index,
+    targets=list[dict[str, Index]], extensions=_PrimitiveExtensions,
+)  # fmt: skip
+_Mesh = _object("Mesh", primitives=list[_Primitive])
+_Node = _object(
+    "Node", children=list[Index], mesh=Index, skin=Index, matrix=Matrix, rotation=Quadruple, scale=Triple,
+    translation=Triple,
+)  # fmt: skip
+_Skin = _object("Skin", joints=list[Index], inverseBindMatrices=Index)
+_Scene = _object("Scene", nodes=list[Index])
+_Document = _object(
+    "Document", "asset", asset=dict[str, Any], extensionsRequired=list[str], scene=Index, scenes=list[_Scene],
+    nodes=list[_Node], meshes=list[_Mesh], skins=list[_Skin], materials=list[_Material],
+    textures=list[_Texture], samplers=list[_Sampler], images=list[_Image], accessors=list[_Accessor],
+    bufferViews=list[_BufferView], buffers=list[_Buffer],
+)  # fmt: skip
 
 
 def document_fault(document: Any) -> str:

@@ -9,22 +9,23 @@ import numpy as np
 
 from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
+from realizer.face.au.regions import fit_mouth, shares
+from realizer.face.au.units import units
 from realizer.face.basis import unpack
 from realizer.face.features import Point, write_features
 from realizer.face.load import load_face
 from realizer.face.maps import NAMES
 from realizer.face.mesh_geometry import fit_ball, vertex_normals
+from realizer.face.model import Face
 from realizer.facebuild.arkit.atlas import SIZE, Atlas, make_atlas
-from realizer.facebuild.arkit.au_measurements import measure_units
-from realizer.facebuild.arkit.fap_sources import fap_sources
 from realizer.facebuild.arkit.fields import ShapedSkin, shape_fields
-from realizer.facebuild.arkit.head import Head, Report, read_head
+from realizer.facebuild.arkit.head import Head, Report, fap_sources, read_head
 from realizer.facebuild.arkit.jaw import drag_of, joint_of
 from realizer.facebuild.arkit.mesh_merge import Surface
 from realizer.facebuild.arkit.mouth_coordinates import mouth_of
 from realizer.facebuild.arkit.part_classifier import ball_behind
 from realizer.facebuild.arkit.points import points_of
-from realizer.facebuild.au.measure import write_shapes
+from realizer.facebuild.au.measure import UnitMeasurement, write_shapes
 from realizer.facebuild.face_files import write_fields, write_head, write_mesh
 from realizer.facebuild.mpeg4.build import apply_zones, with_brows
 from realizer.facebuild.mpeg4.defaults import default_setup, split_sides
@@ -251,3 +252,37 @@ def _gaze_rows(surface: Surface, ranges: dict[str, tuple[int, int]]) -> dict[int
             angle = float(np.arcsin(np.clip(size / max(radius, 1e-6), 0.1, 0.9)))
             rows[fap] = move / angle
     return rows
+
+
+OPEN = 0.3  # baked light below this: inside the head, or the inner side of a lip
+
+
+def measure_units(face: Face, surface: Surface) -> dict[int, UnitMeasurement]:
+    """Return each displacement unit that the shapes make, on the left half of the skin.
+
+    Raises:
+        FaceError: a mouth whose points do not go from the middle to the left corner.
+    """
+    first, last = face.parts["skin"]
+    skin = face.vertices[first:last].astype(np.float64)
+    half = skin[:, 0] > -1e-6
+    seen = face.occlusion[first:last][half] > OPEN
+    upper = shares(face, fit_mouth(face))[first:last][half]
+    out = {}
+    for unit in units().values():
+        move = _mixed(surface, unit.mixture) if unit.kind == "displacement" else None
+        if move is not None and move[first:last][half].any():
+            out[unit.au] = UnitMeasurement(unit.au, skin[half], move[first:last][half], seen, upper)
+    return out
+
+
+def _mixed(surface: Surface, mixture: dict[str, float]) -> Float64 | None:
+    """Return the sum of weighted shapes of both sides, or None if a shape is missing."""
+    out = np.zeros_like(surface.vertices)
+    for name, weight in mixture.items():
+        sides = (name,) if name in surface.moves else (f"{name}Left", f"{name}Right")
+        if any(side not in surface.moves for side in sides):
+            return None
+        for side in sides:
+            out += weight * surface.moves[side]
+    return out

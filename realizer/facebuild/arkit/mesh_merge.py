@@ -152,7 +152,7 @@ def cut(surface: Surface, height: Float64) -> Surface:
         return surface
     import scipy.sparse as sp
 
-    from realizer.facebuild.submesh import SLIVER, Submesh
+    from realizer.facebuild.parts import SLIVER, Submesh
 
     n = len(surface.vertices)
     flat = Submesh(sp.csr_matrix(sp.eye_array(n)), np.zeros((n, 3)), surface.triangles)

@@ -8,7 +8,7 @@ import numpy as np
 from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
 from realizer.face.au.model import CENTIMETRE, HeadTurn, Model, Motion, Mouth, UnitModel
-from realizer.face.au.mouth import fit_mouth
+from realizer.face.au.regions import fit_mouth
 from realizer.face.au.units import units
 from realizer.face.model import Face
 from realizer.facebuild.au.fit_limits import FURTHEST, WatchedPlaces, furthest, watched_places

@@ -13,7 +13,7 @@ import numpy as np
 from realizer.core.array_types import Float64
 from realizer.face.au.functions import density
 from realizer.face.au.model import Model, Mouth, UnitModel
-from realizer.face.au.mouth import shares
+from realizer.face.au.regions import shares
 from realizer.face.mesh_geometry import part_triangles
 from realizer.face.model import Face
 from realizer.facebuild.au.measure import UnitMeasurement

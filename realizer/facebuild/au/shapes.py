@@ -8,18 +8,18 @@ import numpy as np
 
 from realizer.core.array_types import Float64, Int32
 from realizer.core.errors import FaceError
-from realizer.face.au.mouth import fit_mouth, shares
+from realizer.face.au.regions import fit_mouth, shares
 from realizer.face.au.units import Unit, units
 from realizer.face.mesh_geometry import part_triangles, triangle_normals, vertex_normals
 from realizer.face.model import Face
 from realizer.facebuild.au.measure import UnitMeasurement
+from realizer.facebuild.parts import Submesh
 from realizer.facebuild.person import makehuman
-from realizer.facebuild.person.base_mesh import Ground
 from realizer.facebuild.person.lips import Lips
+from realizer.facebuild.person.makehuman import Ground
 from realizer.facebuild.person.person import person_of
 from realizer.facebuild.person.recipe import read_recipe
 from realizer.facebuild.photo.warp import read_warp
-from realizer.facebuild.submesh import Submesh
 
 OPEN = 0.3  # baked light below this: inside the head, or the inner side of a lip
 COLLAR = -0.16  # m; below it no face moves

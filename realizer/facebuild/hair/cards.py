@@ -1,7 +1,5 @@
 """Cards as they are made: strips along strands, and what each of their vertices follows."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any

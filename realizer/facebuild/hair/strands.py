@@ -1,7 +1,5 @@
 """Strands: lines that grow from the scalp along the flow of a style and hang down from it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Ways to wear hair, as a recipe's [hair] names them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any

@@ -1,7 +1,5 @@
 """The picture of strands that all cards of a face share, drawn into a corner of its albedo map."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ Paul 2010 (4.4) scored displacements by eye: 3 as it should look, 2 slightly odd
 right, 0 nothing. Here rules give the score, so that it can be repeated.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cache
@@ -14,9 +12,6 @@ from realizer.face.model import Face
 from realizer.facebuild.mpeg4.fap_limits import ROLLED, accompanying_faps, usual_range
 from realizer.facebuild.mpeg4.fap_measures import Measure, error_of, flips_of, mirror_of, others_of, rough_of
 from realizer.tables import Fap, csv_rows, faps
-
-# The scores of other faces (Paul 2010, tables 4.5), with FAPs that they lack counted as 0.
-PEERS = {"FaceEditor": 2.60, "Greta": 2.32, "Miraface": 1.96, "Xface": 1.32}
 
 HALF, TURN = 512.0, 20000.0  # FAPU, angle units: half a face distance is what Paul looked at
 # For scores 3 and 2: error, mirror, others, share of area that flips, roughness; and for 1: error.

@@ -21,7 +21,7 @@ from realizer.face.mesh_geometry import mirror_twins, nearest_vertex
 from realizer.facebuild.face_files import to_bytes, write_fields, write_head, write_mesh
 from realizer.facebuild.fix_flipped import without_flips
 from realizer.facebuild.hair.face_cards import face_cards, write_cards
-from realizer.facebuild.hair.lashes import Margin
+from realizer.facebuild.hair.facial_hair import Margin
 from realizer.facebuild.mpeg4.rigid import Parts, opening_rows, sliding
 from realizer.facebuild.parts import Part
 from realizer.facebuild.person import makehuman, skin_colours

@@ -7,18 +7,16 @@ from realizer.face.mesh_geometry import vertex_normals
 from realizer.facebuild.eyeball import eyeball
 from realizer.facebuild.hair.style import style_of
 from realizer.facebuild.mpeg4.rigid import opening_rows, tongue_bends
-from realizer.facebuild.parts import Part, smooth
+from realizer.facebuild.parts import Part, Submesh, smooth
 from realizer.facebuild.person import clothing, skin_colours
+from realizer.facebuild.person.clothing import glasses, glasses_of
 from realizer.facebuild.person.fap_fields import SINKS
-from realizer.facebuild.person.glasses import glasses, glasses_of
-from realizer.facebuild.person.lids import Lid
+from realizer.facebuild.person.lids import Lid, tears
 from realizer.facebuild.person.lips import Lips
 from realizer.facebuild.person.person import Person
 from realizer.facebuild.person.recipe import Recipe, appearance_of
 from realizer.facebuild.person.scalp import Scalp
-from realizer.facebuild.person.tears import tears
 from realizer.facebuild.skin.atlas import EYES
-from realizer.facebuild.submesh import Submesh
 from realizer.facebuild.teeth import teeth
 
 ORDER = (

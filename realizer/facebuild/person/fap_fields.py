@@ -10,9 +10,9 @@ from realizer.face.basis import JAW_SIN
 from realizer.facebuild.fix_flipped import JAW, LIPS, symmetrize, without_flips
 from realizer.facebuild.mpeg4.rigid import opening_rows, tongue_bends
 from realizer.facebuild.parts import smooth
-from realizer.facebuild.person.base_mesh import FORWARD, LEFT, UP, Ground, scaled
 from realizer.facebuild.person.lids import lid_fields
 from realizer.facebuild.person.lips import Lips, lip_fields
+from realizer.facebuild.person.makehuman import FORWARD, LEFT, UP, Ground, scaled
 
 BEND = 0.45  # of the slope of a cardinal spline: less dips between the stations, more roundness at them
 PUFFED_FROM = np.array([0.034, 0.0, 0.010])  # m, from the middle of the cheek inwards, down and back

@@ -1,13 +1,15 @@
-"""The eyelids: edges that slide along the eye's opening so that both lids meet."""
+"""The eyelids, whose edges slide along the opening so that both meet, and the wet line on the lower ones."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
+import scipy.sparse as sp
 
 from realizer.core.array_types import Float64
-from realizer.facebuild.parts import smooth
-from realizer.facebuild.person.base_mesh import FORWARD, UP, Ground, scaled
-from realizer.facebuild.person.makehuman import walk
+from realizer.face.mesh_geometry import grid
+from realizer.facebuild.parts import Part, Submesh, smooth
+from realizer.facebuild.person.makehuman import FORWARD, UP, Ground, scaled, walk
 
 # Two vertices each of the rings around the left eye, from the edge of the lid outwards.
 RINGS = ((13352, 13369), (6785, 6844), (11465, 11485), (6787, 6845), (6789, 6846), (11515, 11493))
@@ -160,3 +162,41 @@ def _edged(
     for vertex, parents, depth in lining:
         out[vertex] = out[parents].mean() * LINING**depth
     return out
+
+
+TALL = 0.00045  # m up the eye
+# From the lid's edge up the eye: share of the way, and of the edge's distance from the eye; tears are hollow.
+TEAR_RINGS = (0.0, 1.0), (0.4, 0.3), (1.0, 0.0)
+THIN = 0.00015  # m before the eye at the top
+TINT = np.array([204.0, 172, 164])  # the lid's pink seen through
+
+
+def tears(ground: Ground, lids: Sequence[Lid], eyes: Sequence[tuple[Float64, float]]) -> Part:
+    """Return the strips of both eyes, which follow the edges of the lids.
+
+    Args:
+        eyes: centre (3,) and radius of each ball.
+    """
+    places: list[Float64] = []
+    sources: list[int] = []
+    triangles = []
+    for lid, (centre, radius) in zip(lids, eyes, strict=True):
+        edge = ground.at[lid.lower]
+        count = len(edge)
+        # Into the corners it gets thin.
+        tall = TALL * np.sqrt(np.sin(np.pi * np.arange(count) / (count - 1)))
+        room = np.linalg.norm(edge - centre, axis=1) - radius
+        rows = []
+        for share, before in TEAR_RINGS:
+            way = edge + share * tall[:, None] * UP - centre
+            far = radius + THIN + before * np.maximum(room - THIN, 0)
+            rows.append(centre + way * (far / np.linalg.norm(way, axis=1))[:, None])
+        turned = grid(len(TEAR_RINGS), count)
+        triangles.append((turned if lid.side < 0 else turned[:, ::-1]) + len(sources))
+        places.append(np.concatenate(rows))
+        sources += lid.lower * len(TEAR_RINGS)
+    at, source = np.concatenate(places), np.array(sources)
+    n = len(at)
+    mix = sp.csr_matrix((np.ones(n), (np.arange(n), source)), (n, len(ground.at)))
+    patch = Submesh(mix, at - ground.at[source], np.concatenate(triangles).astype(np.int32))
+    return Part("tears", patch, at, patch.triangles, np.tile(TINT, (n, 1)), np.ones(n), np.full(n, 0.85))

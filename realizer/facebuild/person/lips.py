@@ -10,8 +10,7 @@ import numpy as np
 
 from realizer.core.array_types import Bool, Float64
 from realizer.facebuild.parts import smooth
-from realizer.facebuild.person.base_mesh import FORWARD, LEFT, UP, Ground, scaled
-from realizer.facebuild.person.makehuman import walk
+from realizer.facebuild.person.makehuman import FORWARD, LEFT, UP, Ground, scaled, walk
 
 # Two vertices of each ring of edges around the mouth, from inside to outside: the middle of the upper lip and
 # its neighbour. The lips meet at ring 1; ring 7 is the border of the red.

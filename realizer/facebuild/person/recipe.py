@@ -13,7 +13,7 @@ from realizer.core.toml_text import parse_toml
 from realizer.face.reading import face_errors
 from realizer.facebuild.hair.style import style_of
 from realizer.facebuild.person import makehuman
-from realizer.facebuild.person.glasses import glasses_of
+from realizer.facebuild.person.clothing import glasses_of
 from realizer.facebuild.person.sliders import description_of, person_faults, person_tables
 from realizer.tables import toml_table
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from realizer.core.array_types import Float64, Int32
 from realizer.facebuild.parts import smooth
-from realizer.facebuild.person.base_mesh import Ground
 from realizer.facebuild.person.lips import Lips
+from realizer.facebuild.person.makehuman import Ground
 from realizer.facebuild.person.recipe import Appearance
 
 

@@ -1,7 +1,5 @@
 """The build of a face from two photographs."""
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 from collections.abc import Callable, Mapping

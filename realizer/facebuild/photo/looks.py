@@ -1,7 +1,5 @@
 """What a photograph tells of colours and hair, as tables of a recipe."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

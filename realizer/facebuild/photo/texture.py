@@ -1,7 +1,5 @@
 """The skin's colours from two photographs, projected onto the maps of a recipe's skin."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

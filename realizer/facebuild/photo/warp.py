@@ -1,7 +1,5 @@
 """The smooth warp that takes a person made of sliders to what two photographs show."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,14 +1,12 @@
 """Places of the skin in the maps: the base mesh's islands, packed so that the face gets most texels."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from realizer.core.array_types import Float64, Int32
+from realizer.facebuild.parts import Submesh
 from realizer.facebuild.person.makehuman import BaseMesh
-from realizer.facebuild.submesh import Submesh
 
 SIZE = 2048  # texels of a side of the maps
 

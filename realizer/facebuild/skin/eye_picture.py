@@ -1,7 +1,5 @@
 """The picture of an eye for the maps: iris and white, on the square that `eyeball` describes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

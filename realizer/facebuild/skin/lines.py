@@ -1,7 +1,5 @@
 """Lines of the skin: what expressions fold, and what age leaves of it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """The maps of a face: baked, and written as pictures."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,9 +21,8 @@ from realizer.facebuild.skin import atlas
 from realizer.facebuild.skin.albedo import paint_albedo
 from realizer.facebuild.skin.eye_picture import eye_picture
 from realizer.facebuild.skin.lines import lines_of, regions, weights
-from realizer.facebuild.skin.relief import relief_of
+from realizer.facebuild.skin.relief import relief_of, surface_of
 from realizer.facebuild.skin.skin import Skin
-from realizer.facebuild.skin.surface import surface_of
 from realizer.facebuild.skin.texels import Texels
 
 RELIEF = 0.0012  # m that 255 steps of the relief are high

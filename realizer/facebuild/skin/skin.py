@@ -1,7 +1,5 @@
 """The skin of a person at the texels of its maps: places, regions and figures that all maps are made of."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

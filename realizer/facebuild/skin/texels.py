@@ -1,7 +1,5 @@
 """The texels of a map that lie on a surface, and where they are on it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cached_property
 from typing import Any

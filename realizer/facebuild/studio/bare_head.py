@@ -1,7 +1,5 @@
 """The import of a head without shapes (GLB, OBJ or PLY) into a face folder that zones move."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory

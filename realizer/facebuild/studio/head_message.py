@@ -1,7 +1,5 @@
 """What the page gets of a head: mesh, feature points, zones, and the tables that they need."""
 
-from __future__ import annotations
-
 import json
 import re
 import struct

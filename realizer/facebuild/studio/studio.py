@@ -1,7 +1,5 @@
 """The answers to the Face tab: opens heads, makes faces of edited zones, scores and saves them."""
 
-from __future__ import annotations
-
 import errno
 import hashlib
 import json

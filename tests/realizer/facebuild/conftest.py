@@ -13,9 +13,8 @@ from realizer.face.features import NAMES
 from realizer.face.load import folder_of, load_face
 from realizer.facebuild.parts import Part
 from realizer.facebuild.person import fap_fields, lids, lips, skin_colours
-from realizer.facebuild.person.base_mesh import Ground
 from realizer.facebuild.person.bust import assemble
-from realizer.facebuild.person.makehuman import BaseMesh
+from realizer.facebuild.person.makehuman import BaseMesh, Ground
 from realizer.facebuild.person.person import Person
 from realizer.facebuild.person.recipe import Recipe
 from realizer.facebuild.skin.atlas import corners

@@ -180,7 +180,7 @@ def test_moves_of_blink_and_wink_close_the_eye(face: Face) -> None:
 
 def test_moves_of_an_open_jaw_part_the_whole_lips(face: Face) -> None:
     """The lips' two sides are distinguished by the mesh, so that no vertex stays behind on the wrong one."""
-    from realizer.face.au.mouth import halves
+    from realizer.face.au.regions import halves
 
     made = shown(face, au27=1)
     index, upper = halves(face)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from realizer.face.au.model import Model
-from realizer.face.au.mouth import shares
-from realizer.face.au.skin_binding import attached_parts, skin
+from realizer.face.au.regions import attached_parts, shares, skin
 from realizer.face.au.successive_mixer import SuccessiveMixer
 from realizer.face.load import load_face
 from realizer.face.model import Face

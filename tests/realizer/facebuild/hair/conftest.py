@@ -10,7 +10,7 @@ import pytest
 from realizer.face.load import load_face
 from realizer.face.mesh_geometry import part_triangles
 from realizer.face.model import Face
-from realizer.facebuild.hair.lashes import Margin
+from realizer.facebuild.hair.facial_hair import Margin
 from realizer.facebuild.hair.style import Style, style_of
 from realizer.facebuild.person.scalp import Scalp
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from realizer.facebuild.hair.grow import cap, hair, tints
+from realizer.facebuild.hair.grow import bun, cap, hair, tints
 from realizer.facebuild.hair.strands import edge
 from realizer.facebuild.hair.style import Style, style_of
 from realizer.facebuild.person.scalp import Scalp
@@ -47,3 +47,12 @@ def test_tints_turn_white_lock_by_lock(style: Style) -> None:
     )
     assert dark.max() < mixed.min() < mixed.max() < white.min()
     assert np.ptp(mixed) > np.ptp(dark)
+
+
+def test_bun_is_a_ball_behind_the_head(scalp: Scalp) -> None:
+    style = style_of({"style": "bun"})
+    patch = bun(scalp, style, lambda count: np.full((count, 3), 60.0), np.random.default_rng(1))
+    size = np.ptp(patch.places, axis=0)
+    assert (size < 3 * max(style.bun)).all()
+    assert (size > min(style.bun)).all()
+    assert patch.places[:, 2].mean() < scalp.middle[2] - 0.06

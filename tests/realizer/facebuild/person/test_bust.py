@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from realizer.facebuild.parts import Part
-from realizer.facebuild.person.base_mesh import Ground
 from realizer.facebuild.person.bust import ORDER
+from realizer.facebuild.person.makehuman import Ground
 
 pytestmark = pytest.mark.xdist_group("mask")
 

@@ -7,7 +7,7 @@ import pytest
 
 from realizer.face.basis import FAPS, JAW_COS, JAW_DROP, JAW_SIN, TONGUE_COS, TONGUE_SIN
 from realizer.facebuild.mpeg4.fields import WAYS
-from realizer.facebuild.person.base_mesh import Ground
+from realizer.facebuild.person.makehuman import Ground
 from realizer.tables import faps
 
 pytestmark = pytest.mark.xdist_group("mask")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.facebuild.person.base_mesh import Ground
 from realizer.facebuild.person.lips import BORDER, MEET, Lips, close_lips, lip_fields, spline_basis
+from realizer.facebuild.person.makehuman import Ground
 
 pytestmark = pytest.mark.xdist_group("mask")
 

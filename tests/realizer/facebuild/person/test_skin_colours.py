@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.facebuild.person.base_mesh import Ground
 from realizer.facebuild.person.lips import Lips
+from realizer.facebuild.person.makehuman import Ground
 from realizer.facebuild.person.skin_colours import LIT, beard, light_mouth, lining, occlusion
 
 COLOURS = {"mouth": [120, 48, 44], "tongue": [196, 104, 100]}

@@ -3,8 +3,9 @@
 import pytest
 
 from realizer.core.errors import FaceError
-from realizer.facebuild.person.recipe import COLOURS
-from realizer.facebuild.person.sliders import DEFAULTS, person_faults, person_tables
+from realizer.core.toml_text import parse_toml
+from realizer.facebuild.person.recipe import COLOURS, recipe_text
+from realizer.facebuild.person.sliders import DEFAULTS, person_faults, person_tables, random_person
 from realizer.tables import toml_table
 
 
@@ -68,3 +69,28 @@ def test_person_tables_name_what_is_wrong(person, fault):
 
 def test_person_faults_of_the_defaults_are_none():
     assert person_faults(DEFAULTS) == []
+
+
+MANY = [random_person(seed) for seed in range(200)]
+
+
+def test_random_people_are_sound_recipes():
+    for recipe in MANY:
+        assert person_faults(recipe["person"]) == []
+        assert recipe["hair"]["style"] in toml_table("hair.toml")["styles"]
+        assert parse_toml(recipe_text(recipe)) == recipe
+
+
+def test_random_people_are_the_same_for_the_same_seed():
+    assert random_person(7) == random_person(7)
+    assert len({recipe["says"] for recipe in MANY}) == len(MANY)
+
+
+def test_random_people_vary():
+    persons = [recipe["person"] for recipe in MANY]
+    assert 60 < sum(person["sex"] > 0.5 for person in persons) < 140
+    assert min(person["age"] for person in persons) < 25
+    assert max(person["age"] for person in persons) > 65
+    assert len({person["hair"] for person in persons}) >= 6
+    assert max(person["skin"] for person in persons) > 0.6
+    assert min(person["skin"] for person in persons) < 0.15

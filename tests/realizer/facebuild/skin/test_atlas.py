@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.facebuild.parts import Part
-from realizer.facebuild.person.base_mesh import Ground
-from realizer.facebuild.person.makehuman import BaseMesh
+from realizer.facebuild.parts import Part, Submesh
+from realizer.facebuild.person.makehuman import BaseMesh, Ground
 from realizer.facebuild.skin.atlas import EYES, HAIR, NEUTRAL, corners, packed
-from realizer.facebuild.submesh import Submesh
 
 pytestmark = pytest.mark.xdist_group("mask")
 

@@ -1,4 +1,4 @@
-// The vertices of a head under one FAP, by the formulas of realizer/face (deform.py, contours.py, basis.py).
+// The vertices of a head under one FAP, by the formulas of realizer/face (deform.py, basis.py).
 
 const OUTER = { 4: 51, 5: 52, 6: 53, 7: 54, 8: 55, 9: 56, 10: 57, 11: 58, 12: 59, 13: 60 };
 const PARTNER = new Map(Object.entries(OUTER).flatMap(([inner, outer]) => [[Number(inner), outer], [outer, Number(inner)]]));
