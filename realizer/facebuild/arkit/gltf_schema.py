@@ -1,5 +1,6 @@
 """The parts of glTF 2.0 documents that heads are read from, as a schema."""
 
+from types import GenericAlias
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, create_model
@@ -19,6 +20,11 @@ def _object(name: str, needed: str = "", **members: Any) -> Any:
     """Return the schema of an object: the kinds of its members, of which some are needed."""
     rows = {key: (kind, ... if key in needed.split() else None) for key, kind in members.items()}
     return create_model(f"_{name}", **rows)  # type: ignore[call-overload]
+
+
+def _rows(kind: Any) -> Any:
+    """Return the schema of a list."""
+    return GenericAlias(list, (kind,))
 
 
 _SparseIndices = _object(
@@ -83,7 +89,7 @@ _Primitive = _object(
     "Primitive", attributes=dict[str, Index], indices=Index, material=Index, mode=Index,
     targets=list[dict[str, Index]], extensions=_PrimitiveExtensions,
 )  # fmt: skip
-_Mesh = _object("Mesh", primitives=list[_Primitive])
+_Mesh = _object("Mesh", primitives=_rows(_Primitive))
 _Node = _object(
     "Node", children=list[Index], mesh=Index, skin=Index, matrix=Matrix, rotation=Quadruple, scale=Triple,
     translation=Triple,
@@ -91,10 +97,10 @@ _Node = _object(
 _Skin = _object("Skin", joints=list[Index], inverseBindMatrices=Index)
 _Scene = _object("Scene", nodes=list[Index])
 _Document = _object(
-    "Document", "asset", asset=dict[str, Any], extensionsRequired=list[str], scene=Index, scenes=list[_Scene],
-    nodes=list[_Node], meshes=list[_Mesh], skins=list[_Skin], materials=list[_Material],
-    textures=list[_Texture], samplers=list[_Sampler], images=list[_Image], accessors=list[_Accessor],
-    bufferViews=list[_BufferView], buffers=list[_Buffer],
+    "Document", "asset", asset=dict[str, Any], extensionsRequired=list[str], scene=Index,
+    scenes=_rows(_Scene), nodes=_rows(_Node), meshes=_rows(_Mesh), skins=_rows(_Skin),
+    materials=_rows(_Material), textures=_rows(_Texture), samplers=_rows(_Sampler), images=_rows(_Image),
+    accessors=_rows(_Accessor), bufferViews=_rows(_BufferView), buffers=_rows(_Buffer),
 )  # fmt: skip
 
 
