@@ -11,17 +11,16 @@ import numpy as np
 
 from bml_schema import Feedback, WarningFeedback
 from realizer.animation.axis import AU_NAMES
-from realizer.animation.fap.au_fap_mapping import FapMapping, standard
+from realizer.animation.fap.conversion import FapMapping, standard
 from realizer.animation.frames import AUFrames, FAPFrames
 from realizer.animation.pose import poses
 from realizer.core.array_types import Float32, Float64, Int16
 from realizer.core.errors import RealizerError
 from realizer.core.options import PlayOptions
 from realizer.core.units import frame_count
-from realizer.playback.audio_mix import render_utterance
 from realizer.playback.block_store import BlockStore
 from realizer.playback.player import Player
-from realizer.playback.scheduled_speech import SPEECH_FADE, ScheduledSpeech
+from realizer.playback.scheduled_speech import SPEECH_FADE, ScheduledSpeech, render_utterance
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.utterance import Utterance
 from realizer.tables import faps

@@ -7,8 +7,7 @@ import numpy as np
 from realizer import realize
 from realizer.animation.axis import axis
 from realizer.animation.frames import AUFrames
-from realizer.animation.lips.mouth_faps import mouth_faps
-from realizer.animation.lips.visemes import shape_table
+from realizer.animation.lips.visemes import mouth_faps, shape_table
 from realizer.animation.pose import poses
 from realizer.core.array_types import Float32, Float64, Int32
 from realizer.face.drawn_mesh import drawn_mesh

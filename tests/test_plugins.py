@@ -16,7 +16,7 @@ from pathlib import Path
 from bml_schema.node_schema import node
 from bml_schema.nodes import Behaviour
 from realizer.behaviours.kind import BehaviourKind
-from realizer.behaviours.table_timing import table_timing
+from realizer.behaviours.kind import table_timing
 from realizer.outputs.output import Output
 from realizer.speech.base_voice import BaseVoice
 

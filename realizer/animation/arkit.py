@@ -7,8 +7,7 @@ from functools import cache
 import numpy as np
 
 from realizer.animation.axis import AU_NAMES, axis, mask_channel
-from realizer.animation.fap.au_fap_mapping import FapMapping
-from realizer.animation.fap.conversion import to_fap
+from realizer.animation.fap.conversion import FapMapping, to_fap
 from realizer.animation.frames import AUFrames
 from realizer.core.array_types import Float32, Float64
 from realizer.core.units import ANGLE_UNIT

@@ -11,8 +11,7 @@ from realizer.animation.axis import AU_NAMES, axis, region
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.curves import Samples, sample, samples, weights
 from realizer.animation.frames import AUFrames
-from realizer.animation.idle.idle_face import Idle
-from realizer.animation.idle.idle_layer import idle_layer, lids, motion_left
+from realizer.animation.idle.idle_face import Idle, idle_layer, lids, motion_left
 from realizer.core import work
 from realizer.core.array_types import Float32, Float64
 from realizer.tables.cooccurrence import Rules

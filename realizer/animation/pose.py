@@ -3,8 +3,7 @@
 import numpy as np
 
 from realizer.animation.axis import AU_NAMES, axis
-from realizer.animation.fap.au_fap_mapping import FapMapping
-from realizer.animation.fap.conversion import to_fap
+from realizer.animation.fap.conversion import FapMapping, to_fap
 from realizer.animation.frames import AUFrames
 from realizer.core.array_types import Float32
 

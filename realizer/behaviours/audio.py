@@ -1,16 +1,55 @@
-"""audiofile: plays a sound file of the media folder, or a clip of a client."""
+"""audiofile: plays a recording, which is a sound file of the media folder or a clip of a client."""
 
 from __future__ import annotations
 
+import difflib
 from dataclasses import replace
 
 import numpy as np
 
 from bml_schema import AudioFile
-from realizer.behaviours import recordings
+from realizer.behaviours import media
 from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
+from realizer.behaviours.media import MediaError
+from realizer.behaviours.sound_file import read_sound
 from realizer.scheduling.timing import Timing
-from realizer.speech.utterance import Utterance
+from realizer.speech.utterance import Recording, Utterance
+
+CLIP = "clip:"  # before the id of a clip
+
+
+def recording(name: str, context: PlanningContext) -> Recording:
+    """Return the recording with a name.
+
+    Raises:
+        MediaError: there is none, or it cannot be read.
+    """
+    id = _clip(name)
+    return media.load(name, context, read_sound) if id is None else _client_clip(id, context)
+
+
+def faults(name: str, context: PlanningContext) -> tuple[Fault, ...]:
+    """Return why a recording cannot be played."""
+    id = _clip(name)
+    if id is None:
+        return media.faults(name, context, read_sound)
+    try:
+        _client_clip(id, context)
+    except MediaError as error:
+        return (Fault("CANNOT_CREATE_BEHAVIOR", f"fileName: {error}"),)
+    return ()
+
+
+def _clip(name: str) -> str | None:
+    return name.strip()[len(CLIP) :] if name.strip().startswith(CLIP) else None
+
+
+def _client_clip(id: str, context: PlanningContext) -> Recording:
+    if id not in context.clips:
+        near = difflib.get_close_matches(id, list(context.clips))
+        suggestion = f', did you mean "{CLIP}{near[0]}"?' if near else ""
+        raise MediaError(f"wanted a clip that was sent to its last piece, got {CLIP + id!r}{suggestion}")
+    return context.clips[id]
 
 
 def timing(node: AudioFile, context: PlanningContext) -> Timing:
@@ -21,12 +60,12 @@ def timing(node: AudioFile, context: PlanningContext) -> Timing:
 
 
 def check(node: AudioFile, context: PlanningContext) -> tuple[Fault, ...]:
-    return recordings.faults(node.file_name, context)
+    return faults(node.file_name, context)
 
 
 def sound(node: AudioFile, context: PlanningContext) -> Utterance:
-    recording = recordings.recording(node.file_name, context)
-    return Utterance(len(recording.pcm) / recording.rate, (), (), {}, recording.rate, recording.pcm)
+    found = recording(node.file_name, context)
+    return Utterance(len(found.pcm) / found.rate, (), (), {}, found.rate, found.pcm)
 
 
 KINDS = (BehaviourKind(AudioFile, timing, check=check, sound=sound, parameters={"volume": 100.0}),)

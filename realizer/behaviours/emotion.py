@@ -14,10 +14,16 @@ from bml_schema import Emotion, Mood
 from realizer.animation.axis import Target, fap
 from realizer.animation.channel import Channel
 from realizer.behaviours import pose_channels
-from realizer.behaviours.expressive_channels import express
-from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext, claiming
+from realizer.behaviours.kind import (
+    BehaviourKind,
+    Fault,
+    PlanningContext,
+    claiming,
+    table_timing,
+    timing_from_table,
+)
 from realizer.behaviours.media import MediaError, media_file
-from realizer.behaviours.table_timing import table_timing, timing_from_table
+from realizer.behaviours.pose_channels import express
 from realizer.core.array_types import Float64
 from realizer.emotions.archetypes import archetypes, is_profile_file, split_set
 from realizer.emotions.wheel import affect, blend_weights, place_of_affect, strength_at, wheel

@@ -1,4 +1,4 @@
-"""faceLexeme, faceFacs, face, faceShift: AU channels that rise, hold and relax."""
+"""faceLexeme, faceFacs, face, faceShift, expression, blink: AU channels that rise, hold and relax."""
 
 from __future__ import annotations
 
@@ -7,15 +7,14 @@ from typing import TypeAlias
 
 import numpy as np
 
-from bml_schema import Face, FaceFacs, FaceLexeme, FaceShift
+from bml_schema import Blink, Expression, Face, FaceFacs, FaceLexeme, FaceShift
 from bml_schema.behaviours import PEAK
 from realizer import tables
 from realizer.animation.axis import Target, au
 from realizer.animation.channel import Channel
 from realizer.behaviours import pose_channels
-from realizer.behaviours.expressive_channels import express
-from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext, claiming
-from realizer.behaviours.table_timing import from_gaps, table_timing
+from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext, claiming, from_gaps, table_timing
+from realizer.behaviours.pose_channels import express
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
@@ -108,6 +107,27 @@ def check(node: Part | Face | FaceShift, context: PlanningContext) -> tuple[Faul
     return tuple(faults)
 
 
+def expression_timing(node: Expression, context: PlanningContext) -> Timing:
+    """Return the onset, apex and offset of the library; those of templates were measured."""
+    return from_gaps(PEAK, context.library[node.name].gaps)
+
+
+def expand_expression(node: Expression, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
+    """Return channels with the expression from attackPeak to relax."""
+    values = pose_channels.columns(context.library[node.name].aus, node.intensity)
+    return express(pose_channels.hold(values, times, node.id), context)
+
+
+def check_expression(node: Expression, context: PlanningContext) -> tuple[Fault, ...]:
+    known = context.library
+    return () if node.name in known else (pose_channels.unknown_word("name", node.name, known),)
+
+
+def expand_blink(node: Blink, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
+    """Return channels of AU45, closed from attackPeak to relax."""
+    return pose_channels.hold(pose_channels.columns({(45, node.side): 1.0}, node.amount), times, node.id)
+
+
 AMOUNT = {"amount": "amount"}
 KINDS = (
     BehaviourKind(FaceLexeme, timing_of_lexeme, expand_part, check, parameters=AMOUNT),
@@ -121,4 +141,12 @@ KINDS = (
         claims=claiming("base face"),
         region="face",
     ),
+    BehaviourKind(
+        Expression,
+        expression_timing,
+        expand_expression,
+        check_expression,
+        parameters={"intensity": "intensity", "amount": "intensity"},
+    ),
+    BehaviourKind(Blink, table_timing("blink"), expand_blink, parameters=AMOUNT),
 )

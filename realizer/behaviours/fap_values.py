@@ -10,9 +10,8 @@ from realizer.animation.axis import fap
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.fap.fap_clip import FAPClip
 from realizer.behaviours import media
-from realizer.behaviours.key_channels import track
-from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
-from realizer.behaviours.table_timing import table_timing
+from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext, table_timing
+from realizer.behaviours.pose_channels import track
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 

@@ -9,8 +9,7 @@ import numpy as np
 
 from realizer import tables
 from realizer.animation.fap.fap_clip import FAPClip
-from realizer.animation.lips.mouth_faps import mouth_faps
-from realizer.animation.lips.visemes import VISEME_COUNT, shape_table
+from realizer.animation.lips.visemes import VISEME_COUNT, mouth_faps, shape_table
 from realizer.core.array_types import Float64, Int32
 from realizer.emotions.archetypes import archetypes
 

@@ -12,8 +12,7 @@ from realizer import tables
 from realizer.animation.axis import au, mask_channel
 from realizer.animation.channel import Channel, Layer
 from realizer.behaviours.gaze_targets import Turn, angles, check_target, facts, limited, limits, turn
-from realizer.behaviours.kind import BehaviourKind, PlanningContext, claiming
-from realizer.behaviours.table_timing import timing_from_table
+from realizer.behaviours.kind import BehaviourKind, PlanningContext, claiming, timing_from_table
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 

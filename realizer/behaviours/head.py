@@ -12,9 +12,8 @@ from realizer import tables
 from realizer.animation.axis import au
 from realizer.animation.channel import Channel, Layer
 from realizer.behaviours.gaze_targets import angles, check_target, limited, limits, turn
-from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext, claiming
+from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext, claiming, from_gaps, table_timing
 from realizer.behaviours.pose_channels import unknown_word
-from realizer.behaviours.table_timing import from_gaps, table_timing
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 from realizer.tables.lexemes import head_lexemes

@@ -8,8 +8,7 @@ from bml_schema import Idle
 from realizer.animation.axis import mask_channel
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.idle.blinks import OnsetMask
-from realizer.behaviours.kind import BehaviourKind, PlanningContext, claiming
-from realizer.behaviours.table_timing import table_timing
+from realizer.behaviours.kind import BehaviourKind, PlanningContext, claiming, table_timing
 from realizer.core.array_types import Float64
 
 

@@ -1,4 +1,4 @@
-"""facekeyframe: BMLT's keyframes of FAPs or action units as channels."""
+"""facekeyframe: BMLT's keyframes of FAPs or action units as channels; documents of FAP clips."""
 
 from __future__ import annotations
 
@@ -8,14 +8,16 @@ from functools import lru_cache
 
 import numpy as np
 
-from bml_schema import FaceKeyframe
+from bml_schema import Block, FaceInterpolator, FaceKeyframe, Required, write
 from realizer import tables
 from realizer.animation.axis import Target, au, fap
 from realizer.animation.channel import Channel
+from realizer.animation.fap.fap_clip import FAPClip
 from realizer.behaviours.fap_values import RECORDED, out_of_range
-from realizer.behaviours.key_channels import track
 from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
+from realizer.behaviours.pose_channels import track
 from realizer.core.array_types import Float64
+from realizer.core.errors import RealizerError
 from realizer.scheduling.timing import Timing
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
@@ -165,3 +167,30 @@ def _targets(part: int | tuple[int, str]) -> tuple[Target, ...]:
 
 
 KINDS = (BehaviourKind(FaceKeyframe, timing, expand, check, claims=claims, parameters={"amount": 1.0}),)
+
+
+def document_of(clip: FAPClip, block: str) -> str:
+    """Return BML text with the clip as keys, a line each; FAPs are limited to the range of the standard.
+
+    FAPs that the clip defines are held, also at 0. FAP 1 and 2 are left out.
+
+    Args:
+        clip: at least two frames, and at least one FAP from 3 on.
+        block: id of the block; its behaviour `fap` is required.
+
+    Raises:
+        RealizerError: the clip has nothing to play.
+    """
+    columns = np.flatnonzero(clip.mask[2:]) + 2
+    if len(clip.values) < 2 or not len(columns):
+        got = f"{len(clip.values)} frames of {len(columns)} FAPs"
+        raise RealizerError(f"wanted at least two frames of a FAP from 3 on, got {got}")
+    rows = [tables.faps()[column] for column in columns]
+    values = np.clip(clip.values[:, columns], [r.least for r in rows], [r.most for r in rows]).astype(int)
+    lines = [
+        " ".join(map(str, (f"{number / clip.fps:.9g}", *row))) for number, row in enumerate(values.tolist())
+    ]
+    keys = "\n".join(["", *lines, ""])
+    parts = " ".join(str(column + 1) for column in columns)
+    node = FaceKeyframe(id="fap", type="FAPS", interpolator=FaceInterpolator(parts=parts, keys=keys))
+    return write(Block(id=block, children=(Required(children=(node,)),)))

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from bml_schema import Activate, Interrupt, ParameterValueChange
 from realizer.animation.channel import Channel
@@ -14,6 +17,7 @@ from realizer.core.options import DEFAULTS
 from realizer.expressions.library import Library, builtin
 from realizer.scheduling.timing import Timing
 from realizer.speech.utterance import Recording, SpeechRequest, Utterance
+from realizer.tables.timing import Gap, gaps
 
 Position = tuple[float, float, float]
 
@@ -113,3 +117,22 @@ class BehaviourKind:
 def claiming(resource: str) -> Callable[[Any, PlanningContext], frozenset[str]]:
     """Return the function `claims` of a behaviour that always needs one resource."""
     return lambda node, context: frozenset({resource})
+
+
+def timing_from_table(element: str, variant: str = "") -> Timing:
+    """Return the timing of an element; a `variant` is a lexeme or an influence with a timing of its own."""
+    row = gaps(element, variant)
+    return from_gaps(row.points, row.gaps)
+
+
+def table_timing(element: str) -> Callable[[Any, PlanningContext], Timing]:
+    """Return the function `timing` of a behaviour whose timing is always that of its element."""
+    return lambda node, context: timing_from_table(element)
+
+
+@lru_cache(maxsize=1000)
+def from_gaps(points: tuple[str, ...], gaps: tuple[Gap, ...]) -> Timing:
+    """Return the timing of k points and the k-1 gaps between them."""
+    rows = np.array([(gap.preferred, gap.least, gap.stiffness) for gap in gaps]).T
+    rows.setflags(write=False)  # shared by all behaviours of a kind
+    return Timing(points, *rows)

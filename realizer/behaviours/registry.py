@@ -1,16 +1,55 @@
-"""The registry of behaviours: a row for each module with behaviour elements."""
+"""The registry of behaviours: a row for each module with behaviour elements, and those of plug-ins."""
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from functools import cache
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from bml_schema import VOCABULARY as SCHEMA
 from bml_schema.node_schema import local
-from realizer.behaviours.guarded import guarded
-from realizer.behaviours.kind import BehaviourKind
+from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
+from realizer.core.array_types import Float64
 from realizer.core.registry import Registry
+
+log = logging.getLogger(__name__)
+_warn = cache(log.warning)  # each text once
+
+
+def guarded(kind: BehaviourKind, plugin: str) -> BehaviourKind:
+    """Return a behaviour of a plug-in that plays as before; where its functions fail, it is dropped.
+
+    Its timing and its channels are tried when it is checked, so that a failure is one warning about the
+    behaviour. What fails only later is a warning in the log.
+    """
+
+    def words(error: Exception) -> str:
+        return f"the plug-in {plugin} failed: {type(error).__name__}: {error}"
+
+    def check(node: Any, context: PlanningContext) -> tuple[Fault, ...]:
+        try:
+            faults = tuple(kind.check(node, context))
+            if kind.speech_request is None and not any(fault.fatal for fault in faults):
+                gaps = kind.timing(node, context).preferred
+                kind.claims(node, context)
+                kind.expand(node, np.concatenate([[0.0], np.cumsum(gaps)]), context)
+        except Exception as error:
+            return (Fault("CANNOT_CREATE_BEHAVIOR", words(error)),)
+        return faults
+
+    def expand(node: Any, times: Float64, context: PlanningContext) -> tuple[Any, ...]:
+        try:
+            return kind.expand(node, times, context)
+        except Exception as error:
+            _warn(words(error))
+            return ()
+
+    return replace(kind, check=check, expand=expand)
 
 
 def _is_family(value: Any) -> bool:
@@ -20,22 +59,18 @@ def _is_family(value: Any) -> bool:
 # Family, a module of this package -> its elements. It is imported when one of them is first used, or at once
 # if their node classes are not in bml_schema.
 ELEMENTS = {
-    "face": "faceLexeme faceFacs face faceShift",
+    "face": "faceLexeme faceFacs face faceShift expression blink",
     "gaze": "gaze gazeShift",
     "head": "head headDirectionShift",
     "speech": "speech",
-    "wait": "wait",
-    "body": "gesture pointing posture postureShift locomotion",
     "emotion": "emotion mood",
-    "expression": "expression",
     "fap_values": "faps fapFile",
     "timeline": "timeline",
     "keyframes": "facekeyframe",
-    "blink": "blink",
     "idle_control": "idle",
     "listen": "listen",
     "audio": "audiofile",
-    "block_control": "interrupt activate parametervaluechange",
+    "timed": "wait gesture pointing posture postureShift locomotion interrupt activate parametervaluechange",
 }
 FAMILIES: Registry[tuple[BehaviourKind, ...]] = Registry(
     "realizer.behaviours",

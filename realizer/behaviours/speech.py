@@ -104,7 +104,7 @@ _cached_lips: WeakKeyDictionary[Utterance, tuple[Style, float, tuple[Channel, ..
 def _lips(utterance: Utterance, start: float, style: Style) -> tuple[Channel, ...]:
     # Imported here, because it reads tables that a block without speech does not need.
     from realizer.animation.lips.lip_sync import LipStyle, lip_channels
-    from realizer.speech.loudness import with_loudness
+    from realizer.speech.melody import with_loudness
 
     known, before, channels = _cached_lips.get(utterance, (None, start, ()))
     if known != style:
@@ -125,9 +125,9 @@ def check(node: Speech, context: PlanningContext) -> tuple[Fault, ...]:
     name = _audio_file(node)
     faults: tuple[Fault, ...] = ()
     if name is not None:
-        from realizer.behaviours import recordings  # most speech has none
+        from realizer.behaviours import audio  # most speech has none
 
-        faults = recordings.faults(name, context)
+        faults = audio.faults(name, context)
     elif unread := [d for d in node.descriptions if d.content.strip().startswith("clip:")]:
         got = f'a description of type "{unread[0].type}" with {unread[0].content.strip()[:80]!r}'
         wanted = f'wanted <bmlt:audiofile fileName="clip:ID"/> in its description, got {got}'
@@ -185,10 +185,10 @@ def _recording(node: Speech, context: PlanningContext) -> Recording | None:
     name = _audio_file(node)
     if name is None:
         return None
-    from realizer.behaviours import recordings
+    from realizer.behaviours import audio
 
     try:
-        return recordings.recording(name, context)
+        return audio.recording(name, context)
     except RealizerError:
         return None
 

@@ -1,4 +1,4 @@
-"""Labels for the lines of a scheduling conflict; parses texts of `realizer.scheduling.explain`."""
+"""Labels for the lines of a scheduling conflict; parses texts of `realizer.scheduling.conflict`."""
 
 from __future__ import annotations
 

@@ -124,8 +124,8 @@ def play(file: str, **flags: Any) -> int:
     import numpy as np
 
     from bml_schema.documents import MAX_BYTES
-    from realizer.behaviours.fap_document import document_of
     from realizer.behaviours.fap_visemes import expand_compound
+    from realizer.behaviours.keyframes import document_of
     from realizer.core.errors import RealizerError
 
     clip = expand_compound(_read(file))

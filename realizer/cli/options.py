@@ -326,7 +326,7 @@ def decode(content: bytes, name: str, wanted: str) -> str:
 
 def read_scene(path: str | Path | None) -> dict[str, Position] | None:
     """Return the targets of a scene file, or None without one."""
-    from realizer.playback.scene_file import parse_scene
+    from realizer.behaviours.gaze_targets import parse_scene
 
     if path is None:
         return None

@@ -14,7 +14,7 @@ from realizer.cli import options
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from realizer.animation.fap.au_fap_mapping import FapMapping
+    from realizer.animation.fap.conversion import FapMapping
     from realizer.cli.sheet_poses import Series
     from realizer.outputs.output import RenderSettings
     from realizer.render.contact_sheet import Cell

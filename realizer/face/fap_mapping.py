@@ -3,7 +3,7 @@
 from functools import lru_cache
 from pathlib import Path
 
-from realizer.animation.fap.au_fap_mapping import FapMapping, standard
+from realizer.animation.fap.conversion import FapMapping, standard
 from realizer.face.reading import face_errors
 from realizer.tables.mappings import own_file, read_mapping
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from bml_schema import Block, SyncRef, without
 from realizer.animation.channel import Channel, Gain, Layer, later
-from realizer.animation.crossfade import crossfade
+from realizer.animation.curves import crossfade
 from realizer.animation.idle.prosody import KnownMotion
 from realizer.behaviours.kind import BehaviourKind, PlanningContext
 from realizer.core import work

@@ -13,6 +13,7 @@ from realizer.core import work
 from realizer.playback.active_block import ActiveBlock, Dependency
 from realizer.playback.announced_blocks import AnnouncedBlock, AnnouncedBlocks, BlockRejectedError
 from realizer.playback.block_commands import CommandError, execute
+from realizer.playback.block_links import anticipators_of, lead_time
 from realizer.playback.block_states import BlockEvent, State, next_state
 from realizer.playback.character import Character
 from realizer.playback.feedback_events import (
@@ -23,7 +24,6 @@ from realizer.playback.feedback_events import (
     progress,
     sync_progress,
 )
-from realizer.playback.replanning import anticipators_of, lead_time
 from realizer.playback.timeline import Arrival, BlockTimeline
 from realizer.scheduling.timing import UNKNOWN, Schedule, Warning
 from realizer.speech.utterance import Utterance

@@ -12,10 +12,10 @@ from realizer.animation.axis import AU_NAMES, axis
 from realizer.animation.blend import blend
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.frames import AUFrames
-from realizer.animation.idle.gaze_shifts import gaze_shifts
+from realizer.animation.idle.blinks import gaze_shifts
 from realizer.animation.idle.idle_face import Idle, idle_face
 from realizer.animation.idle.prosody import KnownMotion, SpeechSpan, phrase_ends, prosody_channels
-from realizer.animation.lips.effort import opened
+from realizer.animation.lips.lip_sync import opened
 from realizer.animation.speaking_style import Style, style_of
 from realizer.core.array_types import Float64
 from realizer.core.options import PlayOptions

@@ -150,7 +150,7 @@ class Player(BlockManager):
             is_speaking: whether the other still speaks: then the character listens.
             text: the next piece of what the other says, if it is known.
         """
-        from realizer.playback.listener import responses  # few characters listen
+        from realizer.behaviours.listen import responses  # few characters listen
 
         own = self._characters[character]
         context = replace(self.context, seed=self.context.seed + SEED_STEP * character)

@@ -13,14 +13,13 @@ from realizer.behaviours.kind import BehaviourKind, PlanningContext
 from realizer.core import work
 from realizer.playback import block_links
 from realizer.playback.active_block import ActiveBlock, Dependency
+from realizer.playback.block_links import affected_blocks, member
 from realizer.playback.block_planner import Plan
 from realizer.playback.block_planner import plan as plan_block
 from realizer.playback.block_states import BlockEvent
 from realizer.playback.block_store import BlockStore
 from realizer.playback.character import Character
-from realizer.playback.event_queue import EventQueue
-from realizer.playback.feedback_events import Reports, prediction, progress
-from realizer.playback.replanning import affected_blocks, member
+from realizer.playback.feedback_events import EventQueue, Reports, prediction, progress
 from realizer.playback.resources import ResourceClaim, after_interrupts, claims, conflicts, interrupts
 from realizer.scheduling import schedule_together
 from realizer.scheduling.timing import Schedule, Warning

@@ -8,10 +8,9 @@ import numpy as np
 
 from realizer.core import work
 from realizer.core.array_types import Bool, Float64
-from realizer.scheduling.longest_paths import components, longest_path_levels
+from realizer.scheduling.graphs import UnionFind, components, longest_path_levels
 from realizer.scheduling.model import LOOSE, TIGHT, Index
 from realizer.scheduling.rigid_clusters import least_squares
-from realizer.scheduling.union_find import UnionFind
 
 # Active sets tried before the interior point method, which is rarely needed.
 GUESSES = 12

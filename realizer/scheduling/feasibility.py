@@ -10,11 +10,10 @@ from itertools import count
 from math import inf
 
 from realizer.core import work
-from realizer.scheduling.conflict import Conflict, Link, conflict_of
-from realizer.scheduling.explain import choose
+from realizer.scheduling.conflict import Conflict, Link, choose, conflict_of
+from realizer.scheduling.graphs import UnionFind
 from realizer.scheduling.model import LOOSE, drop_least_gaps
 from realizer.scheduling.problem import ORIGIN, Part, Problem, Relation
-from realizer.scheduling.union_find import UnionFind
 
 
 @dataclass(slots=True, eq=False)

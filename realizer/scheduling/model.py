@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from realizer.core import work
 from realizer.core.array_types import Bool, Float64
+from realizer.scheduling.graphs import UnionFind
 from realizer.scheduling.problem import ORIGIN, Problem
-from realizer.scheduling.union_find import UnionFind
 
 Index: TypeAlias = npt.NDArray[np.intp]
 

@@ -13,9 +13,9 @@ import numpy as np
 
 from realizer.core import work
 from realizer.core.array_types import Bool, Float64
+from realizer.scheduling.graphs import UnionFind
 from realizer.scheduling.model import Index, Model
 from realizer.scheduling.problem import ORIGIN
-from realizer.scheduling.union_find import UnionFind
 
 # Lengths that differ by less than this count as equal.
 FITS = 1e-9  # s

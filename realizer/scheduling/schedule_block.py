@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from realizer.core import work
 from realizer.core.array_types import Float64
-from realizer.scheduling.explain import choose, fault_warning, refusal, warning_of
+from realizer.scheduling.conflict import choose, fault_warning, refusal, warning_of
+from realizer.scheduling.graphs import UnionFind
 from realizer.scheduling.model import TIGHT
 from realizer.scheduling.problem import ORIGIN, Member, Part, Problem, problem_of
 from realizer.scheduling.solve import Solution, solve
 from realizer.scheduling.timing import Schedule, Timing, Warning
-from realizer.scheduling.union_find import UnionFind
 
 if TYPE_CHECKING:
     from bml_schema import Block, SyncRef

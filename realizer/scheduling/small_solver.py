@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from realizer.scheduling.graphs import UnionFind
 from realizer.scheduling.model import LOOSE, TIGHT
 from realizer.scheduling.problem import ORIGIN, Problem
 from realizer.scheduling.rigid_clusters import FITS, SPARSE_FROM, attach
 from realizer.scheduling.timing import TimingArrays
-from realizer.scheduling.union_find import UnionFind
 
 NEVER = float("-inf")
 

@@ -14,9 +14,8 @@ import numpy as np
 from realizer.core import work
 from realizer.core.array_types import Float64
 from realizer.scheduling.conflict import Conflict, ConstraintGraph, Link
-from realizer.scheduling.constrained_groups import solve_groups
-from realizer.scheduling.groups import Group, groups_of, slides
-from realizer.scheduling.longest_paths import components, longest_path_levels
+from realizer.scheduling.graphs import components, longest_path_levels
+from realizer.scheduling.groups import Group, groups_of, slides, solve_groups
 from realizer.scheduling.model import LOOSE, TIGHT, Model, model_of
 from realizer.scheduling.problem import ORIGIN, Problem
 from realizer.scheduling.rigid_clusters import RigidClusters, clusters_of

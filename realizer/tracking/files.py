@@ -10,7 +10,7 @@ from realizer.animation.axis import au, axis
 from realizer.animation.fap.conversion import to_fap
 from realizer.animation.fap.fap_clip import FAPClip
 from realizer.animation.frames import AUFrames, FAPFrames
-from realizer.behaviours.fap_document import document_of
+from realizer.behaviours.keyframes import document_of
 from realizer.core.array_types import Bool, Float64
 from realizer.core.units import ANGLE_UNIT
 from realizer.face.fap_mapping import mapping_of

@@ -23,8 +23,7 @@ from realizer.face.load import load_face
 from realizer.offline import realize
 from realizer.playback.scheduled_speech import ScheduledSpeech
 from realizer.realization import Realization
-from realizer.speech.loudness import Levels
-from realizer.speech.melody import RATE, melody
+from realizer.speech.melody import RATE, Levels, melody
 from realizer.speech.registry import find_voice
 from realizer.tables import faps
 from tests.benchmarks.lips import SENTENCES

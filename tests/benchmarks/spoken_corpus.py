@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from realizer.animation.lips.visemes import sounds
-from realizer.behaviours.wav_file import read_wav
+from realizer.behaviours.sound_file import read_wav
 from realizer.core.array_types import Float64, Index, Int16
 from realizer.speech.align.aligner import align
 from realizer.speech.align.alignment import AlignError

@@ -29,7 +29,7 @@ from spoken_corpus import (
 )
 
 from realizer.speech.sound_visemes.mel_stream import BANDS, HOP, RATE, MelStream, viseme_facts
-from realizer.speech.sound_visemes.network import FUTURE, OFFSETS, WEIGHTS, context
+from realizer.speech.sound_visemes.recogniser import FUTURE, OFFSETS, WEIGHTS, context
 
 # espeak-ng's language, dictionary.
 ESPEAK = {

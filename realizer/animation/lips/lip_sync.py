@@ -1,17 +1,23 @@
 """Lip, jaw and tongue channels from phonemes: dominance functions and hard closures."""
 
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from realizer.animation.axis import fap, mask_channel
+from realizer.animation.axis import Target, fap, mask_channel
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.lips.closures import BILABIAL, LABIODENTAL, closure_mask, lip_weight, pressure
 from realizer.animation.lips.dominance import Track, dominances, key_times, track_of
-from realizer.animation.lips.mouth_faps import mouth_faps
-from realizer.animation.lips.visemes import ARTICULATORS, SHAPE_COLUMNS, coarticulation, shape_table
+from realizer.animation.lips.visemes import (
+    ARTICULATORS,
+    SHAPE_COLUMNS,
+    coarticulation,
+    mouth_faps,
+    shape_table,
+)
 from realizer.core.array_types import Float64
 from realizer.speech.utterance import Phoneme
 
@@ -152,3 +158,38 @@ def _bell(half: int) -> Float64:
     bell = np.hanning(2 * half + 3)[1:-1]
     weights: Float64 = bell / bell.sum()
     return weights
+
+
+# FAPs that open the mouth, and the sign that they have then.
+OPENING_FAPS = {3: 1.0} | dict.fromkeys((4, 5, *range(8, 12), 51, 52, *range(55, 59)), -1.0)
+
+# First channel -> factor and result. Windows of frames ask for the same ones again and again.
+_known: WeakKeyDictionary[Channel, tuple[float, tuple[Channel, ...]]] = WeakKeyDictionary()
+
+
+def opened(channels: tuple[Channel, ...], factor: float) -> tuple[Channel, ...]:
+    """Return the channels of a speech whose lips and jaw open by a factor; closures and bites stay.
+
+    Args:
+        channels: of `lip_channels`, at least one.
+    """
+    if factor == 1.0:
+        return channels
+    known = _known.get(channels[0])
+    if known is None or known[0] != factor:
+        known = _known[channels[0]] = factor, tuple(_opened(channel, factor) for channel in channels)
+    return known[1]
+
+
+def _opened(channel: Channel, factor: float) -> Channel:
+    sign = _signs().get(channel.target)
+    if sign is None:
+        return channel
+    # Where it opens the mouth, the scaled value is the outer one if the factor is above 1; elsewhere not.
+    choice = np.maximum if (factor > 1.0) == (sign > 0) else np.minimum
+    return channel.changed({"values": choice(channel.values, factor * channel.values)})
+
+
+@cache
+def _signs() -> dict[Target, float]:
+    return {fap(number): sign for number, sign in OPENING_FAPS.items()}

@@ -72,7 +72,7 @@ class SessionFactory:
         if settings.journal is not None:
             self.journal = journal_at(settings.journal)
         if settings.scene is not None:
-            from realizer.playback.scene_file import parse_scene
+            from realizer.behaviours.gaze_targets import parse_scene
 
             self._scene = parse_scene(settings.scene.read_text("utf-8"))
         if settings.record is not None:

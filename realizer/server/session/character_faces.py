@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from typing import TYPE_CHECKING
 
-from realizer.animation.fap.au_fap_mapping import FapMapping
+from realizer.animation.fap.conversion import FapMapping
 from realizer.core.errors import FaceError, TableError
 from realizer.core.settings import Settings
 from realizer.face.fap_mapping import mapping_of

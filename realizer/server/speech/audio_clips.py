@@ -12,7 +12,7 @@ from realizer.protocol.messages.speech import SpeechMessage, TimedText
 from realizer.protocol.wire import ClipPiece
 from realizer.server.session.control_fields import FieldError
 from realizer.server.speech.clip import ArrivingClip, Clip, samples_of
-from realizer.speech.recorded.viseme_names import sound_of
+from realizer.speech.recorded.recorded_speech import sound_of
 from realizer.speech.utterance import RATES, Phoneme, Recording, Word
 
 MAX_BYTES = 64 * 2**20  # of all clips of a session: half an hour of speech; the oldest are removed

@@ -10,7 +10,7 @@ from xml.sax.saxutils import unescape
 import numpy as np
 
 from realizer.core.array_types import Int16
-from realizer.playback.audio_mix import resample
+from realizer.playback.scheduled_speech import resample
 from realizer.server.speech.sentence_splitter import TAG, SentenceSplitter, is_sentence
 from realizer.speech.duration_fit import shortened
 from realizer.speech.ssml import NAMED

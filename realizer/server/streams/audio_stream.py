@@ -8,9 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from realizer.core.array_types import Float32
-from realizer.playback.audio_mix import CUT, render_utterance
 from realizer.playback.player import Player
-from realizer.playback.scheduled_speech import ScheduledSpeech
+from realizer.playback.scheduled_speech import CUT, ScheduledSpeech, render_utterance
 from realizer.protocol.wire import pack
 from realizer.server.streams.frame_windows import EPSILON
 

@@ -12,8 +12,7 @@ import numpy as np
 
 from realizer.animation.arkit import ARKIT_NAMES, arkit
 from realizer.animation.axis import AU_NAMES
-from realizer.animation.fap.au_fap_mapping import FapMapping, standard
-from realizer.animation.fap.conversion import to_fap
+from realizer.animation.fap.conversion import FapMapping, standard, to_fap
 from realizer.animation.frames import AUFrames
 from realizer.animation.pose import poses
 from realizer.core.array_types import Float32, Float64, Int16, Int32

@@ -15,7 +15,6 @@ from realizer.speech.align import features, sphinx
 from realizer.speech.align.alignment import AlignError, Alignment, moved
 from realizer.speech.align.dtw_align import dtw_align
 from realizer.speech.align.features import mono, to_aligner
-from realizer.speech.align.model_align import model_align
 from realizer.speech.letter_to_sound import subtag
 from realizer.speech.registry import reference_voice
 from realizer.speech.utterance import Recording, SpeechRequest, Utterance, Voice
@@ -89,7 +88,7 @@ def align_request(
     if aligner == "pocketsphinx" or (
         aligner is None and subtag(request.language) == "en" and not sphinx.install_hint()
     ):
-        found = model_align(heard, duration, reference)
+        found = sphinx.model_align(heard, duration, reference)
         if found is None:
             reason = "pocketsphinx does not find the text in the recording"
             if aligner is not None:

@@ -9,7 +9,7 @@ import numpy as np
 from realizer.core.array_types import Int16
 from realizer.speech.espeak.document import Document
 from realizer.speech.utterance import STRETCH, Phoneme, Utterance, Word, tile
-from realizer.speech.word_boundaries import divided, is_vowel, strip_marks
+from realizer.speech.words import divided, is_vowel, strip_marks
 
 STRESS = {"ˈ": 1, "ˌ": 2}
 SILENCE = 8  # of 32768; a closure is exact zeros, except for the tail of the sound before

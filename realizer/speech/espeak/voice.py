@@ -8,8 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 from realizer.core.errors import VoiceError
-from realizer.speech.engine_process import Engine
-from realizer.speech.engine_voice import EngineVoice
+from realizer.speech.engine_voice import Engine, EngineVoice
 from realizer.speech.espeak.document import write_document
 from realizer.speech.espeak.events import read_answer, timeline
 from realizer.speech.ssml import Script

@@ -3,7 +3,7 @@
 import importlib.util
 import unicodedata
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +11,12 @@ import numpy as np
 
 from realizer import tables
 from realizer.core.array_types import Int16
-from realizer.speech.engine_process import Engine
-from realizer.speech.engine_voice import EngineVoice
-from realizer.speech.hibari.text import ProsodyRun, runs
+from realizer.speech.engine_voice import Engine, EngineVoice
 from realizer.speech.hibari.times import (
     Sound,
+    SpeechBuffer,
     Token,
+    cut,
     guess_lengths,
     signs_of,
     sounds,
@@ -24,9 +24,73 @@ from realizer.speech.hibari.times import (
     word_spans,
 )
 from realizer.speech.letter_to_sound import subtag, syllable_facts
-from realizer.speech.speech_buffer import SpeechBuffer, cut
-from realizer.speech.ssml import Script
+from realizer.speech.ssml import Break, Mark, Script
+from realizer.speech.ssml_prosody import PLAIN, Prosody
 from realizer.speech.utterance import STRETCH, SpeechRequest, Utterance, Word
+from realizer.speech.words import PlacedMark, words_in
+
+
+@dataclass(frozen=True, slots=True)
+class ProsodyRun:
+    """Text with one prosody.
+
+    Attributes:
+        text: plain; may be empty if the script ends in a pause.
+        words: of the text, in order.
+        prosody: of the text.
+        pause: seconds of silence before it.
+    """
+
+    text: str
+    words: tuple[str, ...]
+    prosody: Prosody = PLAIN
+    pause: float = 0.0
+
+
+def runs(script: Script) -> tuple[tuple[ProsodyRun, ...], tuple[PlacedMark, ...]]:
+    """Divide a script at each <break>, and where <prosody> begins or ends; <sub> is read by its alias.
+
+    hibari does not support other SSML elements: their text is spoken.
+    """
+    found: list[ProsodyRun] = []
+    marks: list[PlacedMark] = []
+    manners = [PLAIN]  # of the open tags, outermost first
+    hidden = 0  # depth inside <sub>
+    count = 0  # of words before
+    text, pause = "", 0.0
+
+    def close() -> None:
+        nonlocal text, pause, count
+        if text.strip() or pause:
+            words = tuple(word for word, _ in words_in(text))
+            found.append(ProsodyRun(text, words, manners[-1], pause))
+            count += len(words)
+            text, pause = "", 0.0
+
+    for part in script.parts:
+        if isinstance(part, str):
+            text += "" if hidden else part
+        elif isinstance(part, Mark):
+            marks.append(PlacedMark(part.name, count + len(list(words_in(text))), False))
+        elif isinstance(part, Break):
+            if text.strip():
+                close()
+            pause += part.seconds
+            marks = [replace(mark, paused=mark.paused or mark.word == count) for mark in marks]
+        elif part.name == "prosody":
+            if text.strip():
+                close()
+            if part.attributes is None:
+                manners.pop()
+            else:
+                manners.append(manners[-1].within(dict(part.attributes)))
+        elif part.name == "sub":
+            if part.attributes is not None and not hidden:
+                text += dict(part.attributes).get("alias", "")
+            hidden += 1 if part.attributes is not None else -1
+    close()
+    return tuple(found), tuple(marks)
+
 
 INSTALL = "hibari (neural, English) is not installed: pip install 'bml-realizer[neural]'"
 SHOWN = 3  # words quoted in a warning

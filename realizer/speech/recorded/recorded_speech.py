@@ -1,8 +1,8 @@
 """Utterances from recordings, by known times, by alignment, or by their sound alone."""
 
-from collections.abc import Sequence
-from dataclasses import replace
-from functools import lru_cache
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, lru_cache
 from itertools import pairwise
 from typing import TypeVar
 
@@ -192,3 +192,34 @@ def by_loudness(pcm: Int16, rate: int) -> tuple[Phoneme, ...]:
     sounds = [next((s["ipa"] for s in facts["opening"] if one >= s["above"]), "") for one in level]
     starts = [k for k in range(count) if k == 0 or sounds[k] != sounds[k - 1]]
     return tile([(k * size, sounds[k], 0) for k in starts], len(pcm), rate)
+
+
+@dataclass(frozen=True, slots=True)
+class NamedViseme:
+    """A row of the table; `ipa` is "" for silence."""
+
+    set: str
+    viseme: str
+    ipa: str
+
+
+def sound_of(set: str, viseme: str) -> str:
+    """Return the IPA whose mouth shape the viseme is; "" for silence.
+
+    Raises:
+        KeyError: if there is no such set, or no such viseme in it; the text lists the known ones.
+    """
+    if set not in _sounds():
+        raise KeyError(f"wanted a set of visemes of {', '.join(_sounds())}, got {set!r}")
+    known = _sounds()[set]
+    if viseme not in known:
+        raise KeyError(f"wanted a viseme of {set}: {', '.join(known)}; got {viseme!r}")
+    return known[viseme]
+
+
+@cache
+def _sounds() -> Mapping[str, Mapping[str, str]]:
+    rows = tables.csv_rows("visemes_given.csv", NamedViseme)
+    return {
+        name: {r.viseme: r.ipa for r in rows if r.set == name} for name in dict.fromkeys(r.set for r in rows)
+    }

@@ -9,7 +9,7 @@ import numpy as np
 from realizer.analysis.faps_from_points import faps_from_points
 from realizer.animation.fap.fap_clip import FAPClip
 from realizer.animation.frames import FAPFrames
-from realizer.behaviours.fap_document import document_of
+from realizer.behaviours.keyframes import document_of
 from realizer.core.array_types import Bool, Float64
 from realizer.face.load import load_face
 from realizer.outputs.csv_table import csv_text

@@ -7,8 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from realizer.behaviours.audio import faults, recording
+from realizer.behaviours.kind import PlanningContext
+from realizer.behaviours.media import MediaError
 from realizer.speech.espeak.voice import EspeakVoice, install_hint
-from realizer.speech.utterance import SpeechRequest
+from realizer.speech.utterance import Recording, SpeechRequest
 from tests.realizer.behaviours.conftest import wav
 
 
@@ -130,3 +133,30 @@ def test_speech_with_a_recording_without_text_guesses_its_syncs(play, media: Pat
     )
     assert played.times("s")["end"] == pytest.approx(1.0)
     assert 0.3 < played.times("s")["x"] < 0.8
+
+
+CLIP = Recording(8000, np.zeros(80, np.int16))
+
+
+def test_recording_is_a_file_of_the_media_folder(media: Path) -> None:
+    found = recording("hello.wav", PlanningContext(media=media))
+    assert (found.rate, len(found.pcm)) == (8000, 4000)
+
+
+def test_recording_is_a_clip_of_a_client() -> None:
+    assert recording(" clip:hi ", PlanningContext(clips={"hi": CLIP})) is CLIP
+
+
+@pytest.mark.parametrize("name", ["clip:hi", "hello.wav"])
+def test_recording_without_media_and_clips_is_an_error(name: str) -> None:
+    with pytest.raises(MediaError):
+        recording(name, PlanningContext())
+    (fault,) = faults(name, PlanningContext())
+    assert fault.fatal
+    assert fault.text.startswith("fileName: wanted a ")
+
+
+def test_faults_suggest_the_id_of_a_clip() -> None:
+    (fault,) = faults("clip:helo", PlanningContext(clips={"hello": CLIP}))
+    assert fault.text.endswith("""got 'clip:helo', did you mean "clip:hello"?""")
+    assert faults("clip:hello", PlanningContext(clips={"hello": CLIP})) == ()

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from realizer.animation.fap.fap_clip import FAPClip
-from realizer.animation.lips.mouth_faps import mouth_faps
-from realizer.animation.lips.visemes import shape_table
+from realizer.animation.lips.visemes import mouth_faps, shape_table
 from realizer.behaviours.fap_visemes import FapExpression, expand_compound, fap_expressions
 from realizer.emotions.archetypes import archetypes
 from realizer.tables import faps

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from realizer.behaviours.gaze_targets import angles, known_direction
+from realizer.behaviours.gaze_targets import angles, known_direction, parse_scene
 from realizer.behaviours.kind import PlanningContext, Position
 from tests.realizer.behaviours.elements import SCENE, check, gaze, total
 
@@ -72,3 +72,22 @@ def test_known_direction_gives_way_to_a_scene_with_its_name() -> None:
     context = PlanningContext(scene={"camera": (1.0, 0.0, 1.0)})
     assert known_direction("CAMERA") == (0, 0)
     assert angles("CAMERA", context)[0] == pytest.approx(45)
+
+
+def test_parse_scene_reads_lines_or_json() -> None:
+    scene = {"cup": (0.1, -0.2, 0.5)}
+    assert parse_scene("# what she sees\ncup 0.1 -0.2 0.5\n") == scene
+    assert parse_scene('{"cup": [0.1, -0.2, 0.5]}') == scene
+    with pytest.raises(ValueError, match="cup: wanted three numbers"):
+        parse_scene("cup 1 2")
+
+
+def test_parse_scene_reads_named_axes() -> None:
+    assert parse_scene('{"cup": {"x": 1, "y": 2, "z": 3}}') == {"cup": (1.0, 2.0, 3.0)}
+    assert parse_scene("cup 1, 2, 3") == {"cup": (1.0, 2.0, 3.0)}
+
+
+@pytest.mark.parametrize("number", ["10001", "nan", "-inf"])
+def test_parse_scene_refuses_positions_beyond_10_km(number: str) -> None:
+    with pytest.raises(ValueError, match="cup: wanted metres within 10 km, got"):
+        parse_scene(f"cup 0 {number} 0")

@@ -5,8 +5,10 @@ from __future__ import annotations
 import subprocess
 import sys
 import textwrap
+from dataclasses import replace
 from importlib import import_module
 from pkgutil import iter_modules
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,13 +16,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bml_schema import VOCABULARY as CORE
+from bml_schema.behaviours import FaceLexeme
 from bml_schema.node_schema import local
 from realizer import behaviours
 from realizer.animation.channel import Layer
 from realizer.animation.curves import sample
-from realizer.behaviours.kind import BehaviourKind
+from realizer.behaviours.kind import BehaviourKind, Fault
 from realizer.behaviours.registry import ELEMENTS as FAMILY_ELEMENTS
-from realizer.behaviours.registry import FAMILIES, KINDS, VOCABULARY
+from realizer.behaviours.registry import FAMILIES, KINDS, VOCABULARY, guarded
+from realizer.playback.player import Player
 from tests.realizer.behaviours.elements import ELEMENTS, check, expand, keys, node, timing
 
 
@@ -52,9 +56,9 @@ def test_kinds_import_a_family_on_first_use() -> None:
         parse('<bml id="b"><blink id="x" xmlns="urn:bml-realizer:1"/></bml>', VOCABULARY)
         assert len(KINDS) == len(VOCABULARY) == len(list(KINDS))
         assert Blink.tag in KINDS
-        assert "realizer.behaviours.blink" not in sys.modules
+        assert "realizer.behaviours.face" not in sys.modules
         assert KINDS[Blink.tag].node is Blink
-        assert "realizer.behaviours.blink" in sys.modules
+        assert "realizer.behaviours.face" in sys.modules
         assert "realizer.behaviours.emotion" not in sys.modules
         assert KINDS.get("x") is None
     """
@@ -97,3 +101,40 @@ def test_kinds_expand_any_rising_times_to_finite_keys(element: str, gaps: list[f
         assert np.all(np.diff(channel.times) >= 0)
         assert np.all(np.isfinite(channel.values))
         assert np.all(np.isfinite(sample([channel], np.linspace(0, 60, 100))))
+
+
+KIND = KINDS[FaceLexeme.tag]
+SMILE = FaceLexeme(id="f", lexeme="SMILE")
+
+
+def fail(*_: Any) -> Any:
+    raise ValueError("boom")
+
+
+def checked(**changed: Any) -> tuple[Fault, ...]:
+    return guarded(replace(KIND, **changed), "sneer").check(SMILE, Player().context)
+
+
+def test_guarded_behaviour_that_works_has_no_faults() -> None:
+    assert checked() == ()
+
+
+@pytest.mark.parametrize("name", ["check", "timing", "claims", "expand"])
+def test_guarded_behaviour_that_fails_is_one_fault(name) -> None:
+    (fault,) = checked(**{name: fail})
+    assert (fault.type, fault.fatal) == ("CANNOT_CREATE_BEHAVIOR", True)
+    assert fault.text == "the plug-in sneer failed: ValueError: boom"
+
+
+def test_guarded_behaviour_keeps_its_own_faults() -> None:
+    own = Fault("NO_SUCH_TARGET", "nobody there", fatal=False)
+    assert checked(check=lambda node, context: (own,)) == (own,)
+
+
+def test_guarded_behaviour_that_fails_later_does_not_move_and_is_logged_once(caplog) -> None:
+    kind = guarded(replace(KIND, expand=fail), "later")
+    for _ in range(2):
+        assert kind.expand(SMILE, None, None) == ()
+    assert [record.getMessage() for record in caplog.records] == [
+        "the plug-in later failed: ValueError: boom"
+    ]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from realizer.animation.fap.au_fap_mapping import FapMapping, standard
+from realizer.animation.fap.conversion import FapMapping, standard
 from realizer.core.errors import FaceError, TableError
 from realizer.core.settings import Settings, SettingsError
 from realizer.face.fap_mapping import mapping_of

@@ -9,8 +9,7 @@ from scipy.spatial import cKDTree
 
 from realizer.animation.axis import axis
 from realizer.animation.frames import AUFrames
-from realizer.animation.lips.mouth_faps import mouth_faps
-from realizer.animation.lips.visemes import shape_table
+from realizer.animation.lips.visemes import mouth_faps, shape_table
 from realizer.animation.pose import poses
 from realizer.core.array_types import Float32, Float64, Int32
 from realizer.face.deform import deform

@@ -8,8 +8,8 @@ import pytest
 from bml_schema import parse
 from realizer.core.options import PlayOptions
 from realizer.offline import realize
-from realizer.playback.audio_mix import render_utterance
 from realizer.playback.player import Player
+from realizer.playback.scheduled_speech import render_utterance
 from realizer.realization import Realization
 from realizer.speech.silent import SilentVoice
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from realizer.animation.axis import axis
-from realizer.animation.fap.au_fap_mapping import standard
+from realizer.animation.fap.conversion import standard
 from realizer.animation.frames import AUFrames
 from realizer.protocol.messages.common import Encoding, NumericStream, StreamName
 from realizer.protocol.messages.requests import Subscribe

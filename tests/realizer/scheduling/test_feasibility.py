@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer import schedule
-from realizer.scheduling.explain import choose, in_words
+from realizer.scheduling.conflict import choose, in_words
 from realizer.scheduling.feasibility import ConstraintNetwork, Edge, conflicts_of
 from realizer.scheduling.problem import ORIGIN, Problem
 from realizer.scheduling.solve import Solution, solve

@@ -9,8 +9,7 @@ from hypothesis import given
 from scipy.optimize import linprog
 
 from realizer.core.array_types import Float64
-from realizer.scheduling.conflict import Conflict, LengthBound, Link
-from realizer.scheduling.explain import in_words
+from realizer.scheduling.conflict import Conflict, LengthBound, Link, in_words
 from realizer.scheduling.minimal_cycles import _simple
 from realizer.scheduling.problem import ORIGIN, Problem, Relation
 from realizer.scheduling.solve import Solution, solve

@@ -18,7 +18,7 @@ from realizer.core.errors import RealizerError, VoiceError
 from realizer.scheduling.timing import Schedule
 from realizer.server.runtime.effect_runner import Engines
 from realizer.server.session.effects import Speak
-from realizer.speech import engine_process
+from realizer.speech import engine_voice
 from realizer.speech.espeak.voice import EspeakVoice
 from realizer.speech.hibari.voice import HibariVoice
 from realizer.speech.registry import VOICES
@@ -176,7 +176,7 @@ def test_engines_lose_one_sound_when_a_process_is_killed(
 ) -> None:
     studio = Engines()
     answers: list[object] = []
-    exchange, begun = engine_process._exchange, threading.Event()
+    exchange, begun = engine_voice._exchange, threading.Event()
 
     def announced(process: Any, request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
         begun.set()
@@ -191,7 +191,7 @@ def test_engines_lose_one_sound_when_a_process_is_killed(
         os.kill(pid, signal.SIGSTOP)  # so that it can never answer before it dies
         order = Speak(2, SpeechRequest("It is raining here today. " * 50, voice=name))
         asking = threading.Thread(target=lambda: answers.append(studio.speak(order)))
-        monkeypatch.setattr(engine_process, "_exchange", announced)
+        monkeypatch.setattr(engine_voice, "_exchange", announced)
         asking.start()
         assert begun.wait(30)
         os.kill(pid, signal.SIGKILL)

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from realizer.speech.engine_process import RUN
+from realizer.speech.engine_voice import RUN
 
 FAKE = Path(__file__).with_name("engines.py")
 

@@ -8,9 +8,9 @@ from itertools import count
 from bml_schema import Block, BMLError, read
 from realizer.animation.fap.fap_clip import FAPClip
 from realizer.animation.fap.fap_reader import read_fap
-from realizer.behaviours.fap_document import document_of
 from realizer.behaviours.fap_values import MAX_BYTES
 from realizer.behaviours.fap_visemes import expand_compound
+from realizer.behaviours.keyframes import document_of
 from realizer.behaviours.kind import PlanningContext
 from realizer.behaviours.media import media_file
 from realizer.behaviours.registry import VOCABULARY

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from bml_schema import BlockProgress, PredictionFeedback, WarningFeedback
 from bml_schema.feedback import parse_feedback
 from realizer.animation.fap.fap_clip import FAPClip
-from realizer.behaviours.fap_document import document_of
+from realizer.behaviours.keyframes import document_of
 from realizer.core.errors import RealizerError
 from realizer.server.transports.message_formats import Disconnect, Inbound
 from realizer.server.transports.xface.attachments import Attachment, MissingAttachment, Script

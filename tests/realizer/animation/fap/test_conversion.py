@@ -10,9 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer import tables
-from realizer.animation.axis import AU_NAMES, axis, fap, mask_channel
-from realizer.animation.fap.au_fap_mapping import FapMapping
-from realizer.animation.fap.conversion import to_fap
+from realizer.animation.axis import AU_NAMES, au, axis, fap, mask_channel
+from realizer.animation.fap.conversion import FapMapping, PiecewiseMatrix, standard, to_fap
 from realizer.animation.frames import AUFrames
 from realizer.core.array_types import Float32
 from realizer.tables import AuToFap
@@ -177,3 +176,67 @@ def test_to_fap_scales_combinations_by_their_weaker_unit() -> None:
 
     assert more(1.0, 0.0) == 0
     assert more(1.0, 0.5) == pytest.approx(more(0.5, 1.0)) == pytest.approx(more(1.0, 1.0) / 2)
+
+
+AT = (0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 1.0)
+
+
+def asked(rows: tuple[AuToFap, ...], fap: int) -> Float32:
+    """Return the values of a FAP as AU26 rises."""
+    aus = np.zeros((len(AU_NAMES()), len(AT)), np.float32)
+    aus[au(26)[0].column] = AT
+    raised, lowered, turned = PiecewiseMatrix.of(rows).evaluate(aus)
+    found: Float32 = (raised - lowered + turned)[fap - 1]
+    return found
+
+
+def test_matrix_is_constant_between_two_pieces() -> None:
+    rows = (AuToFap(26, "", 3, 0.1, 0.3, 0.0, 100.0), AuToFap(26, "", 3, 0.7, 0.9, 100.0, 300.0))
+    assert asked(rows, 3) == pytest.approx([0, 0, 50, 100, 100, 100, 300, 300], abs=1e-3)
+
+
+def test_matrix_of_no_rows_is_zero() -> None:
+    assert not asked((), 3).any()
+
+
+def test_matrix_mask_has_the_faps_of_rows_and_speech() -> None:
+    mask = PiecewiseMatrix.of((AuToFap(9, "L", 63, 0.0, 1.0, 0.0, 30.0),)).mask
+    assert mask[62]
+    assert mask[2]  # speech opens the jaw
+    assert not mask[[0, 1, 30]].any()
+
+
+def test_matrix_separates_raising_and_lowering() -> None:
+    rows = (AuToFap(26, "", 3, 0.0, 0.5, 0.0, 100.0), AuToFap(26, "", 3, 0.5, 1.0, 100.0, -100.0))
+    aus = np.zeros((len(AU_NAMES()), len(AT)), np.float32)
+    aus[au(26)[0].column] = AT
+    raised, lowered, _ = PiecewiseMatrix.of(rows).evaluate(aus)
+    assert np.flatnonzero(raised.any(axis=1)).tolist() == [2]
+    assert raised[2] == pytest.approx([0, 20, 40, 60, 100, 20, 0, 0], abs=1e-3)
+    assert lowered[2] == pytest.approx([0, 0, 0, 0, 0, 0, 60, 100], abs=1e-3)
+
+
+def test_matrix_closed_is_the_greatest_value_of_each_fap() -> None:
+    rows = (AuToFap(43, "L", 19, 0.0, 1.0, 0.0, 200.0), AuToFap(7, "L", 19, 0.0, 1.0, 0.0, 900.0))
+    closed = PiecewiseMatrix.of(rows).closed
+    assert closed[18] == 900
+    assert np.count_nonzero(closed) == 1
+
+
+def test_standard_mapping_is_the_table() -> None:
+    assert standard().rows == tables.au_to_fap()
+    assert standard() is standard()
+
+
+def test_mapping_replaces_units_completely_on_one_side() -> None:
+    own = AuToFap(12, "L", 6, 0.0, 1.0, 0.0, 99.0)
+    mapping = standard().replaced({(12, "L"): (own,)}, "mine")
+    assert [row for row in mapping.rows if (row.au, row.side) == (12, "L")] == [own]
+    others = [row for row in mapping.rows if (row.au, row.side) != (12, "L")]
+    assert others == [row for row in standard().rows if (row.au, row.side) != (12, "L")]
+    assert mapping.sources == ("au_to_fap.csv", "mine")
+
+
+def test_mapping_replaces_a_unit_by_nothing() -> None:
+    mapping = standard().replaced({(25, ""): ()}, "mine")
+    assert 25 not in {row.au for row in mapping.rows}

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from realizer.animation.axis import fap
 from realizer.animation.blend import blend
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.fap.conversion import to_fap
-from realizer.animation.lips.lip_sync import LipStyle, lip_channels
-from realizer.animation.lips.mouth_faps import ROLL
-from realizer.animation.lips.visemes import coarticulation
+from realizer.animation.lips.lip_sync import LipStyle, lip_channels, opened
+from realizer.animation.lips.visemes import ROLL, coarticulation
 from realizer.speech.utterance import Phoneme
 from realizer.tables import faps
 from realizer.tables.phonemes import phoneme_features
@@ -179,8 +179,8 @@ def test_lip_channels_open_further_for_loud_vowels() -> None:
 def test_lip_channels_keep_rounding_and_closures_at_any_volume(volume: float) -> None:
     usual, other = loud("_ u p ɑ f ɑ _", 1.0), loud("_ u p ɑ f ɑ _", volume)
     assert np.array_equal(values(usual, 53), values(other, 53))
-    for fap in (16, 17):  # lips that press roll in, from where they meet
-        assert np.allclose(values(usual, fap), values(other, fap), atol=15)
+    for number in (16, 17):  # lips that press roll in, from where they meet
+        assert np.allclose(values(usual, number), values(other, number), atol=15)
     p, f = slice(44, 47), slice(64, 67)
     assert gap(other)[p].max() <= 0
     assert values(other, 5)[f].min() > 50
@@ -322,3 +322,36 @@ def test_lip_channels_prepare_a_first_closure_if_there_is_room(room: float) -> N
     # With more room they move more slowly.
     assert steepest.max() < 1.6 / max(early, coarticulation()["pauses"]["least"])
     assert lips.values[(lips.times > 3.025) & (lips.times < 3.2)].min() == pytest.approx(1, abs=1e-6)
+
+
+SOUNDS = ("", "ɑ", "p", "ɑ", "f", "u", "m", "i", "")
+USUAL = lip_channels([Phoneme(0.15 * k, 0.15 * (k + 1), ipa, 1) for k, ipa in enumerate(SOUNDS)], 0.0)
+
+
+def moved(channels, number: int) -> np.ndarray:
+    return next(channel.values for channel in channels if channel.target == fap(number))
+
+
+def mouth_gap(channels) -> np.ndarray:
+    return -moved(channels, 4) - moved(channels, 5)
+
+
+@pytest.mark.parametrize("factor", [0.6, 0.8, 1.3, 1.6])
+def test_opened_scales_the_mouth_and_leaves_closures(factor: float) -> None:
+    usual, other = mouth_gap(USUAL), mouth_gap(opened(USUAL, factor))
+    assert other.max() == pytest.approx(factor * usual.max())
+    assert moved(opened(USUAL, factor), 3) == pytest.approx(factor * moved(USUAL, 3))
+    raised = moved(USUAL, 5) > 0  # the lower lip, to the upper one or to the teeth
+    assert raised.sum() > 20
+    assert np.array_equal(moved(opened(USUAL, factor), 5)[raised], moved(USUAL, 5)[raised])
+    assert other[raised & (usual <= 0)].max() <= 0
+    for number in (6, 16, 17, 44):
+        assert np.array_equal(moved(opened(USUAL, factor), number), moved(USUAL, number))
+
+
+def test_opened_remembers_its_result() -> None:
+    assert opened(USUAL, 1.0) is USUAL
+    assert opened(USUAL, 1.3) is opened(USUAL, 1.3)
+    other = opened(USUAL, 0.7)
+    assert isinstance(other[0], Channel)
+    assert mouth_gap(other).max() < mouth_gap(opened(USUAL, 1.3)).max()

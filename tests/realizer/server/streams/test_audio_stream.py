@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from realizer.playback.audio_mix import render_utterance
+from realizer.playback.scheduled_speech import render_utterance
 from realizer.server.streams.audio_stream import AudioStream
 from realizer.speech.utterance import Utterance
 from tests.realizer.server.conftest import RATE, TALK, Driver, spoken

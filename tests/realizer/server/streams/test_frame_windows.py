@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from realizer.animation.arkit import ARKIT_NAMES, arkit
-from realizer.animation.fap.au_fap_mapping import FapMapping, standard
+from realizer.animation.fap.conversion import FapMapping, standard
 from realizer.playback.player import Player
 from realizer.server.streams.frame_windows import TURNS, FrameTimeline
 from tests.realizer.server.conftest import NOD

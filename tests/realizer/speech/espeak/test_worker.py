@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from realizer.core.errors import VoiceError
-from realizer.speech.engine_process import RUN
+from realizer.speech.engine_voice import RUN
 from realizer.speech.espeak.voice import ENGINE, EspeakVoice, choose_voice
 from realizer.speech.utterance import SpeechRequest, Utterance
 

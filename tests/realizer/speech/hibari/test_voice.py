@@ -11,8 +11,10 @@ import pytest
 
 from realizer.core.errors import VoiceError
 from realizer.speech.duration_fit import speak_to_length
-from realizer.speech.hibari.voice import HibariVoice
+from realizer.speech.hibari.voice import HibariVoice, ProsodyRun, runs
 from realizer.speech.registry import find_voice
+from realizer.speech.ssml import read_script
+from realizer.speech.ssml_prosody import Prosody
 from realizer.speech.utterance import SpeechRequest, Utterance
 from realizer.tables.phonemes import phoneme_features
 
@@ -304,3 +306,38 @@ def test_hibari_refuses_a_voice_without_fetching_it(
     with pytest.raises(VoiceError, match="'emma' is not on this machine; `hibari --voice emma"):
         find_voice("hibari:emma")
     assert find_voice("hibari:heart").name == "hibari:heart"
+
+
+def test_runs_end_at_breaks_and_where_prosody_changes() -> None:
+    ssml = (
+        'a <mark name="m"/>b <break time="1s"/>c <prosody rate="slow"> d</prosody> <sub alias="e f">x</sub>.'
+    )
+    found, marks = runs(read_script(SpeechRequest(ssml)))
+    assert [(r.text.strip(), r.words, r.prosody.rate, r.pause) for r in found] == [
+        ("a b", ("a", "b"), 1.0, 0.0),
+        ("c", ("c",), 1.0, 1.0),
+        ("d", ("d",), 0.75, 0.0),
+        ("e f.", ("e", "f"), 1.0, 0.0),
+    ]
+    assert [(m.name, m.word, m.paused) for m in marks] == [("m", 1, False)]
+    assert runs(read_script(SpeechRequest('a<break time="1s"/>')))[0][-1] == ProsodyRun(
+        "", (), Prosody(), 1.0
+    )
+
+
+def test_runs_place_marks_before_and_after_breaks() -> None:
+    ssml = 'a <mark name="m"/><break time="1s"/><mark name="n"/>b'
+    _, marks = runs(read_script(SpeechRequest(ssml)))
+    assert [(m.name, m.word, m.paused) for m in marks] == [("m", 1, True), ("n", 1, False)]
+
+
+def test_runs_nest_prosody() -> None:
+    ssml = 'a <prosody rate="fast">b <prosody volume="50">c</prosody> d</prosody> e'
+    found, _ = runs(read_script(SpeechRequest(ssml)))
+    assert [(r.words, r.prosody.rate, r.prosody.volume) for r in found] == [
+        (("a",), 1.0, 1.0),
+        (("b",), 1.4, 1.0),
+        (("c",), 1.4, 0.5),
+        (("d",), 1.4, 1.0),
+        (("e",), 1.0, 1.0),
+    ]

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from realizer.scheduling.longest_paths import components, longest_path_levels
+from realizer.scheduling.graphs import UnionFind, components, longest_path_levels
 
 NODES = 8
 nodes = st.integers(0, NODES - 1)
@@ -52,3 +53,26 @@ def test_longest_path_levels_are_the_least_that_satisfy_every_edge(
         bounds=[(s, None) for s in start],
     )
     np.testing.assert_allclose(level, least.x, atol=1e-9)
+
+
+def test_tie_keeps_distances_and_measures_misfits() -> None:
+    ties = UnionFind(5)
+    assert ties.tie(4, 3, 1.0) == 0
+    assert ties.tie(3, 1, 2.0) == 0
+    assert ties.tie(2, 4, -5.0) == 0
+    assert [ties.find(k) for k in range(5)] == [0, 1, 1, 1, 1]
+    assert [ties.shift[k] for k in (1, 2, 3, 4)] == [0, -2, 2, 3]
+    assert ties.tie(4, 1, 3.0) == 0
+    assert ties.tie(4, 1, 3.5) == pytest.approx(0.5)
+    assert ties.tie(0, 2, 0.0) == 0
+    assert {ties.find(k) for k in range(5)} == {0}
+    assert ties.shift[4] == pytest.approx(5)
+
+
+@given(st.lists(st.tuples(nodes, nodes), max_size=20), st.lists(st.integers(-9, 9), min_size=8, max_size=8))
+def test_tie_finds_no_misfit_between_true_distances(pairs: list[tuple[int, int]], time: list[int]) -> None:
+    ties = UnionFind(NODES)
+    for u, v in pairs:
+        assert ties.tie(u, v, float(time[u] - time[v])) == 0
+    for k in range(NODES):
+        assert time[k] - time[ties.find(k)] == ties.shift[k]
