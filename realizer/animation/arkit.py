@@ -38,19 +38,12 @@ class _Slide:
 
 @dataclass(frozen=True, eq=False)
 class ArkitFrames:
-    """The animation of an ARKit head.
+    """The animation of an ARKit head."""
 
-    Attributes:
-        times: (n,) float64 seconds.
-        weights: (n, 52) float32, 0..1; columns as `ARKIT_NAMES()`.
-        head: (n, 3) float32 radians: yaw to the character's left, pitch down, roll to its right.
-        eyes: (n, 2, 2) float32 radians: left and right eye; yaw to the character's left, pitch down.
-    """
-
-    times: Float64
-    weights: Float32
-    head: Float32
-    eyes: Float32
+    times: Float64  # (n,) float64 seconds
+    weights: Float32  # (n, 52) float32, 0..1; columns as `ARKIT_NAMES()`
+    head: Float32  # (n, 3) float32 radians: yaw to the character's left, pitch down, roll to its right
+    eyes: Float32  # (n, 2, 2) float32 radians: left and right eye; yaw to the character's left, pitch down
 
 
 @cache

@@ -59,37 +59,25 @@ class Crossfade(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """One target over time.
+    """One target over time."""
 
-    Attributes:
-        target: the column it drives.
-        times: (k,) float64 seconds, rising; from block start when expanded, on the session clock in the
-            player.
-        values: (k,) float64; AUs and mask channels 0..1, FAPs in their FAPU.
-        curve: name in `animation.curves`: "smooth" (velocity zero at each key) or "linear".
-        layer: where it is blended.
-        keeps_last: whether the last value stays for ever (base states); otherwise the channel is 0 outside
-            its keys.
-        gains: changes of its factor, which is 1 at first: for behaviours that are interrupted, base states
-            that are replaced, and amounts that change. Each starts from the factor reached before it.
-        until: seconds; the channel is 0 from then on, because another one replaces it.
-        crossfade: set for such a replacement, which is 0 before `crossfade.at`.
-        weight: (k,) 0..1: how far it replaces the layers below, at each key; None for 1. Only for the layers
-            FAPS and DIRECT. The values are weighted already: 0 where the weight is 0.
-        source: "block:behaviour" that it comes from, for messages.
-    """
-
-    target: Target
+    target: Target  # the column it drives
+    # (k,) float64 seconds, rising; from block start when expanded, on the session clock in the player
     times: Float64
-    values: Float64
-    curve: str = "smooth"
-    layer: Layer = Layer.EXPRESSION
+    values: Float64  # (k,) float64; AUs and mask channels 0..1, FAPs in their FAPU
+    curve: str = "smooth"  # name in `animation.curves`: "smooth" (velocity zero at each key) or "linear"
+    layer: Layer = Layer.EXPRESSION  # where it is blended
+    # whether the last value stays for ever (base states); otherwise the channel is 0 outside its keys
     keeps_last: bool = False
+    # changes of its factor, which is 1 at first: for behaviours that are interrupted, base states that are
+    # replaced, and amounts that change. Each starts from the factor reached before it.
     gains: tuple[Gain, ...] = ()
-    until: float = float("inf")
-    crossfade: Crossfade | None = None
+    until: float = float("inf")  # seconds; the channel is 0 from then on, because another one replaces it
+    crossfade: Crossfade | None = None  # set for such a replacement, which is 0 before `crossfade.at`
+    # (k,) 0..1: how far it replaces the layers below, at each key; None for 1. Only for the layers FAPS and
+    # DIRECT. The values are weighted already: 0 where the weight is 0.
     weight: Float64 | None = None
-    source: str = ""
+    source: str = ""  # "block:behaviour" that it comes from, for messages
 
     def __post_init__(self) -> None:
         times, values = np.asarray(self.times, np.float64), np.asarray(self.values, np.float64)

@@ -20,18 +20,13 @@ from realizer.tables.cooccurrence import Rule, Rules, Unit
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """Rules that limit a unit to 1 - min(m(a), m(b)), where m is membership in a fuzzy set.
+    """Rules that limit a unit to 1 - min(m(a), m(b)), where m is membership in a fuzzy set."""
 
-    Attributes:
-        units: (g,) the rows of the limited units.
-        stronger: (2, m, g) indices into `rows` of a and b, which may be equal; some rules may be repeated.
-        rows: (2, k) the rows of both sides of a stronger unit, which may be equal.
-        start, low, high: (k, 1) its membership at 0, and the slopes below and above 0.5.
-    """
-
-    units: Index
+    units: Index  # (g,) the rows of the limited units
+    # (2, m, g) indices into `rows` of a and b, which may be equal; some rules may be repeated
     stronger: Index
-    rows: Index
+    rows: Index  # (2, k) the rows of both sides of a stronger unit, which may be equal
+    # start, low, high: (k, 1) its membership at 0, and the slopes below and above 0.5
     start: Float32
     low: Float32
     high: Float32

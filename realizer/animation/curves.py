@@ -36,19 +36,12 @@ CURVES: Mapping[str, Callable[[Float64], Float64]] = {"linear": lambda u: u, "sm
 
 
 class Samples(NamedTuple):
-    """Values of channels in the frames where they are active, concatenated piece by piece.
+    """Values of channels in the frames where they are active, concatenated piece by piece."""
 
-    Attributes:
-        channels: (p,) the channel of each piece; if one has two pieces, the later one counts.
-        counts: (p,) the number of its frames.
-        frames: (e,) the frame of each value.
-        values: (e,) float64.
-    """
-
-    channels: Index
-    counts: Index
-    frames: Index
-    values: Float64
+    channels: Index  # (p,) the channel of each piece; if one has two pieces, the later one counts
+    counts: Index  # (p,) the number of its frames
+    frames: Index  # (e,) the frame of each value
+    values: Float64  # (e,) float64
 
     def spread(self, of_channel: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Return (e,) for each value the entry of its channel in (m,)."""

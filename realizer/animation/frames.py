@@ -16,19 +16,14 @@ from realizer.tables.cooccurrence import Rules
 
 @dataclass(frozen=True, eq=False)
 class AUFrames:
-    """Sampled values of every target of the axis.
+    """Sampled values of every target of the axis."""
 
-    Attributes:
-        times: (n,) float64 seconds on the session clock.
-        values: (n, n_targets) float32; columns as `animation.axis.axis()`: AUs 0..1 as requested, FAPs in
-            FAPU that do not come from AUs, mask channels 0..1.
-        rules: co-occurrence rules; None for none.
-        overridden: (n, 68) float32, 0..1: how far AUs do not contribute to a FAP; None for 0 everywhere.
-    """
-
-    times: Float64
+    times: Float64  # (n,) float64 seconds on the session clock
+    # (n, n_targets) float32; columns as `animation.axis.axis()`: AUs 0..1 as requested, FAPs in FAPU that do
+    # not come from AUs, mask channels 0..1
     values: Float32
-    rules: Rules | None = None
+    rules: Rules | None = None  # co-occurrence rules; None for none
+    # (n, 68) float32, 0..1: how far AUs do not contribute to a FAP; None for 0 everywhere
     overridden: Float32 | None = None
 
     @classmethod
@@ -79,17 +74,11 @@ class AUFrames:
 
 @dataclass(frozen=True, eq=False)
 class FAPFrames:
-    """MPEG-4 facial animation parameters.
+    """MPEG-4 facial animation parameters."""
 
-    Attributes:
-        times: (n,) float64 seconds.
-        values: (n, 68) float32 in each FAP's FAPU; column = FAP - 1. FAP 1 and 2 (compound) are 0.
-        mask: (68,) bool, True where any frame may use the FAP; FAP 1 and 2 are False.
-    """
-
-    times: Float64
-    values: Float32
-    mask: Bool
+    times: Float64  # (n,) float64 seconds
+    values: Float32  # (n, 68) float32 in each FAP's FAPU; column = FAP - 1. FAP 1 and 2 (compound) are 0.
+    mask: Bool  # (68,) bool, True where any frame may use the FAP; FAP 1 and 2 are False
 
     def integers(self) -> Int32:
         """Return the values rounded (half to even), as files and streams hold them: (n, 68) int32."""

@@ -14,18 +14,13 @@ from realizer.speech.accents import prosody_facts
 
 
 class Style(NamedTuple):
-    """How a feeling changes speech.
+    """How a feeling changes speech."""
 
-    Attributes:
-        size, pace: factors of the motion of the head.
-        pitch: of the head, degrees.
-        opening: factor of the opening of the mouth.
-    """
-
+    # size, pace: factors of the motion of the head
     size: float = 1.0
     pace: float = 1.0
-    pitch: float = 0.0
-    opening: float = 1.0
+    pitch: float = 0.0  # of the head, degrees
+    opening: float = 1.0  # factor of the opening of the mouth
 
 
 NEUTRAL = Style()

@@ -37,21 +37,13 @@ HEAD_MASK = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 0.0])
 
 
 class GazeAngles(NamedTuple):
-    """The angles of a gaze.
+    """The angles of a gaze."""
 
-    Attributes:
-        eyes: final angles of the eyes relative to the head.
-        head: final angles of the head.
-        first: angles of the eyes before the head follows.
-        away: angles of the eyes when they have turned back and the head has not.
-        inward: degrees by which each eye turns inwards.
-    """
-
-    eyes: Turn
-    head: Turn
-    first: Turn
-    away: Turn
-    inward: float
+    eyes: Turn  # final angles of the eyes relative to the head
+    head: Turn  # final angles of the head
+    first: Turn  # angles of the eyes before the head follows
+    away: Turn  # angles of the eyes when they have turned back and the head has not
+    inward: float  # degrees by which each eye turns inwards
 
 
 def split_angle(node: Gaze | GazeShift, context: PlanningContext) -> GazeAngles:

@@ -36,17 +36,11 @@ class KeyframeError(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Keys:
-    """The keys of a <FaceInterpolator>.
+    """The keys of a <FaceInterpolator>."""
 
-    Attributes:
-        parts: FAP number or (AU, side) of each column.
-        times: (k,) seconds, rising.
-        values: (k, number of parts); FAPs in FAPU, AUs 0..1.
-    """
-
-    parts: tuple[int | tuple[int, str], ...]
-    times: Float64
-    values: Float64
+    parts: tuple[int | tuple[int, str], ...]  # FAP number or (AU, side) of each column
+    times: Float64  # (k,) seconds, rising
+    values: Float64  # (k, number of parts); FAPs in FAPU, AUs 0..1
 
 
 def timing(node: FaceKeyframe, context: PlanningContext) -> Timing:

@@ -24,39 +24,28 @@ Position = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class PlanningContext:
-    """The settings and data that planning needs besides the document.
+    """The settings and data that planning needs besides the document."""
 
-    Attributes:
-        scene: target name -> (x, y, z) metres, origin between the eyes, +x the character's left, +y up,
-            +z forward; None while the session has no scene (then any target is straight ahead).
-        utterances: behaviour id -> its utterance.
-        language: BCP-47 of speech without its own.
-        jaw, lips: how far the jaw and the lips move in speech without its own style (`LipStyle`).
-        seed: for random choices.
-        media: the folder of the files that documents can name, or None.
-        clips: id -> sound of a client, which documents name as `clip:ID`.
-        library: the expressions that documents can name.
-        face_inputs: () -> the inputs of the character's face (`Face.inputs`), or None if unknown.
-        grace: seconds by which a behaviour may come too late for its references into other blocks.
-        max_planning: steps of planning a block.
-        liveliness: 0..1, how much expressions vary as people's do; 0: sides are equal, holds are still.
-        animates: whether behaviours are expanded and played; False if only their times are wanted.
-    """
-
+    # target name -> (x, y, z) metres, origin between the eyes, +x the character's left, +y up, +z forward;
+    # None while the session has no scene (then any target is straight ahead)
     scene: Mapping[str, Position] | None = None
-    utterances: Mapping[str, Utterance] = field(default_factory=dict)
-    language: str = "en-US"
+    utterances: Mapping[str, Utterance] = field(default_factory=dict)  # behaviour id -> its utterance
+    language: str = "en-US"  # BCP-47 of speech without its own
+    # jaw, lips: how far the jaw and the lips move in speech without its own style (`LipStyle`)
     jaw: float = 1.0
     lips: float = 1.0
-    seed: int = 0
-    media: Path | None = None
+    seed: int = 0  # for random choices
+    media: Path | None = None  # the folder of the files that documents can name, or None
+    # id -> sound of a client, which documents name as `clip:ID`
     clips: Mapping[str, Recording] = field(default_factory=dict)
-    library: Library = field(default_factory=builtin)
+    library: Library = field(default_factory=builtin)  # the expressions that documents can name
+    # () -> the inputs of the character's face (`Face.inputs`), or None if unknown
     face_inputs: Callable[[], Sequence[str] | None] = lambda: None
-    grace: float = 0.0
-    max_planning: int = DEFAULTS.max_planning
+    grace: float = 0.0  # seconds by which a behaviour may come too late for its references into other blocks
+    max_planning: int = DEFAULTS.max_planning  # steps of planning a block
+    # 0..1, how much expressions vary as people's do; 0: sides are equal, holds are still
     liveliness: float = 0.0
-    animates: bool = True
+    animates: bool = True  # whether behaviours are expanded and played; False if only their times are wanted
 
 
 # What a behaviour does to other blocks and behaviours when it starts.
@@ -74,38 +63,33 @@ class Fault:
 
 @dataclass(frozen=True)
 class BehaviourKind:
-    """The functions that play one behaviour element.
+    """The functions that play one behaviour element."""
 
-    Attributes:
-        node: its class in `bml_schema` (core) or in the module itself (extension); `node.tag` is its name.
-        timing: (node, context) -> Timing, step 2. A speech needs `context.utterances[node.id]`.
-        expand: (node, times (k,) seconds from block start, context) -> Channels, step 4. Times follow
-            `timing(...).points`. By default the face does not move.
-        check: (node, context) -> faults: unknown lexeme or AU, no such target. Called before timing.
-        speech_request: (node, context) -> the request to the voice, or None. Only for speech.
-        command: node -> its command to other blocks and behaviours.
-        stretch: (node, context) -> Timing of a rigid behaviour that can stretch if nothing else helps, or
-            None.
-        sound: (node, context) -> its sound from start to end, or None.
-        claims: (node, context) -> exclusive resources ("voice", "gaze", "head pitch") that it needs from
-            start to relax (to end if it has no relax): of two behaviours of a character with the same claim
-            at one time one is dropped. Expressions have no claims: they blend.
-        parameters: parameter that can change while it plays -> the field with its initial value, or that
-            value. "volume" scales its sound, all others its channels.
-        region: the base state that this behaviour replaces permanently ("eyes", "head", "face"); for the
-            *Shift behaviours, whose channels have `keeps_last=True`.
-    """
-
+    # its class in `bml_schema` (core) or in the module itself (extension); `node.tag` is its name
     node: type[Any]
+    # (node, context) -> Timing, step 2. A speech needs `context.utterances[node.id]`.
     timing: Callable[[Any, PlanningContext], Timing]
+    # (node, times (k,) seconds from block start, context) -> Channels, step 4. Times follow
+    # `timing(...).points`. By default the face does not move.
     expand: Callable[[Any, Float64, PlanningContext], tuple[Channel, ...]] = lambda node, times, context: ()
+    # (node, context) -> faults: unknown lexeme or AU, no such target. Called before timing.
     check: Callable[[Any, PlanningContext], tuple[Fault, ...]] = lambda node, context: ()
+    # (node, context) -> the request to the voice, or None. Only for speech.
     speech_request: Callable[[Any, PlanningContext], SpeechRequest | None] | None = None
-    command: Callable[[Any], BlockCommand] | None = None
+    command: Callable[[Any], BlockCommand] | None = None  # node -> its command to other blocks and behaviours
+    # (node, context) -> Timing of a rigid behaviour that can stretch if nothing else helps, or None
     stretch: Callable[[Any, PlanningContext], Timing | None] = lambda node, context: None
+    # (node, context) -> its sound from start to end, or None
     sound: Callable[[Any, PlanningContext], Utterance | None] = lambda node, context: None
+    # (node, context) -> exclusive resources ("voice", "gaze", "head pitch") that it needs from start to relax
+    # (to end if it has no relax): of two behaviours of a character with the same claim at one time one is
+    # dropped. Expressions have no claims: they blend.
     claims: Callable[[Any, PlanningContext], frozenset[str]] = lambda node, context: frozenset()
+    # parameter that can change while it plays -> the field with its initial value, or that value. "volume"
+    # scales its sound, all others its channels.
     parameters: Mapping[str, str | float] = field(default_factory=dict)
+    # the base state that this behaviour replaces permanently ("eyes", "head", "face"); for the *Shift
+    # behaviours, whose channels have `keeps_last=True`
     region: str | None = None
 
     @property

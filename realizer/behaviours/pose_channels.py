@@ -147,19 +147,12 @@ def order() -> Mapping[int, float]:
 
 
 class _Aus(NamedTuple):
-    """The AUs of an expression.
+    """The AUs of an expression."""
 
-    Attributes:
-        numbers: (n + 1,) 0, for the face itself, and the number of each.
-        places: (n,) in the order of onsets, from 0 for the first to 1 for the last of these.
-        sides: (n,) 1 for the left, -1 for the right one of a pair whose sides differ, otherwise 0.
-        drifts: (n,) 1 for those whose hold drifts, otherwise 0.
-    """
-
-    numbers: Index
-    places: Float64
-    sides: Float64
-    drifts: Float64
+    numbers: Index  # (n + 1,) 0, for the face itself, and the number of each
+    places: Float64  # (n,) in the order of onsets, from 0 for the first to 1 for the last of these
+    sides: Float64  # (n,) 1 for the left, -1 for the right one of a pair whose sides differ, otherwise 0
+    drifts: Float64  # (n,) 1 for those whose hold drifts, otherwise 0
 
 
 @lru_cache(maxsize=512)

@@ -42,43 +42,30 @@ class Dependency:
 
 @dataclass(eq=False)
 class ActiveBlock:
-    """An accepted block, until it has ended and its last frames are past.
+    """An accepted block, until it has ended and its last frames are past."""
 
-    Attributes:
-        plan: its schedule has the start, which is inf while unknown (the block was not activated).
-        context: the context of its planning.
-        character: index of its character.
-        number: order of arrival, from 1.
-        order: at one instant it reports before blocks of a higher order, as of `set_order`.
-        not_before: its earliest start, seconds on the session clock.
-        dependencies: blocks that it waits for; empty once it has started.
-        followers: blocks that wait for it.
-        stopped_at: when it was cut off, or None.
-        external_refs: its references into other blocks.
-        first_schedule: its schedule when it was accepted.
-        whole_schedule: its schedule before some of it was cut off; None if nothing was.
-        channels, shifts, speech: by behaviour, on the session clock; empty while the start is unknown.
-        known_since: behaviour -> when its place on the session clock became known.
-    """
-
-    plan: Plan
+    plan: Plan  # its schedule has the start, which is inf while unknown (the block was not activated)
     kinds: Mapping[str, BehaviourKind]
-    context: PlanningContext
-    character: int
-    number: int
-    not_before: float
+    context: PlanningContext  # the context of its planning
+    character: int  # index of its character
+    number: int  # order of arrival, from 1
+    not_before: float  # its earliest start, seconds on the session clock
+    # blocks that it waits for; empty once it has started
     dependencies: list[Dependency] = field(default_factory=list)
     state: State = State.LURKING
-    stopped_at: float | None = None
+    stopped_at: float | None = None  # when it was cut off, or None
+    # channels, shifts, speech: by behaviour, on the session clock; empty while the start is unknown
     channels: dict[str, tuple[Channel, ...]] = field(default_factory=dict)
     shifts: dict[str, BaseShift] = field(default_factory=dict)
     speech: dict[str, ScheduledSpeech] = field(default_factory=dict)
+    # behaviour -> when its place on the session clock became known
     known_since: dict[str, float] = field(default_factory=dict)
-    followers: list[ActiveBlock] = field(default_factory=list)
-    whole_schedule: Schedule | None = None
+    followers: list[ActiveBlock] = field(default_factory=list)  # blocks that wait for it
+    whole_schedule: Schedule | None = None  # its schedule before some of it was cut off; None if nothing was
+    # at one instant it reports before blocks of a higher order, as of `set_order`
     order: tuple[int, int, int] = field(init=False)
-    external_refs: tuple[SyncRef, ...] = field(init=False)
-    first_schedule: Schedule = field(init=False)
+    external_refs: tuple[SyncRef, ...] = field(init=False)  # its references into other blocks
+    first_schedule: Schedule = field(init=False)  # its schedule when it was accepted
 
     def __post_init__(self) -> None:
         self.first_schedule = self.plan.schedule

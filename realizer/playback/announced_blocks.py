@@ -23,23 +23,15 @@ class BlockRejectedError(Exception):
 
 @dataclass(eq=False)
 class AnnouncedBlock:
-    """A block that was announced and has not arrived, with the commands that it received so far.
-
-    Attributes:
-        character: index of its character.
-        number: order of arrival.
-        state: IN_PREP, or REVOKED after it was ended and reported.
-        activated: it does not wait for activation.
-        dependencies: blocks that were placed before it.
-        unstarted: ids of the blocks that have to wait for it and had not started when it was announced.
-    """
+    """A block that was announced and has not arrived, with the commands that it received so far."""
 
     block: Block
-    character: int
-    number: int = 0
-    state: State = State.IN_PREP
-    activated: bool = False
-    dependencies: list[Dependency] = field(default_factory=list)
+    character: int  # index of its character
+    number: int = 0  # order of arrival
+    state: State = State.IN_PREP  # IN_PREP, or REVOKED after it was ended and reported
+    activated: bool = False  # it does not wait for activation
+    dependencies: list[Dependency] = field(default_factory=list)  # blocks that were placed before it
+    # ids of the blocks that have to wait for it and had not started when it was announced
     unstarted: frozenset[str] = frozenset()
 
     @property

@@ -27,24 +27,19 @@ MIN_RATE_GAP = 0.02
 
 @dataclass(frozen=True)
 class Plan:
-    """A block that can be played.
+    """A block that can be played."""
 
-    Attributes:
-        block: without the dropped behaviours and the references to them.
-        schedule: `failed` if a required behaviour cannot be played; the other attributes are then empty.
-        channels: behaviour id -> channels in seconds from block start.
-        claims: the exclusive resources of its behaviours, on the clock of `schedule.start`.
-        timings: behaviour id -> the timing that it prefers.
-        other_schedules: the new schedules of linked blocks, each in seconds from its own start.
-        trims: (block, behaviour) -> when a speech that plays has to end; only its final silence is cut.
-    """
-
-    block: Block
+    block: Block  # without the dropped behaviours and the references to them
+    # `failed` if a required behaviour cannot be played; the other attributes are then empty
     schedule: Schedule
+    # behaviour id -> channels in seconds from block start
     channels: Mapping[str, tuple[Channel, ...]] = field(default_factory=dict)
+    # the exclusive resources of its behaviours, on the clock of `schedule.start`
     claims: Sequence[ResourceClaim] = ()
-    timings: Mapping[str, Timing] = field(default_factory=dict)
+    timings: Mapping[str, Timing] = field(default_factory=dict)  # behaviour id -> the timing that it prefers
+    # the new schedules of linked blocks, each in seconds from its own start
     other_schedules: Sequence[Schedule] = ()
+    # (block, behaviour) -> when a speech that plays has to end; only its final silence is cut
     trims: Mapping[tuple[str, str], float] = field(default_factory=dict)
 
 

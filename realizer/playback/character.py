@@ -39,17 +39,14 @@ class BaseShift:
 
 @dataclass(eq=False)
 class Character:
-    """The state of a face outside any block.
-
-    Attributes:
-        heard: the voice of another one that the character hears, if its sound is sent.
-    """
+    """The state of a face outside any block."""
 
     id: str | None
     shifts: list[BaseShift] = field(default_factory=list)
     direct: dict[str, Channel] = field(default_factory=dict)
     emotion: dict[str, Channel] = field(default_factory=dict)
     responses: list[Channel] = field(default_factory=list)
+    # the voice of another one that the character hears, if its sound is sent
     heard: VoiceActivity | None = None
 
     def add_shifts(self, shifts: Collection[BaseShift]) -> None:

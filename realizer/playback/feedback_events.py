@@ -39,21 +39,17 @@ class Event(NamedTuple):
 
     At one instant a block reports before its followers, so that the dependencies of an APPEND, and the blocks
     that a REPLACE ended, have ended before it starts; within a block start, sync points by behaviour, end.
-
-    Attributes:
-        time: seconds on the session clock.
-        order: order of the block among those that report at one instant, as of `ActiveBlock`.
-        behaviour, point: indices of a sync point in the block and in its behaviour.
-        block: number of the block.
-        name, sync: behaviour id and sync point.
     """
 
-    time: float
+    time: float  # seconds on the session clock
+    # order of the block among those that report at one instant, as of `ActiveBlock`
     order: tuple[int, int, int]
     phase: Phase
+    # behaviour, point: indices of a sync point in the block and in its behaviour
     behaviour: int = 0
     point: int = 0
-    block: int = 0
+    block: int = 0  # number of the block
+    # name, sync: behaviour id and sync point
     name: str = ""
     sync: str = ""
 

@@ -28,23 +28,18 @@ PASSES = {"gaze": "own block", "base gaze": "any block", "base head": "any block
 
 @dataclass(frozen=True, slots=True)
 class ResourceClaim:
-    """A claim of a behaviour on an exclusive resource for some time.
+    """A claim of a behaviour on an exclusive resource for some time."""
 
-    Attributes:
-        resource: such as "voice" or "gaze"; of one character.
-        begin, end: seconds; all compared claims are on the same clock.
-        block, behaviour: the claimant.
-        rank: of two behaviours in one block the one with the lower rank wins.
-        silent_from: when the final silence of its sound begins; infinite without sound.
-    """
-
-    resource: str
+    resource: str  # such as "voice" or "gaze"; of one character
+    # begin, end: seconds; all compared claims are on the same clock
     begin: float
     end: float
+    # block, behaviour: the claimant
     block: str
     behaviour: str
+    # of two behaviours in one block the one with the lower rank wins
     rank: tuple[float, bool, int] = (0.0, False, 0)
-    silent_from: float = inf
+    silent_from: float = inf  # when the final silence of its sound begins; infinite without sound
 
     def shifted(self, seconds: float) -> ResourceClaim:
         """Return the same claim, later by `seconds`."""

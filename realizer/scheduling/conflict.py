@@ -37,19 +37,13 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class Conflict:
-    """A minimal set of relations that cannot hold together.
+    """A minimal set of relations that cannot hold together."""
 
-    Attributes:
-        relations: the equalities and orders, in the order of their chain.
-        gaps: least and greatest lengths, one for each section of a behaviour.
-        earliest: the point that would come before its earliest time, and that in seconds, or None.
-        named: the behaviours of the points, also those that state none of the relations.
-    """
-
-    relations: tuple[Relation, ...]
-    gaps: tuple[LengthBound, ...] = ()
+    relations: tuple[Relation, ...]  # the equalities and orders, in the order of their chain
+    gaps: tuple[LengthBound, ...] = ()  # least and greatest lengths, one for each section of a behaviour
+    # the point that would come before its earliest time, and that in seconds, or None
     earliest: tuple[Part, str, float] | None = None
-    named: tuple[Part, ...] = ()
+    named: tuple[Part, ...] = ()  # the behaviours of the points, also those that state none of the relations
 
     @property
     def parts(self) -> list[Part]:

@@ -27,9 +27,6 @@ class Quadratic:
     """Minimise the sum of stiffness * (x[j] - x[i] - wanted)^2 where x[v] - x[u] >= w.
 
     There are `size` unknowns, of which x[0] is 0.
-
-    Attributes:
-        piece: (size,) a number below size for each set of nodes that springs connect.
     """
 
     size: int
@@ -40,7 +37,7 @@ class Quadratic:
     u: Index
     v: Index
     w: Float64
-    piece: Index
+    piece: Index  # (size,) a number below size for each set of nodes that springs connect
 
 
 def feasible_start(

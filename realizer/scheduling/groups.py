@@ -86,17 +86,13 @@ def slides(
 
 @dataclass(slots=True, eq=False)
 class _GroupProblem:
-    """Groups as a convex problem; node 0 is the block's start, and one class of every group that can slide.
-
-    Attributes:
-        points: the points to solve. number: (n,) the node of each point's class.
-        gaps, bounded, orders, starts: the sources of the inequalities, in this order: least lengths of gaps,
-            greatest lengths, orders, and earliest starts of behaviours.
-    """
+    """Groups as a convex problem; node 0 is the block's start and a class of every group that can slide."""
 
     quadratic: Quadratic
-    points: Index
+    points: Index  # the points to solve. number: (n,) the node of each point's class.
     number: Index
+    # gaps, bounded, orders, starts: the sources of the inequalities, in this order: least lengths of gaps,
+    # greatest lengths, orders, and earliest starts of behaviours
     gaps: Index
     bounded: Index
     orders: list[Relation]

@@ -24,35 +24,27 @@ TIGHT = 1e-10  # s
 
 @dataclass(slots=True, eq=False)
 class Model:
-    """n points (0 is the block's start), B behaviours, g gaps of behaviours that are not rigid.
-
-    Attributes:
-        first, last: (B,) each behaviour's first and last point.
-        owner: (n,) behaviour of each point; B for the block's start.
-        root, shift: (n,) time[p] = time[root[p]] + shift[p]; untied points are their own root.
-        tied: points other than the block's start that some equality names, ascending.
-        chain: (n,) seconds after the behaviour's first point if every gap has its preferred length.
-        slack: (n,) the same for 1 / stiffness: how much a unit of force lengthens the gaps before a point.
-        gap: (g,) the point where each gap starts; it ends at the next point.
-        wanted, least, most, stiffness: (g,) of each gap; most is inf if there is no upper bound.
-        earliest: (B,) the earliest time of each first point.
-    """
+    """n points (0 is the block's start), B behaviours, g gaps of behaviours that are not rigid."""
 
     problem: Problem
+    # first, last: (B,) each behaviour's first and last point
     first: Index
     last: Index
-    owner: Index
+    owner: Index  # (n,) behaviour of each point; B for the block's start
+    # root, shift: (n,) time[p] = time[root[p]] + shift[p]; untied points are their own root
     root: Index
     shift: Float64
-    tied: Index
-    chain: Float64
+    tied: Index  # points other than the block's start that some equality names, ascending
+    chain: Float64  # (n,) seconds after the behaviour's first point if every gap has its preferred length
+    # (n,) the same for 1 / stiffness: how much a unit of force lengthens the gaps before a point
     slack: Float64
-    gap: Index
+    gap: Index  # (g,) the point where each gap starts; it ends at the next point
+    # wanted, least, most, stiffness: (g,) of each gap; most is inf if there is no upper bound
     wanted: Float64
     least: Float64
     most: Float64
     stiffness: Float64
-    earliest: Float64
+    earliest: Float64  # (B,) the earliest time of each first point
 
     def points_of(self, chosen: Bool) -> Index:
         """Return the points of chosen behaviours; chosen is (B + 1,) bool, with its last entry False."""

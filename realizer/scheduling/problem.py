@@ -21,23 +21,17 @@ ORIGIN = 0
 
 @dataclass(slots=True, eq=False)
 class Part:
-    """A part of a document that can be dropped: a behaviour or a constraint.
+    """A part of a document that can be dropped: a behaviour or a constraint."""
 
-    Attributes:
-        id: for warnings, "block:behaviour" or "block:constraint"; of a constraint without an id, its block's.
-        name: for sentences, "nod1"; "" for a constraint without an id.
-        order: position in the document, among its own kind.
-        line: the line in the document, or None if unknown.
-        names: the behaviours that a constraint names, as "block:behaviour"; it is dropped with any of them.
-    """
-
+    # for warnings, "block:behaviour" or "block:constraint"; of a constraint without an id, its block's
     id: str
-    name: str
+    name: str  # for sentences, "nod1"; "" for a constraint without an id
     required: bool = False
     priority: float = 0.0
-    order: int = 0
-    line: int | None = None
+    order: int = 0  # position in the document, among its own kind
+    line: int | None = None  # the line in the document, or None if unknown
     is_constraint: bool = False
+    # the behaviours that a constraint names, as "block:behaviour"; it is dropped with any of them
     names: frozenset[str] = frozenset()
 
 
@@ -57,29 +51,21 @@ class Relation(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """A block that is solved together with others, in seconds from the new block's start.
-
-    Attributes:
-        timings: behaviour id -> preferred timing; a behaviour without one is absent, and references to it
-            are ignored.
-        start: of the block.
-        earliest: the earliest start of its behaviours.
-        passed_times: behaviour id -> sync point -> its past time, which is fixed. Later points are not before
-            `earliest`.
-        is_fixed: its behaviours are never dropped, because it plays already.
-        priorities: behaviour id -> priority, 0 if absent; in a conflict the lowest is dropped.
-        late: behaviour id -> seconds by which it is later than its references into other blocks say.
-        sequences: pairs of which the first ends before the second starts; behaviour ids, or fixed times.
-    """
+    """A block that is solved together with others, in seconds from the new block's start."""
 
     block: Block
+    # behaviour id -> preferred timing; a behaviour without one is absent, and references to it are ignored
     timings: Mapping[str, Timing]
-    start: float = 0.0
-    earliest: float = 0.0
+    start: float = 0.0  # of the block
+    earliest: float = 0.0  # the earliest start of its behaviours
+    # behaviour id -> sync point -> its past time, which is fixed. Later points are not before `earliest`.
     passed_times: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    is_fixed: bool = False
+    is_fixed: bool = False  # its behaviours are never dropped, because it plays already
+    # behaviour id -> priority, 0 if absent; in a conflict the lowest is dropped
     priorities: Mapping[str, float] = field(default_factory=dict)
+    # behaviour id -> seconds by which it is later than its references into other blocks say
     late: Mapping[str, float] = field(default_factory=dict)
+    # pairs of which the first ends before the second starts; behaviour ids, or fixed times
     sequences: Sequence[tuple[str | float, str | float]] = ()
 
 
@@ -89,22 +75,19 @@ class Problem:
 
     Point 0 is the block's start; behaviour b owns the k points from first[b] on, in document order. The gaps
     of a behaviour that is not rigid cost stiffness * (gap - preferred)^2 and are at least `least`.
-
-    Attributes:
-        earliest: (behaviours,) seconds, the earliest start of each.
-        owner: (points,) behaviour number of each point; -1 for the block's start.
-        faults: invalid parts with the reason: a reference to a sync point that does not exist.
-        external: the parts that refer to other blocks, of the new block.
     """
 
     behaviours: list[Part] = field(default_factory=list)
     timings: list[Timing] = field(default_factory=list)
     first: list[int] = field(default_factory=list)
-    earliest: list[float] = field(default_factory=list)
+    earliest: list[float] = field(default_factory=list)  # (behaviours,) seconds, the earliest start of each
+    # (points,) behaviour number of each point; -1 for the block's start
     owner: list[int] = field(default_factory=lambda: [-1])
     equalities: list[Relation] = field(default_factory=list)
     orders: list[Relation] = field(default_factory=list)
+    # invalid parts with the reason: a reference to a sync point that does not exist
     faults: list[tuple[Part, str]] = field(default_factory=list)
+    # the parts that refer to other blocks, of the new block
     external: list[Part] = field(default_factory=list)
 
     def add(self, part: Part, timing: Timing, earliest: float = 0.0) -> int:

@@ -28,17 +28,11 @@ MANY = 2_000
 
 @dataclass(slots=True, eq=False)
 class RigidClusters:
-    """The clusters of tied behaviours, and the positions of their points.
+    """The clusters of tied behaviours, and the positions of their points."""
 
-    Attributes:
-        label: (B + 1,) the cluster of each behaviour, named by one of them; B is the block's start.
-        held: (B + 1,) bool by label: the cluster is tied to a fixed time and cannot slide.
-        at: (n,) seconds: from the block's start for fixed clusters, relative for others.
-    """
-
-    label: Index
-    held: Bool
-    at: Float64
+    label: Index  # (B + 1,) the cluster of each behaviour, named by one of them; B is the block's start
+    held: Bool  # (B + 1,) bool by label: the cluster is tied to a fixed time and cannot slide
+    at: Float64  # (n,) seconds: from the block's start for fixed clusters, relative for others
 
 
 def clusters_of(model: Model) -> RigidClusters:

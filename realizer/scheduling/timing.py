@@ -19,43 +19,31 @@ SOFTER = 1e-6
 
 
 class TimingArrays(NamedTuple):
-    """The numbers of a Timing of k points as plain floats.
+    """The numbers of a Timing of k points as plain floats."""
 
-    Attributes:
-        chain: (k,) seconds after the first point if every gap has its preferred length.
-        slack: (k,) the same for 1 / stiffness: how much a unit of force lengthens the gaps before a point.
-        least, most: (k-1,) of each gap.
-        fits: whether all preferred lengths are within their bounds, as those of rigid behaviours are.
-    """
-
-    chain: tuple[float, ...]
+    chain: tuple[float, ...]  # (k,) seconds after the first point if every gap has its preferred length
+    # (k,) the same for 1 / stiffness: how much a unit of force lengthens the gaps before a point
     slack: tuple[float, ...]
+    # least, most: (k-1,) of each gap
     least: tuple[float, ...]
     most: tuple[float, ...] | None
     rigid: bool
-    fits: bool
+    fits: bool  # whether all preferred lengths are within their bounds, as those of rigid behaviours are
 
 
 @dataclass(frozen=True)
 class Timing:
-    """The timing that one behaviour prefers: k sync points, k-1 gaps.
+    """The timing that one behaviour prefers: k sync points, k-1 gaps."""
 
-    Attributes:
-        points: k sync point names in chronological order, such as ("start", "attackPeak", "relax", "end").
-        preferred: (k-1,) float64 seconds, the preferred length of each gap.
-        least: (k-1,) float64 seconds, the least length of each gap.
-        stiffness: (k-1,) float64 > 0, the a of a (t[i+1] - t[i] - preferred[i])^2 (Paul 2010, 3.3.3).
-        rigid: every gap has exactly its preferred length; stiffness, least and most are ignored.
-        most: (k-1,) float64 seconds >= least, the greatest length of each gap, inf if there is none; None if
-            no gap has one. With it, least and most take precedence over lengths that the document states;
-            otherwise a stated length takes precedence over the least gaps in it.
-    """
-
+    # k sync point names in chronological order, such as ("start", "attackPeak", "relax", "end")
     points: tuple[str, ...]
-    preferred: Float64
-    least: Float64
-    stiffness: Float64
-    rigid: bool = False
+    preferred: Float64  # (k-1,) float64 seconds, the preferred length of each gap
+    least: Float64  # (k-1,) float64 seconds, the least length of each gap
+    stiffness: Float64  # (k-1,) float64 > 0, the a of a (t[i+1] - t[i] - preferred[i])^2 (Paul 2010, 3.3.3)
+    rigid: bool = False  # every gap has exactly its preferred length; stiffness, least and most are ignored
+    # (k-1,) float64 seconds >= least, the greatest length of each gap, inf if there is none; None if no gap
+    # has one. With it, least and most take precedence over lengths that the document states; otherwise a
+    # stated length takes precedence over the least gaps in it.
     most: Float64 | None = None
 
     def __post_init__(self) -> None:

@@ -10,16 +10,11 @@ class BaseVoice(ABC):
 
     Args:
         voice: a voice of its engine: the part after the colon in "espeak:nl". None for the default.
-
-    Attributes:
-        name: the name in the registry of voices, followed by a colon and the voice, if any.
-        engine: the name of the engine, for lists.
-        description: one sentence, for lists.
     """
 
-    name: str
-    engine: str = ""
-    description: str = ""
+    name: str  # the name in the registry of voices, followed by a colon and the voice, if any
+    engine: str = ""  # the name of the engine, for lists
+    description: str = ""  # one sentence, for lists
 
     def __init__(self, voice: str | None = None) -> None:
         if voice:

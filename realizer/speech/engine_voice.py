@@ -27,16 +27,11 @@ CHECKS = 20  # number of checks of a running request within its time limit
 
 @dataclass(frozen=True, slots=True)
 class Engine:
-    """An engine that runs in a process of its own.
+    """An engine that runs in a process of its own."""
 
-    Attributes:
-        name: its name in messages.
-        worker: its file, the first argument of `engine_worker`.
-        install_hint: returns a sentence that says what to install, or None if it is installed.
-    """
-
-    name: str
-    worker: Path
+    name: str  # its name in messages
+    worker: Path  # its file, the first argument of `engine_worker`
+    # returns a sentence that says what to install, or None if it is installed
     install_hint: Callable[[], str | None]
 
 

@@ -118,15 +118,10 @@ OCTAVE = 12.0  # semitones
 
 @dataclass(frozen=True, eq=False)
 class Melody:
-    """Loudness and pitch, `RATE` values a second from the start of the utterance to `CLOSING` after its end.
+    """Loudness and pitch, `RATE` values a second from the start of the utterance to `CLOSING` after it."""
 
-    Attributes:
-        loudness: (n,) 0..1; 1 is the loud parts of the utterance.
-        pitch: (n,) semitones above the utterance's median; interpolated where there is no voice.
-    """
-
-    loudness: Float64
-    pitch: Float64
+    loudness: Float64  # (n,) 0..1; 1 is the loud parts of the utterance
+    pitch: Float64  # (n,) semitones above the utterance's median; interpolated where there is no voice
 
 
 # Results are cached as long as the utterance is in use.

@@ -66,15 +66,11 @@ Part = str | Mark | Break | Tag
 
 @dataclass(frozen=True, slots=True)
 class Script:
-    """A parsed text.
+    """A parsed text."""
 
-    Attributes:
-        parts: text (not empty, blanks collapsed), marks, breaks, and properly nested tags, in order.
-        warnings: sentences about what was ignored.
-    """
-
+    # text (not empty, blanks collapsed), marks, breaks, and properly nested tags, in order
     parts: tuple[Part, ...]
-    warnings: tuple[str, ...] = field(default=())
+    warnings: tuple[str, ...] = field(default=())  # sentences about what was ignored
 
     @property
     def text(self) -> str:

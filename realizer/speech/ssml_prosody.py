@@ -26,17 +26,11 @@ NUMBER = re.compile(r"\s*([+-]?)(\d+(?:\.\d+)?|\.\d+)\s*(%|st|dB|)\s*", re.IGNOR
 
 @dataclass(frozen=True, slots=True)
 class Prosody:
-    """Factors on the voice's own way of speaking; 1 is no change.
+    """Factors on the voice's own way of speaking; 1 is no change."""
 
-    Attributes:
-        rate: 2 is twice as fast.
-        pitch: 2 is an octave higher.
-        volume: of the amplitude; 0 is silent.
-    """
-
-    rate: float = 1.0
-    pitch: float = 1.0
-    volume: float = 1.0
+    rate: float = 1.0  # 2 is twice as fast
+    pitch: float = 1.0  # 2 is an octave higher
+    volume: float = 1.0  # of the amplitude; 0 is silent
 
     def within(self, attributes: Mapping[str, str]) -> Prosody:
         """Return the prosody of a <prosody> element inside this one; unknown values change nothing."""

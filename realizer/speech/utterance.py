@@ -18,45 +18,32 @@ RATES = (1000, 384_000)  # Hz of recordings
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Recording:
-    """Recorded speech. It equals nothing but itself.
+    """Recorded speech. It equals nothing but itself."""
 
-    Attributes:
-        rate: Hz.
-        pcm: (n,) int16 mono.
-        text: the plain text, if known.
-        words, phonemes: in order, in seconds from its start; () if unknown.
-        heard: the phonemes that were recognised in the sound when it arrived, or None.
-    """
-
-    rate: int
-    pcm: Int16
-    text: str | None = None
+    rate: int  # Hz
+    pcm: Int16  # (n,) int16 mono
+    text: str | None = None  # the plain text, if known
+    # words, phonemes: in order, in seconds from its start; () if unknown
     words: tuple[Word, ...] = ()
     phonemes: tuple[Phoneme, ...] = ()
+    # the phonemes that were recognised in the sound when it arrived, or None
     heard: tuple[Phoneme, ...] | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class SpeechRequest:
-    """A text to be spoken by a voice.
+    """A text to be spoken by a voice."""
 
-    Attributes:
-        ssml: the content of <speak>: text with <mark name="x"/> and the SSML elements of the document; the
-            <, > and & of plain text are escaped.
-        marks: names of the marks in the order of the text.
-        language: BCP-47, such as "en-US".
-        voice: name of a voice, or None for the language's default.
-        rate: 1 is the voice's own rate, 2 twice as fast.
-        seconds: wanted duration, or None for the voice's own; handled by `duration_fit`, not by voices.
-        recording: a recording of the text, which is aligned (`speech.align`) instead of synthesizing speech.
-    """
-
+    # the content of <speak>: text with <mark name="x"/> and the SSML elements of the document; the <, > and &
+    # of plain text are escaped
     ssml: str
-    marks: tuple[str, ...] = ()
-    language: str = "en-US"
-    voice: str | None = None
-    rate: float = 1.0
+    marks: tuple[str, ...] = ()  # names of the marks in the order of the text
+    language: str = "en-US"  # BCP-47, such as "en-US"
+    voice: str | None = None  # name of a voice, or None for the language's default
+    rate: float = 1.0  # 1 is the voice's own rate, 2 twice as fast
+    # wanted duration, or None for the voice's own; handled by `duration_fit`, not by voices
     seconds: float | None = None
+    # a recording of the text, which is aligned (`speech.align`) instead of synthesizing speech
     recording: Recording | None = None
 
 
@@ -69,46 +56,32 @@ class Word:
 
 @dataclass(frozen=True, slots=True)
 class Phoneme:
-    """One phoneme.
-
-    Attributes:
-        ipa: "" for a pause.
-        stress: 0 none, 1 primary, 2 secondary.
-        volume: requested factor of the amplitude; 1 is the voice's own.
-    """
+    """One phoneme."""
 
     start: float
     end: float
-    ipa: str
-    stress: int = 0
-    volume: float = 1.0
+    ipa: str  # "" for a pause
+    stress: int = 0  # 0 none, 1 primary, 2 secondary
+    volume: float = 1.0  # requested factor of the amplitude; 1 is the voice's own
 
 
 @dataclass(frozen=True, eq=False)
 class Utterance:
-    """Speech with its times, all in seconds from its start.
+    """Speech with its times, all in seconds from its start."""
 
-    Attributes:
-        duration: seconds; exactly the length of the PCM, if there is any.
-        sample_rate: Hz; 0 if there is no sound (silent voice).
-        pcm: (n,) int16 mono, or None.
-        words, phonemes: in order; phonemes do not overlap.
-        marks: seconds by name.
-        warnings: sentences for the client, such as "the text is empty".
-        stretch: the least and the greatest length, relative to its duration, to which it can be changed;
-            (1, 1) if it cannot.
-        sections: (start, utterance) of the parts it was joined from, if any. While a long text is being
-            synthesized, the duration is an estimate and the sound ends with the last part.
-    """
-
-    duration: float
+    duration: float  # seconds; exactly the length of the PCM, if there is any
+    # words, phonemes: in order; phonemes do not overlap
     words: tuple[Word, ...]
     phonemes: tuple[Phoneme, ...]
-    marks: Mapping[str, float]
-    sample_rate: int = 0
-    pcm: Int16 | None = None
-    warnings: tuple[str, ...] = field(default=())
+    marks: Mapping[str, float]  # seconds by name
+    sample_rate: int = 0  # Hz; 0 if there is no sound (silent voice)
+    pcm: Int16 | None = None  # (n,) int16 mono, or None
+    warnings: tuple[str, ...] = field(default=())  # sentences for the client, such as "the text is empty"
+    # the least and the greatest length, relative to its duration, to which it can be changed; (1, 1) if it
+    # cannot
     stretch: tuple[float, float] = (1.0, 1.0)
+    # (start, utterance) of the parts it was joined from, if any. While a long text is being synthesized, the
+    # duration is an estimate and the sound ends with the last part.
     sections: tuple[tuple[float, Utterance], ...] = ()
 
     @property

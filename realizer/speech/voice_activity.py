@@ -27,21 +27,16 @@ class VoiceActivity:
     """Tells when somebody begins to speak, pauses and ends, whatever the pieces of the sound are.
 
     Sound is a voice where it is louder than the background, which is followed quickly down and slowly up.
-
-    Attributes:
-        rate: Hz of the sound.
-        rest: the samples after the last whole frame.
-        background: root mean square.
-        loud, quiet: frames in a row.
-        speaks: whether somebody speaks.
     """
 
-    rate: int
+    rate: int  # Hz of the sound
+    # the samples after the last whole frame
     rest: Int16 = field(default_factory=lambda: np.zeros(0, np.int16))
-    background: float = field(default_factory=lambda: float(_facts()["background"]))
+    background: float = field(default_factory=lambda: float(_facts()["background"]))  # root mean square
+    # loud, quiet: frames in a row
     loud: int = 0
     quiet: int = 0
-    speaks: bool = False
+    speaks: bool = False  # whether somebody speaks
 
     def add(self, sound: Int16) -> list[Turn]:
         """Return what has happened in the next piece of sound, (n,) mono, in order."""

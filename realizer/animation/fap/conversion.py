@@ -21,15 +21,10 @@ from realizer.tables.mappings import Units
 
 @dataclass(frozen=True, eq=False)
 class FapMapping:
-    """A mapping of AUs to FAPs (Paul 2010, chapter 5).
+    """A mapping of AUs to FAPs (Paul 2010, chapter 5)."""
 
-    Attributes:
-        rows: pieces of the function from each (au, side) of the axis to each FAP.
-        sources: the files that the rows come from; later ones override earlier ones.
-    """
-
-    rows: tuple[AuToFap, ...]
-    sources: tuple[str, ...]
+    rows: tuple[AuToFap, ...]  # pieces of the function from each (au, side) of the axis to each FAP
+    sources: tuple[str, ...]  # the files that the rows come from; later ones override earlier ones
 
     @cached_property
     def matrix(self) -> PiecewiseMatrix:
@@ -57,19 +52,14 @@ Line: TypeAlias = tuple[int, list[tuple[float, float]]]
 
 @dataclass(frozen=True, eq=False)
 class Polylines:
-    """Piecewise linear functions of AUs, up to k for each FAP: slope * au plus a term for each bend.
+    """Piecewise linear functions of AUs, up to k for each FAP: slope * au plus a term for each bend."""
 
-    Attributes:
-        faps: (g,) FAP - 1.
-        units, slopes: (k, g), (k, g, 1) the unit of each polyline, and its slope at 0.
-        bent: (2, b) the indices of the polylines of bends.
-        knots, bends: (b, 1) where they are, and the changes of slope.
-    """
-
-    faps: Index
+    faps: Index  # (g,) FAP - 1
+    # units, slopes: (k, g), (k, g, 1) the unit of each polyline, and its slope at 0
     units: Index
     slopes: Float32
-    bent: Index
+    bent: Index  # (2, b) the indices of the polylines of bends
+    # knots, bends: (b, 1) where they are, and the changes of slope
     knots: Float32
     bends: Float32
 
@@ -100,18 +90,13 @@ class Polylines:
 
 @dataclass(frozen=True, eq=False)
 class PiecewiseMatrix:
-    """The rows of a mapping, prepared for whole arrays.
+    """The rows of a mapping, prepared for whole arrays."""
 
-    Attributes:
-        lines: FAP - 1 -> polylines: what raises each FAP; what lowers it, negated; rotations, which add up. A
-            polyline may both raise and lower.
-        closed: (68,) float32, the greatest value of each FAP, at which a lid is closed.
-        mask: (68,) True where an AU or speech may use the FAP.
-    """
-
+    # FAP - 1 -> polylines: what raises each FAP; what lowers it, negated; rotations, which add up. A polyline
+    # may both raise and lower.
     lines: tuple[Mapping[int, Sequence[Line]], ...]
-    closed: Float32
-    mask: Bool
+    closed: Float32  # (68,) float32, the greatest value of each FAP, at which a lid is closed
+    mask: Bool  # (68,) True where an AU or speech may use the FAP
 
     @classmethod
     def of(cls, rows: Iterable[AuToFap]) -> PiecewiseMatrix:

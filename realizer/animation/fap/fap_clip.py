@@ -14,26 +14,17 @@ from realizer.core.units import frame_count
 
 @dataclass(frozen=True, eq=False)
 class FAPClip:
-    """The contents of a text FAP file.
+    """The contents of a text FAP file."""
 
-    Attributes:
-        name: from the header; without blanks when written.
-        fps: frames a second.
-        values: (n, 68) int32 in each FAP's FAPU, column = FAP - 1; 0 where a frame does not specify the FAP.
-            Columns 0 and 1 are 0.
-        mask: (68,) bool, True where any frame specifies the FAP.
-        visemes: (n, 4) int32: select1, select2, blend, def of FAP 1; zeros unless mask[0].
-        expressions: (n, 6) int32: select1, intensity1, select2, intensity2, init_face, def of FAP 2.
-        notes: deviations of the text from the format, a sentence each.
-    """
-
-    name: str
-    fps: float
+    name: str  # from the header; without blanks when written
+    fps: float  # frames a second
+    # (n, 68) int32 in each FAP's FAPU, column = FAP - 1; 0 where a frame does not specify the FAP. Columns 0
+    # and 1 are 0.
     values: Int32
-    mask: Bool
-    visemes: Int32
-    expressions: Int32
-    notes: tuple[str, ...] = field(default=())
+    mask: Bool  # (68,) bool, True where any frame specifies the FAP
+    visemes: Int32  # (n, 4) int32: select1, select2, blend, def of FAP 1; zeros unless mask[0]
+    expressions: Int32  # (n, 6) int32: select1, intensity1, select2, intensity2, init_face, def of FAP 2
+    notes: tuple[str, ...] = field(default=())  # deviations of the text from the format, a sentence each
 
     @staticmethod
     def of(frames: FAPFrames, fps: float, name: str) -> FAPClip:

@@ -166,17 +166,11 @@ def _frame(mask: Line, values: Line, notes: _Notes) -> _Frame:
 
 @dataclass(frozen=True, eq=False)
 class _Layout:
-    """The columns of the numbers of a frame.
+    """The columns of the numbers of a frame."""
 
-    Attributes:
-        used: the FAPs in the mask.
-        columns: for each number, its FAP, or its column in FAP 1 or 2 (see `COMPOUND`).
-        note: the deviation from the format, or "".
-    """
-
-    used: npt.NDArray[np.intp]
-    columns: npt.NDArray[np.intp]
-    note: str
+    used: npt.NDArray[np.intp]  # the FAPs in the mask
+    columns: npt.NDArray[np.intp]  # for each number, its FAP, or its column in FAP 1 or 2 (see `COMPOUND`)
+    note: str  # the deviation from the format, or ""
 
 
 @lru_cache(maxsize=64)

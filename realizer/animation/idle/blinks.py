@@ -68,20 +68,13 @@ NOTHING = Occasions((), np.zeros(0), ())
 
 @dataclass(frozen=True, eq=False)
 class Blinks:
-    """The blinks in a span of time.
+    """The blinks in a span of time."""
 
-    Attributes:
-        onsets: (b,) float64 seconds.
-        draws: (b,) 0..1, random; a blink is shown if the wanted part of blinks exceeds its draw.
-        keys: (4, b) seconds from the onset: lids begin to move, are closed, begin to open, are open.
-        amounts: (b,) 0..1 how far the lids close.
-        lags: (b,) seconds by which the right lid is later than the left one; if negative, the left one is.
-    """
-
-    onsets: Float64
-    draws: Float64
-    keys: Float64
-    amounts: Float64
+    onsets: Float64  # (b,) float64 seconds
+    draws: Float64  # (b,) 0..1, random; a blink is shown if the wanted part of blinks exceeds its draw
+    keys: Float64  # (4, b) seconds from the onset: lids begin to move, are closed, begin to open, are open
+    amounts: Float64  # (b,) 0..1 how far the lids close
+    # (b,) seconds by which the right lid is later than the left one; if negative, the left one is
     lags: Float64
 
     def only(self, kept: Bool) -> Blinks:

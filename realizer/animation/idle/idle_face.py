@@ -87,19 +87,12 @@ LOOKS = ("listening", "thinking")
 
 @dataclass(frozen=True, eq=False)
 class IdleLayer:
-    """Idle animation in frames.
+    """Idle animation in frames."""
 
-    Attributes:
-        columns: (m,) the columns of lids, head and eyes.
-        values: (m, n) 0..1.
-        face: (f,) the columns of small movements, which yield to others; none at liveliness 0.
-        small: (f, n) 0..1, these movements.
-    """
-
-    columns: tuple[int, ...]
-    values: Float64
-    face: tuple[int, ...]
-    small: Float64
+    columns: tuple[int, ...]  # (m,) the columns of lids, head and eyes
+    values: Float64  # (m, n) 0..1
+    face: tuple[int, ...]  # (f,) the columns of small movements, which yield to others; none at liveliness 0
+    small: Float64  # (f, n) 0..1, these movements
 
     @property
     def areas(self) -> Sequence[tuple[list[int], frozenset[int]]]:

@@ -31,17 +31,13 @@ DRIFT, POSTURE, RHYTHM, BREATH, TONE, SMALL, SWALLOW = 500, 530, 540, 541, 550, 
 
 @dataclass(frozen=True, eq=False)
 class Life:
-    """Slow motion in a span of time.
+    """Slow motion in a span of time."""
 
-    Attributes:
-        face: (f,) the columns beside those of head and eyes; they yield to what a document shows in them.
-        first: the number of the first instant.
-        values, steps: (m + f, k) 0..1 the columns of `Motion` and these at each instant, and their
-            differences to the next one.
-    """
-
+    # (f,) the columns beside those of head and eyes; they yield to what a document shows in them
     face: tuple[int, ...]
-    first: int
+    first: int  # the number of the first instant
+    # values, steps: (m + f, k) 0..1 the columns of `Motion` and these at each instant, and their differences
+    # to the next one
     values: Float64
     steps: Float64
 

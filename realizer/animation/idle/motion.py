@@ -36,33 +36,25 @@ BATCH, CACHED = 8, 512
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Head sway (AU51-56) and eye movements (AU61-64) in a span of time.
+    """Head sway (AU51-56) and eye movements (AU61-64) in a span of time."""
 
-    Attributes:
-        columns: (m,) the columns that move.
-        keys, lengths: (s, k) seconds at which each direction of head rotation reaches its poses, and from
-            each to the next one.
-        poses, steps: (m, k) 0..1: the columns in these poses, and their differences to the next one.
-        way: (m,) the direction of head rotation that moves each column.
-        jumps: (j,) seconds at which saccades start.
-        durations: (j,) seconds of saccades.
-        points, leaps: (e, j) 0..1: the points of fixation, added to the last e columns, and their differences
-            to the one before.
-        aims: (2, j) degrees: the points of fixation, directions as in `SACCADE`.
-        seed, number: of the character, and of the first saccade.
-    """
-
-    columns: tuple[int, ...]
+    columns: tuple[int, ...]  # (m,) the columns that move
+    # keys, lengths: (s, k) seconds at which each direction of head rotation reaches its poses, and from each
+    # to the next one
     keys: Float64
     lengths: Float64
+    # poses, steps: (m, k) 0..1: the columns in these poses, and their differences to the next one
     poses: Float64
     steps: Float64
-    way: Index
-    jumps: Float64
-    durations: Float64
+    way: Index  # (m,) the direction of head rotation that moves each column
+    jumps: Float64  # (j,) seconds at which saccades start
+    durations: Float64  # (j,) seconds of saccades
+    # points, leaps: (e, j) 0..1: the points of fixation, added to the last e columns, and their differences
+    # to the one before
     points: Float64
     leaps: Float64
-    aims: Float64
+    aims: Float64  # (2, j) degrees: the points of fixation, directions as in `SACCADE`
+    # seed, number: of the character, and of the first saccade
     seed: int
     number: int
 

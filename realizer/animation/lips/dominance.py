@@ -29,30 +29,19 @@ STRESS = {0: "none", 1: "primary", 2: "secondary"}
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """The sounds of an utterance in order, without the short pauses between them.
+    """The sounds of an utterance in order, without the short pauses between them."""
 
-    Attributes:
-        begin, end: (m,) float64 seconds.
-        mix: (m, 15) float64, part of each viseme.
-        target: (m, 11) float64 FAPU, the shape of the mouth, with columns as `SHAPE_COLUMNS`.
-        weight: (m, 6) float64, its priority for each of `ARTICULATORS`.
-        vowel: (m,) whether it is a vowel.
-        size: (m,) float64, the part of its shape that it reaches.
-        effort: (m,) float64, factor for the opening of jaw and lips, usually 1.
-        pressure: (m,) float64 0..1, how firmly the lips meet, if it closes them.
-        rest: (m,) whether it is a pause.
-    """
-
+    # begin, end: (m,) float64 seconds
     begin: Float64
     end: Float64
-    mix: Float64
-    target: Float64
-    weight: Float64
-    vowel: Bool
-    size: Float64
-    effort: Float64
-    pressure: Float64
-    rest: Bool
+    mix: Float64  # (m, 15) float64, part of each viseme
+    target: Float64  # (m, 11) float64 FAPU, the shape of the mouth, with columns as `SHAPE_COLUMNS`
+    weight: Float64  # (m, 6) float64, its priority for each of `ARTICULATORS`
+    vowel: Bool  # (m,) whether it is a vowel
+    size: Float64  # (m,) float64, the part of its shape that it reaches
+    effort: Float64  # (m,) float64, factor for the opening of jaw and lips, usually 1
+    pressure: Float64  # (m,) float64 0..1, how firmly the lips meet, if it closes them
+    rest: Bool  # (m,) whether it is a pause
 
 
 class _Row(NamedTuple):

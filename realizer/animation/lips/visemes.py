@@ -77,19 +77,12 @@ class LipShape:
 
 @dataclass(frozen=True, slots=True)
 class Articulation:
-    """One articulation in a phoneme.
+    """One articulation in a phoneme."""
 
-    Attributes:
-        mix: (viseme, part) pairs whose parts add up to 1; () if it has no lip shape.
-        vowel: whether it is a vowel.
-        share: part of the phoneme's time, 0..1.
-        shape: the same for the shapes of `lip_shapes`; differs from `mix` if the sound has its own targets.
-    """
-
-    mix: Mix
-    vowel: bool
-    share: float
-    shape: Mix
+    mix: Mix  # (viseme, part) pairs whose parts add up to 1; () if it has no lip shape
+    vowel: bool  # whether it is a vowel
+    share: float  # part of the phoneme's time, 0..1
+    shape: Mix  # the same for the shapes of `lip_shapes`; differs from `mix` if the sound has its own targets
 
 
 @cache

@@ -18,27 +18,16 @@ class AlignError(RealizerError):
 
 @dataclass(frozen=True, slots=True)
 class Alignment:
-    """The times of words and phonemes in a recording, in seconds from its start.
+    """The times of words and phonemes in a recording, in seconds from its start."""
 
-    Attributes:
-        duration: of the recording.
-        words: in the order of the text; words that were not found have no length.
-        phonemes: with pauses (""), they cover 0..duration without gaps.
-        confidences: 0..1, one for each word.
-        phoneme_confidences: 0..1, one for each phoneme: that of its word; 1 for pauses.
-        confidence: 0..1, of the whole; below 0.5 the recording probably has another text.
-        aligner: "pocketsphinx", "espeak", or "even" if neither is installed and words are spread evenly.
-        warnings: sentences.
-    """
-
-    duration: float
-    words: tuple[Word, ...]
-    phonemes: tuple[Phoneme, ...]
-    confidences: tuple[float, ...]
-    phoneme_confidences: tuple[float, ...]
-    confidence: float
-    aligner: str
-    warnings: tuple[str, ...] = ()
+    duration: float  # of the recording
+    words: tuple[Word, ...]  # in the order of the text; words that were not found have no length
+    phonemes: tuple[Phoneme, ...]  # with pauses (""), they cover 0..duration without gaps
+    confidences: tuple[float, ...]  # 0..1, one for each word
+    phoneme_confidences: tuple[float, ...]  # 0..1, one for each phoneme: that of its word; 1 for pauses
+    confidence: float  # 0..1, of the whole; below 0.5 the recording probably has another text
+    aligner: str  # "pocketsphinx", "espeak", or "even" if neither is installed and words are spread evenly
+    warnings: tuple[str, ...] = ()  # sentences
 
 
 def build(

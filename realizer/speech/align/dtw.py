@@ -20,32 +20,20 @@ SAMPLES = 300  # rows and columns from which the usual difference is computed
 
 @dataclass(frozen=True, eq=False)
 class States:
-    """The expected sounds, in order.
+    """The expected sounds, in order."""
 
-    Attributes:
-        features: (j, d); rows of pauses are ignored.
-        pause: (j,) whether the state is an optional pause, such as the first and the last one.
-        times: (j,) seconds in the reference; for a pause, those of the next state.
-    """
-
-    features: Float64
-    pause: Bool
-    times: Float64
+    features: Float64  # (j, d); rows of pauses are ignored
+    pause: Bool  # (j,) whether the state is an optional pause, such as the first and the last one
+    times: Float64  # (j,) seconds in the reference; for a pause, those of the next state
 
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """The recorded sounds.
+    """The recorded sounds."""
 
-    Attributes:
-        features: (t, d), normalised like those of the states.
-        quiet: (t,) cost of each frame in a pause.
-        usual: the unit of costs: the median difference of a frame and a state.
-    """
-
-    features: Float64
-    quiet: Float64
-    usual: float
+    features: Float64  # (t, d), normalised like those of the states
+    quiet: Float64  # (t,) cost of each frame in a pause
+    usual: float  # the unit of costs: the median difference of a frame and a state
 
 
 def distance(features: Float64, others: Float64) -> Float64:

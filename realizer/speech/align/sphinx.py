@@ -23,14 +23,10 @@ _lock = threading.Lock()  # decoders are not thread-safe
 
 @dataclass(frozen=True, slots=True)
 class AlignedWord:
-    """A word, with its phones as (start, end, ARPABET) in seconds.
-
-    Attributes:
-        score: the mean log likelihood of its frames relative to that of the best phone; 0 is perfect.
-    """
+    """A word, with its phones as (start, end, ARPABET) in seconds."""
 
     phones: tuple[tuple[float, float, str], ...]
-    score: float
+    score: float  # the mean log likelihood of its frames relative to that of the best phone; 0 is perfect
 
 
 def install_hint() -> str | None:

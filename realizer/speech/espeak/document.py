@@ -19,17 +19,12 @@ STOPS = re.compile(r"\.+(?!\w)")
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """The input of espeak-ng.
+    """The input of espeak-ng."""
 
-    Attributes:
-        text: SSML; marks are named m0, m1, ...
-        words: (word, place) with places as espeak-ng counts them: characters of `text` from 1.
-        marks: in the order of the text.
-    """
-
-    text: str
+    text: str  # SSML; marks are named m0, m1, ..
+    # (word, place) with places as espeak-ng counts them: characters of `text` from 1
     words: tuple[tuple[str, int], ...]
-    marks: tuple[PlacedMark, ...]
+    marks: tuple[PlacedMark, ...]  # in the order of the text
 
 
 def write_document(script: Script) -> Document:

@@ -206,18 +206,12 @@ FADE = 0.004  # s, where a sound is cut
 
 @dataclass(slots=True)
 class SpeechBuffer:
-    """The speech so far.
+    """The speech so far."""
 
-    Attributes:
-        pcm: the pieces, `length` samples in all.
-        phonemes: in order; `start` and `end` in samples of the whole.
-        words: first sample, end, text.
-    """
-
-    pcm: list[Int16] = field(default_factory=list)
+    pcm: list[Int16] = field(default_factory=list)  # the pieces, `length` samples in all
     length: int = 0
-    phonemes: list[Sound] = field(default_factory=list)
-    words: list[tuple[int, int, str]] = field(default_factory=list)
+    phonemes: list[Sound] = field(default_factory=list)  # in order; `start` and `end` in samples of the whole
+    words: list[tuple[int, int, str]] = field(default_factory=list)  # first sample, end, text
 
     def add(self, pcm: Int16) -> None:
         """Append a piece of sound."""

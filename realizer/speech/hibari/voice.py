@@ -32,19 +32,12 @@ from realizer.speech.words import PlacedMark, words_in
 
 @dataclass(frozen=True, slots=True)
 class ProsodyRun:
-    """Text with one prosody.
+    """Text with one prosody."""
 
-    Attributes:
-        text: plain; may be empty if the script ends in a pause.
-        words: of the text, in order.
-        prosody: of the text.
-        pause: seconds of silence before it.
-    """
-
-    text: str
-    words: tuple[str, ...]
-    prosody: Prosody = PLAIN
-    pause: float = 0.0
+    text: str  # plain; may be empty if the script ends in a pause
+    words: tuple[str, ...]  # of the text, in order
+    prosody: Prosody = PLAIN  # of the text
+    pause: float = 0.0  # seconds of silence before it
 
 
 def runs(script: Script) -> tuple[tuple[ProsodyRun, ...], tuple[PlacedMark, ...]]:

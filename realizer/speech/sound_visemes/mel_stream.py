@@ -27,17 +27,11 @@ viseme_facts = partial(tables.toml_table, "sound_visemes.toml")
 
 
 class MelFrames(NamedTuple):
-    """Frames, 100 a second; frame k is centred at k x 10 ms.
+    """Frames, 100 a second; frame k is centred at k x 10 ms."""
 
-    Attributes:
-        log: (n, BANDS) logarithm of the power in each band.
-        level: (n,) the loud level until that frame.
-        mean: (n, BANDS) the mean of the speech until that frame, relative to the loud level.
-    """
-
-    log: Float32
-    level: Float32
-    mean: Float32
+    log: Float32  # (n, BANDS) logarithm of the power in each band
+    level: Float32  # (n,) the loud level until that frame
+    mean: Float32  # (n, BANDS) the mean of the speech until that frame, relative to the loud level
 
 
 class MelStream:
