@@ -52,13 +52,16 @@ def edit_face(name: str, folder: Path, port: int, browser: bool) -> None:
 
 async def _serve(settings: Settings, copy: Path, browser: bool) -> None:
     """Serve the page until the command is stopped."""
+    import signal
     import webbrowser
 
-    from realizer.server.serve import Server
+    from realizer.server.serve import Server, wait_for_signal
+
+    ending = wait_for_signal(signal.SIGINT, signal.SIGTERM)
 
     async with Server(settings) as server:
         click.echo(f"{copy}: the copy that is edited")
         click.echo(f"page: {server.page}#face")
         if browser:
             webbrowser.open(f"{server.page}#face")
-        await server.wait_closed()
+        await ending

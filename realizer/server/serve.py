@@ -44,7 +44,7 @@ async def serve(settings: Settings | None = None) -> None:
 
         with _bind_errors(settings):
             workers = await Workers(settings, run_worker).start()
-        ending = _wait_for_signal(signal.SIGINT, signal.SIGTERM)
+        ending = wait_for_signal(signal.SIGINT, signal.SIGTERM)
         try:
             print(*startup_lines(settings, workers.port), sep="\n", flush=True)
             await ending
@@ -53,7 +53,7 @@ async def serve(settings: Settings | None = None) -> None:
         return
     with _bind_errors(settings):
         server = await Server(settings).start()
-    await _serve(server, _wait_for_signal(signal.SIGINT, signal.SIGTERM))
+    await _serve(server, wait_for_signal(signal.SIGINT, signal.SIGTERM))
 
 
 @contextlib.contextmanager
@@ -79,7 +79,7 @@ async def work(settings: Settings, number: int, control: socket.socket) -> None:
         await loop.sock_sendall(control, FAULT + str(error).encode())
         return
     # Before READY, because the parent may terminate a worker that is ready.
-    ending = _wait_for_signal(signal.SIGTERM)
+    ending = wait_for_signal(signal.SIGTERM)
 
     def take() -> None:
         try:
@@ -116,7 +116,7 @@ async def _serve(server: Server, ending: Awaitable[None]) -> None:
         await server.close()
 
 
-def _wait_for_signal(*signals: signal.Signals) -> asyncio.Future[None]:
+def wait_for_signal(*signals: signal.Signals) -> asyncio.Future[None]:
     """Return a future that is done when one of these signals has come; a second one ends the process."""
     loop = asyncio.get_running_loop()
     received: asyncio.Future[None] = loop.create_future()

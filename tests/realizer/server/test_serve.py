@@ -21,7 +21,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from bml_schema.feedback import BlockProgress, SyncPointProgress, parse_feedback
 from realizer.core.settings import Settings, SettingsError
 from realizer.protocol.wire import unpack
-from realizer.server.serve import Server, _wait_for_signal, serve, work
+from realizer.server.serve import Server, wait_for_signal, serve, work
 from realizer.server.session.session import Session
 from tests.programs import SERVE, running
 
@@ -345,7 +345,7 @@ def test_serve_ends_at_a_signal_in_every_event_loop(loop) -> None:
     before = signal.getsignal(signal.SIGTERM)
 
     async def end() -> object:
-        ending = _wait_for_signal(signal.SIGTERM)
+        ending = wait_for_signal(signal.SIGTERM)
         signal.raise_signal(signal.SIGTERM)
         async with asyncio.timeout(10):
             await ending
