@@ -59,11 +59,7 @@ def arkit(frames: AUFrames, mapping: FapMapping | None = None) -> ArkitFrames:
     lips. The rest (speech, FAPs of clients, action units without a shape) is fitted from the remaining FAPs:
     bounded least squares in millimetres at the feature points, with a ridge towards the copied weights. The
     minimum is unique; the alternating direction method of multipliers (Boyd et al. 2011, 5.2) finds it for
-    all frames at once.
-
-    Args:
-        frames: n frames.
-        mapping: from AUs to FAPs; None for the built-in one.
+    all frames at once. Without a mapping from AUs to FAPs, it is the built-in one.
     """
     whole = to_fap(frames, mapping).values
     columns, share, owned = _from_aus(mapping)

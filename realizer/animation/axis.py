@@ -44,7 +44,7 @@ def AU_NAMES() -> tuple[str, ...]:
 
 @lru_cache(maxsize=512)  # more than all AUs and sides
 def au(number: int, side: str = "BOTH") -> tuple[Target, ...]:
-    """Return the columns of one AU; side is LEFT, RIGHT or BOTH (the character's). Midline AUs have one.
+    """Return the columns of one AU, of the character's LEFT or RIGHT side or BOTH; midline AUs have one.
 
     Raises:
         KeyError: if there is no such AU.
@@ -67,11 +67,7 @@ def mask_channel(region: str) -> Target:
 
 
 def mixing_order(number: int) -> Target:
-    """Return the column that holds an AU's position (0..1) in the successive mixer.
-
-    Raises:
-        KeyError: if there is no such AU, or it is a rotation.
-    """
+    """Return the column of an AU's position (0..1) in the successive mixer; KeyError for a rotation."""
     return axis()[f"rank {number}"]
 
 

@@ -167,8 +167,7 @@ def _override(
 ) -> Float64 | None:
     """Blend the channels of the layers FAPS and DIRECT over `values` (c, n), in place.
 
-    Returns:
-        (c, n) 0..1 how far each value was replaced, or None if nowhere.
+    Return (c, n) 0..1 how far each value was replaced, or None if nowhere.
     """
     work.count(len(channels))
     overridden: Float64 | None = None
@@ -188,7 +187,6 @@ def _override(
 
 @cache
 def _sums() -> tuple[bool, ...]:
-    """Return for each column whether channels add up in it."""
     known = tables.by_number()
     aus = [known[int(name.rstrip("LR"))].combine == "sum" for name in AU_NAMES()]
     return (*aus, *(True for _ in range(len(aus), len(axis()))))

@@ -36,7 +36,6 @@ class Gain(NamedTuple):
     curve: str = "smooth"
 
     def shifted(self, seconds: float) -> Gain:
-        """Return the same change, later by `seconds`."""
         return self._replace(begin=self.begin + seconds, end=self.end + seconds)
 
 
@@ -87,7 +86,6 @@ class Channel:
             self.__dict__.update(times=times, values=values)
 
     def shifted(self, seconds: float) -> Channel:
-        """Return the same channel, later by `seconds`."""
         return later((self,), seconds, self.source)[0]
 
     def faded(self, begin: float, end: float) -> Channel:

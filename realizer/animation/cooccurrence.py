@@ -81,7 +81,6 @@ class Bounds:
 
 @lru_cache(maxsize=8)
 def bounds(rules: Rules) -> Bounds:
-    """Return rules as arrays for all action units."""
     opposed = [
         (row, _rows(rule.stronger[0].au, side)[0])
         for rule in rules.rules

@@ -17,10 +17,7 @@ MANY_KEYS = 32
 
 
 def smooth(u: Float64) -> Float64:
-    """Return the minimum-jerk curve from 0 to 1: velocity and acceleration are 0 at both ends.
-
-    Args:
-        u: any shape, 0..1, elapsed part of the time.
+    """Return the minimum-jerk curve from 0 to 1, for 0..1: velocity and acceleration are 0 at both ends.
 
     Source: Flash & Hogan (1985), in one dimension.
     """
@@ -49,18 +46,10 @@ class Samples(NamedTuple):
 
 
 def sample(channels: Sequence[Channel], times: Float64) -> Float64:
-    """Return the value of every channel at every time.
+    """Return the value of every channel, (m, n) float64, at times (n,) in any order.
 
-    Args:
-        channels: m channels.
-        times: (n,) seconds, any order.
-
-    Returns:
-        (m, n) float64: exactly the key's value at a key, 0 outside the keys (with `keeps_last`, the last
-        value after them); of two keys at one time the later counts.
-
-    Raises:
-        KeyError: if a curve is not in `CURVES`.
+    It is exactly the key's value at a key, 0 outside the keys (with `keeps_last`, the last value after them);
+    of two keys at one time the later counts.
     """
     order = np.argsort(times, kind="stable")
     found = samples(channels, times[order])
@@ -77,9 +66,7 @@ def weights(channels: Sequence[Channel], times: Float64) -> Float64:
 def samples(channels: Sequence[Channel], times: Float64) -> Samples:
     """Sample channels at a cost that grows with the frames inside their keys, not with channels x frames.
 
-    Args:
-        channels: m channels.
-        times: (n,) seconds, not falling.
+    Times, (n,), must not fall.
     """
     # By curve; linear channels with many keys apart, together if they share their key times, as lips do.
     groups: dict[tuple[str, int, bool], list[int]] = {}
@@ -232,9 +219,8 @@ STEP = 1e-4
 def crossfade(old: Sequence[Channel], new: Sequence[Channel], now: float) -> tuple[Channel, ...]:
     """Replace channels at `now` without a jump in value or velocity, and return all channels.
 
-    Args:
-        old: the channels of one behaviour; those that were replaced before stay as they are.
-        new: the channels of the same behaviour at other times; they inherit the gains of the old ones.
+    Of the old channels, those that were replaced before stay as they are; the new ones, of the same behaviour
+    at other times, inherit their gains.
     """
     kept = [c for c in old if c.until < float("inf")]
     playing = [c for c in old if c.until == float("inf")]

@@ -43,7 +43,6 @@ class AUFrames:
         )
 
     def part(self, first: int, last: int) -> AUFrames:
-        """Return frames `first` .. `last - 1`."""
         overridden = None if self.overridden is None else self.overridden[first:last]
         return AUFrames(self.times[first:last], self.values[first:last], self.rules, overridden)
 

@@ -9,22 +9,12 @@ from realizer.core.array_types import Float32
 
 
 def poses(frames: AUFrames, inputs: tuple[str, ...], mapping: FapMapping | None = None) -> Float32:
-    """Return the parameters from which a face is drawn, a column for each of `inputs`.
+    """Return the parameters from which a face is drawn, (n, len(inputs)) float32, for names of `axis()`.
 
     Action units and mask channels are 0..1, FAPs are in FAPU. Action units that are not among `inputs` are
     converted to FAPs, as in `to_fap`. An overridden FAP is reduced by the effect of the other action units on
-    it by the mapping, so that the face shows the value that was set.
-
-    Args:
-        frames: n frames.
-        inputs: names of `axis()` (`Face.inputs`).
-        mapping: mapping of AUs to FAPs; None for the built-in one.
-
-    Returns:
-        (n, len(inputs)) float32.
-
-    Raises:
-        KeyError: a name is not in `axis()`.
+    it by the mapping, so that the face shows the value that was set. A name that is not in `axis()` is a
+    KeyError.
     """
     columns = [axis()[name].column for name in inputs]
     count = len(AU_NAMES())

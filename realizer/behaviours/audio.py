@@ -19,17 +19,12 @@ CLIP = "clip:"  # before the id of a clip
 
 
 def recording(name: str, context: PlanningContext) -> Recording:
-    """Return the recording with a name.
-
-    Raises:
-        MediaError: there is none, or it cannot be read.
-    """
+    """Return the recording with a name; raise MediaError if there is none, or it cannot be read."""
     id = _clip(name)
     return media.load(name, context, read_sound) if id is None else _client_clip(id, context)
 
 
 def faults(name: str, context: PlanningContext) -> tuple[Fault, ...]:
-    """Return why a recording cannot be played."""
     id = _clip(name)
     if id is None:
         return media.faults(name, context, read_sound)

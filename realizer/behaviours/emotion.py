@@ -76,7 +76,6 @@ def _timing(feeling: EmotionRequest) -> Timing:
 
 
 def expand(node: Emotion, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
-    """Return channels with the emotion from attackPeak to relax."""
     channels = pose_channels.hold(values_of(node, context), times, node.id)
     return express(channels, context) if _set_of(node, context) == "own" else channels
 
@@ -133,11 +132,7 @@ def values_of(node: Emotion | Mood, context: PlanningContext = NO_MEDIA) -> dict
 
 
 def _set_of(node: Emotion | Mood, context: PlanningContext) -> str:
-    """Return the set of profiles that an element names; a profile file is one of the media folder.
-
-    Raises:
-        MediaError: no such file.
-    """
+    """Return the set of profiles that an element names; a profile file is one of the media folder."""
     name, chosen = split_set(node.profile or "own")
     if is_profile_file(name):
         name = str(media_file(name, context))

@@ -78,7 +78,6 @@ def _rise_and_fall(
 
 
 def _targets(node: Part, context: PlanningContext) -> dict[Target, float]:
-    """Return column -> sustained value."""
     if isinstance(node, FaceFacs):
         return dict.fromkeys(au(node.au, node.side), node.amount)
     return pose_channels.columns(context.library[node.lexeme].aus, node.amount)
@@ -113,7 +112,6 @@ def expression_timing(node: Expression, context: PlanningContext) -> Timing:
 
 
 def expand_expression(node: Expression, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
-    """Return channels with the expression from attackPeak to relax."""
     values = pose_channels.columns(context.library[node.name].aus, node.intensity)
     return express(pose_channels.hold(values, times, node.id), context)
 

@@ -49,7 +49,6 @@ def claims(node: Faps, context: PlanningContext) -> frozenset[str]:
 
 
 def timing_of_file(node: FapFile, context: PlanningContext) -> Timing:
-    """Return the duration of its frames; it can stretch."""
     clip = media.load(node.file_name, context, read)
     length = (len(clip.values) - 1) / clip.fps
     return Timing(("start", "end"), np.array([length]), np.zeros(1), np.array([RECORDED]))

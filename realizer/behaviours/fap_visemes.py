@@ -75,7 +75,6 @@ def _visemes(given: Int32, notes: list[str]) -> tuple[Float64, Float64]:
 
 
 def _expressions(given: Int32, notes: list[str]) -> Float64:
-    """Return (n, 68) FAPs of the expressions."""
     selects = _selects(given[:, [0, 2]], len(_faces()), "FAP 2: wanted expressions", notes)
     parts = _parts(given[:, [1, 3]], "FAP 2: wanted intensities", notes)
     _defines(given[:, 5], "FAP 2: expression_def", notes)

@@ -30,17 +30,14 @@ TURNS = {"eyes": ((61, 62), (63, 64)), "head": ((51, 52), (53, 54))}
 
 @cache
 def facts() -> dict[str, Any]:
-    """Return the content of gaze.toml."""
     return tables.read_toml(tables.text_of(FILE), FILE)
 
 
 def limits(part: str) -> Turn:
-    """Return the maximum yaw and pitch of "eyes" or "head"."""
     return facts()[part]["yaw"], facts()[part]["pitch"]
 
 
 def limited(turn: Turn, maximum: Turn) -> Turn:
-    """Limit a turn to maximum angles."""
     (yaw, pitch), (max_yaw, max_pitch) = turn, maximum
     return max(-max_yaw, min(max_yaw, yaw)), max(-max_pitch, min(max_pitch, pitch))
 
@@ -82,7 +79,6 @@ def angles(target: str, context: PlanningContext) -> tuple[float, float, float]:
 
 
 def is_known(target: str, context: PlanningContext) -> bool:
-    """Return whether a target is a point, a name of the scene, or a direction."""
     return position(target, context) is not None or known_direction(target) is not None
 
 

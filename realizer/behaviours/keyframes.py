@@ -166,14 +166,10 @@ KINDS = (BehaviourKind(FaceKeyframe, timing, expand, check, claims=claims, param
 def document_of(clip: FAPClip, block: str) -> str:
     """Return BML text with the clip as keys, a line each; FAPs are limited to the range of the standard.
 
-    FAPs that the clip defines are held, also at 0. FAP 1 and 2 are left out.
-
-    Args:
-        clip: at least two frames, and at least one FAP from 3 on.
-        block: id of the block; its behaviour `fap` is required.
+    FAPs that the clip defines are held, also at 0. FAP 1 and 2 are left out. The behaviour `fap` is required.
 
     Raises:
-        RealizerError: the clip has nothing to play.
+        RealizerError: fewer than two frames, or no FAP from 3 on.
     """
     columns = np.flatnonzero(clip.mask[2:]) + 2
     if len(clip.values) < 2 or not len(columns):

@@ -27,10 +27,9 @@ DOWN, EYES_UP = 54, 63
 def expand(
     node: Listen, times: Float64, context: PlanningContext, *, quiet: float = 0.0
 ) -> tuple[Channel, ...]:
-    """Return channels of the eyes and of all responses, which depend on the seed and the id."
+    """Return channels of the eyes and of all responses, which depend on the seed and the id.
 
-    Args:
-        quiet: seconds from the start without a response.
+    There is no response in the first `quiet` seconds.
     """
     facts = tables.toml_table("listening.toml")
     start, end = times.tolist()
@@ -48,13 +47,9 @@ def expand(
 def respond(
     name: str, begin: float, size: float, source: str, context: PlanningContext, *, movements: int = 1
 ) -> tuple[Channel, ...]:
-    """Return the channels of one response.
+    """Return the channels of one response: "nod", in which the head moves down so often, "brows" or "smile".
 
-    Args:
-        name: "nod", "brows" or "smile".
-        begin: seconds on the clock of the channels.
-        size: 0..1.
-        movements: how often the head goes down and up in a nod.
+    It begins at `begin` seconds on the clock of the channels; `size` is 0..1.
     """
     row = tables.toml_table("listening.toml")[name]
     if name != "nod":
@@ -106,16 +101,11 @@ SOURCE = "heard"
 def responses(
     known: Iterable[Channel], now: float, context: PlanningContext, *, is_speaking: bool, text: str | None
 ) -> list[Channel]:
-    """Return the channels of responses after news of the other: those that have begun, and new ones.
+    """Return the channels of responses after news of the other: those `known` that have begun, and new ones.
 
     The end of a piece of text calls for a response, by its last character; the end of a turn for a nod.
-    While the other speaks, responses come of themselves too.
-
-    Args:
-        known: the channels of earlier responses.
-        now: seconds on the session clock.
-        is_speaking: whether the other speaks.
-        text: what the other has said since the last news.
+    While the other speaks, responses come of themselves too. `text` is what the other has said since the last
+    news; `now` is on the session clock.
     """
     facts = tables.toml_table("listening.toml")["heard"]
     found = [channel for channel in known if channel.times[0] <= now]

@@ -65,11 +65,7 @@ AT_REST = 0.05
 
 
 def track(target: Target, times: Float64, values: Float64, source: str) -> Channel:
-    """Return a channel with these keys, linear between them; one of a FAP overrides lower layers.
-
-    Args:
-        times: (k,) seconds, rising; values: (k,).
-    """
+    """Return a channel with keys (k,), linear between them; one of a FAP overrides lower layers."""
     ease = min(EASE, float(times[-1] - times[0]) / 2)
     most = AT_REST * float(np.abs(values).max())
     first, last = abs(float(values[0])), abs(float(values[-1]))
@@ -107,14 +103,11 @@ MOST_TURNS = 60  # parts of a hold, between turning points
 
 
 def express(channels: Sequence[Channel], context: PlanningContext) -> tuple[Channel, ...]:
-    """Return the channels of one expression as a living face shows them.
+    """Return the channels of one expression as a living face shows them; unchanged at a liveliness of 0.
 
     The latest AU peaks at attackPeak, the first one begins to fall at relax, and no value grows. Random
-    numbers depend on the seed, the behaviour's id and the AU, so that the same document looks the same.
-
-    Args:
-        channels: with equal keys: start, attackPeak, possibly others, relax, end.
-        context: `liveliness` scales all of it; at 0, the channels are returned as they are.
+    numbers depend on the seed, the behaviour's id and the AU, so that the same document looks the same. All
+    channels have the same keys: start, attackPeak, possibly others, relax, end.
     """
     if not channels or context.liveliness <= 0.0:
         return tuple(channels)
@@ -188,10 +181,7 @@ def _drifting(
 ) -> tuple[Float64, Float64]:
     """Return keys and values, (n, k + count - 1), with turning points in the hold that lower the held value.
 
-    Args:
-        keys, values: (n, k) of each AU.
-        count: of the parts into which turning points divide the hold.
-        depths: (n,) 0..1, scales the drift of each AU.
+    Turning points divide the hold into `count` parts; `depths`, (n,) 0..1, scale the drift of each AU.
     """
     facts, turns = expression_facts()["hold"], np.arange(1, count)
     numbers = id + MOST_TURNS * np.arange(len(keys))[:, None] + turns

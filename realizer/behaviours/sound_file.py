@@ -80,11 +80,7 @@ SUPPORTED = "PCM of 8, 16, 24 or 32 bits, or 32-bit floats"
 # Not the standard library's `wave`: before Python 3.12 it refuses the extensible header, which most programs
 # write for 24 bits, and it cannot read floats.
 def read_wav(content: bytes) -> tuple[int, Int16]:
-    """Return sample rate in Hz and (n,) int16 samples, the mean of all channels.
-
-    Raises:
-        RealizerError: no WAV, or a coding that is not supported.
-    """
+    """Return sample rate in Hz and (n,) int16 samples, the mean of all channels, or raise RealizerError."""
     chunks = dict(reversed(list(_chunks(content))))  # the first of each name counts
     if b"fmt " not in chunks or b"data" not in chunks or len(chunks[b"fmt "]) < 16:
         raise RealizerError("wanted a WAV file with a format and data, got one without")
@@ -120,7 +116,6 @@ def _chunks(content: bytes) -> Iterator[tuple[bytes, bytes]]:
 
 
 def _samples(data: bytes, coding: int, bits: int) -> Float32:
-    """Return samples in 16-bit units."""
     if coding == FLOAT:
         floats = np.frombuffer(data, "<f4")
         scaled: Float32 = np.nan_to_num(np.clip(floats, -1, 1), nan=0.0) * np.float32(32767)

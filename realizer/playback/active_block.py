@@ -109,12 +109,10 @@ class ActiveBlock:
 
     @property
     def is_revoked(self) -> bool:
-        """Whether it ended before it started."""
         return self.state is State.REVOKED
 
     @property
     def is_waiting(self) -> bool:
-        """Whether it has not started yet."""
         return self.state in (State.PENDING, State.LURKING)
 
     @property
@@ -129,7 +127,6 @@ class ActiveBlock:
 
     @property
     def end(self) -> float:
-        """When it ends or was cut off."""
         return self.schedule.end if self.stopped_at is None else self.stopped_at
 
     def words_spoken(self, now: float) -> str | None:
@@ -166,11 +163,9 @@ class ActiveBlock:
         return max([self.not_before, *(wait.until for wait in self.dependencies)])
 
     def refers_to(self, other: ActiveBlock) -> bool:
-        """Return whether it refers to sync points of another block."""
         return any(ref.block == other.block.id for ref in self.external_refs)
 
     def change_state(self, event: BlockEvent) -> None:
-        """Change to the state that follows from an event."""
         self.state = next_state(self.state, event)
 
     def set_order(self) -> None:
@@ -228,17 +223,13 @@ class ActiveBlock:
                 )
 
     def unfinished(self, now: float) -> set[str]:
-        """Return the behaviours whose end has not passed."""
         return {b for b, times in self.schedule.times.items() if self.start + float(times[-1]) > now}
 
     def retime(self, schedule: Schedule, now: float) -> list[str]:
         """Change the times of sync points that have not passed; visible curves continue without a jump.
 
-        Args:
-            schedule: of the same block from the same start; times before `now` are unchanged.
-
-        Returns:
-            The behaviours whose times changed.
+        The schedule is from the same start, and unchanged before `now`. Return the behaviours whose times
+        changed.
         """
         changed = [
             b
@@ -306,15 +297,12 @@ class ActiveBlock:
             self.speech[behaviour] = replace(self.speech[behaviour], utterance=utterance)
 
     def saved(self) -> tuple[Plan, PlanningContext, dict[str, ScheduledSpeech]]:
-        """Return what `update_speech` changes, for `restore`."""
         return self.plan, self.context, dict(self.speech)
 
     def restore(self, saved: tuple[Plan, PlanningContext, dict[str, ScheduledSpeech]]) -> None:
-        """Take back what `update_speech` has changed."""
         self.plan, self.context, self.speech = saved
 
     def _placed(self, behaviour: str, channels: Sequence[Channel]) -> tuple[Channel, ...]:
-        """Return channels of a behaviour on the session clock."""
         return later(channels, self.start, f"{self.block.id}:{behaviour}")
 
     def cut(self, behaviours: Collection[str], now: float, *, ends: bool = False) -> None:
@@ -374,7 +362,6 @@ class ActiveBlock:
             self.channels[behaviour] = tuple(replace(c, gains=(*c.gains, *gains)) for c in own)
 
     def moving_channels(self) -> Iterator[Channel]:
-        """Return its channels that are not base states."""
         return chain.from_iterable(self.channels.values())
 
     def known_motions(self) -> Iterator[KnownMotion]:
@@ -386,5 +373,4 @@ class ActiveBlock:
 
 
 def _moves(channels: Iterable[Channel], now: float) -> bool:
-    """Return whether channels have begun to move."""
     return any(channel.span[0] < now for channel in channels)

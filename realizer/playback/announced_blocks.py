@@ -44,7 +44,6 @@ class AnnouncedBlock:
         return any(name not in self.unstarted for name, _ in block_links.followers(self.block))
 
     def change_state(self, event: BlockEvent) -> None:
-        """Change to the state that follows from an event."""
         self.state = next_state(self.state, event)
 
     def ends(self, other: AnnouncedBlock | ActiveBlock) -> bool:
@@ -54,11 +53,7 @@ class AnnouncedBlock:
 
 
 class AnnouncedBlocks:
-    """The announced blocks of a session, by id, in order of arrival.
-
-    Args:
-        blocks: the accepted blocks of the session.
-    """
+    """The announced blocks of a session, by id, in order of arrival."""
 
     def __init__(self, blocks: BlockStore) -> None:
         self._blocks = blocks
@@ -68,11 +63,9 @@ class AnnouncedBlocks:
         return len(self._announced)
 
     def find(self, id: str) -> AnnouncedBlock | None:
-        """Return the announced block with an id, or None."""
         return self._announced.get(id)
 
     def pop(self, id: str) -> AnnouncedBlock | None:
-        """Remove and return the announced block with an id, or None."""
         return self._announced.pop(id, None)
 
     def add(self, block: Block, character: int) -> AnnouncedBlock | None:
@@ -86,7 +79,6 @@ class AnnouncedBlocks:
         return added
 
     def before(self, announced: AnnouncedBlock) -> list[AnnouncedBlock]:
-        """Return the announced blocks that arrived before one."""
         return [other for other in self._announced.values() if other.number < announced.number]
 
     def is_in_use(self, block: Block, character: int) -> bool:
@@ -95,12 +87,10 @@ class AnnouncedBlocks:
         return other is not None and not AnnouncedBlock(block, character).ends(other)
 
     def blocks_to_end(self, announced: AnnouncedBlock) -> list[ActiveBlock]:
-        """Return the accepted blocks that one interrupts or replaces."""
         active = self._blocks.active()
         return [p for p in active if p.number < announced.number and announced.ends(p)]
 
     def dependencies(self, announced: AnnouncedBlock) -> list[Dependency]:
-        """Return the blocks that one waits for."""
         placed_before = [w for w in announced.dependencies if not w.block.is_done]
         block, active = announced.block, self._blocks.active()
         waits = block_links.dependencies(block, announced.character, announced.number, active)

@@ -31,11 +31,7 @@ class CommandError(Exception):
 
 
 def execute(blocks: Blocks, playing: ActiveBlock, behaviour: str, act: BlockCommand, now: float) -> None:
-    """Execute the command of a behaviour of a playing block.
-
-    Raises:
-        CommandError: it cannot be executed.
-    """
+    """Execute the command of a behaviour of a playing block; raise CommandError if that is impossible."""
     match act:
         case Interrupt():
             _interrupt(blocks, act, now)

@@ -51,10 +51,7 @@ def existing_claims(
 ) -> list[ResourceClaim]:
     """Return the claims that a block of a character gives way to, on the session clock.
 
-    They are those of blocks that play, and of earlier ones that wait and whose start is known.
-
-    Args:
-        number: of the block, by order of arrival.
+    They are those of blocks that play, and of those before `number` that wait and whose start is known.
     """
     gone = {id(p) for p in without}
     return [
@@ -69,7 +66,6 @@ def existing_claims(
 
 
 def all_dependencies(waits: Iterable[Dependency]) -> set[int]:
-    """Return the id() of every direct and indirect dependency."""
     todo = [wait.block for wait in waits]
     visited = {id(p) for p in todo}
     while todo:
@@ -86,9 +82,8 @@ def external_times(
 ) -> Callable[[SyncRef], float | None]:
     """Return a function that maps references into other blocks to seconds from `start`, or None if unknown.
 
-    Args:
-        schedule_of: block id -> its schedule, with `start` on the session clock, or None.
-        fallback: the same for points that the schedule no longer has.
+    `schedule_of` maps a block id to its schedule, with `start` on the session clock; `fallback` does so for
+    points that the schedule no longer has.
     """
 
     def instant(ref: SyncRef) -> float | None:
@@ -140,15 +135,8 @@ def affected_blocks(
 ) -> list[ActiveBlock]:
     """Return the blocks that are solved together with one, by references to sync points that have not passed.
 
-    A block is not solved together with one that it waits for, because both would move later for ever.
-
-    Args:
-        block: a new block, or one whose times have changed.
-        alive: the other playing and waiting blocks.
-        waits: the dependencies of the block.
-
-    Returns:
-        Those of `alive` that are linked to the block, directly or through other blocks, in order.
+    They are those of `alive` that are linked to the block, directly or through other blocks, in order. A
+    block is not solved together with one that it waits for, because both would move later for ever.
     """
     by_id = {p.block.id: p for p in alive if p.start < inf}
     refs_by_block = [
@@ -197,9 +185,8 @@ def _has_passed(ref: SyncRef, playing: ActiveBlock, now: float) -> bool:
 def member(playing: ActiveBlock, origin: float, now: float, *, is_moved: bool = False) -> Member:
     """Return a playing block on the clock of a block that starts at `origin`, with fixed past points.
 
-    Args:
-        is_moved: whether points at `now` may still move if the block has not started. A new block does not
-            move them: what it refers to starts in time.
+    With `is_moved`, points at `now` may still move if the block has not started. A new block does not move
+    them: what it refers to starts in time.
     """
     delay = playing.start - origin
     passed_times: dict[str, dict[str, float]] = {}
@@ -224,15 +211,13 @@ def member(playing: ActiveBlock, origin: float, now: float, *, is_moved: bool = 
 
 
 def anticipators_of(block: Block) -> set[str]:
-    """Return the anticipators that a block refers to."""
     return {ref.behaviour or "" for ref in references(block) if ref.block == ANTICIPATORS}
 
 
 def lead_time(playing: ActiveBlock, id: str, sync: str, now: float) -> float:
     """Return the earliest possible time of an anticipated point, after the least times before it.
 
-    Returns:
-        Seconds on the session clock; `now` if no later sync point refers to the point.
+    It is in seconds on the session clock; `now` if no later sync point refers to the point.
     """
     soonest = now
     for node in playing.block.behaviours:

@@ -35,14 +35,7 @@ ANTICIPATORS = 2_000
 class BlockManager:
     """The blocks of one session, and their pending feedback.
 
-    Args:
-        kinds: tag -> BehaviourKind.
-        veto: (block, its schedule) -> why it is refused, or None.
-
-    Attributes:
-        timeline: when the accepted ones play.
-        blocks: the blocks.
-        reports: pending feedback.
+    `veto` maps a block and its schedule to the reason why it is refused, or None.
     """
 
     def __init__(
@@ -94,11 +87,9 @@ class BlockManager:
             self._revoke(announced, now)
 
     def refuse(self, warning: Warning, character: str | None = None) -> None:
-        """Report a document, block or behaviour that cannot be played."""
         self.reports.warn(warning, character)
 
     def accept(self, block: Block, context: PlanningContext, now: float) -> Schedule:
-        """Plan a block and accept or refuse it."""
         character = self.character_index(block.character_id)
         self.advance(now, starts_before=now)
         self.announce(block, now)
@@ -155,10 +146,8 @@ class BlockManager:
     def advance(self, now: float, starts_before: float = inf) -> None:
         """Process everything that is due, in order, each event at its own time.
 
-        A block that starts at an instant starts after everything that arrives at this instant.
-
-        Args:
-            starts_before: blocks that start then or later do not start yet.
+        Blocks that start at `starts_before` or later do not start yet: one that starts at an instant starts
+        after everything that arrives at this instant.
         """
         for event in work.counted(self.timeline.events.due(now, starts_before), 5):
             self._handle_event(event, self.blocks[event.block])
@@ -170,8 +159,7 @@ class BlockManager:
     def is_idle(self, now: float = -inf) -> bool:
         """Whether nothing plays, waits or is visible, so that a snapshot holds the whole state.
 
-        Args:
-            now: blocks that have ended by then do not count, though they affect idle motion for some seconds.
+        Blocks that have ended by `now` do not count, though they affect idle motion for some seconds.
         """
         seen = any(not playing.is_done or playing.invisible_after > now for playing in self.blocks.all())
         return not (seen or self._announced or self.reports)
@@ -251,14 +239,7 @@ class BlockManager:
         self.reports.add(progress(announced.block, "end", now, announced.state))
 
     def stop(self, now: float, block_ids: Iterable[str] | None = None) -> list[str]:
-        """End blocks gracefully: sound fades, the face relaxes to its base without a jump.
-
-        Args:
-            block_ids: None for all that play or wait.
-
-        Returns:
-            The ids of the blocks that were stopped.
-        """
+        """End blocks, or all; return their ids. Sound fades, the face relaxes to its base without a jump."""
         ids = None if block_ids is None else set(block_ids)
         self.advance(now, starts_before=now)
         stopped = [p for p in self.blocks.active() if ids is None or p.block.id in ids]
@@ -288,9 +269,8 @@ class BlockManager:
     def anticipate(self, id: str, syncs: Mapping[str, float], now: float) -> None:
         """Set the expected times of the points `anticipators:id:sync`; sync points tied to them follow.
 
-        Args:
-            syncs: sync -> seconds on the session clock; a time that is too soon becomes the earliest
-                possible. A point that has passed stays where it was.
+        `syncs` are seconds on the session clock; a time that is too soon becomes the earliest possible. A
+        point that has passed stays where it was.
         """
         self.advance(now, starts_before=now)
         tied = [p for p in self.blocks.active() if p.start < inf and id in anticipators_of(p.block)]
@@ -308,11 +288,7 @@ class BlockManager:
     def update_speech_timing(self, block: str, behaviour: str, utterance: Utterance, now: float) -> bool:
         """Replace an utterance by one with its real timing while it is spoken; the rest of the block follows.
 
-        Args:
-            utterance: the complete utterance. Points that have passed stay where they were.
-
-        Returns:
-            False if the speech neither plays nor waits.
+        Points that have passed stay where they were. Return False if the speech neither plays nor waits.
         """
         self.advance(now, starts_before=now)
         playing = self.blocks.find(block)

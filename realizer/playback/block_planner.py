@@ -58,12 +58,11 @@ def plan(
 
     Args:
         context: with the utterances of the block's speech behaviours.
-        start: when the block starts, seconds on the session clock.
+        start: seconds on the session clock.
         external_times: returns the time of a sync point of another block, in seconds from this block's
             start; None if it is unknown.
         existing_claims: claims of earlier blocks of this character, on the session clock.
-        others: playing blocks that are linked with this one and solved with it, in seconds from this
-            block's start.
+        others: playing blocks that are solved with it, in seconds from this block's start.
         may_stretch: whether the plan may require speech of other lengths.
     """
     builder = _PlanBuilder(block, kinds, context, may_stretch)
@@ -114,7 +113,6 @@ class _PlanBuilder:
         self.trims: dict[tuple[str, str], float] = {}
 
     def add_problems(self) -> None:
-        """Add the warnings of the parser."""
         for problem in self.block.problems:
             of_constraint = "/constraint[" in problem.path
             warning = Warning(problem.id, problem.type, str(problem), constraint=of_constraint)
@@ -262,11 +260,7 @@ class _PlanBuilder:
             raise _NoPlan(lengths=lengths)
 
     def drop(self, warnings: Iterable[tuple[str, Warning]]) -> None:
-        """Drop behaviours and the references to them; each one's warning names both.
-
-        Args:
-            warnings: (behaviour id, warning) of each.
-        """
+        """Drop behaviours, by id, and the references to them; each one's warning names both."""
         dropped = dict(warnings)
         if not dropped:
             return
@@ -286,7 +280,6 @@ class _PlanBuilder:
             self.warnings.append(warning)
 
     def refuse(self, warning: Warning, more: str = "") -> NoReturn:
-        """Refuse the block because a required behaviour or constraint cannot be played."""
         warning = replace(warning, id=self.original.id, text=warning.text + more)
         raise _NoPlan(warnings=(warning,), failed=True)
 
@@ -296,10 +289,8 @@ class _PlanBuilder:
         return behaviour if block == self.original.id else ""
 
     def warning(self, type: str, behaviour: str, text: str) -> Warning:
-        """Return a warning about a behaviour, with its place."""
         return Warning(f"{self.block.id}:{behaviour}", type, self.with_place(behaviour, text))
 
     def with_place(self, behaviour: str, text: str) -> str:
-        """Return a sentence with the place of its behaviour."""
         place = self.original.places.get(behaviour)
         return text if place is None else place.with_place(text)

@@ -56,11 +56,7 @@ class TransitionError(RuntimeError):
 
 
 def next_state(state: State, event: BlockEvent) -> State:
-    """Return the state of a block after an event.
-
-    Raises:
-        TransitionError: the event cannot happen in that state.
-    """
+    """Return the state of a block after an event; raise TransitionError if it cannot happen in that state."""
     try:
         return TRANSITIONS[state, event]
     except KeyError:

@@ -42,7 +42,6 @@ class BlockStore:
         return self.last_number
 
     def add(self, playing: ActiveBlock) -> None:
-        """Add an accepted block."""
         self._blocks[playing.number] = self._active[playing.block.id] = playing
 
     def end(self, playing: ActiveBlock) -> None:
@@ -64,12 +63,10 @@ class BlockStore:
         return gone
 
     def note_revoked(self, id: str) -> None:
-        """Note a block that was ended before it was planned."""
         if not self.has_seen(id):
             self._remember(_revoked(id))
 
     def _remember(self, past: Schedule) -> None:
-        """Store the schedule of an ended block, and drop the oldest ones if there are too many."""
         if (old := self._past.pop(past.block, None)) is not None:
             self._points -= _points(old)
         self._past[past.block] = past
@@ -96,7 +93,6 @@ class BlockStore:
         return self._active.get(id)
 
     def has_seen(self, id: str) -> bool:
-        """Whether there is or was such a block."""
         return self.schedule_of(id) is not None
 
     def schedule_of(self, id: str) -> Schedule | None:
@@ -120,7 +116,6 @@ class BlockStore:
         return list(past.values())[-PAST:], self._anticipated
 
     def restore(self, past: Iterable[Schedule], anticipated: Schedule) -> None:
-        """Restore the schedules of another store's snapshot."""
         self._past = {schedule.block: schedule for schedule in past}
         self._points = sum(map(_points, self._past.values()))
         self._anticipated = anticipated
@@ -134,21 +129,15 @@ class BlockStore:
 
     @property
     def anticipators(self) -> Collection[str]:
-        """The ids of all anticipators, the oldest first."""
         return self._anticipated.points.keys()
 
     def drop_anticipators(self, ids: Collection[str]) -> None:
-        """Drop all points of some anticipators."""
         points = {id: names for id, names in self._anticipated.points.items() if id not in ids}
         times = {id: self._anticipated.times[id] for id in points}
         self._anticipated = replace(self._anticipated, points=points, times=times)
 
     def latest(self, schedule: Schedule, *, whole: bool = False) -> Schedule:
-        """Return the present schedule of a block, given its first schedule.
-
-        Args:
-            whole: as if nothing of it had been cut off.
-        """
+        """Return the present schedule of a block, given its first one; `whole` as if nothing was cut off."""
         playing = next((p for p in self._blocks.values() if p.first_schedule is schedule), None)
         if playing is None:
             return schedule
@@ -165,7 +154,6 @@ def _points(schedule: Schedule) -> int:
 
 
 def _first_schedule(playing: ActiveBlock) -> Schedule:
-    """Return the first schedule of a block, moved to its present start."""
     first = replace(playing.first_schedule, start=playing.start)
     if playing.stopped_at is None:
         return first

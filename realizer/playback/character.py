@@ -50,11 +50,9 @@ class Character:
     heard: VoiceActivity | None = None
 
     def add_shifts(self, shifts: Collection[BaseShift]) -> None:
-        """Add base states, in order of their begin."""
         self.shifts = sorted([*self.shifts, *shifts], key=lambda s: (s.begin, s.end))
 
     def replace_shifts(self, old: Mapping[str, BaseShift], new: Mapping[str, BaseShift]) -> None:
-        """Replace the shifts of some behaviours."""
         replacements = {id(old[name]): shift for name, shift in new.items()}
         shifts = [replacements.get(id(s), s) for s in self.shifts]
         self.shifts = sorted(shifts, key=lambda s: (s.begin, s.end))
@@ -65,20 +63,14 @@ class Character:
         self.shifts = [s for s in self.shifts if id(s) not in gone]
 
     def set_direct(self, values: Mapping[str, float | None], now: float) -> None:
-        """Hold AUs (0..1) and FAPs (FAPU) by name from `now` on; None releases one.
-
-        Raises:
-            KeyError: no such AU or FAP; nothing is changed then.
-        """
+        """Hold AUs (0..1) and FAPs (FAPU) by name; None releases one. A KeyError changes nothing."""
         _hold(self.direct, values, now, Layer.DIRECT, SETTLE)
 
     def set_emotion(self, values: Mapping[str, float], now: float) -> None:
-        """Hold an emotion from `now` on instead of the previous one: AUs (0..1) and FAPs (FAPU) by name.
+        """Hold an emotion instead of the previous one: AUs (0..1) and FAPs (FAPU) by name; {} for none.
 
-        Its layer is that of expressions, below mood, speech, gaze and direct values. {} releases it.
-
-        Raises:
-            KeyError: no such AU or FAP; nothing is changed then.
+        Its layer is that of expressions, below mood, speech, gaze and direct values. A KeyError changes
+        nothing.
         """
         changes = dict.fromkeys(self.emotion) | dict(values)
         _hold(self.emotion, changes, now, Layer.EXPRESSION, RELAX)

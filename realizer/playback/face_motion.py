@@ -30,16 +30,7 @@ NEAR = 5.0  # s
 
 
 class FaceMotion:
-    """The motion of a session's faces.
-
-    Args:
-        options: of idle motion, and the seed.
-        blocks: the blocks.
-        characters: shared with the caller.
-
-    Attributes:
-        rules: of co-occurrence, None if there are none.
-    """
+    """The motion of a session's faces; `rules` of co-occurrence are None if there are none."""
 
     def __init__(self, options: PlayOptions, blocks: BlockStore, characters: Sequence[Character]) -> None:
         self.rules = load_rules(options.cooccurrence)
@@ -56,11 +47,7 @@ class FaceMotion:
         return blend(channels, times, self.rules, idle)
 
     def channels(self, times: Float64, character: int = 0) -> tuple[list[Channel], Idle | None]:
-        """Return all channels that move a face at these times, and possibly more, and its idle motion.
-
-        Args:
-            times: as for `frames`, at least one.
-        """
+        """Return all channels that move a face at these times (at least one), and its idle motion."""
         first, last = float(times[0]), float(times[-1])
         blocks = self._blocks.of_character(character)
         own = self._characters[character].channels()
@@ -126,6 +113,5 @@ def _with_feeling(
 
 
 def _up(frames: AUFrames) -> dict[str, float]:
-    """Return the AUs of the first frame that are not 0."""
     values = zip(AU_NAMES(), frames.aus[0].tolist(), strict=True)
     return {name: round(value, 3) for name, value in values if value > 0.005}

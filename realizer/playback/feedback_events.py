@@ -137,15 +137,12 @@ class Reports:
         return len(self._feedback)
 
     def add(self, feedback: Feedback) -> None:
-        """Add a message."""
         self._feedback.append(feedback)
 
     def warn(self, warning: Warning, character: str | None) -> None:
-        """Add a BML warning."""
         self.add(WarningFeedback(id=warning.id, type=warning.type, text=warning.text, character_id=character))
 
     def take_all(self) -> list[Feedback]:
-        """Remove and return all messages."""
         pending, self._feedback = self._feedback, []
         return pending
 
@@ -166,14 +163,12 @@ class EventQueue:
 
     @property
     def next(self) -> float | None:
-        """The time of the first event, or None."""
         return None if self._first is None else self._first.time
 
     def due(self, now: float, starts_before: float = inf) -> Iterator[Event]:
         """Remove and yield events that are due, in order, with those that are added meanwhile.
 
-        Args:
-            starts_before: blocks that start then or later do not start yet.
+        Blocks that start at `starts_before` or later do not start yet.
         """
         while (first := self._first) is not None and first.time <= now:
             if first.phase is Phase.START and first.time >= starts_before:
@@ -189,11 +184,7 @@ class EventQueue:
             yield first
 
     def add(self, playing: ActiveBlock, only: Collection[tuple[str, str]] | None = None) -> None:
-        """Add the future events of a block instead of those it has.
-
-        Args:
-            only: (behaviour, sync) of its future sync points; None for all.
-        """
+        """Add the future events of a block, or `only` some (behaviour, sync), instead of those it has."""
         number, order = playing.number, playing.order
         due = events(playing.block, playing.schedule, order, number)
         if only is not None:
@@ -217,7 +208,6 @@ class EventQueue:
         return {(e.name, e.sync) for e in self._events.get(playing.number, ()) if e.name}
 
     def drop(self, playing: ActiveBlock) -> None:
-        """Remove all events of a block."""
         if self._events.pop(playing.number, None) is not None:
             self._find_next()
 

@@ -144,11 +144,9 @@ class Player(BlockManager):
         self.timeline.mark_changed()
 
     def hear(self, now: float, *, is_speaking: bool, text: str | None = None, character: int = 0) -> None:
-        """Add the responses of a character to what another one says.
+        """Add the responses of a character to what another one says; it listens while the other still speaks.
 
-        Args:
-            is_speaking: whether the other still speaks: then the character listens.
-            text: the next piece of what the other says, if it is known.
+        `text` is the next piece of what the other says, if it is known.
         """
         from realizer.behaviours.listen import responses  # few characters listen
 
@@ -163,8 +161,7 @@ class Player(BlockManager):
         """Add the responses of a character to the voice of another one.
 
         Args:
-            sound: (n,) the next samples, mono.
-            rate: Hz.
+            sound: (n,) the next samples, mono; `rate` is in Hz.
             is_last: whether no more sound follows.
         """
         from realizer.speech.voice_activity import Turn, VoiceActivity
@@ -186,7 +183,7 @@ class Player(BlockManager):
     def set_emotion(self, values: Mapping[str, float], now: float, character: int = 0) -> None:
         """Hold an emotion, as AUs (0..1) and FAPs (FAPU) by name, instead of the previous one; {} for none.
 
-        It is in the layer of expressions, below speech, gaze and direct values, in whatever order they are
+        Its layer is that of expressions, below speech, gaze and direct values, in whatever order they are
         set.
 
         Raises:
@@ -200,8 +197,7 @@ class Player(BlockManager):
     def due(self, now: float, starts_before: float = float("inf")) -> list[Feedback]:
         """Return feedback that is due, in the order of report, each message once.
 
-        Args:
-            starts_before: blocks that start then or later do not start yet.
+        Blocks that start at `starts_before` or later do not start yet.
         """
         forgettable = now - self.history - RELAX - AFTERMATH
         due = self.timeline.events.next
@@ -239,12 +235,7 @@ class Player(BlockManager):
         return tuple(self._characters)
 
     def restore(self, characters: Iterable[Character], past: Iterable[Schedule], expected: Schedule) -> None:
-        """Restore the state of another player that was idle.
-
-        Args:
-            characters: now belong to this player.
-            past, expected: as of `blocks.snapshot`.
-        """
+        """Restore the state of another player that was idle; `past`, `expected`: as of `blocks.snapshot`."""
         self._characters[:] = characters
         self.blocks.restore(past, expected)
         self.timeline.mark_changed()
@@ -270,11 +261,7 @@ class Player(BlockManager):
         return self._faces.frames(times, character)
 
     def motion(self, times: Float64, character: int = 0) -> tuple[list[Channel], Idle | None]:
-        """Return all channels that move a face at these times, and possibly more, and its idle motion.
-
-        Args:
-            times: as for `frames`, at least one.
-        """
+        """Return all channels that move a face at these times (at least one), and its idle motion."""
         return self._faces.channels(times, character)
 
     @property

@@ -10,7 +10,6 @@ from realizer.core import work
 
 
 def external_refs(block: Block) -> tuple[SyncRef, ...]:
-    """Return the references into other blocks."""
     return tuple(ref for ref in references(block) if ref.block is not None and ref.block != block.id)
 
 

@@ -42,7 +42,6 @@ class ResourceClaim:
     silent_from: float = inf  # when the final silence of its sound begins; infinite without sound
 
     def shifted(self, seconds: float) -> ResourceClaim:
-        """Return the same claim, later by `seconds`."""
         return replace(
             self,
             begin=self.begin + seconds,
@@ -53,8 +52,7 @@ class ResourceClaim:
     def conflicts_with(self, other: ResourceClaim, *, in_silence: bool = True) -> bool:
         """Return whether one of the two has to be dropped.
 
-        Args:
-            in_silence: whether a speech may begin in the final silence of another speech of its block.
+        With `in_silence`, a speech may begin in the final silence of another speech of its block.
         """
         if self.resource != other.resource:
             return False

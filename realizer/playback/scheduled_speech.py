@@ -35,11 +35,9 @@ class ScheduledSpeech:
         return self.until > self.start
 
     def is_complete(self, now: float) -> bool:
-        """Whether all of it has been heard."""
         return min(self.until, now) >= self.start + self.utterance.duration - HEARD
 
     def words(self, now: float) -> list[str]:
-        """Return the words that have been heard completely."""
         until = min(self.until, now) - self.start + HEARD
         return [word.text for word in self.utterance.words if word.end <= until]
 
@@ -49,10 +47,7 @@ CUT = 0.04  # s
 
 
 def render_utterance(speaking: ScheduledSpeech, rate: int) -> Float32:
-    """Return (n,) float32 samples of an utterance with sound, cut off and faded if it was stopped.
-
-    Films and streams both use it.
-    """
+    """Return (n,) float32 samples of an utterance with sound, cut off and faded if it was stopped."""
     utterance = speaking.utterance
     assert utterance.pcm is not None
     pcm = resample(utterance.pcm, utterance.sample_rate, rate)

@@ -43,7 +43,6 @@ def synthesize(requests: Mapping[str, SpeechRequest], voice: Voice) -> dict[str,
 
 
 def without_stretch(utterance: Utterance) -> Utterance:
-    """Return an utterance that cannot be stretched."""
     return replace(utterance, stretch=(1.0, 1.0))
 
 

@@ -38,18 +38,7 @@ class Arrival:
 
 
 class BlockTimeline:
-    """When accepted blocks play.
-
-    Args:
-        kinds: tag -> BehaviourKind.
-        characters: the blocks change their base states; shared with the caller.
-
-    Attributes:
-        version: increases whenever visible motion changes.
-        blocks: the blocks.
-        events: their future events.
-        reports: pending feedback.
-    """
+    """When accepted blocks play; it changes the base states of the characters."""
 
     def __init__(self, kinds: Mapping[str, BehaviourKind], characters: Sequence[Character]) -> None:
         self.kinds = kinds
@@ -78,8 +67,7 @@ class BlockTimeline:
         Conflicts with blocks that wait are resolved when it starts, because they may still move.
 
         Args:
-            waits: its dependencies.
-            ended: the blocks that it ends.
+            waits, ended: the blocks that it waits for, and those that it ends.
             alone: sync points of other blocks are fixed.
             starts: whether its start event is due.
             may_stretch: whether the plan may require speech of other lengths.
@@ -131,7 +119,6 @@ class BlockTimeline:
         return after_interrupts(block_links.existing_claims(character, number, alive, without), promised)
 
     def _conflict(self, blocks: Sequence[ActiveBlock], schedules: Sequence[Schedule]) -> bool:
-        """Whether blocks with new times would conflict with the claims of the others."""
         for playing, schedule in zip(blocks, schedules, strict=True):
             at = replace(schedule, start=playing.start)
             active = self.blocks.active()
@@ -141,18 +128,13 @@ class BlockTimeline:
         return False
 
     def place(self, playing: ActiveBlock) -> None:
-        """Schedule the base states and events of a block with a new start."""
         self.characters[playing.character].add_shifts(playing.shifts.values())
         if playing.start < inf:
             self.events.add(playing)
             self.mark_changed()
 
     def reorder(self, playing: ActiveBlock) -> None:
-        """Order a waiting block and its followers after the blocks that they wait for.
-
-        Raises:
-            graphlib.CycleError: blocks wait for each other.
-        """
+        """Order a waiting block and its followers after the blocks that they wait for, or raise CycleError."""
         graph: TopologicalSorter[ActiveBlock] = TopologicalSorter({playing: ()})
         todo, visited = deque([playing]), {playing}  # there may be many paths to a block
         while todo:
@@ -182,8 +164,7 @@ class BlockTimeline:
     def move(self, playing: ActiveBlock, now: float, *, after: str = "") -> bool:
         """Move a waiting block to its earliest start; return False if nothing changes.
 
-        Args:
-            after: id of the dependency that has moved; its points are fixed.
+        `after` is the id of the dependency that has moved; its points are fixed.
         """
         start = playing.earliest
         named = {ref.block for ref in playing.external_refs}
@@ -286,13 +267,10 @@ class BlockTimeline:
             self.update_followers(playing, now)
 
     def trim(self, ends: Mapping[tuple[str, str], float], now: float) -> None:
-        """Cut the closing silence of speeches that play.
+        """Cut the closing silence of speeches that play; `ends` are seconds on the session clock.
 
         A speech stays as it is if its end has a stated time, or if other blocks refer to its end: what speaks
         in its silence must not move with it.
-
-        Args:
-            ends: (block, behaviour) -> its new end, seconds on the session clock.
         """
         for (block, behaviour), end in ends.items():
             playing = self.blocks.find(block)
@@ -345,10 +323,8 @@ class BlockTimeline:
     def stop(self, playing: ActiveBlock, now: float, others: Collection[ActiveBlock] = ()) -> None:
         """Cut a block off at `now`: what plays relaxes, what waits is cancelled, and its end is reported.
 
-        Blocks that wait and refer to one that has not started are planned again, without these references.
-
-        Args:
-            others: blocks that are stopped with it.
+        Blocks that wait and refer to one that has not started are planned again, without these references;
+        not `others`, which are stopped with it.
         """
         bereft = [] if playing.has_begun else self._waiting_for_points_of(playing, others)
         tied = self.linked_blocks(playing, now) if playing.start < inf else []
@@ -402,7 +378,6 @@ class BlockTimeline:
         self.reports.add(prediction(playing.block, schedule, playing.state, predicted))
 
     def mark_changed(self) -> None:
-        """Note that visible motion has changed."""
         self.version += 1
 
     def _withdraw_shifts(self, playing: ActiveBlock, behaviours: Iterable[str], now: float) -> None:

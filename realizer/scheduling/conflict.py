@@ -24,9 +24,9 @@ class LengthBound:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """One inequality of a cycle: time[v] >= time[u] + seconds.
+    """One inequality of a cycle: time[v] >= time[u] + seconds; a bound (the earliest start) has u = ORIGIN.
 
-    `order` is its relation, None for a gap or a bound; a bound (the earliest start) has u = ORIGIN.
+    `order` is its relation, None for a gap or a bound.
     """
 
     u: int
@@ -52,16 +52,11 @@ class Conflict:
 
     @property
     def statements(self) -> int:
-        """The number of statements in the conflict."""
         return len(self.relations) + len(self.gaps) + (self.earliest is not None)
 
 
 class ConstraintGraph:
-    """A graph of the equalities of a problem, for searching the shortest chains.
-
-    Args:
-        contradicting: numbers of equalities that are left out.
-    """
+    """A graph of equalities, apart from some (by number), for searching the shortest chains."""
 
     def __init__(self, problem: Problem, contradicting: Iterable[int] = ()) -> None:
         self.problem = problem
@@ -87,7 +82,6 @@ class ConstraintGraph:
         return _conflict(self.problem, relations, links)
 
     def _chain(self, begin: int, end: int) -> list[Relation]:
-        """Return the fewest equalities that connect one point to another."""
         previous: dict[int, tuple[int, Relation] | None] = {begin: None}
         queue = deque([begin])
         while queue and end not in previous:
@@ -106,7 +100,6 @@ class ConstraintGraph:
 
 
 def conflict_of(problem: Problem, steps: Iterable[Relation | Link]) -> Conflict:
-    """Return the conflict of the steps of a cycle."""
     steps = list(steps)
     links = [step for step in steps if isinstance(step, Link)]
     relations = [step if isinstance(step, Relation) else step.order for step in steps]
@@ -168,7 +161,6 @@ def choose(clash: Conflict) -> Part | None:
 
 
 def warning_of(clash: Conflict, dropped: Part) -> Warning:
-    """Return the warning about a dropped part."""
     name = dropped.name or "a constraint"
     if dropped.is_constraint:
         name = f"constraint {dropped.name}" if dropped.name else "a constraint without an id"
@@ -180,7 +172,6 @@ def warning_of(clash: Conflict, dropped: Part) -> Warning:
 
 
 def refusal(block: str, clash: Conflict) -> Warning:
-    """Return the warning about a block in which all parts of a conflict are required."""
     text = f"{in_words(clash)}, and all of this is required"
     return Warning(block, IMPOSSIBLE, text, clauses(clash))
 
@@ -202,7 +193,6 @@ def in_words(clash: Conflict) -> str:
 
 
 def clauses(clash: Conflict) -> tuple[Clause, ...]:
-    """Return the conflict as single clauses."""
     return tuple(dict.fromkeys(clause for _, clause in _clauses(clash)))
 
 

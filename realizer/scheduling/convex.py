@@ -24,10 +24,7 @@ RESTS = 1e-11
 
 @dataclass(slots=True, eq=False)
 class Quadratic:
-    """Minimise the sum of stiffness * (x[j] - x[i] - wanted)^2 where x[v] - x[u] >= w.
-
-    There are `size` unknowns, of which x[0] is 0.
-    """
+    """Minimise the sum of stiffness * (x[j] - x[i] - wanted)^2 where x[v] - x[u] >= w; x[0] is 0."""
 
     size: int
     i: Index
@@ -43,10 +40,10 @@ class Quadratic:
 def feasible_start(
     quadratic: Quadratic, start: Float64, slack: float = LOOSE
 ) -> tuple[Float64, list[int] | None]:
-    """Return the least x from a start on that satisfies every inequality within the slack.
+    """Return the least x from a start on that satisfies every inequality within the slack, and None.
 
-    Returns:
-        x and None; or an arbitrary x, and the numbers of inequalities that form a cycle of positive length.
+    If there is none, return an arbitrary x, and the numbers of inequalities that form a cycle of positive
+    length.
     """
     work.count(len(quadratic.u) // 2)
     u, v, w = quadratic.u, quadratic.v, quadratic.w
@@ -158,8 +155,7 @@ def _cost(quadratic: Quadratic, x: Float64) -> float:
 def _bound(quadratic: Quadratic, binding: Bool, x: Float64) -> tuple[Float64, Float64]:
     """Solve least squares with the active inequalities as equalities; free directions stay near x.
 
-    Returns:
-        x, and the force of each inequality: positive if it pushes, negative if it should be inactive.
+    Return x, and the force of each inequality: positive if it pushes, negative if it should be inactive.
     """
     m = quadratic.size
     work.count(m)

@@ -89,7 +89,6 @@ class ConstraintNetwork:
                 queue.extend(self._out[step.v])
 
     def edges_of(self, points: Iterable[int]) -> list[Edge]:
-        """Return the inequalities of some points, each once."""
         return list(dict.fromkeys(edge for p in points for edge in (*self._out[p], *self._in[p])))
 
     def _cycle(self, last: Edge) -> list[Edge]:

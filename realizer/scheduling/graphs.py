@@ -21,7 +21,6 @@ class UnionFind:
         self.shift = [0.0] * n
 
     def find(self, i: int) -> int:
-        """Return the root of i's class."""
         parent = self.parent
         root = parent[i]
         if parent[root] == root:
@@ -38,11 +37,7 @@ class UnionFind:
         return i
 
     def tie(self, u: int, v: int, seconds: float) -> float:
-        """Tie two points: time[u] = time[v] + seconds.
-
-        Returns:
-            0.0; or, if u and v were tied already, the difference to their present distance.
-        """
+        """Tie points: time[u] = time[v] + seconds; return the misfit if they were tied already, else 0."""
         parent = self.parent
         a, b = parent[u], parent[v]
         if parent[a] != a:
@@ -64,15 +59,11 @@ Edge = tuple[int, int, float]
 
 
 def longest_path_levels(level: list[float], edges: Sequence[Edge], slack: float) -> list[int] | None:
-    """Raise levels in place, as little as possible, until each edge is satisfied.
+    """Raise levels in place, as little as possible, until all edges have level[v] + slack >= level[u] + w.
 
-    An edge (u, v, w) is satisfied if level[v] + slack >= level[u] + w.
-
-    This is Bellman-Ford's longest path from the given levels. It takes one sweep if the edges come in the
-    order of the paths, so pass them sorted by the approximate final level of their tails.
-
-    Returns:
-        None; or, if there is no end, the numbers of edges that form a cycle of positive length, in order.
+    This is Bellman-Ford's longest path from the given levels. It takes one sweep if the edges (u, v, w) come
+    in the order of the paths, so pass them sorted by the approximate final level of their tails. Return None;
+    or, if there is no end, the numbers of edges that form a cycle of positive length, in order.
     """
     cause: dict[int, int] = {}
     sweep = 0

@@ -19,10 +19,7 @@ from realizer.scheduling.rigid_clusters import RigidClusters
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Clusters that cannot slide apart, with the orders that connect them.
-
-    `held`: they cannot slide without limit, because some of them are tied to fixed times.
-    """
+    """Clusters that cannot slide apart, with the orders that connect them."""
 
     clusters: list[int]
     orders: list[Relation]
@@ -99,14 +96,12 @@ class _GroupProblem:
     starts: Index
 
     def start(self, clusters: RigidClusters) -> Float64:
-        """Return the present positions of the clusters, (size,)."""
         start = np.zeros(self.quadratic.size)
         nodes = np.flatnonzero(self.number)
         start[self.number[nodes]] = clusters.at[nodes]
         return start
 
     def link(self, model: Model, k: int) -> Link:
-        """Return inequality k in terms of the problem."""
         if k < len(self.gaps):
             p = int(model.gap[self.gaps[k]])
             return Link(p, p + 1, float(model.least[self.gaps[k]]))
@@ -127,9 +122,8 @@ def solve_groups(
 ) -> list[list[Link]]:
     """Move the points of some groups, in place, to the least cost within gaps and orders.
 
-    Returns:
-        Cycles of inequalities if there is no solution, and no point is moved then: one for each infeasible
-        group, or without `find_all` a single one.
+    If there is no solution, no point is moved. Return cycles of inequalities then: one for each infeasible
+    group, or without `find_all` a single one.
     """
     # A group that can slide is moved so that its class of node 0 is at 0.
     begin = np.zeros(len(clusters.label))
@@ -153,10 +147,7 @@ def solve_groups(
 def _feasible(
     model: Model, clusters: RigidClusters, groups: Sequence[Group]
 ) -> tuple[_GroupProblem, Float64, list[Link]]:
-    """Return the problem of some groups, some least gaps dropped, and positions that satisfy it.
-
-    If there are none, return a cycle of inequalities as well.
-    """
+    """Return the problem of some groups, some least gaps dropped, and positions; or a cycle of inequalities."""
     while True:
         problem = _group_problem(model, clusters, groups)
         level, cycle = feasible_start(problem.quadratic, problem.start(clusters))

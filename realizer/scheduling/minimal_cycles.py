@@ -65,11 +65,9 @@ class _StepGraph:
         self._known: list[list[Step] | None] = [None] * n
 
     def back_to(self, start: int, statements: int, steps: int) -> tuple[list[Step], int]:
-        """Return the positive cycle through a point with the fewest statements, up to a maximum.
+        """Return the positive cycle through a point with the fewest statements, and the number of steps tried.
 
-        Returns:
-            The steps, [] if there is no such cycle or the search takes too many steps; and the number of
-            steps tried.
+        It is [] if there is none of so few statements, or if the search takes too many steps.
         """
         best, layer = [-np.inf] * len(self._least), {start: 0.0}
         best[start] = 0.0

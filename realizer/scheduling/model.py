@@ -116,15 +116,10 @@ def model_of(problem: Problem) -> Model | list[int]:
 
 
 def drop_least_gaps(least: list[float], points: Iterable[tuple[int, tuple[int, float]]]) -> bool:
-    """Drop the least gaps of a behaviour, in place, within a shorter length that the document states.
+    """Drop least gaps of a behaviour, in place, within a shorter stated length; return whether there were any.
 
-    Args:
-        least: of each gap.
-        points: (place in the behaviour, (root, shift)) of its points in order; those that no equality names
-            may be left out.
-
-    Returns:
-        Whether any was dropped.
+    `points` are (place in the behaviour, (root, shift)) in order; those that no equality names may be left
+    out.
     """
     changed = False
     seen: dict[int, tuple[int, float]] = {}

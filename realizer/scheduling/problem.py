@@ -139,10 +139,9 @@ def problem_of(
 ) -> Problem:
     """Return the problem of one or more blocks.
 
-    Args:
-        members: the new block first; messages name the behaviours of the others with their block.
-        outside: a reference into a block that is no member, with its offset -> seconds on the members' clock,
-            or None.
+    `members` has the new block first; messages name the behaviours of the others with their block. `outside`
+    maps a reference into a block that is no member, with its offset, to seconds on the members' clock, or
+    None.
     """
     problem, own = Problem(), members[0].block.id
     first: dict[tuple[str, str], int] = {}
@@ -207,7 +206,6 @@ def _pass(
     points: tuple[str, ...],
     when: Mapping[str, float],
 ) -> None:
-    """Fix the points that have passed, and bound the next point by the present."""
     later = False
     for i, sync in enumerate(points):
         if sync in when:
@@ -317,10 +315,7 @@ class _ReferenceResolver:
         return float(time)
 
     def point(self, ref: SyncRef, late: float = 0.0) -> tuple[int, float] | None:
-        """Return the point of a reference, or None if its behaviour is absent.
-
-        Args:
-            late: seconds by which points of other blocks are taken as later.
+        """Return the point of a reference, those of other blocks `late` seconds later; None if it is absent.
 
         Raises:
             LookupError: there is no such sync point; the message has the existing ones.

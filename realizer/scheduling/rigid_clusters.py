@@ -76,7 +76,6 @@ def attach(
     """Attach behaviours to each other at their preferred lengths.
 
     Args:
-        size: number of behaviours.
         knots: of each tied point its behaviour, the root of its class, and the seconds from that root to the
             first point of the behaviour.
 
@@ -157,15 +156,12 @@ def _each(numbers: Index, size: int) -> Index:
 def least_squares(
     i: Index, j: Index, wanted: Float64, stiffness: Float64, fixed: Bool, x: Float64
 ) -> Float64:
-    """Return x that minimises the sum of stiffness * (x[j] - x[i] - wanted)^2.
+    """Return x, (m,), that minimises the sum of stiffness * (x[j] - x[i] - wanted)^2 over s springs.
 
     Args:
-        i, j: (s,) the two nodes of each spring. wanted, stiffness: (s,).
+        i, j, wanted, stiffness: (s,) the two nodes of each spring, its length and stiffness.
         fixed: (m,) bool; at least one node of each set that springs connect.
         x: (m,) the positions of the fixed nodes.
-
-    Returns:
-        (m,) float64.
     """
     free = np.flatnonzero(~fixed)
     n = len(free)

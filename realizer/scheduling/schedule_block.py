@@ -57,19 +57,16 @@ def schedule_together(
     outside: Callable[[SyncRef], float | None] = lambda ref: None,
     grace: float = 0.0,
 ) -> list[Schedule]:
-    """Return the sync times of a new block and of playing blocks, solved together.
+    """Return the sync times of a new block and of playing blocks, solved together, each from its own start.
 
     Behaviours that would have to start before their block, because a point of another block that they refer
     to has just passed, start as soon as they can and keep their lengths, if that is within `grace`. If not,
-    they are late by `grace` and shorter, or dropped if that is not enough.
+    they are late by `grace` and shorter, or dropped if that is not enough. If the new block fails, only its
+    own schedule is returned.
 
     Args:
         members: the new block first; past points of the others are fixed, all else may move.
         outside: a reference into a block that is no member -> seconds on the members' clock.
-        grace: seconds.
-
-    Returns:
-        A schedule for each member, from its own start. If the new block fails, only its own.
     """
     new = members[0].block
     problem = problem_of(members, outside)
@@ -191,8 +188,7 @@ def _lateness(problem: Problem, block: str) -> dict[str, float]:
 def _room(outcome: _Outcome, group: Sequence[int | None], free: Collection[int]) -> dict[int, float]:
     """Return by how many seconds each free group, which nothing keeps from starting earlier, can be later.
 
-    Args:
-        group: (behaviours,) the group of each behaviour of the outcome; None for those of no group.
+    `group` has the group of each behaviour of the outcome, or None.
     """
     assert outcome.solution is not None
     time, orders = outcome.solution.time, list[tuple[int, int | None, float]]()
@@ -220,7 +216,6 @@ def _with_lateness(warning: Warning, late: float, grace: float) -> Warning:
 
 
 def _attempt(problem: Problem, block: str) -> Solution | list[tuple[Part, Warning]] | Warning:
-    """Return the solution, or the parts to drop with their warnings, or the warning of a failed block."""
     if problem.faults:
         required = next((fault for fault in problem.faults if fault[0].required), None)
         if required is not None:

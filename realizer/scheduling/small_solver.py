@@ -98,7 +98,6 @@ def solve_small(problem: Problem) -> tuple[list[float], float] | None:
 
 
 def _fits(at: list[float], own: TimingArrays) -> bool:
-    """Return whether a behaviour's gaps are within their bounds."""
     for begin, end, least in zip(at, at[1:], own.least, strict=False):
         if end - begin < least - TIGHT or end < begin:
             return False

@@ -82,8 +82,7 @@ def _all_conflicts(problem: Problem) -> list[Conflict]:
 def _keep_inequalities(model: Model, clusters: RigidClusters, find_all: bool) -> list[list[Link]]:
     """Solve, in place, the groups of clusters that violate an inequality which sliding cannot satisfy.
 
-    Returns:
-        Cycles of inequalities if there is no solution: of each group, or without `find_all` a single one.
+    If there is no solution, return cycles of inequalities: of each group, or without `find_all` a single one.
     """
     at, label = clusters.at, clusters.label
     length = at[model.gap + 1] - at[model.gap]

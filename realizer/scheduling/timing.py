@@ -72,7 +72,6 @@ class Timing:
 
     @cached_property
     def arrays(self) -> TimingArrays:
-        """The same values as plain floats."""
         slack = np.ones(len(self.points) - 1) if self.rigid else 1.0 / self.stiffness
         fits = bool((self.preferred >= np.maximum(self.least, 0.0)).all())
         if self.most is not None:

@@ -21,10 +21,7 @@ NEAR = 0.006
 def speak_to_length(voice: Voice, request: SpeechRequest) -> Utterance:
     """Synthesize speech that lasts `request.seconds`, if set, by choosing a rate and then resampling.
 
-    A recording (`request.recording`) keeps its length.
-
-    Raises:
-        VoiceError: as `voice.say`.
+    A recording (`request.recording`) keeps its length. It raises VoiceError as `voice.say`.
     """
     if request.recording is not None:
         from realizer.speech.recorded.recorded_speech import utterance_of
@@ -34,11 +31,7 @@ def speak_to_length(voice: Voice, request: SpeechRequest) -> Utterance:
 
 
 def silent_fallback(request: SpeechRequest, fault: VoiceError | str) -> Utterance:
-    """Return the silent voice's utterance of a request that another voice failed, with a warning.
-
-    Raises:
-        VoiceError: if the text is too long.
-    """
+    """Return the silent voice's utterance of a request that another voice failed, with a warning."""
     from realizer.speech.silent import SilentVoice
 
     made = speak_to_length(SilentVoice(), request)
@@ -74,11 +67,7 @@ def _synthesize(voice: Voice, request: SpeechRequest) -> Utterance:
 
 
 def stretched(utterance: Utterance, times: Mapping[str, float]) -> Utterance:
-    """Return the utterance resampled so that its end and marks have given times; it cannot stretch again.
-
-    Args:
-        times: seconds from its start for "end" and marks.
-    """
+    """Return the utterance with its end and marks at given seconds; it cannot stretch again."""
     was = {**utterance.marks, "end": utterance.duration}
     knots = sorted((was[name], time) for name, time in times.items() if name in was)
     source, target = (np.array([0.0, *side]) for side in zip(*knots, strict=True))

@@ -38,10 +38,8 @@ class Engine:
 class EngineProcess:
     """A process that starts with the first request and serves one at a time; thread-safe.
 
-    Args:
-        engine: the engine to run.
-        options: further arguments of its process.
-        limit: seconds after which a request is cancelled and the process is replaced.
+    `limit` is in seconds, after which a request is cancelled and the process is replaced; `options` are
+    further arguments of the process.
     """
 
     def __init__(self, engine: Engine, options: tuple[str, ...] = (), limit: float = 30.0) -> None:
@@ -56,7 +54,6 @@ class EngineProcess:
 
     @property
     def pid(self) -> int | None:
-        """The process's id, or None if it is not running."""
         running = self._running
         return None if running is None else running.process.pid
 
@@ -165,7 +162,6 @@ class _Running:
             self._deadline = float("inf")
 
     def end(self) -> None:
-        """Kill the process and close its pipes."""
         self._ended.set()
         self.process.kill()
         self.process.wait()
@@ -200,12 +196,7 @@ class EngineVoice(BaseVoice):
     """A voice whose engine runs in a process of its own; the same request gives the same samples.
 
     Thread-safe. The process starts with the first request; if it dies, that request fails with VoiceError and
-    the next one starts it again.
-
-    Args:
-        voice: one of the engine's voices, or None for its default.
-        limit: greatest duration of one request to the engine, in seconds.
-        options: for the worker process.
+    the next one starts it again. `limit` is the greatest duration of one request to the engine, in seconds.
     """
 
     worker: ClassVar[Engine]
@@ -235,7 +226,6 @@ class EngineVoice(BaseVoice):
 
     @property
     def pid(self) -> int | None:
-        """The id of the engine's process, or None if it is not running."""
         return self._process.pid
 
     def _speak(self, request: SpeechRequest) -> Utterance:

@@ -27,7 +27,6 @@ PATIENCE = 5.0  # s between checks whether the parent is alive
 
 
 def answer(engine: Any, request: dict[str, Any], out: int, last: bool = False) -> None:
-    """Serve one request and write the whole answer."""
     try:
         head, body = engine.operations[request["op"]](request)
     except Exception as error:
@@ -80,7 +79,6 @@ def serve_in_forks(engine: Any, out: int) -> None:
 
 
 def loaded(arguments: list[str]) -> Any:
-    """Load the engine whose file is the first argument."""
     spec = importlib.util.spec_from_file_location("engine", Path(arguments[0]))
     assert spec is not None
     assert spec.loader is not None

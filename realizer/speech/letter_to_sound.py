@@ -30,10 +30,6 @@ class LetterRule:
 def vowel_units(word: str, language: str) -> int:
     """Return the length of a word in vowel units, at least 1. Digits count by their names.
 
-    Args:
-        word: one written word.
-        language: BCP-47; only the first part counts.
-
     Source: Wojdel 2005, equation 6.6 (there: the vowel letters of Polish).
     """
     facts = _facts(language)

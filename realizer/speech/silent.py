@@ -24,11 +24,7 @@ class SilentVoice(BaseVoice):
         return tuple(name for name in syllable_facts()["languages"] if name != GENERIC)
 
     def say(self, request: SpeechRequest) -> Utterance:
-        """Estimate times: a word lasts a unit (0.2 s at rate 1) for each vowel, a punctuation mark one unit.
-
-        Raises:
-            VoiceError: if the text is too long.
-        """
+        """Estimate times: a word lasts a unit (0.2 s at rate 1) for each vowel, a punctuation mark one."""
         script = read_script(request)
         facts = syllable_facts()
         if script.is_silent and not any(not isinstance(part, (str, Mark)) for part in script.parts):
@@ -72,7 +68,6 @@ class SilentVoice(BaseVoice):
 def _phonemes(
     word: WordToken, language: str, start: float, length: float, consonant: float
 ) -> Iterator[tuple[float, str, int]]:
-    """Yield (start, IPA, stress) of the phonemes of a word."""
     ipa = letters_to_phonemes(word.text, language) or ("",)
     vowel = [not sound or sound[0] in vowels() for sound in ipa]  # an unknown sound counts as a vowel
     times = [1.0 if is_vowel else consonant for is_vowel in vowel]

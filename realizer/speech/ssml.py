@@ -74,7 +74,6 @@ class Script:
 
     @property
     def text(self) -> str:
-        """The text without marks and tags."""
         return "".join(part for part in self.parts if isinstance(part, str))
 
     @property
@@ -84,7 +83,6 @@ class Script:
 
     @property
     def is_silent(self) -> bool:
-        """Whether there is nothing to pronounce."""
         return not any(unicodedata.category(c)[0] in "LNS" for c in self.text)
 
 
@@ -222,7 +220,6 @@ def _collapsed(parts: list[Part]) -> Iterator[Part]:
 
 
 def write_tag(tag: Tag) -> str:
-    """Return the tag as SSML text, with attributes in double quotes."""
     if tag.attributes is None:
         return f"</{tag.name}>"
     # quoteattr would choose single quotes for a value with a double one, which engines do not accept.

@@ -48,7 +48,6 @@ class VoiceActivity:
         return [turn for level in levels.tolist() if (turn := self._advance(level)) is not None]
 
     def end(self) -> list[Turn]:
-        """Return what the end of the sound means."""
         return [Turn.ENDS] if self.speaks else []
 
     def _advance(self, level: float) -> Turn | None:

@@ -62,9 +62,8 @@ def words_in(text: str) -> Iterator[tuple[str, int]]:
 def tokens(script: Script, phrase: str) -> tuple[Token, ...]:
     """Return words, pauses and marks in the order of the text, for voices without an engine.
 
-    Args:
-        script: the parts; <prosody> scales the words inside it, <sub alias> replaces its text.
-        phrase: the characters of pauses; several together are one pause.
+    <prosody> scales the words inside it, <sub alias> replaces its text. `phrase` has the characters of
+    pauses; several together are one pause.
     """
     found: list[Token] = []
     manners = [PLAIN]  # of the open tags, outermost first
@@ -111,10 +110,7 @@ def boundaries(
 ) -> list[int]:
     """Return the index of each word's first phoneme, by aligning the phonemes of words spoken separately.
 
-    Args:
-        expected: phonemes of each word spoken separately.
-        heard: phonemes of all words spoken together.
-        hints: indices at which the engine reports a word.
+    `hints` are indices at which the engine reports a word.
     """
     flat = [(strip_marks(sound), n == 0) for word in expected for n, sound in enumerate(word)]
     if not flat or len(flat) * len(heard) > MAX_CELLS:
@@ -158,7 +154,6 @@ def divided(
 
 
 def strip_marks(ipa: str) -> str:
-    """Return a phoneme without stress and length marks."""
     return ipa.strip("ˈˌː_").replace("ː", "")
 
 

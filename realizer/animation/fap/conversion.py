@@ -28,7 +28,6 @@ class FapMapping:
 
     @cached_property
     def matrix(self) -> PiecewiseMatrix:
-        """The rows, prepared for whole arrays."""
         return PiecewiseMatrix.of(self.rows)
 
     def replaced(self, units: Units, source: str) -> FapMapping:
@@ -42,7 +41,6 @@ class FapMapping:
 
 @cache
 def standard() -> FapMapping:
-    """Return the built-in mapping, `tables/au_to_fap.csv`."""
     return FapMapping(tables.au_to_fap(), ("au_to_fap.csv",))
 
 
@@ -132,7 +130,6 @@ class PiecewiseMatrix:
 # Sessions repeat a few sets of units.
 @lru_cache(maxsize=512)
 def _polylines(matrix: PiecewiseMatrix, live: tuple[int, ...]) -> list[Polylines]:
-    """Return the polylines of the units that are not 0."""
     every = [
         {fap: [line for line in own if line[0] in live] for fap, own in lines.items()}
         for lines in matrix.lines
@@ -165,7 +162,7 @@ APERTURE = 1024.0
 
 
 def to_fap(frames: AUFrames, mapping: FapMapping | None = None) -> FAPFrames:
-    """Convert AU frames to FAP frames.
+    """Convert AU frames to FAP frames; the mask is the same for all frames of one mapping.
 
     1. The mapping gives a value for each pair of AU and FAP. A FAP gets the strongest positive plus the
        strongest negative one; rotations add up. Pairs of AUs that FACS calls "different" combinations add a
@@ -175,12 +172,7 @@ def to_fap(frames: AUFrames, mapping: FapMapping | None = None) -> FAPFrames:
     4. FAPs that do not come from AUs are added, or replace those from AUs as far as they are overridden;
        each FAP is limited to `least`..`most`.
 
-    Args:
-        frames: n frames.
-        mapping: from AUs to FAPs (`realizer.face.fap_mapping.mapping_of`); None for the built-in one.
-
-    Returns:
-        n frames; the mask is the same for all frames of one mapping.
+    Without a mapping from AUs to FAPs (`realizer.face.fap_mapping.mapping_of`), it is the built-in one.
     """
     matrix, aus = (mapping or standard()).matrix, frames.moving
     raised, lowered, turned = matrix.evaluate(aus)

@@ -39,7 +39,6 @@ class FAPClip:
         )
 
     def from_frame(self, frame: int) -> FAPClip:
-        """Return the clip from a frame on."""
         parts = (self.values[frame:], self.mask, self.visemes[frame:], self.expressions[frame:])
         return FAPClip(self.name, self.fps, *parts, self.notes)
 

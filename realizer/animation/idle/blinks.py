@@ -78,11 +78,9 @@ class Blinks:
     lags: Float64
 
     def only(self, kept: Bool) -> Blinks:
-        """Return the blinks where `kept` (b,) is true."""
         return Blinks(*(values[..., kept] for values in vars(self).values()))
 
     def together(self, other: Blinks) -> Blinks:
-        """Return these blinks and others."""
         pairs = zip(vars(self).values(), vars(other).values(), strict=True)
         return Blinks(*(np.concatenate(pair, axis=-1) for pair in pairs))
 
@@ -121,10 +119,7 @@ def blinks_between(
 ) -> Blinks:
     """Return the blinks visible in start..end, seconds on the session clock; the first is after 0.
 
-    Args:
-        seed: of the character.
-        occasions: what moves blinks, or adds some.
-        liveliness: 0..1; see `idle.toml`.
+    They depend on the seed of the character and `liveliness` 0..1; occasions move some, or add some.
     """
     limits, moves = idle_facts()["blink_limits"], prosody_facts()["blinks"]
     reach = limits["longest"] + moves["reach"] + moves["delay"]
@@ -192,7 +187,6 @@ def _shapes(seed: int, first: int, last: int, liveliness: float) -> tuple[Float6
 
 
 def _shape(seed: int, kind: int, numbers: Index, liveliness: float) -> tuple[Float64, Float64, Float64]:
-    """Return keys, amounts and lags of blinks."""
     facts, limits = blink_facts(liveliness), idle_facts()["blink_limits"]
     *length, partial, amount, lag = uniform(seed, range(kind, kind + 6), numbers)
     # The sum of three draws is nearly normal; its standard deviation is a half.
@@ -226,8 +220,7 @@ SHOWN = 2.0  # s after its begin, in which a shift may matter
 def gaze_shifts(channels: Iterable[Channel], start: float, end: float) -> list[GazeShift]:
     """Return the shifts of eyes and head together that begin from shortly before `start` until `end`.
 
-    Args:
-        channels: those of a gaze or a gaze shift share their key times.
+    Channels of one gaze or gaze shift share their key times.
     """
     turns = dict[int, tuple[list[float], list[complex]]]()
     for channel in channels:

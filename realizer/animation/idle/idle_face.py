@@ -54,7 +54,6 @@ def idle_face(
         seed: of the character.
         ends: the ends of its phrases, in order of time; a blink near one is moved there.
         liveliness: 0..1; 0 for blinks of equal shape, sway and saccades alone.
-        shifts: gaze shifts of documents.
     """
     first, last = math.floor(start / SPAN), math.floor(end / SPAN) + 1
     blinks = _blinks(first, last, seed, tuple(ends), liveliness, tuple(shifts))
@@ -71,7 +70,6 @@ def _blinks(
     liveliness: float,
     shifts: tuple[GazeShift, ...],
 ) -> Blinks:
-    """Return the blinks of some spans, for neighbouring windows."""
     start, end = first * SPAN, last * SPAN
     saccades = motion_between(start, end, seed).jumps if liveliness else np.zeros(0)
     occasions = Occasions(ends, saccades, shifts) if ends or liveliness else NOTHING
@@ -132,7 +130,6 @@ def motion_left(channels: Sequence[Channel], times: Float64) -> Float64 | None:
 
 @cache
 def lids() -> tuple[int, ...]:
-    """Return the columns of blinks."""
     return face_columns(45)
 
 
@@ -168,7 +165,6 @@ def _left(masks: Sequence[Channel], times: Float64) -> Float64 | None:
 
 
 def _masks(channels: Sequence[Channel]) -> dict[str, list[Channel]]:
-    """Return the channels of each mask that idle motion obeys."""
     names = _mask_names()
     masks: dict[str, list[Channel]] = {name: [] for name in names.values()}
     for channel in channels:

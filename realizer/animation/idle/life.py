@@ -67,13 +67,11 @@ def face_columns(number: int) -> tuple[int, ...]:
 
 @cache
 def _columns() -> tuple[int, ...]:
-    """Return the columns beside those of head and eyes."""
     numbers = [*_small(), 38, *(number for name in ("swallow", "trace") for number in _units(name))]
     return tuple(column for number in dict.fromkeys(numbers) for column in face_columns(number))
 
 
 def _small() -> list[int]:
-    """Return the AUs that small movements move."""
     return list(dict.fromkeys(number for group in idle_facts()["small"]["units"] for number in group))
 
 
@@ -84,7 +82,6 @@ def _units(section: str) -> Mapping[int, float]:
 
 @lru_cache(maxsize=CACHED)
 def _life(seed: int, first: int, last: int, liveliness: float) -> Life:
-    """Return the batches first .. last - 1."""
     facts, times = idle_facts(), np.arange(first * BATCH, last * BATCH + 1) / RATE
     row = {column: k for k, column in enumerate((*motion_columns(), *_columns()))}
     values = np.zeros((len(row), len(times)))
@@ -165,8 +162,8 @@ def _events(
 ) -> tuple[Float64, Float64]:
     """Return movements of `count` kinds, each at most once in `every` seconds of its own.
 
-    Returns:
-        (count, k) amounts, and (count, 2, k) 0..1 the part of them that the left and the right side show.
+    They are (count, k) amounts, and (count, 2, k) 0..1 the part of them that the left and the right side
+    show.
     """
     offsets = np.arange(count)[:, None] / count
     passed = times / facts["every"] + offsets

@@ -59,11 +59,7 @@ class Motion:
     number: int
 
     def looking(self, patterns: Mapping[str, Bool]) -> Motion:
-        """Return the motion with other points of fixation.
-
-        Args:
-            patterns: "listening" or "thinking" -> (j,) whether the face does so at each saccade.
-        """
+        """Return the motion with the points of fixation of "listening" or "thinking" at some saccades (j,)."""
         aims = self.aims
         for name, active in patterns.items():
             aims = np.where(active, _pattern(self.seed, name, self.number, len(active)), aims)
@@ -136,7 +132,6 @@ def _motion(seed: int, sways: tuple[int, int], jumps: tuple[int, int]) -> Motion
 
 @cache
 def motion_columns() -> tuple[int, ...]:
-    """Return the columns of AU51-56 and, last, AU61-64."""
     return tuple(au(number)[0].column for sides in (*SWAY, *SACCADE) for number in sides)
 
 
@@ -174,8 +169,7 @@ def _poses(
 ) -> tuple[Float64, Float64]:
     """Return seconds and degrees, (m, k) each, of poses numbers[0] .. numbers[1] - 1, about `period` apart.
 
-    Args:
-        movements: for each, the random kind of its times, that of its degrees, and the greatest degrees.
+    A movement has the random kind of its times, that of its degrees, and the greatest degrees.
     """
     k = np.arange(*numbers)
     kinds = [kind for times, way, _ in movements for kind in (times, 100 + way, 200 + way)]

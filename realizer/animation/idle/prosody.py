@@ -75,7 +75,6 @@ class Gesture:
         return float(self.channels[0].times[-1])
 
     def scaled(self, factor: float) -> Gesture:
-        """Return the movement, multiplied by a factor."""
         return replace(self, channels=tuple(c.changed({"values": factor * c.values}) for c in self.channels))
 
 
@@ -102,13 +101,8 @@ def prosody_channels(
 
     They are in the idle layer, so that a document that reduces idle motion reduces them too. A movement is
     dropped if a document moves the same part of the face during it; if that becomes known after the movement
-    has begun, it is faded out. The continuous motion of the head gives way and comes back.
-
-    Args:
-        talks: what the character says.
-        start, end: seconds on the session clock.
-        seed: of the character.
-        known_motions: all other channels of the character.
+    has begun, it is faded out. The continuous motion of the head gives way and comes back. `known_motions`
+    are all other channels of the character, `seed` is its; times are seconds on the session clock.
     """
     shown: list[Channel] = []
     fade = prosody_facts()["yield"]["fade"]
@@ -141,7 +135,6 @@ def prosody_channels(
 
 
 def _claims(known_motions: Iterable[KnownMotion]) -> dict[str, list[KnownMotion]]:
-    """Return the motions of each part of the face that prosody may move."""
     claims: dict[str, list[KnownMotion]] = {}
     for motion in known_motions:
         part = _parts().get(motion.channel.target.column)
@@ -180,7 +173,6 @@ def _parts() -> dict[int, str]:
 def _gestures(
     all_phrases: tuple[Phrase, ...], heard: Melody, last_sound: float, start: float, seed: int
 ) -> tuple[Gesture, ...]:
-    """Return all movements that may accompany an utterance that starts at `start`."""
     return (
         *_accents(all_phrases, heard, start, seed),
         *_looks_aside(all_phrases, start, seed),

@@ -11,16 +11,9 @@ from realizer.core.array_types import Float64
 def uniform(seed: int, kind: int | Sequence[int], k: npt.NDArray[np.int64]) -> Float64:
     """Return numbers in [0, 1) that depend on (seed, kind, k) alone, by the mixing step of SplitMix64.
 
-    Generators of numpy may draw other numbers in its next version.
-
-    Args:
-        seed: any integer.
-        kind: the purpose; numbers of different kinds are independent. Several, (m,), cost little more than
-            one.
-        k: (n,) int64, index of each number within its kind.
-
-    Returns:
-        (n,) float64, or (m, n) of several kinds.
+    Generators of numpy may draw other numbers in its next version. Numbers of different kinds, which are
+    purposes, are independent; several kinds, (m,), cost little more than one. For indices k, (n,), there are
+    (n,) numbers, or (m, n) of several kinds.
     """
     begins = [_begin(seed, one) for one in ([kind] if isinstance(kind, int) else kind)]
     z = k.astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15) + np.array(begins, np.uint64)[:, None]

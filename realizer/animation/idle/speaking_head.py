@@ -36,10 +36,8 @@ def head_channels(
     """Return channels of the head, and of the eyes that stay on their target, during an utterance.
 
     Args:
-        start: seconds on the session clock.
-        until: the speech is cut off then.
+        start, until: when the speech starts and is cut off, seconds on the session clock.
         seed: of the character.
-        style: of what the face shows.
         claims: (known, first, last) of movements of the head that a document asks for: the time at which
             each became known, and the times between which it moves. The motion gives way to them.
     """
@@ -111,7 +109,6 @@ def _angles(
 
 
 def _averaged(values: Float64, seconds: float) -> Float64:
-    """Return the average of the values around each."""
     around = round(seconds * RATE / 2)
     weights = np.full(2 * around + 1, 1.0 / (2 * around + 1))
     averaged: Float64 = np.convolve(np.pad(values, around, "edge"), weights, "valid")

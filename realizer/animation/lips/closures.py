@@ -10,12 +10,9 @@ BILABIAL, LABIODENTAL = 1, 2  # visemes
 
 
 def lip_weight(track: Track, times: Float64, longest: float | None = None) -> Float64:
-    """Return how far speech masks the lips, (n,) 0..1; 0 at the ends and in long pauses.
+    """Return how far speech masks the lips, (n,) 0..1; 0 at the ends and in pauses above `longest` seconds.
 
     It is 1 from the first sound that closes the lips to the last, because an expression would part them.
-
-    Args:
-        longest: seconds above which a pause is long; None for the table's `released`.
     """
     facts = coarticulation()
     pauses = facts["pauses"]

@@ -94,7 +94,6 @@ def track_of(phonemes: Sequence[Phoneme]) -> Track | None:
 
 
 def _rows(phonemes: Sequence[Phoneme]) -> list[_Row]:
-    """Return a row for each sound, and for each pause; two pauses are one."""
     pressure = coarticulation()["pressure"]
     rows: list[_Row] = []
     for phoneme in phonemes:
@@ -166,9 +165,8 @@ def key_times(phonemes: Sequence[Phoneme], lead: float = 0.0) -> Float64:
 def dominances(track: Track, times: Float64) -> Iterator[tuple[Index, Float64, tuple[str, ...]]]:
     """Yield the dominance of the sounds around each time for each of `ARTICULATORS`.
 
-    Yields:
-        The sounds, (k, n); their parts, (k, n), which add up to a little less than 1, as the rest belongs to
-        the neutral mouth; the columns of `SHAPE_COLUMNS` that the articulator moves.
+    A row has the sounds, (k, n); their parts, (k, n), which add up to a little less than 1, as the rest
+    belongs to the neutral mouth; the columns of `SHAPE_COLUMNS` that the articulator moves.
     """
     facts = coarticulation()
     rule = facts["dominance"]

@@ -100,7 +100,6 @@ def _restyle(target: dict[str, Float64], style: LipStyle) -> None:
 
 
 def _rows(articulators: Sequence[str]) -> slice:
-    """Return the rows of neighbouring articulators in `SHAPE_COLUMNS`."""
     return slice(SHAPE_COLUMNS.index(articulators[0]), SHAPE_COLUMNS.index(articulators[-1]) + 1)
 
 
@@ -168,11 +167,7 @@ _known: WeakKeyDictionary[Channel, tuple[float, tuple[Channel, ...]]] = WeakKeyD
 
 
 def opened(channels: tuple[Channel, ...], factor: float) -> tuple[Channel, ...]:
-    """Return the channels of a speech whose lips and jaw open by a factor; closures and bites stay.
-
-    Args:
-        channels: of `lip_channels`, at least one.
-    """
+    """Return the channels of a speech whose lips and jaw open by a factor; closures and bites stay."""
     if factor == 1.0:
         return channels
     known = _known.get(channels[0])

@@ -31,17 +31,11 @@ def oculus_visemes() -> tuple[OculusViseme, ...]:
 
 
 def viseme_weights(phonemes: Sequence[Phoneme], times: Float64) -> Float64:
-    """Return the weight of each MPEG-4 viseme over time.
+    """Return the weight of each MPEG-4 viseme over time, (n, 15) float64, column = viseme; rows add up to 1.
 
     Weights are the mean of the dominances of sounds in jaw, lips, width and tongue (see `lip_channels`). A
-    sound that closes the lips or presses the lower lip to the teeth has weight 1 meanwhile.
-
-    Args:
-        phonemes: in order, seconds from the start of the utterance; "" is a pause.
-        times: (n,) seconds on the same clock.
-
-    Returns:
-        (n, 15) float64, 0..1, column = viseme (0 is none); each row adds up to 1.
+    sound that closes the lips or presses the lower lip to the teeth has weight 1 meanwhile. Times, (n,), are
+    on the clock of the phonemes, seconds from the start of the utterance; "" is a pause.
     """
     weights = np.zeros((len(times), VISEME_COUNT))
     weights[:, 0] = 1.0
@@ -70,15 +64,10 @@ def oculus_weights(weights: Float64) -> Float64:
 
 
 def fap_1(weights: Float64) -> Int32:
-    """Return FAP 1 with the two strongest visemes: select1, select2, blend, def.
+    """Return FAP 1, (n, 4) int32, with the two strongest visemes of (n, 15): select1, select2, blend, def.
 
     A decoder shows select1 x blend / 63 + select2 x (1 - blend / 63); a single viseme is select1 with 63.
-
-    Args:
-        weights: (n, 15), column = viseme.
-
-    Returns:
-        (n, 4) int32; `def` is 0, which means the standard's visemes.
+    `def` is 0, which means the standard's visemes.
     """
     order = np.argsort(-weights, axis=1, kind="stable")[:, :2]
     first, second = np.take_along_axis(weights, order, axis=1).T

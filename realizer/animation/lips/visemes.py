@@ -186,11 +186,7 @@ ROLL = 1e5 * math.pi / 180  # units of FAP 47 in a degree
 
 
 def mouth_faps(mouth: Float64) -> dict[int, Float64]:
-    """Return the values (n,), in FAPU, of all FAPs that speech moves.
-
-    Args:
-        mouth: (n, 11) float64, columns as `SHAPE_COLUMNS`.
-    """
+    """Return the values (n,), in FAPU, of all FAPs that speech moves, by `SHAPE_COLUMNS` (n, 11)."""
     contour, pressure = coarticulation()["contour"], coarticulation()["pressure"]
     part = {name: mouth[:, k] for k, name in enumerate(SHAPE_COLUMNS)}
     # In MPEG-4 FAPs of the upper lip move it down, those of the lower lip up: both are negative when open.

@@ -49,7 +49,6 @@ def align(
     Args:
         pcm: (n,) or (n, channels) samples: int16, int32 or floats in -1..1.
         rate: Hz.
-        text: plain text of the recording.
         language: BCP-47.
         aligner: the only one to use.
         voice: used instead of espeak-ng.
@@ -106,7 +105,6 @@ def align_request(
 
 
 def _unusable_reason(aligner: str | None, voice: Voice | None) -> str | None:
-    """Return why the aligner cannot be used, or None."""
     from realizer.speech.espeak import voice as espeak
 
     if aligner not in (None, "pocketsphinx", "espeak"):
@@ -138,10 +136,8 @@ def uniform_align(sound: Float32, duration: float, reference: Utterance) -> Alig
 def align_recording(request: SpeechRequest, recording: Recording) -> Utterance:
     """Return a recording as an utterance, with words, phonemes and marks at the times of alignment.
 
-    If it cannot be aligned, return the sound alone with a warning.
-
-    Args:
-        request: the text with its marks; its voice, rate and duration are ignored.
+    If it cannot be aligned, return the sound alone with a warning. Voice, rate and duration of the request
+    are ignored.
     """
     pcm, rate = recording.pcm, recording.rate
     try:

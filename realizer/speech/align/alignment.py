@@ -42,7 +42,6 @@ def build(
     """Return an alignment with times in order, within the recording, and with pauses.
 
     Args:
-        aligner: its name.
         reference: an utterance with the same words.
         duration: of the recording.
         spans: (n, 2) times of the words.

@@ -44,7 +44,6 @@ def distance(features: Float64, others: Float64) -> Float64:
 
 
 def usual(features: Float64, others: Float64) -> float:
-    """Return the median of `distance` for a sample of rows."""
     sampled = (rows[:: max(1, len(rows) // SAMPLES)] for rows in (features, others))
     return max(float(np.median(distance(*sampled))), 1e-6)
 
@@ -61,13 +60,8 @@ def best_path(
 
     From one frame to the next the state stays the same or advances by up to three (dynamic time warping with
     slopes 0 to 3). It is free to skip a pause or to stay in it. Time and memory are proportional to t times
-    the width of the band.
-
-    Args:
-        observed: t frames.
-        states: j states.
-        centre: (t,) states in the middle of the band, not decreasing; None for no band.
-        reach: number of states on each side of the middle.
+    the width of the band: `reach` states on each side of `centre` (t,), which does not fall; None for no
+    band.
 
     Source: Sakoe and Chiba 1978, with optional pauses.
     """
@@ -113,7 +107,6 @@ def _penalties(pause: Bool) -> Float64:
 
 
 def _costs(observed: Observed, states: States, lows: Index, width: int) -> Iterator[Float64]:
-    """Yield the costs (width,) of each frame."""
     for k in range(0, len(lows), BATCH):
         band = slice(int(lows[k]), int(lows[k : k + BATCH][-1]) + width)
         rows = distance(observed.features[k : k + BATCH], states.features[band]) / observed.usual

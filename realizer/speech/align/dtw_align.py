@@ -41,12 +41,9 @@ class _Match:
 
 
 def dtw_align(sound: Float32, duration: float, references: Sequence[Utterance]) -> Alignment:
-    """Warp the most similar of several utterances to the recording.
+    """Warp the most similar of several utterances, of one text by different voices, to the recording.
 
-    Args:
-        sound: (n,) at 16 kHz, not silent.
-        duration: seconds of the recording.
-        references: the same text by different voices, with sound.
+    The sound is (n,) at 16 kHz, not silent; `duration` is in seconds.
 
     Source: Malfrère and Dutoit 1997, who align speech by synthesis.
     """

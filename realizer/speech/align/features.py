@@ -40,9 +40,7 @@ def resampled(pcm: Float32, rate: int) -> Float32:
 def energies(sound: Float32, hop: float) -> Float64:
     """Return the energy (n, bands) in the bands of the mel scale; frame k is centred at k x hop.
 
-    Args:
-        sound: (m,) at 16 kHz, -1..1.
-        hop: samples between frames; need not be whole.
+    The sound is (m,) at 16 kHz, -1..1; `hop`, in samples, need not be whole.
     """
     flat = np.append(sound[:1], sound[1:] - np.float32(EMPHASIS) * sound[:-1])
     at = np.rint(np.arange(int(len(sound) / hop) + 1) * hop).astype(np.intp)
@@ -107,17 +105,12 @@ def _bands() -> Float64:
 
 @cache
 def _cosines() -> Float64:
-    """Return the cosine transform (bands, kept)."""
     angles = np.pi / BANDS * (np.arange(BANDS)[:, None] + 0.5) * np.arange(KEPT)
     return np.asarray(np.cos(angles) * np.sqrt(2 / BANDS), np.float64)
 
 
 def mono(pcm: npt.ArrayLike, rate: float) -> Float32:
-    """Convert (n,) or (n, channels) int16, int32 or floats to (n,) float32 in -1..1.
-
-    Raises:
-        AlignError: if the samples or the rate are invalid.
-    """
+    """Convert (n,) or (n, channels) int16, int32 or floats to (n,) float32 in -1..1, or raise AlignError."""
     samples = np.asarray(pcm)
     if not (np.isfinite(rate) and RATES[0] <= rate <= RATES[1] and float(rate).is_integer()):
         raise AlignError(f"rate: wanted a whole number of {RATES[0]}..{RATES[1]} Hz, got {rate}")
@@ -138,11 +131,7 @@ def mono(pcm: npt.ArrayLike, rate: float) -> Float32:
 
 
 def to_aligner(sound: Float32, rate: int) -> Float32:
-    """Resample to 16 kHz.
-
-    Raises:
-        AlignError: if the sound is silent.
-    """
+    """Resample to 16 kHz; raise AlignError if the sound is silent."""
     if float(np.abs(sound).max()) < SILENCE:
         raise AlignError("recording: wanted speech, got silence")
     return resampled(sound, rate)

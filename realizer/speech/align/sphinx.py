@@ -37,12 +37,10 @@ def install_hint() -> str | None:
 def align_words(
     sound: Float32, words: Sequence[tuple[str, tuple[str, ...]]]
 ) -> tuple[AlignedWord | None, ...] | None:
-    """Align words with the sound; return None if that is impossible.
+    """Align words with the sound, (n,) at 16 kHz, -1..1; return None if that is impossible.
 
-    Args:
-        sound: (n,) at 16 kHz, -1..1.
-        words: (spelling, phones in case the dictionary does not have it). A word without phones that is not
-            in the dictionary is ignored, and its result is None.
+    A word has its spelling, and phones in case the dictionary does not have it. Without phones and not in the
+    dictionary it is ignored, and its result is None.
     """
     pcm = np.clip(np.rint(sound * 32767), -32768, 32767).astype("<i2").tobytes()
     with _lock:
@@ -116,12 +114,8 @@ STRIPPED = str.maketrans("", "", "ːˑˈˌ̩̯̃̍͡ʲʰˀ_-~|")
 def model_align(sound: Float32, duration: float, reference: Utterance) -> Alignment | None:
     """Align words by the acoustic model; return None if it does not find them.
 
-    Words that are not in its dictionary have the phonemes of the reference.
-
-    Args:
-        sound: (n,) at 16 kHz.
-        duration: seconds of the recording.
-        reference: a voice's utterance of the text.
+    Words that are not in its dictionary have the phonemes of the reference, a voice's utterance of the text.
+    The sound is (n,) at 16 kHz, `duration` in seconds.
     """
     of_words = [
         [p for p in reference.phonemes if p.ipa and word.start - 1e-6 <= p.start < word.end - 1e-6]

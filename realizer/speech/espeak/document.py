@@ -28,7 +28,6 @@ class Document:
 
 
 def write_document(script: Script) -> Document:
-    """Return the script as SSML for espeak-ng."""
     text = "<speak>"
     words: list[tuple[str, int]] = []
     marks: list[PlacedMark] = []

@@ -41,10 +41,7 @@ def timeline(document: Document, events: Sequence[Event], pcm: Int16, rate: int,
     """Return the utterance; its phonemes and pauses cover 0..len(pcm)/rate without gaps.
 
     Args:
-        document: the spoken document.
         events: (type, sample, place, text) in order.
-        pcm: (n,) int16.
-        rate: Hz.
         spoken: returns the phonemes of words spoken separately; called if espeak-ng merged words.
     """
     events = _linked(events)
@@ -202,7 +199,6 @@ def _phonemes(begins: Sequence[int], sounds: Sequence[str], end: int, rate: int)
 # There are only a few hundred different sounds.
 @lru_cache(maxsize=2048)
 def _plain(sound: str) -> tuple[str, int]:
-    """Return the sound without stress marks, and its stress."""
     stress = next((STRESS[c] for c in sound if c in STRESS), 0)
     return sound.replace("ˈ", "").replace("ˌ", ""), stress
 
@@ -215,9 +211,8 @@ def _is_vowel(sound: str) -> bool:
 def read_answer(head: Mapping[str, Any], body: bytes) -> tuple[list[Event], Int16]:
     """Parse an answer to "say" of `espeak.worker`.
 
-    Returns:
-        (type, sample, place, text) of words, marks, phonemes and ends in order, where `text` is a phoneme's
-        IPA or a mark's name; and (n,) int16 samples, read-only.
+    Return (type, sample, place, text) of words, marks, phonemes and ends in order, where `text` is a
+    phoneme's IPA or a mark's name; and (n,) int16 samples, read-only.
     """
     size: int = head["events"]
     fields = np.frombuffer(body, LAYOUT, size // LAYOUT.itemsize)

@@ -37,7 +37,6 @@ class EspeakVoice(EngineVoice):
 
     Args:
         voice: a voice of espeak-ng ("nl", "en-gb+f3", "+m3" for a variant of the default voice), or None.
-        limit: greatest duration of one request to the engine, in seconds.
         options: for the worker process ("--data", PATH; "--no-fork").
     """
 
@@ -66,7 +65,6 @@ class EspeakVoice(EngineVoice):
         return replace(said, warnings=(*script.warnings, *warnings))
 
     def _word_phonemes(self, voice: str, words: Sequence[str]) -> list[tuple[str, ...]]:
-        """Return the phonemes of each word spoken separately."""
         known = dict(self._alone)
         unknown = sorted({word for word in words if (voice, word) not in known})
         if unknown:
@@ -83,7 +81,6 @@ def choose_voice(hello: dict[str, Any], wanted: str | None, language: str) -> tu
     espeak-ng accepts "nl" and "en-gb" but not "nl-NL" or "fr-fr"; its list of voices has the tags of each.
 
     Args:
-        hello: the engine's description of itself.
         wanted: a tag, an identifier or a name from the list, with or without "+variant"; or None.
         language: BCP-47, used if `wanted` is not a voice.
     """

@@ -66,14 +66,7 @@ SynthCallback = ctypes.CFUNCTYPE(
 
 
 class Engine:
-    """The loaded library.
-
-    Args:
-        data: folder of its data, or None for the library's own.
-
-    Raises:
-        RuntimeError: if the library or its data cannot be loaded.
-    """
+    """The loaded library, with a folder of data or its own; RuntimeError if one of them cannot be loaded."""
 
     drifts = True
     # Spoken before the first request, because a fork of an engine that has spoken takes half the time.

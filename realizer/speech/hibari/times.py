@@ -66,10 +66,8 @@ def signs_of(sentence: Sequence[Token]) -> tuple[str, tuple[int, ...]]:
 def sounds(sentence: Sequence[Token], lengths: Sequence[int]) -> list[Sound]:
     """Return phonemes and pauses in order, which cover the sentence from 0 without gaps.
 
-    The length of a stress sign is added to its vowel; a blank is divided between the phonemes beside it.
-
-    Args:
-        lengths: in samples: of the silence before, of each sign, and of the silence after.
+    The length of a stress sign is added to its vowel; a blank is divided between the phonemes beside it. The
+    lengths are in samples: of the silence before, of each sign, and of the silence after.
     """
     signs, owners = signs_of(sentence)
     at, *each, tail = lengths
@@ -143,13 +141,8 @@ def word_spans(
     """Return (first sound, sound after the last) of each word; equal indices for a word without sounds.
 
     hibari expands numbers, dates and abbreviations before it reads them. Words that also occur in the
-    expanded text are matched; words between them are divided by their phonemes when spoken separately.
-
-    Args:
-        words: of the text.
-        tokens: of hibari, of all sentences.
-        heard: of all sentences; `token` is an index into `tokens`.
-        alone: returns the phonemes of words spoken separately.
+    expanded text are matched; words between them are divided by their phonemes when spoken separately, which
+    `alone` returns. Tokens and sounds are those of all sentences.
     """
     firsts: dict[int, int] = {}
     for k, sound in enumerate(heard):
@@ -214,7 +207,6 @@ class SpeechBuffer:
     words: list[tuple[int, int, str]] = field(default_factory=list)  # first sample, end, text
 
     def add(self, pcm: Int16) -> None:
-        """Append a piece of sound."""
         self.pcm.append(pcm)
         self.length += len(pcm)
 

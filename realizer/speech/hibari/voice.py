@@ -114,12 +114,8 @@ ENGINE = Engine("hibari", Path(__file__).with_name("worker.py"), install_hint)
 class HibariVoice(EngineVoice):
     """hibari, which speaks English; the same request gives the same samples.
 
-    A long text is spoken sentence by sentence, so that other requests can be served in between.
-
-    Args:
-        voice: one of hibari's voices that is on this machine, or None for the one in the package.
-        limit: greatest duration of the synthesis of a sentence, in seconds.
-        options: for the worker ("--durations", TENSOR).
+    A long text is spoken sentence by sentence, so that other requests can be served in between; `limit` is
+    the greatest duration of the synthesis of one, in seconds. The voice, or None, has to be on this machine.
     """
 
     name = "hibari"
@@ -227,7 +223,6 @@ class HibariVoice(EngineVoice):
         return pcm, trim_to_sound(heard, pcm)
 
     def _word_phonemes(self, words: Sequence[str]) -> list[list[str]]:
-        """Return the phonemes of each word spoken separately."""
         head, _ = self._process.ask({"op": "read", "texts": list(words)})
         found = []
         for text in head["texts"]:

@@ -21,12 +21,7 @@ LINK = re.compile(r"\](?=\()")  # hibari interprets [word](/phonemes/); here bra
 
 
 class Speaker:
-    """The loaded model and its reader.
-
-    Args:
-        voice: one of hibari's voices that is on this machine.
-        durations: name of the tensor of durations.
-    """
+    """The loaded model and its reader; `durations` is the name of the tensor of durations."""
 
     drifts = False
 

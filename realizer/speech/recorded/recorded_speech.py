@@ -166,18 +166,13 @@ def _is_speech(heard: Sequence[Phoneme], loudness: Sequence[Phoneme]) -> bool:
 
 
 def _at(values: Sequence[bool], phonemes: Sequence[Phoneme], times: Float64) -> Bool:
-    """Return (n,) the value of the phoneme at each time."""
     return np.array(values)[np.searchsorted([p.start for p in phonemes], times, "right") - 1]
 
 
 def by_loudness(pcm: Int16, rate: int) -> tuple[Phoneme, ...]:
-    """Return vowels that are the more open the louder the sound is (`envelope.toml`).
+    """Return vowels that are the more open the louder the sound (n,) is (`envelope.toml`); () for silence.
 
-    Phonemes and pauses cover the sound without gaps; () for silence.
-
-    Args:
-        pcm: (n,) mono.
-        rate: Hz.
+    Phonemes and pauses cover the sound without gaps.
     """
     facts = tables.toml_table("envelope.toml")
     size = max(1, round(facts["window"] * rate))

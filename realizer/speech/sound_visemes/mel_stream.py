@@ -35,11 +35,7 @@ class MelFrames(NamedTuple):
 
 
 class MelStream:
-    """Converts PCM to mel frames; how it is divided into pieces changes nothing.
-
-    Args:
-        rate: Hz of the PCM.
-    """
+    """Converts PCM, of `rate` Hz, to mel frames; how it is divided into pieces changes nothing."""
 
     def __init__(self, rate: int) -> None:
         self._rate = rate

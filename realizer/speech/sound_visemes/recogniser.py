@@ -41,11 +41,9 @@ def shares() -> Float32:
 
 
 def context(log: Float32, level: Float32, mean: Float32) -> Float32:
-    """Return the inputs (..., frames x BANDS) of the network.
+    """Return the inputs (..., frames x BANDS) of the network, of `log` (..., frames, BANDS) at `OFFSETS`.
 
-    Args:
-        log: (..., frames, BANDS) of the frames at `OFFSETS`.
-        level, mean: (...,) and (..., BANDS) at the last of these frames.
+    `level` and `mean` are (...,) and (..., BANDS) at the last of these frames.
     """
     loud = np.maximum(log - level[..., None, None], np.float32(-FLOOR)) - mean[..., None, :]
     inputs: Float32 = (loud * np.float32(1 / SCALE)).reshape(*log.shape[:-2], len(OFFSETS) * BANDS)
@@ -75,10 +73,8 @@ class VisemeRecogniser:
     """Recognises mouth shapes in PCM that arrives in pieces; how it is divided changes nothing.
 
     The end of a phoneme is known 119 ms after it at most: half a frame, half a window, the frames after it in
-    the context, the rest of the block, the lag of the path, and less than a millisecond of resampling.
-
-    Args:
-        rate: Hz, at least `LOWEST`.
+    the context, the rest of the block, the lag of the path, and less than a millisecond of resampling. The
+    rate, in Hz, is at least `LOWEST`.
     """
 
     def __init__(self, rate: int) -> None:
@@ -101,7 +97,6 @@ class VisemeRecogniser:
         return [phoneme for part in parts for phoneme in self._advance(part)]
 
     def close(self) -> list[Phoneme]:
-        """Return the rest of the phonemes, up to the end of the sound."""
         found = self._advance(np.zeros(round(TAIL * self._rate), np.int16))
         end = self._length / self._rate
         found.append(Phoneme(self._start, end, _ipa(self._class)))
