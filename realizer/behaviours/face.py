@@ -132,12 +132,7 @@ KINDS = (
     BehaviourKind(FaceFacs, table_timing("faceFacs"), expand_part, check, parameters=AMOUNT),
     BehaviourKind(Face, table_timing("face"), expand_face, check, parameters=AMOUNT),
     BehaviourKind(
-        FaceShift,
-        table_timing("faceShift"),
-        expand_shift,
-        check,
-        claims=claiming("base face"),
-        region="face",
+        FaceShift, table_timing("faceShift"), expand_shift, check, claims=claiming("base face"), region="face"
     ),
     BehaviourKind(
         Expression,

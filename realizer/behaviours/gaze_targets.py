@@ -97,13 +97,7 @@ def check_target(node: Gaze | GazeShift | HeadDirectionShift, context: PlanningC
 
 
 def turn(
-    part: str,
-    times: Float64,
-    turns: Sequence[Turn],
-    *,
-    layer: Layer,
-    source: str,
-    holds: bool = False,
+    part: str, times: Float64, turns: Sequence[Turn], *, layer: Layer, source: str, holds: bool = False
 ) -> tuple[Channel, ...]:
     """Return channels that turn "eyes" or "head" by k turns at times (k,).
 

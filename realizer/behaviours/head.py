@@ -45,8 +45,7 @@ def _timing(lexeme: str, repetition: int) -> Timing:
     numbered = tuple(f"stroke:{i}" for i in range(1, repetition + 1))
     between = (row.strokes,) * (repetition - 1)
     return from_gaps(
-        (*row.points[:at], *numbered, *row.points[at:]),
-        (*row.gaps[:at], *between, SAME, *row.gaps[at:]),
+        (*row.points[:at], *numbered, *row.points[at:]), (*row.gaps[:at], *between, SAME, *row.gaps[at:])
     )
 
 

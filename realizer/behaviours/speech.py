@@ -89,10 +89,7 @@ def expand(node: Speech, times: Float64, context: PlanningContext) -> tuple[Chan
     """Return the channels of lips, jaw and tongue, from the phonemes."""
     utterance, start = context.utterances[node.id], float(times[0])
     parts = utterance.sections or ((0.0, utterance),)
-    style = (
-        context.jaw if node.jaw is None else node.jaw,
-        context.lips if node.lips is None else node.lips,
-    )
+    style = (context.jaw if node.jaw is None else node.jaw, context.lips if node.lips is None else node.lips)
     lips = (channel for at, part in parts for channel in _lips(part, start + at, style))
     return tuple(channel.changed({"source": node.id}) for channel in lips)
 

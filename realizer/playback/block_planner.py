@@ -97,11 +97,7 @@ class _PlanBuilder:
     """The state of planning one block: its remaining behaviours, and the warnings so far."""
 
     def __init__(
-        self,
-        block: Block,
-        kinds: Mapping[str, BehaviourKind],
-        context: PlanningContext,
-        may_stretch: bool,
+        self, block: Block, kinds: Mapping[str, BehaviourKind], context: PlanningContext, may_stretch: bool
     ) -> None:
         self.may_stretch = may_stretch
         self.original = self.block = block

@@ -43,10 +43,7 @@ class ResourceClaim:
 
     def shifted(self, seconds: float) -> ResourceClaim:
         return replace(
-            self,
-            begin=self.begin + seconds,
-            end=self.end + seconds,
-            silent_from=self.silent_from + seconds,
+            self, begin=self.begin + seconds, end=self.end + seconds, silent_from=self.silent_from + seconds
         )
 
     def conflicts_with(self, other: ResourceClaim, *, in_silence: bool = True) -> bool:

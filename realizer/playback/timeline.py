@@ -134,7 +134,7 @@ class BlockTimeline:
             self.mark_changed()
 
     def reorder(self, playing: ActiveBlock) -> None:
-        """Order a waiting block and its followers after the blocks that they wait for, or raise CycleError."""
+        """Order a waiting block and its followers after the blocks that they wait for; or CycleError."""
         graph: TopologicalSorter[ActiveBlock] = TopologicalSorter({playing: ()})
         todo, visited = deque([playing]), {playing}  # there may be many paths to a block
         while todo:

@@ -147,7 +147,7 @@ def solve_groups(
 def _feasible(
     model: Model, clusters: RigidClusters, groups: Sequence[Group]
 ) -> tuple[_GroupProblem, Float64, list[Link]]:
-    """Return the problem of some groups, some least gaps dropped, and positions; or a cycle of inequalities."""
+    """Return the problem of some groups, some least gaps dropped, and positions; or a cycle of links."""
     while True:
         problem = _group_problem(model, clusters, groups)
         level, cycle = feasible_start(problem.quadratic, problem.start(clusters))

@@ -65,7 +65,7 @@ class _StepGraph:
         self._known: list[list[Step] | None] = [None] * n
 
     def back_to(self, start: int, statements: int, steps: int) -> tuple[list[Step], int]:
-        """Return the positive cycle through a point with the fewest statements, and the number of steps tried.
+        """Return the positive cycle through a point with the fewest statements, and the number of trials.
 
         It is [] if there is none of so few statements, or if the search takes too many steps.
         """

@@ -116,10 +116,9 @@ def model_of(problem: Problem) -> Model | list[int]:
 
 
 def drop_least_gaps(least: list[float], points: Iterable[tuple[int, tuple[int, float]]]) -> bool:
-    """Drop least gaps of a behaviour, in place, within a shorter stated length; return whether there were any.
+    """Drop least gaps of a behaviour, in place, within a shorter stated length; return whether it has any.
 
-    `points` are (place in the behaviour, (root, shift)) in order; those that no equality names may be left
-    out.
+    `points` are (place in the behaviour, (root, shift)) in order; those that no equality names may be absent.
     """
     changed = False
     seen: dict[int, tuple[int, float]] = {}

@@ -94,8 +94,7 @@ class Utterance:
 def tile(starts: Iterable[tuple[float, str, int]], end: float, rate: float = 1.0) -> tuple[Phoneme, ...]:
     """Return phonemes without gaps, each until the next starts or the `end`; adjacent pauses are joined.
 
-    `starts` are (time, IPA, stress) in order; IPA is "" for a pause. `rate` is the units of times in a
-    second.
+    `starts` are (time, IPA, stress) in order; IPA is "" for a pause. `rate` is how many times are a second.
     """
     kept: list[tuple[float, str, int]] = []
     for start in starts:

@@ -59,7 +59,7 @@ class Motion:
     number: int
 
     def looking(self, patterns: Mapping[str, Bool]) -> Motion:
-        """Return the motion with the points of fixation of "listening" or "thinking" at some saccades (j,)."""
+        """Return the motion with the points of fixation of "listening" or "thinking" at some saccades."""
         aims = self.aims
         for name, active in patterns.items():
             aims = np.where(active, _pattern(self.seed, name, self.number, len(active)), aims)
