@@ -109,6 +109,7 @@ def test_site_builds_without_a_warning(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+    assert "mermaid" not in (tmp_path / "blocks.html").read_text("utf-8")
     assert (tmp_path / "generated" / "bml.html").stat().st_size > 50_000
     elsewhere = re.compile(r'<(?:script|link|img)[^>]+(?:src|href)="(https?:)?//')
     assert not [page for page in tmp_path.rglob("*.html") if elsewhere.search(page.read_text("utf-8"))]

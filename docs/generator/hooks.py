@@ -35,25 +35,30 @@ OTHERS = (
     "realizer/examples/speaking.webp",
 )
 LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
+DIAGRAM = re.compile(r"```mermaid\n.*?^```$", re.DOTALL | re.MULTILINE)
 FENCE = re.compile(r"(^```.*?^```$)", re.DOTALL | re.MULTILINE)
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the pages that are made, and the files of other folders."""
     from docs.generator.pages import PAGES
+    from docs.generator.states import drawing
 
     for name, make in PAGES.items():
         for path, content in make().items():
             files.append(File.generated(config, f"generated/{path}", content=content))
         assert files.get_file_from_path(f"generated/{name}.md")
+    files.append(File.generated(config, "generated/states.svg", content=drawing()))
     for name in OTHERS:
         files.append(File.generated(config, f"project/{name}", abs_src_path=str(ROOT / name)))
     return files
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Point the links of a page to pages of the site, or into the repository."""
+    """Point the links of a page to pages of the site, or into the repository; draw the states."""
     uri = page.file.src_uri
+    if uri == "blocks.md":  # a page would need a script of others to draw it
+        markdown = DIAGRAM.sub("![The states of a block](generated/states.svg)", markdown)
     here = posixpath.dirname(uri.removeprefix("project/") if uri.startswith("project/") else f"docs/{uri}")
 
     def link(match: re.Match[str]) -> str:

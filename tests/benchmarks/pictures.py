@@ -13,6 +13,7 @@ import realizer
 from realizer.examples import examples
 from realizer.outputs.output import RenderSettings
 from realizer.render.light import presets
+from tests.benchmarks import curve_pictures
 
 ROOT = Path(__file__).parents[2]
 EMOTIONS = "ada JOY, ben SURPRISE, ida SADNESS, leo ANGER, nia DISGUST, omar FEAR"
@@ -159,3 +160,4 @@ if __name__ == "__main__":
     film(ROOT / "docs" / "film-after.jpg")
     page(ROOT / "realizer/examples/page.png")
     designer(ROOT / "docs" / "design.png")
+    curve_pictures.main()

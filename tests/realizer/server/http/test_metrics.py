@@ -7,7 +7,7 @@ from pathlib import Path
 
 from realizer.server.http.metrics import COUNTERS, GAUGES, Metrics, sum_samples
 
-OPERATION = Path(__file__).parents[4] / "docs" / "operation.md"
+PAGE = Path(__file__).parents[4] / "docs" / "metrics.md"
 SAMPLE = re.compile(r'([a-z_]+)(?:\{([a-z]+="[^"]*"(?:,[a-z]+="[^"]*")*)\})? (\S+)')
 
 
@@ -33,7 +33,7 @@ def test_metrics_describe_each_series_once() -> None:
 def test_metrics_are_all_described_in_the_documentation() -> None:
     text = sum_samples({0: Metrics(0).text(dict.fromkeys(GAUGES, 0), {})})
     kinds = dict(re.findall(r"^# TYPE (\S+) (\S+)$", text, re.M))
-    rows = re.findall(r"^\| (realizer_\S+) \| (\w+) \| (.+) \|$", OPERATION.read_text("utf-8"), re.M)
+    rows = re.findall(r"^\| (realizer_\S+) \| (\w+) \| (.+) \|$", PAGE.read_text("utf-8"), re.M)
     helps = re.findall(r"^# HELP (\S+) (.+)$", text, re.M)
     assert rows == [(name, kinds[name], words) for name, words in helps]
 

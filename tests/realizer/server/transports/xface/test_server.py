@@ -454,7 +454,7 @@ def test_xface_reports_one_error_and_reads_the_next_task(
 def test_xface_refuses_a_task_that_is_too_large(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    assert xface.MAX_TASK == 4 * 2**20, "docs/protocol.md and docs/operation.md say so"
+    assert xface.MAX_TASK == 4 * 2**20, "docs/protocol.md and docs/limits.md say so"
     monkeypatch.setattr(xface, "MAX_TASK", 100_000)
 
     async def test(server: Server, transport: XfaceTransport) -> None:
