@@ -44,9 +44,8 @@ from realizer.server.session.effects import Send
 from realizer.server.session.session import Session
 from realizer.server.transports.message_formats import Disconnect, Inbound
 from realizer.server.transports.xface.attachments import prepare
-from realizer.server.transports.xface.reader import Fault, TaskReader
 from realizer.server.transports.xface.tasks import ABLE, UNABLE, Answer, TaskRunner
-from realizer.server.transports.xface.wire import Task, pack_task, read_notes
+from realizer.server.transports.xface.wire import Fault, Task, TaskReader, pack_task, read_notes
 from realizer.speech.silent import SilentVoice
 from tests.fuzz_files import FILES, file_tried
 from tests.interleavings import CONTROLS, FILTERS, Interleaving, no_error

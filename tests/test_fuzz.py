@@ -14,7 +14,7 @@ from bml_schema import Block, BMLError, Feedback, read
 from realizer.behaviours.registry import VOCABULARY
 from realizer.core.settings import Settings
 from realizer.server.serve import Server
-from realizer.server.session.feedback_log import FeedbackLog
+from realizer.server.session.connections import FeedbackLog
 from tests.fuzz import corpus, no_hang, plays, tried
 from tests.mutants import mutants
 

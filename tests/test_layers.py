@@ -81,8 +81,8 @@ IMPORTERS = {
     "pocketsphinx": ("realizer.speech.align.sphinx",),
     "starlette": ("realizer.server.asgi",),
     "stomp": ("realizer.server.transports.broker",),
-    "jwt": ("realizer.server.http.jwt_tokens",),
-    "cryptography": ("realizer.server.http.jwt_tokens",),
+    "jwt": ("realizer.server.http.access",),
+    "cryptography": ("realizer.server.http.access",),
 }
 
 

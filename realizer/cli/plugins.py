@@ -21,7 +21,7 @@ def plugins(as_json: bool) -> None:
     from realizer.behaviours.registry import FAMILIES
     from realizer.face.load import FACES
     from realizer.outputs.registry import OUTPUTS
-    from realizer.server.transports.registry import TRANSPORTS
+    from realizer.server.transports.transport import TRANSPORTS
     from realizer.speech.registry import VOICES
 
     found = [p for registry in (FAMILIES, OUTPUTS, VOICES, TRANSPORTS, FACES) for p in registry.plugins()]

@@ -18,11 +18,11 @@ from realizer.client.message_router import (
     BlockWaiter,
     ClientError,
     Frame,
+    Playout,
     Receiver,
     Router,
     is_blank,
 )
-from realizer.client.playout import Playout
 from realizer.client.speech import Speech
 from realizer.client.stream_options import FrameOptions, PictureOptions, SoundOptions, SpeechOptions
 from realizer.client.voice import Pcm, Timed, Voice, samples_of, timed

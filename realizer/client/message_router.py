@@ -1,8 +1,9 @@
-"""The router of the service's messages to queues, answers and listeners; it has no sockets."""
+"""The router of the service's messages to queues, answers, listeners and receivers; it has no sockets."""
 
 from __future__ import annotations
 
 import json
+import math
 import re
 import time
 from collections import deque
@@ -80,13 +81,9 @@ class Arrivals:
 class Router:
     """The queues of messages that have arrived, and the pending request.
 
-    Args:
-        clock: returns seconds, and never jumps.
-
     Attributes:
         receivers: (stream, the character in `subscribe`) -> what its binary frames go to instead of a queue.
         errors: errors about messages without an answer, and of video streams that ended.
-        last_block: id of the last block that was sent, or None.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
@@ -212,3 +209,57 @@ class BlockWaiter:
             return self.last
         assert self.last is not None
         raise ClientError(f"{self.last.id}: {self.last.text}", "refused")
+
+
+# A consumer that is slower than the frames loses the oldest ones.
+MAX_WAITING = 1_000
+# The session clock is estimated from the messages of so many seconds.
+MEMORY = 5.0  # s
+
+
+class Playout:
+    """A queue of the frames of one stream, each of which is due at its time on the session clock.
+
+    The session clock is estimated from the messages that took the least time: the service sends their last
+    frame `ahead` seconds before its time.
+
+    Args:
+        ahead: as in `subscribe`.
+    """
+
+    def __init__(self, ahead: float) -> None:
+        self._ahead = ahead
+        self._frames: deque[WireFrame[Any]] = deque(maxlen=MAX_WAITING)
+        self._next = 0  # number of the first frame that was not taken
+        # (arrival, offset) of messages, the offsets rising: the first is the least of those remembered.
+        self._offsets: deque[tuple[float, float]] = deque()
+
+    def receive(self, message: WireFrame[Any], now: float) -> None:
+        """Add the frames of a message, instead of those from its first one on.
+
+        Args:
+            now: when it arrived, in seconds on any clock that never jumps.
+        """
+        frames = message.rows()
+        while self._frames and self._frames[-1].frame >= message.frame:
+            self._frames.pop()
+        self._frames.extend(frame for frame in frames if frame.frame >= self._next)
+        offset = now - (frames[-1].time - self._ahead)
+        while self._offsets and self._offsets[0][0] < now - MEMORY:
+            self._offsets.popleft()
+        while self._offsets and self._offsets[-1][1] >= offset:
+            self._offsets.pop()
+        self._offsets.append((now, offset))
+
+    @property
+    def next_due(self) -> float:
+        """When the next frame is due, on the clock of `receive`; infinity without frames."""
+        return self._frames[0].time + self._offsets[0][1] if self._frames else math.inf
+
+    def take(self, now: float) -> WireFrame[Any] | None:
+        """Return the next frame if it is due."""
+        if self.next_due > now:
+            return None
+        frame = self._frames.popleft()
+        self._next = frame.frame + 1
+        return frame

@@ -24,11 +24,7 @@ LOOK = {"format": "jpeg", "quality": 95}
 async def record(
     connection: AbstractAsyncContextManager[Any], path: Path, bml: str, fps: float, look: Mapping[str, Any]
 ) -> BlockProgress:
-    """Play BML and save its last block as a film. Other arguments and errors are those of `Client.film`.
-
-    Args:
-        connection: a `Client` of the session, to be opened and used for this only.
-    """
+    """Play BML and save its last block as a film. Other arguments and errors are those of `Client.film`."""
     from realizer.core.atomic_files import replacing
     from realizer.outputs.film import FORMATS, encode_film
 

@@ -86,14 +86,6 @@ class OpenSpeech(ABC):
     """A speech that is sent in parts over an open connection.
 
     `async with` closes it at its end, and stops it after an exception.
-
-    Args:
-        opening: fields of the first message.
-        control: sends a control message.
-        wait: waits until a condition holds.
-
-    Attributes:
-        id: of the speech, and of its block.
     """
 
     def __init__(
@@ -154,11 +146,7 @@ class OpenSpeech(ABC):
 
 
 class Speech(OpenSpeech):
-    """A speech whose text is sent as it comes, which `Client.speech` returns.
-
-    Args:
-        check: raises ClientError if the connection has ended.
-    """
+    """A speech whose text is sent as it comes, which `Client.speech` returns."""
 
     def __init__(
         self,

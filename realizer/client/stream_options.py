@@ -1,7 +1,5 @@
 """Options of the streams and speeches of a client; the service chooses what is left out."""
 
-from __future__ import annotations
-
 from typing import Literal, TypedDict
 
 

@@ -49,7 +49,7 @@ class LoopThread:
                 yield item
         finally:
             if isinstance(items, AsyncGenerator) and not self.has_ended:
-                self.do(_end_iteration(items))
+                self.do(items.aclose())
 
     def end(self) -> None:
         """End the loop and the thread."""
@@ -140,7 +140,7 @@ class SyncClient(Synchronous[Client]):
     def __init__(self, opening: AbstractAsyncContextManager[Client]) -> None:
         thread = LoopThread()
         try:
-            super().__init__(thread.do(_enter(opening)), thread)
+            super().__init__(thread.do(opening.__aenter__()), thread)
         except BaseException:
             thread.end()
             raise
@@ -197,7 +197,7 @@ class SyncClient(Synchronous[Client]):
         if self._thread.has_ended:
             return
         try:
-            self._thread.do(_exit(self._opening, None))
+            self._thread.do(self._opening.__aexit__(None, None, None))
             self._thread.do(self._thread.end_iterations())
         finally:
             self._thread.end()
@@ -205,16 +205,3 @@ class SyncClient(Synchronous[Client]):
 
 async def _next(items: AsyncIterator[T]) -> T | None:
     return await anext(items, None)
-
-
-async def _end_iteration(items: AsyncGenerator[T, None]) -> None:
-    await items.aclose()
-
-
-async def _enter(manager: AbstractAsyncContextManager[T]) -> T:
-    return await manager.__aenter__()
-
-
-async def _exit(manager: AbstractAsyncContextManager[Any], error: BaseException | None) -> None:
-    trace = None if error is None else error.__traceback__
-    await manager.__aexit__(None if error is None else type(error), error, trace)

@@ -1,7 +1,5 @@
 """Speech of any other voice: sound that is sent in clips, with or without the times of its words."""
 
-from __future__ import annotations
-
 import secrets
 import time
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
@@ -26,12 +24,7 @@ Timed = tuple[float, str] | tuple[float, float, str]
 
 
 class Voice(OpenSpeech):
-    """A speech whose sound is sent as it comes, which `Client.voice` returns.
-
-    Args:
-        rate: samples a second.
-        send: sends bytes.
-    """
+    """A speech whose sound is sent as it comes, which `Client.voice` returns."""
 
     def __init__(
         self,

@@ -14,24 +14,17 @@ class Stream:
     """A row of the table.
 
     Attributes:
-        name: its name in `subscribe`.
-        encodings: the default first.
-        options: the fields of `subscribe` that apply to it, beside `encoding`.
-        kind: the first byte of its binary messages; None if it has none.
         dtype: NumPy's name of the numbers in a binary message; None if the payload is not numeric.
-        width: how many numbers belong together, such as the three coordinates of a vertex.
-        payload: description of what follows the header of a binary message.
-        flushes: whether a binary message can have the flag FLUSH.
     """
 
     name: str
-    encodings: tuple[str, ...]
-    options: tuple[str, ...]
-    kind: int | None = None
+    encodings: tuple[str, ...]  # the default first
+    options: tuple[str, ...]  # the fields of `subscribe` that apply to it, beside `encoding`
+    kind: int | None = None  # the first byte of its binary messages; None if it has none
     dtype: str | None = None
-    width: int = 1
+    width: int = 1  # how many numbers belong together, such as the three coordinates of a vertex
     payload: str = ""
-    flushes: bool = False
+    flushes: bool = False  # whether a binary message can have the flag FLUSH
 
     @property
     def numeric(self) -> bool:

@@ -1,7 +1,5 @@
 """Binary and JSON encoding of stream frames."""
 
-from __future__ import annotations
-
 import json
 import struct
 from collections.abc import Mapping, Sequence
@@ -162,7 +160,6 @@ def pack_frames(
     """Encode many frames in one call. Return their messages, joined, and the length of one.
 
     Args:
-        first: number of the first frame; the others follow it.
         times: (n,) seconds.
         rows: (n, k) the payloads.
     """
@@ -197,11 +194,8 @@ class ClipPiece:
     """A piece of a sound clip from a client: kind 4, like outgoing sound.
 
     Attributes:
-        id: id of the clip.
         number: 0, 1, 2, ...: the header's `frame`; 0 begins the clip anew.
         rate: Hz of raw mono int16 PCM; 0 if the pieces together are a sound file.
-        sound: its bytes.
-        final: whether it is the last piece.
     """
 
     id: str

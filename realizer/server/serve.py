@@ -17,8 +17,7 @@ from realizer.face.fap_mapping import mapping_of
 from realizer.scheduling import warm_up
 from realizer.server.runtime.gc_policy import disable_automatic_gc
 from realizer.server.runtime.session_host import SessionHost
-from realizer.server.transports import registry
-from realizer.server.transports.transport import Transport
+from realizer.server.transports.transport import Transport, requested
 from realizer.server.transports.websocket.server import WebSocketTransport, startup_lines
 
 # s; a thread waits so long before it takes Python's lock from the event loop. While documents are planned the
@@ -58,7 +57,6 @@ async def serve(settings: Settings | None = None) -> None:
 
 @contextlib.contextmanager
 def _bind_errors(settings: Settings) -> Iterator[None]:
-    """Report a host name that does not exist as an error of the setting."""
     try:
         yield
     except socket.gaierror as error:
@@ -172,9 +170,6 @@ class Server:
 
     Args:
         worker: number of this process, if it is one of several; its connections come by `serve_socket` only.
-
-    Attributes:
-        transports: the open transports; WebSocket is the first.
     """
 
     def __init__(self, settings: Settings | None = None, worker: int | None = None) -> None:
@@ -210,7 +205,7 @@ class Server:
         """
         await self._sessions.start()
         try:
-            others = (make(self._sessions, self.settings) for make in registry.requested(self.settings))
+            others = (make(self._sessions, self.settings) for make in requested(self.settings))
             for transport in (self._web, *others):
                 if transport is not None:
                     await transport.start()

@@ -32,7 +32,7 @@ from realizer.behaviours.registry import KINDS, VOCABULARY
 from realizer.core.options import PlayOptions
 from realizer.playback.block_planner import plan
 from realizer.playback.player import Player
-from realizer.server.session.feedback_log import FeedbackLog
+from realizer.server.session.connections import FeedbackLog
 
 COUNTS = (1, 6, 20, 60)
 PARTS = ("read", "plan", "expand", "add", "feedback", "total", "longest")

@@ -24,17 +24,15 @@ from realizer.outputs.registry import OUTPUTS
 from realizer.server.asgi.client import AsgiClient
 from realizer.server.asgi.openapi import FINDING, description
 from realizer.server.asgi.renderings import Renderings
-from realizer.server.http.access import ANY_GRANT, AccessControl
+from realizer.server.http.access import ANY_GRANT, AccessControl, Grant
 from realizer.server.http.http_site import FRAMES
-from realizer.server.http.jwt_tokens import Grant
 from realizer.server.http.page_tools import MAX_TEXT
-from realizer.server.http.requests import SOCKETS, HttpRequests
+from realizer.server.http.requests import SOCKETS, HttpRequests, session_of
 from realizer.server.journal import JournalError
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError, Visitor
 from realizer.server.transports.transport import Outbound
 from realizer.server.transports.websocket.connection import WebSocketConnections
-from realizer.server.transports.websocket.request import session_of
 from realizer.sources import document_of
 
 if TYPE_CHECKING:
@@ -162,7 +160,6 @@ def _guarded(hub: Hub, handler: Callable[[Hub, Request], Any]) -> Callable[[Requ
 
 
 async def _socket(hub: Hub, path: str, socket: WebSocket) -> None:
-    """Serve a WebSocket until it closes."""
     await hub.ready()
     target, address = f"{path}?{socket.url.query}", address_of(socket)
     try:
@@ -184,7 +181,6 @@ async def _socket(hub: Hub, path: str, socket: WebSocket) -> None:
 
 
 async def _site(hub: Hub, request: Request) -> Response:
-    """Answer as the service's own server does."""
     hub.access.check_host(dict(request.headers))
     target = f"/{request.path_params['path']}?{request.url.query}"
     found = await hub.requests.answer(target, dict(request.headers))
@@ -196,7 +192,6 @@ async def _openapi(hub: Hub, request: Request) -> Response:
 
 
 async def _realize(hub: Hub, request: Request) -> Response:
-    """Return a file made of the document or the text in the body."""
     visitor, query = hub.admit(request), dict(request.query_params)
     path = await hub.renderings.render(await _body(hub, request), query, visitor.address)
     remove = BackgroundTask(shutil.rmtree, path.parent, ignore_errors=True)
@@ -204,7 +199,6 @@ async def _realize(hub: Hub, request: Request) -> Response:
 
 
 async def _check(hub: Hub, request: Request) -> Response:
-    """Return the faults of the document in the body."""
     from realizer.checking.source import check
 
     hub.admit(request)
@@ -258,7 +252,6 @@ async def _feedback(hub: Hub, request: Request) -> Response:
 
 
 async def _end(hub: Hub, request: Request) -> Response:
-    """End a session with all its connections."""
     visitor, name = hub.admit(request), request.path_params["session"]
     hub.sessions.check(name, visitor)
     if not hub.sessions.end(name):
@@ -292,7 +285,6 @@ async def _connect_peer(hub: Hub, request: Request) -> Response:
 
 
 async def _disconnect_peer(hub: Hub, request: Request) -> Response:
-    """End the WebRTC connection that an answer has named."""
     visitor, name = hub.admit(request), request.path_params["session"]
     hub.sessions.check(name, visitor)
     number = request.path_params["peer"]

@@ -1,7 +1,5 @@
 """A WebSocket of an ASGI server as a client of sessions."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 from collections import deque
@@ -10,18 +8,14 @@ from collections.abc import Callable, Mapping
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from realizer.core.settings import Settings, limit_hint
-from realizer.server.http.access import RateLimiter
 from realizer.server.transports.websocket.connection import GOODBYE, REASON
-from realizer.server.transports.websocket.protocol import UNIT
+from realizer.server.transports.websocket.protocol import UNIT, RateLimiter
 
 
 class AsgiClient:
     """A `ClientSocket` of an ASGI server: data waits in a queue that a task sends.
 
     The rate of messages and bytes is limited as by `protocol.Connection`; control frames are the server's.
-
-    Args:
-        target: path and query, as `/ws?session=show`.
     """
 
     def __init__(self, socket: WebSocket, target: str, address: str, settings: Settings) -> None:

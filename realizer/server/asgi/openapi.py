@@ -1,7 +1,5 @@
 """The description of the HTTP interface in OpenAPI 3.1."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import realizer

@@ -1,7 +1,5 @@
 """When the pictures and the sound of a session are sent to a peer: together, behind the session's clock."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 
@@ -21,7 +19,6 @@ class Playout:
 
     Args:
         opened: seconds on the loop's clock at which the session's clock was 0.
-        now: seconds on the loop's clock.
 
     Attributes:
         began: seconds on the loop's clock at which the timestamps of both tracks are 0.

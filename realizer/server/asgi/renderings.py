@@ -1,7 +1,5 @@
 """Files made of documents on request, by `realizer realize` in processes of their own."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import re
@@ -101,7 +99,6 @@ class Renderings:
 
 
 async def _run(body: bytes, options: list[str], folder: Path) -> Path:
-    """Run the command, and return the file it wrote."""
     process = await asyncio.create_subprocess_exec(
         sys.executable, "-m", "realizer", "--quiet", "realize", "-", *options,
         stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.DEVNULL, stderr=asyncio.subprocess.PIPE,

@@ -1,7 +1,5 @@
 """The pictures and the sound of a session as tracks of a WebRTC connection."""
 
-from __future__ import annotations
-
 import asyncio
 import math
 from collections import deque

@@ -1,7 +1,5 @@
 """Sessions by WebRTC: the picture and the sound of a face for a peer, such as a browser."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import json
@@ -34,7 +32,6 @@ class Peer:
     """An `Outbound` that passes the frames of a session on to the tracks of a WebRTC connection.
 
     Args:
-        session: its name.
         seconds_left: until its token expires; None: it does not.
 
     Attributes:
@@ -69,11 +66,7 @@ class Peer:
 
 
 class Peers:
-    """The WebRTC connections of an application.
-
-    Args:
-        sessions: the host of the sessions.
-    """
+    """The WebRTC connections of an application."""
 
     def __init__(self, sessions: SessionHost) -> None:
         self._sessions = sessions

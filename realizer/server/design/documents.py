@@ -1,7 +1,5 @@
 """Timelines from texts and documents, and documents from timelines."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -41,15 +39,12 @@ class Opened:
     """A timeline from a file or a text.
 
     Attributes:
-        timeline: as JSON.
-        left_out: what a timeline cannot hold, a sentence each.
-        text: of the speech.
         words: (start, end, word) of the speech, in seconds.
         peaks: largest amplitude of its sound, 0..1, in each hundredth of a second; [] without sound.
     """
 
     timeline: dict[str, object]
-    left_out: list[str] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)  # what a timeline cannot hold, a sentence each
     text: str = ""
     words: list[tuple[float, float, str]] = field(default_factory=list)
     peaks: list[float] = field(default_factory=list)
@@ -151,7 +146,6 @@ def _expressions(block: Block, schedule: Schedule, left: list[str]) -> Iterable[
 
 
 def _shown(node: Expression | FaceLexeme) -> tuple[str, float, str | None]:
-    """Return the name of an expression, how strong it is, and the reason for it."""
     if isinstance(node, Expression):
         return node.name, node.intensity, node.because
     return node.lexeme, node.amount, None

@@ -1,7 +1,5 @@
 """Frames of a timeline and of an expression as vertices, for the head of the page."""
 
-from __future__ import annotations
-
 import io
 import tempfile
 from base64 import b64encode
@@ -103,7 +101,6 @@ def sheet(face: str, settings: Settings) -> bytes:
 
 
 def _held(aus: Mapping[tuple[int, str], float]) -> Sequence[Channel]:
-    """Return channels that hold action units from 0 to 1 s."""
     return [
         Channel(target, np.array([0.0, 1.0]), np.array([value, value]))
         for target, value in pose_channels.columns(aus, 1.0).items()

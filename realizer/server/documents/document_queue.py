@@ -1,7 +1,5 @@
 """The queue of a session's documents, and their submission: parsed, synthesized, then planned."""
 
-from __future__ import annotations
-
 import logging
 import re
 from collections import Counter, deque
@@ -115,13 +113,7 @@ class Submission:
     """The submission of a session's documents: it reads them, requests their speech, and plans their blocks.
 
     Args:
-        name: the session's name, for the log.
         clock: the session clock; it stands still while the documents of one message are planned.
-        add_effects: takes the requests to voices.
-
-    Attributes:
-        voices: index of a character -> name of its voice.
-        counts: counters of the service, by name.
     """
 
     def __init__(
@@ -132,7 +124,7 @@ class Submission:
         clock: SessionClock,
         add_effects: Callable[[Iterable[Effect]], None],
     ) -> None:
-        self.voices: dict[int, str] = {}
+        self.voices: dict[int, str] = {}  # index of a character -> name of its voice
         self.counts = Counter[str]()
         self.pending = PendingBlocks()
         self.speeches = SpeechStreams(player)
@@ -291,7 +283,6 @@ class Submission:
         self._player.stop(t, blocks)
 
     def _internal(self, block: Block) -> None:
-        """Log a bug with its traceback, and refuse the block."""
         log.exception("session %s: block %s failed", self._name, block.id)
         warning = Warning(block.id, "EXECUTION_EXCEPTION", "internal error while planning this block")
         self.refuse(warning, block.character_id)
@@ -325,12 +316,7 @@ def size_error(text: str, settings: Settings) -> str | None:
 def block_limit_error(
     block: Block, settings: Settings, busy: int, characters: Collection[str | None]
 ) -> str | None:
-    """Return why a session refuses a block, or None.
-
-    Args:
-        busy: number of blocks that play or wait in the session.
-        characters: ids of the session's characters.
-    """
+    """Return why a session refuses a block, or None."""
     longest = _longest_speech(block)
     if longest > settings.max_speech:
         words = f"wanted at most {settings.max_speech} characters in one speech, got {longest}"
@@ -344,7 +330,6 @@ def block_limit_error(
 
 
 def _longest_speech(block: Block) -> int:
-    """Return the length of a block's longest speech in any of its forms, in characters."""
     speeches = [node for node in block.behaviours if isinstance(node, Speech)]
     texts = [sum(len(part) for part in s.text.parts if isinstance(part, str)) for s in speeches if s.text]
     return max([0, *texts, *(len(form.content) for s in speeches for form in s.descriptions)])

@@ -1,7 +1,5 @@
 """Limits on schedules, pictures and memory. Each check returns an error text or None."""
 
-from __future__ import annotations
-
 import os
 import sys
 from pathlib import Path

@@ -5,6 +5,7 @@ Long texts are requested in parts.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -32,27 +33,21 @@ class PendingBlock:
     """A block in preparation.
 
     Attributes:
-        message: number of the message that it came with; 0 for a part of a streamed speech.
         resources_of: block -> what it needs that one behaviour at a time can have ("voice", "gaze").
-        requests: ids of requests without an answer.
-        utterances: behaviour -> its synthesized speech.
-        predecessors: blocks in preparation that must be planned first.
-        final: whether the requested speech is used as it comes, without another request.
         is_incomplete: whether a block refers to a sync point that has not arrived.
-        is_streaming: whether the block speaks part of a sentence, which another block continues.
     """
 
     block: Block
     character: int
     waiting_since: float
-    message: int = 0
+    message: int = 0  # number of the message that it came with; 0 for a part of a streamed speech
     resources_of: Callable[[Block], frozenset[str]] = lambda block: frozenset()
-    requests: set[int] = field(default_factory=set)
+    requests: set[int] = field(default_factory=set)  # ids of requests without an answer
     utterances: dict[str, Utterance] = field(default_factory=dict)
-    predecessors: set[PendingBlock] = field(default_factory=set)
-    final: bool = False
+    predecessors: set[PendingBlock] = field(default_factory=set)  # that must be planned first
+    final: bool = False  # whether the requested speech is used as it comes, without another request
     is_incomplete: Callable[[Block], bool] = lambda block: False
-    is_streaming: bool = False
+    is_streaming: bool = False  # whether the block speaks part of a sentence, which another block continues
 
     @cached_property
     def resources(self) -> frozenset[str]:
@@ -157,31 +152,21 @@ class PendingBlocks:
 
 @dataclass(eq=False)
 class _Request:
-    """A request to a voice, of a whole speech or of a part of a long text.
-
-    Attributes:
-        part: what is requested now.
-        utterance: what the block has of a long text so far.
-    """
+    """A request to a voice, of a whole speech or of a part of a long text."""
 
     pending: PendingBlock
     behaviour: str
-    part: SpeechRequest
+    part: SpeechRequest  # what is requested now
     long_text: LongText | None
-    utterance: Utterance | None = None
+    utterance: Utterance | None = None  # what the block has of a long text so far
 
 
 class TtsRequests:
-    """The requests of a session to voices.
-
-    Attributes:
-        fault: why a voice failed last; None if none did.
-        request_count: how many requests were made; the id of the last one.
-    """
+    """The requests of a session to voices."""
 
     def __init__(self, player: Player, pending: PendingBlocks) -> None:
-        self.fault: str | None = None
-        self.request_count = 0
+        self.fault: str | None = None  # why a voice failed last; None if none did
+        self.request_count = 0  # how many requests were made; the id of the last one
         self._player = player
         self._pending = pending
         self._requests: dict[int, _Request] = {}
@@ -210,11 +195,7 @@ class TtsRequests:
         return {r.behaviour for r in requests if r.pending is pending and r.long_text is not None}
 
     def answer(self, id: int, result: Utterance | RealizerError, t: float) -> list[Speak]:
-        """Take the answer to a request. If the voice failed, the silent voice replaces it.
-
-        Returns:
-            The next requests.
-        """
+        """Take the answer to a request. If the voice failed, the silent voice replaces it."""
         request = self._requests.pop(id, None)
         if request is None or (request.long_text is None and id not in request.pending.requests):
             return []
@@ -243,9 +224,9 @@ class TtsRequests:
         overdue = [id for pending in late for id in sorted(pending.requests)]
         return [speak for id in overdue for speak in self.answer(id, fault, t)]
 
-    def deadline(self) -> float | None:
-        """Return the time at which `expire` is due; None without requests."""
-        return min((w.waiting_since + PATIENCE for w in self._pending.blocks if w.requests), default=None)
+    def deadline(self) -> float:
+        """Return the time at which `expire` is due; infinity without requests."""
+        return min((w.waiting_since + PATIENCE for w in self._pending.blocks if w.requests), default=math.inf)
 
     def _speak(self, request: _Request) -> Speak:
         self.request_count += 1

@@ -1,14 +1,23 @@
-"""The folder in which clients save files: whole files, and never over somebody else's change."""
+"""The folder in which clients save files: which kinds, whole, and never over somebody else's change."""
 
 from __future__ import annotations
 
+import base64
+import binascii
 import hashlib
 import re
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
 from realizer.core.atomic_files import lock, write_bytes
 from realizer.core.errors import RealizerError
-from realizer.protocol.messages.replies import ErrorCode
+from realizer.protocol.messages.common import Reply
+from realizer.protocol.messages.replies import ErrorCode, ErrorMessage, Saved
+
+if TYPE_CHECKING:
+    from realizer.server.session.effects import Write
+
 
 NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,63}")
 SUFFIX = re.compile(r"\.[a-z0-9]{1,8}")
@@ -17,11 +26,7 @@ LOCK = ".lock"
 
 
 class EditError(RealizerError):
-    """A file that is not saved; nothing has changed.
-
-    Attributes:
-        code: of the error message for the client.
-    """
+    """A file that is not saved; nothing has changed."""
 
     def __init__(self, text: str, code: ErrorCode = "edit") -> None:
         super().__init__(text)
@@ -34,11 +39,7 @@ def version_of(content: bytes) -> str:
 
 
 class EditFolder:
-    """A folder in which clients save files.
-
-    Args:
-        folder: exists, and can be written to.
-    """
+    """A folder in which clients save files."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder.resolve()
@@ -63,7 +64,6 @@ class EditFolder:
         """Write a file, complete or not at all, and return its new version.
 
         Args:
-            names, suffix: as for `path`; folders are made.
             version: of the file that this replaces; None: there is none.
 
         Raises:
@@ -86,7 +86,6 @@ class EditFolder:
         return version_of(content)
 
     def _check(self, path: Path, version: str | None) -> None:
-        """Raise EditError if a file is not of the expected version."""
         place = path.relative_to(self._folder)
         present = version_of(path.read_bytes()) if path.exists() else None
         if present == version:
@@ -98,3 +97,50 @@ class EditFolder:
         else:
             words = f"{place}: it was changed since it was opened: open it again, or save as another name"
         raise EditError(words, "conflict")
+
+
+class Kind(NamedTuple):
+    """A kind of file: `check` takes its path and content, and raises RealizerError if it cannot be used."""
+
+    folder: str
+    suffix: str
+    check: Callable[[Path, bytes], None]
+
+
+def save(order: Write) -> Reply:
+    """Save a file, and return the answer."""
+    message = order.message
+    kind = KINDS[message.kind]
+    folder = EditFolder(order.folder)
+    try:
+        content = _content(message.content, message.encoding)
+        path = folder.path(kind.folder, message.name, suffix=kind.suffix)
+        kind.check(path, content)
+        version = folder.write(
+            kind.folder, message.name, suffix=kind.suffix, content=content, version=message.version
+        )
+    except RealizerError as error:
+        code = error.code if isinstance(error, EditError) else "edit"
+        # The client knows the file by its place in the folder only.
+        words = str(error).replace(f"{order.folder.resolve()}/", "")
+        return ErrorMessage(code=code, message=words, where="save")
+    place = f"{kind.folder}/{message.name}{kind.suffix}"
+    return Saved(kind=message.kind, name=message.name, version=version, file=place)
+
+
+def _content(text: str, encoding: str) -> bytes:
+    if encoding == "text":
+        return text.encode()
+    try:
+        return base64.b64decode(text, validate=True)
+    except (binascii.Error, ValueError):
+        raise EditError("content: wanted base64") from None
+
+
+def _check_expression(path: Path, content: bytes) -> None:
+    from realizer.expressions.user_expressions import check_file
+
+    check_file(path, content)
+
+
+KINDS = {"expression": Kind("expressions", ".toml", _check_expression)}

@@ -1,8 +1,5 @@
-"""Access control: tokens, connection slots and rate limits."""
+"""Access control: tokens, which may be JSON Web Tokens (RFC 7519), hosts, origins and TLS."""
 
-from __future__ import annotations
-
-import asyncio
 import hashlib
 import hmac
 import ipaddress
@@ -10,15 +7,123 @@ import json
 import logging
 import socket
 import ssl
-from collections.abc import Callable, Mapping
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from http import HTTPStatus
+from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
-from realizer.core.settings import Settings, SettingsError, is_loopback, limit_hint
+from realizer.core.errors import RealizerError
+from realizer.core.settings import Settings, SettingsError, is_loopback
 from realizer.protocol.messages.common import MAX_CONTROL
 from realizer.server.documents.limits import memory_error
-from realizer.server.http.jwt_tokens import Grant, TokenError, TokenVerifier
 from realizer.server.runtime.session_registry import JoinError
+
+LEEWAY = 10.0  # s; allows for different clocks of hosts
+MIN_RSA_BITS = 2048  # shorter keys are insecure
+# Elliptic curve -> the one algorithm that signs with it (RFC 7518, 3.4).
+CURVES = {"secp256r1": "ES256", "secp384r1": "ES384", "secp521r1": "ES512"}
+
+
+class TokenError(RealizerError):
+    """A token is not accepted; the text says why, without its content."""
+
+
+@dataclass(frozen=True, slots=True)
+class Grant:
+    """The rights of a connection."""
+
+    sessions: frozenset[str] | None = None  # names of the sessions it may join; None: any
+    until: float | None = None  # POSIX time at which it ends, or None
+
+    @property
+    def seconds_left(self) -> float | None:
+        """Seconds until the grant ends, or None."""
+        return None if self.until is None else max(0.0, self.until + LEEWAY - time.time())
+
+
+class TokenVerifier:
+    """A verifier of tokens signed with one key, by the algorithms of that key only.
+
+    Args:
+        key: a public key in PEM (RSA, an elliptic curve, Ed25519), or a secret (HS256).
+        audience: required claim `aud` of tokens; None: they must not have one.
+
+    Raises:
+        RealizerError: the key is not one of these, or PyJWT is not installed.
+    """
+
+    def __init__(self, key: str, audience: str | None = None) -> None:
+        try:
+            import jwt
+        except ImportError:
+            raise _missing() from None
+        self._jwt = jwt
+        self._audience = audience
+        read: tuple[Any, Sequence[str]] = _public(key) if "-----BEGIN" in key else (key, ["HS256"])
+        self._key, self._algorithms = read
+
+    def verify(self, token: str) -> Grant:
+        """Return the grant of a token.
+
+        Raises:
+            TokenError: the token is not accepted.
+        """
+        jwt = self._jwt
+        try:
+            claims = jwt.decode(
+                token, self._key, algorithms=self._algorithms, audience=self._audience, leeway=LEEWAY
+            )
+            until = claims.get("exp")
+            return Grant(_sessions(claims), None if until is None else float(until))
+        except jwt.ExpiredSignatureError:
+            raise TokenError("one that has expired") from None
+        except (jwt.ImmatureSignatureError, jwt.InvalidIssuedAtError):
+            raise TokenError("one that is not valid yet") from None
+        except (jwt.InvalidAudienceError, jwt.MissingRequiredClaimError):
+            raise TokenError("one for somebody else (REALIZER_JWT_AUDIENCE)") from None
+        except (jwt.InvalidSignatureError, jwt.InvalidAlgorithmError):
+            raise TokenError("one that is not signed with it") from None
+        except (jwt.InvalidTokenError, ValueError, TypeError, OverflowError):
+            raise TokenError("another one") from None
+
+
+def _sessions(claims: dict[str, Any]) -> frozenset[str] | None:
+    """Return the sessions that the claim `session` names, a string or a list; None without the claim."""
+    if "session" not in claims:
+        return None
+    claim = claims["session"]
+    names = [claim] if isinstance(claim, str) else claim
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise TokenError("one whose claim session is no name, and no list of names")
+    return frozenset(names)
+
+
+def _public(text: str) -> tuple[Any, Sequence[str]]:
+    """Return a public key, and the algorithms that may sign with it."""
+    try:
+        from cryptography.hazmat.primitives.asymmetric import ec, ed25519, rsa
+        from cryptography.hazmat.primitives.serialization import load_pem_public_key
+    except ImportError:
+        raise _missing() from None
+    try:
+        key = load_pem_public_key(text.encode())
+    except ValueError:
+        key = None
+    if isinstance(key, rsa.RSAPublicKey) and key.key_size >= MIN_RSA_BITS:
+        return key, ["RS256", "RS384", "RS512"]
+    if isinstance(key, ec.EllipticCurvePublicKey) and key.curve.name in CURVES:
+        return key, [CURVES[key.curve.name]]
+    if isinstance(key, ed25519.Ed25519PublicKey):
+        return key, ["EdDSA"]
+    wanted = f"of RSA ({MIN_RSA_BITS} bits or more), of an elliptic curve ({', '.join(CURVES)}) or of Ed25519"
+    raise RealizerError(f"setting jwt_key: wanted a public key in PEM (BEGIN PUBLIC KEY), {wanted}")
+
+
+def _missing() -> RealizerError:
+    return RealizerError("--jwt-key needs PyJWT: pip install 'bml-realizer[jwt]'")
+
 
 # To listen on all addresses of the machine -> the one that it prints.
 EVERYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}
@@ -83,7 +188,6 @@ class AccessControl:
         """Return the grant of a request's token; None if it has none but may send one `later`.
 
         Args:
-            target: path and query of the request.
             headers: by lower-case names.
 
         Raises:
@@ -178,48 +282,6 @@ class AccessControl:
         if is_loopback(self._settings.host):
             return is_loopback(parts.hostname or "")
         return parts.netloc != "" and parts.netloc == headers.get("host", "").lower()
-
-
-class RateLimiter:
-    """A limit of the rate at which the messages of a client are read.
-
-    Args:
-        rate: messages a second; after a pause twice as many may come at once.
-
-    Attributes:
-        notice: a text for the client when it begins to exceed the rate, otherwise None.
-    """
-
-    def __init__(self, rate: float) -> None:
-        self.notice: str | None = None
-        self._rate = rate
-        self._was_limited = False
-        self._free = float("-inf")  # when all messages so far would have arrived at that rate
-
-    def wait(self, now: float, count: float = 1.0) -> float:
-        """Return the seconds to wait after a message, or several, that arrived `now`."""
-        self._free = max(self._free, now) + count / self._rate
-        pause = max(0.0, self._free - now - 2.0)
-        words = (
-            f"wanted at most {self._rate:g} messages a second; more are read later {limit_hint('max_rate')}"
-        )
-        self.notice = words if pause and not self._was_limited else None
-        self._was_limited = bool(pause)
-        return pause
-
-    async def pause(self, warn: Callable[[str], None], count: float = 1.0) -> None:
-        """Wait as long as the message that was just read, or several, demand.
-
-        Others run in between also if that is 0: one read may hold many messages, which must not delay the
-        frames of other clients.
-
-        Args:
-            warn: takes `notice`, if there is one.
-        """
-        seconds = self.wait(asyncio.get_running_loop().time(), count)
-        if self.notice is not None:
-            warn(self.notice)
-        await asyncio.sleep(seconds)
 
 
 def _is_address(name: str) -> bool:

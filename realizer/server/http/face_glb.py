@@ -1,7 +1,5 @@
 """What is drawn of a face as a binary glTF 2.0 file: mesh, maps, and how it follows a stream of vertices."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from typing import Any

@@ -1,7 +1,5 @@
 """The HTTP site on the service's port: page, tools, faces as GLB, health."""
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import json
@@ -129,7 +127,6 @@ class HttpSite:
         return _json(_look(face, self._settings.light, self._settings.background))
 
     def _background(self, asked: dict[str, str]) -> HttpResponse:
-        """Return the picture behind the face, as its file has it."""
         from realizer.render.backdrop import is_picture
 
         path = self._settings.background
@@ -151,7 +148,6 @@ class HttpSite:
             return frozenset(f.relative_to(folder).as_posix() for f in folder.rglob("*") if f.is_file())
 
     def _document(self, name: str) -> HttpResponse:
-        """Return a file of the documentation."""
         if not self._documents:
             return HttpResponse(404, TEXT, NO_DOCUMENTATION.encode())
         if not name:
@@ -283,7 +279,6 @@ def _sheet(face: str, settings: Settings, edition: int) -> Future[bytes]:
 
 @functools.lru_cache(8)
 def _glb(name: str) -> tuple[bytes, str]:
-    """Return what is drawn of a face as GLB, and its tag."""
     from realizer.face.load import load_face
     from realizer.server.http.face_glb import face_glb
 

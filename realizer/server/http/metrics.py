@@ -1,7 +1,5 @@
 """Metrics in the Prometheus text format (0.0.4)."""
 
-from __future__ import annotations
-
 import logging
 import re
 from bisect import bisect_left
@@ -18,17 +16,10 @@ SLOW_STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0, 60.0)
 
 
 class Histogram:
-    """A histogram of seconds.
-
-    Args:
-        ends: upper bounds of the buckets.
-
-    Attributes:
-        pending: seconds that `count` will add to the buckets.
-    """
+    """A histogram of seconds."""
 
     def __init__(self, ends: Sequence[float]) -> None:
-        self.pending: list[float] = []
+        self.pending: list[float] = []  # seconds that `count` will add to the buckets
         self._ends = ends
         self._counts = [0] * (len(ends) + 1)
         self._sum = 0.0
@@ -56,18 +47,12 @@ class Histogram:
 class Metrics:
     """The counters of one process.
 
-    Args:
-        worker: number of the process among several, or None.
-
     Attributes:
-        late: seconds by which sessions woke too late to send frames.
-        planning: seconds of reading and planning documents.
         slow_steps: seconds of the steps of the event loop that delayed all clients.
-        counts: name in `COUNTERS` -> count.
     """
 
     def __init__(self, worker: int | None = None) -> None:
-        self.late = Histogram(LATENESS)
+        self.late = Histogram(LATENESS)  # seconds by which sessions woke too late to send frames
         self.planning = Histogram(PLANNING)
         self.slow_steps = Histogram(SLOW_STEPS)
         self.counts: Counter[str] = Counter(dict.fromkeys(COUNTERS, 0))

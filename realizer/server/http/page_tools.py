@@ -22,11 +22,7 @@ EMOTION = {"name": str, "profile": str, "angle": int | float, "activation": int 
 
 
 class ToolError(RealizerError):
-    """A request that cannot be answered; the text says what was wanted.
-
-    Attributes:
-        status: of the response.
-    """
+    """A request that cannot be answered; the text says what was wanted."""
 
     status = 400
 

@@ -1,17 +1,78 @@
-"""Requests for the site, the metrics and the health of the service: who may make them, and their answers."""
+"""HTTP requests: their parts, who may make them, and the answers of the site, the metrics and the health."""
 
 import asyncio
 import http
 import logging
 from collections.abc import Mapping
+from urllib.parse import parse_qsl
+
+from websockets.asyncio.server import ServerConnection
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
 
 from realizer.core.settings import Settings
 from realizer.server.http.access import AccessControl
-from realizer.server.http.http_site import TEXT, HttpResponse, HttpSite
+from realizer.server.http.http_site import FRAMES, TEXT, HttpResponse, HttpSite
 from realizer.server.http.metrics import MEDIA_TYPE
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError
-from realizer.server.transports.websocket.request import path_of, query_of
+
+
+def address_of(socket: ServerConnection) -> str:
+    """Return the IP address of a client; "" if the socket has none, or is closed."""
+    try:
+        remote = socket.remote_address
+    except (AttributeError, OSError):  # uvloop asks the socket, which may be closed
+        return ""
+    return str(remote[0]) if isinstance(remote, tuple) else ""
+
+
+def headers_of(request: Request) -> dict[str, str]:
+    """Return the headers by lower-case names; of several with one name the last."""
+    return {name.lower(): value for name, value in request.headers.raw_items()}
+
+
+def query_of(target: str) -> dict[str, str]:
+    """Return the query of a request's target; of several values with one name the last."""
+    return dict(parse_qsl(target.partition("?")[2], keep_blank_values=True))
+
+
+def session_of(target: str) -> tuple[str | None, int | None]:
+    """Return the session and the number in `?session=ID&seen=N`.
+
+    Raises:
+        JoinError: 400, `seen` is not a number.
+    """
+    query = query_of(target)
+    session, seen = query.get("session") or None, query.get("seen")
+    if seen is None:
+        return session, None
+    if not (seen.isascii() and seen.isdigit() and len(seen) < 16):
+        raise JoinError(400, f"seen: wanted the number of the last feedback that came, got {seen[:80]!r}")
+    return session, int(seen)
+
+
+def path_of(target: str) -> str:
+    """Return the path of a request's target as it was sent, without its query."""
+    return target.partition("?")[0]
+
+
+def response_to(answer: HttpResponse, origin: str | None = None) -> Response:
+    """Convert a response for the websockets library; pages of `origin` may read it beside those of ours."""
+    headers = Headers(
+        {
+            "Content-Type": answer.media_type,
+            "Content-Length": str(len(answer.body)),
+            "X-Content-Type-Options": "nosniff",
+            "Content-Security-Policy": FRAMES,
+            "Vary": "Origin",
+            "Connection": "close",
+            **({} if origin is None else {"Access-Control-Allow-Origin": origin}),
+            **dict(answer.headers),
+        }
+    )
+    return Response(answer.status, http.HTTPStatus(answer.status).phrase, headers, answer.body)
+
 
 log = logging.getLogger(__name__)
 
@@ -19,11 +80,7 @@ SOCKETS = ("/ws", "/check", "/studio")  # paths of WebSockets
 
 
 class HttpRequests:
-    """The answers to GET requests that open no WebSocket.
-
-    Args:
-        worker: number of this process among several.
-    """
+    """The answers to GET requests that open no WebSocket."""
 
     def __init__(
         self, sessions: SessionHost, settings: Settings, access: AccessControl, worker: int = 0
@@ -38,8 +95,6 @@ class HttpRequests:
         """Return the answer to a request.
 
         Args:
-            target: path and query.
-            headers: by lower-case names.
             upgrade: whether a WebSocket is wanted, where there is none.
 
         Raises:
@@ -69,7 +124,6 @@ class HttpRequests:
         return HttpResponse(error.status, TEXT, f"{error}\n".encode(), headers)
 
     def _wrong_worker(self, target: str) -> str | None:
-        """Return the error if a request names another worker, or None."""
         worker = query_of(target).get("worker")
         if worker in (None, str(self._worker)):
             return None

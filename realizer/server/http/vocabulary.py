@@ -1,7 +1,5 @@
 """The vocabulary as JSON: elements, lexemes, emotions, AUs, FAPs, profiles, voices."""
 
-from __future__ import annotations
-
 import functools
 import json
 from typing import Any

@@ -16,7 +16,7 @@ from realizer.scheduling.timing import Schedule
 from realizer.server.documents.document_queue import Submission
 from realizer.server.journal.entry import JournalError
 from realizer.server.session.character_faces import CharacterFaces
-from realizer.server.session.feedback_log import FeedbackLog
+from realizer.server.session.connections import FeedbackLog
 from realizer.server.speech.audio_clips import AudioClips
 from realizer.server.speech.clip import Clip
 
@@ -40,12 +40,7 @@ class Checkpoint:
         return self.submission.is_idle and self.player.is_idle(ended_by)
 
     def write(self, at: float, connections: Collection[int]) -> dict[str, str | None]:
-        """Return the parts that a journal stores.
-
-        Args:
-            at: seconds on the session clock.
-            connections: numbers of the connections.
-        """
+        """Return the parts that a journal stores."""
         player, tts, scene = self.player, self.submission.tts, self.player.context.scene
         past, expected = player.blocks.snapshot()
         data = {
@@ -71,7 +66,6 @@ class Checkpoint:
         """Restore the state of a new session from a checkpoint.
 
         Args:
-            session: its name, for errors.
             parts: as in `SavedSession`.
 
         Returns:
@@ -176,7 +170,6 @@ def schedule_from_json(data: Mapping[str, Any]) -> Schedule:
 
 
 def _channel_to_json(channel: Channel) -> dict[str, Any]:
-    """Return the attributes of a channel except the default values."""
     data: dict[str, Any] = {
         "kind": next(name for name, kind in CHANNELS.items() if kind is type(channel)),
         "target": channel.target.name,

@@ -33,18 +33,12 @@ class TakenOver(JournalError):
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One event that changed a session.
+    """One event that changed a session."""
 
-    Attributes:
-        at: seconds on the session clock.
-        number: of the connection, or of the speech request.
-        body: the message; for "spoken" the voice's error, or "".
-    """
-
-    at: float
+    at: float  # seconds on the session clock
     kind: Kind
-    number: int = 0
-    body: str | bytes = ""
+    number: int = 0  # of the connection, or of the speech request
+    body: str | bytes = ""  # the message; for "spoken" the voice's error, or ""
 
     def line(self) -> str:
         """Return the entry as one line of JSON, without a line feed."""
@@ -81,16 +75,13 @@ class SavedSession:
     """A session as a journal or a recording holds it.
 
     Attributes:
-        epoch: POSIX time at 0 of the session clock.
-        entries: all entries, or those after the checkpoint; the oldest first.
-        parts: name -> text of the checkpoint; {} without one.
         head: what a recording says about the session beside the epoch: `session` (its name), `settings`,
             `scene`; {} in a journal.
     """
 
-    epoch: float
-    entries: list[Entry]
-    parts: Mapping[str, str] = field(default_factory=dict)
+    epoch: float  # POSIX time at 0 of the session clock
+    entries: list[Entry]  # all entries, or those after the checkpoint; the oldest first
+    parts: Mapping[str, str] = field(default_factory=dict)  # name -> text of the checkpoint; {} without one
     head: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
@@ -137,24 +128,17 @@ def quoted(line: str | bytes) -> str:
 class Journal(Protocol):
     """A log of sessions from which another process can resume them; it keeps them until they end.
 
-    Its methods but `taken_over` run in the event loop: each takes well under 1 ms.
+    Its methods but `taken_over` run in the event loop: each takes well under 1 ms. All but `end` raise
+    JournalError if the journal cannot be read or written, and nothing has changed then; those that write to a
+    session raise TakenOver if another process has taken it over.
     """
 
     def begin(self, session: str, epoch: float) -> None:
-        """Add a new session, whose clock is 0 at the POSIX time `epoch`.
-
-        Raises:
-            JournalError: the session cannot be written.
-        """
+        """Add a new session, whose clock is 0 at the POSIX time `epoch`."""
         ...
 
     def add(self, session: str, entry: Entry) -> None:
-        """Append an entry; it is stored when this returns.
-
-        Raises:
-            TakenOver: another process has taken the session over.
-            JournalError: the entry cannot be written.
-        """
+        """Append an entry; it is stored when this returns."""
         ...
 
     def end(self, session: str) -> None:
@@ -166,37 +150,19 @@ class Journal(Protocol):
         ...
 
     def claim(self, session: str) -> SavedSession | None:
-        """Take a session over and return it, or None if there is none.
-
-        Raises:
-            JournalError: the session cannot be read.
-        """
+        """Take a session over and return it, or None if there is none."""
         ...
 
     def note(self, session: str, text: str | None) -> None:
-        """Store a note about the replay as the part `replay`, or delete it (None).
-
-        Raises:
-            TakenOver: another process has taken the session over.
-            JournalError: it cannot be written.
-        """
+        """Store a note about the replay as the part `replay`, or delete it (None)."""
         ...
 
     def replace(self, session: str, index: int, entry: Entry) -> None:
-        """Replace an entry after the checkpoint by another, and delete the note about the replay.
-
-        Raises:
-            TakenOver: another process has taken the session over.
-            JournalError: there is no such entry, or it cannot be written.
-        """
+        """Replace an entry after the checkpoint by another, and delete the note about the replay."""
         ...
 
     def taken_over(self, sessions: Collection[str]) -> set[str]:
-        """Return which of these sessions another process has taken over. May block; any thread may call it.
-
-        Raises:
-            JournalError: the journal cannot be read.
-        """
+        """Return those of these sessions that another process has taken over. May block, in any thread."""
         ...
 
     def compact(self, session: str, parts: Mapping[str, str | None]) -> None:
@@ -204,9 +170,5 @@ class Journal(Protocol):
 
         Args:
             parts: name -> text of each new or changed part, None for a part to delete; others stay.
-
-        Raises:
-            TakenOver: another process has taken the session over.
-            JournalError: the checkpoint cannot be written; nothing has changed.
         """
         ...

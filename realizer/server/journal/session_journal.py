@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from realizer.server.journal.checkpoint import Checkpoint
@@ -27,12 +28,13 @@ AGAIN = 25
 class JournalWriter:
     """A writer that appends a session's entries to its journal and its recording.
 
+    Its methods raise TakenOver if another process has taken the session over; `begin` and `append` raise
+    JournalError if the journal cannot be written.
+
     Args:
-        session: the session's name.
         journal: from which another process can resume the session, or None.
         recorder: of the session for replay, or None. The session does not depend on it.
         on_stopped: is called when the recording has failed and stops.
-        saved: the content of the journal so far.
         follow: is called after each entry, until it returns False.
     """
 
@@ -67,11 +69,7 @@ class JournalWriter:
         return self._entries >= LONG * ENTRIES or self._bytes >= LONG * BYTES
 
     def begin(self, epoch: float) -> None:
-        """Add a new session.
-
-        Raises:
-            JournalError: it cannot be written to the journal.
-        """
+        """Add a new session."""
         if self._journal is not None:
             self._journal.begin(self._session, epoch)
         self._record(lambda recorder: recorder.begin(self._session, epoch))
@@ -81,12 +79,7 @@ class JournalWriter:
         self._record(lambda recorder: recorder.resume(self._session, saved))
 
     def append(self, at: float, kind: Kind, number: int = 0, body: str | bytes = "") -> None:
-        """Append an entry for an event that must not happen unless it is stored.
-
-        Raises:
-            TakenOver: another process has taken the session over.
-            JournalError: the entry cannot be written to the journal.
-        """
+        """Append an entry for an event that must not happen unless it is stored."""
         entry = Entry(at, kind, number, body)
         if self._journal is not None:
             self._journal.add(self._session, entry)
@@ -101,11 +94,7 @@ class JournalWriter:
         self._record(lambda recorder: recorder.add(self._session, entry))
 
     def try_append(self, at: float, kind: Kind, number: int = 0, body: str | bytes = "") -> None:
-        """Append an entry for an event that happens anyway. Only the first of several failures is logged.
-
-        Raises:
-            TakenOver: another process has taken the session over.
-        """
+        """Append an entry for an event that happens anyway. Only the first of several failures is logged."""
         try:
             self.append(at, kind, number, body)
         except TakenOver:
@@ -116,11 +105,7 @@ class JournalWriter:
             self._record(lambda recorder: recorder.add(self._session, Entry(at, kind, number, body)))
 
     def compact(self, parts: Mapping[str, str | None]) -> bool:
-        """Write a checkpoint. Return False if that fails; another one is due soon.
-
-        Raises:
-            TakenOver: another process has taken the session over.
-        """
+        """Write a checkpoint. Return False if that fails; another one is due soon."""
         try:
             if self._journal is not None:
                 self._journal.compact(self._session, parts)
@@ -157,41 +142,27 @@ class JournalWriter:
         self._failing = True
 
 
+@dataclass(eq=False)
 class SessionJournal:
-    """The journal of a session, from which another process can take the session over.
+    """The journal of a session, from which another process can take the session over."""
 
-    Args:
-        session: the session's name.
-        checkpoint: reads and writes the session's state.
-        connections: the ids of its connections.
-        on_taken_over: called when another process has taken the session over.
+    session: str
+    checkpoint: Checkpoint
+    connections: Collection[int]
+    on_taken_over: Callable[[TakenOver], None]
 
-    Attributes:
-        writer: writes the entries; at first nowhere.
-    """
-
-    def __init__(
-        self,
-        session: str,
-        checkpoint: Checkpoint,
-        connections: Collection[int],
-        on_taken_over: Callable[[TakenOver], None],
-    ) -> None:
-        self.writer = JournalWriter(session)
-        self._session = session
-        self._checkpoint = checkpoint
-        self._connections = connections
-        self._on_taken_over = on_taken_over
+    def __post_init__(self) -> None:
+        self.writer = JournalWriter(self.session)  # at first it writes nowhere
 
     def accept(self, t: float, kind: Kind, connection: int, message: str | bytes) -> str | None:
         """Write a message. Return why it cannot be accepted, or None."""
         try:
             self.writer.append(t, kind, connection, message)
         except TakenOver as error:
-            self._on_taken_over(error)
+            self.on_taken_over(error)
             return str(error)
         except JournalError as error:
-            log.error("session %s: %s", self._session, error)
+            log.error("session %s: %s", self.session, error)
             return f"this could not be written to the journal, so it is refused: {error}"
         return None
 
@@ -200,7 +171,7 @@ class SessionJournal:
         try:
             self.writer.try_append(t, kind, number, body)
         except TakenOver as error:
-            self._on_taken_over(error)
+            self.on_taken_over(error)
             return False
         return True
 
@@ -211,12 +182,12 @@ class SessionJournal:
         the journal is far too long, this is not required: then a blink or a nod of the next seconds, which
         depends on the last speech, may differ after a takeover.
         """
-        if not self._checkpoint.is_possible(t if self.writer.is_far_too_long else float("-inf")):
+        if not self.checkpoint.is_possible(t if self.writer.is_far_too_long else float("-inf")):
             return True
         try:
-            if self.writer.compact(self._checkpoint.write(t, self._connections)):
-                self._checkpoint.clips.settle()
+            if self.writer.compact(self.checkpoint.write(t, self.connections)):
+                self.checkpoint.clips.settle()
         except TakenOver as error:
-            self._on_taken_over(error)
+            self.on_taken_over(error)
             return False
         return True

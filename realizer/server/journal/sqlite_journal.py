@@ -126,7 +126,6 @@ class SqliteJournal:
             raise TakenOver(session)
 
     def _set_part(self, session: str, name: str, text: str | None) -> None:
-        """Store a part of a session, or delete it (None)."""
         if text is None:
             self._file.execute("DELETE FROM parts WHERE session = ? AND name = ?", (session, name))
         else:

@@ -22,22 +22,14 @@ def disable_automatic_gc() -> None:
 
 
 class GcPolicy:
-    """A policy of full collections, for when there may be many cycles.
-
-    Attributes:
-        ended_connections: number of connections that have closed since the last collection.
-    """
+    """A policy of full collections, for when there may be many cycles."""
 
     def __init__(self) -> None:
         self.ended_connections = 0
         self._least = memory()
 
     def collect_if_needed(self, alive: int) -> bool:
-        """Run a full collection if one is due. Return whether it was.
-
-        Args:
-            alive: number of open connections.
-        """
+        """Run a full collection if one is due. Return whether it was."""
         used = memory()
         self._least = min(self._least, used)
         if self.ended_connections < max(ENDED, alive) and used < GROWN * self._least + MORE:

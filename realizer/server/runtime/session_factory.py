@@ -1,4 +1,4 @@
-"""The factory of sessions: new ones, and those restored from a journal."""
+"""The factory of sessions: new ones, and those restored from a journal, which other processes had."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ import contextlib
 import functools
 import logging
 import time
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping, MutableMapping
+from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 from weakref import WeakValueDictionary
@@ -25,16 +26,18 @@ from realizer.server.http.metrics import Metrics
 from realizer.server.journal import Entry, Journal, JournalError, SavedSession, TakenOver, journal_at
 from realizer.server.journal.entry import NOTE
 from realizer.server.journal.session_journal import JournalWriter
+from realizer.server.runtime.engines import Engines
 from realizer.server.runtime.session_registry import JoinError
 from realizer.server.session.effects import Speak
+from realizer.server.session.query_handlers import capabilities_of
 from realizer.server.session.session import Session
-from realizer.server.session.welcome import capabilities_of
-from realizer.server.streams.overload import Overload
+from realizer.server.streams.broadcast import Overload
 from realizer.speech.utterance import Utterance
 
 if TYPE_CHECKING:
     from realizer.server.journal.recordings import RecordingFolder
-    from realizer.server.journal.replay_watch import ReplayNote, ReplayWatch
+    from realizer.server.journal.replay import ReplayNote, ReplayWatch
+
 
 log = logging.getLogger(__name__)
 
@@ -43,16 +46,7 @@ BATCH = 100
 
 
 class SessionFactory:
-    """The factory of the sessions of one process.
-
-    Args:
-        metrics: counts recordings that have stopped, and frames that sessions take back.
-
-    Attributes:
-        journal: from which another process can resume sessions, or None.
-        ending: whether new sessions take no documents.
-        overload: of the process.
-    """
+    """The factory of the sessions of one process."""
 
     def __init__(self, settings: Settings, metrics: Metrics) -> None:
         self.journal: Journal | None = None
@@ -119,7 +113,6 @@ class SessionFactory:
 
         Args:
             seen: sequence number of the last feedback that a client received; the session is advanced to it.
-            speak: synthesizes a speech request again.
 
         Returns:
             The session, and the speech requests that are not answered yet.
@@ -129,8 +122,7 @@ class SessionFactory:
         """
         if self.journal is None or (saved := self.journal.claim(name)) is None:
             return None
-        from realizer.server.journal.replay import catch_up, restore_session
-        from realizer.server.journal.replay_watch import TRIES, ReplayNote, ReplayWatch
+        from realizer.server.journal.replay import TRIES, ReplayNote, ReplayWatch, catch_up, restore_session
 
         loop = asyncio.get_running_loop()
         last = ReplayNote.read(saved.parts)
@@ -163,11 +155,7 @@ class SessionFactory:
         return session, unanswered
 
     def _put_aside(self, session: str, entries: list[Entry], note: ReplayNote) -> None:
-        """Replace a document in the journal by a note that it is left out.
-
-        Raises:
-            JournalError: it cannot be written.
-        """
+        """Replace a document in the journal by a note that it is left out."""
         assert self.journal is not None
         index = note.entry
         if not index < len(entries) or entries[index].kind != "text":
@@ -246,3 +234,64 @@ class SessionFactory:
             self._metrics.counts["records_stopped"] += 1
 
         return JournalWriter(id, journal, self._recorder, on_stopped=on_stopped, saved=saved, follow=follow)
+
+
+@dataclass(eq=False)
+class SessionRestorer:
+    """Restores the sessions that other processes had.
+
+    Args:
+        keep: seconds for which clients may reconnect to a restored session.
+    """
+
+    factory: SessionFactory
+    engines: Engines
+    sessions: MutableMapping[str, Session]
+    keep: float
+    call: Callable[[Session, Callable[[], None]], object]
+    adopt: Callable[[Session, list[Speak]], None]
+    restoring: dict[str, asyncio.Task[None]] = field(default_factory=dict)
+    resumed: dict[str, float] = field(default_factory=dict)  # session -> end of `keep`; loop time
+
+    async def restore(self, name: str | None, seen: int | None = None) -> None:
+        """Take over a session of another process, before a client joins it.
+
+        Raises:
+            JournalError: the journal cannot be read, or the session not be restored.
+        """
+        if self.factory.journal is None or name is None:
+            return
+        if not self.is_live(name):
+            if name not in self.restoring:
+                self.restoring[name] = asyncio.create_task(self._restore(name, seen or 0))
+            await asyncio.shield(self.restoring[name])
+        session = self.sessions.get(name)
+        if session is not None and name in self.resumed and session.feedback_log.newest < (seen or 0):
+            self.call(session, partial(self._catch_up, session, seen or 0))
+
+    def is_live(self, name: str) -> bool:
+        """Whether the session plays here. One that another process has taken over may still be registered."""
+        session = self.sessions.get(name)
+        return session is not None and not session.closed
+
+    def expire(self, now: float) -> None:
+        """Forget the restored sessions to which clients have had time to reconnect."""
+        self.resumed = {name: end for name, end in self.resumed.items() if end > now}
+
+    async def _restore(self, name: str, seen: int) -> None:
+        try:
+            restored = await self.factory.restore(name, seen, self.engines.speak)
+            if restored is None:
+                return
+            session, unanswered = restored
+            self.sessions[name] = session
+            self.resumed[name] = asyncio.get_running_loop().time() + self.keep
+            self.adopt(session, unanswered)
+        finally:
+            del self.restoring[name]
+
+    def _catch_up(self, session: Session, seen: int) -> None:
+        from realizer.server.journal.replay import catch_up
+
+        now = asyncio.get_running_loop().time()
+        session.clock.opened -= catch_up(session, now, seen) - now

@@ -6,14 +6,17 @@ import functools
 import itertools
 import logging
 from collections.abc import Callable, Iterable
+from typing import TypeVar
 
+from realizer.core import work
 from realizer.core.settings import Settings
 from realizer.server.documents.limits import memory
+from realizer.server.edits.edit_folder import save
 from realizer.server.http.metrics import Metrics
 from realizer.server.journal import TakenOver
-from realizer.server.runtime.effect_runner import EffectRunner, Engines
+from realizer.server.runtime.engines import Engines, FairPool
 from realizer.server.runtime.gc_policy import GcPolicy
-from realizer.server.runtime.session_factory import SessionFactory
+from realizer.server.runtime.session_factory import SessionFactory, SessionRestorer
 from realizer.server.runtime.session_registry import (
     ANYBODY,
     JoinError,
@@ -21,14 +24,16 @@ from realizer.server.runtime.session_registry import (
     Visitor,
     worker_of,
 )
-from realizer.server.runtime.session_restorer import SessionRestorer
 from realizer.server.runtime.turns import ReadingTurns, SlicedCalls, WakeUps
-from realizer.server.session.effects import Close, Effect, MoveConnection
+from realizer.server.session.effects import Close, Draw, Effect, Look, MoveConnection, Send, Speak, Write
 from realizer.server.session.session import Session
 from realizer.server.streams.connection import SLOW
 from realizer.server.transports.transport import Outbound
 
 log = logging.getLogger(__name__)
+
+E = TypeVar("E", Speak, Draw, Look, Write)
+R = TypeVar("R")
 
 DRAIN_STEP = 0.05  # s; how often `drain` checks whether everything has ended
 FRAME_SLICES = 5  # of time; frames that take longer to compute are continued with the documents, in turn
@@ -47,9 +52,6 @@ class SessionHost:
 
     Args:
         worker: number of this process among `settings.workers`; None if it is the only one.
-
-    Attributes:
-        metrics: the counters of the service.
     """
 
     def __init__(self, settings: Settings, worker: int | None = None) -> None:
@@ -92,7 +94,6 @@ class SessionHost:
             JournalError: the journal cannot be opened.
         """
         self._loop = asyncio.get_running_loop()
-        self._effects = EffectRunner(self._loop, self._engines, self._clients, self._deliver)
         self._wake_ups = WakeUps[Session](self._loop, self._wake)
         self._reading = ReadingTurns[Session](
             self._loop, self._read, lambda: self._overload.is_active and self._wake_ups.is_behind
@@ -167,16 +168,13 @@ class SessionHost:
         await self._restorer.restore(name, seen)
 
     def _adopt(self, session: Session, unanswered: Iterable[Effect]) -> None:
-        self._effects.run(session, unanswered)
+        self._run(session, unanswered)
         self._apply_effects(session)
 
     def join(
         self, client: Outbound, name: str | None = None, seen: int | None = None, visitor: Visitor = ANYBODY
     ) -> int:
         """Add a client to the named session, or to a new one, and return the number of its connection.
-
-        Args:
-            seen: sequence number of the last feedback that the client received.
 
         Raises:
             JoinError: as `check`.
@@ -253,7 +251,7 @@ class SessionHost:
 
     def _end(self, session: Session, code: int, reason: str) -> None:
         numbers = self._registry.joined(session)
-        self._effects.run(session, [Close(number, code, reason) for number in numbers])
+        self._run(session, [Close(number, code, reason) for number in numbers])
         self._registry.end(session)
         self._apply_effects(session)
 
@@ -277,14 +275,48 @@ class SessionHost:
         return not self._calls.is_busy(session)
 
     def _apply_effects(self, session: Session) -> None:
-        """Carry out the effects of a session, and schedule its next wake-up."""
         effects = session.take_effects()
         if any(isinstance(effect, MoveConnection) for effect in effects):
             effects = self._registry.move_connections(session, effects, self._loop.time())
-        self._effects.run(session, effects)
+        self._run(session, effects)
         if session.closed:
             self._engines.drop(session)
         self._schedule_wakeup(session)
+
+    def _run(self, session: Session, effects: Iterable[Effect]) -> None:
+        engines = self._engines
+        for effect in work.counted(effects, 5):
+            match effect:
+                case Send(connection, data):
+                    if (client := self._clients.get(connection)) is not None:
+                        client.send(data)
+                case Speak():
+                    self._submit(session, engines.speech_pool, engines.speak, effect, session.on_speech)
+                case Draw():
+                    self._submit(session, engines.render_pool, engines.draw, effect, session.on_picture)
+                case Look():
+                    self._submit(session, engines.tracking_pool, engines.look, effect, session.on_sight)
+                case Write():
+                    self._submit(session, engines.file_pool, save, effect, session.on_saved)
+                case Close(connection, code, reason):
+                    if (client := self._clients.get(connection)) is not None:
+                        client.disconnect(code, reason)
+
+    def _submit(
+        self,
+        session: Session,
+        pool: FairPool,
+        compute: Callable[[E], R],
+        effect: E,
+        take: Callable[[int, R, float], None],
+    ) -> None:
+        def answer(future: asyncio.Future[R]) -> None:
+            if not future.cancelled():
+                result = future.result()
+                self._deliver(session, lambda: take(effect.id, result, self._loop.time()))
+
+        computed = pool.submit(session, functools.partial(compute, effect))
+        asyncio.wrap_future(computed, loop=self._loop).add_done_callback(answer)
 
     def _schedule_wakeup(self, session: Session) -> None:
         """Schedule the next wake-up of a session, and its next document, which waits for its turn."""
@@ -318,7 +350,7 @@ class SessionHost:
             self._call(session, functools.partial(self._work, session, now, read_documents=False))
             return
         effects, due = frames
-        self._effects.run(session, effects)
+        self._run(session, effects)
         for number in session.connections:
             client = self._clients.get(number)
             if client is not None and (waiting := client.unsent_bytes) > SLOW:
@@ -354,13 +386,11 @@ class SessionHost:
             self.metrics.report_slow_step(seconds, action, session.id, clients)
 
     def _fail(self, session: Session) -> None:
-        """Log an internal error and end its session; the others play on."""
         log.exception("session %s ends: it failed", session.id)
         self.metrics.counts["failures"] += 1
         self._end(session, 1011, "internal error")  # in the journal, too: a restored session would fail again
 
     def _deliver(self, session: Session, answer: Callable[[], None]) -> None:
-        """Pass the answer of a voice or a renderer to a session."""
         if not self._closed:
             began = self._loop.time()
             self._call(session, answer)
@@ -379,7 +409,7 @@ class SessionHost:
             waiting = self._registry.joined(session).difference(session.connections)
             session.hand_over(error := TakenOver(session.id))
             self._apply_effects(session)
-            self._effects.run(session, [Close(number, 1012, str(error)) for number in waiting])
+            self._run(session, [Close(number, 1012, str(error)) for number in waiting])
 
     def _expire_sessions(self) -> None:
         self._gc_policy.collect_if_needed(len(self._clients))

@@ -13,7 +13,7 @@ from realizer.protocol.messages.replies import ErrorMessage
 from realizer.server.documents.limits import memory_error
 from realizer.server.session.effects import Close, Effect, MoveConnection, Send
 from realizer.server.session.session import Session
-from realizer.server.streams.overload import Overload
+from realizer.server.streams.broadcast import Overload
 
 SESSION_ID = re.compile(r"[A-Za-z0-9._~-]{1,64}")
 # Sessions of other transports than the WebSocket, which are open in the first worker only.
@@ -41,17 +41,11 @@ class JoinError(RealizerError):
 
 @dataclass(frozen=True, slots=True)
 class Visitor:
-    """The origin and the rights of a connection.
+    """The origin and the rights of a connection."""
 
-    Attributes:
-        address: IP address; "" if unknown, as for other transports than the WebSocket.
-        sessions: names of the sessions it may join; None: any.
-        may_edit: whether it may save files of the service.
-    """
-
-    address: str = ""
-    sessions: frozenset[str] | None = None
-    may_edit: bool = False
+    address: str = ""  # IP address; "" if unknown, as for other transports than the WebSocket
+    sessions: frozenset[str] | None = None  # names of the sessions it may join; None: any
+    may_edit: bool = False  # whether it may save files of the service
 
 
 ANYBODY = Visitor()
@@ -67,17 +61,9 @@ class SessionRegistry:
     """All sessions of the service, by name and by connection.
 
     Args:
-        make: (id, now, named) -> Session.
-        settings: the limits of sessions.
         is_local: (name) -> whether the session of that name belongs to this process.
         call: (session, function) -> calls a function that changes a session, now or when its other calls have
             ended; and returns whether it was now.
-        cancel: ends the calls of a session that have not ended.
-        overload: whether new sessions are refused.
-
-    Attributes:
-        sessions: name -> session.
-        session_of: number of a connection -> its session.
     """
 
     def __init__(
@@ -202,11 +188,7 @@ class SessionRegistry:
             self._opened_by.pop(session.id, None)
 
     def move_connections(self, session: Session, taken: Iterable[Effect], now: float) -> list[Effect]:
-        """Move the connections that change to another session, and return the effects that are left.
-
-        Args:
-            taken: the effects of the session that they leave.
-        """
+        """Move the connections that change to another session, and return the effects that are left."""
         effects: list[Effect] = []
         moved: set[int] = set()
         for effect in taken:
@@ -241,7 +223,6 @@ class SessionRegistry:
             joined.connections.send_missed_feedback(move.connection, move.seen)
 
     def _refusal(self, move: MoveConnection, left: Session, visitor: Visitor) -> str | None:
-        """Return why a connection cannot move from a session to another, or None."""
         if not self._is_local(move.session):
             target = f"/ws?session={move.session}" + ("" if move.seen is None else f"&seen={move.seen}")
             return f"hello reaches the sessions of this process only: connect to {target} instead"

@@ -1,7 +1,5 @@
 """How sessions share the event loop: when they are woken, when they read documents, how long calls take."""
 
-from __future__ import annotations
-
 import asyncio
 import math
 import time
@@ -36,7 +34,6 @@ class WakeUps(Generic[T]):
     """The times at which sessions are woken, each at most once.
 
     Args:
-        loop: the event loop.
         wake: called with a session and the time at which it was to be woken.
     """
 
@@ -80,7 +77,6 @@ class WakeUps(Generic[T]):
         self._times.clear()
 
     def _wake_step(self, step: int) -> None:
-        """Wake the sessions of a step after those that are still to be woken."""
         is_idle = not self._due
         self._due.extend((step, session) for session in self._steps.pop(step))
         if is_idle:
@@ -103,8 +99,6 @@ class ReadingTurns(Generic[T]):
     """The turns of the sessions that have documents to read, or a paused call to continue.
 
     Args:
-        loop: the event loop.
-        read: called with the session whose turn it is.
         must_wait: returns whether turns wait until it is time for their share.
     """
 
@@ -170,7 +164,6 @@ class SlicedCalls(Generic[T]):
     Args:
         on_pause: called with the owner of a call that was paused; the caller passes it to `resume` later.
         call_soon: calls a function in the thread of the other methods; called in any thread.
-        clock: seconds, rising while calls run.
     """
 
     def __init__(

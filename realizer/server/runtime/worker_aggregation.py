@@ -52,7 +52,6 @@ def is_for_all_workers(line: str) -> bool:
 
 
 def _request_target(line: str) -> tuple[str, str]:
-    """Return path and query of the first line of a GET request; ("", "") of another."""
     method, _, rest = line.partition(" ")
     path, _, query = rest.partition(" ")[0].partition("?")
     return (path, query) if method == "GET" else ("", "")
@@ -64,9 +63,6 @@ async def aggregate(
     """Answer a request for the metrics, or the health, of all workers.
 
     Each worker gets the request with its token and checks it itself. If one refuses it, so does the answer.
-
-    Args:
-        give: passes a socket to the worker of that number.
     """
     loop = asyncio.get_running_loop()
     request = b""

@@ -47,9 +47,6 @@ class Workers:
     Args:
         serve: (settings, number, control): serves the connections that arrive through `control`, in a worker
             process; a function of a module, which that process imports.
-
-    Attributes:
-        port: the open port after `start`.
     """
 
     def __init__(self, settings: Settings, serve: Serve) -> None:
@@ -138,7 +135,6 @@ class Workers:
         return child, ours
 
     async def _watch(self, number: int, control: socket.socket) -> None:
-        """Restart a worker that has ended by itself."""
         loop = asyncio.get_running_loop()
         while not self._ending:
             with contextlib.suppress(OSError):
@@ -243,7 +239,6 @@ def receive_sockets(control: socket.socket) -> list[socket.socket]:
 def _work(
     serve: Serve, settings: Settings, number: int, port: int, control: socket.socket, level: int
 ) -> None:
-    """Run a worker process, with the log level of its parent."""
     write_words(level, f"worker {number}: ")
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to the parent, which ends the workers
     if number:  # other transports than the WebSocket are open in the first worker only

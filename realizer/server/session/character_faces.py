@@ -19,9 +19,6 @@ log = logging.getLogger(__name__)
 class CharacterFaces:
     """The faces of characters, by the characters' indices.
 
-    Args:
-        settings: the default face, the deformer and the mapping.
-
     Attributes:
         assigned: index -> the face that a client requested, as the client named it.
     """
@@ -57,11 +54,7 @@ class CharacterFaces:
         return face_name(self.assigned.get(index, self._settings.face))
 
     def of(self, index: int) -> Face:
-        """Return the face of a character.
-
-        Raises:
-            FaceError: it cannot be loaded.
-        """
+        """Return the face of a character."""
         return self._load(self.name(index))
 
     def mapping(self, index: int) -> FapMapping:

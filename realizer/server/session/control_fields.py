@@ -1,7 +1,5 @@
 """Lookup of the characters, action units, FAPs and emotions that control messages name."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 
 from bml_schema import Emotion
@@ -37,9 +35,6 @@ def character_index(player: Player, character: str | None) -> int:
 
 def direct_values(message: SetMessage, before: Collection[str]) -> dict[str, float | None]:
     """Return the AUs (0..1) and FAPs (FAPU) that a message sets, by name; None releases one.
-
-    Args:
-        before: names that earlier messages set.
 
     Raises:
         FieldError: the message names an unknown AU or FAP.

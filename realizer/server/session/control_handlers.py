@@ -1,7 +1,5 @@
 """Handlers of the control messages that change a session."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -33,11 +31,7 @@ from realizer.server.streams.connection import Connection
 
 @dataclass(eq=False)
 class ControlHandlers:
-    """The handlers of the control messages that change what a session shows or sends.
-
-    Attributes:
-        reply: sends a message to a connection, by its id.
-    """
+    """The handlers of the control messages that change what a session shows or sends."""
 
     player: Player
     faces: CharacterFaces
@@ -47,11 +41,7 @@ class ControlHandlers:
     reply: Callable[[int, Reply], None]
 
     def handle(self, connection: Connection, message: Control, t: float) -> None:
-        """Handle a control message, or reply with an error and change nothing (`stop`: see `_stop`).
-
-        Args:
-            t: seconds on the session clock.
-        """
+        """Handle a control message, or reply with an error and change nothing (`stop`: see `_stop`)."""
         characters = self.player.characters
         id = message.id if isinstance(message, SpeechMessage) else None
         try:
@@ -106,7 +96,6 @@ class ControlHandlers:
             self.reply(connection.id, _error("clip", error, error.where))
 
     def _clip_piece(self, piece: ClipPiece, t: float) -> None:
-        """Add a piece of a clip, and pass on what of it can be spoken."""
         try:
             self.clips.add_chunk(piece)
         except ClipError as error:
@@ -141,7 +130,6 @@ class ControlHandlers:
             self._speak_parts(clip, t, is_last=True, fault=f"no piece of it has come for {PATIENCE:g} s")
 
     def _hear(self, piece: ClipPiece, t: float) -> None:
-        """Pass sound that a character hears to the player."""
         sound = heard_samples(piece)
         index = character_index(self.player, piece.id.removeprefix(HEARD) or None)
         self.player.hear_sound(sound, piece.rate, t, is_last=piece.final, character=index)

@@ -31,20 +31,14 @@ class Speak:
 
 @dataclass(frozen=True, slots=True)
 class RenderOptions:
-    """Options of a picture, as `realizer.render.Renderer` takes them.
+    """Options of a picture, as `realizer.render.Renderer` takes them."""
 
-    Attributes:
-        size: width and height in pixels.
-        quality: 1..100, of a JPEG or a WebP.
-        form: "jpeg", "png" or "webp".
-    """
-
-    size: tuple[int, int]
+    size: tuple[int, int]  # width and height in pixels
     camera: str
     light: str | None
     background: str | None
-    quality: int
-    form: str = "jpeg"
+    quality: int  # 1..100, of a JPEG or a WebP
+    form: str = "jpeg"  # "jpeg", "png" or "webp"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

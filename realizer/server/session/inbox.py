@@ -1,8 +1,7 @@
 """The inbox of a session: each message of a client is written to the journal, and then handled."""
 
-from __future__ import annotations
-
 import json
+from dataclasses import dataclass
 from typing import get_args
 
 from bml_schema import WarningFeedback
@@ -26,31 +25,18 @@ PASSING = (*get_args(Query), Subscribe, Unsubscribe, Track)
 PICTURE = bytes([STREAMS["video"].kind or 0])  # first byte of a picture
 
 
+@dataclass(eq=False)
 class Inbox:
-    """The inbox of a session.
+    """The inbox of a session."""
 
-    Attributes:
-        ending: whether documents are refused because the service is ending.
-    """
-
-    def __init__(
-        self,
-        player: Player,
-        submission: Submission,
-        journal: SessionJournal,
-        connections: Connections,
-        queries: QueryHandlers,
-        controls: ControlHandlers,
-        tracked: TrackedFaces,
-    ) -> None:
-        self.ending = False
-        self._player = player
-        self._submission = submission
-        self._journal = journal
-        self._connections = connections
-        self._queries = queries
-        self._controls = controls
-        self._tracked = tracked
+    player: Player
+    submission: Submission
+    journal: SessionJournal
+    connections: Connections
+    queries: QueryHandlers
+    controls: ControlHandlers
+    tracked: TrackedFaces
+    ending: bool = False  # whether documents are refused because the service is ending
 
     def handle(self, connection: Connection, message: str | bytes, t: float) -> bool:
         """Handle a message, or reply with an error. Return whether it was written to the journal.
@@ -58,16 +44,15 @@ class Inbox:
         Args:
             message: bytes are a picture or a sound clip, text that starts with `{` is control, all else is
                 BML.
-            t: seconds on the session clock.
         """
         if isinstance(message, bytes) and message[:1] == PICTURE:
-            self._tracked.picture(connection.id, message, t)
+            self.tracked.picture(connection.id, message, t)
             return False
         control: Control | None = None
         if isinstance(message, str) and (text := message.lstrip("\ufeff \t\r\n")).startswith("{"):
             parsed = parse_control(text, can_save=connection.may_edit)
             if isinstance(parsed, ErrorMessage):
-                self._connections.reply(connection.id, parsed)
+                self.connections.reply(connection.id, parsed)
                 return False
             if isinstance(parsed, PASSING):
                 self._handle_passing(connection, parsed, t)
@@ -76,41 +61,41 @@ class Inbox:
         is_bml = control is None and isinstance(message, str)
         ending = "the service is ending and takes no more documents" if self.ending and is_bml else None
         kind: Kind = "text" if isinstance(message, str) else "sound"
-        if (refused := ending or self._journal.accept(t, kind, connection.id, message)) is not None:
+        if (refused := ending or self.journal.accept(t, kind, connection.id, message)) is not None:
             if is_bml:
                 # Without a number: the message is not in the journal, and a session that is restored from the
                 # journal must number all other feedback in the same way.
                 id = block_id_of(str(message))
                 warning = WarningFeedback(id=id, type="CANNOT_CREATE_BEHAVIOR", text=refused)
-                self._connections.send_feedback([warning.to_xml()])
+                self.connections.send_feedback([warning.to_xml()])
             else:
-                self._connections.reply(connection.id, ErrorMessage(code="journal", message=refused))
+                self.connections.reply(connection.id, ErrorMessage(code="journal", message=refused))
         elif isinstance(message, bytes):
-            self._controls.handle_sound(connection, message, t)
+            self.controls.handle_sound(connection, message, t)
         elif control is not None:
-            self._controls.handle(connection, control, t)
+            self.controls.handle(connection, control, t)
         else:
-            self._submission.enqueue(message)
+            self.submission.enqueue(message)
         return refused is None
 
     def _handle_passing(self, connection: Connection, control: Control, t: float) -> None:
         """Handle a message that is not written to the journal, except for the characters that it adds."""
-        known = self._player.characters
+        known = self.player.characters
         if isinstance(control, Track):
             self._start_tracking(connection, control)
         elif isinstance(control, Query):
-            self._queries.handle(connection, control, t)
+            self.queries.handle(connection, control, t)
         else:
-            self._controls.handle(connection, control, t)
-        for name in self._player.characters:
+            self.controls.handle(connection, control, t)
+        for name in self.player.characters:
             if name not in known:  # their order matters: the first is the default
-                self._journal.note(t, "text", connection.id, json.dumps({"type": "character", "id": name}))
+                self.journal.note(t, "text", connection.id, json.dumps({"type": "character", "id": name}))
 
     def _start_tracking(self, connection: Connection, message: Track) -> None:
         try:
-            self._tracked.start(connection.id, message)
+            self.tracked.start(connection.id, message)
         except FieldError as error:
             where = f"track.{error.where}"
-            self._connections.reply(
+            self.connections.reply(
                 connection.id, ErrorMessage(code="invalid", message=str(error), where=where)
             )

@@ -1,27 +1,30 @@
 """Handlers of the messages that change nothing in a session: hello, save, state and ping."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from realizer.core.settings import Settings
+from realizer.expressions.library import library_of
 from realizer.playback.player import Player
-from realizer.protocol.messages.common import PROTOCOL
+from realizer.protocol.messages.common import MAX_CONTENT, MAX_CONTROL, MAX_FPS, PICTURES, PROTOCOL
 from realizer.protocol.messages.replies import (
     BlockState,
+    Capabilities,
     CharacterState,
     ErrorMessage,
+    Limits,
     Pong,
     StateMessage,
     VoiceState,
+    Welcome,
 )
 from realizer.protocol.messages.requests import Hello, Ping, Save, StateQuery
+from realizer.protocol.streams import STREAMS
 from realizer.server.documents.document_queue import Submission
+from realizer.server.documents.limits import MAX_CHARACTERS
 from realizer.server.session.character_faces import CharacterFaces
 from realizer.server.session.connections import Connections
-from realizer.server.session.welcome import build_welcome
 from realizer.server.streams.connection import Connection
 
 Query = Hello | Save | StateQuery | Ping
@@ -31,12 +34,7 @@ BARRED = "wanted a token for all sessions"
 
 @dataclass(eq=False)
 class QueryHandlers:
-    """The handlers of the messages that change nothing in a session.
-
-    Attributes:
-        id: name of the session.
-        capabilities: of the service, for `welcome`.
-    """
+    """The handlers of the messages that change nothing in a session."""
 
     id: str
     settings: Settings
@@ -47,11 +45,7 @@ class QueryHandlers:
     connections: Connections
 
     def handle(self, connection: Connection, message: Query, t: float) -> None:
-        """Answer a message.
-
-        Args:
-            t: seconds on the session clock.
-        """
+        """Answer a message."""
         match message:
             case Hello():
                 self._hello(connection, message, t)
@@ -109,3 +103,64 @@ class QueryHandlers:
             connections=len(self.connections),
             dropped=connection.dropped,
         )
+
+
+def build_welcome(id: str, t: float, seq: int, s: Settings, capabilities: Mapping[str, Any]) -> Welcome:
+    """Return the answer to `hello`."""
+    return Welcome(
+        session=id,
+        time=t,
+        seq=seq,
+        capabilities=Capabilities(
+            streams={stream: list(row.encodings) for stream, row in STREAMS.items()},
+            pictures=list(PICTURES),
+            fps=s.fps,
+            # Those of a folder may have changed since the service began.
+            **{
+                **capabilities,
+                **({} if s.edit is None else {"expressions": sorted(library_of(s.library_folder))}),
+            },
+        ),
+        limits=Limits(
+            message=s.max_message,
+            document=s.max_document,
+            control=MAX_CONTROL,
+            content=MAX_CONTENT,
+            behaviours=s.max_behaviours,
+            elements=s.max_elements,
+            duration=s.max_duration,
+            speech=s.max_speech,
+            blocks=s.max_blocks,
+            characters=MAX_CHARACTERS,
+            connections=s.max_connections,
+            rate=s.max_rate,
+            picture=s.max_size,
+            pixels=s.max_pixels,
+            fps=MAX_FPS,
+            keep=s.keep,
+        ),
+    )
+
+
+def capabilities_of(settings: Settings) -> dict[str, Any]:
+    """Return the capabilities of the service without its streams: names that documents and messages use."""
+    from realizer.animation.axis import AU_NAMES
+    from realizer.behaviours.registry import KINDS
+    from realizer.emotions.words import known_words
+    from realizer.face.load import list_faces, load_face
+    from realizer.render.cameras import camera_names
+    from realizer.render.light import presets
+    from realizer.speech.registry import voices
+    from realizer.tables.lexemes import face_lexemes, head_lexemes
+
+    return {
+        "behaviours": sorted(tag.partition("}")[2] for tag in KINDS),
+        "lexemes": {"faceLexeme": sorted(face_lexemes()), "head": sorted(head_lexemes())},
+        "emotions": sorted(known_words()),
+        "expressions": sorted(library_of(settings.library_folder)),
+        "aus": list(AU_NAMES()),
+        "faces": [face.name for face in list_faces()],
+        "voices": [voice.name for voice in voices() if voice.available],
+        "cameras": list(camera_names(load_face(settings.face, deformer=settings.deformer))),
+        "lights": list(presets()),
+    }

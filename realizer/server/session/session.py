@@ -23,11 +23,9 @@ from realizer.server.journal import TakenOver
 from realizer.server.journal.checkpoint import Checkpoint
 from realizer.server.journal.session_journal import SessionJournal
 from realizer.server.session.character_faces import CharacterFaces
-from realizer.server.session.connections import Connections
+from realizer.server.session.connections import Connections, FeedbackLog
 from realizer.server.session.control_handlers import ControlHandlers
-from realizer.server.session.deadlines import Deadlines
 from realizer.server.session.effects import Close, Effect
-from realizer.server.session.feedback_log import FeedbackLog
 from realizer.server.session.inbox import Inbox
 from realizer.server.session.query_handlers import QueryHandlers
 from realizer.server.session.session_clock import SessionClock
@@ -53,19 +51,11 @@ class Session:
     Parameters `now` are seconds on the host's clock, `t` seconds on the session clock.
 
     Args:
-        id: the session's name.
-        settings: limits and defaults.
         now: the session clock starts here. If the host's clock goes back, the session clock waits.
         named: whether a client chose the name: then the session outlives its last connection by
             `settings.keep`.
-        scene: the initial positions of targets.
-        capabilities: of the service, for `welcome`.
         epoch: POSIX seconds at `now`, added to every time in feedback; None leaves them out.
         log: the feedback log of another session, to continue it.
-
-    Attributes:
-        clock: the session clock.
-        feedback_log: the published feedback.
     """
 
     def __init__(
@@ -101,9 +91,9 @@ class Session:
         self.connections = Connections(self.feedback_log, self._add_effects)
         self._checkpoint = Checkpoint(self.player, self.faces, self.clips, self.submission, self.feedback_log)
         self.journal = SessionJournal(id, self._checkpoint, self.connections, self.hand_over)
-        self._deadlines = Deadlines(
-            self.clock, self.player, self.submission, self.broadcast, self.connections
-        )
+        self._next_feedback = 0.0  # session clock
+        # When the next event that is neither a frame nor feedback is due; None until it is wanted.
+        self._next_other: float | None = None
         self._effects: list[Effect] = []
         self._must_end_speech = False  # with the next tick, as a client has left, or sends no more of a clip
         reply = self.connections.reply
@@ -132,15 +122,11 @@ class Session:
     def connect(
         self, connection: int, now: float, seen: int | None = None, *, may_edit: bool = False
     ) -> None:
-        """Add a connection. With `seen` it gets all feedback after that one, without it only new feedback.
-
-        Args:
-            may_edit: whether it may save files of the service.
-        """
+        """Add a connection. With `seen` it gets all feedback after that one, without it only new feedback."""
         if self.closed:  # it ended while the client waited for it
             self._effects.append(Close(connection, 1012, f"session {self.id} has ended: reconnect"))
             return
-        self._deadlines.forget()
+        self._next_other = None
         self.connections[connection] = Connection(
             connection, may_edit=may_edit and self.settings.edit is not None
         )
@@ -161,7 +147,7 @@ class Session:
         self._controls.on_disconnect(connection, self.clock.read(now))
         self.tracked.drop(connection)
         self._must_end_speech = True
-        self._deadlines.forget()
+        self._next_other = None
         if not self.connections:
             self.empty_since = now
             if not self.named and not is_awaited:
@@ -174,7 +160,7 @@ class Session:
     def close(self) -> None:
         """Close the session: it does and sends nothing any more."""
         self.closed = True
-        self._deadlines.forget()
+        self._next_other = None
         self.connections.clear()
         self.submission.queue.clear()
         self._effects.clear()
@@ -182,7 +168,7 @@ class Session:
     def update_backlog(self, connection: int, waiting: int) -> None:
         """Take the number of unsent bytes of a client, as `Connections.update_backlog`."""
         if self.connections.update_backlog(connection, waiting):
-            self._deadlines.forget()
+            self._next_other = None
 
     # messages in --------------------------------------------------------------------------------
 
@@ -201,7 +187,6 @@ class Session:
     # journal ------------------------------------------------------------------------------------
 
     def _show(self, connection: int, message: str, t: float) -> None:
-        """Handle a message as if a connection had sent it."""
         if connection in self.connections:
             self.inbox.handle(self.connections[connection], message, t)
 
@@ -243,7 +228,7 @@ class Session:
         """Take the answer to an effect `Draw`. If it is an error, the subscriptions to the picture end."""
         if self.closed:
             return
-        self._deadlines.forget()
+        self._next_other = None
         picture = result if isinstance(result, bytes) else None
         effects, viewers = self.broadcast.video.on_picture(draw, picture, self.connections.values())
         self._effects += effects
@@ -255,7 +240,7 @@ class Session:
         """Take the answer to an effect `Look`."""
         if self.closed:
             return
-        self._deadlines.forget()
+        self._next_other = None
         self.tracked.answer(connection, result, self.clock.read(now))
         self.tick(now)
 
@@ -278,26 +263,22 @@ class Session:
 
         This is the fast way for a session in which nothing but frames and feedback is due.
         """
-        deadlines, opened = self._deadlines, self.clock.opened
-        t = now - opened
-        if not deadlines.has_only_frames_and_feedback(t):
+        t = now - self.clock.opened
+        if self._next_other is None or t + EPSILON >= self._next_other:
             return None
-        if deadlines.has_feedback(t):
+        if t + EPSILON >= self._next_feedback:
             version = self.player.version
             self._publish(t)
-            deadlines.update_feedback()
+            self._next_feedback = self.player.next_change()
             if self.player.version != version:
-                self._deadlines.forget()
-        sends, following = self.broadcast.frames_due(t)
-        effects = [*self.take_effects(), *sends]
-        if not deadlines.is_known:
-            return effects, self.next_due()
-        return effects, min(deadlines.next_event, following) + opened
+                self._next_other = None
+        sends = self.broadcast.frames_due(t)
+        return [*self.take_effects(), *sends], self.next_due()
 
     def compact_journal(self, now: float) -> None:
         """Replace the journal by a checkpoint if it has grown; due feedback is published first."""
         if self.journal.writer.needs_checkpoint and not self.closed:
-            self._deadlines.forget()
+            self._next_other = None
             self._publish(t := self.clock.read(now))
             self.journal.compact(t)
 
@@ -324,7 +305,7 @@ class Session:
             starts: whether blocks that start at `t` start.
         """
         self._must_end_speech = bool(self.submission.speeches.overdue(t))
-        self._deadlines.forget()
+        self._next_other = None
         self._publish(t, starts=starts)
         if self.broadcast.active or self.connections.has_subscriptions:
             self.broadcast.set_subscribers(self.connections.values())
@@ -346,7 +327,7 @@ class Session:
     @property
     def has_documents(self) -> bool:
         """Whether a document can be read or planned now."""
-        if self.closed or self._deadlines.is_known:
+        if self.closed or self._next_other is not None:
             return False
         return self._must_end_speech or self.submission.has_work
 
@@ -354,7 +335,22 @@ class Session:
         """Return the time of the next event other than documents; infinity if there is none."""
         if self.closed:
             return math.inf
-        return self._deadlines.next(has_documents=self.has_documents) + self.clock.opened
+        other, submission, streams = self._next_other, self.submission, self.broadcast
+        if other is None:
+            event, has_documents = self.player.next_event, self.has_documents
+            self._next_feedback = self.player.next_change()
+            if submission.has_work and (start := self.clock.start_of(event)) > event:
+                self._next_feedback = start
+            other = min(submission.tts.deadline(), streams.next_other if streams.active else math.inf)
+            if not has_documents:
+                other = min(other, submission.speeches.deadline())
+            # Open speeches and slow clients are checked with every frame, schedules with all feedback: then
+            # the deadline cannot be kept.
+            shown = streams.active and bool(streams.schedule_subscribers)
+            if not (has_documents or self.connections.has_slow or submission.speeches.open_ids or shown):
+                self._next_other = other
+        due = min(other, self._next_feedback, streams.next_frame if streams.active else math.inf)
+        return due + self.clock.opened
 
     @property
     def busy(self) -> bool:
@@ -405,4 +401,4 @@ class Session:
         """
         self._publish(t, starts=False)
         if self.broadcast.active:
-            self._effects += self.broadcast.frames_due(t, is_reading=True)[0]
+            self._effects += self.broadcast.frames_due(t, is_reading=True)

@@ -1,7 +1,5 @@
 """The clock of a session, which never goes back and stands still while a message is planned."""
 
-from __future__ import annotations
-
 import math
 
 # The clock stands still for at most so long, while the documents of a message are planned.
@@ -17,23 +15,16 @@ class SessionClock:
 
     Args:
         opened: seconds on the host's clock when the session opened.
-
-    Attributes:
-        opened: seconds on the host's clock at 0 of this one; a restored session moves it.
     """
 
     def __init__(self, opened: float) -> None:
-        self.opened = opened
+        self.opened = opened  # seconds on the host's clock at 0 of this one; a restored session moves it
         self._latest = 0.0  # nothing happens before this time any more
         self._instant = -math.inf  # where the clock stands still
         self._held = -math.inf  # blocks that start at this time or earlier are held
 
     def read(self, now: float) -> float:
-        """Return the time of something that happens, which is at or after all that has happened.
-
-        Args:
-            now: seconds on the host's clock.
-        """
+        """Return the time of something that happens, which is at or after all that has happened."""
         self._latest = max(now - self.opened, self._latest)
         return self._latest
 

@@ -1,7 +1,5 @@
 """The subscriptions of a session's clients: `subscribe` and `unsubscribe`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -16,11 +14,11 @@ from realizer.server.documents.limits import MAX_CHARACTERS, pixel_rate_error
 from realizer.server.session.character_faces import CharacterFaces
 from realizer.server.session.control_fields import FieldError, character_index
 from realizer.server.session.effects import RenderOptions
-from realizer.server.session.feedback_log import FeedbackFilter
 from realizer.server.streams.audio_stream import AudioSubscription
 from realizer.server.streams.broadcast import Broadcast
 from realizer.server.streams.connection import (
     Connection,
+    FeedbackFilter,
     ScheduleSubscription,
     Subscription,
     VideoSubscription,
@@ -35,12 +33,7 @@ _Answer = tuple[Subscription, dict[str, Any]]
 
 @dataclass(eq=False)
 class Subscriptions:
-    """The subscriptions of a session's connections to its streams.
-
-    Attributes:
-        connections: the session's own dictionary of connections, by id.
-        reply: sends a message to a connection, by its id.
-    """
+    """The subscriptions of a session's connections to its streams."""
 
     settings: Settings
     player: Player

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from realizer.core.errors import RealizerError
@@ -25,21 +25,17 @@ LEAST = 0.02  # a smaller action unit is not shown
 
 @dataclass(eq=False)
 class _Camera:
-    """The pictures of one connection.
-
-    Attributes:
-        last: time and number of the picture that was looked at last.
-        waiting: the newest picture while another one is looked at.
-    """
+    """The pictures of one connection."""
 
     character: str | None
     fps: float
     mirror: Mirror
-    last: tuple[float, int] = (float("-inf"), 0)
+    last: tuple[float, int] = (float("-inf"), 0)  # time and number of the picture that was looked at last
     is_busy: bool = False
-    waiting: bytes | None = None
+    waiting: bytes | None = None  # the newest picture while another one is looked at
 
 
+@dataclass(eq=False)
 class TrackedFaces:
     """Looks at the newest picture of each connection, one at a time, and makes its character show the face.
 
@@ -49,15 +45,11 @@ class TrackedFaces:
         show: handles a message of a connection, as if a client had sent it.
     """
 
-    def __init__(
-        self,
-        player: Player,
-        add_effects: Callable[[Iterable[Effect]], None],
-        reply: Callable[[int, Reply], None],
-        show: Callable[[int, str, float], None],
-    ) -> None:
-        self._player, self._add_effects, self._reply, self._show = player, add_effects, reply, show
-        self._cameras: dict[int, _Camera] = {}
+    player: Player
+    add_effects: Callable[[Iterable[Effect]], None]
+    reply: Callable[[int, Reply], None]
+    show: Callable[[int, str, float], None]
+    cameras: dict[int, _Camera] = field(default_factory=dict)  # by connection
 
     def start(self, connection: int, message: Track) -> None:
         """Make a character follow the pictures of a connection; at 0 frames a second, no longer.
@@ -67,39 +59,39 @@ class TrackedFaces:
         """
         from realizer.tracking.mirror import Mirror  # slow to load
 
-        self._cameras.pop(connection, None)
+        self.cameras.pop(connection, None)
         if message.fps:
-            character_index(self._player, message.character)
-            self._cameras[connection] = _Camera(message.character, message.fps, Mirror())
+            character_index(self.player, message.character)
+            self.cameras[connection] = _Camera(message.character, message.fps, Mirror())
 
     def drop(self, connection: int) -> None:
         """Forget the camera of a connection."""
-        self._cameras.pop(connection, None)
+        self.cameras.pop(connection, None)
 
     def picture(self, connection: int, message: bytes, t: float) -> None:
         """Look at a picture, or let it wait in the place of an earlier one."""
-        camera = self._cameras.get(connection)
+        camera = self.cameras.get(connection)
         if camera is None or len(message) <= HEADER.size:
             text = (
                 "wanted `track` before pictures" if camera is None else "wanted a picture behind the header"
             )
-            self._reply(connection, ErrorMessage(code="unsupported", message=text))
+            self.reply(connection, ErrorMessage(code="unsupported", message=text))
         elif camera.is_busy:
             camera.waiting = message
         elif t - camera.last[0] >= EARLY / camera.fps:
             _, _, _, number, _ = HEADER.unpack_from(message)
             camera.last, camera.is_busy, camera.waiting = (t, number), True, None
-            self._add_effects([Look(connection, camera.mirror, message[HEADER.size :], t)])
+            self.add_effects([Look(connection, camera.mirror, message[HEADER.size :], t)])
 
     def answer(self, connection: int, result: Sight | RealizerError | None, t: float) -> None:
         """Take what a picture shows; then look at the next one."""
-        camera = self._cameras.get(connection)
+        camera = self.cameras.get(connection)
         if camera is None:
             return
         camera.is_busy = False
         time, number = camera.last
         if isinstance(result, RealizerError):
-            self._reply(connection, ErrorMessage(code="unsupported", message=str(result), where="track"))
+            self.reply(connection, ErrorMessage(code="unsupported", message=str(result), where="track"))
         else:
             seen: dict[str, Any] = {}
             if result is not None:
@@ -107,9 +99,9 @@ class TrackedFaces:
                 seen["aus"] = result.units
                 shown = {name: value if value >= LEAST else None for name, value in result.units.items()}
                 message = {"type": "set", "aus": shown, "character": camera.character}
-                self._show(connection, json.dumps(message), t)
+                self.show(connection, json.dumps(message), t)
             face = result is not None
             answer = Tracked(character=camera.character, frame=number, time=time, face=face, **seen)
-            self._reply(connection, answer)
+            self.reply(connection, answer)
         if camera.waiting is not None:
             self.picture(connection, camera.waiting, t)

@@ -1,7 +1,5 @@
 """Sound clips that clients send in chunks, with their annotations."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -28,14 +26,10 @@ class ClipError(FieldError):
 
 
 class AudioClips:
-    """The sound clips of one session.
-
-    Attributes:
-        recordings: id -> clip whose sound and annotation are complete.
-    """
+    """The sound clips of one session."""
 
     def __init__(self) -> None:
-        self.recordings: dict[str, Recording] = {}
+        self.recordings: dict[str, Recording] = {}  # id -> clip whose sound and annotation are complete
         self._clips: dict[str, Clip] = {}
         self._arriving: dict[str, ArrivingClip] = {}  # those that are spoken already
         self._refused: set[str] = set()

@@ -27,20 +27,16 @@ class Clip:
 
     Attributes:
         pieces: the bytes received so far, until the last piece has arrived.
-        rate: Hz of raw PCM; 0 for a sound file.
-        sound: rate and int16 samples; None until the last piece has arrived.
-        is_annotated: whether the annotation is complete.
         recogniser: recognises mouth shapes in the pieces; None if they come too fast, or are not needed.
-        heard: the phonemes that it has recognised.
     """
 
     pieces: list[bytes] = field(default_factory=list)
-    rate: int = 0
-    sound: tuple[int, Int16] | None = None
+    rate: int = 0  # Hz of raw PCM; 0 for a sound file
+    sound: tuple[int, Int16] | None = None  # rate and int16 samples; None until the last piece has arrived
     text: str | None = None
     words: list[TimedText] = field(default_factory=list)
     phonemes: list[TimedText] = field(default_factory=list)
-    is_annotated: bool = True
+    is_annotated: bool = True  # whether the annotation is complete
     recogniser: VisemeRecogniser | None = None
     heard: list[Phoneme] = field(default_factory=list)
 
@@ -88,17 +84,13 @@ class ArrivingClip:
     """The sound of a clip that is in no part yet.
 
     Attributes:
-        rate: Hz.
         words, phonemes: of the whole clip; without any, mouth shapes are recognised in each part.
-        sound: little-endian int16 samples.
-        taken: samples in parts.
-        count: the number of parts.
     """
 
     rate: int
     words: list[TimedText]
     phonemes: list[TimedText]
-    sound: bytearray = field(default_factory=bytearray)
+    sound: bytearray = field(default_factory=bytearray)  # little-endian int16 samples
     taken: int = 0
     count: int = 0
 
@@ -139,7 +131,6 @@ class ArrivingClip:
 
 
 def _moved(item: TimedText, end: float | None, start: float) -> TimedText:
-    """Return a word or a phoneme with times from the start of a part."""
     moved = {"start": max(0.0, item.start - start), "end": None if end is None else end - start}
     return item.model_copy(update=moved)
 

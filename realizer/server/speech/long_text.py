@@ -1,7 +1,5 @@
 """Synthesis of long texts in parts, so that sound starts early."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -30,17 +28,10 @@ QUOTES: Mapping[str, str] = {"&quot;": '"', "&apos;": "'"}
 
 
 class LongText:
-    """A text that is synthesized part by part.
-
-    Args:
-        request: the whole text.
-
-    Attributes:
-        ready_until: seconds of finished sound.
-    """
+    """A text that is synthesized part by part."""
 
     def __init__(self, request: SpeechRequest) -> None:
-        self.ready_until = 0.0
+        self.ready_until = 0.0  # seconds of finished sound
         self._request = request
         # An iterator, because splitting a long text takes a while too.
         self._parts = _parts(request.ssml)
@@ -123,7 +114,6 @@ class LongText:
         self._length = last
 
     def _estimate(self) -> tuple[dict[str, float], float]:
-        """Return the marks and the duration of the missing parts."""
         spoken = sum(part.duration for _, part in self._joined)
         pace = (spoken + WEIGHT / PACE) / (self._characters + WEIGHT)  # s a character
         if self._next is None:
@@ -134,7 +124,6 @@ class LongText:
 
 
 def _parts(text: str) -> Iterator[str]:
-    """Yield the first clause, then parts of several clauses."""
     part, length = "", 1
     for piece in _pieces(text):
         part += piece

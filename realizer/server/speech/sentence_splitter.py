@@ -1,7 +1,5 @@
 """An incremental splitter of tagged text into sentences."""
 
-from __future__ import annotations
-
 import re
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """Conversion of chunks of text, with syncs, SSML and behaviours, to blocks."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -27,19 +25,13 @@ QUOTES = {"&quot;": '"', "&apos;": "'"}
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """The options of a speech and the number of a chunk.
+    """The options of a speech and the number of a chunk."""
 
-    Attributes:
-        speech: id of the speech, and of the speech behaviour in each of its blocks.
-        number: 1, 2, ...
-        marks: sync of an earlier chunk -> its block.
-    """
-
-    speech: str
+    speech: str  # id of the speech, and of the speech behaviour in each of its blocks
     number: int
     character: str | None = None
     language: str | None = None
-    marks: Mapping[str, str] = field(default_factory=dict)
+    marks: Mapping[str, str] = field(default_factory=dict)  # sync of an earlier chunk -> its block
 
     @property
     def block(self) -> str:
@@ -99,7 +91,6 @@ class _Text:
         self.marked = False
 
     def read(self, text: str) -> None:
-        """Parse the text into words, marks and behaviours."""
         at = 0
         while (tag := TAG.search(text, at)) is not None:
             self.say(text[at : tag.start()])
@@ -131,7 +122,6 @@ class _Text:
         self.ssml.append(escaped)
 
     def content(self) -> str:
-        """Return the content of the block."""
         if not self.spoken and not self.marked:
             return "".join(self.behaviours)
         language = self.chunk.language
@@ -163,7 +153,6 @@ class _Text:
         self.behaviours.append(f"{head}{tag[4]}>{self._resolve(inner)}")
 
     def _reference_here(self) -> str:
-        """Return a reference to this place in the text."""
         if not self.spoken:
             return "0"
         name = f"at-{self.chunk.number}-{len(self.behaviours) + 1}"
@@ -194,5 +183,4 @@ def _element_end(text: str, tag: re.Match[str]) -> int:
 
 @cache
 def _behaviours() -> Mapping[str, frozenset[str]]:
-    """Return the sync points of behaviours, by the elements' names."""
     return {tag.rpartition("}")[2]: frozenset(node.sync_points) for tag, node in VOCABULARY.items()}

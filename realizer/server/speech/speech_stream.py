@@ -1,7 +1,5 @@
 """A streaming speech: chunks of text and clips, and the block that spans them."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
@@ -20,19 +18,9 @@ class SpeechStream:
     clock.
 
     Attributes:
-        chunk: the last chunk.
         unspoken: (sentence or id of a clip, whether it is a clip) of what is in no block yet.
-        marks: sync -> id of its chunk's block.
         arriving: id of a clip in `unspoken` that is spoken while it arrives -> when its last piece came.
-        partial_chunks: ids of blocks that speak only part of a sentence.
-        unplanned: ids of blocks that are not planned yet, in order.
         scheduled: ids of blocks that are planned and have not ended, in order.
-        words: the spoken words of blocks that have ended.
-        is_announced: whether `own_block` was called.
-        is_closed: whether the client has closed the speech.
-        is_finished: whether the speech was cut off.
-        last_end: when the last ended block ended.
-        end: the anticipated end of its own block.
     """
 
     id: str
@@ -41,15 +29,15 @@ class SpeechStream:
     chunk: Chunk
     splitter: SentenceSplitter = field(default_factory=SentenceSplitter)
     unspoken: deque[tuple[str, bool]] = field(default_factory=deque)
-    marks: dict[str, str] = field(default_factory=dict)
+    marks: dict[str, str] = field(default_factory=dict)  # sync -> id of its chunk's block
     arriving: dict[str, float] = field(default_factory=dict)
-    partial_chunks: set[str] = field(default_factory=set)
-    unplanned: list[str] = field(default_factory=list)
+    partial_chunks: set[str] = field(default_factory=set)  # ids of blocks that speak only part of a sentence
+    unplanned: list[str] = field(default_factory=list)  # ids of blocks that are not planned yet, in order
     scheduled: list[str] = field(default_factory=list)
-    words: list[str] = field(default_factory=list)
+    words: list[str] = field(default_factory=list)  # the spoken words of blocks that have ended
     is_announced: bool = False
     is_closed: bool = False
-    is_finished: bool = False
+    is_finished: bool = False  # whether the speech was cut off
     last_end: float = 0.0
     end: float = 0.0
 

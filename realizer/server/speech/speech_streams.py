@@ -1,7 +1,5 @@
 """The streaming speeches of a session."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import replace
@@ -263,7 +261,6 @@ class SpeechStreams:
         return known and ref.sync not in ("start", "end")
 
     def _chunk_reference(self, ref: SyncRef) -> SyncRef:
-        """Return a reference to a sync of a speech as one to the chunk's block."""
         if not self._is_speech_sync(ref):
             return ref
         chunk = self._speeches[ref.block or ""].marks.get(ref.sync or "")
@@ -277,7 +274,6 @@ class SpeechStreams:
         self._player.anticipate(speech.anticipator, {"end": end}, t)
 
     def _words(self, chunk: str, t: float) -> list[str]:
-        """Return the words of a chunk that have been spoken."""
         playing = next((p for p in reversed(self._player.blocks.all()) if p.block.id == chunk), None)
         if playing is None:
             return []

@@ -61,7 +61,6 @@ class AudioStream:
         return None if is_silent else np.clip(np.rint(mix), -32768, 32767).astype("<i2").tobytes()
 
     def _pcm(self, speech: ScheduledSpeech, first: int, last: int) -> Float32:
-        """Return samples first .. last of a speech at the stream's rate; fewer at its end."""
         size = BLOCK * self.rate
         blocks = [self._block(speech, n) for n in range(first // size, -(-last // size))]
         joined = blocks[0] if len(blocks) == 1 else np.concatenate([np.zeros(0, np.float32), *blocks])

@@ -1,5 +1,6 @@
 """The broadcast of a session: it sends due frames, packets, pictures and schedules to subscribers."""
 
+import logging
 import math
 from collections import Counter
 from collections.abc import Iterable
@@ -15,12 +16,65 @@ from realizer.server.streams.frame_windows import (
     FrameSubscription,
     FrameTimeline,
     FrameWindow,
+    first_frame_at,
     last_frame_at,
 )
 from realizer.server.streams.frames_ahead import AheadSubscription
-from realizer.server.streams.overload import Overload
 from realizer.server.streams.schedule_stream import ScheduleStream, schedule_message
 from realizer.server.streams.video_stream import VideoStream
+
+log = logging.getLogger(__name__)
+
+LATE = 0.1  # s; it begins when all sessions have been woken later than this
+PERIOD = 2.0  # s; for so long
+TIMELY = 0.05  # s; it ends when none has been woken later than this
+RECOVERY = 5.0  # s; for so long
+# Frames that are later than this, after the process stalled, are not sent.
+OUTDATED = 0.5  # s
+
+
+class Overload:
+    """Whether a process is overloaded.
+
+    Then it opens no new sessions, and of frames that are late it sends the newest only: all sessions get
+    fewer frames, instead of frames that are later and later.
+    """
+
+    def __init__(self) -> None:
+        self.is_active = False
+        self._late_since = math.inf  # all were woken later than LATE since then
+        self._noted = -math.inf
+        self._behind = -math.inf  # when one was last woken later than TIMELY
+
+    def note(self, late: float, now: float) -> None:
+        """Note that a session was woken `late` seconds after its time."""
+        if late <= LATE:
+            self._late_since = math.inf
+        elif self._late_since > now or now - self._noted > PERIOD:
+            self._late_since = now
+        if late > TIMELY:
+            self._behind = now
+        self._noted = now
+        if not self.is_active and now - self._late_since >= PERIOD:
+            self.is_active = True
+            words = "sessions are woken %.0f ms too late. New ones are refused, and frames are left out"
+            log.warning(f"overloaded: {words}", 1000 * late)
+
+    def end_if_over(self, now: float) -> None:
+        """End the overload if sessions have been woken in time for a while."""
+        if self.is_active and now - self._behind >= RECOVERY:
+            self.is_active = False
+            log.warning("no longer overloaded: sessions are woken in time")
+
+    def oldest(self, newest: int, now: float, fps: float) -> int:
+        """Return the number of the oldest frame that is worth sending.
+
+        Args:
+            newest: number of the last frame whose time has come.
+            now: seconds on the session clock.
+        """
+        return newest if self.is_active else first_frame_at(now - OUTDATED, fps)
+
 
 # A slow client gets schedules again after this time.
 RETRY = 0.1  # s
@@ -108,8 +162,6 @@ class Broadcast:
     """The streams of one session; each timeline, sound and picture is computed once for all subscribers.
 
     Attributes:
-        active: whether there is a subscription; without one nothing is ever due.
-        overload: whether late frames are left out.
         counts: counts in `taken_back` how often frames were taken back that had been sent ahead.
         schedule_subscribers: the subscriptions to the stream `schedule`, with their connections.
     """
@@ -126,7 +178,7 @@ class Broadcast:
         self._audio_subscribers: list[tuple[Connection, AudioSubscription]] = []
         self.schedule_subscribers: list[tuple[Connection, ScheduleSubscription]] = []
         self._video_subscribers: list[VideoSubscription] = []
-        self.active = False
+        self.active = False  # whether there is a subscription; without one nothing is ever due
         self.counts = Counter[str]()
         self.overload = Overload()
 
@@ -190,11 +242,7 @@ class Broadcast:
                 s.settle(t)
 
     def send_due(self, now: float, effects: list[Effect], *, is_reading: bool = False) -> None:
-        """Send all that is due to the subscribers of the last `set_subscribers`.
-
-        Args:
-            is_reading: as for `frames_due`.
-        """
+        """Send all that is due to the subscribers of the last `set_subscribers`."""
         self._send_schedules(now, effects)
         for connection, s in self._audio_subscribers:
             for message, is_sound in s.messages(now):
@@ -202,11 +250,11 @@ class Broadcast:
                     connection.dropped += 1
                 else:
                     effects.append(Send(connection.id, message))
-        effects += self.frames_due(now, is_reading=is_reading)[0]
+        effects += self.frames_due(now, is_reading=is_reading)
         self.video.due(self._video_subscribers, now, effects)
 
-    def frames_due(self, now: float, *, is_reading: bool = False) -> tuple[list[Send], float]:
-        """Return the due frames of fap, au, arkit and mesh, and the time of the next ones.
+    def frames_due(self, now: float, *, is_reading: bool = False) -> list[Send]:
+        """Return the due frames of fap, au, arkit and mesh.
 
         Args:
             is_reading: whether the plan will soon change again: frames are taken back after that.
@@ -219,7 +267,7 @@ class Broadcast:
             if fanout.ahead:
                 taken_back = fanout.send_ahead(newest, now, sends, is_reading=is_reading)
                 self.counts["taken_back"] += taken_back
-        return sends, self.next_frame
+        return sends
 
     @property
     def next_frame(self) -> float:

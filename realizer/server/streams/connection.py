@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from bml_schema import parse_feedback
 from realizer.server.session.effects import RenderOptions
-from realizer.server.session.feedback_log import FeedbackFilter
 from realizer.server.streams.audio_stream import AudioSubscription
 from realizer.server.streams.frame_windows import FrameSubscription, FrameTimeline
 
@@ -24,18 +24,13 @@ class Drawing(NamedTuple):
 
 @dataclass(eq=False)
 class VideoView:
-    """A view, drawn once for all its subscribers.
-
-    Attributes:
-        next: number of the next frame to draw.
-        drawing: the picture in progress; None while there is none.
-    """
+    """A view, drawn once for all its subscribers."""
 
     timeline: FrameTimeline
     index: int
     face: str
     options: RenderOptions
-    next: int
+    next: int  # number of the next frame to draw
     drawing: Drawing | None = None
 
     @property
@@ -66,21 +61,36 @@ class ScheduleSubscription:
 Subscription = FrameSubscription | AudioSubscription | VideoSubscription | ScheduleSubscription
 
 
+@dataclass(frozen=True)
+class FeedbackFilter:
+    """A filter of the feedback for one connection. Messages keep their numbers, so there are gaps.
+
+    Attributes:
+        character: id of a character; None accepts all. Feedback without a character is always accepted.
+    """
+
+    elements: frozenset[str] | None = None  # names of feedback elements; None accepts all
+    character: str | None = None
+
+    def accepts(self, text: str) -> bool:
+        """Whether the filter lets a message pass."""
+        if self.elements is not None and text[1:].split(maxsplit=1)[0] not in self.elements:
+            return False
+        return self.character is None or parse_feedback(text).character_id in (None, self.character)
+
+
 @dataclass(eq=False)
 class Connection:
     """One client of a session.
 
     Attributes:
         feedback: filter of its feedback; None for no feedback.
-        is_slow: whether more than SLOW bytes are unsent.
-        dropped: number of frames, pictures and sound packets it missed because it was slow.
         subscriptions: (stream, character, view) -> subscription.
-        may_edit: whether it may save files of the service.
     """
 
     id: int
     feedback: FeedbackFilter | None = field(default_factory=FeedbackFilter)
-    is_slow: bool = False
-    dropped: int = 0
+    is_slow: bool = False  # whether more than SLOW bytes are unsent
+    dropped: int = 0  # number of frames, pictures and sound packets it missed because it was slow
     subscriptions: dict[tuple[str, str | None, str | None], Subscription] = field(default_factory=dict)
     may_edit: bool = False

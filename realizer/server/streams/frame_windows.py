@@ -43,15 +43,13 @@ class FrameSource:
     """The source of a stream of numbers.
 
     Attributes:
-        names: returns the names of the values of a frame.
         rows: (AUs, mapping to FAPs, whether AUs are wanted as they were before the rules of co-occurrence)
             -> (n, k) the values of n frames.
-        window: seconds that are computed in one call.
     """
 
-    names: Callable[[], list[str]]
+    names: Callable[[], list[str]]  # returns the names of the values of a frame
     rows: Callable[[AUFrames, FapMapping, bool], Float32 | Int32]
-    window: float = WINDOW
+    window: float = WINDOW  # seconds that are computed in one call
 
 
 def _arkit_rows(frames: AUFrames, mapping: FapMapping, raw: bool) -> Float32:
@@ -221,9 +219,6 @@ class FrameTimeline:
     Args:
         face: returns the face; called when the first mesh or pose is needed.
         mapping: returns the mapping from AUs to FAPs; called again when the face has changed.
-
-    Attributes:
-        latest_window: the window that was computed last, or None.
     """
 
     def __init__(
@@ -280,25 +275,17 @@ class FrameTimeline:
 
 @dataclass(eq=False)
 class FrameSubscription:
-    """A subscription to fap, au, arkit or mesh.
-
-    Attributes:
-        name: the character's name, if the client named it.
-        next: number of the next frame to send.
-        raw: whether AUs are sent as they are before the rules of co-occurrence.
-        ahead: how long before their time rows are sent, in seconds.
-    """
+    """A subscription to fap, au, arkit or mesh."""
 
     stream: str
     encoding: str
     timeline: FrameTimeline
     index: int
-    name: str | None
+    name: str | None  # the character's name, if the client named it
     next: int
-    raw: bool = False
-    ahead: float = 0.0
+    raw: bool = False  # whether AUs are sent as they are before the rules of co-occurrence
+    ahead: float = 0.0  # how long before their time rows are sent, in seconds
 
 
 def _listed(rows: Float32 | Int32) -> list[list[int]] | list[list[float]]:
-    """Return rows as JSON has them."""
     return rows.tolist() if rows.dtype.kind == "i" else [[round(v, 4) for v in row] for row in rows.tolist()]

@@ -1,7 +1,5 @@
 """Subscriptions whose rows are sent ahead of their time, and taken back when the plan changes."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 
@@ -24,13 +22,11 @@ class AheadSubscription(FrameSubscription):
 
     Attributes:
         final: number of the first row that can still be taken back: those before it were shown.
-        version: version of the timeline from which the rows `final` .. `next - 1` were computed.
-        takes_back: whether rows were taken back since the last message.
     """
 
     final: int = field(init=False)
-    version: int = -1
-    takes_back: bool = False
+    version: int = -1  # version of the timeline from which the rows `final` .. `next - 1` were computed.
+    takes_back: bool = False  # whether rows were taken back since the last message
     _due: float = -math.inf  # when the next message is due, if the plan does not change
     _window: FrameWindow | None = None  # has the rows `final` .. `next - 1`
 

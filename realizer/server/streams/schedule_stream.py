@@ -22,17 +22,15 @@ class Snapshot:
     """A block as it was last sent.
 
     Attributes:
-        others: ids of the blocks it refers to.
         schedules: its own schedule and those of `others`; a block that moves gets a new object. Empty before
             the first message.
-        text: the whole block as JSON, computed on first use.
     """
 
     block: ActiveBlock
-    others: tuple[str, ...]
+    others: tuple[str, ...]  # ids of the blocks it refers to
     schedules: list[Schedule | None] = field(default_factory=list)
     state: State | None = None
-    text: str | None = None
+    text: str | None = None  # the whole block as JSON, computed on first use
 
 
 class ScheduleStream:
@@ -99,7 +97,6 @@ class ScheduleStream:
 
 
 def _has_moved(snapshot: Snapshot, schedules: Callable[[str], Schedule | None]) -> bool:
-    """Whether a block or one that it refers to has a new schedule."""
     now = [snapshot.block.schedule, *map(schedules, snapshot.others)]
     return list(map(id, now)) != list(map(id, snapshot.schedules))
 
@@ -108,9 +105,7 @@ def schedule_message(time: float, blocks: str, character: str | None, *, whole: 
     """Return a message of the stream.
 
     Args:
-        time: seconds on the session clock.
         blocks: JSON objects separated by commas.
-        character: the character that the client named, or None.
         whole: whether these are all blocks, not only the changed ones.
     """
     head = {"type": "schedule", "time": round(time, 6), "whole": whole}

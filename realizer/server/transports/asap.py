@@ -17,11 +17,11 @@ from typing import cast
 
 from bml_schema import WarningFeedback
 from realizer.core.settings import Settings
-from realizer.server.http.access import RateLimiter
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError
 from realizer.server.transports.document_framing import DocumentFramer, Fault
 from realizer.server.transports.tcp_listener import TcpTransport, session_name
+from realizer.server.transports.websocket.protocol import RateLimiter
 
 log = logging.getLogger(__name__)
 
@@ -87,12 +87,7 @@ class AsapTransport(TcpTransport):
 
 
 class CallBack(asyncio.Protocol):
-    """The way out to one client: a connection to its feedback port, opened again until it is cancelled.
-
-    Args:
-        host, port: where the client listens, sooner or later.
-        close: closes the client's BML connection.
-    """
+    """The way out to one client: a connection to its feedback port, opened again until it is cancelled."""
 
     def __init__(self, host: str, port: int, close: Callable[[], None]) -> None:
         self._target = (host, port)

@@ -1,11 +1,18 @@
-"""The base of transports that show a session on an avatar in another program, by UDP."""
+"""Transports that show a session on an avatar in another program, by UDP: VMC, and Live Link Face."""
 
 import asyncio
 import json
+import struct
+import uuid
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
+import numpy as np
+
+from realizer.animation.arkit import ARKIT_NAMES
 from realizer.core.settings import Settings
+from realizer.outputs.arkit_csv import SHAPES
+from realizer.outputs.rotations import half_turns, quaternions
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError
 from realizer.server.transports.reconnecting import ReconnectingTransport
@@ -82,7 +89,6 @@ class AvatarTransport(ReconnectingTransport):
         self._show(self._session or self._sessions.oldest_in_use(AvatarTransport))
 
     def _show(self, session: str | None) -> None:
-        """Leave the session that is shown, and join another one."""
         if session == self._shown:
             return
         if self._shown is not None:
@@ -94,3 +100,97 @@ class AvatarTransport(ReconnectingTransport):
             wanted = {"type": "subscribe", "stream": "arkit", "encoding": "json", "fps": self._fps}
             for message in ({"type": "unsubscribe", "stream": "feedback"}, wanted):
                 self._sessions.receive(self._number, json.dumps(message))
+
+
+MAX_PACKET = 1400  # bytes, which fit into an Ethernet frame
+IMMEDIATELY = 1  # OSC's time tag
+
+
+class VmcTransport(AvatarTransport):
+    """A performer that sends to the marionette at `settings.vmc`.
+
+    It sends the 52 blend shapes under their names in VRM's perfect sync, such as "BrowDownLeft", and the
+    rotations of head, neck and eyes. The positions of these bones are 0: it does not know the avatar's.
+    """
+
+    def __init__(self, sessions: SessionHost, settings: Settings) -> None:
+        assert settings.vmc is not None
+        super().__init__("vmc", settings.vmc, sessions, settings)
+
+    def packets(self, frame: int, time: float, values: Sequence[float]) -> Iterable[bytes]:
+        messages = [_message("/VMC/Ext/OK", 1), _message("/VMC/Ext/T", float(time))]
+        for bone, rotation in _bones(values[52:]):
+            messages.append(_message("/VMC/Ext/Bone/Pos", bone, 0.0, 0.0, 0.0, *rotation))
+        for name, value in zip(ARKIT_NAMES(), values, strict=False):
+            messages.append(_message("/VMC/Ext/Blend/Val", name[0].upper() + name[1:], float(value)))
+        return _bundles([*messages, _message("/VMC/Ext/Blend/Apply")])
+
+
+def _bones(turns: Sequence[float]) -> Iterator[tuple[str, list[float]]]:
+    """Yield the bones and their quaternions x, y, z, w for head and eyes as the stream arkit has them.
+
+    Unity's x axis is to the character's right, ours to its left.
+    """
+    yaw, pitch, roll, *eyes = turns
+    rows = np.array([[pitch, yaw, roll], [eyes[1], eyes[0], 0], [eyes[3], eyes[2], 0]], np.float32)
+    head, left, right = quaternions(rows) * np.array([1, -1, -1, 1], np.float32)
+    half = half_turns(head)
+    for bone, rotation in (("Neck", half), ("Head", half), ("LeftEye", left), ("RightEye", right)):
+        yield bone, rotation.tolist()
+
+
+def _message(address: str, *values: str | int | float) -> bytes:
+    tags = "".join({str: "s", int: "i", float: "f"}[type(value)] for value in values)
+    packed = (
+        _text(value) if isinstance(value, str) else struct.pack(f">{tag}", value)
+        for tag, value in zip(tags, values, strict=True)
+    )
+    return _text(address) + _text(f",{tags}") + b"".join(packed)
+
+
+def _text(text: str) -> bytes:
+    """Return an OSC string: it ends with a null, and its length is a multiple of 4."""
+    return text.encode() + bytes(4 - len(text) % 4)
+
+
+def _bundles(messages: Iterable[bytes]) -> Iterator[bytes]:
+    head = b"#bundle\0" + struct.pack(">Q", IMMEDIATELY)
+    bundle = head
+    for message in messages:
+        if len(bundle) + 4 + len(message) > MAX_PACKET:
+            yield bundle
+            bundle = head
+        bundle += struct.pack(">i", len(message)) + message
+    yield bundle
+
+
+VERSION = 6
+SUBJECT = "bml-realizer"
+# Packets have these the other way round than the app's files.
+SWAPPED = {
+    "JawLeft": "JawRight", "JawRight": "JawLeft", "MouthLeft": "MouthRight", "MouthRight": "MouthLeft",
+}  # fmt: skip
+HEAD_AND_EYES = (52, 53, 54, 55, 56, None, 57, 58, None)  # eyes do not roll
+
+
+class LivelinkTransport(AvatarTransport):
+    """A device that sends to the Live Link source at `settings.livelink`."""
+
+    def __init__(self, sessions: SessionHost, settings: Settings) -> None:
+        assert settings.livelink is not None
+        super().__init__("livelink", settings.livelink, sessions, settings)
+        names = [SWAPPED.get(name, name) for name in SHAPES]
+        weights = [ARKIT_NAMES().index(name[0].lower() + name[1:]) for name in names]
+        self._order = (*weights, *HEAD_AND_EYES)
+        self._head = (
+            struct.pack(">B", VERSION) + _counted_text(str(uuid.uuid4()).upper()) + _counted_text(SUBJECT)
+        )
+
+    def packets(self, frame: int, time: float, values: Sequence[float]) -> Iterable[bytes]:
+        clock = struct.pack(">ifii", frame % 2**31, 0.0, self._fps, 1)
+        row = [0.0 if column is None else values[column] for column in self._order]
+        return (self._head + clock + struct.pack(f">B{len(row)}f", len(row), *row),)
+
+
+def _counted_text(text: str) -> bytes:
+    return struct.pack(">i", len(text)) + text.encode()

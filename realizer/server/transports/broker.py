@@ -33,9 +33,7 @@ class BrokerConnection:
     """One connection, from `connect` to `lost`. Methods that block are called in a thread of the caller.
 
     Args:
-        loop: the event loop in which events are set and `take` is called.
         take: (self, topic, body), called for each message; `topic` is the index in `subscribe`.
-        timeout: seconds to connect in.
     """
 
     def __init__(

@@ -8,12 +8,7 @@ from realizer.core.settings import limit_hint
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A span of the stream that is no document.
-
-    Attributes:
-        text: why.
-        block: the block's id, if it can be read.
-    """
+    """A span of the stream that is no document."""
 
     text: str
     block: str | None = None
@@ -168,7 +163,6 @@ class DocumentFramer:
             self._wrapper = b"" if ends or tag.endswith(b"/>") else tag
 
     def _around(self, document: str) -> str:
-        """Return a document in the element around it."""
         found = _WRAPPER.match(self._wrapper) if self._wraps else None
         if found is None:
             return document

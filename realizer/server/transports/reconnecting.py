@@ -16,7 +16,6 @@ class ReconnectingTransport(ABC):
     """A transport that connects to another program, and connects again when the connection is lost.
 
     Args:
-        name: name of the transport in log messages.
         peer: HOST:PORT of the program.
     """
 

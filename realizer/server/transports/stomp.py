@@ -11,7 +11,6 @@ from typing import Any
 from bml_schema import WarningFeedback
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings, limit_hint
-from realizer.server.http.access import RateLimiter
 from realizer.server.runtime.session_host import CONGESTION, SessionHost
 from realizer.server.runtime.session_registry import JoinError
 from realizer.server.transports.broker import BrokerConnection, check_installed
@@ -25,6 +24,7 @@ from realizer.server.transports.message_formats import (
 )
 from realizer.server.transports.reconnecting import ReconnectingTransport
 from realizer.server.transports.vhmsg import Vhmsg
+from realizer.server.transports.websocket.protocol import RateLimiter
 
 log = logging.getLogger(__name__)
 
@@ -82,7 +82,6 @@ class StompTransport(ReconnectingTransport):
         await self._leaving
 
     async def _leave(self) -> None:
-        """End the sessions, send what is queued, and disconnect."""
         for link in self._links:
             link.leave()
         with contextlib.suppress(TimeoutError):
@@ -219,7 +218,6 @@ class _SessionLink:
         self._number: int | None = None
 
     def receive(self, text: str) -> None:
-        """Pass a message to the session, and create that if there is none."""
         sessions = self._transport._sessions
         try:
             if self._number is None:
@@ -233,7 +231,6 @@ class _SessionLink:
 
     @property
     def is_congested(self) -> bool:
-        """Whether no more should be read for the session."""
         return self._number is not None and self._transport._sessions.is_congested(self._number)
 
     @property

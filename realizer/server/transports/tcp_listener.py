@@ -24,8 +24,6 @@ class TcpTransport(ABC):
     """The base of transports that listen on a TCP port; `port` is the open one after `start`.
 
     Args:
-        name: of the transport, for the log.
-        most: number of connections that one address may open.
         allow: addresses and networks whose clients are accepted, beside this machine; none: all.
     """
 

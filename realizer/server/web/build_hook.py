@@ -105,7 +105,6 @@ def _skipped() -> bool:
 
 
 def _current() -> bool:
-    """Return whether the bundle exists and was made from the present sources."""
     mark = STATIC / MARK
     return mark.is_file() and (STATIC / "index.html").is_file() and mark.read_text("utf-8").strip() == _hash()
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from realizer.client.playout import MEMORY, Playout
+from realizer.client.message_router import MEMORY, Playout
 from realizer.protocol.wire import WireFrame
 
 FPS = 25.0

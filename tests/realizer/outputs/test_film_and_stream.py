@@ -11,7 +11,7 @@ from PIL import Image
 from realizer.offline import realize
 from realizer.outputs.output import RenderSettings
 from realizer.outputs.registry import OUTPUTS
-from realizer.server.runtime.effect_runner import Engines
+from realizer.server.runtime.engines import Engines
 from realizer.server.session.effects import Draw, Speak
 from tests.pictures import drawn_here
 from tests.realizer.server.conftest import Driver

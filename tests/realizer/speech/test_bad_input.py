@@ -16,7 +16,7 @@ from realizer.behaviours.registry import VOCABULARY
 from realizer.behaviours.speech import speech_request
 from realizer.core.errors import RealizerError, VoiceError
 from realizer.scheduling.timing import Schedule
-from realizer.server.runtime.effect_runner import Engines
+from realizer.server.runtime.engines import Engines
 from realizer.server.session.effects import Speak
 from realizer.speech import engine_voice
 from realizer.speech.espeak.voice import EspeakVoice

@@ -1,7 +1,5 @@
 """WebSocket connections: admission, session, messages; whichever library serves them."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import http
@@ -18,14 +16,13 @@ from websockets.protocol import State
 from realizer.core.settings import Settings, limit_hint
 from realizer.protocol.messages.replies import ErrorMessage
 from realizer.server.http import access
-from realizer.server.http.access import AccessControl
-from realizer.server.http.jwt_tokens import Grant
+from realizer.server.http.access import AccessControl, Grant
+from realizer.server.http.requests import address_of, headers_of, path_of, session_of
 from realizer.server.journal import JournalError
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError, Visitor
 from realizer.server.transports.transport import Outbound
 from realizer.server.transports.websocket.protocol import Connection
-from realizer.server.transports.websocket.request import address_of, headers_of, path_of, session_of
 
 log = logging.getLogger(__name__)
 
@@ -34,17 +31,11 @@ REASON = 123  # bytes of a reason in a close frame
 
 
 class ClientSocket(Outbound, Protocol):
-    """The WebSocket of a client.
-
-    Attributes:
-        address: IP address, or "".
-        target: path and query of its request.
-        headers: of its request, by lower-case names.
-    """
+    """The WebSocket of a client."""
 
     address: str
     target: str
-    headers: Mapping[str, str]
+    headers: Mapping[str, str]  # of its request, by lower-case names
 
     @property
     def close_code(self) -> int | None:
@@ -113,7 +104,6 @@ class WebSocketConnections:
             self._from.remove(address)
 
     def _check_room(self, address: str) -> None:
-        """Raise JoinError if too many connections of an address are open."""
         most = self._settings.max_connections
         if self._from.count(address) >= most:
             words = f"{most} connections from {address} are open: wanted fewer"
@@ -288,6 +278,5 @@ class WebSocketClient:
 
 @lru_cache(maxsize=1024)
 def _head(text: bool, length: int) -> bytes:
-    """Return the head of a frame of so many bytes."""
     frame = Frame(Opcode.TEXT if text else Opcode.BINARY, bytes(length)).serialize(mask=False)
     return frame[: len(frame) - length]

@@ -16,17 +16,18 @@ from websockets.protocol import State
 
 from realizer.core.settings import Settings
 from realizer.server.http.access import EVERYWHERE, AccessControl
-from realizer.server.http.requests import SOCKETS, HttpRequests
-from realizer.server.runtime.session_host import SessionHost
-from realizer.server.runtime.session_registry import JoinError
-from realizer.server.transports.websocket.connection import GOODBYE, WebSocketConnections
-from realizer.server.transports.websocket.protocol import Connection, Protocol
-from realizer.server.transports.websocket.request import (
+from realizer.server.http.requests import (
+    SOCKETS,
+    HttpRequests,
     address_of,
     headers_of,
     path_of,
     response_to,
 )
+from realizer.server.runtime.session_host import SessionHost
+from realizer.server.runtime.session_registry import JoinError
+from realizer.server.transports.websocket.connection import GOODBYE, WebSocketConnections
+from realizer.server.transports.websocket.protocol import Connection, Protocol
 
 PATIENCE: Mapping[str, Any] = {"ping_interval": 20, "ping_timeout": 60}  # s
 OPENING = 10.0  # s; time for the HTTP request

@@ -86,8 +86,6 @@ def _read(script: str, settings: Settings) -> list[Block | BMLError]:
 
 
 def _with_ids(script: str) -> str:
-    """Return a script whose documents all have an id."""
-
     def tag(found: re.Match[str]) -> str:
         if (id := _ID.search(found[0])) is None:
             return f'{found[0]} id="script-{next(_NUMBERS)}"'

@@ -8,15 +8,14 @@ from collections.abc import Iterable
 
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
-from realizer.server.http.access import RateLimiter
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError
 from realizer.server.transports.message_formats import Disconnect, Inbound
 from realizer.server.transports.tcp_listener import TcpTransport, session_name
+from realizer.server.transports.websocket.protocol import RateLimiter
 from realizer.server.transports.xface.attachments import Attachment, prepare
-from realizer.server.transports.xface.reader import Fault, TaskReader
 from realizer.server.transports.xface.tasks import ERROR, Answer, TaskRunner
-from realizer.server.transports.xface.wire import Status, Task, pack_note
+from realizer.server.transports.xface.wire import Fault, Status, Task, TaskReader, pack_note
 
 log = logging.getLogger(__name__)
 
@@ -95,7 +94,6 @@ class XfaceTransport(TcpTransport):
                 await self._sessions.wait_for_room(link.number)
 
     async def _prepared(self, task: Task) -> Attachment:
-        """Return what a task needs, or the error."""
         try:
             if sum(map(len, task.params)) < MAX_INLINE and task.name != "LOAD_FAP":
                 return prepare(task, self._settings)
@@ -118,13 +116,11 @@ class _SessionLink:
         self.number: int
 
     def attach(self, number: int) -> None:
-        """Subscribe to feedback, and greet the client."""
         self.number = number
         self._sessions.receive(number, FEEDBACK)
         self._writer.write(pack_note("CONNECTION_OK", self.tasks.owner, 0, Status.UNKNOWN))
 
     def carry_out(self, answers: Iterable[Answer]) -> None:
-        """Carry out the answers of the task runner, in order."""
         for answer in answers:
             match answer:
                 case Inbound(text):

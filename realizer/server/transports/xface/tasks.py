@@ -55,9 +55,6 @@ class TaskRunner:
     A FAP file plays as a BML block with a generated id. A pose is held by a `set` message that releases all
     other FAPs, since each frame of a player stands alone. The FAPs of the frame before are set to 0 first,
     because released ones fade slowly.
-
-    Args:
-        owner: the client's number.
     """
 
     def __init__(self, owner: int) -> None:
@@ -208,7 +205,6 @@ class TaskRunner:
             yield self._show(self._first)
 
     def _show(self, frame: int) -> Inbound:
-        """Return a message that holds one frame of the clip."""
         assert self._clip is not None
         values: dict[str, float] = {}
         for row, value in zip(faps(), self._clip.values[frame].tolist(), strict=True):
@@ -220,11 +216,9 @@ class TaskRunner:
 
 
 def _hold_faps(values: dict[str, float]) -> Inbound:
-    """Return a message that holds these FAPs by name, and releases all others."""
     return Inbound(json.dumps({"type": "set", "faps": dict.fromkeys(_NAMES) | values}))
 
 
 def _notes(task: Task, status: Status) -> Iterator[bytes]:
-    """Yield a note to the client, if it wants notes."""
     if task.owner:
         yield pack_note(task.name, task.owner, task.id, status)

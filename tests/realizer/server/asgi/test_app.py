@@ -17,7 +17,7 @@ pytest.importorskip("starlette", reason="needs the asgi extra")
 
 from realizer.core.settings import Settings, SettingsError
 from realizer.server.asgi.app import create_app, event_of
-from realizer.server.http.jwt_tokens import LEEWAY
+from realizer.server.http.access import LEEWAY
 from tests.realizer.server.asgi.conftest import LIMIT, Served
 
 NOD = '<bml id="a"><head id="n" lexeme="NOD"/></bml>'

@@ -1,4 +1,4 @@
-"""Tests of `realizer.server.edits.saving`."""
+"""Tests of `realizer.server.edits.edit_folder`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from realizer.expressions.library import library_of
 from realizer.protocol.messages.replies import ErrorMessage, Saved
 from realizer.protocol.messages.requests import Save
-from realizer.server.edits.saving import save
+from realizer.server.edits.edit_folder import save
 from realizer.server.session.effects import Write
 
 SMIRK = 'name = "Wry smirk"\naus = { 12L = 0.6 }\n'

@@ -16,9 +16,9 @@ from cryptography.hazmat.primitives.hashes import SHA256
 
 from realizer.core.settings import Settings, SettingsError
 from realizer.protocol.messages.common import MAX_CONTROL
-from realizer.server.http.access import AccessControl, RateLimiter
-from realizer.server.http.jwt_tokens import Grant
+from realizer.server.http.access import AccessControl, Grant
 from realizer.server.runtime.session_registry import JoinError
+from realizer.server.transports.websocket.protocol import RateLimiter
 
 TOKEN = "Xk-secret-7"
 SECRET = "a secret that is long enough to be one"

@@ -18,8 +18,8 @@ from cryptography.hazmat.primitives.serialization import (
 )
 
 from realizer.core.errors import RealizerError
-from realizer.server.http import jwt_tokens
-from realizer.server.http.jwt_tokens import Grant, TokenError, TokenVerifier
+from realizer.server.http import access as jwt_tokens
+from realizer.server.http.access import Grant, TokenError, TokenVerifier
 
 SECRET = "a secret that is long enough to be one"
 LONG = 10**10  # s; POSIX, in three hundred years

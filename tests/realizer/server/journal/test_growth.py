@@ -14,8 +14,8 @@ from realizer.protocol.wire import ClipPiece, pack_clip
 from realizer.server.journal import Journal, JournalError, SavedSession, journal_at
 from realizer.server.journal.replay import restore_session
 from realizer.server.journal.session_journal import ENTRIES, LONG, JournalWriter
+from realizer.server.session.connections import LAST
 from realizer.server.session.effects import Send, Speak
-from realizer.server.session.feedback_log import LAST
 from realizer.server.session.session import Session
 from tests.feedback_log import seq_numbers
 from tests.interleavings import Memory, spoken

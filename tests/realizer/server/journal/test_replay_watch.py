@@ -15,8 +15,7 @@ from websockets.asyncio.client import connect
 from realizer.core.settings import Settings
 from realizer.server.journal import Entry, SavedSession, journal_at
 from realizer.server.journal.entry import NOTE
-from realizer.server.journal.replay import restore_session
-from realizer.server.journal.replay_watch import STALLS, ReplayNote, ReplayWatch
+from realizer.server.journal.replay import STALLS, ReplayNote, ReplayWatch, restore_session
 from realizer.server.session.session import Session
 from tests.feedback_log import read_feedback, seq_numbers
 from tests.programs import serving

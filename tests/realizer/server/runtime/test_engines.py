@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from realizer.core.errors import RenderError
-from realizer.server.runtime.effect_runner import IDLE, Engines
+from realizer.server.runtime.engines import IDLE, Engines
 from realizer.server.session.effects import Draw, RenderOptions
 
 
@@ -54,7 +54,7 @@ def width(picture: bytes) -> int:
 def test_engines_refuse_one_picture_too_many_and_draw_the_others(
     engines, clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("realizer.server.runtime.effect_runner.RENDERERS", 2)
+    monkeypatch.setattr("realizer.server.runtime.engines.RENDERERS", 2)
     for k in range(2):
         clock.now = 0.1 * k
         assert width(engines.draw(order(16 + k))) == 16 + k
@@ -77,7 +77,7 @@ def test_engines_refuse_one_picture_too_many_and_draw_the_others(
 def test_engines_keep_a_renderer_that_takes_long_to_start(
     engines, clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("realizer.server.runtime.effect_runner.RENDERERS", 2)
+    monkeypatch.setattr("realizer.server.runtime.engines.RENDERERS", 2)
     assert width(engines.draw(order(16))) == 16
     begins = clock.asked = threading.Event()
     starting = engines.render_pool.submit(0, lambda: engines.draw(order(17)))
@@ -92,7 +92,7 @@ def test_engines_keep_a_renderer_that_takes_long_to_start(
 
 @pytest.mark.gl
 def test_engines_keep_a_renderer_that_draws(engines, clock, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("realizer.server.runtime.effect_runner.RENDERERS", 1)
+    monkeypatch.setattr("realizer.server.runtime.engines.RENDERERS", 1)
     begins = clock.asked = threading.Event()
     drawing = engines.render_pool.submit(0, lambda: engines.draw(order(16)))
     assert begins.wait(60)

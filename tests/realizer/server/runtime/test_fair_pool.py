@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from realizer.server.runtime.effect_runner import FairPool
+from realizer.server.runtime.engines import FairPool
 
 
 class Blocked(FairPool):

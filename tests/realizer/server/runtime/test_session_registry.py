@@ -14,7 +14,7 @@ from realizer.server.documents import limits
 from realizer.server.runtime.session_registry import JoinError, SessionRegistry, Visitor, worker_of
 from realizer.server.session.effects import Close
 from realizer.server.session.session import Session
-from realizer.server.streams.overload import Overload
+from realizer.server.streams.broadcast import Overload
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from realizer.server.session import feedback_log
+from realizer.server.session import connections as feedback_log
 from tests.realizer.server.conftest import NOD, Driver
 
 

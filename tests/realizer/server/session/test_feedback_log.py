@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bml_schema import BlockProgress, SyncPointProgress, parse_feedback
-from realizer.server.session.feedback_log import FRESH, MOST, PACK, ROOM, FeedbackLog
+from realizer.server.session.connections import FRESH, MOST, PACK, ROOM, FeedbackLog
 
 
 def filled(count: int, step: float = 1.0) -> FeedbackLog:

@@ -10,7 +10,7 @@ import pytest
 
 from realizer.core.settings import Settings
 from realizer.protocol.wire import HEADER
-from realizer.server.runtime.effect_runner import Engines
+from realizer.server.runtime.engines import Engines
 from realizer.server.session.effects import Look, Send
 from realizer.server.session.session import Session
 from tests.portraits import LITERT, faps_of, portrait

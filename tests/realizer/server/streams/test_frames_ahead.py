@@ -15,8 +15,8 @@ from realizer.protocol.wire import HEADER, unpack
 from realizer.server.journal import Entry, SavedSession
 from realizer.server.journal.replay import restore_session
 from realizer.server.session.session import Session
+from realizer.server.streams.broadcast import OUTDATED
 from realizer.server.streams.frame_windows import FrameTimeline, FrameWindow
-from realizer.server.streams.overload import OUTDATED
 from tests.example_counts import examples
 from tests.realizer.server.conftest import NOD, TALK, Client, Driver, spoken
 

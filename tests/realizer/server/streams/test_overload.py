@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from realizer.server.streams.overload import LATE, PERIOD, RECOVERY, TIMELY, Overload
+from realizer.server.streams.broadcast import LATE, PERIOD, RECOVERY, TIMELY, Overload
 
 STEP = 0.125  # s
 

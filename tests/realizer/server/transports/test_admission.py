@@ -25,7 +25,7 @@ from websockets.exceptions import ConnectionClosed, InvalidMessage, InvalidStatu
 from realizer.core.settings import Settings, SettingsError
 from realizer.server.documents import limits
 from realizer.server.http import access
-from realizer.server.http.jwt_tokens import Grant
+from realizer.server.http.access import Grant
 from realizer.server.runtime import session_host
 from realizer.server.serve import Server
 

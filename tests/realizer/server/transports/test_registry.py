@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from realizer.core.settings import Settings
-from realizer.server.transports.registry import TRANSPORTS, requested
+from realizer.server.transports.transport import TRANSPORTS, requested
 from realizer.server.transports.xface.server import XfaceTransport
 
 

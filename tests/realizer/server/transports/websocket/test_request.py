@@ -7,8 +7,8 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request
 
 from realizer.server.http.http_site import HttpResponse
+from realizer.server.http.requests import headers_of, query_of, response_to, session_of
 from realizer.server.runtime.session_registry import JoinError
-from realizer.server.transports.websocket.request import headers_of, query_of, response_to, session_of
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,8 @@ from __future__ import annotations
 import pytest
 
 from realizer.animation.fap.fap_reader import read_fap
-from realizer.server.transports.xface.player_link import NUMBERS, PATIENCE, PlayerLink, State
-from realizer.server.transports.xface.reader import TaskReader
-from realizer.server.transports.xface.wire import Task, pack_note
+from realizer.server.transports.xface.player import NUMBERS, PATIENCE, PlayerLink, State
+from realizer.server.transports.xface.wire import Task, TaskReader, pack_note
 
 
 def frame(**faps: int) -> list[int]:

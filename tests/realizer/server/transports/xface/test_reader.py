@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.server.transports.xface.reader import Fault, TaskReader
-from realizer.server.transports.xface.wire import Task
+from realizer.server.transports.xface.wire import Fault, Task, TaskReader
 from tests.rows import each_row
 
 LIMIT = 2000

@@ -5,8 +5,15 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.server.transports.xface.reader import TaskReader
-from realizer.server.transports.xface.wire import Note, Status, Task, pack_note, pack_task, read_notes
+from realizer.server.transports.xface.wire import (
+    Note,
+    Status,
+    Task,
+    TaskReader,
+    pack_note,
+    pack_task,
+    read_notes,
+)
 
 NAMES = st.from_regex(r"[A-Z][A-Z_]{0,20}", fullmatch=True)
 NUMBERS = st.integers(0, 999_999_999)

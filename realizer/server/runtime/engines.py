@@ -1,25 +1,19 @@
-"""The runner of sessions' effects: it sends to clients, and lets voices and renderers work in threads."""
+"""The voices, the renderers and the other workers of the service, in threads."""
 
 from __future__ import annotations
 
-import asyncio
 import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from realizer.core import work
 from realizer.core.errors import RealizerError, RenderError, VoiceError
-from realizer.server.edits.saving import save
-from realizer.server.session.effects import Close, Draw, Effect, Look, RenderOptions, Send, Speak, Write
-from realizer.server.session.session import Session
-from realizer.server.transports.transport import Outbound
+from realizer.server.session.effects import Draw, Look, RenderOptions, Speak
 from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.utterance import Utterance, Voice
 
@@ -32,95 +26,18 @@ RENDERERS = 6
 IDLE = 5.0  # s; a renderer unused for so long makes room for another one
 
 
-class EffectRunner:
-    """Carries out the effects of sessions in an event loop.
-
-    Args:
-        loop: the event loop.
-        engines: speak and draw, in threads.
-        clients: number of a connection -> its way out.
-        deliver: called in the loop with a session, and a function that passes it an answer.
-    """
-
-    def __init__(
-        self,
-        loop: asyncio.AbstractEventLoop,
-        engines: Engines,
-        clients: Mapping[int, Outbound],
-        deliver: Callable[[Session, Callable[[], None]], None],
-    ) -> None:
-        self._loop = loop
-        self._engines = engines
-        self._clients = clients
-        self._deliver = deliver
-
-    def run(self, session: Session, effects: Iterable[Effect]) -> None:
-        """Carry out effects of a session, in order."""
-        for effect in work.counted(effects, 5):
-            match effect:
-                case Send(connection, data):
-                    if (client := self._clients.get(connection)) is not None:
-                        client.send(data)
-                case Speak():
-                    self._submit(self._engines.speech_pool, self._engines.speak, session, effect)
-                case Draw():
-                    self._submit(self._engines.render_pool, self._engines.draw, session, effect)
-                case Look():
-                    self._submit(self._engines.tracking_pool, self._engines.look, session, effect)
-                case Write():
-                    self._submit(self._engines.file_pool, save, session, effect)
-                case Close(connection, code, reason):
-                    if (client := self._clients.get(connection)) is not None:
-                        client.disconnect(code, reason)
-
-    def _submit(
-        self,
-        pool: FairPool,
-        compute: Callable[[Any], Any],
-        session: Session,
-        effect: Speak | Draw | Look | Write,
-    ) -> None:
-        """Compute the answer to an effect in a thread, and pass it to the session."""
-        takers: dict[type, Callable[[int, Any, float], None]] = {
-            Speak: session.on_speech,
-            Draw: session.on_picture,
-            Look: session.on_sight,
-            Write: session.on_saved,
-        }
-        take = takers[type(effect)]
-
-        def answer(future: asyncio.Future[Any]) -> None:
-            if not future.cancelled():
-                result = future.result()
-                self._deliver(session, lambda: take(effect.id, result, self._loop.time()))
-
-        computed = pool.submit(session, partial(compute, effect))
-        asyncio.wrap_future(computed, loop=self._loop).add_done_callback(answer)
-
-
 @dataclass(slots=True)
 class _RendererSlot:
-    """A renderer.
-
-    Attributes:
-        used: when it drew last, seconds on the clock of `Engines`.
-        busy: number of threads that draw with it now.
-        begun: whether its process has started.
-    """
+    """A renderer."""
 
     renderer: Renderer
-    used: float
-    busy: int = 0
-    begun: bool = False
+    used: float  # when it drew last, seconds on the clock of `Engines`
+    busy: int = 0  # number of threads that draw with it now
+    begun: bool = False  # whether its process has started
 
 
 class Engines:
-    """The voices and renderers. `speak` and `draw` may be called by the threads of their pools.
-
-    Args:
-        deformer: overrides that of the faces.
-        clock: monotonic seconds.
-    """
+    """The voices and renderers. `speak` and `draw` may be called by the threads of their pools."""
 
     def __init__(self, deformer: str | None = None, clock: Callable[[], float] = time.monotonic) -> None:
         self._deformer = deformer
@@ -238,7 +155,6 @@ class Engines:
                     slot.begun, self._begun = True, slot.used
 
     def _least_recent(self, now: float) -> tuple[str, RenderOptions]:
-        """Return the key of the idle renderer that was used the longest ago."""
         idle = {
             key: slot.used
             for key, slot in self._slots.items()
@@ -258,12 +174,7 @@ class Engines:
 
 
 class FairPool:
-    """A pool of threads: of the owners whose calls wait, each has one call made before another's second.
-
-    Args:
-        threads: number of calls that are made at once.
-        name: prefix of the names of the threads.
-    """
+    """A pool of threads: of the owners whose calls wait, each has one call made before another's second."""
 
     def __init__(self, threads: int, name: str) -> None:
         self._pool = ThreadPoolExecutor(threads, name)

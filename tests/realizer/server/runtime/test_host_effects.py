@@ -8,7 +8,8 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 from realizer.core.settings import Settings
-from realizer.server.runtime.effect_runner import EffectRunner, Engines
+from realizer.server.runtime.engines import Engines
+from realizer.server.runtime.session_host import SessionHost
 from realizer.server.session.effects import Close, Send, Speak
 from realizer.server.session.session import Session
 from realizer.speech.utterance import SpeechRequest
@@ -45,10 +46,11 @@ async def delivered(*effects: Any) -> tuple[Client, Pool, list[Any]]:
     """Run effects of a session with one client; return it, the pool of voices, and where answers go."""
     client, pool, deliveries = Client(), Pool(), list[Any]()
     engines = cast(Engines, SimpleNamespace(speech_pool=pool, speak=lambda effect: spoken()))
-    loop = asyncio.get_running_loop()
-    runner = EffectRunner(loop, engines, {1: client}, lambda session, answer: deliveries.append(answer))
+    host: Any = SessionHost(Settings())
+    host._loop, host._engines, host._clients = asyncio.get_running_loop(), engines, {1: client}
+    host._deliver = lambda session, answer: deliveries.append(answer)
     session = Session("s", Settings(), 0.0)
-    runner.run(session, effects)
+    host._run(session, effects)
     for future in pool.futures[:1]:
         future.set_result(spoken())
     for future in pool.futures[1:]:
