@@ -18,35 +18,20 @@ EXTENSIONS = "http://www.bml-initiative.org/bml/coreextensions-1.0"
 BMLA = "http://www.asap-project.org/bmla"
 BMLT = "http://hmi.ewi.utwente.nl/bmlt"
 OWN = "urn:bml-realizer:1"  # the extensions of this project
+# Usual prefix -> namespace.
+NAMESPACES = {"bml": CORE, "ext": EXTENSIONS, "bmla": BMLA, "bmlt": BMLT, "realizer": OWN}
 XML = "http://www.w3.org/XML/1998/namespace"
 LANGUAGE = f"{{{XML}}}lang"
 SSML = "application/ssml+xml"  # type of descriptions
 COMPOSITIONS = ("MERGE", "APPEND", "REPLACE")
 
 
-def core(name: str) -> str:
-    """Return the Clark name of an element in the BML 1.0 core namespace."""
-    return f"{{{CORE}}}{name}"
+def _names_in(namespace: str) -> Callable[[str], str]:
+    return lambda name: f"{{{namespace}}}{name}"
 
 
-def extension(name: str) -> str:
-    """Return the Clark name of an element in the BML 1.0 core extensions namespace."""
-    return f"{{{EXTENSIONS}}}{name}"
-
-
-def bmla(name: str) -> str:
-    """Return the Clark name of a name in the namespace of BMLA, the extensions of AsapRealizer."""
-    return f"{{{BMLA}}}{name}"
-
-
-def bmlt(name: str) -> str:
-    """Return the Clark name of a name in the namespace of BMLT, the extensions of Elckerlyc."""
-    return f"{{{BMLT}}}{name}"
-
-
-def own(name: str) -> str:
-    """Return the Clark name of a name in the namespace of this project."""
-    return f"{{{OWN}}}{name}"
+# Functions: local name -> Clark name.
+core, extension, bmla, bmlt, own = map(_names_in, (CORE, EXTENSIONS, BMLA, BMLT, OWN))
 
 
 @node

@@ -109,10 +109,7 @@ def read_block(
             reader.places.setdefault(node.id, node.place)
     next_element()
     return Block(
-        **values,
-        children=_grouped(tree, nodes),
-        problems=tuple(reader.problems),
-        places=reader.places,
+        **values, children=_grouped(tree, nodes), problems=tuple(reader.problems), places=reader.places
     )
 
 

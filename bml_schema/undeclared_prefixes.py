@@ -11,8 +11,7 @@ from bml_schema.node_schema import local, schema_of
 from bml_schema.nodes import (
     BMLA,
     BMLT,
-    CORE,
-    EXTENSIONS,
+    NAMESPACES,
     OWN,
     After,
     Before,
@@ -29,15 +28,7 @@ from bml_schema.nodes import (
 SMARTBODY = "http://ict.usc.edu"
 GRETA = "gretaNameSpace"
 # The namespaces that documents mean by these prefixes.
-_MEANT = {
-    "bml": CORE,
-    "ext": EXTENSIONS,
-    "bmla": BMLA,
-    "bmlt": BMLT,
-    "realizer": OWN,
-    "sbm": SMARTBODY,
-    "greta": GRETA,
-}
+_MEANT = NAMESPACES | {"sbm": SMARTBODY, "greta": GRETA}
 # Elements of BML that are no behaviours, nor children that their classes name.
 _INNER = {local(c.tag) for c in (Required, Constraint, Synchronize, Before, After, Description, Sync)}
 

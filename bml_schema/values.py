@@ -149,9 +149,7 @@ seconds = number(-MAX_SECONDS, MAX_SECONDS, wanted=f"seconds, at most {MAX_SECON
 # Ids have no colon, because references and feedback ids are joined with it. Those of behaviours have no
 # blank, because "a - 1" must always mean an offset. "bml" is the block itself in references.
 block_name = Value(
-    f'a name of at most {_MAX_NAME} characters without ":", other than "bml"',
-    _read_block_name,
-    type="name",
+    f'a name of at most {_MAX_NAME} characters without ":", other than "bml"', _read_block_name, type="name"
 )
 name = Value(
     f'a name of at most {_MAX_NAME} characters without blanks or ":", other than "bml"',

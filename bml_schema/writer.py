@@ -7,33 +7,15 @@ from lxml import etree
 
 from bml_schema.escape import escape, escape_value
 from bml_schema.node_schema import schema_of, sync_ref
-from bml_schema.nodes import (
-    BMLA,
-    BMLT,
-    CORE,
-    EXTENSIONS,
-    OWN,
-    XML,
-    Behaviour,
-    Block,
-    Constraint,
-    Description,
-    Required,
-)
+from bml_schema.nodes import CORE, NAMESPACES, XML, Behaviour, Block, Constraint, Description, Required
 from bml_schema.steps import next_element
 from bml_schema.sync_refs import SyncRef
 from bml_schema.values import decimal
 
 _IN_CORE = f"{{{CORE}}}"
 # Well-known prefixes; any other namespace becomes ns1, ns2, ...
-_PREFIXES: Mapping[str, str] = {
-    CORE: "bml",
-    EXTENSIONS: "ext",
-    OWN: "realizer",
-    BMLA: "bmla",
-    BMLT: "bmlt",
-    "http://www.w3.org/2001/XMLSchema-instance": "xsi",
-}
+_PREFIXES = {uri: prefix for prefix, uri in NAMESPACES.items()}
+_PREFIXES["http://www.w3.org/2001/XMLSchema-instance"] = "xsi"
 
 
 def write(block: Block) -> str:

@@ -13,8 +13,6 @@ from bml_schema.steps import next_element
 from bml_schema.undeclared_prefixes import SMARTBODY
 from bml_schema.vocabulary import VOCABULARY
 
-__all__ = ["has_words_of_dialects", "is_draft"]
-
 _SMARTBODY = f"{{{SMARTBODY}}}"
 
 

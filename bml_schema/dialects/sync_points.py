@@ -10,8 +10,6 @@ from bml_schema.dialects.table import Row, point_row, squeezed, table
 from bml_schema.node_schema import local
 from bml_schema.vocabulary import VOCABULARY
 
-__all__ = ["POINTS", "SyncPoints"]
-
 # Name of a behaviour -> its sync points.
 POINTS = {local(tag): cls.sync_points for tag, cls in VOCABULARY.items()}
 _REFERENCE = re.compile(r"\s*([^:\s]+)\s*:\s*([A-Za-z_-]+?)(\s*[+-]\s*[0-9.]+\s*)?")

@@ -1,6 +1,6 @@
 """Translates an element tree from a dialect to BML 1.0, in place, before it is parsed."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from copy import deepcopy
 from itertools import count, repeat
 from typing import Any
@@ -8,19 +8,14 @@ from typing import Any
 from lxml import etree
 
 from bml_schema.canonical import MAX_ATTRIBUTES
-from bml_schema.dialects.greta_references import translate_reference
-from bml_schema.dialects.report import Report
 from bml_schema.dialects.speech_text import translate_speech
 from bml_schema.dialects.sync_points import POINTS, SyncPoints
-from bml_schema.dialects.table import Row, table
+from bml_schema.dialects.table import Report, Row, table
 from bml_schema.dialects.values import FUNCTIONS
 from bml_schema.node_schema import local
-from bml_schema.nodes import BMLA, BMLT, CORE, DRAFTS, EXTENSIONS, OWN
+from bml_schema.nodes import BMLA, BMLT, CORE, DRAFTS, NAMESPACES, OWN
 from bml_schema.undeclared_prefixes import SMARTBODY, remove_element
 
-__all__ = ["dialect_of", "translate"]
-
-_SPACES = {"ext": EXTENSIONS, "bmla": BMLA, "bmlt": BMLT, "realizer": OWN}
 _OURS = frozenset({BMLA, BMLT, OWN})
 _JOINTS = frozenset({"eyes", "head", "neck", "chest", "back"})  # SmartBody's children of <gaze>
 
@@ -207,7 +202,7 @@ class _Translation:
 
     def _rename(self, element: Any, name: str) -> None:
         prefix, colon, short = name.rpartition(":")
-        space = _SPACES[prefix] if colon else str(self.root.tag).rpartition("}")[0][1:]
+        space = NAMESPACES[prefix] if colon else str(self.root.tag).rpartition("}")[0][1:]
         element.tag = f"{{{space}}}{short}" if space else short
 
     def _timed(self) -> Iterator[Any]:
@@ -260,3 +255,31 @@ class _Translation:
             and "characterId" not in self.root.attrib
         ):
             self.root.set("characterId", id)
+
+
+_WORDS = frozenset(("lexeme", "type", "rotation", "orientation", "au", "shape"))
+_PARTS = ("{*}lexeme", "{*}faceLexeme", "{*}facs", "{*}faceFacs")
+
+
+def translate_reference(element: Any, name: str, apply: Callable[[Row], None]) -> None:
+    """Give a head or face without a lexeme the one that its description refers to.
+
+    Args:
+        element: the behaviour.
+        name: its local name.
+        apply: called with the row of the table that was used.
+    """
+    if name not in ("head", "face") or not _WORDS.isdisjoint(element.keys()):
+        return
+    row = next(row for row in table().attributes["description"]["type"] if row.dialect == "Greta")
+    for description in element.findall("{*}description"):
+        reference = description.findtext("{*}reference", "").rpartition("=")[2].strip()
+        if not reference or not row.fits(description.get("type", "")):
+            continue
+        if name == "head":
+            element.set("lexeme", reference)
+            apply(row)
+        elif all(element.find(part) is None for part in _PARTS):
+            space = str(element.tag).rpartition("}")[0]
+            etree.SubElement(element, f"{space}}}lexeme" if space else "lexeme", lexeme=reference)
+            apply(row)

@@ -14,8 +14,7 @@ from realizer.core.array_types import Bool, Float64
 from realizer.emotions.archetypes import archetypes
 from realizer.emotions.profile import Profile
 from realizer.emotions.wheel import wheel
-from realizer.tables.emotion_model import emotion_model
-from realizer.tables.wheel_words import ring
+from realizer.tables.emotions import emotion_model, ring
 
 
 @dataclass(frozen=True)

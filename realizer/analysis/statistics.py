@@ -7,7 +7,7 @@ import numpy as np
 
 from realizer import tables
 from realizer.emotions.profile import Profile
-from realizer.tables.profiles import statistics
+from realizer.tables.emotions import statistics
 
 MIN_MEAN = 1.0  # FAPU; FAPs with a smaller mean are not part of an expression
 

@@ -30,8 +30,7 @@ from realizer.emotions.wheel import affect, blend_weights, place_of_affect, stre
 from realizer.emotions.words import UnknownWordError, known_words, place_of, strength_of
 from realizer.emotions.words import emotion as profile_of
 from realizer.scheduling.timing import Timing
-from realizer.tables.emotion_model import emotion_model
-from realizer.tables.emotions import emotion_faces
+from realizer.tables.emotions import emotion_faces, emotion_model
 
 # Our profiles play as action units, so that speech and blinks combine with them; others as FAPs.
 OWN, PUBLISHED = (None, "default", "own"), ("published", "raw")

@@ -12,9 +12,8 @@ from realizer.animation.channel import Channel
 from realizer.behaviours import media, pose_channels
 from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
 from realizer.core.array_types import Float64
-from realizer.expressions.spans import duration_of, spans
-from realizer.expressions.timeline import Timeline, Track, faults_of, remarks
-from realizer.expressions.timeline_reader import read_timeline
+from realizer.expressions.timeline import Timeline, Track, duration_of, faults_of, remarks, spans
+from realizer.expressions.timeline_file import read_timeline
 from realizer.scheduling.timing import Timing
 
 # 1/s^2; as stiff as an expression.

@@ -8,8 +8,7 @@ from typing import NamedTuple
 from bml_schema import Block
 from realizer.expressions.expression import Expression
 from realizer.expressions.library import Library
-from realizer.expressions.spans import VisibleSpan, visible_spans
-from realizer.expressions.timeline import Timeline
+from realizer.expressions.timeline import Timeline, VisibleSpan, visible_spans
 from realizer.knowledge.advice import Advice, VisibleExpression, advise, duration_advice, stands_alone
 from realizer.tables.knowledge import CompanionRule, Mood, Role, knowledge
 from realizer.tables.templates import PREFIX

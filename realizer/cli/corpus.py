@@ -153,8 +153,7 @@ def label(folder: Path, name: str, annotator: str, added: Spans, removed: Spans)
     Segments of other programs come in by `realizer corpus add`, and go out by `realizer corpus export`.
     """
     from realizer.corpus.agreement import agreement
-    from realizer.corpus.labels import change
-    from realizer.corpus.recording import CorpusError, read_recording, write_recording
+    from realizer.corpus.recording import CorpusError, change, read_recording, write_recording
 
     with options.reporting(CorpusError):
         found = read_recording(folder / name)

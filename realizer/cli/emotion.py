@@ -153,7 +153,7 @@ def _print_profile(profile: Profile, shares: Mapping[str, float], seed: int | No
 
 
 def _write(profiles: Sequence[Profile], seed: int | None, path: Path, face: str, camera: str) -> None:
-    from realizer.emotions.profile_file import write_profiles
+    from realizer.emotions.profile import write_profiles
 
     if path.suffix.lower() == ".txt":
         path.write_text(write_profiles(profiles), "utf-8")
@@ -180,7 +180,7 @@ def _draw_wheel(profiles: str, path: Path, face: str, camera: str) -> None:
     from realizer.emotions.wheel import wheel
     from realizer.render.contact_sheet import sheet
     from realizer.render.renderer import Renderer
-    from realizer.tables.wheel_words import ring
+    from realizer.tables.emotions import ring
 
     places = [(place, activation) for activation in RINGS for place in ring("paul").values()]
     rows = np.stack([wheel(place.angle, activation, profiles).frame() for place, activation in places])

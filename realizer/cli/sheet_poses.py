@@ -16,9 +16,8 @@ from realizer.emotions.wheel import wheel
 from realizer.expressions.expression import Expression
 from realizer.tables import by_number, faps
 from realizer.tables.control_groups import au_regions, fap_regions
-from realizer.tables.emotions import archetypes
+from realizer.tables.emotions import archetypes, ring
 from realizer.tables.lexemes import face_lexemes
-from realizer.tables.wheel_words import ring
 
 if TYPE_CHECKING:
     from realizer.tables import Fap

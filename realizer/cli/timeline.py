@@ -69,7 +69,7 @@ def faults_in(content: bytes, library: Library) -> list[str]:
     """Return the faults of a timeline, each with its channel and entry."""
     from realizer.core.errors import TableError
     from realizer.expressions.timeline import faults_of
-    from realizer.expressions.timeline_reader import read_timeline
+    from realizer.expressions.timeline_file import read_timeline
 
     try:
         return faults_of(read_timeline(content), library)
@@ -87,7 +87,7 @@ def advice_on(
     """
     from realizer.checking.timeline_advice import timeline_advice
     from realizer.expressions.timeline import remarks
-    from realizer.expressions.timeline_reader import read_timeline
+    from realizer.expressions.timeline_file import read_timeline
 
     timeline = read_timeline(content)
     advice = (

@@ -101,8 +101,7 @@ def _from_points(source: str, output: Path, fps: float) -> Tracked:
     """Return what feature points show, as a FAP file."""
     import numpy as np
 
-    from realizer.analysis.faps_from_points import faps_from_points
-    from realizer.analysis.points_file import bridge, read_points
+    from realizer.analysis.faps_from_points import bridge, faps_from_points, read_points
     from realizer.animation.fap.fap_clip import FAPClip
     from realizer.animation.frames import FAPFrames
     from realizer.outputs.fap_text import encode

@@ -11,9 +11,8 @@ from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
-from realizer.analysis.faps_from_points import faps_from_points
-from realizer.analysis.points_file import COLUMNS as POINT_COLUMNS
-from realizer.analysis.points_file import bridge, read_points
+from realizer.analysis.faps_from_points import COLUMNS as POINT_COLUMNS
+from realizer.analysis.faps_from_points import bridge, faps_from_points, read_points
 from realizer.animation.axis import au, axis
 from realizer.animation.fap.conversion import to_fap
 from realizer.animation.fap.fap_reader import read_fap

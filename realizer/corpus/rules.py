@@ -25,8 +25,7 @@ from realizer.corpus.statistics import (
     questions,
     shares,
 )
-from realizer.emotions.profile import Profile
-from realizer.emotions.profile_file import write_profiles
+from realizer.emotions.profile import Profile, write_profiles
 from realizer.tables import faps
 from realizer.tables.templates import FRAME, templates
 

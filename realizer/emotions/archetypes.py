@@ -4,10 +4,8 @@ from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 
-from realizer.emotions.profile import Profile
-from realizer.emotions.profile_file import read_profiles
-from realizer.tables.emotion_model import emotion_model
-from realizer.tables.profiles import own_ranges, published_ranges
+from realizer.emotions.profile import Profile, read_profiles
+from realizer.tables.emotions import emotion_model, own_ranges, published_ranges
 
 SETS = ("own", "published", "raw")
 

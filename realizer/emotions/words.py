@@ -7,10 +7,9 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from realizer.emotions.archetypes import archetypes, is_profile_file, split_set
-from realizer.emotions.intermediate import between
 from realizer.emotions.profile import Profile
-from realizer.emotions.wheel import NEUTRAL, blend_weights, neighbours, wheel
-from realizer.tables.wheel_words import own_words, ring, whissell_words
+from realizer.emotions.wheel import NEUTRAL, between, blend_weights, neighbours, wheel
+from realizer.tables.emotions import own_words, ring, whissell_words
 
 
 class WordPlace(NamedTuple):

@@ -1,21 +1,42 @@
-"""The library of expressions by name: templates, lexemes and a user's folder."""
+"""The library of expressions by name: templates, lexemes and a user's folder; and their search words."""
 
 import difflib
 import logging
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
 
 import numpy as np
 
+from realizer import tables
 from realizer.core.errors import TableError
 from realizer.expressions.expression import Expression, key
-from realizer.tables.expression_words import expression_words
 from realizer.tables.lexemes import face_lexemes
 from realizer.tables.templates import PREFIX, Template, apex, templates
 from realizer.tables.timing import Gap, gaps
 
 log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class ExpressionWords:
+    """Words of an expression; templates have their `features` in their own table."""
+
+    name: str
+    features: str
+    means: str
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """Return the words and phrases of `means`."""
+        return tuple(word.strip() for word in self.means.split(";") if word.strip())
+
+
+@cache
+def expression_words() -> Mapping[str, ExpressionWords]:
+    """Return name in the expression library -> words."""
+    return {row.name: row for row in tables.csv_rows("expression_words.csv", ExpressionWords)}
 
 
 class Library(Mapping[str, Expression]):

@@ -1,10 +1,11 @@
-"""Timelines: tracks of expressions and a mixer, with checks against a library and a face."""
+"""Timelines: tracks of expressions and a mixer, their checks, and the times of their entries."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from itertools import pairwise
+from typing import Literal, NamedTuple
 
-from realizer.expressions.expression import key
+from realizer.expressions.expression import Expression, key
 from realizer.expressions.library import Library
 
 Joins = Literal["both", "onset", "offset"]
@@ -81,3 +82,99 @@ def remarks(timeline: Timeline, inputs: Collection[str] | None = None) -> list[s
         f"order: no effect on {', '.join(unmixed)}, which this face does not mix with other action units"
     )
     return [message] if unmixed else []
+
+
+BREAK = 0.5  # s, the default duration of a break
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """The times of an entry, in seconds from the start of the timeline.
+
+    The expression is at full intensity from `reached` to `left`. `start` and `end` are the borders of the
+    entry; transitions may begin before and end after them.
+    """
+
+    entry: Entry
+    start: float
+    reached: float
+    left: float
+    end: float
+
+
+class VisibleSpan(NamedTuple):
+    """The seconds for which an entry is visible."""
+
+    place: str  # of the entry, for messages
+    expression: Expression
+    begin: float  # seconds from the start of the timeline
+    end: float  # seconds from the start of the timeline
+    track: int  # number of the track, from 0
+    entry: int  # number of the entry in it, from 0
+    times: Span  # of the entry
+
+
+def spans(track: Track, library: Mapping[str, Expression]) -> list[Span]:
+    """Return the times of each entry of a track.
+
+    An entry begins with its onset and ends with its offset. If `joins` is "onset" or "offset", only this one
+    is used between two entries, and the other expression stays whole up to the border. The first entry
+    always has its onset and the last its offset. A break has neither: the entry before it ends with its
+    offset, and the entry after it begins with its onset. If an entry is too short, onset and offset are
+    scaled to fit.
+
+    Raises:
+        KeyError: an expression that is not in the library.
+    """
+    begins, lengths = [track.start], []
+    times = [_onset_and_offset(entry, library) for entry in track.entries]
+    for entry, (onset, offset) in zip(track.entries, times, strict=True):
+        own = BREAK if entry.neutral else onset + library[entry.expression].apex + offset
+        lengths.append(own if entry.duration is None else entry.duration)
+        begins.append(begins[-1] + lengths[-1])
+    # Seconds of the transition after the begin of each entry, and before its end.
+    rises, falls = [times[0][0]], []
+    for (one, (_, offset)), (other, (onset, _)) in pairwise(zip(track.entries, times, strict=True)):
+        before, after = offset, onset
+        if track.joins == "onset":
+            before, after = 0.0, offset if other.neutral else onset
+        elif track.joins == "offset":
+            before, after = onset if one.neutral else offset, 0.0
+        falls.append(before)
+        rises.append(after)
+    falls.append(times[-1][1])
+    entries = []
+    for k, (entry, length, rise, fall) in enumerate(zip(track.entries, lengths, rises, falls, strict=True)):
+        part = min(1.0, length / (rise + fall)) if rise + fall > 0 else 1.0
+        begin, end = begins[k], begins[k + 1]
+        entries.append(Span(entry, begin, begin + rise * part, end - fall * part, end))
+    return entries
+
+
+def duration_of(timeline: Timeline, library: Mapping[str, Expression]) -> float:
+    """Return the seconds to the end of the longest track."""
+    return max(spans(track, library)[-1].end for track in timeline.tracks)
+
+
+def visible_spans(timeline: Timeline, library: Mapping[str, Expression]) -> Iterator[VisibleSpan]:
+    """Yield the seconds for which each entry except breaks is visible.
+
+    An expression is visible from the middle of the transition to it to the middle of the next one.
+    """
+    for number, track in enumerate(timeline.tracks):
+        shown = spans(track, library)
+        lefts = [shown[0].start, *(span.left for span in shown)]
+        reached = [*(span.reached for span in shown), shown[-1].end]
+        for k, span in enumerate(shown):
+            if not span.entry.neutral:
+                begin, end = (lefts[k] + span.reached) / 2, (span.left + reached[k + 1]) / 2
+                place, expression = f"channel {track.name}, entry {k + 1}", library[span.entry.expression]
+                yield VisibleSpan(place, expression, begin, end, number, k, span)
+
+
+def _onset_and_offset(entry: Entry, library: Mapping[str, Expression]) -> tuple[float, float]:
+    if entry.neutral:
+        return 0.0, 0.0
+    expression = library[entry.expression]
+    onset, offset = entry.onset, entry.offset
+    return (expression.onset if onset is None else onset, expression.offset if offset is None else offset)

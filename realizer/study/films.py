@@ -16,12 +16,7 @@ from realizer.study.drawing import FRONT, SIZE, Variant
 from realizer.study.items import Item
 from realizer.tables.templates import PREFIX, templates
 
-PAIRS = (
-    ("enriched", "plain"),
-    ("enriched", "random"),
-    ("random", "plain"),
-    ("enriched", "no co-occurrence"),
-)
+PAIRS = (("enriched", "plain"), ("enriched", "random"), ("random", "plain"), ("enriched", "no co-occurrence"))
 SAME = 0.02  # of intensities
 TAG = "<realizer:expression"
 DOCUMENT = (

@@ -11,7 +11,7 @@ from realizer.facebuild.mpeg4.fap_scores import weights
 from realizer.render.difference_image import difference, faint
 from realizer.study.drawing import FRONT, Drawer, Variant, opaque, row, webp
 from realizer.tables import faps
-from realizer.tables.wheel_words import ring
+from realizer.tables.emotions import ring
 
 EMOTIONS = ("anger", "disgust", "fear", "joy", "sadness", "surprise")
 NAMES = (*EMOTIONS, "trust", "anticipation", "other")

@@ -13,7 +13,7 @@ from realizer.core.errors import TableError
 from realizer.study.answers import COLUMNS
 from realizer.study.items import NAMES
 from realizer.study.kit import ITEMS
-from realizer.tables.wheel_words import ring
+from realizer.tables.emotions import ring
 from realizer.tracking.files import mask
 from realizer.tracking.follower import follow
 from realizer.tracking.pictures import Picture, read_picture

@@ -8,30 +8,13 @@ import csv
 import types
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from functools import cache
+from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from realizer.core.errors import TableError
 from realizer.core.toml_text import parse_toml
-
-__all__ = [
-    "ActionUnit",
-    "AuCombination",
-    "AuToFap",
-    "Fap",
-    "action_units",
-    "au_combinations",
-    "au_to_fap",
-    "by_number",
-    "csv_rows",
-    "faps",
-    "nearest",
-    "read_csv",
-    "read_toml",
-    "toml_table",
-]
 
 Row = TypeVar("Row")
 T = TypeVar("T")
@@ -210,28 +193,12 @@ class AuCombination:
     value: float
 
 
-@cache
-def au_combinations() -> tuple[AuCombination, ...]:
-    """Return the combinations of action units that FACS lists as different."""
-    return csv_rows("au_combinations.csv", AuCombination)
-
-
-@cache
-def faps() -> tuple[Fap, ...]:
-    """Return the 68 FAPs; row i is FAP i + 1."""
-    return csv_rows("faps.csv", Fap)
-
-
-@cache
-def action_units() -> tuple[ActionUnit, ...]:
-    """Return the action units in ascending order."""
-    return csv_rows("action_units.csv", ActionUnit)
-
-
-@cache
-def au_to_fap() -> tuple[AuToFap, ...]:
-    """Return the mapping of action units to FAPs."""
-    return csv_rows("au_to_fap.csv", AuToFap)
+# Functions without arguments that return the rows of a table.
+faps = cache(partial(csv_rows, "faps.csv", Fap))  # row i is FAP i + 1
+action_units = cache(partial(csv_rows, "action_units.csv", ActionUnit))  # in ascending order
+au_to_fap = cache(partial(csv_rows, "au_to_fap.csv", AuToFap))
+# What FACS lists as other than the sum of its action units.
+au_combinations = cache(partial(csv_rows, "au_combinations.csv", AuCombination))
 
 
 @cache

@@ -1,12 +1,73 @@
-"""The action units of the archetypal emotions (`emotions.toml`)."""
+"""Emotions: places on the wheel, words, faces, ranges of FAPs, and the parameters of models."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
+from typing import Literal
 
 from realizer import tables
 from realizer.tables.lexemes import face_lexemes, read_aus
-from realizer.tables.wheel_words import ring
+
+
+@dataclass(frozen=True, slots=True)
+class WhissellWord:
+    """A word of Raouzaiou et al. 2002, table 6."""
+
+    word: str
+    raw_activation: float | None  # as printed
+    activation: float | None  # as the paper uses it
+    evaluation: float | None
+    angle: float  # degrees on the ring "plutchik"
+    category: str  # archetype of the word; "" for a word between two archetypes
+
+
+@dataclass(frozen=True, slots=True)
+class OwnWord:
+    """Another name or degree, chosen for this project, of a word of the wheel or of Whissell."""
+
+    word: str
+    like: str
+    strength: float  # factor of the word that it is like
+    source: Literal["own", "plutchik"]
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """An emotion on a ring of the wheel.
+
+    Attributes:
+        angle: degrees.
+        activation: 1..7 of a published archetype, or None.
+        opposite, between: of Paul 2010, table 6.1, such as "trust+fear"; "" on the other rings.
+    """
+
+    ring: Literal["plutchik", "paul", "affect"]
+    kind: Literal["archetype", "basic", "advanced", "rest"]
+    name: str
+    angle: float
+    activation: float | None
+    opposite: str
+    between: str
+
+
+@cache
+def whissell_words() -> Mapping[str, WhissellWord]:
+    """Return lower-case word -> row."""
+    return {row.word: row for row in tables.csv_rows("words_whissell.csv", WhissellWord)}
+
+
+@cache
+def own_words() -> Mapping[str, OwnWord]:
+    """Return lower-case word -> row."""
+    return {row.word: row for row in tables.csv_rows("words_own.csv", OwnWord)}
+
+
+@cache
+def ring(name: str) -> Mapping[str, Place]:
+    """Return emotion -> place on a ring, by angle."""
+    rows = tables.csv_rows("emotion_wheel.csv", Place)
+    return {row.name: row for row in sorted(rows, key=lambda row: row.angle) if row.ring == name}
+
 
 FILE = "emotions.toml"
 
@@ -48,3 +109,71 @@ def archetypes() -> tuple[Archetype, ...]:
         for place in ring("plutchik").values()
         if place.activation is not None
     )
+
+
+@dataclass(frozen=True, slots=True)
+class EmotionModel:
+    """The parameters of the emotion wheel and the recogniser."""
+
+    most: float  # highest activation, at which our own profiles are defined
+    spread: float  # share of an action unit by which a random face may differ
+    middle: float  # middle of the scales of evaluation and activation
+    chosen: Mapping[str, int]  # emotion -> number of its preferred published profile
+    least_length: float  # least length of a range, FAPU
+    absent: float  # tolerance for a FAP that is not moved, FAPU
+    noise: Mapping[str, float]  # unit -> FAPU by which FAPs of tracked points are blurred
+    most_square: float  # greatest square of a relative distance from a range
+    least_belief: float  # belief below which a face belongs to no class
+    window: float  # seconds over which frames are averaged
+    unjudged: tuple[int, ...]  # FAPs that no feature point tells of alone
+    strengths: tuple[float, ...]  # strengths at which our own profiles are recognised
+
+
+@cache
+def emotion_model() -> EmotionModel:
+    """Return the model."""
+    table = tables.toml_table("emotion_model.toml")
+    recognition = table["recognition"]
+    recognition |= {name: tuple(recognition[name]) for name in ("unjudged", "strengths")}
+    return EmotionModel(**table["wheel"], chosen=table["chosen"], **recognition)
+
+
+@dataclass(frozen=True, slots=True)
+class PublishedRange:
+    """The range of a FAP in a published profile, printed and corrected (Raouzaiou et al. 2002, table 5)."""
+
+    emotion: str
+    profile: int
+    fap: int
+    raw_low: float
+    raw_high: float
+    low: float
+    high: float
+    fault: str
+
+
+@dataclass(frozen=True, slots=True)
+class OwnRange:
+    """The range of a FAP in one of our own profiles."""
+
+    emotion: str
+    profile: int
+    fap: int
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
+class Statistic:
+    """Mean and deviation of a FAP in faces that show an emotion; None if not verified."""
+
+    emotion: str
+    fap: int
+    raw_mean: float | None
+    mean: float | None
+    deviation: float | None
+
+
+published_ranges = cache(partial(tables.csv_rows, "profiles_published.csv", PublishedRange))  # as printed
+own_ranges = cache(partial(tables.csv_rows, "profiles_own.csv", OwnRange))
+statistics = cache(partial(tables.csv_rows, "fap_statistics.csv", Statistic))  # by emotion and FAP

@@ -28,7 +28,7 @@ from realizer.emotions.words import emotion, known_words
 from realizer.face.deform import deform
 from realizer.face.load import list_faces, load_face
 from realizer.face.model import Face
-from realizer.tables.emotion_model import emotion_model
+from realizer.tables.emotions import emotion_model
 
 Counts = dict[str, Counter[str]]
 

@@ -22,8 +22,7 @@ from scipy.spatial.transform import Rotation
 from realizer.animation.axis import AU_NAMES
 from realizer.face.load import list_faces
 from realizer.tracking.landmarks import landmarks
-from realizer.tracking.regressor import PARTS, SEEN_FAPS, SEEN_UNITS, WEIGHTS, Components, inputs
-from realizer.tracking.shape import UP, upright
+from realizer.tracking.regressor import PARTS, SEEN_FAPS, SEEN_UNITS, UP, WEIGHTS, Components, inputs, upright
 
 PICTURES = 24  # of a sitting
 KEPT = {"shape": 48, "traits": 64, "eyes": 24}  # components

@@ -15,8 +15,7 @@ import pytest
 
 from realizer.expressions.library import builtin
 from realizer.expressions.timeline import Entry, Timeline, Track
-from realizer.expressions.timeline_reader import read_timeline
-from realizer.expressions.timeline_writer import write_timeline
+from realizer.expressions.timeline_file import read_timeline, write_timeline
 from tests.browser.test_page import ARGUMENTS, CHROMIUM, PATIENCE, browser, pytestmark, serving
 
 __all__ = ["ARGUMENTS", "CHROMIUM", "browser", "pytestmark"]

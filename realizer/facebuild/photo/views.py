@@ -15,8 +15,7 @@ from realizer.tracking.landmarks import IRIS_MIDDLE, LEFT_EYE, RIGHT_EYE, Landma
 from realizer.tracking.network import TrackingError
 from realizer.tracking.pictures import read_picture
 from realizer.tracking.region import Region
-from realizer.tracking.regressor import stored
-from realizer.tracking.shape import head_angles, upright
+from realizer.tracking.regressor import head_angles, stored, upright
 
 if TYPE_CHECKING:
     from PIL.Image import Image

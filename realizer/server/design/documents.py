@@ -15,10 +15,8 @@ from realizer.core.errors import RealizerError, TableError
 from realizer.core.settings import Settings
 from realizer.enrichment import Enrichment
 from realizer.expressions.library import library_of
-from realizer.expressions.spans import spans
-from realizer.expressions.timeline import Entry, Timeline, Track
-from realizer.expressions.timeline_reader import MIN_SECONDS, read_timeline
-from realizer.expressions.timeline_writer import timeline_json, write_timeline
+from realizer.expressions.timeline import Entry, Timeline, Track, spans
+from realizer.expressions.timeline_file import MIN_SECONDS, read_timeline, timeline_json, write_timeline
 from realizer.knowledge.enrich import Enricher
 from realizer.outputs.output import RenderSettings
 from realizer.outputs.registry import OUTPUTS

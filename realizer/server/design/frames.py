@@ -24,7 +24,7 @@ from realizer.core.options import PlayOptions
 from realizer.core.settings import Settings
 from realizer.expressions.library import library_of
 from realizer.expressions.timeline import Timeline
-from realizer.expressions.timeline_writer import write_timeline
+from realizer.expressions.timeline_file import write_timeline
 from realizer.face.deform import deform
 from realizer.face.fap_mapping import mapping_of
 from realizer.face.load import face_folders, face_name, input_names, load_face

@@ -13,7 +13,7 @@ from realizer.core.settings import Settings
 from realizer.expressions.expression import Expression
 from realizer.expressions.library import library_of
 from realizer.expressions.timeline import Timeline, faults_of
-from realizer.expressions.timeline_reader import read_timeline
+from realizer.expressions.timeline_file import read_timeline
 
 if TYPE_CHECKING:
     from realizer.tables.knowledge import Mood, Role
@@ -92,8 +92,7 @@ def _check(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
     from itertools import islice
 
     from realizer.checking.timeline_advice import missing_companions, timeline_advice
-    from realizer.expressions.spans import duration_of, spans, visible_spans
-    from realizer.expressions.timeline import remarks
+    from realizer.expressions.timeline import duration_of, remarks, spans, visible_spans
 
     library = library_of(settings.library_folder)
     timeline = _distinct(timeline_of(request, settings))

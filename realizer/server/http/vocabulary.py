@@ -34,8 +34,8 @@ def vocabulary() -> bytes:
     from realizer.speech.registry import voices
     from realizer.tables import action_units, faps
     from realizer.tables.control_groups import au_regions, fap_regions
+    from realizer.tables.emotions import ring
     from realizer.tables.lexemes import face_lexemes, head_lexemes
-    from realizer.tables.wheel_words import ring
 
     known, words = AU_NAMES(), sorted(known_words())
     aus = [

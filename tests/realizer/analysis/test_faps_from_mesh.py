@@ -12,12 +12,12 @@ from realizer.analysis.faps_from_mesh import (
     measurable_profile,
     points_of,
 )
+from realizer.analysis.faps_from_points import facial_features
 from realizer.analysis.recognise import recogniser
 from realizer.emotions.archetypes import archetypes
 from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.face.model import Face
-from realizer.tables.facial_features import facial_features
 
 SEEDS = (0, 1, 2)
 

@@ -7,15 +7,30 @@ import pytest
 
 from realizer.analysis.faps_from_mesh import points_of
 from realizer.analysis.faps_from_points import (
+    bridge,
+    facial_features,
     faps_from_features,
     faps_from_points,
     features_from_points,
+    read_points,
 )
 from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.face.model import Face
 from realizer.tables import faps
-from realizer.tables.facial_features import facial_features
+
+
+def test_facial_features_are_15_in_the_units_of_their_faps() -> None:
+    rows = facial_features()
+    assert [row.number for row in rows] == list(range(1, 16))
+    for row in rows:
+        assert {faps()[fap - 1].unit for fap in (*row.signs, *row.also)} == {row.unit}
+
+
+def test_facial_features_of_eyes_have_the_opposite_sign_of_lids() -> None:
+    features = {row.number: row for row in facial_features()}
+    assert features[12].signs == {19: -1, 21: -1}
+    assert features[13].signs == {20: -1, 22: -1}
 
 
 @pytest.fixture(scope="module")
@@ -122,3 +137,51 @@ def test_faps_from_points_refuses_invalid_points(face: Face) -> None:
         features_from_points(here, rest(face), face.fapu)
     with pytest.raises(ValueError, match=r"wanted \(n, "):
         faps_from_features(np.zeros((3, 4)))
+
+
+TABLE = """\
+# tracked by hand
+frame,point,x,y,z
+0,4.1,0.015,0.017,0.028
+0,2.1,0,-0.1,0.012
+
+1,4.1,0.015,0.018,0.028
+3,4.1,0.015,0.020,0.028
+1,2.1,0,-0.11,0.012
+2,2.1,0,-0.12,0.012
+3,2.1,0,-0.13,0.012
+"""
+
+
+def test_read_points_has_nan_for_lost_points() -> None:
+    points, rest = read_points(TABLE)
+    assert points["4.1"].shape == points["2.1"].shape == (4, 3)
+    assert np.isnan(points["4.1"][2]).all()
+    assert list(points["2.1"][3]) == [0, -0.13, 0.012]
+    assert list(rest["4.1"]) == [0.015, 0.017, 0.028]
+
+
+def test_bridge_interpolates_linearly() -> None:
+    points, _ = read_points(TABLE)
+    whole = bridge(points)
+    assert whole["4.1"][2] == pytest.approx([0.015, 0.019, 0.028])
+    assert np.array_equal(whole["2.1"], points["2.1"])
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "t: wanted a first line frame,point,x,y,z, got ''"),
+        ("time,x\n1,2", "t: wanted a first line frame,point,x,y,z, got 'time,x'"),
+        (TABLE + "4,2.1,0,up,0\n", "t, line 11: wanted frame,point,x,y,z, got '4,2.1,0,up,0'"),
+        (TABLE + "4,2.1,0,0\n", "t, line 11: wanted frame"),
+        (TABLE + "3,2.1,0,0,0\n", "t, line 11: point 2.1 is there twice in frame 3"),
+        (TABLE + "-1,2.1,0,0,0\n", r"t, line 11: wanted a frame 0\.\."),
+        (TABLE + "4,2.1,0,nan,0\n", "finite places"),
+        (TABLE + "0,99.9,0,0,0\n", "t, line 11: wanted a point of MPEG-4, 2.1 to 11.6, got '99.9'"),
+        (TABLE + "3,4.2,0,0,0\n", "t: wanted every point at rest in frame 0, got none of 4.2"),
+    ],
+)
+def test_read_points_refuses_an_invalid_line(text: str, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        read_points(text, "t")

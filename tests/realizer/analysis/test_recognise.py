@@ -13,8 +13,7 @@ from realizer.emotions.profile import Profile
 from realizer.emotions.words import emotion, known_words
 from realizer.face.deform import deform
 from realizer.face.load import load_face
-from realizer.tables.emotion_model import emotion_model
-from realizer.tables.wheel_words import ring
+from realizer.tables.emotions import emotion_model, ring
 
 DRAWS = 60
 

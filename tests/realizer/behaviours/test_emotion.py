@@ -11,9 +11,8 @@ import pytest
 from realizer.emotions.wheel import affect
 from realizer.emotions.wheel import wheel as place_on
 from realizer.emotions.words import emotion, known_words
-from realizer.tables.emotions import emotion_faces
+from realizer.tables.emotions import emotion_faces, ring, whissell_words
 from realizer.tables.lexemes import face_lexemes
-from realizer.tables.wheel_words import ring, whissell_words
 from tests.rows import each_row
 
 AT = 'start="0" attackPeak="0.5" relax="1.5" end="2"'

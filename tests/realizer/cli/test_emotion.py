@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from realizer.cli import cli
-from realizer.emotions.profile_file import read_profiles
+from realizer.emotions.profile import read_profiles
 from realizer.emotions.wheel import affect, wheel
 from realizer.emotions.words import emotion
 

@@ -6,11 +6,21 @@ import pytest
 
 from realizer.core.errors import TableError
 from realizer.expressions.expression import key
-from realizer.expressions.library import builtin, library_of
+from realizer.expressions.library import ExpressionWords, builtin, expression_words, library_of
 from realizer.tables.emotions import archetypes
-from realizer.tables.expression_words import expression_words
 from realizer.tables.templates import templates
 from tests.rows import each_row
+
+
+def test_expression_words_are_separated_by_semicolons() -> None:
+    assert ExpressionWords("x", "", "glad; in good spirits ;").words == ("glad", "in good spirits")
+
+
+def test_expression_words_exist_for_every_expression() -> None:
+    rows = expression_words()
+    assert len(rows) > 6
+    assert all(row.name == name and row.words for name, row in rows.items())
+
 
 SMIRK = 'means = ["irony"]\naus = { 12L = 0.6, 2R = 0.3 }\nonset = 0.2\napex = 0.5\noffset = 0.4\n'
 

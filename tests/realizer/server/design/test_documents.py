@@ -12,8 +12,7 @@ from realizer.cli import cli
 from realizer.core.errors import TableError
 from realizer.core.settings import Settings
 from realizer.expressions.timeline import Entry, Timeline, Track
-from realizer.expressions.timeline_reader import read_timeline
-from realizer.expressions.timeline_writer import timeline_json, write_timeline
+from realizer.expressions.timeline_file import read_timeline, timeline_json, write_timeline
 from realizer.server.design.documents import enrich_text, export, open_file
 
 SETTINGS = Settings(voice="silent")

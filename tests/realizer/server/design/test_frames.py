@@ -13,7 +13,7 @@ from PIL import Image
 from realizer.core.settings import Settings
 from realizer.expressions.library import builtin
 from realizer.expressions.timeline import Entry, Timeline, Track
-from realizer.expressions.timeline_writer import write_timeline
+from realizer.expressions.timeline_file import write_timeline
 from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.face.surface import face_scale, quantise

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from realizer.analysis.points_file import read_points
+from realizer.analysis.faps_from_points import read_points
 from realizer.animation.fap.fap_reader import read_fap
 from realizer.tracking.markers.colours import named
 from realizer.tracking.markers.film import FORMATS, Look, Markers, faps_of, track_markers

@@ -37,7 +37,7 @@ export class Design extends EventTarget {
     return this.rows.get(keyOf(expression));
   }
 
-  // Seconds of onset and offset, and of the whole, as realizer/expressions/spans.py has them.
+  // Seconds of onset and offset, and of the whole, as realizer/expressions/timeline.py has them.
   times(entry) {
     if (isBreak(entry)) return { onset: 0, offset: 0, length: entry.duration ?? BREAK };
     const row = this.row(entry) ?? { onset: 0.3, apex: 0.6, offset: 0.5 };
