@@ -9,14 +9,6 @@ from bml_schema.nodes import Behaviour, Block, Constraint
 from bml_schema.steps import next_element
 from bml_schema.sync_refs import SyncRef
 
-MAX_LISTED = 10  # lost references in a warning's text; `Problem.lost_references` has all
-
-
-def listed(references: Sequence[str]) -> str:
-    """Return lost references as words of a warning."""
-    rest = len(references) - MAX_LISTED
-    return ", ".join(references[:MAX_LISTED]) + (f" and {rest} more" if rest > 0 else "")
-
 
 class ReducedBlock(NamedTuple):
     """A block without some of its behaviours."""

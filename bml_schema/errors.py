@@ -7,7 +7,7 @@ BMLError               no block: too big, no usable id, not a <bml>
 
 import difflib
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
@@ -119,6 +119,12 @@ def quoted(value: str) -> str:
     if len(value) > _LONGEST_SHOWN:
         value = value[:_LONGEST_SHOWN] + "..."
     return value if re.fullmatch(r"[+-]?[0-9.]+", value) else f'"{value}"'
+
+
+def listed(words: Sequence[str], most: int = 10) -> str:
+    """Return `a, b and 3 more`, with at most so many words."""
+    rest = len(words) - most
+    return ", ".join(words[:most]) + (f" and {rest} more" if rest > 0 else "")
 
 
 _MAX_CHOICES = 500  # difflib is slow; this many take about a millisecond

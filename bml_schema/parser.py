@@ -15,7 +15,7 @@ from lxml import etree
 
 from bml_schema.block_outline import BlockOutline, Entry, flat
 from bml_schema.canonical import attributes
-from bml_schema.dropped_references import ReferenceRemover, listed
+from bml_schema.dropped_references import ReferenceRemover
 from bml_schema.element_reader import ElementReader, Vocabulary
 from bml_schema.errors import (
     BEHAVIOR_TYPE_NOT_SUPPORTED,
@@ -27,6 +27,7 @@ from bml_schema.errors import (
     Fault,
     Place,
     Problem,
+    listed,
     quoted,
 )
 from bml_schema.node_schema import local, schema_of

@@ -21,6 +21,8 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+from bml_schema.errors import listed
+
 FILE = Path(__file__).with_name("rows.csv")
 MISSING = "(none)"
 
@@ -120,8 +122,8 @@ class Report:
         """The text of the warning that lists the translations."""
         ignored = dict.fromkeys(row.name for row in self.rows if _is_ignored(row))
         read = dict.fromkeys(f"{row.name} as {_shown(row)}" for row in self.rows if not _is_ignored(row))
-        parts = [_listed([*read, *self.made])] if read or self.made else []
-        parts += [f"without {_listed(list(ignored))}"] if ignored else []
+        parts = [listed([*read, *self.made], _MAX_LISTED)] if read or self.made else []
+        parts += [f"without {listed(list(ignored), _MAX_LISTED)}"] if ignored else []
         return f"read as {self.dialect}: {', '.join(parts)}"
 
 
@@ -133,8 +135,3 @@ def _shown(row: Row) -> str:
     tag, _, becomes = row.becomes.rpartition(": ")
     shown = becomes.replace("{value}", "...").replace("{id}:", "").replace(";", " ").replace("|", " or ")
     return f"{tag} {row.says or row.attribute if becomes[:1] in ('@', '') else shown}".strip()
-
-
-def _listed(words: list[str]) -> str:
-    rest = len(words) - _MAX_LISTED
-    return ", ".join(words[:_MAX_LISTED]) + (f" and {rest} more" if rest > 0 else "")

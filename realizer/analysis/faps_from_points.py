@@ -89,7 +89,7 @@ def faps_from_points(points: Points, neutral: Points, fapu: Fapu) -> tuple[Float
     turns = _turns(places, rest)
     if turns is not None:
         rotation, moved = turns
-        values[:, HEAD] = _angles(rotation) / ANGLE_UNIT
+        values[:, HEAD] = head_angles(rotation) / ANGLE_UNIT
         seen[HEAD] = True
         # The rest is relative to the skull.
         places = {name: np.einsum("nji,nj->ni", rotation, at - moved) for name, at in places.items()}
@@ -184,8 +184,8 @@ def _turns(places: Mapping[str, Float64], rest: Mapping[str, Float64]) -> tuple[
     return rotation, centre - np.einsum("nij,j->ni", rotation, middle)
 
 
-def _angles(rotation: Float64) -> Float64:
-    """Return (n, 3) radians of pitch (down), yaw (left) and roll (right), applied as roll, pitch, yaw."""
+def head_angles(rotation: Float64) -> Float64:
+    """Return (n, 3) radians of FAPs 48 to 50: pitch down, yaw left, roll right, applied from last to first."""
     pitch = np.arcsin(np.clip(-rotation[:, 1, 2], -1, 1))
     yaw = np.arctan2(rotation[:, 0, 2], rotation[:, 2, 2])
     roll = np.arctan2(rotation[:, 1, 0], rotation[:, 1, 1])

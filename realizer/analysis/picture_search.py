@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from realizer.animation.axis import au, axis
+from realizer.animation.axis import au_row
 from realizer.animation.frames import AUFrames
 from realizer.animation.pose import poses
 from realizer.core.array_types import Bool, Float32, UInt8
@@ -87,12 +87,9 @@ def by_picture(
     light = max(presets(), key=lambda light: _correlation(brightness, *_neutral(name, light, size)))
     if _correlation(brightness, *_neutral(name, light, size)) < MIN_CORRELATION:
         raise UnknownPictureError(f"{_WANTED} ({', '.join(names)}), got one that is like none of them")
-    rows = np.zeros((len(expressions) * len(STEPS) + 1, len(axis())), np.float32)
     candidates = [(expression, step) for expression in expressions for step in STEPS]
-    for row, (expression, step) in zip(rows[1:], candidates, strict=True):
-        for (number, side), value in expression.aus.items():
-            row[[target.column for target in au(number, side)]] = value * step
-    (rest, face), *drawn = _draw(name, light, size, rows)
+    rows = [au_row({}), *(step * au_row(expression.aus) for expression, step in candidates)]
+    (rest, face), *drawn = _draw(name, light, size, np.stack(rows))
     difference = (brightness - rest)[face]
     scores: dict[str, float] = {}
     for (expression, _), (look, _) in zip(candidates, drawn, strict=True):
@@ -113,7 +110,7 @@ _WANTED = "wanted a picture of one of our faces from the front, as `realizer rea
 
 @lru_cache(maxsize=32)
 def _neutral(name: str, light: str, size: tuple[int, int]) -> tuple[Float32, Bool]:
-    return _draw(name, light, size, np.zeros((1, len(axis())), np.float32))[0]
+    return _draw(name, light, size, au_row({})[None])[0]
 
 
 def _draw(name: str, light: str, size: tuple[int, int], rows: Float32) -> list[tuple[Float32, Bool]]:

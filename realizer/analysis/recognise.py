@@ -12,7 +12,7 @@ import numpy as np
 from realizer import tables
 from realizer.core.array_types import Bool, Float64
 from realizer.emotions.archetypes import archetypes
-from realizer.emotions.profile import Profile
+from realizer.emotions.profile import Profile, split_number
 from realizer.emotions.wheel import wheel
 from realizer.tables.emotions import emotion_model, ring
 
@@ -147,5 +147,4 @@ def recogniser(profiles: str = "own") -> Recogniser:
 
 def emotion_of(name: str) -> str:
     """Return the emotion of a profile: its name without the number."""
-    emotion, _, number = name.rpartition(" ")
-    return (emotion if emotion and number.isdecimal() else name).lower()
+    return split_number(name)[0].lower()

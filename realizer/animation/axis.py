@@ -1,9 +1,13 @@
 """The columns of animation frames: AUs by side, 68 FAPs, mask channels, mixing order of the AUs."""
 
+from collections.abc import Mapping
 from functools import cache, lru_cache
 from typing import NamedTuple
 
+import numpy as np
+
 from realizer import tables
+from realizer.core.array_types import Float32
 
 # Each has a mask channel (0..1), by which one source suppresses another: speech suppresses other movements of
 # the lips, a temporary gaze the base gaze of eyes and head, a document a kind of idle motion (blinks, small
@@ -54,6 +58,14 @@ def au(number: int, side: str = "BOTH") -> tuple[Target, ...]:
         return (columns[str(number)],)
     sides = {"LEFT": "L", "RIGHT": "R", "BOTH": "LR"}[side]
     return tuple(columns[f"{number}{s}"] for s in sides)
+
+
+def au_row(units: Mapping[tuple[int, str], float]) -> Float32:
+    """Return a row (n_targets,) of AUs, (AU, side LEFT | RIGHT | BOTH) -> intensity; the rest is 0."""
+    row = np.zeros(len(axis()), np.float32)
+    for (number, side), intensity in units.items():
+        row[[target.column for target in au(number, side)]] = intensity
+    return row
 
 
 def fap(number: int) -> Target:

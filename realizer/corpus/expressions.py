@@ -9,12 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from realizer.animation.axis import au, axis
-from realizer.animation.fap.conversion import to_fap
-from realizer.animation.frames import AUFrames
+from realizer.animation.axis import au_row
 from realizer.core.array_types import Float64
 from realizer.core.atomic_files import write_text
-from realizer.corpus.learn import features
+from realizer.corpus.learn import faps_of, features
 from realizer.corpus.recording import Recording, Segment
 from realizer.corpus.statistics import FEWEST, Study
 from realizer.tables import action_units, au_to_fap
@@ -117,13 +115,8 @@ def _units() -> tuple[tuple[str, ...], Float64]:
         if row.au in moving
         for side in (sides if row.sides else ("",))
     ]
-    rows = np.zeros((len(keys), len(axis())), np.float32)
-    for row, (number, side) in zip(rows, keys, strict=True):
-        row[[target.column for target in au(number, sides[side])]] = 1.0
-    shown = to_fap(AUFrames(np.arange(len(rows), dtype=np.float64), rows)).values
-    return tuple(f"{number}{side}" for number, side in keys), features(
-        Recording("", faps=shown.astype(float))
-    )
+    shown = faps_of(np.stack([au_row({(number, sides[side]): 1.0}) for number, side in keys]))
+    return tuple(f"{number}{side}" for number, side in keys), features(Recording("", faps=shown))
 
 
 def _ramps(strength: Float64, one: Segment, recording: Recording) -> tuple[float, float]:

@@ -14,11 +14,10 @@ import numpy as np
 from realizer.analysis.faps_from_points import COLUMNS as POINT_COLUMNS
 from realizer.analysis.faps_from_points import bridge, faps_from_points, read_points
 from realizer.animation.axis import au, axis
-from realizer.animation.fap.conversion import to_fap
 from realizer.animation.fap.fap_reader import read_fap
-from realizer.animation.frames import AUFrames
 from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError, RealizerError
+from realizer.corpus.learn import faps_of
 from realizer.corpus.recording import (
     COLUMNS,
     LABELS,
@@ -199,7 +198,7 @@ def _faps_of(units: Mapping[tuple[int, str], Float64]) -> Float64:
     for (number, side), intensities in units.items():
         for target in au(number, side):
             values[:, target.column] = np.maximum(values[:, target.column], np.clip(intensities, 0, 1))
-    return to_fap(AUFrames(np.arange(count, dtype=np.float64), values)).values.astype(np.float64)
+    return faps_of(values)
 
 
 def _spans(tiers: Mapping[str, Spans]) -> Recording:

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from realizer.animation.arkit import MILLIMETRES
-from realizer.animation.axis import au, axis
+from realizer.animation.axis import au_row
 from realizer.animation.fap.conversion import to_fap
 from realizer.animation.frames import AUFrames
-from realizer.core.array_types import Bool, Float64, UInt8
+from realizer.core.array_types import Bool, Float32, Float64, UInt8
 from realizer.core.atomic_files import replacing, write_text
 from realizer.core.toml_text import parse_toml
 from realizer.corpus.recording import CorpusError, Recording
@@ -48,6 +48,11 @@ class FaceMap:
         """Return frames (n, d) as (n, k) by their components."""
         placed: Float64 = (frames - self.mean) @ self.components.T
         return placed
+
+
+def faps_of(rows: Float32) -> Float64:
+    """Return the FAPs (n, 68) of rows (n, n_targets) of the animation axis."""
+    return to_fap(AUFrames(np.arange(len(rows), dtype=np.float64), rows)).values.astype(np.float64)
 
 
 def features(recording: Recording) -> Float64:
@@ -216,11 +221,7 @@ def _by_templates(own: Sequence[Bool], whole: Float64) -> tuple[str, ...]:
 @cache
 def template_faps() -> Mapping[str, Float64]:
     """Return the FAPs (68,) of each template, by its name in lower case."""
-    values = np.zeros((len(templates()), len(axis())), np.float32)
-    for row, template in zip(values, templates().values(), strict=True):
-        for (number, side), intensity in template.aus.items():
-            row[[target.column for target in au(number, side)]] = intensity
-    shown = to_fap(AUFrames(np.arange(len(values), dtype=np.float64), values)).values.astype(np.float64)
+    shown = faps_of(np.stack([au_row(template.aus) for template in templates().values()]))
     return {name.lower(): row for name, row in zip(templates(), shown, strict=True)}
 
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 
-from realizer.emotions.profile import Profile, read_profiles
+from realizer.emotions.profile import Profile, read_profiles, split_number
 from realizer.tables.emotions import emotion_model, own_ranges, published_ranges
 
 SETS = ("own", "published", "raw")
@@ -42,10 +42,10 @@ def split_set(profiles: str) -> tuple[str, dict[str, int]]:
     name, *parts = profiles.split(",")
     chosen: dict[str, int] = {}
     while parts:
-        emotion, _, number = parts[-1].strip().rpartition(" ")
-        if not (emotion and number.isdecimal() and len(number) < 10):
+        emotion, number = split_number(parts[-1].strip())
+        if number is None:
             break
-        chosen.setdefault(emotion.strip().lower(), int(number))
+        chosen.setdefault(emotion.strip().lower(), number)
         parts.pop()
     return ",".join([name, *parts]).strip(), chosen
 

@@ -113,6 +113,12 @@ class Profile:
         return Profile(name or self.name, self.source, ranges)
 
 
+def split_number(name: str) -> tuple[str, int | None]:
+    """Split the name of a profile, "fear 8", into "fear" and 8; the number of other names is None."""
+    emotion, _, number = name.rpartition(" ")
+    return (emotion, int(number)) if emotion and number.isdecimal() and len(number) < 10 else (name, None)
+
+
 def _group(fap: int) -> int:
     """Return the number of a group of FAPs: mirror images, and inner and outer points of a lip."""
     inner = fap - OUTER if 4 <= fap - OUTER <= 13 else fap
@@ -168,7 +174,6 @@ def write_profiles(profiles: Iterable[Profile]) -> str:
     """Return the text of a profile file; a profile without a number gets 0."""
     lines = []
     for profile in profiles:
-        numbered = profile.name.rpartition(" ")[2].isdecimal() and " " in profile.name
-        label = profile.name if numbered else f"{profile.name} 0"
+        label = profile.name if split_number(profile.name)[1] is not None else f"{profile.name} 0"
         lines += [label[:1].upper() + label[1:], str(profile)]
     return "\n".join(lines) + "\n"

@@ -6,7 +6,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from realizer.emotions.archetypes import archetypes
-from realizer.emotions.profile import Profile
+from realizer.emotions.profile import Profile, split_number
 from realizer.tables.emotions import emotion_model
 from realizer.tables.emotions import ring as places
 
@@ -119,7 +119,7 @@ def strength_at(activation: float | None) -> float:
 def blend_weights(angle: float, profiles: str = "own", ring: str = "paul") -> dict[str, float]:
     """Return archetype -> weight of the one or two archetypes at an angle; weights add up to 1."""
     pairs = neighbours(angle, profiles, ring)
-    return {_plain(anchor.profile.name): share for anchor, share in pairs if share}
+    return {split_number(anchor.profile.name)[0]: share for anchor, share in pairs if share}
 
 
 def affect(valence: float, arousal: float, profiles: str = "own") -> Profile:
@@ -160,11 +160,6 @@ def neighbours(angle: float, profiles: str, ring: str) -> tuple[tuple[Anchor, fl
     low, high = anchors[after - 1], anchors[after]
     share = ((angle - low.angle) % 360.0) / ((high.angle - low.angle) % 360.0)
     return (low, 1.0 - share), (high, share)
-
-
-def _plain(name: str) -> str:
-    """Return the name of a profile without its number."""
-    return name.rpartition(" ")[0] or name
 
 
 @lru_cache(maxsize=64)

@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from realizer.emotions.archetypes import archetypes, is_profile_file, split_set
-from realizer.emotions.profile import Profile
+from realizer.emotions.profile import Profile, split_number
 from realizer.emotions.wheel import NEUTRAL, between, blend_weights, neighbours, wheel
 from realizer.tables.emotions import own_words, ring, whissell_words
 
@@ -48,7 +48,7 @@ def emotion(word: str, profiles: str = "own") -> Profile:
     """
     word = " ".join(word.split()).lower()
     known = archetypes(profiles)
-    name, number = _split_number(word)
+    name, number = split_number(word)
     if number is not None:
         if number in known.get(name, {}):
             return known[name][number]
@@ -95,7 +95,7 @@ def place_of(word: str, profiles: str = "own") -> WordPlace | None:
         UnknownWordError, ValueError: as for `emotion`.
     """
     word = " ".join(word.split()).lower()
-    name, number = _split_number(word)
+    name, number = split_number(word)
     if number is not None:
         if number not in archetypes(profiles).get(name, {}):
             raise UnknownWordError(_unknown_profile(name, number, profiles))
@@ -123,12 +123,6 @@ def known_words() -> Mapping[str, str]:
     found |= {row.word: "whissell" for row in whissell_words().values() if row.activation is not None}
     found |= dict.fromkeys(own_words(), "own")
     return MappingProxyType(found)
-
-
-def _split_number(word: str) -> tuple[str, int | None]:
-    """Split "fear 8" into "fear" and 8; the number of other words is None."""
-    name, _, number = word.rpartition(" ")
-    return (name, int(number)) if name and number.isdecimal() and len(number) < 10 else (word, None)
 
 
 def _unknown_profile(name: str, number: int, profiles: str) -> str:

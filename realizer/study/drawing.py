@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from realizer.animation.axis import au, axis, fap
+from realizer.animation.axis import au_row, fap
 from realizer.animation.frames import AUFrames
 from realizer.animation.pose import poses
 from realizer.core.array_types import Float32, UInt8
@@ -75,9 +75,7 @@ class Drawer:
 
 def row(units: Units | None = None, faps: Mapping[int, float] | None = None) -> Float32:
     """Return the row of the animation axis, (n_targets,) float32, of action units and FAPs."""
-    values = np.zeros(len(axis()), np.float32)
-    for (number, side), amount in (units or {}).items():
-        values[[target.column for target in au(number, side)]] = amount
+    values = au_row(units or {})
     for number, amount in (faps or {}).items():
         values[fap(number).column] = amount
     return values

@@ -13,12 +13,19 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from realizer.analysis.faps_from_points import head_angles
 from realizer.animation.axis import AU_NAMES
 from realizer.core.array_types import Float32, Float64
 from realizer.core.units import ANGLE_UNIT
 from realizer.tracking.landmarks import Landmarks
 
 UP = np.array([1.0, -1.0, -1.0])  # pixels go down, and depths away from the camera; heads look along +z
+WEIGHTS = Path(__file__).with_name("weights.npz")
+UNITS = (1, 2, 4, 5, 6, 7, 9, 10, 12, 14, 15, 16, 17, 18, 20, 22, 23, 24, 25, 26, 27, 28, 43)
+SEEN_UNITS = tuple(name for name in AU_NAMES() if int(name.rstrip("LR")) in UNITS)
+# Not the compound ones, and those of pupils, nostrils, tongue, head (which is measured apart) and ears.
+SEEN_FAPS = tuple(k for k in range(3, 65) if k not in (27, 28, 29, 30, *range(43, 51)))
+PARTS = ("shape", "traits", "eyes")  # of the components
 
 
 def upright(points: Any, head: Any) -> tuple[Float64, Float64]:
@@ -37,22 +44,6 @@ def upright(points: Any, head: Any) -> tuple[Float64, Float64]:
     rotations = np.einsum("nij,njk->nki", u, vt)
     size = np.linalg.norm(faces, axis=(1, 2)) / np.linalg.norm(head - middle)
     return rotations, np.einsum("nji,npj->npi", rotations, faces) / size[:, None, None] + middle
-
-
-def head_angles(rotations: Any) -> Float64:
-    """Return (n, 3) radians of FAPs 48 to 50: pitch down, yaw to the face's left, roll to its right."""
-    rotations = np.asarray(rotations, np.float64)
-    pitch = np.arcsin(np.clip(-rotations[:, 1, 2], -1, 1))
-    yaw = np.arctan2(rotations[:, 0, 2], rotations[:, 2, 2])
-    return np.stack([pitch, yaw, np.arctan2(rotations[:, 1, 0], rotations[:, 1, 1])], axis=1)
-
-
-WEIGHTS = Path(__file__).with_name("weights.npz")
-UNITS = (1, 2, 4, 5, 6, 7, 9, 10, 12, 14, 15, 16, 17, 18, 20, 22, 23, 24, 25, 26, 27, 28, 43)
-SEEN_UNITS = tuple(name for name in AU_NAMES() if int(name.rstrip("LR")) in UNITS)
-# Not the compound ones, and those of pupils, nostrils, tongue, head (which is measured apart) and ears.
-SEEN_FAPS = tuple(k for k in range(3, 65) if k not in (27, 28, 29, 30, *range(43, 51)))
-PARTS = ("shape", "traits", "eyes")  # of the components
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from realizer.analysis.faps_from_points import head_angles
 from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
 from realizer.tracking.detector import detect
@@ -15,7 +16,7 @@ from realizer.tracking.landmarks import IRIS_MIDDLE, LEFT_EYE, RIGHT_EYE, Landma
 from realizer.tracking.network import TrackingError
 from realizer.tracking.pictures import read_picture
 from realizer.tracking.region import Region
-from realizer.tracking.regressor import head_angles, stored, upright
+from realizer.tracking.regressor import stored, upright
 
 if TYPE_CHECKING:
     from PIL.Image import Image

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from realizer.analysis.faps_from_points import head_angles
 from realizer.face.deform import rotations
 from realizer.tracking.detector import detect
 from realizer.tracking.landmarks import Landmarks, landmarks
@@ -13,7 +14,6 @@ from realizer.tracking.regressor import (
     UP,
     Measured,
     components,
-    head_angles,
     measure,
     stored,
     upright,
