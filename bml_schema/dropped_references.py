@@ -23,9 +23,7 @@ class ReducedBlock(NamedTuple):
 def without(block: Block, gone: Collection[str]) -> ReducedBlock:
     """Return a block without some behaviours, the references to their sync points, and their constraints.
 
-    Args:
-        block: is not changed.
-        gone: ids of behaviours. For an id that the block does not have, references to it are removed.
+    References to ids that the block does not have are removed, too.
     """
     gone = frozenset(gone)
     remover = ReferenceRemover(gone)

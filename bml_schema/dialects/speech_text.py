@@ -16,9 +16,8 @@ _MARKS = {"sync": "id", "tm": "id", "mark": "name"}
 def translate_speech(speech: Any, apply: Callable[[Row], None], *, words: bool) -> None:
     """Move the content of a <speech> into a <text>, and translate <tm> and <mark> to <sync>.
 
-    Args:
-        apply: called with each used row of the table.
-        words: whether plain text without marks is moved; it is a fault of a document in no dialect.
+    `apply` is called with each used row of the table. Plain text without marks is moved only with `words`; it
+    is a fault of a document in no dialect.
     """
     elements = table().elements
     text = next((child for child in speech if local(str(child.tag)) == "text"), None)

@@ -21,15 +21,11 @@ _JOINTS = frozenset({"eyes", "head", "neck", "chest", "back"})  # SmartBody's ch
 
 
 def translate(root: etree._Element, wrapper: str, block_ids: Iterator[str]) -> Report:
-    """Translate a document to BML 1.0 in place.
+    """Translate a document to BML 1.0 in place, and return what was translated; BML 1.0 does not change.
 
     Args:
-        root: the <bml> element; elements and attributes of BML 1.0 do not change.
-        wrapper: local name of the element around it, or "".
+        wrapper: local name of the element around <bml>, or "".
         block_ids: ids for blocks of a dialect without an id.
-
-    Returns:
-        What was translated.
     """
     space = str(root.tag).rpartition("}")[0][1:]
     if space not in ("", CORE, *DRAFTS):
@@ -262,13 +258,7 @@ _PARTS = ("{*}lexeme", "{*}faceLexeme", "{*}facs", "{*}faceFacs")
 
 
 def translate_reference(element: Any, name: str, apply: Callable[[Row], None]) -> None:
-    """Give a head or face without a lexeme the one that its description refers to.
-
-    Args:
-        element: the behaviour.
-        name: its local name.
-        apply: called with the row of the table that was used.
-    """
+    """Give a head or face without a lexeme the one that its description refers to; `apply` gets the row."""
     if name not in ("head", "face") or not _WORDS.isdisjoint(element.keys()):
         return
     row = next(row for row in table().attributes["description"]["type"] if row.dialect == "Greta")

@@ -185,7 +185,7 @@ def _turns(places: Mapping[str, Float64], rest: Mapping[str, Float64]) -> tuple[
 
 
 def head_angles(rotation: Float64) -> Float64:
-    """Return (n, 3) radians of FAPs 48 to 50: pitch down, yaw left, roll right, applied from last to first."""
+    """Return (n, 3) radians of FAPs 48 to 50: pitch down, yaw left, roll right, applied last to first."""
     pitch = np.arcsin(np.clip(-rotation[:, 1, 2], -1, 1))
     yaw = np.arctan2(rotation[:, 0, 2], rotation[:, 2, 2])
     roll = np.arctan2(rotation[:, 1, 0], rotation[:, 1, 1])

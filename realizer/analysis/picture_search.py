@@ -44,11 +44,7 @@ class Likeness:
 
 
 def read_picture(path: Path) -> UInt8:
-    """Read a picture file as (h, w, 3), with transparent parts in black.
-
-    Raises:
-        UnknownPictureError: the file is not a picture.
-    """
+    """Read a picture as (h, w, 3), transparent parts in black; raises UnknownPictureError."""
     from PIL import Image, UnidentifiedImageError
 
     try:

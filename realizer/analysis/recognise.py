@@ -39,11 +39,7 @@ class Recogniser:
     """
 
     def __init__(self, profiles: Iterable[Profile], strengths: Sequence[float] = (1.0,)) -> None:
-        """
-        Args:
-            profiles: at least one; the emotion is the name without the number.
-            strengths: factors of the profiles to try; the best one counts.
-        """
+        """Take profiles, at least one; of the strengths, which are factors to try, the best one counts."""
         self.profiles = tuple(profiles)
         if not self.profiles:
             raise ValueError("profiles: wanted at least one, got none")

@@ -13,9 +13,7 @@ def alpha(codes: Float64, numbers: bool = False) -> float | None:
     """Return Krippendorff's alpha of codes (annotators, units); NaN: not annotated.
 
     1 is full agreement, 0 that of chance. None: fewer than two codes can be compared, or all are the same.
-
-    Args:
-        numbers: codes are numbers, which differ by the square of their distance; otherwise they are names.
+    Codes are names, or `numbers`, which differ by the square of their distance.
     """
     values = np.unique(codes[np.isfinite(codes)])
     counts = np.stack([(codes == value).sum(axis=0) for value in values]) if len(values) else np.zeros((0, 0))

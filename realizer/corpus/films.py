@@ -23,10 +23,8 @@ def is_film(path: Path) -> bool:
 def films(folder: Path) -> dict[Path, Path]:
     """Return film -> folder of its recording: films in folders of recordings, and films beside them.
 
-    A film beside the folders belongs to the recording of its name, which may not exist yet.
-
-    Raises:
-        CorpusError: two films of one recording.
+    A film beside the folders belongs to the recording of its name, which may not exist yet. Raises
+    CorpusError if two films have one recording.
     """
     found: dict[Path, Path] = {}
     for path in sorted(folder.iterdir()):

@@ -56,11 +56,7 @@ def faps_of(rows: Float32) -> Float64:
 
 
 def features(recording: Recording) -> Float64:
-    """Return the frames (n, d) in millimetres: FAPs of the face, or else points without the head's pose.
-
-    Raises:
-        CorpusError: neither.
-    """
+    """Return frames (n, d) in mm: FAPs of the face, or points without the head's pose; or CorpusError."""
     if recording.faps is not None:
         scale = np.array([MILLIMETRES[row.unit] for row in faps()])
         scale[47:50] = 0.0  # the pose of the head

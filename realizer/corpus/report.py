@@ -22,11 +22,7 @@ STYLE = (
 
 
 def describe(folder: Path, study: Study, corpus: Path) -> list[str]:
-    """Write all tables, rules and the report into a folder, and return the names of the files.
-
-    Args:
-        corpus: folder of the corpus, whose picture of the map is in the report.
-    """
+    """Write tables, rules and the report, with the map of the corpus, to a folder; return names of files."""
     folder.mkdir(parents=True, exist_ok=True)
     tables = [make(study) for make in TABLES]
     tables += [agreement(study.recordings)] if any(len(r.annotators) > 1 for r in study.recordings) else []

@@ -40,11 +40,7 @@ def emotion_and_shares(
     affects: tuple[float | None, float | None],
     profiles: str,
 ) -> tuple[Profile, Mapping[str, float]]:
-    """Return the profile of `emotion`, and archetype -> share at a place; arguments and errors as there.
-
-    Args:
-        affects: valence and arousal.
-    """
+    """Return the profile of `emotion`, and archetype -> share at a place; `affects`: valence, arousal."""
     valence, arousal = affects
     numbers = {"angle": angle, "activation": activation, "valence": valence, "arousal": arousal}
     for name, value in numbers.items():

@@ -73,7 +73,7 @@ def wheel(
     """Return the profile at a place on the wheel: a blend of the two nearest archetypes.
 
     The ranges of each archetype are multiplied by its weight and by the ratio of the activations, and added.
-    Unlike the published rules (`intermediate.between`), this is continuous: they take half of a FAP that only
+    Unlike the published rules (`between`), this is continuous: they take half of a FAP that only
     one archetype moves, and intersect contradicting ranges.
 
     Args:
@@ -103,10 +103,9 @@ def wheel(
 
 
 def strength_at(activation: float | None) -> float:
-    """Return the strength of our own archetypes at an activation: 0 in the middle, 1 at the rim (or None).
+    """Return the strength of our own archetypes at an activation: 0 in the middle, 1 at the rim, or for None.
 
-    Raises:
-        ValueError: an activation outside the wheel.
+    Raises ValueError for an activation outside the wheel.
     """
     most = emotion_model().most
     if activation is None:
@@ -139,11 +138,7 @@ def affect(valence: float, arousal: float, profiles: str = "own") -> Profile:
 
 
 def place_of_affect(valence: float, arousal: float) -> tuple[float, float]:
-    """Return the angle on the ring "affect", in degrees, and the distance from the middle, 0..1.
-
-    Raises:
-        ValueError: numbers outside -1..1.
-    """
+    """Return angle on the ring "affect" in degrees and distance from the middle 0..1; raises ValueError."""
     for name, value in (("valence", valence), ("arousal", arousal)):
         if not -1 <= value <= 1:
             raise ValueError(f"{name}: wanted -1..1, got {value:g}")

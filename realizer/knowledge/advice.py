@@ -100,11 +100,8 @@ def duration_advice(
     """Yield advice on an expression that is visible for a time that was never or rarely observed.
 
     Args:
-        id: behaviour or entry that shows it.
-        name: name of the expression.
-        lasts: seconds.
-        possible, probable: least and most seconds; None if unknown.
-        source: source of these times.
+        id: behaviour or entry that shows it, for `lasts` seconds.
+        possible, probable: least and most seconds, and the source of these times; None if unknown.
     """
     if possible is not None and not possible[0] - 1e-3 <= lasts <= possible[1] + 1e-3:
         how = "short" if lasts < possible[0] else "long"

@@ -59,10 +59,9 @@ class Enricher:
         return self.block(Block(id=block, children=(speech,)))
 
     def texts(self, text: str, longest: int) -> Iterator[Block]:
-        """Yield the blocks for a long text, split between sentences, each appended to the one before.
+        """Yield blocks for a long text, split between sentences, each appended to the one before.
 
-        Args:
-            longest: largest number of characters for a voice, marks included.
+        `longest` is the largest number of characters for a voice, marks included.
         """
         for number, block in enumerate(self._short(text, longest, longest // 2), 1):
             yield replace(block, id=f"bml{number}", composition="APPEND" if number > 1 else "MERGE")

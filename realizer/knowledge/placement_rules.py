@@ -30,10 +30,8 @@ def place_expressions(
     """Return the placements of expressions, in the order of the text.
 
     Only the most important rule applies at a place. Expressions of a listener or in a mood have a least
-    distance; less important ones are dropped unless their rule has `keep`.
-
-    Args:
-        words: the emotional words; None: only punctuation counts.
+    distance; less important ones are dropped unless their rule has `keep`. Without emotional words, only
+    punctuation counts.
     """
     rules = knowledge.placings[role]
     placements = [

@@ -40,11 +40,7 @@ class Sentence:
 
 
 def sentences(text: str, language: str = "en") -> tuple[Sentence, ...]:
-    """Return the sentences of a text that have words.
-
-    Args:
-        language: BCP-47 tag; it defines the vowels.
-    """
+    """Return the sentences of a text that have words; the language, a BCP-47 tag, defines the vowels."""
     unit = float(syllable_facts()["unit"])  # s of a vowel unit
     if language.replace("_", "-").partition("-")[0].lower() == "el":
         text = text.replace(";", "\u037e")  # the Greek question mark; keyboards write a semicolon

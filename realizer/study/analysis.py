@@ -265,11 +265,7 @@ TABLES = (matching, implemented, scores, confusion, wheel, films, comparisons, a
 
 
 def tables(answers: Sequence[Answer], keep: bool = False) -> list[Table]:
-    """Return all tables that have answers.
-
-    Args:
-        keep: whether those who failed attention items count too.
-    """
+    """Return all tables that have answers; `keep`: those who failed attention items count too."""
     failed = () if keep else inattentive(answers)
     counted = [one for one in answers if (one.who, one.judge) not in failed]
     asked = {one.kind for one in counted}

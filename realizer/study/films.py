@@ -49,10 +49,7 @@ def films(
 ) -> Iterator[Item]:
     """Yield pairs of films of each text: enriched, plain and random ones, and with and without co-occurrence.
 
-    Two films that show the same are no pair.
-
-    Raises:
-        RealizerError: PyAV is not installed.
+    Two films that show the same are no pair. Raises RealizerError without PyAV.
     """
     for variant in variants:
         play = partial(

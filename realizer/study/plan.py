@@ -36,8 +36,7 @@ class Plan:
     def items(self, step: Callable[[int], object] = lambda count: None) -> list[Item]:
         """Return all questions, with attention items; errors as `references`, `matching` and `films`.
 
-        Args:
-            step: called with 1 after each picture or film.
+        `step` is called with 1 after each picture or film.
         """
         draws = np.random.default_rng(self.seed)
         found: list[Item] = []

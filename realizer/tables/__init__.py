@@ -25,9 +25,8 @@ def read_csv(text: str, row_class: type[Row], name: str) -> tuple[Row, ...]:
     """Return the rows of a CSV table in file order.
 
     Args:
-        text: content of the file.
         row_class: a dataclass with a field for each column; cells are converted to the types of the fields.
-        name: name of the file in messages.
+        name: of the file, in messages.
 
     Raises:
         TableError: a missing head line or column, or an invalid cell; with file, line and column.
@@ -59,15 +58,7 @@ def read_csv(text: str, row_class: type[Row], name: str) -> tuple[Row, ...]:
 
 
 def read_toml(text: str, name: str) -> dict[str, Any]:
-    """Parse a TOML table.
-
-    Args:
-        text: content of the file.
-        name: name of the file in messages.
-
-    Raises:
-        TableError: a missing head line, or text that is not TOML.
-    """
+    """Parse a TOML table; raises TableError, with the file's name, without head or if it is no TOML."""
     _check_head(text, name)
     try:
         return parse_toml(text)
@@ -76,11 +67,7 @@ def read_toml(text: str, name: str) -> dict[str, Any]:
 
 
 def user_table(path: Path, parse: Callable[[dict[str, Any]], T]) -> T:
-    """Return what a user's TOML file means.
-
-    Raises:
-        TableError: a file that cannot be read, or that `parse` cannot use.
-    """
+    """Return what a user's TOML file means; raises TableError if it cannot be read or used by `parse`."""
     try:
         return parse(read_toml(path.read_text("utf-8"), str(path)))
     except (OSError, UnicodeError, TypeError, ValueError, KeyError, AttributeError) as error:

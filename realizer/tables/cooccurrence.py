@@ -53,11 +53,7 @@ def load_rules(setting: str) -> Rules | None:
 
 @cache
 def rules(path: Path | None = None) -> Rules:
-    """Return the rules of a file, or the built-in ones.
-
-    Raises:
-        TableError: an unreadable file, or as `read_rules`.
-    """
+    """Return the rules of a file, or the built-in ones; raises TableError as `read_rules`."""
     if path is None:
         return read_rules(tables.text_of(FILE), FILE)
     try:
@@ -67,12 +63,7 @@ def rules(path: Path | None = None) -> Rules:
 
 
 def read_rules(text: str, name: str) -> Rules:
-    """Read a file of rules; `name` is what messages call it.
-
-    Raises:
-        TableError: invalid TOML, sections, rules or AUs, or rules that contradict each other; one line for
-            each fault.
-    """
+    """Read a file of rules that messages call `name`; raises TableError, with one line for each fault."""
     table = tables.read_toml(text, name)
     unknown = [key for key in table if key != "sets" and key not in SIGNS]
     faults = [f"{name}: wanted sections sets, {', '.join(SIGNS)}; got [{key}]" for key in unknown]
@@ -99,11 +90,7 @@ def read_rules(text: str, name: str) -> Rules:
 
 
 def parse_rule(text: str, kind: Kind, sets: Mapping[str, Any]) -> Rule:
-    """Parse one rule in the notation of the table: "5<63", "18<20+23", "12<15Z", "27@25".
-
-    Raises:
-        TableError: an invalid rule.
-    """
+    """Parse a rule in the notation of the table: "5<63", "18<20+23", "12<15Z", "27@25"; raises TableError."""
     sign = SIGNS[kind]
     left, found, right = str(text).replace(" ", "").partition(sign)
     if not found:

@@ -76,11 +76,7 @@ def words_of(path: Path) -> WordList:
 
 
 def read_words(text: str, name: str) -> WordList:
-    """Parse a list with the columns word, category and origin.
-
-    Raises:
-        TableError: an invalid row, with file and word.
-    """
+    """Parse a list with the columns word, category and origin; raises TableError, with file and word."""
     phrases: dict[str, list[tuple[tuple[str, ...], str]]] = {}
     beginnings: dict[str, str] = {}
     seen: set[str] = set()

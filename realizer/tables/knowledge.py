@@ -64,11 +64,7 @@ class Knowledge:
     moods: Mapping[str, Mood]
 
     def mood(self, word: str) -> Mood:
-        """Return the mood for a word in any case.
-
-        Raises:
-            KeyError: an unknown word; the text lists similar ones.
-        """
+        """Return the mood for a word in any case; raises KeyError, whose text lists similar words."""
         name = word.strip().lower()
         if name not in self.moods:
             near = get_close_matches(name, self.moods, 3, 0.6) or sorted(self.moods)

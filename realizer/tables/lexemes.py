@@ -70,12 +70,7 @@ def _rows(part: str) -> dict[str, Mapping[str, Any]]:
 def read_aus(cells: Mapping[str, float], place: str, most: float = 1.0) -> dict[tuple[int, str], float]:
     """Parse action units such as { 1 = 0.5, 12L = 1.0 } to (AU, side LEFT | RIGHT | BOTH) -> intensity.
 
-    Args:
-        place: name of the row in messages.
-        most: greatest intensity.
-
-    Raises:
-        TableError: an unknown action unit or side, or an intensity outside 0..most.
+    Raises TableError, with the place, for an unknown unit or side, or an intensity outside 0..most.
     """
     known = tables.by_number()
     aus = {}

@@ -34,13 +34,9 @@ NUMBERS = ("AU-start", "AU-end", "FAP-start", "FAP-end")
 
 
 def read_mapping(path: Path) -> Units:
-    """Read a mapping file: (AU, side) -> rows of each action unit that it names.
+    """Read a mapping: (AU, side) -> rows of each action unit that it names; raises TableError.
 
-    Args:
-        path: a .csv file like `au_to_fap.csv`, or any other file with Paul's text.
-
-    Raises:
-        TableError: an unreadable file or an invalid line.
+    A .csv file is like `au_to_fap.csv`; any other file has Paul's text.
     """
     try:
         text = path.read_text("utf-8-sig")
@@ -73,11 +69,7 @@ def own_file(folder: Path) -> Path | None:
 def write_mapping(path: Path, rows: Iterable[AuToFap], source: str) -> None:
     """Write rows as .csv or, for other suffixes, as Paul's text; `read_mapping` returns the same rows.
 
-    Args:
-        source: source of the rows, for the head of the file.
-
-    Raises:
-        OSError: the file cannot be written.
+    `source` is for the head of the file. Raises OSError if it cannot be written.
     """
     path.write_text((_as_csv if path.suffix.lower() == ".csv" else as_text)(rows, source), "utf-8")
 

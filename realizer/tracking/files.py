@@ -44,11 +44,7 @@ def unit_columns(measured: Recording | Measured) -> dict[str, Float64]:
 
 
 def by_mapping(recording: Recording, face: str) -> Recording:
-    """Return the recording with FAPs that a face's mapping makes from the action units.
-
-    Raises:
-        FaceError: no such face.
-    """
+    """Return the recording with FAPs that a face's mapping makes from the action units; raises FaceError."""
     rows = np.zeros((len(recording.times), len(axis())), np.float32)
     rows[:, [axis()[name].column for name in SEEN_UNITS]] = recording.units
     faps = to_fap(AUFrames(recording.times, rows, rules()), mapping_of(face)).values.astype(np.float64)

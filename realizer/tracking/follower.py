@@ -98,10 +98,9 @@ class Kept(Protocol):
 
 
 def follow(pictures: Iterable[Picture], kept: Kept | None = None) -> tuple[list[float], list[Person]]:
-    """Return the times of all pictures, and the people in them; who is seen longest and largest is first.
+    """Return the times of all pictures, and the people in them, the longest and largest seen first.
 
-    Args:
-        kept: what was seen in an interrupted run, which is not looked at again, and what is seen now.
+    `kept` has what was seen in an interrupted run, which is not looked at again, and keeps what is seen now.
     """
     times, follower = kept.read() if kept is not None else ([], Follower())
     known = len(times)

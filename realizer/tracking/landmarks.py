@@ -65,8 +65,7 @@ def eye_region(points: Float64, corners: tuple[int, int]) -> Region:
 def landmarks(picture: Image, region: Region, refine: bool = False) -> Landmarks:
     """Return the landmarks of the face in a region of a picture.
 
-    Args:
-        refine: look again in the region of the landmarks, as that of a detector is not as good.
+    `refine` looks again in the region of the landmarks, as that of a detector is not as good.
     """
     model = network(MODEL, TRAITS)
     outputs = model(region.cut(picture, model.size))

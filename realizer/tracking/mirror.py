@@ -43,15 +43,7 @@ class Mirror:
         self._smooth: tuple[float, Measured] | None = None
 
     def __call__(self, jpeg: bytes, time: float) -> Sight | None:
-        """Return what a picture shows, None without a face.
-
-        Args:
-            time: seconds, of any clock.
-
-        Raises:
-            TrackingError: no picture.
-            RealizerError: ai-edge-litert is not installed.
-        """
+        """Return what a picture at a time in seconds shows, or None; raises TrackingError for none."""
         try:
             with Image.open(io.BytesIO(jpeg), formats=("JPEG", "PNG", "WEBP")) as file:
                 picture = file.convert("RGB")

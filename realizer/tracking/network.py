@@ -32,10 +32,7 @@ class Network:
     """
 
     def __init__(self, name: str, inner: tuple[str, ...] = ()) -> None:
-        """
-        Args:
-            name: the file in `models` without its suffix.
-            inner: names of tensors that are wanted beside the outputs.
+        """Load `name`.tflite of `models`; `inner` names tensors that are wanted beside the outputs.
 
         Raises:
             RealizerError: ai-edge-litert is not installed.

@@ -60,11 +60,7 @@ def is_picture(path: Path) -> bool:
 
 
 def read_picture(path: Path) -> Image:
-    """Read a picture; what is transparent becomes black.
-
-    Raises:
-        TrackingError: the file is not a picture, or it is cut off.
-    """
+    """Read a picture, transparent parts in black; raises TrackingError if it is none, or cut off."""
     from PIL import Image, ImageOps, UnidentifiedImageError
 
     try:

@@ -85,11 +85,7 @@ def inputs(seen: Components, neutral: Float64 | None) -> Float32:
 
 
 def measure(seen: Components, neutral: Float64 | None = None) -> Measured:
-    """Return what pictures of a face show.
-
-    Args:
-        neutral: (k,) components of the same person at rest; None if there is no such picture.
-    """
+    """Return what pictures of a face show; `neutral`: components (k,) of the person at rest."""
     weights, name = stored(), "alone" if neutral is None else "against"
     values = inputs(seen, neutral)
     for layer in range(3):

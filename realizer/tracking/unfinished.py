@@ -26,11 +26,7 @@ class Unfinished:
     """
 
     def __init__(self, folder: Path, source: Path) -> None:
-        """
-        Args:
-            folder: made when the first lot is full; deleted if it is of another film.
-            source: the film.
-        """
+        """Keep a film in a folder, which the first full lot makes; one of another film is deleted."""
         state = source.stat()
         self.every = EVERY
         self._folder = folder

@@ -69,11 +69,7 @@ def named(name: str) -> Colour:
 
 
 def of_numbers(text: str) -> Colour:
-    """Return the colour of "H,S,V" or "H,S,V,SPREAD_H,SPREAD_S,SPREAD_V": degrees and per cent.
-
-    Raises:
-        TrackingError: other text.
-    """
+    """Return the colour of "H,S,V" or "H,S,V,SPREAD_H,SPREAD_S,SPREAD_V"; raises TrackingError."""
     wanted = (
         "--marker-colour: wanted H,S,V (0 to 360 degrees, 0 to 100, 0 to 100 per cent) and, if you like, "
         f"three spreads above 0, got {text!r}"

@@ -39,11 +39,7 @@ class Order:
         self._last = layout.places.copy()
 
     def __call__(self, blobs: Float64) -> Float64:
-        """Return the places (k, 2) of the points in the next picture, NaN for those that are missing.
-
-        Args:
-            blobs: (n, 3) x, y (up) and colour.
-        """
+        """Return the places (k, 2) of the points among blobs (n, 3) of the next picture; NaN: missing."""
         chosen = self._chosen(blobs)
         if (chosen != MISSING).sum() < ENOUGH * len(self.layout):
             placed, _ = locate(self.layout, blobs)
