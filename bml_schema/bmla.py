@@ -16,18 +16,12 @@ behaviour_name = Value("block:behaviour", _read_target, ":".join, "behaviourName
 
 @node
 class Interrupt(Behaviour):
-    """Interrupt a block, or some of its behaviours, at `start`.
-
-    Attributes:
-        target: the block.
-        include: only these behaviours; () for all.
-        exclude: all but these behaviours.
-    """
+    """Interrupt a block, or some of its behaviours, at `start`."""
 
     tag = bmla("interrupt")
-    target: str = attribute(block_name)
-    include: tuple[str, ...] = attribute(names, default=())
-    exclude: tuple[str, ...] = attribute(names, default=())
+    target: str = attribute(block_name)  # the block
+    include: tuple[str, ...] = attribute(names, default=())  # only these behaviours; () for all
+    exclude: tuple[str, ...] = attribute(names, default=())  # all but these behaviours
 
 
 @node
@@ -50,16 +44,11 @@ class Trajectory(Part):
 
 @node
 class ParameterValueChange(Behaviour):
-    """Change a parameter of a playing behaviour, such as its amount or volume.
-
-    Attributes:
-        target: (block, behaviour).
-        param_id: its name; which parameters exist depends on the behaviour.
-    """
+    """Change a parameter of a playing behaviour, such as its amount or volume."""
 
     tag = bmla("parametervaluechange")
-    target: tuple[str, str] = attribute(behaviour_name)
-    param_id: str = attribute(word)
+    target: tuple[str, str] = attribute(behaviour_name)  # (block, behaviour)
+    param_id: str = attribute(word)  # its name; which parameters exist depends on the behaviour
     trajectory: Trajectory = child(Trajectory)
 
 
@@ -73,16 +62,11 @@ class AudioFile(Behaviour):
 
 @node
 class FaceInterpolator(Part):
-    """Keys of several parts of a face.
-
-    Attributes:
-        parts: "31 32" FAP numbers, or "1.BOTH 12.LEFT" action units.
-        keys: a line for each key: its time in seconds, then one value for each part.
-    """
+    """Keys of several parts of a face."""
 
     tag = bmlt("FaceInterpolator")
-    parts: str = attribute(word)
-    keys: str = text(default="")
+    parts: str = attribute(word)  # "31 32" FAP numbers, or "1.BOTH 12.LEFT" action units
+    keys: str = text(default="")  # a line for each key: its time in seconds, then one value for each part
 
 
 @node

@@ -75,27 +75,17 @@ class BMLSyntaxError(BMLError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Problem:
-    """A part of a document that was dropped while parsing; it becomes one BML warning.
+    """A part of a document that was dropped while parsing; it becomes one BML warning."""
 
-    Attributes:
-        id: "block:behaviour" ("block:path" for a behaviour without id), "block:constraint", or the block's.
-        type: BML warning type, such as PARSING_FAILURE.
-        text: expected and actual value, without the place; str(problem) includes the place.
-        line, path: position of the fault.
-        lost_references: what was dropped with it: "behaviour:sync" for a reference, a constraint's id or
-            path.
-        fatal: the whole block is dropped, because the part was inside <required>.
-        dropped: a behaviour or constraint was dropped; if false only attributes were.
-    """
-
-    id: str
-    type: str
-    text: str
-    line: int
-    path: str
+    id: str  # "block:behaviour" ("block:path" for a behaviour without id), "block:constraint", or the block's
+    type: str  # BML warning type, such as PARSING_FAILURE
+    text: str  # expected and actual value, without the place; str(problem) includes the place
+    line: int  # position of the fault
+    path: str  # position of the fault
+    # What was dropped with it: "behaviour:sync" for a reference, a constraint's id or path.
     lost_references: tuple[str, ...] = ()
-    fatal: bool = False
-    dropped: bool = True
+    fatal: bool = False  # the whole block is dropped, because the part was inside <required>
+    dropped: bool = True  # a behaviour or constraint was dropped; if false only attributes were
 
     def __str__(self) -> str:
         return at(self.line, self.path, self.text)

@@ -12,10 +12,10 @@ from typing import Any
 from lxml import etree
 
 from bml_schema.behaviours import Speech, SpeechText, Sync
-from bml_schema.bmla import FaceKeyframe
 from bml_schema.documents import element
 from bml_schema.errors import BMLError, BMLSyntaxError, quoted
 from bml_schema.escape import escape, sanitized, sanitized_value
+from bml_schema.extensions import FaceKeyframe
 from bml_schema.node_schema import local, node
 from bml_schema.nodes import BMLA, CORE, OWN, Behaviour, bmla, core, own
 from bml_schema.parser import read_behaviour
@@ -27,24 +27,16 @@ from bml_schema.writer import Writer
 
 @node
 class BlockProgress:
-    """A block started or ended.
+    """A block started or ended."""
 
-    Attributes:
-        id: "block:start" or "block:end".
-        global_time: seconds on the session clock.
-        character_id: as in the block.
-        status: BMLA's state of the block: IN_EXEC, DONE, INTERRUPTED, REVOKED; or None.
-        said: if speech of the block was cut off, the words that were spoken completely; "" for none.
-        posix_time: milliseconds since 1970, as read, or None.
-    """
-
-    id: str
-    global_time: float
-    character_id: str | None = None
-    status: str | None = None
+    id: str  # "block:start" or "block:end"
+    global_time: float  # seconds on the session clock
+    character_id: str | None = None  # as in the block
+    status: str | None = None  # BMLA's state of the block: IN_EXEC, DONE, INTERRUPTED, REVOKED; or None
+    # If speech of the block was cut off, the words that were spoken completely; "" for none.
     said: str | None = None
     seq: int | None = field(default=None, compare=False)
-    posix_time: int | None = field(default=None, compare=False)
+    posix_time: int | None = field(default=None, compare=False)  # milliseconds since 1970, as read, or None
 
     @property
     def last_word(self) -> str | None:
@@ -65,17 +57,11 @@ class BlockProgress:
 
 @node
 class SyncPointProgress:
-    """A behaviour passed a sync point.
+    """A behaviour passed a sync point."""
 
-    Attributes:
-        id: "block:behaviour:sync", such as "bml1:nod1:stroke:2".
-        time: seconds from block start.
-        global_time: seconds on the session clock.
-    """
-
-    id: str
-    time: float
-    global_time: float
+    id: str  # "block:behaviour:sync", such as "bml1:nod1:stroke:2"
+    time: float  # seconds from block start
+    global_time: float  # seconds on the session clock
     character_id: str | None = None
     seq: int | None = field(default=None, compare=False)
     posix_time: int | None = field(default=None, compare=False)
@@ -92,17 +78,11 @@ class SyncPointProgress:
 
 @node
 class WarningFeedback:
-    """A part of a document was dropped.
+    """A part of a document was dropped."""
 
-    Attributes:
-        id: a block, "block:behaviour", or a constraint.
-        type: such as PARSING_FAILURE.
-        text: explanation for people.
-    """
-
-    id: str
-    type: str
-    text: str = ""
+    id: str  # a block, "block:behaviour", or a constraint
+    type: str  # such as PARSING_FAILURE
+    text: str = ""  # explanation for people
     character_id: str | None = None
     seq: int | None = field(default=None, compare=False)
 
@@ -117,33 +97,23 @@ class WarningFeedback:
 
 @node
 class BlockPrediction:
-    """The expected start and end of a block, seconds on the session clock; None while unknown.
-
-    Attributes:
-        status: BMLA's state of the block: IN_PREP, PENDING, LURKING, IN_EXEC, SUBSIDING.
-        posix_start, posix_end: milliseconds since 1970, as read, or None.
-    """
+    """The expected start and end of a block, seconds on the session clock; None while unknown."""
 
     id: str
     global_start: float | None = None
     global_end: float | None = None
-    status: str | None = None
-    posix_start: int | None = field(default=None, compare=False)
-    posix_end: int | None = field(default=None, compare=False)
+    status: str | None = None  # BMLA's state of the block: IN_PREP, PENDING, LURKING, IN_EXEC, SUBSIDING
+    posix_start: int | None = field(default=None, compare=False)  # milliseconds since 1970, as read, or None
+    posix_end: int | None = field(default=None, compare=False)  # milliseconds since 1970, as read, or None
 
 
 @node
 class PredictionFeedback:
-    """The expected times of blocks and behaviours.
-
-    Attributes:
-        blocks: block times.
-        behaviours: nodes whose id is "block:behaviour" and whose syncs are plain numbers; see
-            `prediction_of`.
-    """
+    """The expected times of blocks and behaviours."""
 
     character_id: str | None = None
-    blocks: tuple[BlockPrediction, ...] = ()
+    blocks: tuple[BlockPrediction, ...] = ()  # block times
+    # Nodes whose id is "block:behaviour" and whose syncs are plain numbers; see `prediction_of`.
     behaviours: tuple[Behaviour, ...] = ()
     seq: int | None = field(default=None, compare=False)
 

@@ -81,42 +81,32 @@ def _reader(
     return read
 
 
-def one_of(*words: str) -> Value:
-    """Return the Value of a closed set of words."""
-    known = frozenset(words)
+def _stripped(good: Callable[[str], object]) -> Callable[[str], str]:
+    """Return a reader of good text without the blanks around it."""
 
     def read(text: str) -> str:
         text = text.strip()
-        if text not in known:
+        if not good(text):
             raise ValueError(text)
         return text
 
+    return read
+
+
+def one_of(*words: str) -> Value:
+    """Return the Value of a closed set of words."""
     listed = ", ".join(words[:-1]) + f" or {words[-1]}" if len(words) > 1 else words[0]
-    return Value(listed, read, str, "words", words=words)
-
-
-def _read_word(text: str) -> str:
-    text = text.strip()
-    if not text:
-        raise ValueError(text)
-    return text
+    return Value(listed, _stripped(frozenset(words).__contains__), str, "words", words=words)
 
 
 _NAME = re.compile(rf"[^\s:]{{1,{_MAX_NAME}}}")
-
-
-def _read_name(text: str) -> str:
-    text = text.strip()
-    if text == "bml" or not ((text.isalnum() and len(text) <= _MAX_NAME) or _NAME.fullmatch(text)):
-        raise ValueError(text)
-    return text
-
-
-def _read_block_name(text: str) -> str:
-    text = text.strip()
-    if not text or text == "bml" or ":" in text or len(text) > _MAX_NAME:
-        raise ValueError(text)
-    return text
+_read_name = _stripped(
+    lambda text: text != "bml" and ((text.isalnum() and len(text) <= _MAX_NAME) or _NAME.fullmatch(text))
+)
+_read_block_name = _stripped(
+    lambda text: text not in ("", "bml") and ":" not in text and len(text) <= _MAX_NAME
+)
+_read_flag = _stripped(frozenset(("true", "1", "false", "0")).__contains__)
 
 
 def _read_block_names(text: str) -> tuple[str, ...]:
@@ -134,17 +124,15 @@ def _write_names(names: tuple[str, ...]) -> str:
     return ",".join(names)
 
 
-def _read_flag(text: str) -> bool:
-    text = text.strip()
-    if text not in ("true", "1", "false", "0"):
-        raise ValueError(text)
-    return text in ("true", "1")
-
-
 # An open set of words.
-word = Value("a word", _read_word)
+word = Value("a word", _stripped(bool))
 string = Value("text", str)
-flag = Value("true or false", _read_flag, lambda v: "true" if v else "false", "boolean")
+flag = Value(
+    "true or false",
+    lambda text: _read_flag(text) in ("true", "1"),
+    lambda v: "true" if v else "false",
+    "boolean",
+)
 seconds = number(-MAX_SECONDS, MAX_SECONDS, wanted=f"seconds, at most {MAX_SECONDS:g}")
 # Ids have no colon, because references and feedback ids are joined with it. Those of behaviours have no
 # blank, because "a - 1" must always mean an offset. "bml" is the block itself in references.

@@ -60,13 +60,15 @@ def mask() -> Bool:
     return seen
 
 
-def clip_of(recording: Recording, name: str) -> FAPClip:
-    """Return the FAPs of a recording, of at least two frames."""
-    values = recording.faps.astype(np.float32)
-    if len(values) == 1:
-        values = np.repeat(values, 2, axis=0)
-    times = np.arange(len(values)) / recording.fps
-    return FAPClip.of(FAPFrames(times, values, mask()), recording.fps, name)
+def clip_of(faps: Float64, seen: Bool, fps: float, name: str) -> FAPClip:
+    """Return FAPs (n, 68), of which some are seen, as a clip of at least two frames."""
+    values = np.repeat(faps, 2, axis=0) if len(faps) == 1 else faps
+    frames = FAPFrames(np.arange(len(values)) / fps, values.astype(np.float32), seen)
+    return FAPClip.of(frames, fps, name)
+
+
+def _clip(recording: Recording, name: str) -> FAPClip:
+    return clip_of(recording.faps, mask(), recording.fps, name)
 
 
 def _csv(recording: Recording, name: str) -> str:
@@ -100,8 +102,8 @@ def _json(recording: Recording, name: str) -> str:
 
 # Suffix -> the text of a recording with a name.
 FORMATS: Mapping[str, Callable[[Recording, str], str]] = {
-    ".fap": lambda recording, name: encode(clip_of(recording, name)),
+    ".fap": lambda recording, name: encode(_clip(recording, name)),
     ".csv": _csv,
     ".json": _json,
-    ".bml": lambda recording, name: document_of(clip_of(recording, name), "tracked"),
+    ".bml": lambda recording, name: document_of(_clip(recording, name), "tracked"),
 }

@@ -8,13 +8,13 @@ import numpy as np
 
 from realizer.analysis.faps_from_points import faps_from_points
 from realizer.animation.fap.fap_clip import FAPClip
-from realizer.animation.frames import FAPFrames
 from realizer.behaviours.keyframes import document_of
 from realizer.core.array_types import Bool, Float64
 from realizer.face.load import load_face
 from realizer.outputs.csv_table import csv_text
 from realizer.outputs.fap_text import encode
 from realizer.tables import faps as fap_rows
+from realizer.tracking.files import clip_of
 from realizer.tracking.markers.blobs import Box, blobs
 from realizer.tracking.markers.colours import Colour
 from realizer.tracking.markers.layout import Layout, numbered, wojdel
@@ -175,10 +175,7 @@ def _json(markers: Markers, face: str, name: str) -> str:
 
 
 def _clip(markers: Markers, face: str, name: str) -> FAPClip:
-    values, seen = faps_of(markers, face)
-    rows = np.repeat(values, 2, axis=0) if len(values) == 1 else values
-    frames = FAPFrames(np.arange(len(rows)) / markers.fps, rows.astype(np.float32), seen)
-    return FAPClip.of(frames, markers.fps, name)
+    return clip_of(*faps_of(markers, face), markers.fps, name)
 
 
 # Suffix -> the text of markers, for a face, with a name.
