@@ -12,10 +12,10 @@ from typing import Any
 from lxml import etree
 
 from bml_schema.behaviours import Speech, SpeechText, Sync
+from bml_schema.bmla import FaceKeyframe
 from bml_schema.documents import element
 from bml_schema.errors import BMLError, BMLSyntaxError, quoted
 from bml_schema.escape import escape, sanitized, sanitized_value
-from bml_schema.extensions import FaceKeyframe
 from bml_schema.node_schema import local, node
 from bml_schema.nodes import BMLA, CORE, OWN, Behaviour, bmla, core, own
 from bml_schema.parser import read_behaviour
