@@ -7,7 +7,7 @@ import pickle
 import pytest
 
 from bml_schema import BMLError, BMLSyntaxError, Problem
-from bml_schema.errors import at, did_you_mean, quoted
+from bml_schema.errors import at, did_you_mean, listed, quoted
 
 
 def test_bml_error_has_line_path_wanted_and_got() -> None:
@@ -51,3 +51,8 @@ def test_did_you_mean_suggests_a_near_name() -> None:
 @pytest.mark.parametrize(("before", "found"), [(499, True), (500, False)])
 def test_did_you_mean_looks_at_the_first_500_choices(before: int, found: bool) -> None:
     assert (did_you_mean("nod2", [*["speech1"] * before, "nod1"]) != "") is found
+
+
+def test_listed_tells_how_many_words_it_leaves_out() -> None:
+    assert listed(["a", "b"], 2) == "a, b"
+    assert listed(["a", "b", "c"], 2) == "a, b and 1 more"

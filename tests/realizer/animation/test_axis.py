@@ -9,6 +9,7 @@ from realizer.animation.axis import (
     AU_NAMES,
     MASKED_REGIONS,
     au,
+    au_row,
     axis,
     fap,
     mask_channel,
@@ -66,3 +67,9 @@ def test_mixing_order_exists_for_all_aus_but_rotations() -> None:
 )
 def test_region_of_a_target(target: object, wanted: str) -> None:
     assert region(target) == wanted  # type: ignore[arg-type]
+
+
+def test_au_row_has_intensities_by_side_and_zeros_elsewhere() -> None:
+    row = au_row({(12, "LEFT"): 0.5, (4, "BOTH"): 1.0})
+    found = {name: float(row[target.column]) for name, target in axis().items() if row[target.column]}
+    assert found == {"12L": 0.5, "4L": 1.0, "4R": 1.0}

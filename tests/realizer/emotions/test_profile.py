@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer.emotions.archetypes import archetypes
-from realizer.emotions.profile import Profile, read_profiles, write_profiles
+from realizer.emotions.profile import Profile, read_profiles, split_number, write_profiles
 
 FEAR = "F3 [400, 560], F5 [-240, -160], F31 [460, 540], F32 [460, 540]"
 
@@ -117,3 +117,9 @@ def test_write_profiles_round_trips_every_set(profiles: str) -> None:
 def test_read_profiles_refuses_an_invalid_line(text: str, said: str) -> None:
     with pytest.raises(ValueError, match=said):
         read_profiles(text, "mine")
+
+
+def test_split_number_of_names_without_one_is_none() -> None:
+    assert split_number("fear 8") == ("fear", 8)
+    assert split_number("neutral") == ("neutral", None)
+    assert split_number("8") == ("8", None)
