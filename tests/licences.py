@@ -38,8 +38,8 @@ DATA = (
     ),
     (
         "realizer/tables/environments.npz",
-        "panoramas of Poly Haven (polyhaven.com/hdris) in the npm package @pmndrs/assets 1.7.0, turned, dimmed "
-        "and filtered by tests/benchmarks/environments.py",
+        "panoramas of Poly Haven (polyhaven.com/hdris) in the npm package @pmndrs/assets 1.7.0, turned, "
+        "dimmed and filtered by tests/benchmarks/environments.py",
         "CC0-1.0",
     ),
     ("realizer/examples/*", "documents, and pictures drawn by the realizer", "MIT; pictures CC0-1.0"),
