@@ -316,7 +316,8 @@ class Session:
         # frames are sent in between.
         if not read_documents:
             return False
-        self._controls.end_overdue_clips(t)
+        if self._must_end_speech:
+            self._controls.end_overdue_clips(t)
         done = self.submission.work(t) or self._must_end_speech
         self._must_end_speech = False
         if self.submission.speeches.advance(t) or done:
