@@ -1,12 +1,11 @@
 """Enrichment of texts and documents with expressions: `realizer.enrich`."""
 
-from __future__ import annotations
-
 import logging
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Self
 
 from bml_schema import Block, BMLError, Speech, read, write
 from bml_schema.escape import ILLEGAL
@@ -104,7 +103,7 @@ class Enrichment:
         return "".join(write(block) for block in self.blocks)
 
     @classmethod
-    def of(cls, source: str | bytes, enricher: Enricher, report: Callable[[str], None]) -> Enrichment:
+    def of(cls, source: str | bytes, enricher: Enricher, report: Callable[[str], None]) -> Self:
         """Enrich a text or documents, and report what is left out.
 
         Raises:

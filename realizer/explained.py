@@ -1,7 +1,5 @@
 """The eight steps of a document, each described by what came out of it."""
 
-from __future__ import annotations
-
 from base64 import b64encode
 from collections.abc import Callable, Iterator
 from dataclasses import replace

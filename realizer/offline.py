@@ -1,7 +1,5 @@
 """Playing and scheduling without a clock: `realizer.realize` and `realizer.schedule`."""
 
-from __future__ import annotations
-
 import errno
 import os
 from collections.abc import Iterable, Mapping

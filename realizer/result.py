@@ -1,7 +1,5 @@
 """The result of `realizer.realize`: a realization that can be saved, drawn, and shown in a notebook."""
 
-from __future__ import annotations
-
 import errno
 import os
 from base64 import b64encode
@@ -9,6 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
 from html import escape
 from pathlib import Path
+from typing import Self
 
 from realizer import realization
 from realizer.core.array_types import UInt8
@@ -22,7 +21,7 @@ class Realization(realization.Realization):
     """Documents, played from 0 to their end. `realizer.realization.Realization` lists the attributes."""
 
     @classmethod
-    def of(cls, played: realization.Realization) -> Realization:
+    def of(cls, played: realization.Realization) -> Self:
         """Return the same realization, with the methods of this class."""
         return cls(**{f.name: getattr(played, f.name) for f in fields(played)})
 

@@ -1,7 +1,5 @@
 """Sources of documents: BML, a text to speak, a file, or several of these."""
 
-from __future__ import annotations
-
 import errno
 import os
 import re

@@ -1,13 +1,11 @@
 """The manifest: a JSON line with the result of each document, which survives a crash."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, Self, TextIO
 
 from realizer.core.atomic_files import lock, write_text
 from realizer.core.errors import RealizerError
@@ -41,7 +39,7 @@ class Manifest:
         self._file: TextIO | None = None
 
     @contextmanager
-    def open(self) -> Iterator[Manifest]:
+    def open(self) -> Iterator[Self]:
         """Read the rows, append to them, and sort them by document at the end.
 
         Raises:

@@ -1,21 +1,16 @@
 """The batch run: plays documents and writes their outputs and the manifest."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from realizer.batch.dask_cluster import DaskCluster
 from realizer.batch.documents import Document
 from realizer.batch.manifest import Manifest, Row
+from realizer.batch.process_pool import ProcessPool
 from realizer.batch.task import Options, Task, fingerprint, key_of
 from realizer.batch.worker import Outcome, failure
 from realizer.core.atomic_files import write_bytes
-
-if TYPE_CHECKING:
-    from realizer.batch.dask_cluster import DaskCluster
-    from realizer.batch.process_pool import ProcessPool
 
 
 def batch(

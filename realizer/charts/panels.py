@@ -1,7 +1,5 @@
 """A picture of panels, one below the other: each has a heading, text, curves and another picture."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import cycle

@@ -1,11 +1,9 @@
 """Advice on valid blocks that look like mistakes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -30,14 +28,12 @@ from realizer.checking.explain import near
 from realizer.checking.finding import Finding, Label
 from realizer.knowledge.advice import VisibleExpression, advise
 from realizer.knowledge.enrich import template_of
+from realizer.knowledge.word_languages import Words
+from realizer.playback.player import Player
+from realizer.scheduling.timing import Schedule
+from realizer.speech.utterance import Utterance
 from realizer.speech.words import words_in
-
-if TYPE_CHECKING:
-    from realizer.knowledge.word_languages import Words
-    from realizer.playback.player import Player
-    from realizer.scheduling.timing import Schedule
-    from realizer.speech.utterance import Utterance
-    from realizer.tables.knowledge import Mood, Role
+from realizer.tables.knowledge import Mood, Role
 
 ADVICE = "ADVICE"
 MAX_SECONDS = 250.0  # longer times are probably milliseconds

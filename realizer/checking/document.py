@@ -1,7 +1,5 @@
 """Checks of documents that find every fault of every block."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """Findings that explain warnings with marked places and suggestions."""
 
-from __future__ import annotations
-
 import difflib
 import re
 from collections.abc import Iterable, Iterator, Mapping

@@ -1,7 +1,5 @@
 """Labels for the lines of a scheduling conflict; parses texts of `realizer.scheduling.conflict`."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 

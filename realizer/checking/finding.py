@@ -1,7 +1,5 @@
 """Findings: faults or advice with labelled places and help."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from bml_schema.source import Source, Spot

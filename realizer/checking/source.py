@@ -1,7 +1,5 @@
 """Checking of sources: `realizer.check`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from itertools import islice
 from pathlib import Path

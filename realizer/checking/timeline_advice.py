@@ -1,7 +1,5 @@
 """Advice on timelines: what is unusual for people, and the expressions that usually accompany others."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import NamedTuple
 

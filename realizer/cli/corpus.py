@@ -1,7 +1,5 @@
 """`corpus`: recordings of people become labelled segments, statistics, rules and profiles."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeAlias

@@ -1,7 +1,5 @@
 """Text of findings for people: place, source line, marks and help."""
 
-from __future__ import annotations
-
 import unicodedata
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

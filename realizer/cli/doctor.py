@@ -1,7 +1,5 @@
 """`doctor`, `voices` and `outputs`: list what works on this machine, and how to install the rest."""
 
-from __future__ import annotations
-
 import json
 import platform
 import shutil

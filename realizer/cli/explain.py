@@ -1,7 +1,5 @@
 """`explain`: shows how a document goes through the eight steps."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

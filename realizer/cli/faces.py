@@ -1,7 +1,5 @@
 """`faces`: lists, checks and builds face folders."""
 
-from __future__ import annotations
-
 from itertools import count
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`faces photo`: makes a face of two photographs."""
 
-from __future__ import annotations
-
 import importlib.util
 from pathlib import Path
 from typing import Any

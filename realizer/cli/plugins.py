@@ -1,7 +1,5 @@
 """`plugins`: lists what other packages add."""
 
-from __future__ import annotations
-
 import json
 
 import click

@@ -1,7 +1,5 @@
 """`replay`: plays a recorded session again."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

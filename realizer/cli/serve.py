@@ -1,7 +1,5 @@
 """`serve`: runs the service."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from dataclasses import fields

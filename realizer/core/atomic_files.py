@@ -1,7 +1,5 @@
 """Atomic writing of files, complete or not at all, and locks on files."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path

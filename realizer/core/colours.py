@@ -1,7 +1,5 @@
 """Conversion between 8-bit sRGB and linear light (IEC 61966-2-1)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from realizer.core.array_types import Float32, Float64, UInt8

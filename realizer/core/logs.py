@@ -1,7 +1,5 @@
 """Logging as text for people or as JSON for programs."""
 
-from __future__ import annotations
-
 import json
 import logging
 import sys

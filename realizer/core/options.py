@@ -1,7 +1,5 @@
 """Options for playing documents, shared by `realize`, the commands, the service and batches."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass

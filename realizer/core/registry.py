@@ -4,8 +4,6 @@ A plug-in is an installed package with entry points in the group of a registry
 (https://packaging.python.org/specifications/entry-points).
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The types of settings: each converts a value, or raises ValueError with the wanted values."""
 
-from __future__ import annotations
-
 import ipaddress
 import math
 import os

@@ -1,14 +1,12 @@
 """The settings of the service, from flags, REALIZER_* variables and a TOML file, in this order."""
 
-from __future__ import annotations
-
 import ipaddress
 import os
 import socket
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from realizer.core import setting_types as kind
 from realizer.core.errors import RealizerError
@@ -313,7 +311,7 @@ class Settings:
         *,
         file: Path | None = None,
         environment: Mapping[str, str] | None = None,
-    ) -> Settings:
+    ) -> Self:
         """Return the settings from all three sources.
 
         Args:

@@ -1,7 +1,5 @@
 """Counted work: long computations count their steps, so that they can be limited, and paused for others."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager
 from contextvars import ContextVar

@@ -1,16 +1,10 @@
 """Morph targets with ARKit's names: any program that drives an ARKit head drives the exported one."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from realizer.animation.arkit import ARKIT_NAMES, arkit, shape_faps
 from realizer.outputs.morph_targets import EYES, HEAD, NEGLIGIBLE, MorphTargets
-
-if TYPE_CHECKING:
-    from realizer.realization import Realization
+from realizer.realization import Realization
 
 
 def make_arkit_targets(realization: Realization) -> MorphTargets:

@@ -1,7 +1,5 @@
 """GLB and VRM avatars: the morph targets that show ARKit's shapes, and the bones that turn head and eyes."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

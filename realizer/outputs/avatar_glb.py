@@ -1,9 +1,7 @@
 """The output .glb for somebody's own avatar: its file, with the animation added."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,9 +11,7 @@ from realizer.face.glb_file import GlbFile
 from realizer.outputs.avatar import Avatar, Bind, rotation_of
 from realizer.outputs.rotations import half_turns, quaternions
 from realizer.outputs.vrma import expressions
-
-if TYPE_CHECKING:
-    from realizer.realization import Realization
+from realizer.realization import Realization
 
 
 def encode_avatar(realization: Realization, avatar: Avatar) -> bytes:

@@ -1,18 +1,14 @@
 """The output .csv: time, every AU and every FAP, a row for each frame."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from realizer.animation.axis import AU_NAMES
 from realizer.outputs.output import Output
+from realizer.realization import Realization
 from realizer.tables import faps
-
-if TYPE_CHECKING:
-    from realizer.realization import Realization
 
 
 def csv_text(header: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:

@@ -1,12 +1,10 @@
 """The output .fap: MPEG-4 FAP text (version 2.1), which Xface and Greta read."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,9 +12,7 @@ from realizer.animation.fap.fap_clip import FAPClip
 from realizer.animation.lips.viseme_weights import fap_1
 from realizer.core.array_types import Int32
 from realizer.outputs.output import Output, RenderSettings
-
-if TYPE_CHECKING:
-    from realizer.realization import Realization
+from realizer.realization import Realization
 
 SMALL = 4096  # only rotations exceed it
 

@@ -1,12 +1,11 @@
 """The output .glb: an animated glTF 2.0 head with morph targets, joints and a key for each frame."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from realizer.face.glb_file import GlbFile
+from realizer.face.model import Face
 from realizer.outputs.arkit_targets import make_arkit_targets
 from realizer.outputs.avatar import read_avatar
 from realizer.outputs.avatar_glb import encode_avatar
@@ -14,10 +13,7 @@ from realizer.outputs.glb_mesh import GlbMesh
 from realizer.outputs.morph_targets import MorphTargets, make_morph_targets
 from realizer.outputs.output import Output, RenderSettings
 from realizer.outputs.rotations import quaternions
-
-if TYPE_CHECKING:
-    from realizer.face.model import Face
-    from realizer.realization import Realization
+from realizer.realization import Realization
 
 # Node numbers; those of the eyes follow.
 FACE, NECK, HEAD = 0, 1, 2

@@ -1,20 +1,16 @@
 """The materials of an exported head, with the face's maps as textures that every glTF reader knows."""
 
-from __future__ import annotations
-
 import io
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from realizer.core.array_types import Float32, UInt8
+from realizer.face.glb_file import GlbFile
+from realizer.face.maps import Maps
 from realizer.render.normal_map import normals_of
 from realizer.render.textures import ALPHA, OCCLUSION, ROUGHNESS, SLOPE_U, SLOPE_V, texels_of
-
-if TYPE_CHECKING:
-    from realizer.core.array_types import Float32, UInt8
-    from realizer.face.glb_file import GlbFile
-    from realizer.face.maps import Maps
 
 QUALITY = {"colour": 92, "normal": 95, "surface": 90}  # of JPEG
 MARGIN = 4  # texels

@@ -1,10 +1,8 @@
 """The drawn mesh of a face as primitives of a glTF file."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,12 +10,10 @@ from realizer.core.array_types import Bool, Float32, Int32
 from realizer.core.colours import linear
 from realizer.face.drawn_mesh import NEUTRAL, drawn_mesh
 from realizer.face.glb_file import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, GlbFile
+from realizer.face.model import Face
 from realizer.face.surface import normals
 from realizer.outputs.glb_materials import Look, Materials
-
-if TYPE_CHECKING:
-    from realizer.face.model import Face
-    from realizer.outputs.morph_targets import MorphTargets
+from realizer.outputs.morph_targets import MorphTargets
 
 MIN_NORMAL_CHANGE = 0.01  # half a degree; smaller changes of a normal are invisible
 NEGLIGIBLE = 5e-6  # m; smaller movements are omitted from a target

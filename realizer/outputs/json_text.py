@@ -1,14 +1,10 @@
 """The output .json: schedule, FAPs, AUs, feedback and warnings."""
 
-from __future__ import annotations
-
 import json
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from realizer.outputs.output import Output
-
-if TYPE_CHECKING:
-    from realizer.realization import Realization
+from realizer.realization import Realization
 
 
 def json_line(content: Any) -> str:

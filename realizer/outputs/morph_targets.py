@@ -1,19 +1,15 @@
 """Morph targets and weights that reproduce a face's poses within a tolerance."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from realizer.animation.axis import fap
 from realizer.core.array_types import Float32, Float64
 from realizer.core.units import ANGLE_UNIT
-
-if TYPE_CHECKING:
-    from realizer.face.model import Face
+from realizer.face.model import Face
 
 HEAD = (48, 49, 50)  # FAPs that turn the head: pitch, yaw, roll
 EYES = ((25, 23), (26, 24))  # FAPs that turn the eyeballs: pitch and yaw of the left, of the right

@@ -1,23 +1,17 @@
 """The type of outputs: suffix, media type, and the function that encodes a realization."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from numbers import Integral, Real
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from realizer.core.array_types import UInt8
 from realizer.core.atomic_files import write_bytes
 from realizer.core.errors import PluginError, RealizerError
-
-if TYPE_CHECKING:
-    from realizer.face.model import Face
-    from realizer.realization import Realization
-    from realizer.render.renderer import Renderer
-
+from realizer.face.model import Face
+from realizer.realization import Realization
+from realizer.render.renderer import Renderer
 
 MORPHS = ("fap", "arkit")
 # Setting -> the only suffix that it is for, and the reason.

@@ -1,19 +1,14 @@
 """The output .png: a contact sheet over time, or the face at one instant."""
 
-from __future__ import annotations
-
 import io
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from realizer.core.array_types import Float32, UInt8
 from realizer.outputs import speech_spans
 from realizer.outputs.output import Output, RenderSettings
-
-if TYPE_CHECKING:
-    from realizer.realization import Realization
+from realizer.realization import Realization
 
 MOST = 24  # pictures on a sheet
 LEAST = 8  # pictures at least, if there are as many frames

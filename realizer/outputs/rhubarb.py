@@ -1,15 +1,11 @@
 """The output .rhubarb.json: mouth cues as Rhubarb Lip Sync writes them, for 2D characters."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from realizer.outputs import speech_spans
 from realizer.outputs.json_text import json_line
 from realizer.outputs.output import Output
-
-if TYPE_CHECKING:
-    from realizer.realization import Realization
+from realizer.realization import Realization
 
 REST, TONGUE = "X", "H"
 # Rhubarb's mouth shape of each viseme of MPEG-4, whose viseme 8 is both n and l.

@@ -1,17 +1,12 @@
 """Times of words, phonemes and sync points of a realization, on one clock."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from realizer.animation.lips.visemes import sounds
-
-if TYPE_CHECKING:
-    from realizer.playback.scheduled_speech import ScheduledSpeech
-    from realizer.realization import Realization
-    from realizer.speech.utterance import Phoneme, Word
+from realizer.playback.scheduled_speech import ScheduledSpeech
+from realizer.realization import Realization
+from realizer.speech.utterance import Phoneme, Word
 
 MIN_LENGTH = 0.001  # s; shorter spans are rounding errors
 

@@ -1,11 +1,9 @@
 """The output .talkinghead.json: the arguments of TalkingHead's `speakAudio`."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +13,7 @@ from realizer.outputs import speech_spans
 from realizer.outputs.json_text import json_line
 from realizer.outputs.output import Output
 from realizer.outputs.speech_spans import Span
-
-if TYPE_CHECKING:
-    from realizer.realization import Realization
+from realizer.realization import Realization
 
 RATE = 22050  # Hz; TalkingHead's default for PCM
 # Ready Player Me's names of visemes that differ from those of Oculus.

@@ -1,17 +1,13 @@
 """The output .textgrid: words, phonemes and sync points for Praat and ELAN."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from realizer.outputs import speech_spans
 from realizer.outputs.output import Output
 from realizer.outputs.speech_spans import Span
-
-if TYPE_CHECKING:
-    from realizer.realization import Realization
+from realizer.realization import Realization
 
 DIGITS = 6  # decimals: microseconds
 

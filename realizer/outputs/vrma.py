@@ -1,10 +1,8 @@
 """The output .vrma: a VRM animation of preset expressions, head and gaze, for any VRM avatar."""
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,11 +12,9 @@ from realizer.core.array_types import Float32, Float64
 from realizer.face.glb_file import GlbFile
 from realizer.outputs.output import Output
 from realizer.outputs.rotations import quaternions
+from realizer.realization import Realization
 from realizer.tables import toml_table
 from realizer.tables.lexemes import face_lexemes
-
-if TYPE_CHECKING:
-    from realizer.realization import Realization
 
 EXTENSION, VERSION = "VRMC_vrm_animation", "1.0"
 BLINKS = {"blinkLeft": "eyeBlinkLeft", "blinkRight": "eyeBlinkRight"}

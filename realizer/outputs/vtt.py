@@ -1,15 +1,10 @@
 """The output .vtt: words, phonemes and sync points as WebVTT cues."""
 
-from __future__ import annotations
-
 import html
-from typing import TYPE_CHECKING
 
 from realizer.outputs import speech_spans
 from realizer.outputs.output import Output
-
-if TYPE_CHECKING:
-    from realizer.realization import Realization
+from realizer.realization import Realization
 
 LEAST = 0.001  # s; WebVTT requires cues to end after their start, and counts milliseconds
 KINDS = ("word", "phoneme", "sync")  # classes for style sheets, in the order of cues that start together

@@ -1,21 +1,16 @@
 """The output .webp: an animated picture without sound."""
 
-from __future__ import annotations
-
 import io
 import math
 import struct
 from collections.abc import Iterable, Sequence
 from contextlib import closing
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from realizer.core.array_types import UInt8
 from realizer.outputs.output import Output, RenderSettings
-
-if TYPE_CHECKING:
-    from realizer.realization import Realization
+from realizer.realization import Realization
 
 PACE = 25  # pictures a second at most
 QUALITY, METHOD = 75, 4  # 160 kB a second at 512x512

@@ -3,8 +3,6 @@
 `realizer/tables/environments.md` names the panoramas; `tests/benchmarks/environments.py` makes the tables.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files

@@ -3,8 +3,6 @@
 Compression is measured on the shape itself, so folds appear whatever moves a face: FAPs, units or shapes.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The view of a lamp that casts shadows."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A normal map in tangent space, as other programs read it, of the relief of a face."""
 
-from __future__ import annotations
-
 import io
 from functools import cache
 

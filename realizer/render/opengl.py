@@ -1,7 +1,5 @@
 """The OpenGL backend; the only importer of moderngl."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Mapping, Sequence

@@ -1,12 +1,10 @@
 """The renderer: pictures of poses, drawn by a child process that is restarted if it dies."""
 
-from __future__ import annotations
-
 import os
 import threading
 from collections.abc import Iterator
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -160,7 +158,7 @@ class Renderer:
         with self._lock:
             self._drop()
 
-    def __enter__(self) -> Renderer:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:

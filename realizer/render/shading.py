@@ -9,8 +9,6 @@ cavities by Jimenez et al. 2016, "Practical realtime strategies for accurate ind
 Kajiya and Kay 1989; normals blended per colour for skin by d'Eon and Luebke 2007, GPU Gems 3 chapter 14.
 """
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from typing import Any

@@ -3,8 +3,6 @@
 Source: Reeves, Salesin and Cook 1987, "Rendering antialiased shadows with depth maps", SIGGRAPH.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """How kinds of surfaces reflect light: the numbers of the formula in shading.py and surface.glsl."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

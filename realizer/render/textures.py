@@ -1,7 +1,5 @@
 """The maps of a face as texels that the renderer reads: decoded, interleaved, and in coarser levels."""
 
-from __future__ import annotations
-
 import io
 from dataclasses import dataclass
 from typing import Any

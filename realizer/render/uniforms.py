@@ -1,7 +1,5 @@
 """The uniforms of surface.glsl: what one light and one kind of surface are to a graphics card."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 
